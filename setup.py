@@ -20,7 +20,7 @@ class CMakeBuild(build_ext):
         if not (build / "CMakeCache.txt").exists():
             subprocess.run(
                 ["cmake", "-S", ROOT, "-B", build, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_UNITY_BUILD=ON",
-                 "-DPANONAV_BUILD_TESTS=OFF", "-DPANONAV_WITH_ROS2=OFF", f"-DPython_EXECUTABLE={sys.executable}"],
+                 "-DPANONAV_BUILD_TESTS=OFF", "-DPANONAV_ROS2=OFF", f"-DPython_EXECUTABLE={sys.executable}"],
                 check=True)
         subprocess.run(["cmake", "--build", build, "--target", "panonav_python", "panonav_command"], check=True)
         folder = ROOT / "python" if self.inplace else pathlib.Path(self.build_lib).resolve()

@@ -18,12 +18,12 @@ constexpr double spacing_m = 0.25;
 constexpr double laser_height_m = 0.3;
 constexpr int beams = 360;
 
-PlaceRecording record(std::uint64_t corridor_seed, Executor& executor) {
-  return record_place(
+simulation::PlaceRecording record(std::uint64_t corridor_seed, Executor& executor) {
+  return simulation::record_place(
       {.scene = "corridor", .seed = corridor_seed, .spacing_m = spacing_m, .queries = 1}, executor);
 }
 
-RangeScan scan_at(const Renderer& renderer, const Pose2& pose) {
+RangeScan scan_at(const simulation::Renderer& renderer, const Pose2& pose) {
   RangeScan scan;
   for (int b = 0; b < beams; ++b) {
     const double azimuth = pose.heading_rad + 2.0 * std::numbers::pi * b / beams;
@@ -33,15 +33,15 @@ RangeScan scan_at(const Renderer& renderer, const Pose2& pose) {
   return scan;
 }
 
-std::vector<Walk> walks(const Corridor& corridor, const RunCondition& condition,
+std::vector<Walk> walks(const Corridor& corridor, const lab::RunCondition& condition,
                         Executor& executor) {
   std::vector<Walk> made;
-  for (TrackingRun& run :
-       record_walks(corridor.place, *corridor.remembered, condition,
-                    {.variants = 1, .runs_each = 4, .images = 21, .seed = seed}, executor)) {
+  for (lab::TrackingRun& run :
+       lab::record_walks(corridor.place, *corridor.remembered, condition,
+                         {.variants = 1, .runs_each = 4, .images = 21, .seed = seed}, executor)) {
     Walk walk;
     std::vector<Pose2> truth;
-    for (const TrackingStep& step : run.steps) {
+    for (const lab::TrackingStep& step : run.steps) {
       truth.push_back(step.truth);
       walk.scans.push_back(scan_at(*corridor.place.renderer, step.truth));
     }
@@ -54,21 +54,21 @@ std::vector<Walk> walks(const Corridor& corridor, const RunCondition& condition,
   return made;
 }
 
-std::vector<const PlacedView*> nearest_to_walks(const Corridor& corridor) {
-  std::vector<std::pair<double, const PlacedView*>> views;
-  for (const PlacedView& view : corridor.place.references) {
+std::vector<const simulation::PlacedView*> nearest_to_walks(const Corridor& corridor) {
+  std::vector<std::pair<double, const simulation::PlacedView*>> views;
+  for (const simulation::PlacedView& view : corridor.place.references) {
     double nearest_m = std::numeric_limits<double>::infinity();
     for (const auto* walks : {&corridor.clean, &corridor.hard}) {
       for (const Walk& walk : *walks) {
-        for (const TrackingStep& step : walk.run.steps) {
+        for (const lab::TrackingStep& step : walk.run.steps) {
           nearest_m = std::min(nearest_m, distance(step.truth.position(), view.pose.position()));
         }
       }
     }
     views.emplace_back(nearest_m, &view);
   }
-  std::ranges::stable_sort(views, {}, &std::pair<double, const PlacedView*>::first);
-  std::vector<const PlacedView*> sorted;
+  std::ranges::stable_sort(views, {}, &std::pair<double, const simulation::PlacedView*>::first);
+  std::vector<const simulation::PlacedView*> sorted;
   for (const auto& [nearest_m, view] : views) sorted.push_back(view);
   return sorted;
 }
@@ -80,36 +80,37 @@ Corridor make_corridor() {
   Executor executor(0);
   Corridor corridor;
   corridor.place = record(seed, executor);
-  corridor.remembered = remember_for_tracking(corridor.place, executor);
-  corridor.clean = walks(corridor, clean_condition(), executor);
-  corridor.hard = walks(corridor, hard_condition(), executor);
-  for (const PlacedView& reference : corridor.place.references) {
+  corridor.remembered = lab::remember_for_tracking(corridor.place, executor);
+  corridor.clean = walks(corridor, lab::clean_condition(), executor);
+  corridor.hard = walks(corridor, lab::hard_condition(), executor);
+  for (const simulation::PlacedView& reference : corridor.place.references) {
     corridor.mapped_from.push_back(reference.pose);
     corridor.map_scans.push_back(scan_at(*corridor.place.renderer, reference.pose));
   }
   return corridor;
 }
 
-std::shared_ptr<const TrackingPlace> corridors_with(const Corridor& corridor, std::size_t count) {
+std::shared_ptr<const lab::TrackingPlace> corridors_with(const Corridor& corridor,
+                                                         std::size_t count) {
   const VisualMemory& first = corridor.remembered->memory();
   VisualMemory memory(first.shape(), first.full_scale(), first.elevations());
-  const auto append = [&](const PlacedView& view, double offset_m) {
+  const auto append = [&](const simulation::PlacedView& view, double offset_m) {
     if (memory.size() == count) return;
-    memory.append(signature_for(view.panorama, first),
+    memory.append(lab::signature_for(view.panorama, first),
                   {std::to_string(memory.size()),
                    ReferencePose{view.pose.x_m + offset_m, view.pose.y_m, view.pose.heading_rad},
                    {}});
   };
-  for (const PlacedView* view : nearest_to_walks(corridor)) append(*view, 0.0);
+  for (const simulation::PlacedView* view : nearest_to_walks(corridor)) append(*view, 0.0);
   Executor executor(0);
   for (std::uint64_t number = 1; memory.size() < count; ++number) {
     std::fprintf(stderr, "rendering another corridor\n");
-    const PlaceRecording other = record(seed + number, executor);
-    for (const PlacedView& view : other.references) {
+    const simulation::PlaceRecording other = record(seed + number, executor);
+    for (const simulation::PlacedView& view : other.references) {
       append(view, 100.0 * static_cast<double>(number));
     }
   }
-  return std::make_shared<const TrackingPlace>(std::move(memory), spacing_m);
+  return std::make_shared<const lab::TrackingPlace>(std::move(memory), spacing_m);
 }
 
 }  // namespace panonav::bench

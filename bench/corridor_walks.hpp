@@ -3,8 +3,8 @@
 #include <memory>
 #include <vector>
 
-#include "experiments/runs/place_recording.hpp"
-#include "experiments/runs/tracking_run.hpp"
+#include "lab/runs/tracking_run.hpp"
+#include "panonav_simulation/place_recording.hpp"
 
 namespace panonav::bench {
 
@@ -14,7 +14,7 @@ using RangeScan = std::vector<float>;
 
 /// A robot that drives through the `corridor` scene.
 struct Walk {
-  TrackingRun run;
+  lab::TrackingRun run;
   std::vector<Pose2> odometry;  ///< robot_old_from_robot_new of each step as odometry tells it; the
                                 ///< first one is unused
   std::vector<RangeScan> scans;  ///< what a laser would have measured beside each view
@@ -22,8 +22,8 @@ struct Walk {
 
 /// The `corridor` scene with its references on a 25 cm grid, 80 x 512 pixels a view.
 struct Corridor {
-  PlaceRecording place;
-  std::shared_ptr<const TrackingPlace> remembered;
+  simulation::PlaceRecording place;
+  std::shared_ptr<const lab::TrackingPlace> remembered;
   std::vector<Walk> clean;         ///< as memorised
   std::vector<Walk> hard;          ///< light, objects and sensor changed (`hard_condition`)
   std::vector<Pose2> mapped_from;  ///< where the scans for a rival's map were taken
@@ -36,7 +36,7 @@ struct Corridor {
 /// A memory of `count` references: those of the corridor that are nearest to the walks; when it has
 /// fewer, those of as many corridors with other furniture and textures besides as it takes, 100 m
 /// apart.
-[[nodiscard]] std::shared_ptr<const TrackingPlace> corridors_with(const Corridor& corridor,
-                                                                  std::size_t count);
+[[nodiscard]] std::shared_ptr<const lab::TrackingPlace> corridors_with(const Corridor& corridor,
+                                                                       std::size_t count);
 
 }  // namespace panonav::bench

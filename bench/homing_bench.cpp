@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include "experiments/baselines/expected_image_homing.hpp"
+#include "lab/baselines/expected_image_homing.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/relative_pose/fourier_homing.hpp"
 #include "panonav/signature/fourier_signature.hpp"
@@ -76,7 +76,7 @@ BENCHMARK(own_80_rows)->Unit(benchmark::kMicrosecond);
 
 void expected_images(benchmark::State& state) {
   const int columns = static_cast<int>(state.range(0));
-  const ExpectedImageHoming homing(columns);
+  const lab::ExpectedImageHoming homing(columns);
   const auto home = row_of(columns, 99);
   const auto current = row_of(columns, 107);
   for (auto _ : state) benchmark::DoNotOptimize(homing.home_vector(home, current));

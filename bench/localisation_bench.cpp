@@ -20,19 +20,19 @@ constexpr double start_heading_deviation_rad = 0.1;
 
 /// Made when the first benchmark asks for it.
 const Corridor& corridor() {
-  static const Corridor made = make_corridor();
+  static const Corridor made = simulation::make_corridor();
   return made;
 }
 
-const TrackingPlace& place_with(std::size_t references) {
-  static std::map<std::size_t, std::shared_ptr<const TrackingPlace>> made;
+const lab::TrackingPlace& place_with(std::size_t references) {
+  static std::map<std::size_t, std::shared_ptr<const lab::TrackingPlace>> made;
   if (references == corridor().remembered->memory().size()) return *corridor().remembered;
   auto& place = made[references];
   if (place == nullptr) place = corridors_with(corridor(), references);
   return *place;
 }
 
-MonteCarloLocaliser localiser_of(const TrackingPlace& place, int particles) {
+MonteCarloLocaliser localiser_of(const lab::TrackingPlace& place, int particles) {
   return MonteCarloLocaliser(place.ranking(), place.model(),
                              {.min_particles = particles, .max_particles = particles, .seed = 1});
 }
@@ -68,7 +68,7 @@ double error_m(const Pose2& estimate, const Walk& walk, std::size_t step) {
 }
 
 /// The robot knows where it is and drives on.
-void time_tracking(benchmark::State& state, const TrackingPlace& place,
+void time_tracking(benchmark::State& state, const lab::TrackingPlace& place,
                    const std::vector<Walk>& walks, int particles) {
   MonteCarloLocaliser filter = localiser_of(place, particles);
   MonteCarloEstimate estimate;
@@ -104,7 +104,7 @@ void time_tracking(benchmark::State& state, const TrackingPlace& place,
 }
 
 /// Nothing is known: the first image of a walk.
-void time_first_image(benchmark::State& state, const TrackingPlace& place,
+void time_first_image(benchmark::State& state, const lab::TrackingPlace& place,
                       const std::vector<Walk>& walks, int particles) {
   MonteCarloLocaliser filter = localiser_of(place, particles);
   double compared = 0.0;
@@ -123,7 +123,7 @@ void time_first_image(benchmark::State& state, const TrackingPlace& place,
 }
 
 /// What an update holds beside the particles: the search of the memory alone.
-void time_search(benchmark::State& state, const TrackingPlace& place,
+void time_search(benchmark::State& state, const lab::TrackingPlace& place,
                  const std::vector<Walk>& walks) {
   std::size_t i = 0;
   for (auto _ : state) {
@@ -209,7 +209,9 @@ int run(int argc, char** argv) {
   }
   for (const std::size_t references : {250, 1000, 4000}) {
     const std::string of = "/" + std::to_string(references) + "_references";
-    const auto walks_on = [references]() -> const TrackingPlace& { return place_with(references); };
+    const auto walks_on = [references]() -> const lab::TrackingPlace& {
+      return place_with(references);
+    };
     add("search" + of,
         [walks_on](benchmark::State& state) { time_search(state, walks_on(), corridor().clean); });
     add("track_clean/1000" + of, [walks_on](benchmark::State& state) {

@@ -47,7 +47,7 @@ class MrptFilter final : public ScanFilter {
  public:
   MrptFilter(const Corridor& corridor, int particles, int beams)
       : beams_(beams), particles_(static_cast<std::size_t>(particles)), filter_(particles_) {
-    const Scene& scene = corridor.place.scene;
+    const simulation::Scene& scene = corridor.place.scene;
     auto map = mrpt::maps::COccupancyGridMap2D::Create(
         static_cast<float>(scene.floor_low.x_m) - 1.0F,
         static_cast<float>(scene.floor_high.x_m) + 1.0F,

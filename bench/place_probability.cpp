@@ -16,11 +16,11 @@
 #include <string>
 #include <vector>
 
-#include "experiments/runs/make_each.hpp"
-#include "experiments/runs/place_experiment.hpp"
-#include "experiments/runs/tracking_run.hpp"
+#include "lab/runs/place_experiment.hpp"
+#include "lab/runs/tracking_run.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
+#include "panonav_simulation/make_each.hpp"
 
 namespace {
 
@@ -56,8 +56,8 @@ constexpr std::size_t asked_of_variants = 20;
 enum class Whose { own, variant, other };
 struct Place {
   std::size_t kind;
-  PlaceRecording recording;
-  std::vector<PlacedView> disturbed;
+  simulation::PlaceRecording recording;
+  std::vector<simulation::PlacedView> disturbed;
 };
 struct Sample {
   PlaceEvidence evidence;
@@ -93,18 +93,19 @@ std::vector<Sample> ask(const std::vector<Place>& places, const Place& place,
                         const Remembering& how, Executor& executor) {
   Random random(place.recording.seed, how.one_of);
   std::vector<Point2> kept;
-  const VisualMemory all = memory_of_references(place.recording, executor, [&](Point2 position) {
-    if (random.index(how.one_of) != 0) return false;
-    kept.push_back(position);
-    return true;
-  });
+  const VisualMemory all =
+      lab::memory_of_references(place.recording, executor, [&](Point2 position) {
+        if (random.index(how.one_of) != 0) return false;
+        kept.push_back(position);
+        return true;
+      });
   const SignatureShape shape{all.shape().rows, how.components};
   VisualMemory memory(shape, all.full_scale(), all.elevations());
   for (const ViewId view : all.views()) {
     memory.append(truncated(all.packed(view), shape), all.info(view));
   }
   Localiser localiser(memory);
-  localiser.use_features(features_of_references(place.recording, memory, executor), false);
+  localiser.use_features(lab::features_of_references(place.recording, memory, executor), false);
   struct Query {
     const Panorama* view;
     Whose whose;
@@ -116,7 +117,7 @@ std::vector<Sample> ask(const std::vector<Place>& places, const Place& place,
     for (const bool disturbed : {false, true}) {
       const auto* const views = disturbed ? &other.disturbed : &other.recording.queries;
       for (std::size_t i = 0; i < views->size(); ++i) {
-        const PlacedView& view = (*views)[i];
+        const simulation::PlacedView& view = (*views)[i];
         if (&other == &place) {
           const bool is_near = std::ranges::any_of(kept, [&](Point2 position) {
             return distance(position, view.pose.position()) <= place.recording.spacing_m;
@@ -129,9 +130,9 @@ std::vector<Sample> ask(const std::vector<Place>& places, const Place& place,
       }
     }
   }
-  return make_each(executor, asked.size(), [&](std::size_t i) {
-    const PackedSignature query = truncated(signature_for(*asked[i].view, all), shape);
-    return Sample{localiser.localise(query, {}, features_of_query(*asked[i].view)).evidence,
+  return simulation::make_each(executor, asked.size(), [&](std::size_t i) {
+    const PackedSignature query = truncated(lab::signature_for(*asked[i].view, all), shape);
+    return Sample{localiser.localise(query, {}, lab::features_of_query(*asked[i].view)).evidence,
                   asked[i].whose, place.kind, asked[i].disturbed, asked[i].for_features};
   });
 }
@@ -255,14 +256,15 @@ int main() {
   std::vector<Place> places;
   for (std::size_t k = 0; k < kinds.size(); ++k) {
     for (std::size_t v = 0; v < kinds[k].spacings_m.size(); ++v) {
-      PlaceRecording recording = record_place({.scene = kinds[k].scene,
-                                               .seed = v + 1,
-                                               .spacing_m = kinds[k].spacings_m[v],
-                                               .queries = queries,
-                                               .columns = 256},
-                                              executor);
-      std::vector<PlacedView> disturbed =
-          retake_queries(recording, place_conditions()[1].sensor, 7919 * (v + 1), executor);
+      simulation::PlaceRecording recording =
+          simulation::record_place({.scene = kinds[k].scene,
+                                    .seed = v + 1,
+                                    .spacing_m = kinds[k].spacings_m[v],
+                                    .queries = queries,
+                                    .columns = 256},
+                                   executor);
+      std::vector<simulation::PlacedView> disturbed = simulation::retake_queries(
+          recording, lab::place_conditions()[1].sensor, 7919 * (v + 1), executor);
       places.push_back({k, std::move(recording), std::move(disturbed)});
       std::fprintf(stderr, "%s %zu\n", kinds[k].scene, v + 1);
     }

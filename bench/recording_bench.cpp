@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "panonav/core/random.hpp"
-#include "panonav/io/mcap_writer.hpp"
-#include "panonav/io/recording.hpp"
+#include "panonav_recordings/mcap_writer.hpp"
+#include "panonav_recordings/recording.hpp"
 
 namespace {
 
@@ -27,14 +27,14 @@ std::filesystem::path bench_path() {
 }
 
 // Pictures as a JPEG camera gives them: they cannot be packed further.
-void write_pictures(McapCompression compression) {
+void write_pictures(recordings::McapCompression compression) {
   static const std::vector<std::uint8_t> noise = [] {
     Random random(1);
     std::vector<std::uint8_t> bytes(64 * picture_bytes);
     for (auto& byte : bytes) byte = static_cast<std::uint8_t>(random.next());
     return bytes;
   }();
-  McapWriter writer(bench_path(), {.compression = compression});
+  recordings::McapWriter writer(bench_path(), {.compression = compression});
   const auto channel = writer.add_channel("/pictures", "cdr", 0);
   for (int i = 0; i < pictures; ++i) {
     writer.write(channel, i, i, std::span(noise).subspan(i % 64 * picture_bytes, picture_bytes));
@@ -47,19 +47,19 @@ void set_speed(benchmark::State& state) {
 }
 
 void write(benchmark::State& state) {
-  for (auto _ : state) write_pictures(static_cast<McapCompression>(state.range(0)));
+  for (auto _ : state) write_pictures(static_cast<recordings::McapCompression>(state.range(0)));
   set_speed(state);
   std::filesystem::remove(bench_path());
 }
 
 void read(benchmark::State& state) {
-  write_pictures(static_cast<McapCompression>(state.range(0)));
+  write_pictures(static_cast<recordings::McapCompression>(state.range(0)));
   const std::vector<std::uint32_t> topics{0};
   for (auto _ : state) {
     std::uint64_t sum = 0;
-    Recording::open(bench_path())->for_each(topics, {}, [&](const MessagePlace&, auto bytes) {
-      sum += bytes.size();
-    });
+    recordings::Recording::open(bench_path())
+        ->for_each(topics, {},
+                   [&](const recordings::MessagePlace&, auto bytes) { sum += bytes.size(); });
     if (sum != pictures * picture_bytes) state.SkipWithError("messages are missing");
   }
   set_speed(state);

@@ -27,7 +27,7 @@
 #include "panonav/motion/trajectory_error.hpp"
 #include "panonav/motion/velocity.hpp"
 #include "panonav/storage/memory_file.hpp"
-#include "ros2/participant.hpp"
+#include "panonav_ros2/participant.hpp"
 
 namespace {
 
@@ -151,60 +151,65 @@ std::vector<Point2> drive_of(const std::vector<Point2>& places, double length_m,
   return path;
 }
 
-ros::PoseStamped in_map(const Pose2& pose) {
-  ros::PoseStamped message;
+recordings::ros::PoseStamped in_map(const Pose2& pose) {
+  recordings::ros::PoseStamped message;
   message.header.frame_id = "map";
-  message.pose = ros::pose_of(pose);
+  message.pose = recordings::ros::pose_of(pose);
   return message;
 }
 
 struct Judge {
   explicit Judge()
       : participant({.node = "judge"}, [](const std::string& line) { puts(line.c_str()); }) {
-    hear<ros::PoseStamped>("ground_truth", [this](const ros::PoseStamped& message) {
-      truth = ros::planar(message.pose);
-      now_s = 1e-9 * static_cast<double>(message.header.stamp_ns);
-      seen = true;
-    });
-    hear<ros::TFMessage>("/tf", [this](const ros::TFMessage& message) {
+    hear<recordings::ros::PoseStamped>(
+        "ground_truth", [this](const recordings::ros::PoseStamped& message) {
+          truth = recordings::ros::planar(message.pose);
+          now_s = 1e-9 * static_cast<double>(message.header.stamp_ns);
+          seen = true;
+        });
+    hear<recordings::ros::TFMessage>("/tf", [this](const recordings::ros::TFMessage& message) {
       for (const auto& each : message.transforms) {
-        if (each.child_frame_id == "base_link") odom_from_base = ros::planar(each.transform);
+        if (each.child_frame_id == "base_link")
+          odom_from_base = recordings::ros::planar(each.transform);
         if (each.child_frame_id != "odom") continue;
-        map_from_odom = ros::planar(each.transform);
+        map_from_odom = recordings::ros::planar(each.transform);
         if (last_transform_s > 0.0) gaps_ms.push_back(1e3 * (wall_s() - last_transform_s));
         last_transform_s = wall_s();
       }
     });
-    hear<ros::DiagnosticArray>("/diagnostics", [this](const ros::DiagnosticArray& message) {
-      state = message.status.at(0).message;
-      values.clear();
-      for (const auto& [key, value] : message.status.at(0).values) {
-        values += "  " + std::string(key) + " " + std::string(value);
-      }
-      ++pictures;
-    });
-    hear<ros::DiagnosticArray>("panonav/goal/result", [this](const ros::DiagnosticArray& message) {
-      const std::string told = message.status.at(0).message;
-      if (told != "another goal") result = told;
-    });
-    hear<ros::DiagnosticArray>("panonav/goal/feedback",
-                               [this](const ros::DiagnosticArray& message) {
-                                 ++feedback;
-                                 way.clear();
-                                 for (const auto& [key, value] : message.status.at(0).values) {
-                                   way += " " + std::string(key) + " " + std::string(value);
-                                 }
-                               });
-    hear<ros::String>("panonav/command/result",
-                      [this](const ros::String& message) { answer = message.data; });
-    hear<ros::Twist>("cmd_vel", [this](const ros::Twist& message) {
+    hear<recordings::ros::DiagnosticArray>(
+        "/diagnostics", [this](const recordings::ros::DiagnosticArray& message) {
+          state = message.status.at(0).message;
+          values.clear();
+          for (const auto& [key, value] : message.status.at(0).values) {
+            values += "  " + std::string(key) + " " + std::string(value);
+          }
+          ++pictures;
+        });
+    hear<recordings::ros::DiagnosticArray>("panonav/goal/result",
+                                           [this](const recordings::ros::DiagnosticArray& message) {
+                                             const std::string told = message.status.at(0).message;
+                                             if (told != "another goal") result = told;
+                                           });
+    hear<recordings::ros::DiagnosticArray>(
+        "panonav/goal/feedback", [this](const recordings::ros::DiagnosticArray& message) {
+          ++feedback;
+          way.clear();
+          for (const auto& [key, value] : message.status.at(0).values) {
+            way += " " + std::string(key) + " " + std::string(value);
+          }
+        });
+    hear<recordings::ros::String>(
+        "panonav/command/result",
+        [this](const recordings::ros::String& message) { answer = message.data; });
+    hear<recordings::ros::Twist>("cmd_vel", [this](const recordings::ros::Twist& message) {
       if (message.linear.x != 0.0 || message.angular.z != 0.0) last_command_s = wall_s();
     });
   }
   template <class Message, class Use>
   void hear(const std::string& topic, Use use) {
     participant.subscribe(topic, Message::type, {.depth = 50}, [use](auto cdr) {
-      use(ros::read_message<Message>(cdr, MessageEncoding::cdr));
+      use(recordings::ros::read_message<Message>(cdr, recordings::MessageEncoding::cdr));
     });
   }
   bool until(double sim_s, const std::function<bool()>& condition) {
@@ -224,9 +229,10 @@ struct Judge {
   [[nodiscard]] Pose2 told() const { return map_from_odom * odom_from_base; }
 
   Participant participant;
-  Publisher<ros::PoseStamped> set_pose{participant, "set_pose"}, goal{participant, "goal_pose"};
-  Publisher<ros::Twist> cmd_vel{participant, "cmd_vel"};
-  Publisher<ros::String> command{participant, "panonav/command"};
+  Publisher<recordings::ros::PoseStamped> set_pose{participant, "set_pose"},
+      goal{participant, "goal_pose"};
+  Publisher<recordings::ros::Twist> cmd_vel{participant, "cmd_vel"};
+  Publisher<recordings::ros::String> command{participant, "panonav/command"};
   Pose2 truth, odom_from_base, map_from_odom;
   double now_s = 0.0, last_transform_s = 0.0, last_command_s = 0.0;
   bool seen = false;

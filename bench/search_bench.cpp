@@ -19,7 +19,7 @@
 #include "panonav/memory/visual_memory.hpp"
 #include "panonav/storage/memory_address.hpp"
 #include "panonav/storage/memory_file.hpp"
-#include "panonav/storage/place_search.hpp"
+#include "panonav_fleet/place_search.hpp"
 #include "rivals.hpp"
 #include "simulated_views.hpp"
 
@@ -256,7 +256,7 @@ int ask(const std::string& address, std::size_t views) {
   std::cout << "memory is read with " << fixed(read_gb_per_s(), 1) << " GB/s\n";
   const double before = gigabytes("VmRSS:");
   const auto start = Clock::now();
-  const PlaceSearch search(address);
+  const fleet::PlaceSearch search(address);
   const double taken_s = seconds_since(start);
   std::cout << "start: " << search.size() << " views in " << fixed(taken_s, 1) << " s; sketches "
             << fixed(1e-9 * double(search.bytes()), 2) << " GB, "
@@ -275,9 +275,9 @@ int ask(const std::string& address, std::size_t views) {
       std::uint64_t bytes = 0;
       for (std::size_t i = 0; i < kind.all.size(); ++i) {
         const auto from = Clock::now();
-        const double own = thread_seconds();
+        const double own = simulation::thread_seconds();
         const SearchResult result = search.search(kind.all[i]);
-        own_ms.push_back(1e3 * (thread_seconds() - own));
+        own_ms.push_back(1e3 * (simulation::thread_seconds() - own));
         ms.push_back(1e3 * seconds_since(from));
         in_full += result.views_in_full;
         bytes += result.bytes_read;

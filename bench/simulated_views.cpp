@@ -8,8 +8,8 @@
 #include <string_view>
 
 #include "panonav/core/random.hpp"
-#include "panonav/simulation/renderer.hpp"
-#include "panonav/simulation/scenes.hpp"
+#include "panonav_simulation/renderer.hpp"
+#include "panonav_simulation/scenes.hpp"
 
 namespace panonav::bench {
 
@@ -22,10 +22,10 @@ constexpr int columns = 64;
 const double noise = 0.02 / std::sqrt(512.0 / columns);
 
 struct Room {
-  Scene scene;
-  Renderer renderer;
+  simulation::Scene scene;
+  simulation::Renderer renderer;
   explicit Room(std::string_view name, std::uint64_t seed)
-      : scene(make_scene(name, {.seed = seed})), renderer(scene) {}
+      : scene(simulation::make_scene(name, {.seed = seed})), renderer(scene) {}
 
   /// Nothing within 15 cm of the camera, the floor free below it.
   [[nodiscard]] bool is_free(Point2 p) const {
@@ -33,7 +33,7 @@ struct Room {
         p.y_m < scene.floor_low.y_m || p.y_m > scene.floor_high.y_m) {
       return false;
     }
-    const Vector3 camera{p.x_m, p.y_m, camera_height_m};
+    const simulation::Vector3 camera{p.x_m, p.y_m, camera_height_m};
     if (renderer.distance_along(camera, {0.0, 0.0, -1.0}) < camera_height_m - 0.02) return false;
     for (int i = 0; i < 8; ++i) {
       const double azimuth = i * std::numbers::pi / 4.0;
@@ -79,10 +79,10 @@ std::vector<Point2> path_through(const Room& room, Random& random, std::size_t m
 
 std::vector<float> magnitudes_at(const Room& room, Point2 place, Random& random,
                                  Executor& executor) {
-  Viewpoint viewpoint;
+  simulation::Viewpoint viewpoint;
   viewpoint.pose = {place.x_m, place.y_m, random.uniform(-std::numbers::pi, std::numbers::pi)};
   viewpoint.height_m = camera_height_m;
-  PanoramaRendering rendering;
+  simulation::PanoramaRendering rendering;
   rendering.rows = ViewSet::shape.rows;
   rendering.columns = columns;
   rendering.rays_per_axis = 1;

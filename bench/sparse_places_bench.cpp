@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "experiments/elsewhere/experiments.hpp"
+#include "lab/elsewhere/experiments.hpp"
 
 #ifdef PANONAV_BENCH_ORB
 #include <opencv2/core.hpp>
@@ -20,7 +20,7 @@ namespace {
 #ifdef PANONAV_BENCH_ORB
 
 /// 500 features (the default of OpenCV) of the rows that the memory keeps, as fine as recorded.
-cv::Mat described(const RivalView& view) {
+cv::Mat described(const lab::RivalView& view) {
   const Image& picture = view.picture;
   const cv::Mat grey(picture.height(), picture.width(), CV_8UC1,
                      const_cast<std::uint8_t*>(picture.pixels().data()));
@@ -45,13 +45,13 @@ std::size_t best_of(std::size_t count, std::optional<std::size_t> left_out, cons
   return best.value();
 }
 
-class MutualOrb final : public RivalRecogniser {
+class MutualOrb final : public lab::RivalRecogniser {
  public:
   [[nodiscard]] std::string name() const override { return "ORB, mutual matches"; }
-  void memorise(const std::vector<RivalView>& references) override {
-    for (const RivalView& view : references) references_.push_back(described(view));
+  void memorise(const std::vector<lab::RivalView>& references) override {
+    for (const lab::RivalView& view : references) references_.push_back(described(view));
   }
-  [[nodiscard]] std::size_t nearest(const RivalView& query,
+  [[nodiscard]] std::size_t nearest(const lab::RivalView& query,
                                     std::optional<std::size_t> left_out) const override {
     const cv::BFMatcher matcher(cv::NORM_HAMMING, true);
     const cv::Mat asked = described(query);
@@ -75,13 +75,13 @@ class MutualOrb final : public RivalRecogniser {
 
 /// Residuals of the descriptors' bits against the words of a vocabulary, which is learnt from the
 /// references of the memory, summed for each word; signed roots, unit length [Jegou et al. 2010].
-class OrbVlad final : public RivalRecogniser {
+class OrbVlad final : public lab::RivalRecogniser {
  public:
   [[nodiscard]] std::string name() const override { return "ORB, VLAD of 32 words"; }
-  void memorise(const std::vector<RivalView>& references) override {
+  void memorise(const std::vector<lab::RivalView>& references) override {
     std::vector<cv::Mat> bits;
     cv::Mat all;
-    for (const RivalView& view : references) {
+    for (const lab::RivalView& view : references) {
       bits.push_back(bits_of(described(view)));
       all.push_back(bits.back());
     }
@@ -91,7 +91,7 @@ class OrbVlad final : public RivalRecogniser {
                cv::KMEANS_PP_CENTERS, words_);
     for (const cv::Mat& one : bits) references_.push_back(vlad(one));
   }
-  [[nodiscard]] std::size_t nearest(const RivalView& query,
+  [[nodiscard]] std::size_t nearest(const lab::RivalView& query,
                                     std::optional<std::size_t> left_out) const override {
     const cv::Mat asked = vlad(bits_of(described(query)));
     return best_of(references_.size(), left_out,
@@ -139,19 +139,19 @@ class OrbVlad final : public RivalRecogniser {
 #endif
 
 void compare(const std::filesystem::path& folder) {
-  ElsewhereReproductionOptions options;
+  lab::ElsewhereReproductionOptions options;
   options.out = std::filesystem::temp_directory_path();
-  std::vector<std::unique_ptr<RivalRecogniser>> rivals;
+  std::vector<std::unique_ptr<lab::RivalRecogniser>> rivals;
 #ifdef PANONAV_BENCH_ORB
   cv::setNumThreads(1);
   rivals.push_back(std::make_unique<MutualOrb>());
   rivals.push_back(std::make_unique<OrbVlad>());
 #endif
   Executor alone(1);
-  Reproduction result;
-  reproduce_leave_one_out(options, folder, std::move(rivals), alone, result);
-  for (const ResultRow& row : result.rows) {
-    std::printf("%s: %s%s%s\n", row.what.c_str(), shown_figure(row).c_str(),
+  lab::Reproduction result;
+  lab::reproduce_leave_one_out(options, folder, std::move(rivals), alone, result);
+  for (const lab::ResultRow& row : result.rows) {
+    std::printf("%s: %s%s%s\n", row.what.c_str(), lab::shown_figure(row).c_str(),
                 row.over.empty() ? "" : ", ", row.over.c_str());
   }
 }

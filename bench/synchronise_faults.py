@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Robots that work, synchronise and fail: whether anything is lost or doubled, and how long it takes.
 
-Usage: synchronise_faults.py TEST_STORAGE PANONAV PANONAV_POSTGRESQL [--robots 20] [--faults 200] [--seed 1] [--quick]
+Usage: synchronise_faults.py TEST_FLEET PANONAV PANONAV_POSTGRESQL [--robots 20] [--faults 200] [--seed 1] [--quick]
 
 Each robot is a process with a memory file of its own; all share one memory on one PostgreSQL server, each over a proxy
 of its own. Robots tell each change before and after they made it. Faults come at random moments: kill -9 of robots, of
@@ -271,7 +271,7 @@ def experiment(arguments, folder):
     server.start()
     ledger = Ledger()
     links = Links(str(server.folder / ".s.PGSQL.5432"), arguments.robots)
-    robots = [Robot(number, robots_folder, server, link, ledger, arguments.test_storage, folder)
+    robots = [Robot(number, robots_folder, server, link, ledger, arguments.test_fleet, folder)
               for number, link in enumerate(links.links)]
     kinds = {"robot killed": 0.45, "server killed": 0.08, "link cut": 0.2, "link delayed": 0.1, "link silent": 0.05}
     for kind, possible in (("clock wrong", bool(FAKETIME)), ("server's disk full", server_disk),
@@ -365,8 +365,8 @@ def experiment(arguments, folder):
         if new == 0 or rounds == 6:
             break
     converging_s = time.monotonic() - begin
-    expected = told(arguments.test_storage, server.address())
-    different = [robot.number for robot in robots if told(arguments.test_storage, robot.file) != expected]
+    expected = told(arguments.test_fleet, server.address())
+    different = [robot.number for robot in robots if told(arguments.test_fleet, robot.file) != expected]
 
     there = collections.Counter(line.split("\t")[2] for line in expected)
     positions = {line.split("\t")[2]: float(line.split("\t")[3]) for line in expected}
@@ -443,7 +443,7 @@ def measure(arguments, folder):
 
 def main():
     parser = argparse.ArgumentParser()
-    for name in ("test_storage", "panonav", "server"):
+    for name in ("test_fleet", "panonav", "server"):
         parser.add_argument(name)
     parser.add_argument("--robots", type=int, default=20)
     parser.add_argument("--faults", type=int, default=200)

@@ -1,16 +1,17 @@
 # One target per module, and one test program per module.
 
-# panonav_module(NAME [SOURCES ...] [DEPENDS modules of ours ...] [LINK public libraries ...]
+# panonav_module(NAME [APART] [SOURCES ...] [DEPENDS modules of ours ...] [LINK public libraries ...]
 #                [LINK_PRIVATE libraries that no public header shows ...] [PACKAGES that find those ...])
 # Makes the static library panonav_NAME with the alias panonav::NAME of the sources beside the CMake file and in its
-# folder `internal`, unless SOURCES names others. Headers are included as "panonav/NAME/x.hpp"; those in `internal` are
-# the module's own and are not installed. Each module has an export set of its own, so that users of a module need
-# only the packages of that module and of those before it.
+# folder `internal`, unless SOURCES names others. Headers are included as "panonav/NAME/x.hpp", those of an outbuilding
+# (a folder of src) as "panonav_NAME/x.hpp"; those in `internal` are the module's own and are not installed. Each module
+# has an export set of its own, so that users of a module need only the packages of that module and of those before it.
 # With BUILD_SHARED_LIBS the modules are parts of one libpanonav (panonav_one_library), and panonav::NAME is that library
-# with the headers of the module and of those before it.
+# with the headers of the module and of those before it. APART: a static library that uses libpanonav, for the command.
 function(panonav_module name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS;LINK;LINK_PRIVATE;PACKAGES" ${ARGN})
+  cmake_parse_arguments(ARG "APART" "" "SOURCES;DEPENDS;LINK;LINK_PRIVATE;PACKAGES" ${ARGN})
   set(target panonav_${name})
+  cmake_path(RELATIVE_PATH CMAKE_CURRENT_SOURCE_DIR BASE_DIRECTORY ${PROJECT_SOURCE_DIR}/src OUTPUT_VARIABLE folder)
   if(NOT ARG_SOURCES)
     file(GLOB ARG_SOURCES CONFIGURE_DEPENDS *.cpp internal/*.cpp)
   endif()
@@ -19,10 +20,18 @@ function(panonav_module name)
   target_include_directories(${target} PUBLIC
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src>
     $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
-  list(TRANSFORM ARG_DEPENDS PREPEND panonav_ OUTPUT_VARIABLE libraries)
+  set(prefix panonav_)
+  if(ARG_APART)
+    set(prefix panonav::)
+  endif()
+  list(TRANSFORM ARG_DEPENDS PREPEND ${prefix} OUTPUT_VARIABLE libraries)
   target_link_libraries(${target} PUBLIC ${libraries} ${ARG_LINK} PRIVATE ${ARG_LINK_PRIVATE})
   panonav_warnings(${target})
   panonav_precompile(${target})
+  if(BUILD_SHARED_LIBS AND ARG_APART)
+    add_library(panonav::${name} ALIAS ${target})
+    return()
+  endif()
   if(BUILD_SHARED_LIBS)
     set(user_target panonav_shared_${name})
     add_library(${user_target} INTERFACE)
@@ -44,15 +53,15 @@ function(panonav_module name)
           ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development)
   install(EXPORT panonav_${name} NAMESPACE panonav:: FILE panonav-${name}.cmake
           DESTINATION ${PANONAV_PACKAGE_FOLDER} COMPONENT development)
-  install(DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/panonav/${name}
+  install(DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/${folder}
           COMPONENT development FILES_MATCHING PATTERN "*.hpp" PATTERN internal EXCLUDE)
   set_property(GLOBAL APPEND PROPERTY PANONAV_MODULE_NAMES ${name})
   set_property(GLOBAL PROPERTY PANONAV_DEPENDS_${name} ${ARG_DEPENDS})
   set_property(GLOBAL PROPERTY PANONAV_PACKAGES_${name} ${ARG_PACKAGES})
 endfunction()
 
-# panonav_library(NAME DEPENDS targets ...): a library for the command and the experiments that is not installed.
-# Its headers are included as "NAME/x.hpp".
+# panonav_library(NAME DEPENDS targets ...): a library for the command that is not installed. Its headers are included
+# as "NAME/x.hpp".
 function(panonav_library name)
   cmake_parse_arguments(ARG "" "" "DEPENDS;LINK_PRIVATE" ${ARGN})
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS *.cpp)

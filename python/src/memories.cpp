@@ -4,7 +4,7 @@
 #include "memories.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
 #include "panonav/pipeline/named_view.hpp"
-#include "panonav/storage/memory_synchronisation.hpp"
+#include "panonav_fleet/memory_synchronisation.hpp"
 
 namespace panonav::python {
 
@@ -374,7 +374,7 @@ void bind_memory_file(py::module_& m) {
 }
 
 void bind_synchronisation(py::module_& m) {
-  using Report = SynchronisationReport;
+  using Report = fleet::SynchronisationReport;
   Record<Report>(m, "SynchronisationReport", "What synchronise_memory did.")
       .field("views", &Report::views, "Of the file, afterwards.")
       .field("uploaded", &Report::uploaded, "Views that the server got.")
@@ -403,7 +403,7 @@ void bind_synchronisation(py::module_& m) {
       "areas_around",
       [](double x_m, double y_m, double radius_m) {
         Areas areas;
-        for (const MemoryArea& area : areas_around(x_m, y_m, radius_m)) {
+        for (const fleet::MemoryArea& area : fleet::areas_around(x_m, y_m, radius_m)) {
           areas.emplace_back(area.column, area.row);
         }
         return areas;
@@ -414,13 +414,14 @@ void bind_synchronisation(py::module_& m) {
       "synchronise_memory",
       [](const std::filesystem::path& file, const std::string& server,
          const std::optional<Areas>& areas) {
-        SynchronisationOptions options;
+        fleet::SynchronisationOptions options;
         if (areas) {
           options.areas.emplace();
           for (const auto& [column, row] : *areas) options.areas->push_back({column, row});
         }
         const py::gil_scoped_release free;
-        return synchronise_memory(file, server, options, [](std::size_t) { check_signals(); });
+        return fleet::synchronise_memory(file, server, options,
+                                         [](std::size_t) { check_signals(); });
       },
       py::arg("file"), py::arg("server"), py::arg("areas") = py::none(),
       "Brings a robot's memory file and a memory on a PostgreSQL server to the same views, links, "

@@ -1,4 +1,7 @@
 #include "bindings.hpp"
+#ifdef PANONAV_PYTHON_FLEET
+#include "panonav_fleet/postgresql_memories.hpp"
+#endif
 
 namespace {
 namespace py = pybind11;
@@ -8,6 +11,9 @@ PYBIND11_MODULE(_core, m) {
   using namespace panonav::python;
   m.doc() = "The panonav library (see the package panonav).";
   m.attr("__version__") = PANONAV_VERSION;
+#ifdef PANONAV_PYTHON_FLEET
+  panonav::fleet::register_postgresql_memories();
+#endif
   bind_basics(m);
   bind_panoramas(m);
   bind_signatures(m);

@@ -2,12 +2,12 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/io/image_file.hpp"
-#include "panonav/io/recorded_dataset.hpp"
-#include "panonav/io/recording.hpp"
 #include "panonav/io/trajectory_file.hpp"
-#include "panonav/io/video_file.hpp"
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/observation_source.hpp"
+#include "panonav_recordings/recorded_dataset.hpp"
+#include "panonav_recordings/recording.hpp"
+#include "panonav_recordings/video_file.hpp"
 
 namespace panonav::python {
 
@@ -23,9 +23,10 @@ Dataset open_dataset(const std::filesystem::path& path,
     throw FileError(path.string(),
                     "does not say how its pictures lie; say it with a PictureSource");
   }
-  if (is_recording(path)) return read_recording(path, *source).dataset;
+  if (recordings::is_recording(path)) return recordings::read_recording(path, *source).dataset;
   if (folder) return read_picture_folder(path, *source);
-  return is_video(path) ? read_video(path, *source) : single_picture(path, *source);
+  return recordings::is_video(path) ? recordings::read_video(path, *source)
+                                    : single_picture(path, *source);
 }
 
 Dataset dataset_from(const py::handle& recording, const std::optional<PictureSource>& source) {

@@ -1,19 +1,19 @@
 #ifdef PANONAV_PYTHON_SIMULATES
 #include "panonav/core/error.hpp"
 #include "panonav/motion/simulated_base.hpp"
-#include "panonav/simulation/scenes.hpp"
-#include "panonav/simulation/simulated_world.hpp"
+#include "panonav_simulation/scenes.hpp"
+#include "panonav_simulation/simulated_world.hpp"
 #include "recordings.hpp"
 
 namespace panonav::python {
 
 namespace {
 
-using World = std::shared_ptr<const SimulatedWorld>;
+using World = std::shared_ptr<const simulation::SimulatedWorld>;
 
 /// The options of a world as keyword arguments; its recording is taken by the caller.
-World make_world(const std::string& scene, SimulatedWorldOptions wanted, Keywords& taken,
-                 int threads) {
+World make_world(const std::string& scene, simulation::SimulatedWorldOptions wanted,
+                 Keywords& taken, int threads) {
   taken.options(wanted.simulation)
       .options(wanted.frame)
       .options(wanted.sensor)
@@ -27,7 +27,7 @@ World make_world(const std::string& scene, SimulatedWorldOptions wanted, Keyword
   }
   const py::gil_scoped_release free;
   InterruptibleExecutor executor(threads);
-  return std::make_shared<const SimulatedWorld>(
+  return std::make_shared<const simulation::SimulatedWorld>(
       scene, std::move(wanted),
       [&](const std::string&, const std::string& name) {
         const auto found = std::ranges::find(given, name);
@@ -36,11 +36,11 @@ World make_world(const std::string& scene, SimulatedWorldOptions wanted, Keyword
       executor);
 }
 
-SimulatedWorldOptions recording_options(Keywords& taken) {
-  SimulatedWorldOptions wanted;
+simulation::SimulatedWorldOptions recording_options(Keywords& taken) {
+  simulation::SimulatedWorldOptions wanted;
   taken.options(wanted.recording);
   if (!taken.given("heading")) {
-    wanted.recording.heading = usual_heading(wanted.recording.path);
+    wanted.recording.heading = simulation::usual_heading(wanted.recording.path);
   }
   return wanted;
 }
@@ -52,7 +52,7 @@ std::optional<Trajectory> trajectory_from(const py::object& rows) {
   return trajectory;
 }
 
-Dataset record(const SimulatedWorld& world, const std::filesystem::path& folder,
+Dataset record(const simulation::SimulatedWorld& world, const std::filesystem::path& folder,
                const std::optional<Trajectory>& trajectory, int threads) {
   std::error_code ignored;
   if (std::filesystem::exists(folder, ignored) && !std::filesystem::is_empty(folder, ignored)) {
@@ -60,8 +60,9 @@ Dataset record(const SimulatedWorld& world, const std::filesystem::path& folder,
   }
   InterruptibleExecutor executor(threads);
   const auto poses = trajectory ? world.plan_along(trajectory->poses()) : world.plan();
-  const bool with_path = trajectory || world.options().recording.path != RecordingPath::random;
-  return record_dataset(world, folder, poses, with_path, executor);
+  const bool with_path =
+      trajectory || world.options().recording.path != simulation::RecordingPath::random;
+  return simulation::record_dataset(world, folder, poses, with_path, executor);
 }
 
 py::array_t<double> point_rows(std::span<const Point2> points) {
@@ -75,27 +76,28 @@ py::array_t<double> point_rows(std::span<const Point2> points) {
 }
 
 /// Seen somewhere in the world.
-Image picture_at(const SimulatedWorld& world, const Pose2& pose, std::uint64_t seed) {
+Image picture_at(const simulation::SimulatedWorld& world, const Pose2& pose, std::uint64_t seed) {
   Executor executor(1);
   return world.take_picture(pose, seed, executor);
 }
 
 void bind_worlds(py::module_& m) {
-  const auto of_world = {options_of<SimulationOptions>(), options_of<FrameOptions>(),
-                         options_of<SensorOptions>(), options_of<FreeSpaceOptions>(),
-                         options_of<OdometryNoise>("odometry")};
-  std::vector<ListedOptions> of_recording{options_of<RecordingOptions>()};
+  const auto of_world = {
+      options_of<simulation::SimulationOptions>(), options_of<simulation::FrameOptions>(),
+      options_of<simulation::SensorOptions>(), options_of<simulation::FreeSpaceOptions>(),
+      options_of<OdometryNoise>("odometry")};
+  std::vector<ListedOptions> of_recording{options_of<simulation::RecordingOptions>()};
   of_recording.insert(of_recording.end(), of_world);
-  py::class_<SimulatedWorld, std::shared_ptr<SimulatedWorld>>(
+  py::class_<simulation::SimulatedWorld, std::shared_ptr<simulation::SimulatedWorld>>(
       m, "SimulatedWorld",
       "A scene with a robot in it, whose pictures are ray-traced. Several threads may use one at a "
       "time.")
       .def(py::init([](const std::string& scene, const std::optional<Camera>& mirror, int threads,
                        const py::kwargs& keywords) {
              Keywords taken(keywords);
-             SimulatedWorldOptions wanted;
+             simulation::SimulatedWorldOptions wanted;
              wanted.mirror = mirror;
-             return std::const_pointer_cast<SimulatedWorld>(
+             return std::const_pointer_cast<simulation::SimulatedWorld>(
                  make_world(scene, std::move(wanted), taken, threads));
            }),
            py::arg("scene"), py::kw_only(), py::arg("mirror") = py::none(), py::arg("threads") = 0,
@@ -105,58 +107,60 @@ void bind_worlds(py::module_& m) {
                         of_world)
                .c_str())
       .def_property_readonly(
-          "name", [](const SimulatedWorld& w) { return w.scene().name; },
+          "name", [](const simulation::SimulatedWorld& w) { return w.scene().name; },
           "Of the built-in scene or of the file.")
       .def_property_readonly(
-          "warnings", [](const SimulatedWorld& w) { return w.scene().warnings; },
+          "warnings", [](const simulation::SimulatedWorld& w) { return w.scene().warnings; },
           "What of a file could not be shown.")
-      .def_property_readonly("source", &SimulatedWorld::source, "How its pictures lie.")
+      .def_property_readonly("source", &simulation::SimulatedWorld::source, "How its pictures lie.")
       .def_property_readonly(
           "camera_height_m",
-          [](const SimulatedWorld& w) { return w.options().frame.camera_height_m; },
+          [](const simulation::SimulatedWorld& w) { return w.options().frame.camera_height_m; },
           "Of the viewpoint above the floor.")
       .def_property_readonly(
           "robot_radius_m",
-          [](const SimulatedWorld& w) { return w.options().free_space.robot_radius_m; },
+          [](const simulation::SimulatedWorld& w) { return w.options().free_space.robot_radius_m; },
           "Of the robot, which is taken for a cylinder.")
       .def_property_readonly(
-          "free_area_m2", [](const SimulatedWorld& w) { return w.free_space().area_m2(); },
+          "free_area_m2",
+          [](const simulation::SimulatedWorld& w) { return w.free_space().area_m2(); },
           "Where the robot can stand.")
       .def_property_readonly(
-          "low", [](const SimulatedWorld& w) { return w.free_space().low(); },
+          "low", [](const simulation::SimulatedWorld& w) { return w.free_space().low(); },
           "Lower corner of the floor: (x_m, y_m).")
       .def_property_readonly(
-          "high", [](const SimulatedWorld& w) { return w.free_space().high(); },
+          "high", [](const simulation::SimulatedWorld& w) { return w.free_space().high(); },
           "Upper corner of the floor: (x_m, y_m).")
       .def_property_readonly(
-          "tour", [](const SimulatedWorld& w) { return point_rows(w.scene().tour); },
+          "tour", [](const simulation::SimulatedWorld& w) { return point_rows(w.scene().tour); },
           "A round trip, (n, 2) of x_m, y_m; may be empty.")
       .def(
-          "floor_plan", [](const SimulatedWorld& w) { return array_of(w.free_space().picture()); },
+          "floor_plan",
+          [](const simulation::SimulatedWorld& w) { return array_of(w.free_space().picture()); },
           "uint8 of (rows, columns), y upwards from `low` to `high`: free 255, obstacles 0, grey "
           "too near to one.")
       .def(
           "is_free",
-          [](const SimulatedWorld& w, const Point2& place) {
+          [](const simulation::SimulatedWorld& w, const Point2& place) {
             return w.free_space().is_free(place);
           },
           py::arg("place"), "Whether the robot can stand at (x_m, y_m).")
       .def(
           "clearance_m",
-          [](const SimulatedWorld& w, const Point2& place) {
+          [](const simulation::SimulatedWorld& w, const Point2& place) {
             return w.free_space().clearance_m(place);
           },
           py::arg("place"), "Distance from (x_m, y_m) to the nearest obstacle, never too long.")
       .def(
           "random_pose",
-          [](const SimulatedWorld& w, std::uint64_t seed) {
+          [](const simulation::SimulatedWorld& w, std::uint64_t seed) {
             Random random(seed, 0);
             return w.free_space().random_pose(random);
           },
           py::arg("seed"), "A free place, any heading.")
       .def(
           "shortest_path",
-          [](const SimulatedWorld& w, const Point2& from,
+          [](const simulation::SimulatedWorld& w, const Point2& from,
              const Point2& to) -> std::optional<py::array_t<double>> {
             const auto path = [&] {
               const py::gil_scoped_release free;
@@ -169,7 +173,7 @@ void bind_worlds(py::module_& m) {
           "Way points of a short free path, (n, 2) of x_m, y_m; None where there is none.")
       .def(
           "take_picture",
-          [](const SimulatedWorld& w, const Pose2& pose, std::uint64_t seed) {
+          [](const simulation::SimulatedWorld& w, const Pose2& pose, std::uint64_t seed) {
             const Image picture = [&] {
               const py::gil_scoped_release free;
               return picture_at(w, pose, seed);
@@ -181,7 +185,7 @@ void bind_worlds(py::module_& m) {
           "picture its own.")
       .def(
           "plan",
-          [](const SimulatedWorld& w, const py::kwargs& keywords) {
+          [](const simulation::SimulatedWorld& w, const py::kwargs& keywords) {
             Keywords taken(keywords);
             const auto wanted = recording_options(taken);
             taken.finish();
@@ -194,11 +198,11 @@ void bind_worlds(py::module_& m) {
           },
           with_options("Where a recording with these options takes its pictures: (n, 3) of x_m, "
                        "y_m, heading_rad.",
-                       {options_of<RecordingOptions>()})
+                       {options_of<simulation::RecordingOptions>()})
               .c_str())
       .def(
           "record",
-          [](const SimulatedWorld& w, const std::filesystem::path& folder,
+          [](const simulation::SimulatedWorld& w, const std::filesystem::path& folder,
              const py::object& trajectory, std::optional<int> seed, int threads,
              const py::kwargs& keywords) {
             Keywords taken(keywords);
@@ -216,9 +220,9 @@ void bind_worlds(py::module_& m) {
                        "`trajectory`: the robot goes along (n, 4) of stamp_s, x_m, y_m, "
                        "heading_rad instead. `seed`: of poses, noise and odometry, in place of "
                        "the world's.",
-                       {options_of<RecordingOptions>()})
+                       {options_of<simulation::RecordingOptions>()})
               .c_str())
-      .def("__repr__", [](const SimulatedWorld& w) {
+      .def("__repr__", [](const simulation::SimulatedWorld& w) {
         return "SimulatedWorld('" + w.scene().name + "', " + to_text(w.free_space().area_m2()) +
                " m2 free)";
       });
@@ -241,8 +245,9 @@ void bind_worlds(py::module_& m) {
                    "SimulatedWorld(scene).record(folder).",
                    of_recording)
           .c_str());
-  py::tuple names(scene_names().size());
-  for (std::size_t i = 0; i < scene_names().size(); ++i) names[i] = std::string(scene_names()[i]);
+  py::tuple names(simulation::scene_names().size());
+  for (std::size_t i = 0; i < simulation::scene_names().size(); ++i)
+    names[i] = std::string(simulation::scene_names()[i]);
   m.attr("scenes") = names;
 }
 
@@ -256,7 +261,7 @@ struct Robot {
 };
 using SharedRobot = Shared<Robot>;
 
-Pose2 free_start(const SimulatedWorld& world, const std::optional<Pose2>& start,
+Pose2 free_start(const simulation::SimulatedWorld& world, const std::optional<Pose2>& start,
                  std::uint64_t seed) {
   Random random(seed, 0);
   if (!start) return world.free_space().random_pose(random);
@@ -268,7 +273,7 @@ void bind_robots(py::module_& m) {
   py::class_<SharedRobot>(m, "SimulatedRobot",
                           "A robot in a simulated world: it drives as it is told until something "
                           "is in its way, and sees.")
-      .def(py::init([](const std::shared_ptr<SimulatedWorld>& world,
+      .def(py::init([](const std::shared_ptr<simulation::SimulatedWorld>& world,
                        const std::optional<Pose2>& start, std::uint64_t seed) {
              return std::make_unique<SharedRobot>(
                  Robot{world,

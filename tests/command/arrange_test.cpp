@@ -32,7 +32,6 @@ class Arrange : public ::testing::Test {
   std::string memory = folder / "run.panonav";
 };
 
-#ifdef PANONAV_COMMAND_SIMULATES
 TEST_F(Arrange, TheReportUnfolds) {
   const std::string report = folder / "report";
   run_well({"arrange", memory, "--no-save", "--report", report});
@@ -58,7 +57,6 @@ TEST_F(Arrange, TheReportUnfolds) {
   EXPECT_TRUE(contains(refusal({"arrange", memory, "--report", folder / "run"}),
                        "not made by panonav arrange"));
 }
-#endif
 
 TEST_F(Arrange, StoresAndTellsTheMap) {
   const auto answer = answer_of({"arrange", memory, "--json", "--graphml", folder / "map.graphml",

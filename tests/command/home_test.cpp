@@ -62,10 +62,8 @@ TEST_F(Home, WhatNeedsElevationsIsRefusedWhereTheyAreUnknown) {
              std::string_view("[images]\nkind = \"panorama\"\ncolumns = \"clockwise\"\n"
                               "forward_column = 0.5\n[poses]\nfile = \"poses.csv\"\n"));
   std::vector<std::vector<std::string>> verbs{{"home", folder / "run" / view_name(0)}};
-#ifdef PANONAV_COMMAND_SIMULATES
   verbs.push_back({"catchment"});
   verbs.push_back({"catchment", "--ahead", "1"});
-#endif
   for (auto words : verbs) {
     words.push_back(folder / "run");
     EXPECT_NE(run_panonav(words).exit_code, 2) << words.front();
@@ -236,7 +234,6 @@ TEST_F(Home, BadInputIsOneLine) {
                        "3 to 15"));
 }
 
-#ifdef PANONAV_COMMAND_SIMULATES
 TEST_F(Home, TheReportHasItsPictures) {
   const std::filesystem::path report = folder / "report";
   run_well({"home", folder / "home.png", folder / "run", "--report", report});
@@ -251,7 +248,6 @@ TEST_F(Home, TheReportHasItsPictures) {
       contains(refusal({"home", folder / "home.png", folder / "run", "--report", folder / "run"}),
                "not made by panonav home"));
 }
-#endif
 
 }  // namespace
 }  // namespace panonav::testing

@@ -283,7 +283,6 @@ TEST_F(Localise, SeveralPicturesAndATable) {
   EXPECT_TRUE(contains(refusal({"localise", memory(), gone, asked()}), "is a folder"));
 }
 
-#ifdef PANONAV_COMMAND_SIMULATES
 TEST_F(Localise, TheReportShowsEachPictureAboveItsBestMatch) {
   const std::filesystem::path report = *folder_ / "report";
   run_well({"localise", memory(), asked(), "--report", report, "--turn-randomly", "5"});
@@ -343,7 +342,6 @@ TEST_F(Localise, TheReportShowsEachPictureAboveItsBestMatch) {
   EXPECT_TRUE(contains(bare, "no thumbnail of the best match"));
   EXPECT_EQ(panels_of(bare)[0].data["moments"].size(), 25U);
 }
-#endif
 
 TEST_F(Localise, TextForPeopleNamesEachImage) {
   const auto result = run_panonav({"localise", memory(), asked()});

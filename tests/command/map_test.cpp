@@ -77,19 +77,21 @@ TEST_F(Map, ARecordHoldsTheFinishedMap) {
                  {"/ground_truth", {"geometry_msgs/PoseStamped", 100}},
                  {"/references", {"sensor_msgs/PointCloud2", 1}},
                  {"/visited", {"nav_msgs/OccupancyGrid", 1}}});
-  for_each_message<ros::PointCloud2>(
-      record, "/references", [](const ros::PointCloud2& cloud) { EXPECT_EQ(cloud.width, 100U); });
+  for_each_message<recordings::ros::PointCloud2>(
+      record, "/references",
+      [](const recordings::ros::PointCloud2& cloud) { EXPECT_EQ(cloud.width, 100U); });
   // Ends of all edges at least, closures among them.
-  for_each_message<ros::PointCloud2>(record, "/edges", [&](const ros::PointCloud2& cloud) {
-    EXPECT_GE(cloud.width, 2 * (99 + said["closures"].get<unsigned>()));
-    std::size_t of_closures = 0;
-    for (std::size_t i = 0; i < cloud.width; ++i) {
-      float kind = 0.0F;
-      std::memcpy(&kind, &cloud.data[16 * i + 12], sizeof(kind));
-      of_closures += kind == static_cast<float>(LinkKind::closure) ? 1 : 0;
-    }
-    EXPECT_GE(of_closures, 2 * said["closures"].get<std::size_t>());
-  });
+  for_each_message<recordings::ros::PointCloud2>(
+      record, "/edges", [&](const recordings::ros::PointCloud2& cloud) {
+        EXPECT_GE(cloud.width, 2 * (99 + said["closures"].get<unsigned>()));
+        std::size_t of_closures = 0;
+        for (std::size_t i = 0; i < cloud.width; ++i) {
+          float kind = 0.0F;
+          std::memcpy(&kind, &cloud.data[16 * i + 12], sizeof(kind));
+          of_closures += kind == static_cast<float>(LinkKind::closure) ? 1 : 0;
+        }
+        EXPECT_GE(of_closures, 2 * said["closures"].get<std::size_t>());
+      });
 }
 
 TEST_F(Map, ViewsThatHardlyDifferAreSkipped) {

@@ -179,14 +179,14 @@ TEST_F(RouteVerbs, ARecordHoldsTheRouteAndTheFixes) {
   const auto topics = topics_of(file);
   EXPECT_EQ(topics.at("/plan"), (std::pair<std::string, std::uint64_t>{"nav_msgs/Path", 1}));
   EXPECT_EQ(topics.at("/diagnostics").second, answers.size());
-  for_each_message<ros::Path>(file, "/plan",
-                              [](const ros::Path& way) { EXPECT_EQ(way.poses.size(), 41U); });
+  for_each_message<recordings::ros::Path>(
+      file, "/plan", [](const recordings::ros::Path& way) { EXPECT_EQ(way.poses.size(), 41U); });
   std::vector<Pose2> poses;
-  for_each_message<ros::PoseWithCovarianceStamped>(file, "/pose",
-                                                   [&](const ros::PoseWithCovarianceStamped& pose) {
-                                                     EXPECT_GT(pose.pose.covariance[0], 0.0);
-                                                     poses.push_back(ros::planar(pose.pose.pose));
-                                                   });
+  for_each_message<recordings::ros::PoseWithCovarianceStamped>(
+      file, "/pose", [&](const recordings::ros::PoseWithCovarianceStamped& pose) {
+        EXPECT_GT(pose.pose.covariance[0], 0.0);
+        poses.push_back(recordings::ros::planar(pose.pose.pose));
+      });
   std::size_t fixes = 0;
   for (const json& answer : answers) {
     if (!answer["on_route"].get<bool>()) continue;
@@ -309,7 +309,6 @@ TEST_F(RouteVerbs, WrongUseIsRefused) {
   run_well({"route", "--help"});
 }
 
-#ifdef PANONAV_COMMAND_SIMULATES
 TEST_F(RouteVerbs, ReportsShowTheRouteAndTheFixes) {
   (void)record({"--report", folder_ / "recorded"});
   run_well({"route", "follow", folder_ / "m.panonav", folder_ / "repeat", "--report",
@@ -340,7 +339,6 @@ TEST_F(RouteVerbs, ReportsShowTheRouteAndTheFixes) {
     EXPECT_GE(decode_image(bytes, "lines").width(), 50);
   }
 }
-#endif
 
 /// A data set without its every tenth row; pictures are linked.
 void link_part(const fs::path& from, const fs::path& to) {

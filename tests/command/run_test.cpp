@@ -243,8 +243,9 @@ TEST_F(Walk, ARecordOfAStreamHoldsItsJpegsToTheByte) {
                     " 2> /dev/null",
                 folder.path());
   std::size_t number = 0;
-  for_each_message<ros::CompressedImage>(
-      path("run.mcap"), "/camera/image/compressed", [&](const ros::CompressedImage& picture) {
+  for_each_message<recordings::ros::CompressedImage>(
+      path("run.mcap"), "/camera/image/compressed",
+      [&](const recordings::ros::CompressedImage& picture) {
         EXPECT_EQ(picture.format, "jpeg");
         EXPECT_EQ(std::string(picture.data.begin(), picture.data.end()), jpeg(++number));
       });
@@ -267,24 +268,25 @@ TEST_F(Walk, ARecordHoldsWhatWasSeenAndAnswered) {
   EXPECT_EQ(topics.at("/pose").second, known);
   // The pictures are those of the walk.
   std::size_t number = 0;
-  for_each_message<ros::CompressedImage>(
-      path("run.mcap"), "/camera/image/compressed", [&](const ros::CompressedImage& picture) {
-        EXPECT_EQ(ros::picture_of(picture, "picture"),
+  for_each_message<recordings::ros::CompressedImage>(
+      path("run.mcap"), "/camera/image/compressed",
+      [&](const recordings::ros::CompressedImage& picture) {
+        EXPECT_EQ(recordings::ros::picture_of(picture, "picture"),
                   read_image(folder / "walk" / view_name(number)));
         ++number;
       });
-  for_each_message<ros::PointCloud2>(path("run.mcap"), "/references",
-                                     [](const ros::PointCloud2& cloud) {
-                                       EXPECT_EQ(cloud.width, count);
-                                       EXPECT_EQ(cloud.data.size(), 16 * count);
-                                     });
+  for_each_message<recordings::ros::PointCloud2>(path("run.mcap"), "/references",
+                                                 [](const recordings::ros::PointCloud2& cloud) {
+                                                   EXPECT_EQ(cloud.width, count);
+                                                   EXPECT_EQ(cloud.data.size(), 16 * count);
+                                                 });
   // Each pose is that of its answer, and TF says the same, below the root that viewers want.
   std::vector<Pose2> poses;
-  for_each_message<ros::PoseWithCovarianceStamped>(path("run.mcap"), "/pose",
-                                                   [&](const ros::PoseWithCovarianceStamped& pose) {
-                                                     EXPECT_EQ(pose.header.frame_id, "map");
-                                                     poses.push_back(ros::planar(pose.pose.pose));
-                                                   });
+  for_each_message<recordings::ros::PoseWithCovarianceStamped>(
+      path("run.mcap"), "/pose", [&](const recordings::ros::PoseWithCovarianceStamped& pose) {
+        EXPECT_EQ(pose.header.frame_id, "map");
+        poses.push_back(recordings::ros::planar(pose.pose.pose));
+      });
   std::size_t at = 0;
   for (const auto& answer : answers) {
     if (!answer.at("known").get<bool>()) continue;
@@ -292,11 +294,12 @@ TEST_F(Walk, ARecordHoldsWhatWasSeenAndAnswered) {
     EXPECT_NEAR(poses.at(at).heading_rad, answer.at("heading_rad").get<double>(), 1e-9);
     ++at;
   }
-  for_each_message<ros::TFMessage>(path("run.mcap"), "/tf", [](const ros::TFMessage& tf) {
-    ASSERT_GE(tf.transforms.size(), 1U);
-    EXPECT_EQ(tf.transforms[0].header.frame_id, "tf#/");
-    EXPECT_EQ(tf.transforms[0].child_frame_id, "map");
-  });
+  for_each_message<recordings::ros::TFMessage>(
+      path("run.mcap"), "/tf", [](const recordings::ros::TFMessage& tf) {
+        ASSERT_GE(tf.transforms.size(), 1U);
+        EXPECT_EQ(tf.transforms[0].header.frame_id, "tf#/");
+        EXPECT_EQ(tf.transforms[0].child_frame_id, "map");
+      });
 }
 
 TEST_F(Walk, TheBestMatchOfARecordIsThatOfTheNamedViewAlsoWhereItWasJustLearnt) {
@@ -325,17 +328,18 @@ TEST_F(Walk, ATrackIsRecordedWithItsParticlesAndItsPath) {
                             "/particles/poses", "/diagnostics"}) {
     EXPECT_EQ(topics.at(topic).second, count) << topic;
   }
-  for_each_message<ros::PointCloud2>(path("track.mcap"), "/particles",
-                                     [](const ros::PointCloud2& cloud) {
-                                       EXPECT_GE(cloud.width, 1U);
-                                       EXPECT_LE(cloud.width, 500U);
-                                       EXPECT_EQ(cloud.data.size(), 16 * cloud.width);
-                                     });
+  for_each_message<recordings::ros::PointCloud2>(path("track.mcap"), "/particles",
+                                                 [](const recordings::ros::PointCloud2& cloud) {
+                                                   EXPECT_GE(cloud.width, 1U);
+                                                   EXPECT_LE(cloud.width, 500U);
+                                                   EXPECT_EQ(cloud.data.size(), 16 * cloud.width);
+                                                 });
   std::size_t poses = 0;
   if (topics.contains("/path")) {
-    for_each_message<ros::Path>(path("track.mcap"), "/path", [&](const ros::Path& line) {
-      EXPECT_EQ(line.poses.size(), ++poses);  // it grows by one each time
-    });
+    for_each_message<recordings::ros::Path>(
+        path("track.mcap"), "/path", [&](const recordings::ros::Path& line) {
+          EXPECT_EQ(line.poses.size(), ++poses);  // it grows by one each time
+        });
     EXPECT_EQ(poses, topics.at("/pose").second);
   }
 }

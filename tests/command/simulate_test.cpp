@@ -9,8 +9,8 @@
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/io/panorama_reader.hpp"
-#include "panonav/io/recorded_dataset.hpp"
 #include "panonav/pipeline/observation_source.hpp"
+#include "panonav_recordings/recorded_dataset.hpp"
 #include "support/command_runner.hpp"
 #include "support/recorded_messages.hpp"
 
@@ -62,7 +62,7 @@ TEST_F(Simulate, ARecordOfASimulatedRunIsTheDataSetAgain) {
       record, 12,
       {{"/ground_truth", {"geometry_msgs/PoseStamped", 12}}, {"/odom", {"nav_msgs/Odometry", 12}}});
   const Dataset written = read_dataset(folder / "run");
-  const Dataset recorded = panonav::read_recording(record, written.source).dataset;
+  const Dataset recorded = panonav::recordings::read_recording(record, written.source).dataset;
   ASSERT_EQ(recorded.entries.size(), 12U);
   for (std::size_t i = 0; i < 12; ++i) {
     const DatasetEntry& a = written.entries[i];
@@ -75,12 +75,13 @@ TEST_F(Simulate, ARecordOfASimulatedRunIsTheDataSetAgain) {
   }
   // The tree of frames: where odometry leads is where the robot truly is.
   std::size_t moments = 0;
-  for_each_message<ros::TFMessage>(record, "/tf", [&](const ros::TFMessage& tf) {
-    ASSERT_EQ(tf.transforms.size(), 4U);
-    const Pose2 map_from_base =
-        ros::planar(tf.transforms[2].transform) * ros::planar(tf.transforms[1].transform);
-    EXPECT_NEAR(map_from_base.x_m, written.entries[moments++].pose->x_m, 1e-9);
-  });
+  for_each_message<recordings::ros::TFMessage>(
+      record, "/tf", [&](const recordings::ros::TFMessage& tf) {
+        ASSERT_EQ(tf.transforms.size(), 4U);
+        const Pose2 map_from_base = recordings::ros::planar(tf.transforms[2].transform) *
+                                    recordings::ros::planar(tf.transforms[1].transform);
+        EXPECT_NEAR(map_from_base.x_m, written.entries[moments++].pose->x_m, 1e-9);
+      });
 }
 
 TEST_F(Simulate, AMeshThatCrashesItsReaderGivesOneLine) {

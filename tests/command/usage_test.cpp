@@ -363,7 +363,6 @@ TEST(Usage, FormerNamesOfFlagsAreTakenWithAWarningAndNotShown) {
   EXPECT_EQ(help.find("--most-difference"), std::string::npos);
 }
 
-#ifdef PANONAV_COMMAND_SIMULATES
 std::vector<std::string> simulate_one(const std::string& out) {
   return {"simulate", "office",    out,  "--random",        "1", "--kind", "panorama", "--rows",
           "8",        "--columns", "32", "--rays-per-axis", "1"};
@@ -431,7 +430,6 @@ TEST(Usage, ProgressBarsSayTheTimeLeftOnATerminal) {
   EXPECT_TRUE(contains(text, "/2000, about "));
   EXPECT_TRUE(contains(text, "/2000\r")) << "nothing is said of the time at first";
 }
-#endif
 /// A line that types an option where it does nothing, and what makes it do something.
 struct Unused {
   std::string line;
@@ -460,7 +458,6 @@ TEST(Usage, AnOptionThatDoesNothingIsRefused) {
       {"calibrate a -o c --xi 0.9", "--xi", "--profile unified"},
       {"calibrate a -o c --mirror-a-mm 9", "--mirror-a-mm", "--profile hyperboloidal"},
       {"calibrate a -o c --profile unified --inner-elevation-deg 9", "--inner-elevation-deg", ""},
-#ifdef PANONAV_COMMAND_SIMULATES
       {"evaluate a b --align false --align-scale true", "--align-scale", ""},
       {"catchment x --ahead 2 --up-to-m 1", "--up-to-m", ""},
       {"catchment x --ahead 2 --max-step-m 1", "--max-step-m", ""},
@@ -482,7 +479,6 @@ TEST(Usage, AnOptionThatDoesNothingIsRefused) {
       {on_navigate + "--strategy steady --coarse 2", "--coarse", ""},
       {on_navigate + "--strategy recovering --fine 2", "--fine", ""},
       {on_navigate + "--moved-seed 2", "--moved-seed", "--moved-objects 0.1"},
-#endif
   };
   for (const Unused& one : all) {
     EXPECT_TRUE(contains(refusal(words_of(one.line)), one.flag + " has no effect")) << one.line;
@@ -605,9 +601,7 @@ TEST(Usage, AFolderOfPicturesAloneIsToldHowToBecomeADataSet) {
   }
   std::vector<std::vector<std::string>> all{{"route", "record", bare, folder / "m.panonav"},
                                             {"arrange", folder / "m.panonav", "--odometry", bare}};
-#ifdef PANONAV_COMMAND_SIMULATES
   all.push_back({"catchment", bare});
-#endif
   for (const auto& line : all) {
     const auto said = refusal(line);
     EXPECT_TRUE(contains(said, "has no dataset.toml")) << said;

@@ -16,15 +16,15 @@
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/io/option_file.hpp"
-#include "panonav/io/recorded_dataset.hpp"
-#include "panonav/io/recording.hpp"
-#include "panonav/io/ros_messages.hpp"
 #include "panonav/io/trajectory_file.hpp"
 #include "panonav/panorama/preprocessing.hpp"
 #include "panonav/storage/memory_file.hpp"
+#include "panonav_recordings/recorded_dataset.hpp"
+#include "panonav_recordings/recording.hpp"
+#include "panonav_recordings/ros_messages.hpp"
 #include "support/temporary_folder.hpp"
 #ifdef PANONAV_FUZZ_WORLDS
-#include "panonav/simulation/load_gazebo.hpp"
+#include "panonav_simulation/load_gazebo.hpp"
 #endif
 
 namespace panonav::testing {
@@ -109,19 +109,20 @@ void read_tum(Bytes bytes) {
 
 void read_recording(Bytes bytes) {
   expect_value_or_line([&] {
-    constexpr RecordingLimits small{.chunk_bytes = 1 << 20, .messages = 100'000};
-    const std::shared_ptr<const Recording> recording =
-        Recording::open(file_of("recording", bytes), small);
+    constexpr recordings::RecordingLimits small{.chunk_bytes = 1 << 20, .messages = 100'000};
+    const std::shared_ptr<const recordings::Recording> recording =
+        recordings::Recording::open(file_of("recording", bytes), small);
     std::vector<std::uint32_t> topics;
     for (std::uint32_t i = 0; i < recording->topics().size(); ++i) topics.push_back(i);
     std::size_t read = 0;
-    recording->for_each(topics, {},
-                        [&](const MessagePlace&, Bytes message) { read += message.size(); });
+    recording->for_each(topics, {}, [&](const recordings::MessagePlace&, Bytes message) {
+      read += message.size();
+    });
     const auto places = recording->places(topics);
-    if (!std::ranges::is_sorted(places, {}, &MessagePlace::time_ns)) {
+    if (!std::ranges::is_sorted(places, {}, &recordings::MessagePlace::time_ns)) {
       throw std::logic_error("places are not in order of time");
     }
-    for (const MessagePlace& place : places) {
+    for (const recordings::MessagePlace& place : places) {
       expect_value_or_line([&] { read += recording->read(place).size(); });
     }
     if (read > 0 && topics.empty()) throw std::logic_error("messages without a topic");
@@ -129,7 +130,7 @@ void read_recording(Bytes bytes) {
       expect_value_or_line([&] { throw FileError("recording", line); });
     }
     expect_value_or_line([&] {
-      const auto recorded = panonav::read_recording(recording, "recording", {});
+      const auto recorded = panonav::recordings::read_recording(recording, "recording", {});
       for (const std::string& line : recorded.warnings) {
         expect_value_or_line([&] { throw FileError("recording", line); });
       }
@@ -209,11 +210,11 @@ void read_memory_sql(Bytes bytes) {
 
 /// The message is what its bytes say: written, it reads as itself.
 template <class Message>
-Message read_ros_message(Bytes bytes, MessageEncoding encoding) {
-  const auto message = ros::read_message<Message>(bytes, encoding);
-  const auto written = ros::write_message(message, encoding);
-  const auto again = ros::read_message<Message>(written, encoding);
-  if (ros::write_message(again, encoding) != written) {
+Message read_ros_message(Bytes bytes, recordings::MessageEncoding encoding) {
+  const auto message = recordings::ros::read_message<Message>(bytes, encoding);
+  const auto written = recordings::ros::write_message(message, encoding);
+  const auto again = recordings::ros::read_message<Message>(written, encoding);
+  if (recordings::ros::write_message(again, encoding) != written) {
     throw std::logic_error("a message changes on its way");
   }
   return message;
@@ -223,48 +224,50 @@ Message read_ros_message(Bytes bytes, MessageEncoding encoding) {
 void read_ros_bytes(Bytes bytes) {
   if (bytes.empty()) return;
   const Bytes rest = bytes.subspan(1);
-  const MessageEncoding encoding = bytes[0] < 16 ? MessageEncoding::ros1 : MessageEncoding::cdr;
+  const recordings::MessageEncoding encoding =
+      bytes[0] < 16 ? recordings::MessageEncoding::ros1 : recordings::MessageEncoding::cdr;
   expect_value_or_line<Error>([&] {
     switch (bytes[0] % 16) {
       case 0:
-        (void)ros::picture_of(read_ros_message<ros::Image>(rest, encoding), small);
+        (void)recordings::ros::picture_of(read_ros_message<recordings::ros::Image>(rest, encoding),
+                                          small);
         break;
       case 1:
-        (void)ros::picture_of(read_ros_message<ros::CompressedImage>(rest, encoding), "picture",
-                              small);
+        (void)recordings::ros::picture_of(
+            read_ros_message<recordings::ros::CompressedImage>(rest, encoding), "picture", small);
         break;
       case 2:
-        (void)read_ros_message<ros::Imu>(rest, encoding);
+        (void)read_ros_message<recordings::ros::Imu>(rest, encoding);
         break;
       case 3:
-        (void)read_ros_message<ros::PointCloud2>(rest, encoding);
+        (void)read_ros_message<recordings::ros::PointCloud2>(rest, encoding);
         break;
       case 4:
-        (void)read_ros_message<ros::Odometry>(rest, encoding);
+        (void)read_ros_message<recordings::ros::Odometry>(rest, encoding);
         break;
       case 5:
-        (void)read_ros_message<ros::Path>(rest, encoding);
+        (void)read_ros_message<recordings::ros::Path>(rest, encoding);
         break;
       case 6:
-        (void)read_ros_message<ros::OccupancyGrid>(rest, encoding);
+        (void)read_ros_message<recordings::ros::OccupancyGrid>(rest, encoding);
         break;
       case 7:
-        (void)read_ros_message<ros::TFMessage>(rest, encoding);
+        (void)read_ros_message<recordings::ros::TFMessage>(rest, encoding);
         break;
       case 8:
-        (void)read_ros_message<ros::PointStamped>(rest, encoding);
+        (void)read_ros_message<recordings::ros::PointStamped>(rest, encoding);
         break;
       case 9:
-        (void)read_ros_message<ros::PoseStamped>(rest, encoding);
+        (void)read_ros_message<recordings::ros::PoseStamped>(rest, encoding);
         break;
       case 10:
-        (void)read_ros_message<ros::PoseWithCovarianceStamped>(rest, encoding);
+        (void)read_ros_message<recordings::ros::PoseWithCovarianceStamped>(rest, encoding);
         break;
       case 11:
-        (void)read_ros_message<ros::PoseArray>(rest, encoding);
+        (void)read_ros_message<recordings::ros::PoseArray>(rest, encoding);
         break;
       case 12:
-        (void)read_ros_message<ros::DiagnosticArray>(rest, encoding);
+        (void)read_ros_message<recordings::ros::DiagnosticArray>(rest, encoding);
         break;
       default:
         break;
@@ -274,7 +277,7 @@ void read_ros_bytes(Bytes bytes) {
 
 #ifdef PANONAV_FUZZ_WORLDS
 void read_world(Bytes bytes) {
-  expect_value_or_line([&] { (void)load_gazebo(file_of("world.sdf", bytes)); });
+  expect_value_or_line([&] { (void)simulation::load_gazebo(file_of("world.sdf", bytes)); });
 }
 #endif
 

@@ -1,4 +1,4 @@
-#include "ros2/localisation_node.hpp"
+#include "panonav_ros2/localisation_node.hpp"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 #include "panonav/io/atomic_file.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/pipeline/memoriser.hpp"
-#include "ros2/simulated_robot.hpp"
+#include "panonav_ros2/simulated_robot.hpp"
 #include "support/fast_peer.hpp"
 #include "support/remembered_worlds.hpp"
 #include "support/temporary_folder.hpp"
@@ -60,7 +60,7 @@ class LocalisationNodeOnTheWire : public ::testing::Test {
     FastPeer::Bytes last;
     while (FastPeer::waiting(poses) > 0) last = FastPeer::next(poses, 1s);
     if (last.empty()) last = FastPeer::next(poses, 10s);
-    return ros::planar(read<ros::PoseStamped>(last).pose);
+    return recordings::ros::planar(read<recordings::ros::PoseStamped>(last).pose);
   }
 
   ~LocalisationNodeOnTheWire() override { stop(); }
@@ -104,40 +104,41 @@ class LocalisationNodeOnTheWire : public ::testing::Test {
   std::string ask(FastPeer::Endpoint& command, FastPeer::Endpoint& answer,
                   const std::string& words) {
     for (int i = 0; i < 50 && !answers_; ++i) {
-      FastPeer::write(command, ros::write_message(ros::String{"hello"}));
+      FastPeer::write(command, recordings::ros::write_message(recordings::ros::String{"hello"}));
       answers_ = !FastPeer::next(answer, 100ms).empty();
     }
     while (!FastPeer::next(answer, 100ms).empty()) {
     }
-    FastPeer::write(command, ros::write_message(ros::String{words}));
+    FastPeer::write(command, recordings::ros::write_message(recordings::ros::String{words}));
     const auto cdr = FastPeer::next(answer, 20s);
-    return cdr.empty() ? "nothing" : read<ros::String>(cdr).data;
+    return cdr.empty() ? "nothing" : read<recordings::ros::String>(cdr).data;
   }
 
   template <class Message>
   static Message read(const FastPeer::Bytes& cdr) {
-    return ros::read_message<Message>(cdr, MessageEncoding::cdr);
+    return recordings::ros::read_message<Message>(cdr, recordings::MessageEncoding::cdr);
   }
   static std::int64_t now_ns() {
     return std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch()).count();
   }
   /// The robot sees odometry from an origin of its own.
   static Pose2 odometry(const Pose2& pose) { return inverse(Pose2{1.0, 0.5, 0.4}) * pose; }
-  static ros::Odometry odometry_message(std::int64_t ns, const Pose2& pose) {
-    ros::Odometry message;
+  static recordings::ros::Odometry odometry_message(std::int64_t ns, const Pose2& pose) {
+    recordings::ros::Odometry message;
     message.header = {ns, "odom"};
     message.child_frame_id = "base_link";
-    message.pose.pose = ros::pose_of(odometry(pose));
+    message.pose.pose = recordings::ros::pose_of(odometry(pose));
     return message;
   }
   static FastPeer::Bytes image_message(std::int64_t ns, const Image& picture) {
-    return ros::write_message(ros::Image{{ns, "camera"},
-                                         static_cast<std::uint32_t>(picture.height()),
-                                         static_cast<std::uint32_t>(picture.width()),
-                                         "mono8",
-                                         0,
-                                         static_cast<std::uint32_t>(picture.width()),
-                                         picture.pixels()});
+    return recordings::ros::write_message(
+        recordings::ros::Image{{ns, "camera"},
+                               static_cast<std::uint32_t>(picture.height()),
+                               static_cast<std::uint32_t>(picture.width()),
+                               "mono8",
+                               0,
+                               static_cast<std::uint32_t>(picture.width()),
+                               picture.pixels()});
   }
   /// Through the first room, 5 cm and 25 ms a step, or somewhat longer until the node has seen it,
   /// with odometry before and after each picture.
@@ -146,7 +147,8 @@ class LocalisationNodeOnTheWire : public ::testing::Test {
     Pose2 pose{0.6, 0.8, 0.0};
     for (int i = 0; i < steps; ++i) {
       const std::int64_t ns = now_ns();
-      EXPECT_TRUE(FastPeer::write(odom, ros::write_message(odometry_message(ns, pose))));
+      EXPECT_TRUE(
+          FastPeer::write(odom, recordings::ros::write_message(odometry_message(ns, pose))));
       const auto looked_at = [&] { return node_->counts().pictures + node_->counts().dropped; };
       const std::size_t before = looked_at();
       see(ns, pose);
@@ -194,24 +196,24 @@ TEST_F(LocalisationNodeOnTheWire, TellsAnotherVendorsProgramsWhereTheRobotIs) {
                             "geometry_msgs::msg::dds_::PoseWithCovarianceStamped_", true, true);
   auto& references = peer_.listen("rt/robot/panonav/references",
                                   "sensor_msgs::msg::dds_::PointCloud2_", true, true);
-  const auto told = read<ros::PoseWithCovarianceStamped>(FastPeer::next(pose, 10s));
+  const auto told = read<recordings::ros::PoseWithCovarianceStamped>(FastPeer::next(pose, 10s));
   EXPECT_EQ(told.header.frame_id, "map");
-  const Pose2 found = ros::planar(told.pose.pose);
+  const Pose2 found = recordings::ros::planar(told.pose.pose);
   EXPECT_LT(distance(found.position(), truth.position()), 0.3);
   EXPECT_LT(std::abs(angle_difference(found.heading_rad, truth.heading_rad)), 0.2);
   for (const std::size_t i : {0U, 7U, 35U}) EXPECT_GT(told.pose.covariance[i], 0.0) << i;
   for (const std::size_t i : {14U, 21U, 28U}) EXPECT_EQ(told.pose.covariance[i], 0.0) << i;
   const auto cloud_bytes = FastPeer::next(references, 10s);
-  const auto cloud = read<ros::PointCloud2>(cloud_bytes);
+  const auto cloud = read<recordings::ros::PointCloud2>(cloud_bytes);
   EXPECT_EQ(cloud.header.frame_id, "map");
   EXPECT_GT(cloud.width, 100U);
   EXPECT_EQ(cloud.data.size(), 16U * cloud.width);
 
   // map -> odom, dated ahead, with the odometry's own odom -> base_link where the robot is.
   std::size_t transforms = 0;
-  ros::TFMessage last;
+  recordings::ros::TFMessage last;
   while (FastPeer::waiting(tf) > 0) {
-    const auto message = read<ros::TFMessage>(FastPeer::next(tf, 1s));
+    const auto message = read<recordings::ros::TFMessage>(FastPeer::next(tf, 1s));
     ASSERT_EQ(message.transforms.size(), 1U);
     if (transforms++ > 0) {
       EXPECT_GT(message.transforms[0].header.stamp_ns, last.transforms[0].header.stamp_ns);
@@ -223,17 +225,17 @@ TEST_F(LocalisationNodeOnTheWire, TellsAnotherVendorsProgramsWhereTheRobotIs) {
   EXPECT_EQ(last.transforms[0].child_frame_id, "odom");
   EXPECT_GT(last.transforms[0].header.stamp_ns, now_ns());
   EXPECT_LT(last.transforms[0].header.stamp_ns, now_ns() + 1'000'000'000);
-  const Pose2 by_tf = ros::planar(last.transforms[0].transform) * odometry(truth);
+  const Pose2 by_tf = recordings::ros::planar(last.transforms[0].transform) * odometry(truth);
   EXPECT_LT(distance(by_tf.position(), truth.position()), 0.3);
 
-  EXPECT_GT(read<ros::PoseArray>(FastPeer::next(particles, 1s)).poses.size(), 100U);
+  EXPECT_GT(read<recordings::ros::PoseArray>(FastPeer::next(particles, 1s)).poses.size(), 100U);
   const auto best_bytes = FastPeer::next(best, 1s);
-  const auto match = read<ros::CompressedImage>(best_bytes);
-  EXPECT_GT(ros::picture_of(match, "best match").width(), 0);
+  const auto match = read<recordings::ros::CompressedImage>(best_bytes);
+  EXPECT_GT(recordings::ros::picture_of(match, "best match").width(), 0);
   std::map<std::string, std::string> values;
   std::string state;
   while (FastPeer::waiting(diagnostics) > 0) {
-    const auto message = read<ros::DiagnosticArray>(FastPeer::next(diagnostics, 1s));
+    const auto message = read<recordings::ros::DiagnosticArray>(FastPeer::next(diagnostics, 1s));
     for (const auto& [key, value] : message.status.at(0).values) values[key] = value;
     state = message.status.at(0).level == 0 ? message.status.at(0).message : state;
   }
@@ -266,28 +268,31 @@ TEST_F(LocalisationNodeOnTheWire, TakesCompressedPicturesTransformsASimulatedClo
   const auto step = [&](int i) {
     const std::int64_t ns = 50'000'000LL * (i + 1);
     const Pose2 at{first.x_m + 0.05 * i, first.y_m, 0.0};
-    FastPeer::write(clock, ros::write_message(ros::Clock{ns}));
-    FastPeer::write(tf, ros::write_message(ros::TFMessage{
-                            {{{ns, "odom"}, "base_footprint", ros::pose_of(odometry(at))},
-                             {{ns, "base_footprint"}, "base_link", {}}}}));
-    ros::Imu level;
+    FastPeer::write(clock, recordings::ros::write_message(recordings::ros::Clock{ns}));
+    FastPeer::write(tf,
+                    recordings::ros::write_message(recordings::ros::TFMessage{
+                        {{{ns, "odom"}, "base_footprint", recordings::ros::pose_of(odometry(at))},
+                         {{ns, "base_footprint"}, "base_link", {}}}}));
+    recordings::ros::Imu level;
     level.header = {ns, "imu"};
-    FastPeer::write(imu, ros::write_message(level));
+    FastPeer::write(imu, recordings::ros::write_message(level));
     const Image seen = picture(at);
     const auto png = encode_png(seen.view());
-    FastPeer::write(image, ros::write_message(ros::CompressedImage{{ns, "camera"}, "png", png}));
+    FastPeer::write(image, recordings::ros::write_message(
+                               recordings::ros::CompressedImage{{ns, "camera"}, "png", png}));
     std::this_thread::sleep_for(50ms);
   };
   step(0);
-  ros::PoseWithCovarianceStamped begin{{0, "map"}, {ros::pose_of(first), {}}};
+  recordings::ros::PoseWithCovarianceStamped begin{{0, "map"},
+                                                   {recordings::ros::pose_of(first), {}}};
   begin.pose.covariance[0] = begin.pose.covariance[7] = 0.01;
   begin.pose.covariance[35] = 0.01;
-  FastPeer::write(start_pose, ros::write_message(begin));
+  FastPeer::write(start_pose, recordings::ros::write_message(begin));
   std::this_thread::sleep_for(100ms);
   for (int i = 1; i < 12 || (i < 40 && FastPeer::waiting(pose) == 0); ++i) step(i);
   const auto told = FastPeer::next(pose, 10s);
   ASSERT_FALSE(told.empty());
-  const auto told_pose = read<ros::PoseWithCovarianceStamped>(told);
+  const auto told_pose = read<recordings::ros::PoseWithCovarianceStamped>(told);
   EXPECT_LT(told_pose.header.stamp_ns, 3'000'000'000);  // of the simulation
   const double truth_x_m =
       first.x_m + 0.05 * (1e-9 * static_cast<double>(told_pose.header.stamp_ns) / 0.05 - 1);
@@ -297,7 +302,7 @@ TEST_F(LocalisationNodeOnTheWire, TakesCompressedPicturesTransformsASimulatedClo
   for (int i = 40; i < 80 && !dated_ahead; ++i) {  // a clock that stands brings no transform
     step(i);
     while (FastPeer::waiting(heard) > 0) {
-      const auto message = read<ros::TFMessage>(FastPeer::next(heard, 1s));
+      const auto message = read<recordings::ros::TFMessage>(FastPeer::next(heard, 1s));
       if (message.transforms.at(0).child_frame_id != "odom") continue;
       dated_ahead = true;
       EXPECT_GT(message.transforms[0].header.stamp_ns, 1'000'000'000);
@@ -339,23 +344,23 @@ TEST_F(LocalisationNodeOnTheWire, BadMessagesGetOneLineEachAndTheRobotIsFoundAll
         const Image other(30, 20);
         FastPeer::write(image, image_message(ns + 1, other));
         std::this_thread::sleep_for(30ms);
-        ros::Image strange{{ns + 2, "camera"}, 1, 1, "rgb565", 0, 2, {}};
-        FastPeer::write(image, ros::write_message(strange));
+        recordings::ros::Image strange{{ns + 2, "camera"}, 1, 1, "rgb565", 0, 2, {}};
+        FastPeer::write(image, recordings::ros::write_message(strange));
         break;
       }
       case 23: {  // odometry that is no number, of another robot, and late
         auto bad = odometry_message(ns + 1, pose);
         bad.pose.pose.position.x = std::numeric_limits<double>::quiet_NaN();
-        FastPeer::write(odom, ros::write_message(bad));
+        FastPeer::write(odom, recordings::ros::write_message(bad));
         auto foreign = odometry_message(ns + 2, pose);
         foreign.header.frame_id = "other_odom";
-        FastPeer::write(odom, ros::write_message(foreign));
-        FastPeer::write(odom, ros::write_message(odometry_message(ns - 1000, pose)));
+        FastPeer::write(odom, recordings::ros::write_message(foreign));
+        FastPeer::write(odom, recordings::ros::write_message(odometry_message(ns - 1000, pose)));
         break;
       }
       case 24: {
-        ros::PoseWithCovarianceStamped nowhere{{0, "moon"}, {}};
-        FastPeer::write(start_pose, ros::write_message(nowhere));
+        recordings::ros::PoseWithCovarianceStamped nowhere{{0, "moon"}, {}};
+        FastPeer::write(start_pose, recordings::ros::write_message(nowhere));
         FastPeer::write(image, image_message(begin_ns - 10'000'000, picture(pose)));
         break;
       }
@@ -384,9 +389,10 @@ TEST_F(LocalisationNodeOnTheWire, TransformsThatAreMissingOrGoRoundGetOneLineEac
   const auto is_said = [&](const std::string& words, const std::string& parent) {
     for (int i = 0; i < 200 && notes_with(words) == 0; ++i) {
       const std::int64_t ns = now_ns();
-      FastPeer::write(tf, ros::write_message(ros::TFMessage{{{{ns, "odom"}, "wheel", {}},
-                                                             {{ns, parent}, "base_link", {}},
-                                                             {{ns, "base_link"}, "foot", {}}}}));
+      FastPeer::write(tf, recordings::ros::write_message(
+                              recordings::ros::TFMessage{{{{ns, "odom"}, "wheel", {}},
+                                                          {{ns, parent}, "base_link", {}},
+                                                          {{ns, "base_link"}, "foot", {}}}}));
       FastPeer::write(image, image_message(ns, seen));
       std::this_thread::sleep_for(20ms);
     }
@@ -412,7 +418,7 @@ TEST_F(LocalisationNodeOnTheWire, AFloodOfMessagesLeavesItLocalisedWithinItsMemo
   drive(odom, [&](std::int64_t ns, const Pose2& pose) {
     const Image seen = picture(pose);
     for (int i = 0; i < 50; ++i) {  // 1,000 a second
-      FastPeer::write(odom, ros::write_message(odometry_message(ns + i + 1, pose)));
+      FastPeer::write(odom, recordings::ros::write_message(odometry_message(ns + i + 1, pose)));
       FastPeer::write(image, image_message(ns + i, seen));
     }
   });
@@ -462,19 +468,20 @@ TEST_F(LocalisationNodeOnTheWire, DrivesASimulatedRobotToAGoalFindsItKidnappedAn
   const auto robot_is = [&] { return newest_pose(truth); };
   const auto state_of = [](const FastPeer::Bytes& cdr) {
     return cdr.empty() ? std::string("nothing")
-                       : read<ros::DiagnosticArray>(cdr).status.at(0).message;
+                       : read<recordings::ros::DiagnosticArray>(cdr).status.at(0).message;
   };
   ASSERT_TRUE(comes_true([&] { return node_->counts().localised >= 3; }));
 
   // Who writes before both sides know of each other may not be heard: a goal in another frame,
   // which is refused, tells that the node hears.
   ASSERT_TRUE(comes_true([&] {
-    FastPeer::write(goal, ros::write_message(ros::PoseStamped{{0, "moon"}, {}}));
+    FastPeer::write(goal,
+                    recordings::ros::write_message(recordings::ros::PoseStamped{{0, "moon"}, {}}));
     return notes_with("moon") > 0;
   }));
   const auto send_to = [&](Point2 place) {
-    FastPeer::write(goal, ros::write_message(ros::PoseStamped{
-                              {0, "map"}, ros::pose_of({place.x_m, place.y_m, 0.0})}));
+    FastPeer::write(goal, recordings::ros::write_message(recordings::ros::PoseStamped{
+                              {0, "map"}, recordings::ros::pose_of({place.x_m, place.y_m, 0.0})}));
     return state_of(FastPeer::next(feedback, 20s));
   };
   const Point2 there{2.8, 2.8};
@@ -487,12 +494,15 @@ TEST_F(LocalisationNodeOnTheWire, DrivesASimulatedRobotToAGoalFindsItKidnappedAn
   // Carried to the other room, it is found there, and sent back it comes.
   const std::size_t before = node_->counts().pictures;
   while (FastPeer::waiting(pose) > 0) (void)FastPeer::next(pose, 1s);
-  FastPeer::write(set_pose, ros::write_message(ros::PoseStamped{
-                                {0, "map"}, ros::pose_of({elsewhere.x_m, elsewhere.y_m, 2.0})}));
+  FastPeer::write(set_pose,
+                  recordings::ros::write_message(recordings::ros::PoseStamped{
+                      {0, "map"}, recordings::ros::pose_of({elsewhere.x_m, elsewhere.y_m, 2.0})}));
   EXPECT_TRUE(comes_true([&] {
     const auto told = FastPeer::next(pose, 1s);
     return !told.empty() && node_->counts().pictures > before &&
-           distance(ros::planar(read<ros::PoseWithCovarianceStamped>(told).pose.pose).position(),
+           distance(recordings::ros::planar(
+                        read<recordings::ros::PoseWithCovarianceStamped>(told).pose.pose)
+                        .position(),
                     elsewhere) < 0.3;
   }));
 
@@ -504,7 +514,7 @@ TEST_F(LocalisationNodeOnTheWire, DrivesASimulatedRobotToAGoalFindsItKidnappedAn
   for (int i = 0; i < 200 && !moved; ++i) {
     const auto cdr = FastPeer::next(velocity, 5s);
     ASSERT_FALSE(cdr.empty()) << state_of(FastPeer::next(result, 100ms));
-    const auto twist = read<ros::Twist>(cdr);
+    const auto twist = read<recordings::ros::Twist>(cdr);
     moved = twist.linear.x != 0.0 || twist.angular.z != 0.0;
   }
   EXPECT_TRUE(moved);
@@ -513,7 +523,7 @@ TEST_F(LocalisationNodeOnTheWire, DrivesASimulatedRobotToAGoalFindsItKidnappedAn
   for (int i = 0; i < 200 && !stands; ++i) {
     const auto cdr = FastPeer::next(velocity, 5s);
     ASSERT_FALSE(cdr.empty());
-    const auto twist = read<ros::Twist>(cdr);
+    const auto twist = read<recordings::ros::Twist>(cdr);
     stands = twist.linear.x == 0.0 && twist.angular.z == 0.0;
   }
   EXPECT_TRUE(stands);
@@ -548,11 +558,11 @@ TEST_F(LocalisationNodeOnTheWire, LearnsADriveRepeatsItAndGoesOnAfterItDied) {
   ASSERT_TRUE(comes_true([&] { return node_->counts().pictures >= 3; }));
   EXPECT_EQ(ask("repeat drive").find("refused: "), 0U);
   for (int i = 0; i < 70; ++i) {  // a bend of 2.3 m
-    FastPeer::write(velocity, ros::write_message(
-                                  ros::Twist{{0.3, 0.0, 0.0}, {0.0, 0.0, i < 35 ? -0.05 : 0.3}}));
+    FastPeer::write(velocity, recordings::ros::write_message(recordings::ros::Twist{
+                                  {0.3, 0.0, 0.0}, {0.0, 0.0, i < 35 ? -0.05 : 0.3}}));
     std::this_thread::sleep_for(28ms);
   }
-  FastPeer::write(velocity, ros::write_message(ros::Twist{}));
+  FastPeer::write(velocity, recordings::ros::write_message(recordings::ros::Twist{}));
   std::this_thread::sleep_for(200ms);
   const Pose2 end = robot_is();
   EXPECT_GT(end.x_m, 2.0);
@@ -560,15 +570,15 @@ TEST_F(LocalisationNodeOnTheWire, LearnsADriveRepeatsItAndGoesOnAfterItDied) {
   EXPECT_GE(node_->counts().learnt, 8U);
 
   const auto carried_back = [&] {
-    FastPeer::write(
-        set_pose, ros::write_message(ros::PoseStamped{{0, "map"}, ros::pose_of({0.8, 0.8, 0.2})}));
+    FastPeer::write(set_pose, recordings::ros::write_message(recordings::ros::PoseStamped{
+                                  {0, "map"}, recordings::ros::pose_of({0.8, 0.8, 0.2})}));
     std::this_thread::sleep_for(100ms);
   };
   const auto arrives = [&] {
     const auto cdr = FastPeer::next(result, 30s);
     EXPECT_FALSE(cdr.empty()) << (notes_.empty() ? "" : notes_.back());
     if (cdr.empty()) return false;
-    EXPECT_EQ(read<ros::DiagnosticArray>(cdr).status.at(0).message, "arrived");
+    EXPECT_EQ(read<recordings::ros::DiagnosticArray>(cdr).status.at(0).message, "arrived");
     EXPECT_LT(distance(robot_is().position(), end.position()), 0.25);
     return true;
   };
@@ -584,7 +594,7 @@ TEST_F(LocalisationNodeOnTheWire, LearnsADriveRepeatsItAndGoesOnAfterItDied) {
   const auto left = read_file(mission, 1000);
   stop();
   EXPECT_FALSE(fs::exists(mission));
-  EXPECT_EQ(read<ros::DiagnosticArray>(FastPeer::next(result, 5s)).status.at(0).message,
+  EXPECT_EQ(read<recordings::ros::DiagnosticArray>(FastPeer::next(result, 5s)).status.at(0).message,
             "the node ends");
   write_file(mission, left);
   setup.teacher.reset();

@@ -4,7 +4,7 @@
 #include <string>
 #include <thread>
 
-#include "ros2/participant.hpp"
+#include "panonav_ros2/participant.hpp"
 #include "support/fast_peer.hpp"
 
 namespace {
@@ -14,7 +14,7 @@ int say_words() {
   using namespace panonav::ros2;
   const Participant::Note quiet = [](const std::string&) {};
   Participant participant({}, quiet);
-  const Publisher<panonav::ros::String> words(participant, "words");
+  const Publisher<panonav::recordings::ros::String> words(participant, "words");
   for (int i = 0; i < 500; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
     if (words.subscribers() == 0) continue;

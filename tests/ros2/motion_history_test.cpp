@@ -1,4 +1,4 @@
-#include "ros2/motion_history.hpp"
+#include "panonav_ros2/motion_history.hpp"
 
 #include <gtest/gtest.h>
 
@@ -61,7 +61,8 @@ TEST(MotionHistory, KeepsSecondsOnlyHoweverManyMessagesCome) {
   EXPECT_TRUE(flood.at(91'000));
 }
 
-ros::TransformStamped transform(const std::string& parent, const std::string& child, double x) {
+recordings::ros::TransformStamped transform(const std::string& parent, const std::string& child,
+                                            double x) {
   return {{1, parent}, child, {{x, 0.0, 0.0}, {}}};
 }
 

@@ -1,4 +1,4 @@
-#include "ros2/participant.hpp"
+#include "panonav_ros2/participant.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -65,14 +65,15 @@ TEST(Participant, NothingIsLostBothWaysWithAnotherVendorsDds) {
   constexpr int messages = 200;
   auto& heard = peer.listen("rt/words", "std_msgs::msg::dds_::String_");
   auto& said = peer.talk("rt/pictures", "sensor_msgs::msg::dds_::CompressedImage_");
-  const Publisher<ros::String> words(participant, "words", {.depth = messages});
+  const Publisher<recordings::ros::String> words(participant, "words", {.depth = messages});
   std::vector<std::size_t> sizes;
   std::vector<std::int64_t> stamps;
   std::atomic<int> came = 0;
-  participant.subscribe("pictures", ros::CompressedImage::type, {.depth = messages},
+  participant.subscribe("pictures", recordings::ros::CompressedImage::type, {.depth = messages},
                         [&](std::span<const std::uint8_t> cdr) {
                           const auto message =
-                              ros::read_message<ros::CompressedImage>(cdr, MessageEncoding::cdr);
+                              recordings::ros::read_message<recordings::ros::CompressedImage>(
+                                  cdr, recordings::MessageEncoding::cdr);
                           sizes.push_back(message.data.size());
                           stamps.push_back(message.header.stamp_ns);
                           ++came;
@@ -84,14 +85,18 @@ TEST(Participant, NothingIsLostBothWaysWithAnotherVendorsDds) {
   for (int i = 0; i < messages; ++i) {
     words.publish({std::string(static_cast<std::size_t>(i), 'x')});
     const std::vector<std::uint8_t> data(static_cast<std::size_t>(700 * i), 7);
-    ASSERT_TRUE(FastPeer::write(
-        said, ros::write_message(ros::CompressedImage{{i, "camera"}, "jpeg", data})));
+    ASSERT_TRUE(
+        FastPeer::write(said, recordings::ros::write_message(
+                                  recordings::ros::CompressedImage{{i, "camera"}, "jpeg", data})));
     std::this_thread::sleep_for(2ms);
   }
   for (int i = 0; i < messages; ++i) {
     const auto cdr = FastPeer::next(heard, 5s);
     ASSERT_FALSE(cdr.empty()) << i;
-    EXPECT_EQ(ros::read_message<ros::String>(cdr, MessageEncoding::cdr).data.size(), i);
+    EXPECT_EQ(recordings::ros::read_message<recordings::ros::String>(
+                  cdr, recordings::MessageEncoding::cdr)
+                  .data.size(),
+              i);
   }
   for (int waited = 0; came < messages && waited < 500; ++waited) std::this_thread::sleep_for(10ms);
   ASSERT_EQ(came, messages);
@@ -105,13 +110,14 @@ TEST(Participant, HearsPublishersThatOfferBestEffortOnly) {
   FastPeer peer;
   Participant participant({}, [](const std::string& line) { ADD_FAILURE() << line; });
   std::atomic<int> came = 0;
-  participant.subscribe("words", ros::String::type, {},
+  participant.subscribe("words", recordings::ros::String::type, {},
                         [&](std::span<const std::uint8_t>) { ++came; });
   const Served served(participant);
   auto& said = peer.talk("rt/words", "std_msgs::msg::dds_::String_", false);
   ASSERT_TRUE(FastPeer::matched(said, 10s));
   for (int i = 0; i < 100 && came == 0; ++i) {
-    EXPECT_TRUE(FastPeer::write(said, ros::write_message(ros::String{"here"})));
+    EXPECT_TRUE(
+        FastPeer::write(said, recordings::ros::write_message(recordings::ros::String{"here"})));
     std::this_thread::sleep_for(50ms);
   }
   EXPECT_GT(came, 0);
@@ -119,14 +125,18 @@ TEST(Participant, HearsPublishersThatOfferBestEffortOnly) {
 
 TEST(Participant, WhatWasSaidLastReachesThoseWhoComeLater) {
   Participant participant({}, [](const std::string& line) { ADD_FAILURE() << line; });
-  const Publisher<ros::String> words(participant, "words", {.depth = 1, .transient_local = true});
+  const Publisher<recordings::ros::String> words(participant, "words",
+                                                 {.depth = 1, .transient_local = true});
   words.publish({"old"});
   words.publish({"new"});
   FastPeer peer;
   auto& heard = peer.listen("rt/words", "std_msgs::msg::dds_::String_", true, true);
   const auto cdr = FastPeer::next(heard, 10s);
   ASSERT_FALSE(cdr.empty());
-  EXPECT_EQ(ros::read_message<ros::String>(cdr, MessageEncoding::cdr).data, "new");
+  EXPECT_EQ(
+      recordings::ros::read_message<recordings::ros::String>(cdr, recordings::MessageEncoding::cdr)
+          .data,
+      "new");
 }
 
 TEST(Participant, ProcessesOfOneMachineHearEachOtherWithLocalhostOnly) {
@@ -135,7 +145,7 @@ TEST(Participant, ProcessesOfOneMachineHearEachOtherWithLocalhostOnly) {
   options.domain = 7;  // a process configures a domain once
   Participant participant(options, [](const std::string& line) { ADD_FAILURE() << line; });
   std::atomic<int> came = 0;
-  participant.subscribe("words", ros::String::type, {},
+  participant.subscribe("words", recordings::ros::String::type, {},
                         [&](std::span<const std::uint8_t>) { ++came; });
   const Served served(participant);
   const pid_t child = fork();
@@ -156,9 +166,9 @@ TEST(Participant, TheGraphNamesTheNodeAndItsEndpoints) {
   for (const std::size_t gid_bytes : {24U, 16U}) {
     Participant participant(
         {.node = "eyes", .name_space = "/robot", .gid_bytes = static_cast<int>(gid_bytes)}, {});
-    (void)participant.advertise("a", ros::String::type, {});
-    (void)participant.advertise("b", ros::String::type, {});
-    participant.subscribe("c", ros::String::type, {}, {});
+    (void)participant.advertise("a", recordings::ros::String::type, {});
+    (void)participant.advertise("b", recordings::ros::String::type, {});
+    participant.subscribe("c", recordings::ros::String::type, {}, {});
     FastPeer peer;
     auto& graph = peer.listen("ros_discovery_info",
                               "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_", true, true);

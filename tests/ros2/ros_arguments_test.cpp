@@ -1,4 +1,4 @@
-#include "ros2/ros_arguments.hpp"
+#include "panonav_ros2/ros_arguments.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "server/localisation_server.hpp"
+#include "panonav_server/localisation_server.hpp"
 
 #include <gtest/gtest.h>
 
@@ -12,12 +12,13 @@
 #include "panonav/io/image_file.hpp"
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
-#include "server/place_json.hpp"
+#include "panonav_server/place_json.hpp"
 #include "support/landmark_pictures.hpp"
 #include "support/temporary_folder.hpp"
 #include "support/viewer_peer.hpp"
 
-namespace panonav::testing {
+namespace panonav::server {
+using namespace testing;
 namespace {
 
 std::string png_of(const Image& image) {
@@ -288,4 +289,4 @@ TEST_F(LocalisationServerTest, WhoWaitsAtTheEndIsAnswered) {
 }
 
 }  // namespace
-}  // namespace panonav::testing
+}  // namespace panonav::server

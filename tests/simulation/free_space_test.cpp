@@ -1,4 +1,4 @@
-#include "panonav/simulation/free_space.hpp"
+#include "panonav_simulation/free_space.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,13 +7,13 @@
 #include <numbers>
 
 #include "panonav/core/error.hpp"
-#include "panonav/simulation/internal/affine3.hpp"
-#include "panonav/simulation/internal/mesh_library.hpp"
-#include "panonav/simulation/internal/occupancy.hpp"
-#include "panonav/simulation/internal/shapes.hpp"
-#include "panonav/simulation/scenes.hpp"
+#include "panonav_simulation/internal/affine3.hpp"
+#include "panonav_simulation/internal/mesh_library.hpp"
+#include "panonav_simulation/internal/occupancy.hpp"
+#include "panonav_simulation/internal/shapes.hpp"
+#include "panonav_simulation/scenes.hpp"
 
-namespace panonav {
+namespace panonav::simulation {
 namespace {
 
 void add_box(Scene& scene, const std::string& name, Vector3 centre, Vector3 size) {
@@ -264,4 +264,4 @@ TEST(FreeSpace, BadInputIsNamed) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::simulation

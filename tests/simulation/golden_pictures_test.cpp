@@ -13,12 +13,13 @@
 #include <string>
 
 #include "panonav/io/image_file.hpp"
-#include "panonav/simulation/mirror.hpp"
-#include "panonav/simulation/renderer.hpp"
-#include "panonav/simulation/scenes.hpp"
+#include "panonav_simulation/mirror.hpp"
+#include "panonav_simulation/renderer.hpp"
+#include "panonav_simulation/scenes.hpp"
 #include "support/scene_views.hpp"
 
-namespace panonav::testing {
+namespace panonav::simulation {
+using namespace testing;
 namespace {
 
 namespace fs = std::filesystem;
@@ -123,4 +124,4 @@ INSTANTIATE_TEST_SUITE_P(Scenes, GoldenPicture,
                          [](const auto& scene) { return std::string(scene.param); });
 
 }  // namespace
-}  // namespace panonav::testing
+}  // namespace panonav::simulation

@@ -1,4 +1,4 @@
-#include "panonav/simulation/load_gazebo.hpp"
+#include "panonav_simulation/load_gazebo.hpp"
 #include "support/skips.hpp"
 
 #include <gtest/gtest.h>
@@ -9,11 +9,12 @@
 #include <fstream>
 
 #include "panonav/core/error.hpp"
-#include "panonav/simulation/free_space.hpp"
-#include "panonav/simulation/internal/mesh_library.hpp"
+#include "panonav_simulation/free_space.hpp"
+#include "panonav_simulation/internal/mesh_library.hpp"
 #include "support/temporary_folder.hpp"
 
-namespace panonav::testing {
+namespace panonav::simulation {
+using namespace testing;
 namespace {
 
 namespace fs = std::filesystem;
@@ -440,4 +441,4 @@ TEST_F(GazeboWorld, RealWorldsLoadWithTheirWalls) {
 }
 
 }  // namespace
-}  // namespace panonav::testing
+}  // namespace panonav::simulation

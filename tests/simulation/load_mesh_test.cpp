@@ -1,4 +1,4 @@
-#include "panonav/simulation/load_mesh.hpp"
+#include "panonav_simulation/load_mesh.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,10 +6,11 @@
 #include <fstream>
 
 #include "panonav/core/error.hpp"
-#include "panonav/simulation/internal/mesh_library.hpp"
+#include "panonav_simulation/internal/mesh_library.hpp"
 #include "support/temporary_folder.hpp"
 
-namespace panonav::testing {
+namespace panonav::simulation {
+using namespace testing;
 namespace {
 
 namespace fs = std::filesystem;
@@ -190,4 +191,4 @@ TEST_F(MeshFile, BrokenFilesGiveOneClearLine) {
 }
 
 }  // namespace
-}  // namespace panonav::testing
+}  // namespace panonav::simulation

@@ -1,4 +1,4 @@
-#include "panonav/simulation/mirror.hpp"
+#include "panonav_simulation/mirror.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 
 #include "panonav/core/error.hpp"
 
-namespace panonav {
+namespace panonav::simulation {
 namespace {
 
 double dot(const Direction3& a, const Direction3& b) {
@@ -90,4 +90,4 @@ TEST(HyperboloidalMirror, RefusesOtherModels) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::simulation

@@ -1,4 +1,4 @@
-#include "panonav/simulation/recording.hpp"
+#include "panonav_simulation/recording.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,9 +6,9 @@
 #include <numbers>
 
 #include "panonav/core/error.hpp"
-#include "panonav/simulation/scenes.hpp"
+#include "panonav_simulation/scenes.hpp"
 
-namespace panonav {
+namespace panonav::simulation {
 namespace {
 
 class Recording : public ::testing::Test {
@@ -215,4 +215,4 @@ TEST_F(Recording, BadInputIsNamed) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::simulation

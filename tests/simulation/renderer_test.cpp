@@ -1,4 +1,4 @@
-#include "panonav/simulation/renderer.hpp"
+#include "panonav_simulation/renderer.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 
-namespace panonav {
+namespace panonav::simulation {
 namespace {
 
 // A quadrilateral of one colour, corners in order.
@@ -240,4 +240,4 @@ TEST(SceneFromRobot, PitchLowersTheFrontAndRollTheRight) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::simulation

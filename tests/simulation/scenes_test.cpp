@@ -1,4 +1,4 @@
-#include "panonav/simulation/scenes.hpp"
+#include "panonav_simulation/scenes.hpp"
 #include "support/text.hpp"
 
 #include <gtest/gtest.h>
@@ -11,11 +11,12 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/signature/dissimilarity.hpp"
-#include "panonav/simulation/free_space.hpp"
-#include "panonav/simulation/renderer.hpp"
+#include "panonav_simulation/free_space.hpp"
+#include "panonav_simulation/renderer.hpp"
 #include "support/scene_views.hpp"
 
-namespace panonav::testing {
+namespace panonav::simulation {
+using namespace testing;
 namespace {
 
 constexpr std::uint64_t kSeeds[] = {1, 2, 300};
@@ -310,4 +311,4 @@ TEST(Scenes, BadVariationsAreNamed) {
 }
 
 }  // namespace
-}  // namespace panonav::testing
+}  // namespace panonav::simulation

@@ -1,4 +1,4 @@
-#include "panonav/simulation/sensor.hpp"
+#include "panonav_simulation/sensor.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "panonav/core/error.hpp"
-#include "panonav/simulation/mirror.hpp"
+#include "panonav_simulation/mirror.hpp"
 
-namespace panonav {
+namespace panonav::simulation {
 namespace {
 
 Panorama even_view(int rows, int columns, float value) {
@@ -155,4 +155,4 @@ TEST(Sensor, RefusesBadOptionsAndSizes) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::simulation

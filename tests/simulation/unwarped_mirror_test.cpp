@@ -10,12 +10,12 @@
 
 #include "panonav/panorama/unwarper.hpp"
 #include "panonav/signature/compass.hpp"
-#include "panonav/simulation/mirror.hpp"
-#include "panonav/simulation/renderer.hpp"
-#include "panonav/simulation/scenes.hpp"
-#include "panonav/simulation/sensor.hpp"
+#include "panonav_simulation/mirror.hpp"
+#include "panonav_simulation/renderer.hpp"
+#include "panonav_simulation/scenes.hpp"
+#include "panonav_simulation/sensor.hpp"
 
-namespace panonav {
+namespace panonav::simulation {
 namespace {
 
 double mean_difference(const Panorama& a, const Panorama& b) {
@@ -102,4 +102,4 @@ INSTANTIATE_TEST_SUITE_P(Scenes, UnwarpedMirror,
                                            Case{"arena", {0.3, 0.2, -1.0}}));
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::simulation

@@ -1,11 +1,12 @@
-#include "panonav/simulation/internal/xml.hpp"
+#include "panonav_simulation/internal/xml.hpp"
 
 #include <gtest/gtest.h>
 
 #include "panonav/core/error.hpp"
 #include "support/text.hpp"
 
-namespace panonav::testing {
+namespace panonav::simulation {
+using namespace testing;
 namespace {
 
 TEST(Xml, ReadsElementsAttributesAndText) {
@@ -62,4 +63,4 @@ TEST(Xml, NumbersAreFiniteAndAlone) {
 }
 
 }  // namespace
-}  // namespace panonav::testing
+}  // namespace panonav::simulation

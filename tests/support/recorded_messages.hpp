@@ -11,19 +11,19 @@
 #include <utility>
 #include <vector>
 
-#include "panonav/io/recording.hpp"
-#include "panonav/io/ros_messages.hpp"
+#include "panonav_recordings/recording.hpp"
+#include "panonav_recordings/ros_messages.hpp"
 
 namespace panonav::testing {
 
 /// A recording in memory.
-class RecordedMessages : public Recording {
+class RecordedMessages : public recordings::Recording {
  public:
-  explicit RecordedMessages(MessageEncoding encoding) : encoding_(encoding) {}
+  explicit RecordedMessages(recordings::MessageEncoding encoding) : encoding_(encoding) {}
 
   template <class Message>
   void add(const std::string& topic, std::int64_t log_ns, const Message& message) {
-    add(topic, Message::type, log_ns, ros::write_message(message, encoding_));
+    add(topic, Message::type, log_ns, recordings::ros::write_message(message, encoding_));
   }
   void add(const std::string& topic, std::string_view type, std::int64_t log_ns,
            std::vector<std::uint8_t> bytes) {
@@ -34,7 +34,7 @@ class RecordedMessages : public Recording {
       found = topics_.end() - 1;
     }
     ++found->messages;
-    MessagePlace place;
+    recordings::MessagePlace place;
     place.time_ns = log_ns;
     place.topic = static_cast<std::uint32_t>(found - topics_.begin());
     place.offset = messages_.size();
@@ -42,33 +42,37 @@ class RecordedMessages : public Recording {
     messages_.push_back(std::move(bytes));
   }
 
-  [[nodiscard]] const std::vector<RecordedTopic>& topics() const noexcept override {
+  [[nodiscard]] const std::vector<recordings::RecordedTopic>& topics() const noexcept override {
     return topics_;
   }
-  [[nodiscard]] std::optional<TimeSpan> time() const noexcept override { return std::nullopt; }
+  [[nodiscard]] std::optional<recordings::TimeSpan> time() const noexcept override {
+    return std::nullopt;
+  }
   [[nodiscard]] std::vector<std::string> warnings() const override { return {}; }
-  [[nodiscard]] std::vector<MessagePlace> places(
-      std::span<const std::uint32_t> topics, std::optional<TimeSpan> /*within*/) const override {
-    std::vector<MessagePlace> found;
+  [[nodiscard]] std::vector<recordings::MessagePlace> places(
+      std::span<const std::uint32_t> topics,
+      std::optional<recordings::TimeSpan> /*within*/) const override {
+    std::vector<recordings::MessagePlace> found;
     for (const auto& place : places_) {
       if (std::ranges::find(topics, place.topic) != topics.end()) found.push_back(place);
     }
-    std::ranges::stable_sort(found, {}, &MessagePlace::time_ns);
+    std::ranges::stable_sort(found, {}, &recordings::MessagePlace::time_ns);
     return found;
   }
-  [[nodiscard]] std::vector<std::uint8_t> read(const MessagePlace& place) const override {
+  [[nodiscard]] std::vector<std::uint8_t> read(
+      const recordings::MessagePlace& place) const override {
     return messages_.at(place.offset);
   }
-  void for_each(std::span<const std::uint32_t> topics, std::optional<TimeSpan> within,
-                const std::function<void(const MessagePlace&, std::span<const std::uint8_t>)>& use)
-      const override {
+  void for_each(std::span<const std::uint32_t> topics, std::optional<recordings::TimeSpan> within,
+                const std::function<void(const recordings::MessagePlace&,
+                                         std::span<const std::uint8_t>)>& use) const override {
     for (const auto& place : places(topics, within)) use(place, messages_.at(place.offset));
   }
 
  private:
-  MessageEncoding encoding_;
-  std::vector<RecordedTopic> topics_;
-  std::vector<MessagePlace> places_;
+  recordings::MessageEncoding encoding_;
+  std::vector<recordings::RecordedTopic> topics_;
+  std::vector<recordings::MessagePlace> places_;
   std::vector<std::vector<std::uint8_t>> messages_;
 };
 
@@ -76,7 +80,7 @@ class RecordedMessages : public Recording {
 inline std::map<std::string, std::pair<std::string, std::uint64_t>> topics_of(
     const std::string& file) {
   std::map<std::string, std::pair<std::string, std::uint64_t>> topics;
-  const auto recording = panonav::Recording::open(file);
+  const auto recording = panonav::recordings::Recording::open(file);
   EXPECT_TRUE(recording->warnings().empty());
   for (const auto& topic : recording->topics()) {
     topics[topic.name] = {topic.type, topic.messages};
@@ -87,14 +91,15 @@ inline std::map<std::string, std::pair<std::string, std::uint64_t>> topics_of(
 /// `use` gets each message of a topic, as CDR, which must be of the type.
 template <class Message, class Use>
 void for_each_message(const std::string& file, const std::string& topic, const Use& use) {
-  const auto recording = panonav::Recording::open(file);
+  const auto recording = panonav::recordings::Recording::open(file);
   for (std::uint32_t i = 0; i < recording->topics().size(); ++i) {
     if (recording->topics()[i].name != topic) continue;
     EXPECT_EQ(recording->topics()[i].type, Message::type);
-    recording->for_each(std::array{i}, {},
-                        [&](const MessagePlace&, std::span<const std::uint8_t> bytes) {
-                          use(ros::read_message<Message>(bytes, MessageEncoding::cdr));
-                        });
+    recording->for_each(
+        std::array{i}, {},
+        [&](const recordings::MessagePlace&, std::span<const std::uint8_t> bytes) {
+          use(recordings::ros::read_message<Message>(bytes, recordings::MessageEncoding::cdr));
+        });
   }
 }
 
@@ -115,7 +120,7 @@ inline void expect_record(
   EXPECT_EQ(topics, expected) << file;
   std::int64_t before_ns = -1;
   std::size_t poses = 0;
-  for_each_message<ros::Path>(file, "/path", [&](const ros::Path& path) {
+  for_each_message<recordings::ros::Path>(file, "/path", [&](const recordings::ros::Path& path) {
     EXPECT_GT(path.header.stamp_ns, before_ns);
     before_ns = path.header.stamp_ns;
     EXPECT_EQ(path.poses.size(), ++poses);

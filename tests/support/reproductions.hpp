@@ -8,7 +8,7 @@
 #include <set>
 #include <string>
 
-#include "experiments/reproduction.hpp"
+#include "lab/reproduction.hpp"
 #include "panonav/core/executor.hpp"
 #include "support/skips.hpp"
 #include "support/temporary_folder.hpp"
@@ -25,12 +25,12 @@ class ReproductionTest : public InTemporaryFolder {
     Executor alone(1);
     Executor both(2);
     one = reproduce(folder / "1", alone);
-    const Reproduction two = reproduce(folder / "2", both);
+    const lab::Reproduction two = reproduce(folder / "2", both);
     ASSERT_GT(one.rows.size(), more_rows_than);
     ASSERT_EQ(one.rows.size(), two.rows.size());
     for (std::size_t i = 0; i < one.rows.size(); ++i) {
-      const ResultRow& a = one.rows[i];
-      const ResultRow& b = two.rows[i];
+      const lab::ResultRow& a = one.rows[i];
+      const lab::ResultRow& b = two.rows[i];
       EXPECT_TRUE(ids.insert(a.id).second) << a.id << " stands twice";
       EXPECT_EQ(a.id, b.id);
       EXPECT_EQ(a.what, b.what);
@@ -57,7 +57,7 @@ class ReproductionTest : public InTemporaryFolder {
     }
   }
 
-  Reproduction one;
+  lab::Reproduction one;
   std::set<std::string> ids;
   std::size_t judged = 0;  ///< rows with a target
   std::size_t times = 0;

@@ -4,16 +4,17 @@
 #include <vector>
 
 #include "panonav/motion/path.hpp"
-#include "panonav/simulation/free_space.hpp"
-#include "panonav/simulation/renderer.hpp"
-#include "panonav/simulation/scene.hpp"
+#include "panonav_simulation/free_space.hpp"
+#include "panonav_simulation/renderer.hpp"
+#include "panonav_simulation/scene.hpp"
 
 namespace panonav::testing {
 
 /// A free place at this share (0 .. 1) of the shortest way along the first side of the scene's
 /// round trip.
-inline Viewpoint viewpoint_on_tour(const Scene& scene, double share, double heading_rad) {
-  const FreeSpace space(scene, free_space_options(scene));
+inline simulation::Viewpoint viewpoint_on_tour(const simulation::Scene& scene, double share,
+                                               double heading_rad) {
+  const simulation::FreeSpace space(scene, simulation::free_space_options(scene));
   const auto path = space.shortest_path(scene.tour.at(0), scene.tour.at(1));
   std::vector<Pose2> way;
   for (const Point2 point : path.value()) way.push_back({point.x_m, point.y_m, 0.0});

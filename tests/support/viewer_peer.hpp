@@ -12,7 +12,7 @@
 #include <thread>
 #include <vector>
 
-#include "viewer/view_server.hpp"
+#include "panonav_viewer/view_server.hpp"
 
 /// What tests of the server share: a client, and a moment.
 namespace panonav {
@@ -125,8 +125,8 @@ inline int control(const std::string& url, const std::string& body) {
   return status_of(peer.ask(peer.root() + "control", "", "POST", body));
 }
 
-inline RunMoment moment_at(double stamp_s) {
-  RunMoment moment{.stamp_s = stamp_s, .pose = Pose2{stamp_s, 2.0, 0.5}};
+inline recordings::RunMoment moment_at(double stamp_s) {
+  recordings::RunMoment moment{.stamp_s = stamp_s, .pose = Pose2{stamp_s, 2.0, 0.5}};
   moment.state = "localised";
   moment.sure = true;
   moment.probability = 0.75;

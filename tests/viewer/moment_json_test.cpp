@@ -1,4 +1,4 @@
-#include "viewer/moment_json.hpp"
+#include "panonav_viewer/moment_json.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,14 +6,14 @@
 #include <limits>
 #include <string>
 
+#include "panonav_viewer/page.hpp"
 #include "support/viewer_peer.hpp"
-#include "viewer/page.hpp"
 
-namespace panonav {
+namespace panonav::viewer {
 namespace {
 
 TEST(MomentJson, HoldsWhatIsKnownWhateverItIs) {
-  RunMoment moment{.stamp_s = std::numeric_limits<double>::quiet_NaN()};
+  recordings::RunMoment moment{.stamp_s = std::numeric_limits<double>::quiet_NaN()};
   EXPECT_EQ(json::parse(moment_json(moment, 3)), json::parse(R"({"n": 3, "t": null})"));
   moment = moment_at(1.25);
   moment.pose->x_m = std::numeric_limits<double>::infinity();
@@ -31,11 +31,11 @@ TEST(MomentJson, HoldsWhatIsKnownWhateverItIs) {
 }
 
 TEST(MomentJson, TellsModesComparisonsAndStages) {
-  RunMoment moment{.stamp_s = 0.0};
+  recordings::RunMoment moment{.stamp_s = 0.0};
   moment.modes = {{.weight = 0.75, .mean = {1.0, 2.0, 0.5}}, {.weight = 0.25}};
   moment.modes[0].covariance = {1.0, 2.0, 0.0, 2.0, 5.0, 0.0, 0.0, 0.0, 9.0};
   moment.comparisons = {{7, 100}, {2, 4'000'000'000U}};
-  moment.homing = RunHoming{1.5, std::numeric_limits<double>::quiet_NaN()};
+  moment.homing = recordings::RunHoming{1.5, std::numeric_limits<double>::quiet_NaN()};
   moment.stages_ms = {{"reading", 1.25}, {"filter", 0.5}};
   const json told = json::parse(moment_json(moment, 0));
   EXPECT_EQ(told["modes"], json::parse("[[0.75, 1.0, 2.0, 0.5, 1.0, 2.0, 5.0],"
@@ -46,7 +46,7 @@ TEST(MomentJson, TellsModesComparisonsAndStages) {
 }
 
 TEST(MomentJson, TellsWhatStays) {
-  RunMoment moment{.stamp_s = 0.0};
+  recordings::RunMoment moment{.stamp_s = 0.0};
   moment.references = {{1.0, 2.0}, {3.0, 4.0}};
   moment.reference_views = {{"a\xff", 0.5}, {"b", std::nullopt}};
   moment.regions = {{{{0.0, 0.0}, {1.0, 0.0}, {0.0, 1.0}}, 3}};
@@ -59,7 +59,7 @@ TEST(MomentJson, TellsWhatStays) {
   // Other references without names have not those of the ones before.
   StayingParts staying;
   staying.take(moment);
-  RunMoment later{.stamp_s = 1.0};
+  recordings::RunMoment later{.stamp_s = 1.0};
   later.references = {{5.0, 6.0}};
   staying.take(later);
   const json kept = json::parse(staying_json(staying.moment));
@@ -76,7 +76,7 @@ TEST(Page, NeedsNothingFromElsewhere) {
   EXPECT_NE(page.find("panonav/main"), std::string::npos);
   RunPage over("run", 2);
   over.add(moment_at(0.0));
-  RunMoment hostile = moment_at(1.0);
+  recordings::RunMoment hostile = moment_at(1.0);
   hostile.values = {{"picture", "</script><script>alert(1)</script>"}};
   over.add(hostile);
   const std::string played = over.html();
@@ -93,4 +93,4 @@ TEST(Page, NeedsNothingFromElsewhere) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::viewer

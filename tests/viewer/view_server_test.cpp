@@ -1,4 +1,4 @@
-#include "viewer/view_server.hpp"
+#include "panonav_viewer/view_server.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -15,7 +15,7 @@
 #include "panonav/io/image_file.hpp"
 #include "support/viewer_peer.hpp"
 
-namespace panonav {
+namespace panonav::viewer {
 namespace {
 
 TEST(ViewServer, GivesNothingToWhoDoesNotKnowTheToken) {
@@ -144,7 +144,7 @@ TEST(ViewServer, TellsEachMomentInOrder) {
 TEST(ViewServer, TellsWhoComesLateWhatWas) {
   ViewServer server;
   for (int i = 0; i < 30; ++i) {
-    RunMoment moment = moment_at(i);
+    recordings::RunMoment moment = moment_at(i);
     if (i == 0) moment.references = {{1.0, 2.0}, {3.0, 4.0}};
     if (i == 4) moment.truth = ReferencePose{5.0, 6.0, 7.0};
     if (i == 3) moment.goal = Pose2{7.0, 8.0, 0.0};
@@ -203,7 +203,7 @@ TEST(ViewServer, GivesPicturesOfTheNewestMoments) {
     return std::vector<std::uint8_t>(text.begin(), text.end());
   };
   for (int i = 0; i < 20; ++i) {
-    RunMoment moment = moment_at(i);
+    recordings::RunMoment moment = moment_at(i);
     moment.picture = picture;
     moment.best_match = thumbnail;
     server.add(std::move(moment));
@@ -227,7 +227,7 @@ TEST(ViewServer, GivesPicturesOfTheNewestMoments) {
 }
 
 TEST(ViewServer, DoesNotWaitForSlowViewers) {
-  RunMoment moment = moment_at(0.0);
+  recordings::RunMoment moment = moment_at(0.0);
   moment.particles.assign(4000, {1.0, 2.0, 3.0});  // 64 kB of text
   constexpr int count = 300;
   // The time that adding took, and all of it.
@@ -370,4 +370,4 @@ TEST(ViewServer, NamesTheAddressThatIsNotToBeHad) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::viewer

@@ -1,4 +1,4 @@
-#include "viewer/view_server.hpp"
+#include "panonav_viewer/view_server.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include "panonav/io/image_file.hpp"
 #include "support/viewer_peer.hpp"
 
-namespace panonav {
+namespace panonav::viewer {
 namespace {
 
 std::string below_pictures(const std::string& url, int reference) {
@@ -24,7 +24,7 @@ TEST(ViewServer, GivesPicturesOfReferences) {
     return name == "a" ? encode_png(picture.view()) : std::vector<std::uint8_t>{};
   }});
   EXPECT_EQ(status_of(below_pictures(server.url(), 0)), 404);  // none is told yet
-  RunMoment moment = moment_at(0.0);
+  recordings::RunMoment moment = moment_at(0.0);
   moment.references = {{1.0, 2.0}, {3.0, 4.0}};
   moment.reference_views = {{"a", 0.5}, {"../b", std::nullopt}};
   server.add(std::move(moment));
@@ -47,7 +47,7 @@ TEST(ViewServer, TakesTheWishesThatTheRunTakes) {
   const auto told = [](const ViewServer& server, const std::string& body) {
     return control(server.url(), body);
   };
-  RunMoment moment = moment_at(0.0);
+  recordings::RunMoment moment = moment_at(0.0);
   moment.references = {{0.0, 0.0}, {3.0, 4.0}};
   ViewServer takes_pose({.takes = ViewWish::pose});
   EXPECT_EQ(told(takes_pose, R"({"pose": [1, 2, 0.5]})"), 400);  // beside what? nothing is told
@@ -94,4 +94,4 @@ TEST(ViewServer, TakesTheWishesThatTheRunTakes) {
 }
 
 }  // namespace
-}  // namespace panonav
+}  // namespace panonav::viewer

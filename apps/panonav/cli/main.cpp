@@ -25,6 +25,7 @@ void report(std::string_view verb, std::string_view message) {
 }
 
 ExitCode run(std::string_view& verb, std::span<const std::string> words) {
+  panonav::command::register_outbuildings();
   const auto verbs = panonav::command::all_verbs();
   if (const auto* known = panonav::command::verb_in(verbs, words)) verb = known->name;
   const auto command = panonav::command::parse(verbs, words);

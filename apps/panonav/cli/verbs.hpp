@@ -6,7 +6,10 @@
 
 namespace panonav::command {
 
-/// Every verb, in the order in which a newcomer meets them.
+/// Makes what this build has beside the library known to it; called once, before a verb runs.
+void register_outbuildings();
+
+/// Every verb of this build, in the order in which a newcomer meets them.
 [[nodiscard]] std::vector<Verb> all_verbs();
 
 [[nodiscard]] Verb arrange_verb();

@@ -18,13 +18,13 @@
 #include "demo/route.hpp"
 #include "demo/story.hpp"
 #include "demo/track.hpp"
-#include "experiments/runs/surroundings.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/pipeline/arrangement.hpp"
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/observation_source.hpp"
+#include "panonav_viewer/surroundings.hpp"
 #include "reports/report_page.hpp"
 
 namespace panonav::command {
@@ -39,7 +39,8 @@ std::string percent(double share) {
 
 // Raw picture, what calibration found in it, and the cylinder made of it. Gives the first for the
 // page's beginning.
-ReportPicture show_camera(const DemoRecordings& recordings, Session& session, ReportPage& page) {
+viewer::ReportPicture show_camera(const DemoRecordings& recordings, Session& session,
+                                  viewer::ReportPage& page) {
   const Dataset& asked = recordings.query_run;
   const Image colour = recordings.colour_picture(asked.entries.front(), session.executor());
   const Image overlay = draw_mirror(colour.view(), recordings.mirror);
@@ -58,7 +59,7 @@ ReportPicture show_camera(const DemoRecordings& recordings, Session& session, Re
       "middle is the camera itself. Before anything else, calibration finds the mirror in some of "
       "the raw pictures: centre, rim and inner radius. Everything below uses what it found, not "
       "the simulator's own numbers.");
-  ReportPicture mirror = picture_in_page(
+  viewer::ReportPicture mirror = picture_in_page(
       colour.view(), "Raw picture of the mirror camera, " + std::to_string(truth.image_size.width) +
                          " x " + std::to_string(truth.image_size.height) +
                          " (in colour for you; the robot works on grey)");
@@ -139,9 +140,9 @@ std::string median_text(const std::vector<double>& values, double unit, int digi
   return fixed(unit * median(values), digits) + " " + std::string(name);
 }
 
-void show_answers(const VisualMemory& memory, const std::vector<MapLayer>& scene,
+void show_answers(const VisualMemory& memory, const std::vector<viewer::MapLayer>& scene,
                   const std::vector<AskedView>& asked, const Outcome& own, const Outcome& foreign,
-                  double spacing_m, ReportPage& page) {
+                  double spacing_m, viewer::ReportPage& page) {
   const std::string spacing = fixed(100.0 * spacing_m, 0) + " cm";
   page.part("It remembers and localises itself",
             {median_text(own.errors_m, 100.0, 1, "cm"),
@@ -175,8 +176,9 @@ const AskedView& shown_view(const std::vector<AskedView>& asked) {
   return known == asked.end() ? asked.front() : *known;
 }
 
-UnfoldingMap show_levels(const VisualMemory& memory, const std::vector<MapLayer>& scene,
-                         const AskedView& view, double spacing_m, ReportPage& page) {
+viewer::UnfoldingMap show_levels(const VisualMemory& memory,
+                                 const std::vector<viewer::MapLayer>& scene, const AskedView& view,
+                                 double spacing_m, viewer::ReportPage& page) {
   AreasShown areas = map_of_areas(memory, scene, view);
   const std::string first = fixed(areas.areas_m2.front(), 1);
   const std::string last = fixed(areas.areas_m2.back(), 2);
@@ -199,14 +201,14 @@ UnfoldingMap show_levels(const VisualMemory& memory, const std::vector<MapLayer>
 }
 
 void show_what_next(const DemoOptions& wanted, const DemoRecordings& recordings,
-                    const DemoNavigation& navigation, ReportPage& page) {
+                    const DemoNavigation& navigation, viewer::ReportPage& page) {
   const auto in_out = [&](const char* name) { return (wanted.out / name).string(); };
   page.section("Try it yourself");
   page.text(
       "The recordings and the memory of this run lie beside this page. Each command shows more "
       "with --help.");
   const std::string memory = in_out("office.panonav");
-  const SimulatedWorldOptions seen = simulation_of(wanted, 0);
+  const simulation::SimulatedWorldOptions seen = simulation_of(wanted, 0);
   std::string mission;
   for (const std::string& word : navigation.first_mission) mission += " " + word;
   page.commands(
@@ -244,7 +246,7 @@ ordered_json median_or_null(const std::vector<double>& values) {
   return values.empty() ? ordered_json() : ordered_json(median(values));
 }
 
-ordered_json as_json(const MissionRun& run) {
+ordered_json as_json(const simulation::MissionRun& run) {
   return {{"end", name_of(run.end)},
           {"goal_distance_m", run.end_distance_m},
           {"steps", run.decisions.size()},
@@ -360,7 +362,7 @@ ExitCode demonstrate(const DemoOptions& wanted, Session& session) {
   if (!recordings) {
     return session.no_answer("panonav demo: no mirror was found in the simulated pictures");
   }
-  ReportPage page(
+  viewer::ReportPage page(
       "panonav: a robot that remembers what places look like",
       "A robot with one camera remembers views of a place. By what it sees it then knows where it "
       "is, makes maps, finds home, repeats routes and goes where it is told. All of this was just "
@@ -378,7 +380,7 @@ ExitCode demonstrate(const DemoOptions& wanted, Session& session) {
   DemoResults done{.views = memory.size(), .questions = asked.size()};
   done.own = outcome_of(asked, memory);
   done.foreign = outcome_of(elsewhere, memory);
-  const std::vector<MapLayer> scene = scene_layers(recordings->office_scene);
+  const std::vector<viewer::MapLayer> scene = viewer::scene_layers(recordings->office_scene);
   show_answers(memory, scene, asked, done.own, done.foreign, wanted.spacing_m(), page);
   story.position_error = median_text(done.own.errors_m, 100.0, 1, "cm");
   next_part("as accurate as needed");

@@ -5,12 +5,12 @@
 #include <numbers>
 #include <utility>
 
-#include "experiments/runs/surroundings.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/positions.hpp"
-#include "reporting/plot.hpp"
+#include "panonav_viewer/plot.hpp"
+#include "panonav_viewer/surroundings.hpp"
 
 namespace panonav::command {
 
@@ -20,9 +20,10 @@ constexpr double close_m = 0.1;
 
 /// Places like the one that a user would come back to: a start one metre off in the open, so that
 /// no wall stands in between.
-std::vector<HomingTask> tasks_in(const HomingPlace& place, int count, std::uint64_t seed) {
+std::vector<lab::HomingTask> tasks_in(const lab::HomingPlace& place, int count,
+                                      std::uint64_t seed) {
   constexpr double away_m = 1.0;
-  std::vector<HomingTask> tasks;
+  std::vector<lab::HomingTask> tasks;
   Random random(seed, 1);
   while (tasks.size() < static_cast<std::size_t>(count)) {
     const Pose2 goal = place.free_space->random_pose(random);
@@ -37,26 +38,28 @@ std::vector<HomingTask> tasks_in(const HomingPlace& place, int count, std::uint6
 }
 
 /// All robots at once, step by step.
-UnfoldingMap map_of_runs(const Scene& office, const std::vector<HomingRun>& runs) {
-  MapLayer homes{.label = "home", .colour = PlotColour::black};
-  MapLayer starts{.label = "start", .colour = PlotColour::green};
+viewer::UnfoldingMap map_of_runs(const simulation::Scene& office,
+                                 const std::vector<lab::HomingRun>& runs) {
+  viewer::MapLayer homes{.label = "home", .colour = viewer::PlotColour::black};
+  viewer::MapLayer starts{.label = "start", .colour = viewer::PlotColour::green};
   std::size_t longest = 0;
-  for (const HomingRun& run : runs) {
+  for (const lab::HomingRun& run : runs) {
     homes.squares.push_back(run.goal.position());
     starts.circles.push_back(run.path.front().position());
     longest = std::max(longest, run.path.size());
   }
-  UnfoldingMap map{.title = "Runs home in the office", .backdrop = scene_layers(office)};
+  viewer::UnfoldingMap map{.title = "Runs home in the office",
+                           .backdrop = viewer::scene_layers(office)};
   map.backdrop.push_back(homes);
   map.backdrop.push_back(starts);
   for (std::size_t step = 0; step < longest; ++step) {
-    MapLayer good{.label = "way home", .colour = PlotColour::blue};
-    MapLayer bad{.label = "ended elsewhere", .colour = PlotColour::vermilion};
-    for (const HomingRun& run : runs) {
+    viewer::MapLayer good{.label = "way home", .colour = viewer::PlotColour::blue};
+    viewer::MapLayer bad{.label = "ended elsewhere", .colour = viewer::PlotColour::vermilion};
+    for (const lab::HomingRun& run : runs) {
       std::vector<Point2> line = positions_of(run.path);
       const bool over = line.size() <= step + 1;
       line.resize(std::min(line.size(), step + 1));
-      MapLayer& layer = over && !run.succeeds(close_m) ? bad : good;
+      viewer::MapLayer& layer = over && !run.succeeds(close_m) ? bad : good;
       layer.dots.push_back(line.back());
       if (line.size() > 1) layer.lines.push_back(std::move(line));
     }
@@ -66,13 +69,13 @@ UnfoldingMap map_of_runs(const Scene& office, const std::vector<HomingRun>& runs
 }
 
 /// The view at home, turned as the robot faces, above what it sees.
-std::vector<ReportView> views_of(const Panorama& home, const Panorama& current,
-                                 const HomeVector& vector) {
-  std::vector<ViewMark> marks{{.azimuth_rad = 0.0, .colour = PlotColour::grey}};
+std::vector<viewer::ReportView> views_of(const Panorama& home, const Panorama& current,
+                                         const HomeVector& vector) {
+  std::vector<viewer::ViewMark> marks{{.azimuth_rad = 0.0, .colour = viewer::PlotColour::grey}};
   if (vector.length() > 0.0) {
-    marks.push_back({vector.direction_rad(), PlotColour::vermilion, true});
+    marks.push_back({vector.direction_rad(), viewer::PlotColour::vermilion, true});
     marks.push_back(
-        {wrap_angle(vector.direction_rad() + std::numbers::pi), PlotColour::blue, true});
+        {wrap_angle(vector.direction_rad() + std::numbers::pi), viewer::PlotColour::blue, true});
   }
   const double columns = -vector.heading_rad / (2.0 * std::numbers::pi) * home.columns();
   return {{turn_columns(home, static_cast<int>(std::lround(columns))), marks,
@@ -84,24 +87,24 @@ std::vector<ReportView> views_of(const Panorama& home, const Panorama& current,
 
 }  // namespace
 
-DemoHoming show_homing(const Scene& office, int runs, std::uint64_t seed, Session& session,
-                       ReportPage& page) {
-  const HomingPlace place = make_homing_place(office, {}, session.executor());
+DemoHoming show_homing(const simulation::Scene& office, int runs, std::uint64_t seed,
+                       Session& session, viewer::ReportPage& page) {
+  const lab::HomingPlace place = lab::make_homing_place(office, {}, session.executor());
   const auto tasks = tasks_in(place, runs, seed);
   DemoHoming homing;
-  homing.runs = run_home(place, tasks, {}, seed, session.executor());
+  homing.runs = lab::run_home(place, tasks, {}, seed, session.executor());
   std::size_t steps = 0;
-  for (const HomingRun& run : homing.runs) {
+  for (const lab::HomingRun& run : homing.runs) {
     homing.arrived += run.succeeds(close_m) ? 1 : 0;
     homing.distances_m.push_back(run.end_distance_m);
     steps += run.path.size() - 1;
   }
   const auto seen_from = [&](const Pose2& pose) {
-    const HomingCamera& camera = place.camera;
-    return take_panorama(*place.renderer, pose, camera.rendering, camera.frame, camera.sensor, seed,
-                         session.executor());
+    const lab::HomingCamera& camera = place.camera;
+    return simulation::take_panorama(*place.renderer, pose, camera.rendering, camera.frame,
+                                     camera.sensor, seed, session.executor());
   };
-  const HomingRun& shown = homing.runs.front();
+  const lab::HomingRun& shown = homing.runs.front();
 
   page.part("Back home", {std::to_string(homing.arrived) + " of " + std::to_string(runs),
                           "robots found home from a metre away, by one remembered picture"});

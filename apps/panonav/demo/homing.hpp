@@ -4,20 +4,20 @@
 #include <vector>
 
 #include "cli/session.hpp"
-#include "experiments/runs/homing_run.hpp"
+#include "lab/runs/homing_run.hpp"
 #include "reports/report_page.hpp"
 
 namespace panonav::command {
 
 /// Robots that go home to places in the office, each from one view of it and about a metre away.
 struct DemoHoming {
-  std::vector<HomingRun> runs;
+  std::vector<lab::HomingRun> runs;
   std::size_t arrived = 0;          ///< within 10 cm, and they know it
   std::vector<double> distances_m;  ///< between home and where each run ended
 };
 
 /// Runs them and adds a part that plays them to the page. The same seed gives the same runs.
-DemoHoming show_homing(const Scene& office, int runs, std::uint64_t seed, Session& session,
-                       ReportPage& page);
+DemoHoming show_homing(const simulation::Scene& office, int runs, std::uint64_t seed,
+                       Session& session, viewer::ReportPage& page);
 
 }  // namespace panonav::command

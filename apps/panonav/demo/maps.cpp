@@ -9,14 +9,14 @@
 #include <utility>
 #include <vector>
 
-#include "experiments/runs/surroundings.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/geometry/positions.hpp"
 #include "panonav/mapping/lattice.hpp"
 #include "panonav/pipeline/arrangement.hpp"
-#include "panonav/simulation/scenes.hpp"
-#include "reporting/plot.hpp"
+#include "panonav_simulation/scenes.hpp"
+#include "panonav_viewer/plot.hpp"
+#include "panonav_viewer/surroundings.hpp"
 
 namespace panonav::command {
 
@@ -25,17 +25,20 @@ namespace {
 constexpr double spacing_m = 0.1;
 constexpr int components = 15;
 
-MapPlot map_of_drive(const PlaceRecording& place, const MappingRecording& recording,
-                     const MappedRecording& mapped) {
-  MapPlot plot{.title = "A drive through rooms", .layers = scene_layers(place.scene)};
+viewer::MapPlot map_of_drive(const simulation::PlaceRecording& place,
+                             const simulation::MappingRecording& recording,
+                             const simulation::MappedRecording& mapped) {
+  viewer::MapPlot plot{.title = "A drive through rooms",
+                       .layers = viewer::scene_layers(place.scene)};
   plot.layers.push_back(
-      {.label = "true way", .colour = PlotColour::black, .lines = {mapped.truth}});
-  plot.layers.push_back({.label = "wheels alone",
-                         .colour = PlotColour::vermilion,
-                         .lines = {laid_over(positions_of(recording.wheels), mapped.truth)}});
+      {.label = "true way", .colour = viewer::PlotColour::black, .lines = {mapped.truth}});
+  plot.layers.push_back(
+      {.label = "wheels alone",
+       .colour = viewer::PlotColour::vermilion,
+       .lines = {simulation::laid_over(positions_of(recording.wheels), mapped.truth)}});
   plot.layers.push_back({.label = "map from the views",
-                         .colour = PlotColour::blue,
-                         .lines = {laid_over(mapped.estimate, mapped.truth)}});
+                         .colour = viewer::PlotColour::blue,
+                         .lines = {simulation::laid_over(mapped.estimate, mapped.truth)}});
   return plot;
 }
 
@@ -47,12 +50,13 @@ struct Growth {
 
 /// The views as dots, coloured by where they were taken, from west to east: whoever looks sees at
 /// once whether they are sorted.
-std::vector<MapLayer> coloured(const std::vector<Point2>& positions,
-                               const std::vector<Point2>& truth) {
-  constexpr std::array colours{PlotColour::blue,   PlotColour::sky,    PlotColour::green,
-                               PlotColour::yellow, PlotColour::orange, PlotColour::vermilion};
-  std::vector<MapLayer> layers;
-  for (const PlotColour colour : colours) layers.push_back({.colour = colour});
+std::vector<viewer::MapLayer> coloured(const std::vector<Point2>& positions,
+                                       const std::vector<Point2>& truth) {
+  constexpr std::array colours{viewer::PlotColour::blue,   viewer::PlotColour::sky,
+                               viewer::PlotColour::green,  viewer::PlotColour::yellow,
+                               viewer::PlotColour::orange, viewer::PlotColour::vermilion};
+  std::vector<viewer::MapLayer> layers;
+  for (const viewer::PlotColour colour : colours) layers.push_back({.colour = colour});
   layers.front().label = "taken in the west";
   layers.back().label = "taken in the east";
   const auto [west, east] = std::ranges::minmax(truth, {}, &Point2::x_m);
@@ -66,21 +70,21 @@ std::vector<MapLayer> coloured(const std::vector<Point2>& positions,
 
 /// How the views find together: groups at the places where their views end, single views at places
 /// at random.
-UnfoldingMap map_of_growth(const Lattice& arranged, const VisualMemory& office,
-                           const std::vector<Growth>& growth, std::uint64_t seed) {
+viewer::UnfoldingMap map_of_growth(const Lattice& arranged, const VisualMemory& office,
+                                   const std::vector<Growth>& growth, std::uint64_t seed) {
   std::vector<Point2> truth;
   std::vector<Point2> ends;
   for (const LatticeNode& node : arranged.nodes) {
     truth.push_back(office.info(node.view).pose->position());
     ends.push_back(node.pose.position());
   }
-  ends = laid_over(ends, truth);
+  ends = simulation::laid_over(ends, truth);
   std::vector<Point2> anywhere = ends;
   Random random(seed, 1);
   for (std::size_t i = anywhere.size(); i > 1; --i) {
     std::swap(anywhere[i - 1], anywhere[static_cast<std::size_t>(random.index(i))]);
   }
-  UnfoldingMap map{.title = "As the views arrange themselves"};
+  viewer::UnfoldingMap map{.title = "As the views arrange themselves"};
   map.frames.push_back({.title = "in no order", .layers = coloured(anywhere, truth)});
   for (const Growth& at : growth) {
     std::map<std::size_t, std::vector<std::size_t>> groups;
@@ -95,7 +99,7 @@ UnfoldingMap map_of_growth(const Lattice& arranged, const VisualMemory& office,
         now.push_back(at.poses[view].position());
         end.push_back(ends[view]);
       }
-      now = laid_over(now, end);
+      now = simulation::laid_over(now, end);
       for (std::size_t i = 0; i < views.size(); ++i) positions[views[i]] = now[i];
       found += views.size();
     }
@@ -103,7 +107,7 @@ UnfoldingMap map_of_growth(const Lattice& arranged, const VisualMemory& office,
                                    " views in groups",
                           .layers = coloured(positions, truth)});
   }
-  MapLayer springs{.label = "springs", .colour = PlotColour::light_grey};
+  viewer::MapLayer springs{.label = "springs", .colour = viewer::PlotColour::light_grey};
   for (const LatticeSpring& spring : arranged.springs) {
     if (spring.weight >= min_spring_weight)
       springs.lines.push_back({ends[spring.a], ends[spring.b]});
@@ -113,7 +117,7 @@ UnfoldingMap map_of_growth(const Lattice& arranged, const VisualMemory& office,
   return map;
 }
 
-MapPlot map_of_truth(const VisualMemory& office) {
+viewer::MapPlot map_of_truth(const VisualMemory& office) {
   std::vector<Point2> truth;
   for (const ViewId view : office.views()) {
     truth.push_back(office.info(view).pose->position());
@@ -137,7 +141,7 @@ double room_m(const VisualMemory& office) {
 }  // namespace
 
 DemoMaps show_maps(const VisualMemory& office, std::uint64_t seed, bool quick, Session& session,
-                   ReportPage& page) {
+                   viewer::ReportPage& page) {
   constexpr std::size_t frames = 40;
   DemoMaps maps;
   std::vector<Growth> growth;
@@ -150,15 +154,15 @@ DemoMaps show_maps(const VisualMemory& office, std::uint64_t seed, bool quick, S
               });
   maps.lattice = compare_with_ground_truth(maps.arranged, office);
 
-  const PlaceRecording place =
-      empty_place(make_scene("loop", {.seed = seed}), seed, 256, session.executor());
-  const MappingRecording recording =
-      record_for_mapping(place, drive(place, {}, spacing_m, quick ? 60 : 200), components,
-                         cheap_wheels(), seed, session.executor());
-  const MappedRecording mapped =
+  const simulation::PlaceRecording place = simulation::empty_place(
+      simulation::make_scene("loop", {.seed = seed}), seed, 256, session.executor());
+  const simulation::MappingRecording recording = simulation::record_for_mapping(
+      place, drive(place, {}, spacing_m, quick ? 60 : 200), components, simulation::cheap_wheels(),
+      seed, session.executor());
+  const simulation::MappedRecording mapped =
       map_recording(recording, {.odometry = {.camera_height_m = place.scene.camera_height_m}});
-  maps.map_error = shape_error(mapped.estimate, mapped.truth);
-  maps.wheels_error = shape_error(positions_of(recording.wheels), mapped.truth);
+  maps.map_error = simulation::shape_error(mapped.estimate, mapped.truth);
+  maps.wheels_error = simulation::shape_error(positions_of(recording.wheels), mapped.truth);
   maps.map_rms_m = align(mapped.estimate, mapped.truth, {.allow_scale = true}).rms_m;
   maps.wheels_rms_m =
       align(positions_of(recording.wheels), mapped.truth, {.allow_scale = true}).rms_m;

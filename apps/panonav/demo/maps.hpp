@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "cli/session.hpp"
-#include "experiments/runs/mapping_run.hpp"
+#include "panonav_simulation/mapping_run.hpp"
 #include "reports/lattice_picture.hpp"
 #include "reports/report_page.hpp"
 
@@ -24,6 +24,6 @@ struct DemoMaps {
 /// another place, and adds a part to the page that plays the first and
 /// draws the second.
 DemoMaps show_maps(const VisualMemory& office, std::uint64_t seed, bool quick, Session& session,
-                   ReportPage& page);
+                   viewer::ReportPage& page);
 
 }  // namespace panonav::command

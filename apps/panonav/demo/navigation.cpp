@@ -7,8 +7,6 @@
 #include <string>
 #include <utility>
 
-#include "experiments/runs/mission_picture.hpp"
-#include "experiments/runs/surroundings.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
@@ -18,8 +16,10 @@
 #include "panonav/navigation/direction_field.hpp"
 #include "panonav/navigation/navigation_graph.hpp"
 #include "panonav/relative_pose/fourier_homing.hpp"
-#include "panonav/simulation/screen.hpp"
-#include "reporting/plot.hpp"
+#include "panonav_simulation/screen.hpp"
+#include "panonav_viewer/mission_picture.hpp"
+#include "panonav_viewer/plot.hpp"
+#include "panonav_viewer/surroundings.hpp"
 #include "verbs/navigated_run.hpp"
 #include "verbs/shown_references.hpp"
 
@@ -35,9 +35,9 @@ constexpr std::uint64_t noise_stream = 4;
 
 using Pipeline = std::shared_ptr<const ViewEncoder>;
 
-RememberedPlace remembered_place(const VisualMemory& memory, const Lattice& arranged,
-                                 double spacing_m) {
-  RememberedPlace remembered{memory, graph_of_lattice(arranged), {}, spacing_m};
+simulation::RememberedPlace remembered_place(const VisualMemory& memory, const Lattice& arranged,
+                                             double spacing_m) {
+  simulation::RememberedPlace remembered{memory, graph_of_lattice(arranged), {}, spacing_m};
   for (const ViewId view : remembered.graph.views()) {
     const ReferencePose& pose = *memory.info(view).pose;
     remembered.truth.push_back({pose.x_m, pose.y_m, *pose.heading_rad});
@@ -46,29 +46,30 @@ RememberedPlace remembered_place(const VisualMemory& memory, const Lattice& arra
 }
 
 /// The robot sees through the camera as it is, and understands it as it was calibrated.
-void give_sight(MissionPlace& place, const DemoRecordings& recordings, const Pipeline& pipeline) {
-  const SimulatedWorldOptions& settled = recordings.office_world->options();
+void give_sight(simulation::MissionPlace& place, const DemoRecordings& recordings,
+                const Pipeline& pipeline) {
+  const simulation::SimulatedWorldOptions& settled = recordings.office_world->options();
   place.sight = sight_through(place.renderer, recordings.true_camera, settled.frame, settled.sensor,
                               pipeline, nullptr);
 }
 
 /// A mission, and the office with a screen across the middle of its planned way.
 struct ScreenedMission {
-  Mission mission;
-  MissionPlace place;
+  simulation::Mission mission;
+  simulation::MissionPlace place;
 };
 
 /// The first of `missions` that such a screen makes longer but not impossible.
-std::optional<ScreenedMission> screened_mission(const MissionPlace& place,
-                                                const RememberedPlace& remembered,
-                                                const std::vector<Mission>& missions,
+std::optional<ScreenedMission> screened_mission(const simulation::MissionPlace& place,
+                                                const simulation::RememberedPlace& remembered,
+                                                const std::vector<simulation::Mission>& missions,
                                                 const DemoRecordings& recordings,
                                                 const Pipeline& pipeline, Executor& executor) {
   constexpr double width_m = 0.6;
   constexpr double height_m = 1.0;
   constexpr double min_detour_m = 0.1;
   AreaPlanner planner(remembered.graph);
-  for (const Mission& mission : missions) {
+  for (const simulation::Mission& mission : missions) {
     const auto nearest = std::ranges::min_element(remembered.truth, {}, [&](const Pose2& pose) {
       return distance(pose.position(), mission.start.position());
     });
@@ -80,17 +81,17 @@ std::optional<ScreenedMission> screened_mission(const MissionPlace& place,
     const Point2 behind = remembered.truth[way[way.size() / 2]].position();
     const Pose2 across{0.5 * (before.x_m + behind.x_m), 0.5 * (before.y_m + behind.y_m),
                        std::atan2(behind.y_m - before.y_m, behind.x_m - before.x_m)};
-    MissionPlace screened = place;
-    add_screen(screened.scene, across, width_m, height_m);
-    screened.free_space = std::make_shared<const FreeSpace>(
+    simulation::MissionPlace screened = place;
+    simulation::add_screen(screened.scene, across, width_m, height_m);
+    screened.free_space = std::make_shared<const simulation::FreeSpace>(
         screened.scene, recordings.office_world->options().free_space);
     const Point2 goal = remembered.truth[*remembered.graph.node_of(mission.goal)].position();
     const auto direct = place.free_space->shortest_path(mission.start.position(), goal);
     const auto around = screened.free_space->shortest_path(mission.start.position(), goal);
     if (!direct || !around || path_length_m(*around) < path_length_m(*direct) + min_detour_m)
       continue;
-    screened.renderer =
-        std::make_shared<const Renderer>(screened.scene, RendererOptions{}, executor);
+    screened.renderer = std::make_shared<const simulation::Renderer>(
+        screened.scene, simulation::RendererOptions{}, executor);
     give_sight(screened, recordings, pipeline);
     return ScreenedMission{mission, std::move(screened)};
   }
@@ -98,12 +99,14 @@ std::optional<ScreenedMission> screened_mission(const MissionPlace& place,
 }
 
 /// All robots at once, look by look.
-UnfoldingMap map_of_runs(const DemoNavigation& navigation, const RememberedPlace& remembered,
-                         const std::vector<Mission>& missions, const Scene& office) {
-  MapLayer views{.label = "remembered views", .colour = PlotColour::light_grey};
+viewer::UnfoldingMap map_of_runs(const DemoNavigation& navigation,
+                                 const simulation::RememberedPlace& remembered,
+                                 const std::vector<simulation::Mission>& missions,
+                                 const simulation::Scene& office) {
+  viewer::MapLayer views{.label = "remembered views", .colour = viewer::PlotColour::light_grey};
   for (const Pose2& pose : remembered.truth) views.circles.push_back(pose.position());
-  MapLayer starts{.label = "start", .colour = PlotColour::green};
-  MapLayer goals{.label = "goal", .colour = PlotColour::black};
+  viewer::MapLayer starts{.label = "start", .colour = viewer::PlotColour::green};
+  viewer::MapLayer goals{.label = "goal", .colour = viewer::PlotColour::black};
   std::size_t longest = 0;
   for (std::size_t i = 0; i < navigation.runs.size(); ++i) {
     starts.squares.push_back(navigation.runs[i].path.front().position());
@@ -111,16 +114,16 @@ UnfoldingMap map_of_runs(const DemoNavigation& navigation, const RememberedPlace
         remembered.truth[*remembered.graph.node_of(missions[i].goal)].position());
     longest = std::max(longest, navigation.runs[i].path.size());
   }
-  UnfoldingMap map{.title = "All missions", .backdrop = scene_layers(office)};
-  for (const MapLayer& layer : {views, starts, goals}) map.backdrop.push_back(layer);
+  viewer::UnfoldingMap map{.title = "All missions", .backdrop = viewer::scene_layers(office)};
+  for (const viewer::MapLayer& layer : {views, starts, goals}) map.backdrop.push_back(layer);
   for (std::size_t look = 0; look < longest; ++look) {
-    MapLayer good{.label = "way to the goal", .colour = PlotColour::blue};
-    MapLayer bad{.label = "ended elsewhere", .colour = PlotColour::vermilion};
-    for (const MissionRun& run : navigation.runs) {
+    viewer::MapLayer good{.label = "way to the goal", .colour = viewer::PlotColour::blue};
+    viewer::MapLayer bad{.label = "ended elsewhere", .colour = viewer::PlotColour::vermilion};
+    for (const simulation::MissionRun& run : navigation.runs) {
       std::vector<Point2> line = positions_of(run.path);
       const bool over = line.size() <= look + 1;
       line.resize(std::min(line.size(), look + 1));
-      MapLayer& layer = over && !run.arrives(navigation.within_m) ? bad : good;
+      viewer::MapLayer& layer = over && !run.arrives(navigation.within_m) ? bad : good;
       layer.dots.push_back(line.back());
       if (line.size() > 1) layer.lines.push_back(std::move(line));
     }
@@ -130,14 +133,17 @@ UnfoldingMap map_of_runs(const DemoNavigation& navigation, const RememberedPlace
 }
 
 /// One run, look by look, over what the memory tells of the way.
-UnfoldingMap map_of_run(const std::string& title, const MissionPlace& place,
-                        const RememberedPlace& remembered, const PlannerOptions& options,
-                        ViewId goal, const MissionRun& run) {
-  MapPlot backdrop = mission_plot(title, place, remembered, options, goal, run);
-  std::erase_if(backdrop.layers, [](const MapLayer& layer) { return layer.label == "way driven"; });
-  UnfoldingMap map{.title = title, .backdrop = std::move(backdrop.layers)};
+viewer::UnfoldingMap map_of_run(const std::string& title, const simulation::MissionPlace& place,
+                                const simulation::RememberedPlace& remembered,
+                                const PlannerOptions& options, ViewId goal,
+                                const simulation::MissionRun& run) {
+  viewer::MapPlot backdrop = viewer::mission_plot(title, place, remembered, options, goal, run);
+  std::erase_if(backdrop.layers,
+                [](const viewer::MapLayer& layer) { return layer.label == "way driven"; });
+  viewer::UnfoldingMap map{.title = title, .backdrop = std::move(backdrop.layers)};
   for (std::size_t look = 0; look < run.path.size(); ++look) {
-    MapLayer driven{.label = "way driven", .colour = PlotColour::vermilion, .lines = {{}}};
+    viewer::MapLayer driven{
+        .label = "way driven", .colour = viewer::PlotColour::vermilion, .lines = {{}}};
     for (std::size_t i = 0; i <= look; ++i) {
       driven.lines.back().push_back(run.path[i].position());
       if (run.kidnapped_at == i) driven.lines.emplace_back();
@@ -154,23 +160,24 @@ UnfoldingMap map_of_run(const std::string& title, const MissionPlace& place,
 }
 
 /// A mission with what the robot sees and decides at each look.
-RunPage played_run(const MissionPlace& place, const RememberedPlace& remembered,
-                   const DemoRecordings& recordings, const MemoryFile& file,
-                   const Pipeline& pipeline, const PlannerOptions& options, ViewId goal,
-                   const MissionRun& run) {
-  const SimulatedWorldOptions& settled = recordings.office_world->options();
+viewer::RunPage played_run(const simulation::MissionPlace& place,
+                           const simulation::RememberedPlace& remembered,
+                           const DemoRecordings& recordings, const MemoryFile& file,
+                           const Pipeline& pipeline, const PlannerOptions& options, ViewId goal,
+                           const simulation::MissionRun& run) {
+  const simulation::SimulatedWorldOptions& settled = recordings.office_world->options();
   std::optional<Panorama> seen;
   const auto look = sight_through(
       place.renderer, recordings.true_camera, settled.frame, settled.sensor, pipeline, nullptr,
       [&](const Image& /*picture*/, const Panorama& panorama) { seen = panorama; });
   AreaPlanner planner(remembered.graph, options);
   planner.set_goal(goal);
-  RunPage page("A mission", run.decisions.size());
+  viewer::RunPage page("A mission", run.decisions.size());
   bool planned = false;
   for (std::size_t i = 0; i < run.decisions.size(); ++i) {
     const NavigationDecision& decision = run.decisions[i];
     const Pose2& pose = run.path[i];
-    RunMoment moment{.stamp_s = 0.5 * static_cast<double>(i), .pose = pose};
+    recordings::RunMoment moment{.stamp_s = 0.5 * static_cast<double>(i), .pose = pose};
     moment.truth = ReferencePose{pose.x_m, pose.y_m, pose.heading_rad};
     moment.sure = decision.probability >= 0.5;
     moment.state = name_of(decision.state);
@@ -198,7 +205,7 @@ RunPage played_run(const MissionPlace& place, const RememberedPlace& remembered,
       }
     }
     if (i == 0) {
-      moment.walls = walls_of(place.scene);
+      moment.walls = viewer::scene_outlines(place.scene);
       const auto guides = direction_field(remembered.graph, goal, options.field);
       for (std::size_t node = 0; node < guides.size(); ++node) {
         const Pose2& at = remembered.truth[node];
@@ -214,15 +221,15 @@ RunPage played_run(const MissionPlace& place, const RememberedPlace& remembered,
   return page;
 }
 
-std::string end_text(const MissionRun& run, double within_m) {
+std::string end_text(const simulation::MissionRun& run, double within_m) {
   const std::string name(name_of(run.end));
   if (run.end != NavigationState::arrived) return name;
   return run.arrives(within_m) ? "arrived" : "arrived, but too far off";
 }
 
 /// A heading with what came of a run, and a line for each step.
-std::string log_of(const std::string& title, const std::string& goal, const MissionRun& run,
-                   double within_m) {
+std::string log_of(const std::string& title, const std::string& goal,
+                   const simulation::MissionRun& run, double within_m) {
   std::string text = title + ", to " + goal + ": " + end_text(run, within_m) + ", " +
                      fixed(100.0 * run.end_distance_m, 0) + " cm from it\n";
   for (const NavigationDecision& decision : run.decisions) text += describe(decision) + "\n";
@@ -230,7 +237,7 @@ std::string log_of(const std::string& title, const std::string& goal, const Miss
 }
 
 /// What one mission more came to, as a sentence.
-std::string sentence_on(const MissionRun& run, double within_m) {
+std::string sentence_on(const simulation::MissionRun& run, double within_m) {
   return "It ended as: " + end_text(run, within_m) + ", " + fixed(100.0 * run.end_distance_m, 0) +
          " cm from the goal after " + std::to_string(run.decisions.size()) + " steps and " +
          fixed(run.travelled_m, 1) + " m.";
@@ -238,13 +245,13 @@ std::string sentence_on(const MissionRun& run, double within_m) {
 
 /// What the page shows of them.
 struct Shown {
-  RunPage first;
-  UnfoldingMap all;
-  UnfoldingMap kidnapped;
-  std::optional<UnfoldingMap> screened;
+  viewer::RunPage first;
+  viewer::UnfoldingMap all;
+  viewer::UnfoldingMap kidnapped;
+  std::optional<viewer::UnfoldingMap> screened;
 };
 
-void add_part(const DemoNavigation& navigation, Shown shown, ReportPage& page) {
+void add_part(const DemoNavigation& navigation, Shown shown, viewer::ReportPage& page) {
   const std::string count = std::to_string(navigation.runs.size());
   const std::string arrived = std::to_string(navigation.arrived) + " of " + count;
   const std::string within = fixed(100.0 * navigation.within_m, 1) + " cm";
@@ -276,7 +283,7 @@ void add_part(const DemoNavigation& navigation, Shown shown, ReportPage& page) {
       "robot; the thick line: the way planned. Below what the robot sees stands the view that it "
       "takes for the place where it is, turned alike.");
   page.run(shown.first);
-  std::vector<ReportPlot> maps{
+  std::vector<viewer::ReportPlot> maps{
       {std::move(shown.all), "All missions at once. A way that did not end at its goal is orange."},
       {std::move(shown.kidnapped),
        "Half way, somebody kidnapped this robot: it was put down at the purple square. " +
@@ -296,34 +303,36 @@ void add_part(const DemoNavigation& navigation, Shown shown, ReportPage& page) {
 DemoNavigation show_navigation(const DemoOptions& options, const DemoRecordings& recordings,
                                const MemoryFile& file, const VisualMemory& memory,
                                const Lattice& arranged, std::shared_ptr<const ViewEncoder> pipeline,
-                               Session& session, ReportPage& page) {
+                               Session& session, viewer::ReportPage& page) {
   Executor& executor = session.executor();
-  const RememberedPlace remembered = remembered_place(memory, arranged, options.spacing_m());
-  MissionPlace place = mission_place(*recordings.office_world);
+  const simulation::RememberedPlace remembered =
+      remembered_place(memory, arranged, options.spacing_m());
+  simulation::MissionPlace place = mission_place(*recordings.office_world);
   give_sight(place, recordings, pipeline);
   const auto random = [&](std::uint64_t stream, int count, bool kidnapped) {
-    return random_missions(place, remembered, {.count = count, .kidnapped = kidnapped},
-                           Random(options.seed, stream).next());
+    return simulation::random_missions(place, remembered, {.count = count, .kidnapped = kidnapped},
+                                       Random(options.seed, stream).next());
   };
   auto missions = random(mission_stream, options.missions(), false);
   missions.push_back(random(kidnapped_stream, 1, true).front());
-  const MissionOptions settings;
+  const simulation::MissionOptions settings;
   const std::uint64_t noise = Random(options.seed, noise_stream).next();
   DemoNavigation navigation{.within_m = 0.5 * options.spacing_m()};
-  navigation.runs = run_missions(place, remembered, missions, settings, noise, executor);
+  navigation.runs =
+      simulation::run_missions(place, remembered, missions, settings, noise, executor);
   navigation.kidnapped = std::move(navigation.runs.back());
   navigation.runs.pop_back();
-  for (const MissionRun& run : navigation.runs) {
+  for (const simulation::MissionRun& run : navigation.runs) {
     navigation.steps.push_back(static_cast<double>(run.decisions.size()));
     if (!run.arrives(navigation.within_m)) continue;
     ++navigation.arrived;
     if (run.shortest_m > 0.0) navigation.detours.push_back(run.travelled_m / run.shortest_m);
   }
-  const auto map_of = [&](const std::string& title, const MissionPlace& where,
-                          const Mission& mission, const MissionRun& run) {
+  const auto map_of = [&](const std::string& title, const simulation::MissionPlace& where,
+                          const simulation::Mission& mission, const simulation::MissionRun& run) {
     return map_of_run(title, where, remembered, settings.planner, mission.goal, run);
   };
-  const Mission& first = missions.front();
+  const simulation::Mission& first = missions.front();
   Shown shown{
       .first = played_run(place, remembered, recordings, file, pipeline, settings.planner,
                           first.goal, navigation.runs.front()),
@@ -331,8 +340,8 @@ DemoNavigation show_navigation(const DemoOptions& options, const DemoRecordings&
       .kidnapped = map_of("Kidnapped half way", place, missions.back(), navigation.kidnapped)};
   navigation.all = shown.all;
   std::string log;
-  const auto add_log = [&](const std::string& title, const Mission& mission,
-                           const MissionRun& run) {
+  const auto add_log = [&](const std::string& title, const simulation::Mission& mission,
+                           const simulation::MissionRun& run) {
     log += log_of(title, memory.info(mission.goal).name, run, navigation.within_m);
   };
   for (std::size_t i = 0; i < navigation.runs.size(); ++i) {
@@ -346,9 +355,9 @@ DemoNavigation show_navigation(const DemoOptions& options, const DemoRecordings&
   if (const auto screened =
           screened_mission(place, remembered, random(screen_stream, candidates, false), recordings,
                            pipeline, executor)) {
-    navigation.screened =
-        run_missions(screened->place, remembered, {screened->mission}, settings, noise, executor)
-            .front();
+    navigation.screened = simulation::run_missions(screened->place, remembered, {screened->mission},
+                                                   settings, noise, executor)
+                              .front();
     shown.screened =
         map_of("A screen in the way", screened->place, screened->mission, *navigation.screened);
     add_log("A screen in the way", screened->mission, *navigation.screened);

@@ -13,8 +13,8 @@ namespace panonav::command {
 
 namespace {
 
-MapLayer references(const VisualMemory& memory, PlotColour colour) {
-  MapLayer layer{.label = "remembered views", .colour = colour};
+viewer::MapLayer references(const VisualMemory& memory, viewer::PlotColour colour) {
+  viewer::MapLayer layer{.label = "remembered views", .colour = colour};
   for (const ViewId view : memory.views()) {
     layer.circles.push_back(memory.info(view).pose->position());
   }
@@ -23,23 +23,25 @@ MapLayer references(const VisualMemory& memory, PlotColour colour) {
 
 }  // namespace
 
-MapPlot map_of_answers(const VisualMemory& memory, const std::vector<MapLayer>& scene,
-                       const std::vector<AskedView>& asked) {
-  MapLayer truth{.label = "true place", .colour = PlotColour::green};
-  MapLayer error{.label = "from there to the answer", .colour = PlotColour::vermilion};
+viewer::MapPlot map_of_answers(const VisualMemory& memory,
+                               const std::vector<viewer::MapLayer>& scene,
+                               const std::vector<AskedView>& asked) {
+  viewer::MapLayer truth{.label = "true place", .colour = viewer::PlotColour::green};
+  viewer::MapLayer error{.label = "from there to the answer",
+                         .colour = viewer::PlotColour::vermilion};
   for (const auto& view : asked) {
     truth.crosses.push_back(view.truth.position());
     if (view.found.position) {
       error.lines.push_back({view.truth.position(), view.found.position->position});
     }
   }
-  MapPlot map{.title = "The office from above", .layers = scene};
-  for (const MapLayer& layer : {references(memory, PlotColour::blue), error, truth})
+  viewer::MapPlot map{.title = "The office from above", .layers = scene};
+  for (const viewer::MapLayer& layer : {references(memory, viewer::PlotColour::blue), error, truth})
     map.layers.push_back(layer);
   return map;
 }
 
-AreasShown map_of_areas(const VisualMemory& memory, const std::vector<MapLayer>& scene,
+AreasShown map_of_areas(const VisualMemory& memory, const std::vector<viewer::MapLayer>& scene,
                         const AskedView& asked) {
   // Views within a quarter of the best dissimilarity stay candidates, as in `reproduce m04`: with
   // none the first component alone would drop the true place for noise.
@@ -48,14 +50,15 @@ AreasShown map_of_areas(const VisualMemory& memory, const std::vector<MapLayer>&
   const auto levels =
       localise_hierarchically(memory, areas, asked.signature, {.tolerance = tolerance});
   AreasShown shown{.map = {.title = "Where the robot may be", .backdrop = scene}};
-  shown.map.backdrop.push_back(references(memory, PlotColour::light_grey));
+  shown.map.backdrop.push_back(references(memory, viewer::PlotColour::light_grey));
   for (const auto& level : levels) {
-    MapLayer area{.label = "where the robot may be", .colour = PlotColour::orange};
+    viewer::MapLayer area{.label = "where the robot may be", .colour = viewer::PlotColour::orange};
     for (const auto& candidate : level.candidates) {
       area.filled_polygons.push_back(areas.cell(candidate.view));
     }
-    const MapLayer robot{
-        .label = "the robot", .colour = PlotColour::vermilion, .crosses = {asked.truth.position()}};
+    const viewer::MapLayer robot{.label = "the robot",
+                                 .colour = viewer::PlotColour::vermilion,
+                                 .crosses = {asked.truth.position()}};
     shown.areas_m2.push_back(level.area_m2.value_or(std::numeric_limits<double>::quiet_NaN()));
     shown.map.frames.push_back(
         {.title = std::to_string(level.components) +
@@ -66,7 +69,8 @@ AreasShown map_of_areas(const VisualMemory& memory, const std::vector<MapLayer>&
   return shown;
 }
 
-HeatMap map_of_similarity(const VisualMemory& memory, double spacing_m, const AskedView& asked) {
+viewer::HeatMap map_of_similarity(const VisualMemory& memory, double spacing_m,
+                                  const AskedView& asked) {
   std::vector<double> dissimilarities;
   constexpr double infinity = std::numeric_limits<double>::infinity();
   Point2 low{infinity, infinity};
@@ -83,13 +87,13 @@ HeatMap map_of_similarity(const VisualMemory& memory, double spacing_m, const As
   const auto row_of = [&](double y_m) {
     return static_cast<int>(std::lround((y_m - low.y_m) / spacing_m));
   };
-  HeatMap map{.title = "Similarity of every remembered view to the one asked for",
-              .value_label = "similarity, 0 to 1000",
-              .columns = column_of(high.x_m) + 1,
-              .rows = row_of(high.y_m) + 1,
-              .first_cell = low,
-              .spacing_m = spacing_m,
-              .crosses = {asked.truth.position()}};
+  viewer::HeatMap map{.title = "Similarity of every remembered view to the one asked for",
+                      .value_label = "similarity, 0 to 1000",
+                      .columns = column_of(high.x_m) + 1,
+                      .rows = row_of(high.y_m) + 1,
+                      .first_cell = low,
+                      .spacing_m = spacing_m,
+                      .crosses = {asked.truth.position()}};
   map.values.assign(static_cast<std::size_t>(map.columns) * static_cast<std::size_t>(map.rows),
                     std::numeric_limits<double>::quiet_NaN());
   const auto similarity = similarities(dissimilarities);
@@ -104,8 +108,8 @@ HeatMap map_of_similarity(const VisualMemory& memory, double spacing_m, const As
   return map;
 }
 
-ReportPicture picture_in_page(ImageView image, std::string caption) {
-  return {data_url("image/jpeg", encode_jpeg(image)), std::move(caption)};
+viewer::ReportPicture picture_in_page(ImageView image, std::string caption) {
+  return {viewer::data_url("image/jpeg", encode_jpeg(image)), std::move(caption)};
 }
 
 }  // namespace panonav::command

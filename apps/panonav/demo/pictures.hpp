@@ -6,7 +6,7 @@
 #include "panonav/localisation/hierarchical.hpp"
 #include "panonav/localisation/localiser.hpp"
 #include "panonav/memory/visual_memory.hpp"
-#include "reporting/plot.hpp"
+#include "panonav_viewer/plot.hpp"
 #include "reports/report_page.hpp"
 
 namespace panonav::command {
@@ -19,22 +19,24 @@ struct AskedView {
 };
 
 /// True places, and a line from each to where the memory says it is, over the layers of the scene.
-[[nodiscard]] MapPlot map_of_answers(const VisualMemory& memory, const std::vector<MapLayer>& scene,
-                                     const std::vector<AskedView>& asked);
+[[nodiscard]] viewer::MapPlot map_of_answers(const VisualMemory& memory,
+                                             const std::vector<viewer::MapLayer>& scene,
+                                             const std::vector<AskedView>& asked);
 
 /// Where the robot may be after each number of components [M04 figure 9].
 struct AreasShown {
-  UnfoldingMap map;
+  viewer::UnfoldingMap map;
   std::vector<double> areas_m2;  ///< of the frames
 };
 [[nodiscard]] AreasShown map_of_areas(const VisualMemory& memory,
-                                      const std::vector<MapLayer>& scene, const AskedView& asked);
+                                      const std::vector<viewer::MapLayer>& scene,
+                                      const AskedView& asked);
 
 /// How similar every remembered view is to the one asked for [M04 figure 8].
-[[nodiscard]] HeatMap map_of_similarity(const VisualMemory& memory, double spacing_m,
-                                        const AskedView& asked);
+[[nodiscard]] viewer::HeatMap map_of_similarity(const VisualMemory& memory, double spacing_m,
+                                                const AskedView& asked);
 
 /// A picture that stands in the page itself.
-[[nodiscard]] ReportPicture picture_in_page(ImageView image, std::string caption);
+[[nodiscard]] viewer::ReportPicture picture_in_page(ImageView image, std::string caption);
 
 }  // namespace panonav::command

@@ -10,7 +10,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/io/atomic_file.hpp"
 #include "panonav/io/image_file.hpp"
-#include "panonav/simulation/mirror.hpp"
+#include "panonav_simulation/mirror.hpp"
 
 namespace panonav::command {
 
@@ -57,19 +57,20 @@ constexpr std::array<std::string_view, 32> made{"memory_run",
 
 /// A world with the places of one recording.
 struct PlannedRun {
-  SimulatedWorld world;
-  std::vector<RecordedPose> poses;
+  simulation::SimulatedWorld world;
+  std::vector<simulation::RecordedPose> poses;
   bool with_path;
 };
 
-PlannedRun plan(SimulatedWorld world) {
+PlannedRun plan(simulation::SimulatedWorld world) {
   auto poses = world.plan();
-  const bool with_path = world.options().recording.path != RecordingPath::random;
+  const bool with_path = world.options().recording.path != simulation::RecordingPath::random;
   return {std::move(world), std::move(poses), with_path};
 }
 
-SimulatedWorld world_of(const std::string& scene, const SimulatedWorldOptions& wanted,
-                        Executor& executor) {
+simulation::SimulatedWorld world_of(const std::string& scene,
+                                    const simulation::SimulatedWorldOptions& wanted,
+                                    Executor& executor) {
   return {scene, wanted, [](const auto&, const auto&) { return std::nullopt; }, executor};
 }
 
@@ -101,10 +102,10 @@ std::optional<MirrorCircle> find_mirror_in(const Dataset& recording, int count) 
 
 /// Drives as one recording. Between them somebody carries the robot away; its odometry knows
 /// nothing of that.
-std::vector<RecordedPose> joined(std::vector<RecordedPose> walk,
-                                 const std::vector<RecordedPose>& after) {
-  const RecordedPose last = walk.back();
-  for (RecordedPose next : after) {
+std::vector<simulation::RecordedPose> joined(std::vector<simulation::RecordedPose> walk,
+                                             const std::vector<simulation::RecordedPose>& after) {
+  const simulation::RecordedPose last = walk.back();
+  for (simulation::RecordedPose next : after) {
     next.stamp_s += last.stamp_s + 1.0;
     next.odometry = last.odometry * (inverse(after.front().odometry) * next.odometry);
     walk.push_back(next);
@@ -113,26 +114,27 @@ std::vector<RecordedPose> joined(std::vector<RecordedPose> walk,
 }
 
 /// Along straight lines, facing forward.
-PlannedRun drive_through(const SimulatedWorld& world, double spacing_m, int seed,
+PlannedRun drive_through(const simulation::SimulatedWorld& world, double spacing_m, int seed,
                          const std::vector<Point2>& way_points) {
-  SimulatedWorld there = world.with(
-      {.path = RecordingPath::tour, .heading = RecordingHeading::path, .spacing_m = spacing_m},
-      seed);
+  simulation::SimulatedWorld there = world.with({.path = simulation::RecordingPath::tour,
+                                                 .heading = simulation::RecordingHeading::path,
+                                                 .spacing_m = spacing_m},
+                                                seed);
   auto poses = there.plan(way_points);
   return {std::move(there), std::move(poses), true};
 }
 
 }  // namespace
 
-SimulatedWorldOptions simulation_of(const DemoOptions& options, int stream) {
-  SimulatedWorldOptions wanted;
+simulation::SimulatedWorldOptions simulation_of(const DemoOptions& options, int stream) {
+  simulation::SimulatedWorldOptions wanted;
   wanted.simulation.scene.seed = static_cast<int>(3 * (options.seed % 100000000) + stream);
   wanted.simulation.scene.scene_seed = static_cast<int>(options.seed % 1000000000);
   // One ray a pixel: unwrapping averages over pixels, and it takes a third of the time.
   wanted.frame.rays_per_axis = 1;
   // What automatic exposure would choose in these rooms.
   wanted.sensor.exposure = 2.0;
-  if (options.quick) wanted.mirror = half_as_large(simulated_mirror_camera());
+  if (options.quick) wanted.mirror = half_as_large(simulation::simulated_mirror_camera());
   return wanted;
 }
 
@@ -159,12 +161,12 @@ void prepare_demo_folder(const fs::path& out) {
 
 std::optional<DemoRecordings> record_demo(const DemoOptions& options, Session& session) {
   Executor& executor = session.executor();
-  SimulatedWorldOptions grid = simulation_of(options, 0);
-  grid.recording.path = RecordingPath::grid;
+  simulation::SimulatedWorldOptions grid = simulation_of(options, 0);
+  grid.recording.path = simulation::RecordingPath::grid;
   grid.recording.spacing_m = options.spacing_m();
-  const RecordingOptions anywhere{.path = RecordingPath::random,
-                                  .heading = RecordingHeading::random,
-                                  .poses = options.questions()};
+  const simulation::RecordingOptions anywhere{.path = simulation::RecordingPath::random,
+                                              .heading = simulation::RecordingHeading::random,
+                                              .poses = options.questions()};
   const auto seed_of = [&](int stream) {
     return simulation_of(options, stream).simulation.scene.seed;
   };
@@ -176,7 +178,8 @@ std::optional<DemoRecordings> record_demo(const DemoOptions& options, Session& s
   // could as well be in the other one, and either way round, as the plan is the same turned by half
   // and each of them the same as its neighbour. It drives a hand's breadth beside the remembered
   // line.
-  const SimulatedWorld corridor = world_of("corridor", simulation_of(options, 5), executor);
+  const simulation::SimulatedWorld corridor =
+      world_of("corridor", simulation_of(options, 5), executor);
   constexpr double remembered_every_m = 0.35;
   PlannedRun ring = drive_through(corridor, remembered_every_m, seed_of(5),
                                   {{0.0, 0.0}, {12.0, 0.0}, {12.0, 8.0}, {0.0, 8.0}, {0.0, 0.4}});
@@ -200,8 +203,9 @@ std::optional<DemoRecordings> record_demo(const DemoOptions& options, Session& s
                     office.poses.size() + asked.poses.size() + elsewhere.poses.size() +
                         ring.poses.size() + walk.poses.size());
   const auto record_run = [&](const PlannedRun& run, const char* name) {
-    return record_dataset(run.world, options.out / name, run.poses, run.with_path, executor,
-                          [&](const DatasetEntry&, const Image&) { progress.advance(); });
+    return simulation::record_dataset(
+        run.world, options.out / name, run.poses, run.with_path, executor,
+        [&](const DatasetEntry&, const Image&) { progress.advance(); });
   };
   DemoRecordings recordings;
   recordings.memory_run = record_run(office, "memory_run");
@@ -231,17 +235,18 @@ std::optional<DemoRecordings> record_demo(const DemoOptions& options, Session& s
 
   recordings.office_scene = office.world.scene();
   recordings.corridor_scene = corridor.scene();
-  auto in_colour = std::make_shared<const Renderer>(office.world.scene(),
-                                                    RendererOptions{.channels = 3}, executor);
-  recordings.colour_picture = [renderer = std::move(in_colour),
-                               frame = office.world.options().frame, sensor = grid.sensor,
-                               seen_by = recordings.true_camera](const DatasetEntry& entry,
-                                                                 Executor& threads) {
-    const Viewpoint viewpoint{.pose = {entry.pose->x_m, entry.pose->y_m, *entry.pose->heading_rad},
-                              .height_m = frame.camera_height_m};
-    return apply_sensor(renderer->render_image(viewpoint, seen_by, 3, threads), seen_by, sensor, 1);
-  };
-  recordings.office_world = std::make_shared<const SimulatedWorld>(office.world);
+  auto in_colour = std::make_shared<const simulation::Renderer>(
+      office.world.scene(), simulation::RendererOptions{.channels = 3}, executor);
+  recordings.colour_picture =
+      [renderer = std::move(in_colour), frame = office.world.options().frame, sensor = grid.sensor,
+       seen_by = recordings.true_camera](const DatasetEntry& entry, Executor& threads) {
+        const simulation::Viewpoint viewpoint{
+            .pose = {entry.pose->x_m, entry.pose->y_m, *entry.pose->heading_rad},
+            .height_m = frame.camera_height_m};
+        return simulation::apply_sensor(renderer->render_image(viewpoint, seen_by, 3, threads),
+                                        seen_by, sensor, 1);
+      };
+  recordings.office_world = std::make_shared<const simulation::SimulatedWorld>(office.world);
   return recordings;
 }
 

@@ -10,8 +10,8 @@
 #include "panonav/camera/mirror_camera.hpp"
 #include "panonav/camera/mirror_overlay.hpp"
 #include "panonav/io/dataset.hpp"
-#include "panonav/simulation/renderer.hpp"
-#include "panonav/simulation/scene.hpp"
+#include "panonav_simulation/renderer.hpp"
+#include "panonav_simulation/scene.hpp"
 #include "verbs/simulated_recording.hpp"
 
 namespace panonav::command {
@@ -42,16 +42,18 @@ struct DemoRecordings {
   MirrorCircle mirror;              ///< what calibration found
   int calibrated_on = 0;            ///< pictures
   Camera true_camera;
-  Scene office_scene;
-  std::shared_ptr<const SimulatedWorld> office_world;  ///< in grey, as the robot sees it
-  Scene corridor_scene;
+  simulation::Scene office_scene;
+  std::shared_ptr<const simulation::SimulatedWorld>
+      office_world;  ///< in grey, as the robot sees it
+  simulation::Scene corridor_scene;
   /// What the camera sees at an entry of the office, in colour, for people.
   std::function<Image(const DatasetEntry&, Executor&)> colour_picture;
 };
 
 /// How the demonstration's camera sees its office. `stream` tells the noise of different robots
 /// apart.
-[[nodiscard]] SimulatedWorldOptions simulation_of(const DemoOptions& options, int stream);
+[[nodiscard]] simulation::SimulatedWorldOptions simulation_of(const DemoOptions& options,
+                                                              int stream);
 
 /// Makes the folder, or clears away what an earlier demo made in it and nothing else. Throws
 /// FileError when it holds anything and was not made by a demo, or cannot be written.

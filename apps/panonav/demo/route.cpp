@@ -6,11 +6,11 @@
 #include <optional>
 #include <vector>
 
-#include "experiments/runs/surroundings.hpp"
 #include "panonav/core/statistics.hpp"
-#include "panonav/simulation/recording.hpp"
-#include "reporting/picture_plot.hpp"
-#include "reporting/plot.hpp"
+#include "panonav_simulation/recording.hpp"
+#include "panonav_viewer/picture_plot.hpp"
+#include "panonav_viewer/plot.hpp"
+#include "panonav_viewer/surroundings.hpp"
 #include "verbs/shown_references.hpp"
 
 namespace panonav::command {
@@ -19,16 +19,16 @@ namespace {
 
 constexpr double seconds_a_look = 0.3;
 
-PicturePlot picture_of(const RoutePanorama& route) {
+viewer::PicturePlot picture_of(const RoutePanorama& route) {
   const auto columns = static_cast<std::size_t>(route.columns());
-  PicturePlot plot{.title = "What the robot remembers of the route",
-                   .x_label = "azimuth from straight ahead [degrees], left positive",
-                   .y_label = "way along the route [m]",
-                   .x_range = {180.0, -180.0},
-                   .y_range = {0.0, route.length_m()},
-                   .columns = route.columns(),
-                   .rows = static_cast<int>(route.size()),
-                   .x_tick = 45.0};
+  viewer::PicturePlot plot{.title = "What the robot remembers of the route",
+                           .x_label = "azimuth from straight ahead [degrees], left positive",
+                           .y_label = "way along the route [m]",
+                           .x_range = {180.0, -180.0},
+                           .y_range = {0.0, route.length_m()},
+                           .columns = route.columns(),
+                           .rows = static_cast<int>(route.size()),
+                           .x_tick = 45.0};
   for (std::size_t row = 0; row < route.size(); ++row) {
     const auto line = route.line(row);
     for (std::size_t i = 0; i < columns; ++i) {
@@ -40,24 +40,24 @@ PicturePlot picture_of(const RoutePanorama& route) {
 }
 
 /// The first run, line by line.
-RunPage played_run(const RouteScene& place, const RoutePanorama& panorama, const RouteRun& run,
-                   std::uint64_t seed, Executor& executor) {
-  RunPage page("A route is repeated", run.truth.size());
-  std::vector<RouteMark> marks;
+viewer::RunPage played_run(const lab::RouteScene& place, const RoutePanorama& panorama,
+                           const lab::RouteRun& run, std::uint64_t seed, Executor& executor) {
+  viewer::RunPage page("A route is repeated", run.truth.size());
+  std::vector<viewer::RouteMark> marks;
   for (std::size_t i = 0; i < run.truth.size(); ++i) {
     const Pose2& truth = run.truth[i];
     const auto& seen = run.sightings[i];
-    RunMoment moment{.stamp_s = seconds_a_look * static_cast<double>(i)};
+    recordings::RunMoment moment{.stamp_s = seconds_a_look * static_cast<double>(i)};
     moment.truth = ReferencePose{truth.x_m, truth.y_m, truth.heading_rad};
     moment.sure = seen.has_value();
     moment.state = seen ? "on the route" : "off the route";
     moment.values.emplace_back("beside the route", fixed(100.0 * run.lateral_m[i], 1) + " cm");
     if (seen) moment.pose = seen->pose;
-    moment.panorama = take_panorama(
+    moment.panorama = simulation::take_panorama(
         *place.renderer, truth, {.rows = 40, .columns = 256, .rays_per_axis = 1},
         {.camera_height_m = place.scene.camera_height_m}, place.camera.sensor, seed, executor);
     if (i == 0) {
-      moment.walls = walls_of(place.scene);
+      moment.walls = viewer::scene_outlines(place.scene);
       moment.plan.assign(panorama.poses().begin(), panorama.poses().end());
     }
     page.add(moment);
@@ -69,15 +69,15 @@ RunPage played_run(const RouteScene& place, const RoutePanorama& panorama, const
 
 }  // namespace
 
-DemoRoute show_route(const Scene& office, double length_m, std::uint64_t seed, Session& session,
-                     ReportPage& page) {
+DemoRoute show_route(const simulation::Scene& office, double length_m, std::uint64_t seed,
+                     Session& session, viewer::ReportPage& page) {
   constexpr double spacing_m = 0.1;
   Executor& executor = session.executor();
-  RouteScene place = make_route_scene(office, "office", executor);
+  lab::RouteScene place = lab::make_route_scene(office, "office", executor);
   // What automatic exposure would choose in these rooms.
   place.camera.sensor.exposure = 2.0;
-  const auto way = curved_route(place, length_m, spacing_m, seed);
-  const RoutePanorama panorama = record_route(place, way, seed, executor);
+  const auto way = lab::curved_route(place, length_m, spacing_m, seed);
+  const RoutePanorama panorama = lab::record_route(place, way, seed, executor);
   const RouteTracker tracker(panorama);
   DemoRoute route;
   route.length_m = panorama.length_m();
@@ -85,10 +85,10 @@ DemoRoute show_route(const Scene& office, double length_m, std::uint64_t seed, S
   route.runs.resize(2);
   executor.for_chunks(route.runs.size(), 1, [&](std::size_t begin, std::size_t end, std::size_t) {
     for (std::size_t i = begin; i < end; ++i) {
-      route.runs[i] = repeat_route(place, tracker, {.back = i == 1}, seed + i);
+      route.runs[i] = lab::repeat_route(place, tracker, {.back = i == 1}, seed + i);
     }
   });
-  for (const RouteRun& run : route.runs) {
+  for (const lab::RouteRun& run : route.runs) {
     route.completed += run.completes() ? 1 : 0;
     double way_m = 0.0;
     for (std::size_t i = 0; i < run.truth.size(); ++i) {
@@ -97,8 +97,9 @@ DemoRoute show_route(const Scene& office, double length_m, std::uint64_t seed, S
     }
     route.position_m.insert(route.position_m.end(), run.position_m.begin(), run.position_m.end());
   }
-  MapPlot map{.title = "The route, and both drives", .layers = scene_layers(office)};
-  std::ranges::move(route_layers(way, route.runs), std::back_inserter(map.layers));
+  viewer::MapPlot map{.title = "The route, and both drives",
+                      .layers = viewer::scene_layers(office)};
+  std::ranges::move(lab::route_layers(way, route.runs), std::back_inserter(map.layers));
 
   const auto median_cm = [](const std::vector<double>& values) {
     return values.empty() ? std::string("none") : fixed(100.0 * median(values), 1) + " cm";

@@ -4,7 +4,7 @@
 
 namespace panonav::command {
 
-void tell_story(DemoStory story, ReportPage& page) {
+void tell_story(DemoStory story, viewer::ReportPage& page) {
   page.story(
       {{.title = "One camera, all around",
         .shown = std::move(story.mirror),
@@ -13,20 +13,20 @@ void tell_story(DemoStory story, ReportPage& page) {
                    "faces. No laser, no GPU, no training.",
         .part = 1},
        {.title = "It knows where it is",
-        .shown = ReportPlot{std::move(story.areas), ""},
+        .shown = viewer::ReportPlot{std::move(story.areas), ""},
         .value = std::move(story.position_error),
         .meaning = "is the median error, by one picture. Orange: where it may be, by ever more of "
                    "what it sees; cross: where it is.",
         .part = 2},
        {.title = "Lost, and found again",
-        .shown = ReportPlot{std::move(story.gathering), ""},
+        .shown = viewer::ReportPlot{std::move(story.gathering), ""},
         .value = std::move(story.found_again),
         .meaning =
             "until it knew again where it is, when somebody had carried it away. Dots: where "
             "it may be; ring: where it is.",
         .part = 4},
        {.title = "It goes where it is told",
-        .shown = ReportPlot{std::move(story.missions), ""},
+        .shown = viewer::ReportPlot{std::move(story.missions), ""},
         .value = std::move(story.arrived),
         .meaning = "robots reached a remembered view. Squares: starts; crosses: goals; blue: ways "
                    "driven.",

@@ -13,16 +13,16 @@ namespace panonav::command {
 
 /// What the first screen of the page is made of.
 struct DemoStory {
-  ReportPicture mirror;        ///< what the camera sees, in colour
-  UnfoldingMap areas;          ///< how the memory answers one question
-  std::string position_error;  ///< "1.4 cm"
-  std::string found_again;     ///< "4 pictures"
-  UnfoldingMap gathering;      ///< particles of the robot that is tracked
-  std::string arrived;         ///< "12 of 12"
-  UnfoldingMap missions;
+  viewer::ReportPicture mirror;    ///< what the camera sees, in colour
+  viewer::UnfoldingMap areas;      ///< how the memory answers one question
+  std::string position_error;      ///< "1.4 cm"
+  std::string found_again;         ///< "4 pictures"
+  viewer::UnfoldingMap gathering;  ///< particles of the robot that is tracked
+  std::string arrived;             ///< "12 of 12"
+  viewer::UnfoldingMap missions;
 };
 
 /// Four pictures that tell what the program does, how well, and how to use it.
-void tell_story(DemoStory story, ReportPage& page);
+void tell_story(DemoStory story, viewer::ReportPage& page);
 
 }  // namespace panonav::command

@@ -3,9 +3,9 @@
 #include <string>
 #include <utility>
 
-#include "experiments/runs/surroundings.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/positions.hpp"
+#include "panonav_viewer/surroundings.hpp"
 #include "reports/track_pictures.hpp"
 #include "reports/track_report.hpp"
 #include "verbs/shown_references.hpp"
@@ -60,18 +60,20 @@ std::string frame_title(const TrackedImage& image, std::size_t kidnapped_after, 
 }
 
 /// The particles gather: few of them, so that they fit into a small picture.
-UnfoldingMap gathering_of(const std::vector<TrackedImage>& images,
-                          const std::vector<Point2>& at_first, std::vector<MapLayer> scene,
-                          std::size_t kidnapped_after, double within_m) {
-  UnfoldingMap map{.title = "", .backdrop = std::move(scene)};
-  const MapLayer everywhere{
-      .label = "where it may be", .colour = PlotColour::vermilion, .dots = at_first};
+viewer::UnfoldingMap gathering_of(const std::vector<TrackedImage>& images,
+                                  const std::vector<Point2>& at_first,
+                                  std::vector<viewer::MapLayer> scene, std::size_t kidnapped_after,
+                                  double within_m) {
+  viewer::UnfoldingMap map{.title = "", .backdrop = std::move(scene)};
+  const viewer::MapLayer everywhere{
+      .label = "where it may be", .colour = viewer::PlotColour::vermilion, .dots = at_first};
   map.frames.push_back({.title = "before the first picture", .layers = {everywhere}});
   for (const TrackedImage& image : images) {
-    MapLayer particles = everywhere;
+    viewer::MapLayer particles = everywhere;
     particles.dots = positions_of(image.particles);
-    const MapLayer truth{
-        .label = "where it is", .colour = PlotColour::black, .circles = {image.truth->position()}};
+    const viewer::MapLayer truth{.label = "where it is",
+                                 .colour = viewer::PlotColour::black,
+                                 .circles = {image.truth->position()}};
     map.frames.push_back(
         {.title = frame_title(image, kidnapped_after, within_m), .layers = {particles, truth}});
   }
@@ -79,7 +81,8 @@ UnfoldingMap gathering_of(const std::vector<TrackedImage>& images,
 }
 
 void add_part(const DemoTrack& track, double spacing_m, std::size_t kidnapped_after,
-              const RunPage& played, const MapPlot& whole, ReportPage& page) {
+              const viewer::RunPage& played, const viewer::MapPlot& whole,
+              viewer::ReportPage& page) {
   const std::string median_text =
       track.errors_m.empty() ? "none" : fixed(100.0 * median(track.errors_m), 1) + " cm";
   page.part("It tracks itself",
@@ -118,7 +121,7 @@ std::string pictures_text(const std::optional<std::size_t>& pictures) {
 }
 
 DemoTrack show_track(const DemoOptions& options, const DemoRecordings& recordings,
-                     const MemoryFile& file, Session& session, ReportPage& page) {
+                     const MemoryFile& file, Session& session, viewer::ReportPage& page) {
   const Dataset& run = recordings.walk_run;
   const OdometryNoise odometry = simulation_of(options, 0).odometry;
   Tracker tracker(file, {.filter = {.seed = static_cast<int>(options.seed % 1000000000)},
@@ -127,20 +130,21 @@ DemoTrack show_track(const DemoOptions& options, const DemoRecordings& recording
   const VisualMemory& memory = tracker.memory();
   const std::size_t particles_kept = particles_shown(run.entries.size());
   const std::vector<Point2> at_first =
-      positions_of(even_sample(tracker.localiser().particles(), particles_kept));
+      positions_of(recordings::even_sample(tracker.localiser().particles(), particles_kept));
   std::vector<TrackedImage> images;
-  RunPage played("A robot that is kidnapped", run.entries.size());
+  viewer::RunPage played("A robot that is kidnapped", run.entries.size());
   const ShownReferences shown(memory);
   track(tracker, run, {.particles_kept = particles_kept, .recorded = &file, .shown = &shown},
         session.executor(), [&](TrackedImage&& image) {
-          if (image.index == 0) image.moment->walls = walls_of(recordings.corridor_scene);
+          if (image.index == 0)
+            image.moment->walls = viewer::scene_outlines(recordings.corridor_scene);
           add(played, image);
           image.moment.reset();
           images.push_back(std::move(image));
         });
   DemoTrack result = outcome_of(images, recordings.kidnapped_after, options.spacing_m());
   result.places_at_first = images.front().estimate.modes.size();
-  const std::vector<MapLayer> scene = scene_layers(recordings.corridor_scene);
+  const std::vector<viewer::MapLayer> scene = viewer::scene_layers(recordings.corridor_scene);
   result.gathering =
       gathering_of(images, at_first, scene, recordings.kidnapped_after, options.spacing_m());
   add_part(result, options.spacing_m(), recordings.kidnapped_after, played,

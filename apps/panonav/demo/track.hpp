@@ -22,10 +22,10 @@ struct DemoTrack {
   std::optional<std::size_t> until_localised;
   /// The same from the first image after it was kidnapped on.
   std::optional<std::size_t> until_found_again;
-  std::size_t localised = 0;     ///< images at which it says so
-  std::size_t wrong = 0;         ///< of these, farther off than the spacing
-  std::vector<double> errors_m;  ///< of these, right or wrong
-  UnfoldingMap gathering;        ///< the particles, picture by picture
+  std::size_t localised = 0;       ///< images at which it says so
+  std::size_t wrong = 0;           ///< of these, farther off than the spacing
+  std::vector<double> errors_m;    ///< of these, right or wrong
+  viewer::UnfoldingMap gathering;  ///< the particles, picture by picture
 };
 
 /// "9 pictures", or "never".
@@ -34,6 +34,6 @@ struct DemoTrack {
 /// Tracks it by Monte-Carlo localisation and adds a part that plays the run to the page. The same
 /// seed gives the same run.
 DemoTrack show_track(const DemoOptions& options, const DemoRecordings& recordings,
-                     const MemoryFile& file, Session& session, ReportPage& page);
+                     const MemoryFile& file, Session& session, viewer::ReportPage& page);
 
 }  // namespace panonav::command

@@ -77,13 +77,14 @@ LatticeWatch LatticeSteps::watch() {
   };
 }
 
-UnfoldingMap LatticeSteps::unfold(const Lattice& lattice, const VisualMemory& memory) const {
+viewer::UnfoldingMap LatticeSteps::unfold(const Lattice& lattice,
+                                          const VisualMemory& memory) const {
   const auto end = places_of(lattice, memory);
   const Springs springs = shown_springs(lattice);
   constexpr std::size_t numbers = 600'000;
   const std::size_t each = 1 + 2 * lattice.nodes.size() + 4 * springs.size();
   const std::size_t frames = std::clamp<std::size_t>(numbers / each, 10, 100);
-  UnfoldingMap map{.title = "The arrangement as it unfolds"};
+  viewer::UnfoldingMap map{.title = "The arrangement as it unfolds"};
   const std::string of = " of " + std::to_string(count_);
   const auto add = [&](const std::string& title, const std::vector<std::optional<Point2>>& places,
                        const std::vector<std::size_t>& components) {
@@ -94,9 +95,9 @@ UnfoldingMap LatticeSteps::unfold(const Lattice& lattice, const VisualMemory& me
     }
     const auto largest =
         std::ranges::max_element(sizes, {}, [](const auto& entry) { return entry.second; });
-    MapLayer held{.label = "springs", .colour = PlotColour::light_grey};
-    MapLayer views{.label = "largest group", .colour = PlotColour::blue};
-    MapLayer others{.label = "other groups", .colour = PlotColour::orange};
+    viewer::MapLayer held{.label = "springs", .colour = viewer::PlotColour::light_grey};
+    viewer::MapLayer views{.label = "largest group", .colour = viewer::PlotColour::blue};
+    viewer::MapLayer others{.label = "other groups", .colour = viewer::PlotColour::orange};
     for (const auto& [a, b] : springs) {
       if (!places[a] || !places[b] || components[a] != components[b]) continue;
       held.lines.push_back({*places[a], *places[b]});
@@ -124,10 +125,11 @@ UnfoldingMap LatticeSteps::unfold(const Lattice& lattice, const VisualMemory& me
 void write_arrange_report(const std::filesystem::path& folder, const std::string& name,
                           const Lattice& lattice, const VisualMemory& memory,
                           const LatticeSteps& steps) {
-  ReportPage page("How do the places lie?",
-                  "The " + std::to_string(lattice.nodes.size()) + " views of " + name +
-                      " in no order. From their similarity alone follows which lie near each "
-                      "other and in which direction, and from that how all of them lie.");
+  viewer::ReportPage page(
+      "How do the places lie?",
+      "The " + std::to_string(lattice.nodes.size()) + " views of " + name +
+          " in no order. From their similarity alone follows which lie near each "
+          "other and in which direction, and from that how all of them lie.");
   const auto& components = lattice.components;
   std::vector<std::pair<std::string, std::string>> figures{
       {std::to_string(components.front().views) + " of " + std::to_string(lattice.nodes.size()),
@@ -156,8 +158,9 @@ void write_arrange_report(const std::filesystem::path& folder, const std::string
     page.text(
         "True places were not used; they only turn, move and scale the arrangement so that both "
         "can be compared.");
-    std::vector<ReportPlot> plots;
-    for (MapPlot& plot : lattice_plots(lattice, memory)) plots.push_back({std::move(plot), ""});
+    std::vector<viewer::ReportPlot> plots;
+    for (viewer::MapPlot& plot : lattice_plots(lattice, memory))
+      plots.push_back({std::move(plot), ""});
     plots.front().caption = "Where the views were taken";
     plots.back().caption = "Where their similarity puts them";
     page.plots(plots);

@@ -8,7 +8,7 @@
 
 #include "panonav/mapping/lattice.hpp"
 #include "panonav/memory/visual_memory.hpp"
-#include "viewer/report_page.hpp"
+#include "panonav_viewer/report_page.hpp"
 
 namespace panonav::command {
 
@@ -20,7 +20,8 @@ class LatticeSteps {
   /// The steps as a map that unfolds. Groups of views are laid over where they end, as they are
   /// turned and deformed then; views alone and in pairs are not drawn. Of long arrangements
   /// fewer steps and the two shortest springs of each view, so that a page stays small.
-  [[nodiscard]] UnfoldingMap unfold(const Lattice& lattice, const VisualMemory& memory) const;
+  [[nodiscard]] viewer::UnfoldingMap unfold(const Lattice& lattice,
+                                            const VisualMemory& memory) const;
 
  private:
   struct Step {

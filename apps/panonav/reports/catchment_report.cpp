@@ -7,7 +7,7 @@
 
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "reporting/plot.hpp"
+#include "panonav_viewer/plot.hpp"
 #include "reports/report_page.hpp"
 
 namespace panonav::command {
@@ -15,8 +15,8 @@ namespace panonav::command {
 namespace {
 
 /// Places as cells of a raster of their spacing. Places that share a cell show the last one.
-HeatMap raster(const std::vector<Pose2>& places, double spacing_m,
-               const std::function<double(std::size_t)>& value) {
+viewer::HeatMap raster(const std::vector<Pose2>& places, double spacing_m,
+                       const std::function<double(std::size_t)>& value) {
   Point2 low = places.front().position();
   Point2 high = low;
   for (const Pose2& place : places) {
@@ -30,10 +30,10 @@ HeatMap raster(const std::vector<Pose2>& places, double spacing_m,
   const auto cell = [&](double at_m, double from_m) {
     return static_cast<int>(std::lround((at_m - from_m) / cell_m));
   };
-  HeatMap map{.columns = cell(high.x_m, low.x_m) + 1,
-              .rows = cell(high.y_m, low.y_m) + 1,
-              .first_cell = low,
-              .spacing_m = cell_m};
+  viewer::HeatMap map{.columns = cell(high.x_m, low.x_m) + 1,
+                      .rows = cell(high.y_m, low.y_m) + 1,
+                      .first_cell = low,
+                      .spacing_m = cell_m};
   map.values.assign(static_cast<std::size_t>(map.columns) * static_cast<std::size_t>(map.rows),
                     std::numeric_limits<double>::quiet_NaN());
   for (std::size_t i = 0; i < places.size(); ++i) {
@@ -44,46 +44,46 @@ HeatMap raster(const std::vector<Pose2>& places, double spacing_m,
   return map;
 }
 
-std::vector<ReportPlot> curves(const CatchmentResult& result) {
-  Series homeward{.label = "", .style = SeriesStyle::lines_and_points};
-  Series orientation{.label = "", .style = SeriesStyle::lines_and_points};
+std::vector<viewer::ReportPlot> curves(const CatchmentResult& result) {
+  viewer::Series homeward{.label = "", .style = viewer::SeriesStyle::lines_and_points};
+  viewer::Series orientation{.label = "", .style = viewer::SeriesStyle::lines_and_points};
   for (const CatchmentBin& bin : result.bins) {
     if (bin.homeward.distance_m <= 0.0) continue;
     homeward.add(bin.homeward.distance_m, bin.homeward.component);
     orientation.add(bin.homeward.distance_m, degrees(bin.orientation_error_rad));
   }
-  Series areas{.label = "", .style = SeriesStyle::lines_and_points};
+  viewer::Series areas{.label = "", .style = viewer::SeriesStyle::lines_and_points};
   const auto places = static_cast<double>(result.survey.places.size());
   for (std::size_t i = 0; i < result.areas.size(); ++i) {
     areas.add(result.accepted_m[i], 100.0 * result.areas[i] / places);
   }
-  return {{LinePlot{.title = "Average homeward component",
-                    .x_label = "distance from home [m]",
-                    .y_label = "homeward component",
-                    .series = {homeward},
-                    .y_range = std::pair{-0.2, 1.0}},
+  return {{viewer::LinePlot{.title = "Average homeward component",
+                            .x_label = "distance from home [m]",
+                            .y_label = "homeward component",
+                            .series = {homeward},
+                            .y_range = std::pair{-0.2, 1.0}},
            "Cosine between home vector and true direction: 1 straight home, 0 chance "
            "[S06 figure 10]"},
-          {LinePlot{.title = "Error of the heading",
-                    .x_label = "distance from home [m]",
-                    .y_label = "circular standard deviation [degrees]",
-                    .series = {orientation}},
+          {viewer::LinePlot{.title = "Error of the heading",
+                            .x_label = "distance from home [m]",
+                            .y_label = "circular standard deviation [degrees]",
+                            .series = {orientation}},
            "Error of the heading that comes with it [S06 figure 8]"},
-          {LinePlot{.title = "Mean catchment area",
-                    .x_label = "accepted distance from home [m]",
-                    .y_label = "share of all places [%]",
-                    .series = {areas},
-                    .y_range = std::pair{0.0, 100.0}},
+          {viewer::LinePlot{.title = "Mean catchment area",
+                            .x_label = "accepted distance from home [m]",
+                            .y_label = "share of all places [%]",
+                            .series = {areas},
+                            .y_range = std::pair{0.0, 100.0}},
            "Runs from place to place: share of starts from which a run ends within a distance of "
            "home [S06 figure 11]"}};
 }
 
-MapPlot field(const RecordedViews& places, const std::vector<HomeVector>& vectors,
-              const CatchmentResult& result, std::size_t goal) {
+viewer::MapPlot field(const RecordedViews& places, const std::vector<HomeVector>& vectors,
+                      const CatchmentResult& result, std::size_t goal) {
   const double side_m = 0.5 * result.spacing_m;
   const double arrow_m = 0.8 * result.spacing_m;
-  MapLayer inside{.label = "catchment area", .colour = PlotColour::green};
-  MapLayer arrows{.label = "home vector", .colour = PlotColour::blue};
+  viewer::MapLayer inside{.label = "catchment area", .colour = viewer::PlotColour::green};
+  viewer::MapLayer arrows{.label = "home vector", .colour = viewer::PlotColour::blue};
   for (std::size_t p = 0; p < places.views.size(); ++p) {
     const Pose2& place = result.survey.places[p];
     const float end_m = result.final_m[goal * places.views.size() + p];
@@ -100,9 +100,9 @@ MapPlot field(const RecordedViews& places, const std::vector<HomeVector>& vector
     arrows.lines.push_back(
         arrow({place.x_m, place.y_m, place.heading_rad + vectors[p].direction_rad()}, arrow_m));
   }
-  const MapLayer home{.label = "home",
-                      .colour = PlotColour::black,
-                      .squares = {result.survey.goals[goal].position()}};
+  const viewer::MapLayer home{.label = "home",
+                              .colour = viewer::PlotColour::black,
+                              .squares = {result.survey.goals[goal].position()}};
   return {.title = "Home vectors from above", .layers = {inside, arrows, home}};
 }
 
@@ -137,11 +137,11 @@ void write_catchment_report(const std::filesystem::path& folder, const RecordedV
   ends.value_label = "distance from home at the end [m]";
   ends.crosses = difference.crosses;
 
-  ReportPage page("From how far do views lead home?",
-                  "Every view of a recording as a home, every view of " +
-                      std::to_string(places.views.size()) +
-                      " places as what the robot sees: does the home vector point home, and where "
-                      "does a robot end that follows it from place to place?");
+  viewer::ReportPage page(
+      "From how far do views lead home?",
+      "Every view of a recording as a home, every view of " + std::to_string(places.views.size()) +
+          " places as what the robot sees: does the home vector point home, and where "
+          "does a robot end that follows it from place to place?");
   page.figures(
       {{fixed(result.component, 3),
         "average homeward component, " + std::to_string(result.pairs) + " pairs"},

@@ -8,7 +8,7 @@
 #include "cli/session.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/voronoi.hpp"
-#include "reporting/plot.hpp"
+#include "panonav_viewer/plot.hpp"
 #include "reports/report_page.hpp"
 
 namespace panonav::command {
@@ -42,9 +42,9 @@ double arrow_length_m(const std::vector<HomeAnswer>& answers) {
 }
 
 /// Empty where nothing is known of positions.
-std::optional<MapPlot> field(const Goal& goal, const std::vector<HomeAnswer>& answers) {
-  MapLayer arrows{.label = "way home", .colour = PlotColour::blue};
-  MapLayer silent{.label = "no direction", .colour = PlotColour::vermilion};
+std::optional<viewer::MapPlot> field(const Goal& goal, const std::vector<HomeAnswer>& answers) {
+  viewer::MapLayer arrows{.label = "way home", .colour = viewer::PlotColour::blue};
+  viewer::MapLayer silent{.label = "no direction", .colour = viewer::PlotColour::vermilion};
   const double length_m = arrow_length_m(answers);
   for (const auto& answer : answers) {
     if (!answer.pose || !answer.pose->heading_rad) continue;
@@ -57,25 +57,26 @@ std::optional<MapPlot> field(const Goal& goal, const std::vector<HomeAnswer>& an
     arrows.lines.push_back(arrow({at.x_m, at.y_m, towards}, length_m));
   }
   if (arrows.lines.empty()) return std::nullopt;
-  MapLayer home{.label = "home", .colour = PlotColour::black};
+  viewer::MapLayer home{.label = "home", .colour = viewer::PlotColour::black};
   if (goal.pose) home.squares.push_back(goal.pose->position());
-  return MapPlot{.title = "Home vectors from above", .layers = {arrows, silent, home}};
+  return viewer::MapPlot{.title = "Home vectors from above", .layers = {arrows, silent, home}};
 }
 
 /// The view at home, turned as if the robot there faced the same way as here, above the current
 /// one.
-std::vector<ReportView> views_of(const std::optional<Panorama>& home, const Panorama& current,
-                                 const HomeAnswer& answer) {
+std::vector<viewer::ReportView> views_of(const std::optional<Panorama>& home,
+                                         const Panorama& current, const HomeAnswer& answer) {
   const HomeVector& found = answer.way.vector;
-  std::vector<ViewMark> marks{{.azimuth_rad = 0.0, .colour = PlotColour::grey}};
+  std::vector<viewer::ViewMark> marks{{.azimuth_rad = 0.0, .colour = viewer::PlotColour::grey}};
   if (answer.way.direction_rad) {
     const double towards = found.direction_rad();
-    marks.push_back({.azimuth_rad = towards, .colour = PlotColour::vermilion, .through = true});
+    marks.push_back(
+        {.azimuth_rad = towards, .colour = viewer::PlotColour::vermilion, .through = true});
     marks.push_back({.azimuth_rad = wrap_angle(towards + std::numbers::pi),
-                     .colour = PlotColour::blue,
+                     .colour = viewer::PlotColour::blue,
                      .through = true});
   }
-  std::vector<ReportView> views;
+  std::vector<viewer::ReportView> views;
   if (home) {  // the robot at home turns to the current heading
     const double columns = -found.heading_rad / (2.0 * std::numbers::pi) * home->columns();
     views.push_back({turn_columns(*home, static_cast<int>(std::lround(columns))), marks,
@@ -90,10 +91,11 @@ std::vector<ReportView> views_of(const std::optional<Panorama>& home, const Pano
 void write_home_report(const std::filesystem::path& folder, const Goal& goal,
                        const std::vector<HomeAnswer>& answers,
                        const std::function<Panorama(std::size_t)>& current) {
-  ReportPage page("The way home",
-                  "From one view of a place, " + goal.name +
-                      ", and what the robot sees now: which way to go, without a map and without "
-                      "knowing the heading.");
+  viewer::ReportPage page(
+      "The way home",
+      "From one view of a place, " + goal.name +
+          ", and what the robot sees now: which way to go, without a map and without "
+          "knowing the heading.");
   const WayHome& first = answers.front().way;
   if (answers.size() == 1 && !first.known) {
     page.figures({{"no answer", why_none(first)}});

@@ -5,7 +5,7 @@
 
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/mapping/map_measures.hpp"
-#include "reporting/plot.hpp"
+#include "panonav_viewer/plot.hpp"
 
 namespace panonav::command {
 
@@ -31,9 +31,9 @@ Known known_of(const Lattice& lattice, const VisualMemory& memory) {
 }
 
 /// Springs that were not rejected, as lines between `positions`.
-MapLayer springs_between(const Lattice& lattice,
-                         const std::vector<std::optional<Point2>>& positions) {
-  MapLayer layer{.label = "springs", .colour = PlotColour::light_grey};
+viewer::MapLayer springs_between(const Lattice& lattice,
+                                 const std::vector<std::optional<Point2>>& positions) {
+  viewer::MapLayer layer{.label = "springs", .colour = viewer::PlotColour::light_grey};
   for (const LatticeSpring& spring : lattice.springs) {
     const auto& a = positions[spring.a];
     const auto& b = positions[spring.b];
@@ -42,9 +42,9 @@ MapLayer springs_between(const Lattice& lattice,
   return layer;
 }
 
-MapPlot plot_of(std::string title, const Lattice& lattice,
-                const std::vector<std::optional<Point2>>& positions) {
-  MapLayer views{.label = "views"};
+viewer::MapPlot plot_of(std::string title, const Lattice& lattice,
+                        const std::vector<std::optional<Point2>>& positions) {
+  viewer::MapLayer views{.label = "views"};
   for (const auto& position : positions) {
     if (position) views.circles.push_back(*position);
   }
@@ -92,8 +92,9 @@ std::vector<std::optional<Point2>> places_of(const Lattice& lattice, const Visua
   return places;
 }
 
-std::vector<MapPlot> lattice_plots(const Lattice& lattice, const VisualMemory& memory) {
-  MapPlot map = plot_of("as the views arrange themselves", lattice, places_of(lattice, memory));
+std::vector<viewer::MapPlot> lattice_plots(const Lattice& lattice, const VisualMemory& memory) {
+  viewer::MapPlot map =
+      plot_of("as the views arrange themselves", lattice, places_of(lattice, memory));
   if (!is_known(lattice, memory)) {
     if (!lattice.metric) map.unit = "median distance to the nearest view";
     return {map};
@@ -110,7 +111,7 @@ std::vector<MapPlot> lattice_plots(const Lattice& lattice, const VisualMemory& m
 void write_lattice_picture(const std::filesystem::path& path, const Lattice& lattice,
                            const VisualMemory& memory) {
   const auto plots = lattice_plots(lattice, memory);
-  write_plot(path, plots, static_cast<int>(plots.size()));
+  viewer::write_plot(path, plots, static_cast<int>(plots.size()));
 }
 
 }  // namespace panonav::command

@@ -7,7 +7,7 @@
 
 #include "panonav/mapping/lattice.hpp"
 #include "panonav/memory/visual_memory.hpp"
-#include "reporting/plot.hpp"
+#include "panonav_viewer/plot.hpp"
 
 namespace panonav::command {
 
@@ -34,8 +34,8 @@ struct LatticeComparison {
                                                            const VisualMemory& memory);
 
 /// The largest component with its springs; where the memory knows positions, these stand before it.
-[[nodiscard]] std::vector<MapPlot> lattice_plots(const Lattice& lattice,
-                                                 const VisualMemory& memory);
+[[nodiscard]] std::vector<viewer::MapPlot> lattice_plots(const Lattice& lattice,
+                                                         const VisualMemory& memory);
 
 /// Draws the largest component with its springs; where the memory knows positions, the map is laid
 /// over them and they stand beside it. Throws what `write_plot` throws.

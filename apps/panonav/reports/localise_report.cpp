@@ -8,9 +8,9 @@
 #include "panonav/core/statistics.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/pipeline/run_recorder.hpp"
 #include "panonav/storage/memory_address.hpp"
-#include "viewer/report_page.hpp"
+#include "panonav_recordings/run_recorder.hpp"
+#include "panonav_viewer/report_page.hpp"
 
 namespace panonav::command {
 
@@ -41,9 +41,9 @@ std::string answer_text(const LocalisedQuery& query) {
 }
 
 /// What the run shows of a picture. The first one brings the references.
-RunMoment moment_of(const LocalisedQuery& query, std::size_t number, Panorama&& seen,
-                    const MemoryFile& file) {
-  RunMoment moment{.stamp_s = static_cast<double>(number), .panorama = std::move(seen)};
+recordings::RunMoment moment_of(const LocalisedQuery& query, std::size_t number, Panorama&& seen,
+                                const MemoryFile& file) {
+  recordings::RunMoment moment{.stamp_s = static_cast<double>(number), .panorama = std::move(seen)};
   moment.truth = query.pose;
   const auto& matches = query.place.matches;
   describe(moment, query.place);
@@ -69,7 +69,7 @@ RunMoment moment_of(const LocalisedQuery& query, std::size_t number, Panorama&& 
   return moment;
 }
 
-void add_table(ReportPage& page, const std::vector<LocalisedQuery>& queries) {
+void add_table(viewer::ReportPage& page, const std::vector<LocalisedQuery>& queries) {
   page.section("All answers");
   if (queries.size() > max_rows) {
     page.text("The first " + std::to_string(max_rows) + " of " + std::to_string(queries.size()) +
@@ -115,10 +115,11 @@ void write_localise_report(const std::filesystem::path& folder, const MemoryFile
     known += queries[i].place.known ? 1 : 0;
     if (const auto error = error_m(queries[i])) errors.push_back(*error);
   }
-  ReportPage page("Where was this?",
-                  "What the robot saw, and the view of " + memory_name(file.path()) +
-                      " that resembles it most, turned as the robot faced. Where both show the "
-                      "same things in the same directions, the answer is right.");
+  viewer::ReportPage page(
+      "Where was this?",
+      "What the robot saw, and the view of " + memory_name(file.path()) +
+          " that resembles it most, turned as the robot faced. Where both show the "
+          "same things in the same directions, the answer is right.");
   std::vector<std::pair<std::string, std::string>> summary{
       {std::to_string(known) + " of " + std::to_string(readable.size()),
        "pictures show a known place"}};
@@ -146,18 +147,18 @@ void write_localise_report(const std::filesystem::path& folder, const MemoryFile
     page.text("Shown are " + std::to_string(shown) + " of " + std::to_string(readable.size()) +
               " pictures, evenly spread.");
   }
-  RunPage run("", shown);
+  viewer::RunPage run("", shown);
   run.unordered();
   bool thumbnails = true;
   for (std::size_t n = 0; n < shown; ++n) {
     const std::size_t i = readable[n * (readable.size() - 1) / std::max<std::size_t>(1, shown - 1)];
-    RunMoment moment = moment_of(queries[i], n, panorama(i), file);
+    recordings::RunMoment moment = moment_of(queries[i], n, panorama(i), file);
     thumbnails = thumbnails && (queries[i].place.matches.empty() || !moment.best_match.empty());
-    if (n == 0) moment.references = reference_positions(recogniser.memory());
+    if (n == 0) moment.references = recordings::reference_positions(recogniser.memory());
     run.add(moment);
   }
   if (!thumbnails) page.text("The memory holds no thumbnail of the best match of some pictures.");
-  if (reference_positions(recogniser.memory()).empty()) {
+  if (recordings::reference_positions(recogniser.memory()).empty()) {
     page.text("The memory knows no positions, so there is no map.");
   }
   if (shown > 0) page.run(run);

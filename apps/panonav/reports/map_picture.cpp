@@ -9,7 +9,7 @@
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/mapping/map_measures.hpp"
-#include "viewer/report_page.hpp"
+#include "panonav_viewer/report_page.hpp"
 
 namespace panonav::command {
 
@@ -83,22 +83,22 @@ std::optional<MapComparison> compare_with_ground_truth(const Dataset& recording,
   return comparison;
 }
 
-MapPlot map_plot(const Dataset& recording, const MappedRun& run) {
+viewer::MapPlot map_plot(const Dataset& recording, const MappedRun& run) {
   const Nodes nodes = nodes_of(recording, run);
-  MapPlot plot{.title = "map", .layers = {}};
+  viewer::MapPlot plot{.title = "map", .layers = {}};
   std::vector<Point2> map = nodes.map;
   if (is_comparable(nodes.map, nodes.truth)) {
     map = moved(nodes.map, align(nodes.map, nodes.truth, {.allow_scale = !run.wheels}));
     plot.title = "map beside the ground truth";
     plot.layers.push_back(
-        {.label = "ground truth", .colour = PlotColour::black, .lines = {nodes.truth}});
+        {.label = "ground truth", .colour = viewer::PlotColour::black, .lines = {nodes.truth}});
     if (is_comparable(nodes.odometry, nodes.truth)) {
       plot.layers.push_back({.label = "wheels",
-                             .colour = PlotColour::vermilion,
+                             .colour = viewer::PlotColour::vermilion,
                              .lines = {moved(nodes.odometry, align(nodes.odometry, nodes.truth))}});
     }
   }
-  MapLayer closures{.label = "closures", .colour = PlotColour::green};
+  viewer::MapLayer closures{.label = "closures", .colour = viewer::PlotColour::green};
   for (const MapEdge& edge : run.map.edges) {
     const auto a = nodes.number.find(edge.a);
     const auto b = nodes.number.find(edge.b);
@@ -107,22 +107,25 @@ MapPlot map_plot(const Dataset& recording, const MappedRun& run) {
     }
     closures.lines.push_back({map[a->second], map[b->second]});
   }
-  plot.layers.push_back({.label = "map", .colour = PlotColour::blue, .lines = {map}, .dots = map});
+  plot.layers.push_back(
+      {.label = "map", .colour = viewer::PlotColour::blue, .lines = {map}, .dots = map});
   if (!closures.lines.empty()) plot.layers.push_back(std::move(closures));
   return plot;
 }
 
 void write_map_picture(const std::filesystem::path& path, const Dataset& recording,
                        const MappedRun& run) {
-  write_plot(path, map_plot(recording, run));
+  viewer::write_plot(path, map_plot(recording, run));
 }
 
 void write_map_report(const std::filesystem::path& folder, const std::string& name,
-                      const Dataset& recording, const MappedRun& run, const RunPage& played) {
-  ReportPage page("The map of " + name,
-                  "A robot took " + std::to_string(recording.entries.size()) +
-                      " pictures on its way. Each is placed by what it shows of the step from the "
-                      "one before; where the robot passed a place again, the loop is closed.");
+                      const Dataset& recording, const MappedRun& run,
+                      const viewer::RunPage& played) {
+  viewer::ReportPage page(
+      "The map of " + name,
+      "A robot took " + std::to_string(recording.entries.size()) +
+          " pictures on its way. Each is placed by what it shows of the step from the "
+          "one before; where the robot passed a place again, the loop is closed.");
   const auto closures = std::ranges::count(run.map.edges, LinkKind::closure, &MapEdge::kind);
   std::vector<std::pair<std::string, std::string>> figures{
       {std::to_string(run.map.nodes.size()), "places"},

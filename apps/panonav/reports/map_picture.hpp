@@ -6,14 +6,14 @@
 
 #include "panonav/io/dataset.hpp"
 #include "panonav/pipeline/mapper.hpp"
-#include "reporting/plot.hpp"
-#include "viewer/page.hpp"
+#include "panonav_viewer/page.hpp"
+#include "panonav_viewer/plot.hpp"
 
 namespace panonav::command {
 
 /// The largest component of the map with its closures; where the recording knows positions, the map
 /// is laid over them, and so is the odometry of its wheels.
-[[nodiscard]] MapPlot map_plot(const Dataset& recording, const MappedRun& run);
+[[nodiscard]] viewer::MapPlot map_plot(const Dataset& recording, const MappedRun& run);
 /// The same as a PNG or SVG file. Throws what `write_plot` throws.
 void write_map_picture(const std::filesystem::path& path, const Dataset& recording,
                        const MappedRun& run);
@@ -38,6 +38,7 @@ struct MapComparison {
 /// Writes index.html: the drive, picture by picture on its map, and the map beside the truth where
 /// it is known. Throws FileError.
 void write_map_report(const std::filesystem::path& folder, const std::string& name,
-                      const Dataset& recording, const MappedRun& run, const RunPage& played);
+                      const Dataset& recording, const MappedRun& run,
+                      const viewer::RunPage& played);
 
 }  // namespace panonav::command

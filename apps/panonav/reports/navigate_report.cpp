@@ -5,16 +5,17 @@
 #include <vector>
 
 #include "panonav/core/text.hpp"
-#include "viewer/report_page.hpp"
+#include "panonav_viewer/report_page.hpp"
 
 namespace panonav::command {
 
 void write_navigate_report(const std::filesystem::path& folder, const MissionReport& mission,
-                           const RunPage& played) {
-  const MissionRun& run = mission.run;
-  ReportPage page("The way to " + mission.goal,
-                  "A simulated robot was sent to a remembered view. It sees pictures alone: it "
-                  "knows neither where it is nor where its references were taken.");
+                           const viewer::RunPage& played) {
+  const simulation::MissionRun& run = mission.run;
+  viewer::ReportPage page(
+      "The way to " + mission.goal,
+      "A simulated robot was sent to a remembered view. It sees pictures alone: it "
+      "knows neither where it is nor where its references were taken.");
   std::vector<std::pair<std::string, std::string>> figures{
       {std::string(name_of(run.end)), mission.reason},
       {std::to_string(run.decisions.size()), "steps, a picture and a decision each"}};

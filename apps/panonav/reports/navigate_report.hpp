@@ -3,9 +3,9 @@
 #include <filesystem>
 #include <string>
 
-#include "experiments/runs/mission.hpp"
-#include "reporting/plot.hpp"
-#include "viewer/page.hpp"
+#include "panonav_simulation/mission.hpp"
+#include "panonav_viewer/page.hpp"
+#include "panonav_viewer/plot.hpp"
 
 namespace panonav::command {
 
@@ -13,12 +13,12 @@ namespace panonav::command {
 struct MissionReport {
   std::string goal;    ///< name of its view
   std::string reason;  ///< why it ended, in words
-  const MissionRun& run;
-  MapPlot plot;  ///< the whole of it from above
+  const simulation::MissionRun& run;
+  viewer::MapPlot plot;  ///< the whole of it from above
 };
 
 /// Writes index.html: the mission, decision by decision. Throws FileError.
 void write_navigate_report(const std::filesystem::path& folder, const MissionReport& mission,
-                           const RunPage& played);
+                           const viewer::RunPage& played);
 
 }  // namespace panonav::command

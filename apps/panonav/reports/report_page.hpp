@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "panonav/geometry/pose2.hpp"
-#include "viewer/report_page.hpp"
+#include "panonav_viewer/report_page.hpp"
 
 namespace panonav::command {
 

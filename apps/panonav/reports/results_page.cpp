@@ -9,35 +9,35 @@ namespace panonav::command {
 
 namespace {
 
-void add_table(ReportPage& page, std::span<const ResultRow> rows) {
-  const auto header = table_header();
+void add_table(viewer::ReportPage& page, std::span<const lab::ResultRow> rows) {
+  const auto header = lab::table_header();
   std::vector<std::vector<std::string>> lines;
-  for (const ResultRow& row : rows) {
-    lines.push_back(table_cells(row));
+  for (const lab::ResultRow& row : rows) {
+    lines.push_back(lab::table_cells(row));
     if (row.target && !row.holds()) lines.back().back() = "NO";
   }
   page.table({header.begin(), header.end()}, lines);
 }
 
 // Those with a target first.
-void add_tables(ReportPage& page, std::vector<ResultRow> rows) {
-  const std::size_t judged = put_targets_first(rows);
-  const std::span<const ResultRow> all(rows);
+void add_tables(viewer::ReportPage& page, std::vector<lab::ResultRow> rows) {
+  const std::size_t judged = lab::put_targets_first(rows);
+  const std::span<const lab::ResultRow> all(rows);
   if (judged > 0) add_table(page, all.first(judged));
   if (judged == all.size()) return;
   page.text("Figures without a target:");
   add_table(page, all.subspan(judged));
 }
 
-void add_counts(ReportPage& page, const TargetCount& count, std::size_t rows) {
+void add_counts(viewer::ReportPage& page, const lab::TargetCount& count, std::size_t rows) {
   page.figures(
       {{std::to_string(count.held) + " of " + std::to_string(count.judged), "targets hold"},
        {std::to_string(rows - count.judged), "more figures are reported"}});
 }
 
-void add_misses(ReportPage& page, const ResultsDocument& document) {
+void add_misses(viewer::ReportPage& page, const lab::ResultsDocument& document) {
   page.section("Rows that do not hold");
-  const auto misses = miss_lines(document);
+  const auto misses = lab::miss_lines(document);
   for (const std::string& line : misses) page.text(line);
   if (misses.empty()) page.text("None.");
 }
@@ -45,16 +45,16 @@ void add_misses(ReportPage& page, const ResultsDocument& document) {
 }  // namespace
 
 void write_paper_page(const std::filesystem::path& folder, const ReproducedPaper& paper,
-                      const std::string& lead, const Reproduction& reproduction) {
-  ReportPage page(std::string(paper.title), lead);
-  add_counts(page, count_targets(reproduction.rows), reproduction.rows.size());
+                      const std::string& lead, const lab::Reproduction& reproduction) {
+  viewer::ReportPage page(std::string(paper.title), lead);
+  add_counts(page, lab::count_targets(reproduction.rows), reproduction.rows.size());
   add_misses(
       page,
       {.version = {}, .command = {}, .papers = {{std::string(paper.name), {}, reproduction.rows}}});
   page.section("Published and measured");
   add_tables(page, reproduction.rows);
   page.section("Pictures");
-  std::vector<ReportPicture> pictures;
+  std::vector<viewer::ReportPicture> pictures;
   for (const auto& picture : reproduction.pictures) {
     pictures.push_back({picture.file.string(), picture.caption});
   }
@@ -62,15 +62,15 @@ void write_paper_page(const std::filesystem::path& folder, const ReproducedPaper
   page.write(folder);
 }
 
-void write_results_page(const std::filesystem::path& folder, const ResultsDocument& document) {
-  ReportPage page("Results: published and measured",
-                  "Written by panonav " + document.version + ":");
+void write_results_page(const std::filesystem::path& folder, const lab::ResultsDocument& document) {
+  viewer::ReportPage page("Results: published and measured",
+                          "Written by panonav " + document.version + ":");
   page.commands({document.command});
   std::size_t rows = 0;
-  for (const PaperResults& paper : document.papers) rows += paper.rows.size();
-  add_counts(page, count_targets(document), rows);
+  for (const lab::PaperResults& paper : document.papers) rows += paper.rows.size();
+  add_counts(page, lab::count_targets(document), rows);
   add_misses(page, document);
-  for (const PaperResults& paper : document.papers) {
+  for (const lab::PaperResults& paper : document.papers) {
     page.section(paper.title);
     page.link(paper.paper + "/index.html", "Its own page, with pictures");
     add_tables(page, paper.rows);

@@ -9,9 +9,9 @@
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/positions.hpp"
-#include "reporting/picture_plot.hpp"
-#include "reporting/plot.hpp"
-#include "viewer/report_page.hpp"
+#include "panonav_viewer/picture_plot.hpp"
+#include "panonav_viewer/plot.hpp"
+#include "panonav_viewer/report_page.hpp"
 
 namespace panonav::command {
 
@@ -26,26 +26,27 @@ void put_line(std::span<const float> line, float* to) {
   }
 }
 
-MapLayer path_layer(std::span<const Pose2> path) {
-  MapLayer layer{.label = "remembered route", .colour = PlotColour::grey};
+viewer::MapLayer path_layer(std::span<const Pose2> path) {
+  viewer::MapLayer layer{.label = "remembered route", .colour = viewer::PlotColour::grey};
   layer.lines.push_back(positions_of(path));
   return layer;
 }
 
 /// Lines at equal steps of way from the bottom to the top.
-PicturePlot plot_of_panorama(const RoutePanorama& route) {
+viewer::PicturePlot plot_of_panorama(const RoutePanorama& route) {
   constexpr int max_rows = 400;
   const double length_m = route.length_m();
   const int rows = std::clamp(static_cast<int>(route.size()), 1, max_rows);
   const auto columns = static_cast<std::size_t>(route.columns());
-  PicturePlot plot{.title = "What the route looks like: each row is the horizon at one place",
-                   .x_label = "azimuth from straight ahead [degrees], left positive",
-                   .y_label = "way along the route [m]",
-                   .x_range = {180.0, -180.0},
-                   .y_range = {0.0, std::max(length_m, 1e-3)},
-                   .columns = route.columns(),
-                   .rows = rows,
-                   .x_tick = 45.0};
+  viewer::PicturePlot plot{
+      .title = "What the route looks like: each row is the horizon at one place",
+      .x_label = "azimuth from straight ahead [degrees], left positive",
+      .y_label = "way along the route [m]",
+      .x_range = {180.0, -180.0},
+      .y_range = {0.0, std::max(length_m, 1e-3)},
+      .columns = route.columns(),
+      .rows = rows,
+      .x_tick = 45.0};
   plot.values.resize(columns * static_cast<std::size_t>(rows));
   double way_m = 0.0;
   std::size_t line = 0;
@@ -82,22 +83,23 @@ std::vector<std::size_t> spread(const std::vector<FollowedImage>& images, std::s
 }
 
 /// For each chosen picture two bands: seen above, shown by the route below.
-PicturePlot plot_of_lines(const RouteLines& route, const std::vector<FollowedImage>& images,
-                          const std::vector<std::size_t>& chosen) {
+viewer::PicturePlot plot_of_lines(const RouteLines& route, const std::vector<FollowedImage>& images,
+                                  const std::vector<std::size_t>& chosen) {
   constexpr int band = 3;
   constexpr int gap = 1;
   constexpr int rows_of_pair = 2 * band + gap;
   const auto columns = static_cast<std::size_t>(route.columns());
   const int rows = rows_of_pair * static_cast<int>(chosen.size());
-  PicturePlot plot{.title = "Seen (upper band) and shown by the route from there (lower band)",
-                   .x_label = "azimuth from straight ahead [degrees], left positive",
-                   .y_label = "picture, the last one on top",
-                   .x_range = {180.0, -180.0},
-                   .y_range = {0.0, static_cast<double>(chosen.size())},
-                   .columns = route.columns(),
-                   .rows = rows,
-                   .x_tick = 45.0,
-                   .y_tick = 1.0};
+  viewer::PicturePlot plot{
+      .title = "Seen (upper band) and shown by the route from there (lower band)",
+      .x_label = "azimuth from straight ahead [degrees], left positive",
+      .y_label = "picture, the last one on top",
+      .x_range = {180.0, -180.0},
+      .y_range = {0.0, static_cast<double>(chosen.size())},
+      .columns = route.columns(),
+      .rows = rows,
+      .x_tick = 45.0,
+      .y_tick = 1.0};
   plot.values.assign(columns * static_cast<std::size_t>(rows),
                      std::numeric_limits<float>::quiet_NaN());
   for (std::size_t k = 0; k < chosen.size(); ++k) {
@@ -112,11 +114,13 @@ PicturePlot plot_of_lines(const RouteLines& route, const std::vector<FollowedIma
   return plot;
 }
 
-MapPlot plot_of_path(const RouteLines& route, const std::vector<FollowedImage>& images) {
-  MapLayer truth{.label = "ground truth", .colour = PlotColour::black};
-  MapLayer fixes{.label = "fixes", .colour = PlotColour::blue};
-  MapLayer changed{.label = "something changed in view", .colour = PlotColour::orange};
-  MapLayer off{.label = "true place where not on the route", .colour = PlotColour::vermilion};
+viewer::MapPlot plot_of_path(const RouteLines& route, const std::vector<FollowedImage>& images) {
+  viewer::MapLayer truth{.label = "ground truth", .colour = viewer::PlotColour::black};
+  viewer::MapLayer fixes{.label = "fixes", .colour = viewer::PlotColour::blue};
+  viewer::MapLayer changed{.label = "something changed in view",
+                           .colour = viewer::PlotColour::orange};
+  viewer::MapLayer off{.label = "true place where not on the route",
+                       .colour = viewer::PlotColour::vermilion};
   std::vector<Point2> true_path;
   for (const FollowedImage& image : images) {
     if (image.truth) true_path.push_back(image.truth->position());
@@ -130,10 +134,10 @@ MapPlot plot_of_path(const RouteLines& route, const std::vector<FollowedImage>& 
   return {.title = "From above", .layers = {path_layer(route.poses()), truth, changed, fixes, off}};
 }
 
-LinePlot plot_of_errors(const std::vector<FollowedImage>& images) {
-  Series position{.label = "position [cm]", .style = SeriesStyle::points};
-  Series along{.label = "along the route [cm]", .style = SeriesStyle::points};
-  Series lost{.label = "not on this route", .style = SeriesStyle::points};
+viewer::LinePlot plot_of_errors(const std::vector<FollowedImage>& images) {
+  viewer::Series position{.label = "position [cm]", .style = viewer::SeriesStyle::points};
+  viewer::Series along{.label = "along the route [cm]", .style = viewer::SeriesStyle::points};
+  viewer::Series lost{.label = "not on this route", .style = viewer::SeriesStyle::points};
   for (std::size_t i = 0; i < images.size(); ++i) {
     const FollowedImage& image = images[i];
     const auto number = static_cast<double>(i + 1);
@@ -151,8 +155,9 @@ LinePlot plot_of_errors(const std::vector<FollowedImage>& images) {
           .series = {position, along, lost}};
 }
 
-LinePlot plot_of_correlations(const std::vector<FollowedImage>& images) {
-  Series correlation{.label = "of seen and shown line", .style = SeriesStyle::lines_and_points};
+viewer::LinePlot plot_of_correlations(const std::vector<FollowedImage>& images) {
+  viewer::Series correlation{.label = "of seen and shown line",
+                             .style = viewer::SeriesStyle::lines_and_points};
   for (std::size_t i = 0; i < images.size(); ++i) {
     if (!images[i].fix) continue;
     correlation.add(static_cast<double>(i + 1), images[i].fix->fix.correlation);
@@ -163,10 +168,10 @@ LinePlot plot_of_correlations(const std::vector<FollowedImage>& images) {
           .series = {correlation}};
 }
 
-std::vector<RouteMark> marks_of(const std::vector<FollowedImage>& images) {
-  std::vector<RouteMark> marks;
+std::vector<viewer::RouteMark> marks_of(const std::vector<FollowedImage>& images) {
+  std::vector<viewer::RouteMark> marks;
   for (const FollowedImage& image : images) {
-    RouteMark& mark = marks.emplace_back();
+    viewer::RouteMark& mark = marks.emplace_back();
     if (image.fix) mark.along_m = image.fix->along_m;
     if (image.true_place) mark.true_along_m = image.true_place->along_m;
     for (const AzimuthRange& range : image.changed) {
@@ -187,13 +192,14 @@ void add_figure(std::vector<std::pair<std::string, std::string>>& figures,
 
 void write_record_report(const std::filesystem::path& folder, const std::string& name,
                          const RoutePanorama& route, double bytes_per_km) {
-  MapLayer path = path_layer(route.poses());
-  MapLayer start{.label = "start", .colour = PlotColour::green};
+  viewer::MapLayer path = path_layer(route.poses());
+  viewer::MapLayer start{.label = "start", .colour = viewer::PlotColour::green};
   start.squares.push_back(route.poses().front().position());
-  ReportPage page("Route '" + name + "'",
-                  "A robot drove this way once. From each place it keeps one line of pixels, what "
-                  "its camera sees at its own height, and that is all it needs to follow the way "
-                  "again.");
+  viewer::ReportPage page(
+      "Route '" + name + "'",
+      "A robot drove this way once. From each place it keeps one line of pixels, what "
+      "its camera sees at its own height, and that is all it needs to follow the way "
+      "again.");
   page.figures(
       {{fixed(route.length_m(), 1) + " m", "long"},
        {std::to_string(route.size()), "lines of " + std::to_string(route.columns()) + " pixels"},
@@ -205,14 +211,14 @@ void write_record_report(const std::filesystem::path& folder, const std::string&
       "outwards as the robot passes them, the slower the farther they are.");
   page.plots({{plot_of_panorama(route), "Omnidirectional route panorama"}});
   page.section("The way");
-  page.plots(
-      {{MapPlot{.title = "From above", .layers = {path, start}}, "Where the lines were taken"}});
+  page.plots({{viewer::MapPlot{.title = "From above", .layers = {path, start}},
+               "Where the lines were taken"}});
   page.write(folder, "index.html", "panonav route record");
 }
 
 void write_follow_report(const std::filesystem::path& folder, const FollowedRoute& route,
                          const std::vector<FollowedImage>& images, const FollowSummary& summary,
-                         RunPage played) {
+                         viewer::RunPage played) {
   const auto chosen = spread(images, 8);
   std::vector<std::pair<std::string, std::string>> figures{
       {std::to_string(summary.on_route) + " of " + std::to_string(summary.images),
@@ -220,9 +226,10 @@ void write_follow_report(const std::filesystem::path& folder, const FollowedRout
   add_figure(figures, summary.position_m, 100.0, 1, " cm", "median error of position");
   add_figure(figures, summary.along_m, 100.0, 1, " cm", "median error along the route");
   add_figure(figures, summary.heading_rad, degrees(1.0), 2, " degrees", "median error of heading");
-  ReportPage page("Following route '" + route.name + "'",
-                  "A robot that drives the way again, or beside it, looks for the pose from which "
-                  "the remembered lines show what it sees.");
+  viewer::ReportPage page(
+      "Following route '" + route.name + "'",
+      "A robot that drives the way again, or beside it, looks for the pose from which "
+      "the remembered lines show what it sees.");
   page.figures(figures);
   played.route(plot_of_panorama(route.panorama), marks_of(images));
   page.section("The run, picture by picture");

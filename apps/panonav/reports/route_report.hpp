@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "panonav/route/route_panorama.hpp"
+#include "panonav_viewer/page.hpp"
 #include "verbs/followed_run.hpp"
-#include "viewer/page.hpp"
 
 namespace panonav::command {
 
@@ -26,6 +26,6 @@ struct FollowedRoute {
 /// image. Throws FileError.
 void write_follow_report(const std::filesystem::path& folder, const FollowedRoute& route,
                          const std::vector<FollowedImage>& images, const FollowSummary& summary,
-                         RunPage played);
+                         viewer::RunPage played);
 
 }  // namespace panonav::command

@@ -9,8 +9,8 @@ namespace {
 
 using Lines = std::vector<std::vector<Point2>>;
 
-MapLayer references(const VisualMemory& memory) {
-  MapLayer layer{.label = "remembered views", .colour = PlotColour::grey};
+viewer::MapLayer references(const VisualMemory& memory) {
+  viewer::MapLayer layer{.label = "remembered views", .colour = viewer::PlotColour::grey};
   for (const ViewId view : memory.views()) {
     if (const auto& pose = memory.info(view).pose) layer.circles.push_back(pose->position());
   }
@@ -31,37 +31,39 @@ Lines lines_of(const std::vector<std::optional<Point2>>& positions,
   return lines;
 }
 
-MapLayer true_path(const std::vector<TrackedImage>& images, const TrackBackground& background) {
+viewer::MapLayer true_path(const std::vector<TrackedImage>& images,
+                           const TrackBackground& background) {
   std::vector<std::optional<Point2>> positions(images.size());
   for (std::size_t i = 0; i < images.size(); ++i) {
     if (images[i].truth) positions[i] = images[i].truth->position();
   }
   return {.label = "ground truth",
-          .colour = PlotColour::black,
+          .colour = viewer::PlotColour::black,
           .lines = lines_of(positions, background.kidnapped_after)};
 }
 
-MapLayer estimated_path(const std::vector<TrackedImage>& images,
-                        const TrackBackground& background) {
+viewer::MapLayer estimated_path(const std::vector<TrackedImage>& images,
+                                const TrackBackground& background) {
   std::vector<std::optional<Point2>> positions(images.size());
   for (std::size_t i = 0; i < images.size(); ++i) {
     if (is_localised(images[i])) positions[i] = images[i].estimate.pose->position();
   }
   return {.label = "estimated path",
-          .colour = PlotColour::blue,
+          .colour = viewer::PlotColour::blue,
           .lines = lines_of(positions, background.kidnapped_after)};
 }
 
 }  // namespace
 
-MapPlot track_map(const VisualMemory& memory, const std::vector<TrackedImage>& images,
-                  const TrackBackground& background) {
-  MapLayer localised{.label = "localised here", .colour = PlotColour::blue};
-  MapLayer guessed{.label = "ambiguous: likeliest place", .colour = PlotColour::orange};
-  MapLayer lost{.label = "true place where lost", .colour = PlotColour::vermilion};
-  MapLayer start{.label = "start", .colour = PlotColour::green};
+viewer::MapPlot track_map(const VisualMemory& memory, const std::vector<TrackedImage>& images,
+                          const TrackBackground& background) {
+  viewer::MapLayer localised{.label = "localised here", .colour = viewer::PlotColour::blue};
+  viewer::MapLayer guessed{.label = "ambiguous: likeliest place",
+                           .colour = viewer::PlotColour::orange};
+  viewer::MapLayer lost{.label = "true place where lost", .colour = viewer::PlotColour::vermilion};
+  viewer::MapLayer start{.label = "start", .colour = viewer::PlotColour::green};
   if (images.front().truth) start.squares.push_back(images.front().truth->position());
-  MapLayer kidnapped{.label = "kidnapped to here", .colour = PlotColour::purple};
+  viewer::MapLayer kidnapped{.label = "kidnapped to here", .colour = viewer::PlotColour::purple};
   if (background.kidnapped_after && images.at(*background.kidnapped_after + 1).truth) {
     kidnapped.squares.push_back(images[*background.kidnapped_after + 1].truth->position());
   }
@@ -75,10 +77,10 @@ MapPlot track_map(const VisualMemory& memory, const std::vector<TrackedImage>& i
       lost.crosses.push_back(image.truth->position());
     }
   }
-  MapPlot plot{.title = "The whole run from above", .layers = background.surroundings};
-  for (MapLayer& layer : std::vector{references(memory), true_path(images, background),
-                                     estimated_path(images, background), localised, guessed, lost,
-                                     start, kidnapped}) {
+  viewer::MapPlot plot{.title = "The whole run from above", .layers = background.surroundings};
+  for (viewer::MapLayer& layer : std::vector{references(memory), true_path(images, background),
+                                             estimated_path(images, background), localised, guessed,
+                                             lost, start, kidnapped}) {
     plot.layers.push_back(std::move(layer));
   }
   return plot;

@@ -5,20 +5,21 @@
 #include <vector>
 
 #include "panonav/memory/visual_memory.hpp"
-#include "reporting/plot.hpp"
+#include "panonav_viewer/plot.hpp"
 #include "verbs/tracked_run.hpp"
 
 namespace panonav::command {
 
 /// What is drawn below a tracked run.
 struct TrackBackground {
-  std::vector<MapLayer> surroundings;
+  std::vector<viewer::MapLayer> surroundings;
   /// The last image before the robot was kidnapped; empty: it was not.
   std::optional<std::size_t> kidnapped_after;
 };
 
 /// True and estimated path of a run from above, and what the filter said of each image.
-[[nodiscard]] MapPlot track_map(const VisualMemory& memory, const std::vector<TrackedImage>& images,
-                                const TrackBackground& background);
+[[nodiscard]] viewer::MapPlot track_map(const VisualMemory& memory,
+                                        const std::vector<TrackedImage>& images,
+                                        const TrackBackground& background);
 
 }  // namespace panonav::command

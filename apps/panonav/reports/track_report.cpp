@@ -9,7 +9,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "reporting/plot.hpp"
+#include "panonav_viewer/plot.hpp"
 #include "reports/report_page.hpp"
 #include "reports/track_pictures.hpp"
 
@@ -17,12 +17,12 @@ namespace panonav::command {
 
 namespace {
 
-LinePlot plot_of_errors(const std::vector<TrackedImage>& images, double spacing_m) {
-  Series localised{.label = "error, localised", .style = SeriesStyle::points};
-  Series guessed{.label = "error, ambiguous", .style = SeriesStyle::points};
-  Series spread{.label = "spread of particles", .style = SeriesStyle::lines};
-  Series lost{.label = "lost: no estimate", .style = SeriesStyle::points};
-  Series spacing{.label = "spacing of views", .style = SeriesStyle::lines};
+viewer::LinePlot plot_of_errors(const std::vector<TrackedImage>& images, double spacing_m) {
+  viewer::Series localised{.label = "error, localised", .style = viewer::SeriesStyle::points};
+  viewer::Series guessed{.label = "error, ambiguous", .style = viewer::SeriesStyle::points};
+  viewer::Series spread{.label = "spread of particles", .style = viewer::SeriesStyle::lines};
+  viewer::Series lost{.label = "lost: no estimate", .style = viewer::SeriesStyle::points};
+  viewer::Series spacing{.label = "spacing of views", .style = viewer::SeriesStyle::lines};
   for (std::size_t i = 0; i < images.size(); ++i) {
     const TrackedImage& image = images[i];
     const auto x = static_cast<double>(i + 1);
@@ -30,37 +30,37 @@ LinePlot plot_of_errors(const std::vector<TrackedImage>& images, double spacing_
     if (image.estimate.state == LocalisationState::lost) {
       lost.add(x, image.estimate.spread_m);
     } else if (const auto error = position_error_m(image)) {
-      Series& series = is_localised(image) ? localised : guessed;
+      viewer::Series& series = is_localised(image) ? localised : guessed;
       series.add(x, *error);
     }
   }
   spacing.x = {1.0, static_cast<double>(images.size())};
   spacing.y = {spacing_m, spacing_m};
-  return LinePlot{.title = "How far off, and how sure",
-                  .x_label = "image",
-                  .y_label = "metres",
-                  .series = {localised, guessed, spread, lost, spacing},
-                  .log_y = true};
+  return viewer::LinePlot{.title = "How far off, and how sure",
+                          .x_label = "image",
+                          .y_label = "metres",
+                          .series = {localised, guessed, spread, lost, spacing},
+                          .log_y = true};
 }
 
-LinePlot plot_of_particles(const std::vector<TrackedImage>& images) {
-  Series all{.label = "particles", .style = SeriesStyle::lines};
-  Series injected{.label = "drawn anew", .style = SeriesStyle::points};
-  Series effective{.label = "effective number", .style = SeriesStyle::lines};
+viewer::LinePlot plot_of_particles(const std::vector<TrackedImage>& images) {
+  viewer::Series all{.label = "particles", .style = viewer::SeriesStyle::lines};
+  viewer::Series injected{.label = "drawn anew", .style = viewer::SeriesStyle::points};
+  viewer::Series effective{.label = "effective number", .style = viewer::SeriesStyle::lines};
   for (std::size_t i = 0; i < images.size(); ++i) {
     const MonteCarloEstimate& estimate = images[i].estimate;
-    const auto add = [&](Series& series, double value) {
+    const auto add = [&](viewer::Series& series, double value) {
       series.add(static_cast<double>(i + 1), value);
     };
     add(all, estimate.particles);
     add(effective, estimate.effective_particles);
     if (estimate.injected > 0) add(injected, estimate.injected);
   }
-  return LinePlot{.title = "Particles",
-                  .x_label = "image",
-                  .y_label = "number",
-                  .series = {all, injected, effective},
-                  .log_y = true};
+  return viewer::LinePlot{.title = "Particles",
+                          .x_label = "image",
+                          .y_label = "number",
+                          .series = {all, injected, effective},
+                          .log_y = true};
 }
 
 /// Stretches of images with one state.
@@ -120,10 +120,10 @@ std::size_t particles_shown(std::size_t images) {
 
 void write_track_report(const std::filesystem::path& folder, const VisualMemory& memory,
                         double spacing_m, const std::vector<TrackedImage>& images,
-                        const TrackSummary& summary, const RunPage& played) {
+                        const TrackSummary& summary, const viewer::RunPage& played) {
   const bool truth_known =
       std::ranges::any_of(images, [](const auto& image) { return image.truth.has_value(); });
-  ReportPage page(
+  viewer::ReportPage page(
       "Where was the robot?",
       "A robot moved, with odometry that drifts and a memory of " + std::to_string(memory.size()) +
           " views, and took " + std::to_string(images.size()) +

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "panonav/memory/visual_memory.hpp"
+#include "panonav_viewer/page.hpp"
 #include "verbs/tracked_run.hpp"
-#include "viewer/page.hpp"
 
 namespace panonav::command {
 
@@ -18,6 +18,6 @@ namespace panonav::command {
 /// whole of it. `images`: at least one. Throws FileError.
 void write_track_report(const std::filesystem::path& folder, const VisualMemory& memory,
                         double spacing_m, const std::vector<TrackedImage>& images,
-                        const TrackSummary& summary, const RunPage& played);
+                        const TrackSummary& summary, const viewer::RunPage& played);
 
 }  // namespace panonav::command

@@ -16,12 +16,10 @@
 #include "panonav/pipeline/graph_file.hpp"
 #include "panonav/storage/memory_address.hpp"
 #include "panonav/storage/memory_file.hpp"
-#include "verbs/recording.hpp"
-#ifdef PANONAV_COMMAND_SIMULATES
 #include "reports/arrange_report.hpp"
 #include "reports/lattice_picture.hpp"
 #include "reports/report_page.hpp"
-#endif
+#include "verbs/recording.hpp"
 
 namespace panonav::command {
 
@@ -83,7 +81,6 @@ std::size_t number_rejected(const Lattice& lattice) {
       lattice.springs, [](const auto& spring) { return spring.weight < min_spring_weight; }));
 }
 
-#ifdef PANONAV_COMMAND_SIMULATES
 ordered_json as_json(const LatticeComparison& comparison) {
   return {{"views", comparison.compared},
           {"procrustes_disparity", comparison.shape_difference},
@@ -93,7 +90,6 @@ ordered_json as_json(const LatticeComparison& comparison) {
           {"trustworthiness", or_null(comparison.trustworthiness)},
           {"continuity", or_null(comparison.continuity)}};
 }
-#endif
 
 ordered_json as_json(const ArrangeArguments& wanted, const Lattice& lattice,
                      const VisualMemory& memory) {
@@ -124,11 +120,9 @@ ordered_json as_json(const ArrangeArguments& wanted, const Lattice& lattice,
                     {"energy", lattice.energy},
                     {"nodes", std::move(nodes)},
                     {"ground_truth", nullptr}};
-#ifdef PANONAV_COMMAND_SIMULATES
   if (const auto comparison = compare_with_ground_truth(lattice, memory)) {
     json["ground_truth"] = as_json(*comparison);
   }
-#endif
   return json;
 }
 
@@ -157,7 +151,6 @@ void print_result(const Lattice& lattice, const VisualMemory& memory, Session& s
   if (!lattice.components.front().handedness_known) {
     session.print("It may as well be the mirror image: nothing tells left from right.");
   }
-#ifdef PANONAV_COMMAND_SIMULATES
   if (const auto comparison = compare_with_ground_truth(lattice, memory)) {
     session.print("beside the ground truth: Procrustes disparity (shape difference) " +
                   session.strong(fixed(comparison->shape_difference, 4)) + " over " +
@@ -168,9 +161,6 @@ void print_result(const Lattice& lattice, const VisualMemory& memory, Session& s
                     ", continuity " + fixed(*comparison->continuity, 3));
     }
   }
-#else
-  static_cast<void>(memory);
-#endif
 }
 
 ExitCode arrange_views(const ArrangeArguments& wanted, Session& session) {
@@ -181,13 +171,9 @@ ExitCode arrange_views(const ArrangeArguments& wanted, Session& session) {
     return session.no_answer("panonav arrange: " + wanted.memory + " holds no views");
   }
   session.detail(std::to_string(memory.size()) + " views loaded");
-#ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) prepare_report_folder(*wanted.report, "arrange");
   LatticeSteps steps;
   const LatticeWatch watch = wanted.report ? steps.watch() : LatticeWatch();
-#else
-  const LatticeWatch watch;
-#endif
   const Lattice lattice =
       arrange(memory, wanted.lattice, motions_of(wanted, file.header().source, memory, session),
               session.executor(), watch);
@@ -198,24 +184,20 @@ ExitCode arrange_views(const ArrangeArguments& wanted, Session& session) {
     write_graph(*wanted.graph, map_of(lattice),
                 [&](ViewId view) { return memory.info(view).name; });
   }
-#ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.picture) write_lattice_picture(*wanted.picture, lattice, memory);
   if (wanted.report) {
     write_arrange_report(*wanted.report, memory_name(file.path()), lattice, memory, steps);
   }
-#endif
   if (session.json()) {
     session.print(json_line(as_json(wanted, lattice, memory)));
   } else {
     print_result(lattice, memory, session);
-#ifdef PANONAV_COMMAND_SIMULATES
     if (wanted.picture && lattice.components.size() > 1) {
       session.print(*wanted.picture + " shows the largest connected component of the map, " +
                     std::to_string(lattice.components.front().views) + " of " +
                     std::to_string(lattice.nodes.size()) + " views.");
     }
     if (wanted.report) tell_report(*wanted.report, session);
-#endif
   }
   return ExitCode::done;
 }
@@ -232,13 +214,11 @@ Run declare_arrange(Arguments& arguments) {
       "Write the poses of the largest component to this file: TUM text, or CSV for a name "
       "that ends in .csv");
   arguments.option("--graphml FILE", wanted->graph, "Write the map as a graph to this file");
-#ifdef PANONAV_COMMAND_SIMULATES
   arguments.option("--picture FILE", wanted->picture,
                    "Draw the map, beside the truth where it is known, into this PNG or SVG file");
   arguments.option("--report FOLDER", wanted->report,
                    "Write a page that shows the arrangement as it unfolds into this folder: a new "
                    "one, or that of an earlier report");
-#endif
   arguments.flag("--no-save", wanted->no_save, "Leave the memory file as it is");
   arguments.options("lattice", wanted->lattice);
   arguments.options("coarse_motion", wanted->motion, "motion");

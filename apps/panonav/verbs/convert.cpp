@@ -4,7 +4,7 @@
 #include "cli/json.hpp"
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
-#include "panonav/pipeline/recording_conversion.hpp"
+#include "panonav_recordings/recording_conversion.hpp"
 #include "verbs/recording.hpp"
 
 namespace panonav::command {
@@ -20,7 +20,7 @@ struct ConvertArguments {
 };
 
 /// What some pictures lack, and so none has in a data set.
-std::string parts(const RecordingConversion& done) {
+std::string parts(const recordings::RecordingConversion& done) {
   std::string text;
   for (const auto& [has, what] : {std::pair{done.odometry, "odometry"},
                                   {done.positions, "positions"},
@@ -34,8 +34,9 @@ std::string parts(const RecordingConversion& done) {
 ExitCode convert(const ConvertArguments& wanted, Session& session) {
   std::error_code ignored;
   const bool records = fs::path(wanted.output).extension() == ".mcap";
-  if (!records && (fs::exists(fs::path(wanted.input) / "dataset.toml", ignored) ||
-                   (fs::is_directory(wanted.input, ignored) && !is_recording(wanted.input)))) {
+  if (!records &&
+      (fs::exists(fs::path(wanted.input) / "dataset.toml", ignored) ||
+       (fs::is_directory(wanted.input, ignored) && !recordings::is_recording(wanted.input)))) {
     throw UsageError(wanted.output +
                      " does not end in .mcap; pictures of a folder become a "
                      "recording, and a recording becomes a folder");
@@ -47,8 +48,9 @@ ExitCode convert(const ConvertArguments& wanted, Session& session) {
                                          records ? std::optional(any) : std::nullopt, session);
   Progress progress(session, "converting", dataset.entries.size());
   const auto advance = [&] { progress.advance(); };
-  const RecordingConversion done = records ? convert_to_recording(dataset, wanted.output, advance)
-                                           : convert_to_dataset(dataset, wanted.output, advance);
+  const recordings::RecordingConversion done =
+      records ? recordings::convert_to_recording(dataset, wanted.output, advance)
+              : recordings::convert_to_dataset(dataset, wanted.output, advance);
   progress.clear();
   if (session.json()) {
     session.print(json_line(ordered_json{{"input", wanted.input},

@@ -13,7 +13,7 @@ namespace panonav::command {
 
 namespace {
 
-void describe(RunMoment& moment, const FollowedImage& image) {
+void describe(recordings::RunMoment& moment, const FollowedImage& image) {
   moment.sure = image.fix.has_value();
   moment.state = moment.sure ? "on the route" : "not on this route";
   moment.truth.reset();  // a recording's poses may be in another frame than the route's
@@ -37,7 +37,7 @@ void follow(RouteFollower& follower, const Dataset& run, const std::vector<Pose2
             const std::function<void(FollowedImage&&)>& report) {
   struct Seen {
     std::vector<float> line;
-    std::optional<RunMoment> moment;
+    std::optional<recordings::RunMoment> moment;
   };
   const auto every = static_cast<std::size_t>(every_nth);
   make_in_order((run.entries.size() + every - 1) / every, executor,
@@ -48,7 +48,7 @@ void follow(RouteFollower& follower, const Dataset& run, const std::vector<Pose2
                   Seen seen{follower.encode(observation), std::nullopt};
                   clock.stage("scanline");
                   if (recorded == nullptr) return seen;
-                  seen.moment = moment_of(observation, i * every);
+                  seen.moment = recordings::moment_of(observation, i * every);
                   seen.moment->panorama = recorded->convert(seen.moment->picture->view(),
                                                             observation.tilt.value_or(Tilt{}));
                   clock.stage("for viewers");

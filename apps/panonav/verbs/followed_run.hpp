@@ -11,10 +11,10 @@
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/panorama_reader.hpp"
 #include "panonav/pipeline/route_follower.hpp"
-#include "panonav/pipeline/run_recorder.hpp"
 #include "panonav/route/route_changes.hpp"
 #include "panonav/route/route_place.hpp"
 #include "panonav/route/route_tracker.hpp"
+#include "panonav_recordings/run_recorder.hpp"
 
 namespace panonav::command {
 
@@ -28,7 +28,8 @@ struct FollowedImage {
   std::vector<AzimuthRange> changed;   ///< where the scene is not as remembered
   std::optional<Pose2> truth;          ///< in the route's frame, where it is known
   std::optional<RoutePlace> true_place;
-  std::optional<RunMoment> moment;  ///< what was seen and said, where a record is wanted
+  std::optional<recordings::RunMoment>
+      moment;  ///< what was seen and said, where a record is wanted
 };
 
 /// Follows a run along a route, every N-th picture of it. Lines are read on all threads, the

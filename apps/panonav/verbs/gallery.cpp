@@ -11,9 +11,9 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/storage/memory_address.hpp"
+#include "panonav_viewer/page.hpp"
 #include "reports/report_page.hpp"
 #include "verbs/view_selection.hpp"
-#include "viewer/page.hpp"
 
 namespace panonav::command {
 
@@ -90,7 +90,7 @@ std::string picture_of(const MemoryFile& memory, const ViewRecord& view) {
   if (!bytes) return "";
   try {
     const Image picture = decode_image(*bytes, "thumbnail", {.side_px = 4096});
-    return data_url("image/png", encode_png(picture.view()));
+    return viewer::data_url("image/png", encode_png(picture.view()));
   } catch (const FileError&) {
     return "";
   }
@@ -121,7 +121,7 @@ ExitCode gallery(const GalleryArguments& wanted, Session& session) {
   prepare_report_folder(wanted.out, "gallery", page_name);
   views.resize(std::min(found, max_views));
 
-  ReportPage page(
+  viewer::ReportPage page(
       "What " + memory_name(wanted.memory) + " remembers",
       "The reference views of the memory, each as the small picture that is stored "
       "with it: all around the robot, straight ahead in the middle, left and right as "
@@ -140,7 +140,7 @@ ExitCode gallery(const GalleryArguments& wanted, Session& session) {
   for (const auto& [title, members] : grouped(views)) {
     page.section(title + " (" + std::to_string(members.size()) +
                  (members.size() == 1 ? " view)" : " views)"));
-    std::vector<ReportPicture> pictures;
+    std::vector<viewer::ReportPicture> pictures;
     for (const ViewRecord& view : members) {
       std::string picture = picture_of(memory, view);
       std::string caption = caption_of(view, !picture.empty());

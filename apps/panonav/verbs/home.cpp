@@ -11,13 +11,11 @@
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "reports/home_answer.hpp"
+#include "reports/home_report.hpp"
+#include "reports/report_page.hpp"
 #include "verbs/homing_pictures.hpp"
 #include "verbs/memorising.hpp"
 #include "verbs/recording.hpp"
-#ifdef PANONAV_COMMAND_SIMULATES
-#include "reports/home_report.hpp"
-#include "reports/report_page.hpp"
-#endif
 
 namespace panonav::command {
 
@@ -101,16 +99,12 @@ ExitCode answer_all(const HomeArguments& wanted, const HomingGuide& guide, const
     session.print(session.strong(std::to_string(pointing) + " of " + std::to_string(total)) +
                   " views tell the way to " + goal.name);
   }
-#ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) {
     write_home_report(*wanted.report, goal, answers, [&](std::size_t i) {
       return guide.encoder().panorama(read_observation(recording.entries[i]));
     });
     tell_report(*wanted.report, session);
   }
-#else
-  (void)wanted;
-#endif
   return pointing > 0 ? ExitCode::done : ExitCode::no_answer;
 }
 
@@ -137,9 +131,7 @@ ExitCode home_from_memory(const Arguments& arguments, const HomeArguments& wante
 }
 
 ExitCode home(const Arguments& arguments, const HomeArguments& wanted, Session& session) {
-#ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) prepare_report_folder(*wanted.report, "home");
-#endif
   if (wanted.memory) return home_from_memory(arguments, wanted, session);
   const auto& views = wanted.homing.views;
   const auto options = homing_options(arguments, wanted.homing, views.signature.components);
@@ -172,11 +164,9 @@ Run declare_home(Arguments& arguments) {
                        "What the robot sees now: a picture, or a data set (an answer for each)");
   arguments.option("--memory FILE", wanted->memory, "Take GOAL from this memory file");
   declare_pictures(arguments, wanted->pictures);
-#ifdef PANONAV_COMMAND_SIMULATES
   arguments.option("--report FOLDER", wanted->report,
                    "Write pictures of both views and the way home into this folder: a new one, or "
                    "that of an earlier report");
-#endif
   declare_homing(arguments, wanted->homing);
   return [wanted, &arguments](Session& session) { return home(arguments, *wanted, session); };
 }

@@ -8,10 +8,10 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/io/live_pictures.hpp"
-#include "panonav/io/recorded_dataset.hpp"
-#include "panonav/io/video_file.hpp"
 #include "panonav/storage/memory_file.hpp"
+#include "panonav_recordings/live_pictures.hpp"
+#include "panonav_recordings/recorded_dataset.hpp"
+#include "panonav_recordings/video_file.hpp"
 
 namespace panonav::command {
 
@@ -129,11 +129,11 @@ ExitCode show(const std::string& path, Session& session) {
 }
 
 ExitCode show_recording(const std::string& path, Session& session) {
-  const RecordingSummary summary = describe_recording(path);
+  const recordings::RecordingSummary summary = recordings::describe_recording(path);
   const auto seconds = [](std::int64_t ns) { return 1e-9 * static_cast<double>(ns); };
   if (session.json()) {
     ordered_json json{{"recording", path}, {"begin_s", nullptr}, {"end_s", nullptr}};
-    const auto add_span = [&](ordered_json& to, const std::optional<TimeSpan>& span) {
+    const auto add_span = [&](ordered_json& to, const std::optional<recordings::TimeSpan>& span) {
       if (!span) return;
       to["begin_s"] = seconds(span->begin_ns);
       to["end_s"] = seconds(span->end_ns);
@@ -184,9 +184,9 @@ ExitCode show_recording(const std::string& path, Session& session) {
 }
 
 ExitCode show_camera(const std::string& path, Session& session) {
-  const auto formats = camera_formats(path);
+  const auto formats = recordings::camera_formats(path);
   auto listed = ordered_json::array();
-  for (const CameraFormat& format : formats) {
+  for (const recordings::CameraFormat& format : formats) {
     auto sizes = ordered_json::array();
     std::string line = format.pixels + (format.usable ? "" : "  (not used)");
     for (const auto& [width, height] : format.sizes) {
@@ -201,7 +201,7 @@ ExitCode show_camera(const std::string& path, Session& session) {
 }
 
 ExitCode show_video(const std::string& path, Session& session) {
-  const Dataset video = read_video(path, {});
+  const Dataset video = recordings::read_video(path, {});
   const ImageSize size = read_picture(video.entries.front()).size();
   const double begin_s = *video.entries.front().stamp_s;
   const double end_s = *video.entries.back().stamp_s;
@@ -227,8 +227,8 @@ Run declare_info(Arguments& arguments) {
       "Memory file, recording (MCAP, rosbag2, ROS 1 bag), video, or camera (/dev/video0)");
   return [path](Session& session) {
     if (path->starts_with("/dev/video")) return show_camera(*path, session);
-    if (is_video(*path)) return show_video(*path, session);
-    return is_recording(*path) ? show_recording(*path, session) : show(*path, session);
+    if (recordings::is_video(*path)) return show_video(*path, session);
+    return recordings::is_recording(*path) ? show_recording(*path, session) : show(*path, session);
   };
 }
 

@@ -135,10 +135,9 @@ void declare_live(Arguments& arguments, LiveArguments& live) {
   arguments.uncommon({"--count", "--camera-width", "--camera-height"});
 }
 
-std::unique_ptr<LiveObservations> open_live(const Arguments& arguments, const std::string& input,
-                                            const PictureArguments& pictures,
-                                            const std::optional<PictureSource>& remembered,
-                                            const LiveArguments& live) {
+std::unique_ptr<recordings::LiveObservations> open_live(
+    const Arguments& arguments, const std::string& input, const PictureArguments& pictures,
+    const std::optional<PictureSource>& remembered, const LiveArguments& live) {
   arguments.refuse_unused(
       {"--image-topic", "--odometry-topic", "--odometry-frames", "--imu-topic", "--recursive"},
       "where " + input + " is a live source");
@@ -149,9 +148,10 @@ std::unique_ptr<LiveObservations> open_live(const Arguments& arguments, const st
   if (!stated && !remembered) {
     throw UsageError("say what the pictures of " + input + " show with --kind");
   }
-  LiveOptions options;
+  recordings::LiveOptions options;
   if (live.camera_width) options.size = ImageSize{*live.camera_width, *live.camera_height};
-  return std::make_unique<LiveObservations>(input, stated ? *stated : *remembered, options);
+  return std::make_unique<recordings::LiveObservations>(input, stated ? *stated : *remembered,
+                                                        options);
 }
 
 void refuse_live(const Arguments& arguments, const std::string& input, bool count) {
@@ -182,7 +182,7 @@ struct LiveRun::Implementation {
   Implementation(ObservationSource& from, const PartArguments& part, const LiveArguments& wanted,
                  Session& its_session)
       : source(from),
-        live(dynamic_cast<LiveObservations*>(&from)),
+        live(dynamic_cast<recordings::LiveObservations*>(&from)),
         selection(selection_of(part)),
         count(wanted.count),
         session(its_session),
@@ -195,13 +195,13 @@ struct LiveRun::Implementation {
       counts.decoding_ms.push_back(0.0);
     }
     const std::size_t at = delays++ % max_kept;
-    const LiveObservations::Timing timing = live->timing();
+    const recordings::LiveObservations::Timing timing = live->timing();
     counts.delays_ms[at] = milliseconds(std::chrono::steady_clock::now() - timing.arrived);
     counts.decoding_ms[at] = milliseconds(timing.decoding);
   }
 
   ObservationSource& source;
-  LiveObservations* live;  // null: no live source
+  recordings::LiveObservations* live;  // null: no live source
   LiveSelection selection;
   std::optional<int> count;
   Session& session;

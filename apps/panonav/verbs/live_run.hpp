@@ -9,7 +9,7 @@
 
 #include "cli/arguments.hpp"
 #include "cli/session.hpp"
-#include "panonav/pipeline/observation_source.hpp"
+#include "panonav_recordings/live_observations.hpp"
 #include "verbs/recording.hpp"
 
 namespace panonav::command {
@@ -26,7 +26,7 @@ void declare_live(Arguments& arguments, LiveArguments& live);
 
 /// A live source (`is_live`) whose pictures lie as the user says, or else as `remembered`: refuses
 /// what goes with recordings only. Throws UsageError, FileError.
-[[nodiscard]] std::unique_ptr<LiveObservations> open_live(
+[[nodiscard]] std::unique_ptr<recordings::LiveObservations> open_live(
     const Arguments& arguments, const std::string& input, const PictureArguments& pictures,
     const std::optional<PictureSource>& remembered, const LiveArguments& live);
 /// Refuses what goes with live sources only; --count, too, where a verb ends with its input.
@@ -41,7 +41,7 @@ struct LiveCounts {
   /// part of it that decoding took.
   std::vector<double> delays_ms;
   std::vector<double> decoding_ms;
-  LivePictures::Counts source;
+  recordings::LivePictures::Counts source;
 };
 
 /// ", 3 could not be read, 2 came too fast and were dropped": what was out of the ordinary.

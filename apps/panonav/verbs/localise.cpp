@@ -15,14 +15,12 @@
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/pipeline/visual_motion.hpp"
 #include "reports/localise_report.hpp"
+#include "reports/report_page.hpp"
 #include "verbs/live_run.hpp"
 #include "verbs/localised_query.hpp"
 #include "verbs/recording.hpp"
 #include "verbs/run_record.hpp"
 #include "verbs/shown_references.hpp"
-#ifdef PANONAV_COMMAND_SIMULATES
-#include "reports/report_page.hpp"
-#endif
 
 namespace panonav::command {
 
@@ -95,7 +93,7 @@ double turn(Observation& observation, const PlaceRecogniser& recogniser,
 struct Answer {
   LocalisedQuery query;
   std::exception_ptr failure;  ///< why there is none
-  std::optional<RunMoment> moment;
+  std::optional<recordings::RunMoment> moment;
   std::optional<Observation> seen;  ///< with its panorama, where the memory learns from it
 };
 
@@ -125,7 +123,7 @@ Answer answer(const PlaceRecogniser& recogniser, const LocaliseArguments& wanted
     answer.seen->odometry = observation.odometry;
   }
   if (!answer.moment) return answer;
-  RunMoment& moment = *answer.moment;
+  recordings::RunMoment& moment = *answer.moment;
   clock.stage(moment.panorama ? "signature, search, ranking" : "unwarping to ranking");
   if (moment.panorama) {
     shown->compare(moment, recogniser.memory(), recogniser.encoder().packed(*moment.panorama));
@@ -149,7 +147,7 @@ Dataset open_queries(const LocaliseArguments& wanted, const MemoryFile& file, Se
   std::error_code ignored;
   std::optional<Dataset> queries;
   for (const std::string& input : wanted.inputs) {
-    if (std::filesystem::is_directory(input, ignored) || is_recording(input)) {
+    if (std::filesystem::is_directory(input, ignored) || recordings::is_recording(input)) {
       throw UsageError(input +
                        " is a folder or recording; allowed: one of these, or several pictures");
     }
@@ -297,16 +295,14 @@ ExitCode localise_live(const Arguments& arguments, const LocaliseArguments& want
 ExitCode localise(const Arguments& arguments, const LocaliseArguments& wanted, Session& session) {
   const auto file = MemoryFile::open(wanted.memory, Access::read_only);
   check(arguments, wanted, file.header());
-  if (wanted.inputs.size() == 1 && is_live(wanted.inputs.front())) {
+  if (wanted.inputs.size() == 1 && recordings::is_live(wanted.inputs.front())) {
     return localise_live(arguments, wanted, file, session);
   }
   refuse_live(arguments, wanted.inputs.front(), true);
   if (wanted.learn) {
     arguments.refuse_unused({"--turn-randomly", "--exclude-same-file"}, "with --learn");
   }
-#ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) prepare_report_folder(*wanted.report, "localise");
-#endif
   if (wanted.learn && wanted.inputs.size() > 1) {
     throw UsageError("--learn goes with one recording, whose pictures are in order");
   }
@@ -343,7 +339,6 @@ ExitCode localise(const Arguments& arguments, const LocaliseArguments& wanted, S
         " views show a place of " + wanted.memory +
         (unread > 0 ? "; " + std::to_string(unread) + " could not be read" : ""));
   }
-#ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) {
     write_localise_report(*wanted.report, file, recogniser, answers, [&](std::size_t i) {
       Observation seen = read_observation(recording.entries[i]);
@@ -352,7 +347,6 @@ ExitCode localise(const Arguments& arguments, const LocaliseArguments& wanted, S
     });
     tell_report(*wanted.report, session);
   }
-#endif
   if (learner) {
     const auto changes = learner->finish("learn from " + wanted.inputs.front());
     session.note(as_text(changes) + "; " + std::to_string(changes.certain) + " of " +
@@ -377,11 +371,9 @@ Run declare_localise(Arguments& arguments) {
   declare_view(arguments, wanted->record);
   arguments.uncommon({"--record"});
   arguments.option("-o,--out FILE", wanted->out, "Write a CSV table, one line for each picture");
-#ifdef PANONAV_COMMAND_SIMULATES
   arguments.option("--report FOLDER", wanted->report,
                    "Write a page with each picture above its best match, turned alike, into this "
                    "folder: a new one, or that of an earlier report");
-#endif
   arguments.flag("--exclude-same-file", wanted->exclude_same_file,
                  "Leave out the reference view of the same file name (leave-one-out)");
   arguments.flag("--learn", wanted->learn,

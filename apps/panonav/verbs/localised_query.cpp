@@ -2,7 +2,7 @@
 
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "server/place_json.hpp"
+#include "panonav_server/place_json.hpp"
 
 namespace panonav::command {
 
@@ -10,7 +10,7 @@ ordered_json as_json(const LocalisedQuery& answer, bool areas) {
   if (!answer.error.empty()) return {{"file", answer.file}, {"error", answer.error}};
   const Place& found = answer.place;
   ordered_json json{{"file", answer.file}};
-  json.update(place_json(found));
+  json.update(server::place_json(found));
   json["turned_rad"] = answer.turned_rad;
   if (areas) {
     auto levels = ordered_json::array();

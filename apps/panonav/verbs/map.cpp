@@ -15,15 +15,13 @@
 #include "panonav/pipeline/mapper.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/storage/memory_address.hpp"
+#include "reports/map_picture.hpp"
+#include "reports/report_page.hpp"
 #include "verbs/memorising.hpp"
 #include "verbs/recording.hpp"
 #include "verbs/run_record.hpp"
 #include "verbs/shown_map.hpp"
 #include "verbs/shown_references.hpp"
-#ifdef PANONAV_COMMAND_SIMULATES
-#include "reports/map_picture.hpp"
-#include "reports/report_page.hpp"
-#endif
 
 namespace panonav::command {
 
@@ -75,7 +73,6 @@ std::size_t number_of_closures(const TopologicalMap& map) {
   return static_cast<std::size_t>(std::ranges::count(map.edges, LinkKind::closure, &MapEdge::kind));
 }
 
-#ifdef PANONAV_COMMAND_SIMULATES
 ordered_json as_json(const MapComparison& comparison) {
   ordered_json json{{"nodes", comparison.compared},
                     {"procrustes_disparity", comparison.shape_difference},
@@ -108,7 +105,6 @@ void print_comparison(const MapComparison& comparison, const MappedRun& run, Ses
   session.print("closures: right " + std::to_string(comparison.right_closures) + ", wrong " +
                 std::to_string(comparison.wrong_closures));
 }
-#endif
 
 void print_result(const MapArguments& wanted, const Dataset& recording, const MappedRun& run,
                   Session& session) {
@@ -116,9 +112,7 @@ void print_result(const MapArguments& wanted, const Dataset& recording, const Ma
   const double step_ms =
       1e3 * run.mapping_s / static_cast<double>(std::max<std::size_t>(1, recording.entries.size()));
   const auto sizes = component_sizes(run.map);
-#ifdef PANONAV_COMMAND_SIMULATES
   const auto comparison = compare_with_ground_truth(recording, run);
-#endif
   if (session.json()) {
     ordered_json json{{"memory", wanted.memory},
                       {"pictures", recording.entries.size()},
@@ -130,9 +124,7 @@ void print_result(const MapArguments& wanted, const Dataset& recording, const Ma
                       {"wheels", run.wheels},
                       {"step_ms", step_ms},
                       {"ground_truth", nullptr}};
-#ifdef PANONAV_COMMAND_SIMULATES
     if (comparison) json["ground_truth"] = as_json(*comparison);
-#endif
     session.print(json_line(json));
     return;
   }
@@ -158,7 +150,6 @@ void print_result(const MapArguments& wanted, const Dataset& recording, const Ma
     session.print("Lengths are read from the views: one unit counts as " +
                   short_number(run.scale_m) + " m (--scale-m, --camera-height-m).");
   }
-#ifdef PANONAV_COMMAND_SIMULATES
   if (comparison) print_comparison(*comparison, run, session);
   if (wanted.picture) {
     session.print(*wanted.picture + " shows " +
@@ -167,7 +158,6 @@ void print_result(const MapArguments& wanted, const Dataset& recording, const Ma
                                           std::to_string(nodes) + " places"
                                     : "the map"));
   }
-#endif
   session.print(wanted.memory + " holds the map and the views of its places.");
   if (wanted.tum) {
     session.print(*wanted.tum + " holds the poses" +
@@ -189,11 +179,11 @@ MappedRun map_in_view(const MapArguments& wanted, const Dataset& recording, Mapp
                    {.memory = wanted.memory});
   struct Seen {
     Mapper::EncodedView view;
-    RunMoment moment;
+    recordings::RunMoment moment;
     std::string name;
   };
   GrowingMap shown;
-  std::optional<RunMoment> last;  // waits for what comes of it
+  std::optional<recordings::RunMoment> last;  // waits for what comes of it
   Progress progress(session, "mapping", recording.entries.size());
   make_in_order(
       recording.entries.size(), session.executor(),
@@ -201,7 +191,8 @@ MappedRun map_in_view(const MapArguments& wanted, const Dataset& recording, Mapp
         StageClock clock;
         const Observation observation = read_observation(recording.entries[i]);
         clock.stage("reading");
-        Seen seen{mapper.encode(observation), moment_of(observation, i), observation.name};
+        Seen seen{mapper.encode(observation), recordings::moment_of(observation, i),
+                  observation.name};
         clock.stage("unwarping, signature");
         seen.moment.panorama = mapper.encoder().panorama(observation);
         clock.stage("for viewers");
@@ -230,7 +221,7 @@ MappedRun map_in_view(const MapArguments& wanted, const Dataset& recording, Mapp
 /// Writes the finished map, then each picture with the pose that it got: of the largest connected
 /// component, as components have no common frame.
 void record_map(const MapArguments& wanted, const Dataset& recording, const MappedRun& run,
-                const ViewEncoder& encoder, RunPage& played, Session& session) {
+                const ViewEncoder& encoder, viewer::RunPage& played, Session& session) {
   RunRecord record({.file = wanted.record.file, .view = std::nullopt},
                    std::array{wanted.dataset, wanted.memory}, false, session, {});
   const std::size_t component = largest_component(run.map);
@@ -245,11 +236,11 @@ void record_map(const MapArguments& wanted, const Dataset& recording, const Mapp
       recording.entries.size(), session.executor(),
       [&](std::size_t i) {
         const Observation seen = read_observation(recording.entries[i]);
-        RunMoment moment = moment_of(seen, i);
+        recordings::RunMoment moment = recordings::moment_of(seen, i);
         moment.panorama = encoder.panorama(seen);
         return moment;
       },
-      [&](std::size_t i, RunMoment&& moment) {
+      [&](std::size_t i, recordings::RunMoment&& moment) {
         const auto node = nodes.find(i);
         moment.state = node == nodes.end() ? "between places" : "place of the map";
         moment.sure = node != nodes.end();
@@ -258,7 +249,7 @@ void record_map(const MapArguments& wanted, const Dataset& recording, const Mapp
         }
         if (i == 0) put_component(moment, run.map, component, names);
         if (wanted.report) {
-          RunMoment shown = moment;
+          recordings::RunMoment shown = moment;
           shown.truth.reset();  // in another frame than the map's
           played.add(shown);
         }
@@ -299,9 +290,7 @@ void refuse_without_effect(const Arguments& arguments, const MapArguments& wante
 }
 
 ExitCode map(const Arguments& arguments, const MapArguments& wanted, Session& session) {
-#ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) prepare_report_folder(*wanted.report, "map");
-#endif
   const bool there = memory_exists(wanted.memory);
   std::optional<MemoryFile> memory;
   if (there) memory = MemoryFile::open(wanted.memory, Access::read_write);
@@ -331,21 +320,17 @@ ExitCode map(const Arguments& arguments, const MapArguments& wanted, Session& se
       return recording.entries[run.observations[number]].file;
     });
   }
-  RunPage played("", recording.entries.size());
+  viewer::RunPage played("", recording.entries.size());
   if (wanted.record.file || wanted.report) {
     record_map(wanted, recording, run, mapper.encoder(), played, session);
   }
-#ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.picture) write_map_picture(*wanted.picture, recording, run);
   if (wanted.report) {
     write_map_report(*wanted.report, fs::path(wanted.memory).filename().string(), recording, run,
                      played);
   }
-#endif
   print_result(wanted, recording, run, session);
-#ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) tell_report(*wanted.report, session);
-#endif
   return ExitCode::done;
 }
 
@@ -365,14 +350,12 @@ Run declare_map(Arguments& arguments) {
   declare_record(arguments, wanted->record);
   declare_view(arguments, wanted->record);
   arguments.uncommon({"--record"});
-#ifdef PANONAV_COMMAND_SIMULATES
   arguments.option("--picture FILE", wanted->picture,
                    "Draw the map, beside the truth where it is known, into this PNG or SVG file");
   arguments.option("--report FOLDER", wanted->report,
                    "Write a page that plays the drive on its map into this folder: a new one, or "
                    "that of an earlier report");
   arguments.uncommon({"--picture"});
-#endif
   arguments.flag("--no-thumbnails", wanted->no_thumbnails,
                  "Do not keep small pictures of the views");
   arguments.options("signature", wanted->signature);

@@ -151,7 +151,7 @@ ExitCode memorise_live(const Arguments& arguments, const MemoriseArguments& want
 
 ExitCode memorise(const Arguments& arguments, const MemoriseArguments& wanted, Session& session) {
   const bool resumes = memory_exists(wanted.memory);
-  const bool live = is_live(wanted.input);
+  const bool live = recordings::is_live(wanted.input);
   if (!live) refuse_live(arguments, wanted.input, true);
   std::optional<PictureSource> remembered;
   if (resumes) {

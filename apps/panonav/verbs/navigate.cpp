@@ -12,7 +12,6 @@
 #include "cli/option_values.hpp"
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
-#include "experiments/runs/mission_picture.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
@@ -20,6 +19,8 @@
 #include "panonav/navigation/direction_field.hpp"
 #include "panonav/relative_pose/fourier_homing.hpp"
 #include "panonav/storage/memory_file.hpp"
+#include "panonav_viewer/mission_picture.hpp"
+#include "panonav_viewer/surroundings.hpp"
 #include "reports/navigate_report.hpp"
 #include "reports/report_page.hpp"
 #include "verbs/navigated_run.hpp"
@@ -42,8 +43,8 @@ struct NavigateArguments {
   std::optional<std::string> picture;
   std::optional<std::string> report;
   RunRecordArguments record;
-  SimulatedWorldOptions simulation;
-  MissionOptions mission;
+  simulation::SimulatedWorldOptions simulation;
+  simulation::MissionOptions mission;
   KnownRouteOptions known_route;
 };
 
@@ -60,7 +61,8 @@ Pose2 pose_from_text(const std::string& flag, const std::string& text) {
           wrap_angle(radians(number_from_text(flag, text.substr(second + 1))))};
 }
 
-Pose2 free_pose(const std::string& flag, const std::string& text, const FreeSpace& space) {
+Pose2 free_pose(const std::string& flag, const std::string& text,
+                const simulation::FreeSpace& space) {
   const Pose2 pose = pose_from_text(flag, text);
   if (!space.is_free(pose.position())) {
     throw UsageError(
@@ -159,7 +161,8 @@ std::string_view reason_of(NavigationState state) {
 }
 
 ordered_json summary_json(const NavigateArguments& wanted, RobotNavigator& robot,
-                          const std::string& goal, const Pose2& start, const MissionRun& run) {
+                          const std::string& goal, const Pose2& start,
+                          const simulation::MissionRun& run) {
   const NavigationGraph& graph = robot.graph();
   const AreaPlanner& planner = robot.navigator().planner();
   return {{"memory", wanted.memory},
@@ -183,7 +186,7 @@ ordered_json summary_json(const NavigateArguments& wanted, RobotNavigator& robot
            run.kidnapped_at ? ordered_json(*run.kidnapped_at + 1) : ordered_json()}};
 }
 
-void print_summary(const MissionRun& run, Session& session) {
+void print_summary(const simulation::MissionRun& run, Session& session) {
   const std::string name(name_of(run.end));
   session.print((run.end == NavigationState::arrived ? session.good(name) : session.bad(name)) +
                 " after " + std::to_string(run.decisions.size()) +
@@ -207,18 +210,18 @@ void print_summary(const MissionRun& run, Session& session) {
   }
 }
 
-void write_log(const std::string& path, const MissionRun& run) {
+void write_log(const std::string& path, const simulation::MissionRun& run) {
   std::string text;
   for (const NavigationDecision& decision : run.decisions) text += describe(decision) + "\n";
   write_file(path, text);
 }
 
 /// Where the run begins, who is kidnapped to where.
-Mission mission_of(const NavigateArguments& wanted, ViewId goal, const MissionPlace& place,
-                   std::uint64_t seed) {
+simulation::Mission mission_of(const NavigateArguments& wanted, ViewId goal,
+                               const simulation::MissionPlace& place, std::uint64_t seed) {
   constexpr std::uint64_t stream_of_starts = 4;
   Random random(seed, stream_of_starts);
-  Mission mission{goal, place.free_space->random_pose(random), std::nullopt};
+  simulation::Mission mission{goal, place.free_space->random_pose(random), std::nullopt};
   if (wanted.start) mission.start = free_pose("--start", *wanted.start, *place.free_space);
   if (wanted.kidnap)
     mission.kidnapped_to = free_pose("--kidnap", *wanted.kidnap, *place.free_space);
@@ -229,7 +232,7 @@ Mission mission_of(const NavigateArguments& wanted, ViewId goal, const MissionPl
 /// the pose is the true one.
 class MissionMoments {
  public:
-  MissionMoments(const RobotNavigator& robot, const RememberedPlace& remembered,
+  MissionMoments(const RobotNavigator& robot, const simulation::RememberedPlace& remembered,
                  const FieldOptions& field)
       : robot_(robot), remembered_(remembered), field_(field) {}
 
@@ -239,9 +242,10 @@ class MissionMoments {
     panorama_ = panorama;
   }
   void restart() { clock_.restart(); }
-  RunMoment of(const NavigationDecision& decision, const Pose2& pose, const Scene& scene) {
+  recordings::RunMoment of(const NavigationDecision& decision, const Pose2& pose,
+                           const simulation::Scene& scene) {
     clock_.stage("signature, decision");
-    RunMoment moment{.stamp_s = static_cast<double>(number_++), .pose = pose};
+    recordings::RunMoment moment{.stamp_s = static_cast<double>(number_++), .pose = pose};
     if (decision.homing && panorama_) moment.homing = homing();
     moment.picture = std::exchange(picture_, std::nullopt);
     moment.panorama = std::exchange(panorama_, std::nullopt);
@@ -260,7 +264,7 @@ class MissionMoments {
       const auto way = planned_from(*decision.nearest);
       if (way != plan_) moment.plan = plan_ = way;
     }
-    if (number_ == 1) moment.walls = walls_of(scene);
+    if (number_ == 1) moment.walls = viewer::scene_outlines(scene);
     if (shown_goal_ != robot_.goal()) {
       add_field(moment);
       shown_goal_ = robot_.goal();
@@ -287,7 +291,7 @@ class MissionMoments {
     return way;
   }
   /// From what is seen to where the goal's view was taken.
-  [[nodiscard]] RunHoming homing() {
+  [[nodiscard]] recordings::RunHoming homing() {
     const ViewId goal = robot_.goal();
     const VisualMemory views = robot_.memory().load({&goal, 1});
     const HomeVector home = home_vector(homing_view(views.signature(goal)),
@@ -295,7 +299,7 @@ class MissionMoments {
     return {home.direction_rad(), home.confidence};
   }
   /// The views with their areas, where each sends the robot, and the goal.
-  void add_field(RunMoment& moment) const {
+  void add_field(recordings::RunMoment& moment) const {
     const auto guides = direction_field(remembered_.graph, robot_.goal(), field_);
     std::vector<std::size_t> areas;
     for (std::size_t i = 0; i < guides.size(); ++i) {
@@ -318,7 +322,7 @@ class MissionMoments {
   }
 
   const RobotNavigator& robot_;
-  const RememberedPlace& remembered_;
+  const simulation::RememberedPlace& remembered_;
   FieldOptions field_;
   std::optional<Image> picture_;
   std::optional<Panorama> panorama_;
@@ -330,7 +334,8 @@ class MissionMoments {
 
 /// The remembered view nearest to where a viewer has clicked; empty where none did, or no way leads
 /// there.
-std::optional<ViewId> goal_as_wished(RobotNavigator& robot, const RememberedPlace& remembered,
+std::optional<ViewId> goal_as_wished(RobotNavigator& robot,
+                                     const simulation::RememberedPlace& remembered,
                                      RunRecord& record, Session& session) {
   const auto wish = record.take_wish();
   if (!wish) return std::nullopt;
@@ -364,7 +369,7 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
   if (robot.memory().header().source.kind != PictureKind::mirror) {
     arguments.refuse_unused({"--vignetting"}, "on the panoramas of this memory");
   }
-  const RememberedPlace remembered = remembered_by(robot);
+  const simulation::RememberedPlace remembered = remembered_by(robot);
   if (wanted.kidnap &&
       !std::isfinite(remembered.truth[*remembered.graph.node_of(robot.goal())].x_m)) {
     throw FileError(wanted.memory, "does not know where the view " + robot.info(robot.goal()).name +
@@ -372,18 +377,18 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
                                        "--kidnap");
   }
   if (wanted.report) prepare_report_folder(*wanted.report, "navigate");
-  RunPage played("", 100);
+  viewer::RunPage played("", 100);
   RunRecord record(wanted.record, std::span(&wanted.memory, 1), false, session,
-                   {.memory = wanted.memory, .takes = ViewWish::goal});
+                   {.memory = wanted.memory, .takes = viewer::ViewWish::goal});
   if (wanted.report) record.also_into(played);
   MissionMoments moments(robot, remembered, wanted.mission.planner.field);
-  const MissionPlace place = place_as_remembered(
+  const simulation::MissionPlace place = place_as_remembered(
       wanted.scene, wanted.simulation, robot, typed_options(arguments), session,
       record.wanted()
           ? [&](const Image& picture, const Panorama& panorama) { moments.saw(picture, panorama); }
           : SightReport());
   const auto seed = static_cast<std::uint64_t>(wanted.simulation.simulation.scene.seed);
-  const Mission mission = mission_of(wanted, robot.goal(), place, seed);
+  const simulation::Mission mission = mission_of(wanted, robot.goal(), place, seed);
   if (!session.json()) {
     session.print(std::to_string(robot.graph().size()) + " views, " +
                   std::to_string(robot.graph().edges().size()) + " edges from " +
@@ -391,7 +396,7 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
                        ? "an arrangement made now (panonav arrange would keep one)"
                        : "the memory's " + std::string(name_of(robot.origin()))));
   }
-  const MissionRun run = run_mission(
+  const simulation::MissionRun run = simulation::run_mission(
       place, remembered, robot.navigator(), mission, wanted.mission, seed,
       [&](const NavigationDecision& decision, const Pose2& pose) {
         if (record.wanted()) {
@@ -409,7 +414,7 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
   const std::string goal_file = robot.info(robot.goal()).name;  // a viewer may have changed it
   if (wanted.log) write_log(*wanted.log, run);
   if (wanted.picture) {
-    write_mission_picture(
+    viewer::write_mission_picture(
         *wanted.picture,
         "to " + goal_file + " in " + place.scene.name + ": " + std::string(name_of(run.end)), place,
         remembered, wanted.mission.planner, robot.goal(), run);
@@ -418,7 +423,7 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
     write_navigate_report(
         *wanted.report,
         {goal_file, std::string(reason_of(run.end)), run,
-         mission_plot("", place, remembered, wanted.mission.planner, robot.goal(), run)},
+         viewer::mission_plot("", place, remembered, wanted.mission.planner, robot.goal(), run)},
         played);
   }
   if (session.json()) {

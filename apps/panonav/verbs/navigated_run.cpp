@@ -44,7 +44,7 @@ double spacing_of(const NavigationGraph& graph, const std::vector<Pose2>& truth)
 
 }  // namespace
 
-RememberedPlace remembered_by(const RobotNavigator& robot) {
+simulation::RememberedPlace remembered_by(const RobotNavigator& robot) {
   const MemoryHeader& header = robot.memory().header();
   std::vector<Pose2> truth = true_poses(robot.graph(), robot.memory());
   const double spacing_m = spacing_of(robot.graph(), truth);
@@ -53,23 +53,25 @@ RememberedPlace remembered_by(const RobotNavigator& robot) {
 }
 
 std::function<FourierSignature(const Pose2& pose, std::uint64_t seed)> sight_through(
-    std::shared_ptr<const Renderer> renderer, const RecordingCamera& camera,
-    const FrameOptions& frame, const SensorOptions& sensor,
+    std::shared_ptr<const simulation::Renderer> renderer, const simulation::RecordingCamera& camera,
+    const simulation::FrameOptions& frame, const simulation::SensorOptions& sensor,
     std::shared_ptr<const ViewEncoder> pipeline, Executor* executor, SightReport seen) {
   return [renderer = std::move(renderer), camera, frame, sensor, pipeline = std::move(pipeline),
           executor, seen = std::move(seen)](const Pose2& pose, std::uint64_t seed) {
     Executor here(1);
-    const Image picture = take_picture(*renderer, pose, camera, frame, sensor, seed,
-                                       executor == nullptr ? here : *executor);
+    const Image picture = simulation::take_picture(*renderer, pose, camera, frame, sensor, seed,
+                                                   executor == nullptr ? here : *executor);
     const Panorama panorama = pipeline->panorama(picture.view());
     if (seen) seen(picture, panorama);
     return pipeline->signature(panorama);
   };
 }
 
-MissionPlace place_as_remembered(const std::string& scene, SimulatedWorldOptions wanted,
-                                 const RobotNavigator& robot, const GivenOption& given,
-                                 Session& session, SightReport seen) {
+simulation::MissionPlace place_as_remembered(const std::string& scene,
+                                             simulation::SimulatedWorldOptions wanted,
+                                             const RobotNavigator& robot,
+                                             const simulation::GivenOption& given, Session& session,
+                                             SightReport seen) {
   const MemoryHeader& header = robot.memory().header();
   const bool mirror = header.source.kind == PictureKind::mirror;
   if (!mirror) {
@@ -86,21 +88,22 @@ MissionPlace place_as_remembered(const std::string& scene, SimulatedWorldOptions
     wanted.simulation.elevation_low_deg = degrees(header.elevations->bottom_rad);
     wanted.simulation.elevation_high_deg = degrees(header.elevations->top_rad);
   }
-  const SimulatedWorld world(scene, wanted, given, session.executor());
+  const simulation::SimulatedWorld world(scene, wanted, given, session.executor());
   for (const auto& warning : world.scene().warnings) session.note("warning: " + warning);
-  const RecordingCamera camera = mirror ? RecordingCamera(*header.source.camera) : world.camera();
+  const simulation::RecordingCamera camera =
+      mirror ? simulation::RecordingCamera(*header.source.camera) : world.camera();
   const PictureSource source = mirror ? header.source : world.source();
   const auto pipeline = std::make_shared<const ViewEncoder>(header, source);
-  MissionPlace place = mission_place(world);
-  const SimulatedWorldOptions& settled = world.options();
+  simulation::MissionPlace place = mission_place(world);
+  const simulation::SimulatedWorldOptions& settled = world.options();
   place.sight = sight_through(place.renderer, camera, settled.frame, settled.sensor, pipeline,
                               &session.executor(), std::move(seen));
   if (const RouteSource* const route = robot.route()) {
     place.line = [renderer = place.renderer, camera, frame = settled.frame, sensor = settled.sensor,
                   encoder = std::make_shared<LineEncoder>(source, *route),
                   &session](const Pose2& pose, std::uint64_t seed) {
-      return encoder->line(
-          take_picture(*renderer, pose, camera, frame, sensor, seed, session.executor()));
+      return encoder->line(simulation::take_picture(*renderer, pose, camera, frame, sensor, seed,
+                                                    session.executor()));
     };
   }
   return place;

@@ -11,9 +11,9 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/camera_file.hpp"
 #include "panonav/io/image_file.hpp"
-#include "panonav/io/jpeg_stream.hpp"
-#include "panonav/io/live_pictures.hpp"
-#include "panonav/io/video_file.hpp"
+#include "panonav_recordings/jpeg_stream.hpp"
+#include "panonav_recordings/live_pictures.hpp"
+#include "panonav_recordings/video_file.hpp"
 
 namespace panonav::command {
 
@@ -94,7 +94,7 @@ void declare_layout(Arguments& arguments, PictureArguments& pictures) {
   arguments.uncommon({"--columns-run", "--forward-column"});
 }
 
-void declare_topics(Arguments& arguments, RecordingTopics& topics) {
+void declare_topics(Arguments& arguments, recordings::RecordingTopics& topics) {
   arguments.option(
       "--image-topic NAME", topics.image,
       "Pictures of a recording (MCAP, rosbag2, ROS 1 bag) with several topics of them");
@@ -132,8 +132,8 @@ std::vector<std::string> recording_options() {
 
 bool is_one_picture(const std::string& input) {
   std::error_code ignored;
-  return !fs::is_directory(input, ignored) && !is_recording(input) && !is_video(input) &&
-         !is_live(input);
+  return !fs::is_directory(input, ignored) && !recordings::is_recording(input) &&
+         !recordings::is_video(input) && !recordings::is_live(input);
 }
 
 PictureSelection selection_of(const PartArguments& part) {
@@ -228,7 +228,7 @@ std::optional<PictureSource> picture_source(const PictureArguments& pictures) {
 
 namespace {
 
-void refuse_topics(const std::string& input, const RecordingTopics& topics) {
+void refuse_topics(const std::string& input, const recordings::RecordingTopics& topics) {
   for (const auto& [typed, flag] : {std::pair{topics.image.has_value(), "--image-topic"},
                                     {topics.odometry.has_value(), "--odometry-topic"},
                                     {topics.odometry_frames.has_value(), "--odometry-frames"},
@@ -237,12 +237,12 @@ void refuse_topics(const std::string& input, const RecordingTopics& topics) {
   }
 }
 
-Dataset open_topics(const std::string& input, const RecordingTopics& topics,
+Dataset open_topics(const std::string& input, const recordings::RecordingTopics& topics,
                     const PictureSource& source, Session& session) {
   if (topics.odometry && topics.odometry_frames) {
     throw UsageError("--odometry-topic and --odometry-frames do not go together");
   }
-  RecordedDataset recorded = read_recording(input, source, topics);
+  recordings::RecordedDataset recorded = recordings::read_recording(input, source, topics);
   for (const std::string& warning : recorded.warnings) session.note(input + ": " + warning);
   return std::move(recorded.dataset);
 }
@@ -262,13 +262,13 @@ Dataset open_whole(const std::string& input, const PictureArguments& pictures,
     if (!source) throw UsageError("say what the pictures on standard input show with --kind");
     if (pictures.recursive) throw UsageError("--recursive goes with a folder");
     refuse_topics("standard input", pictures.topics);
-    return read_jpeg_stream(STDIN_FILENO, "standard input", *source);
+    return recordings::read_jpeg_stream(STDIN_FILENO, "standard input", *source);
   }
-  if (is_live(input)) {
+  if (recordings::is_live(input)) {
     throw UsageError(input + " is a live source; allowed with run, localise, memorise and track");
   }
   if (!fs::exists(input, ignored)) throw FileError(input, "there is no such file or folder");
-  if (is_recording(input)) {
+  if (recordings::is_recording(input)) {
     const auto& source = stated ? stated : remembered;
     if (!source) {
       throw UsageError(input +
@@ -280,13 +280,13 @@ Dataset open_whole(const std::string& input, const PictureArguments& pictures,
     return recording;
   }
   refuse_topics(input, pictures.topics);
-  if (is_video(input) && fs::is_regular_file(input, ignored)) {
+  if (recordings::is_video(input) && fs::is_regular_file(input, ignored)) {
     const auto& source = stated ? stated : remembered;
     if (!source) {
       throw UsageError(input + " is a video; say what its pictures show with --kind");
     }
     if (pictures.recursive) throw UsageError(input + " is a video; leave out --recursive");
-    Dataset recording = read_video(input, *source, selection);
+    Dataset recording = recordings::read_video(input, *source, selection);
     if (stated) note_other_kind(recording, session);
     return recording;
   }
@@ -327,7 +327,7 @@ Dataset open_whole(const std::string& input, const PictureArguments& pictures,
 
 void select_part(Dataset& recording, const PictureSelection& selection, const std::string& input) {
   if (selection.by_time() || selection.every > 1) {
-    if (!is_video(input)) select_pictures(recording, selection);
+    if (!recordings::is_video(input)) select_pictures(recording, selection);
   }
 }
 
@@ -370,8 +370,8 @@ Dataset open_recording(const std::string& input, const PictureArguments& picture
   return recording;
 }
 
-Dataset read_run(const std::string& input, const RecordingTopics& topics, const PartArguments& part,
-                 const MemoryFile& memory, Session& session) {
+Dataset read_run(const std::string& input, const recordings::RecordingTopics& topics,
+                 const PartArguments& part, const MemoryFile& memory, Session& session) {
   std::error_code ignored;
   if (fs::exists(fs::path(input) / "dataset.toml", ignored)) {
     refuse_topics(input, topics);
@@ -387,7 +387,7 @@ Dataset read_run(const std::string& input, const RecordingTopics& topics, const 
 
 std::string how_to_add(const std::string& folder, const std::string& columns,
                        const std::string& values) {
-  if (is_recording(folder)) {
+  if (recordings::is_recording(folder)) {
     return "; of a recording odometry is nav_msgs/Odometry or TF, poses are those of /ground_truth";
   }
   std::error_code ignored;
@@ -406,7 +406,8 @@ std::string how_to_add(const std::string& folder, const std::string& columns,
 Dataset read_described(const std::string& folder, const PictureArguments& pictures,
                        const std::optional<PictureSource>& remembered, const std::string& columns,
                        const std::string& values, Session& session) {
-  if (is_recording(folder) || is_video(folder) || picture_source(pictures)) {
+  if (recordings::is_recording(folder) || recordings::is_video(folder) ||
+      picture_source(pictures)) {
     return open_recording(folder, pictures, remembered, session);
   }
   refuse_topics(folder, pictures.topics);

@@ -9,9 +9,9 @@
 #include "cli/session.hpp"
 #include "panonav/core/executor.hpp"
 #include "panonav/io/dataset.hpp"
-#include "panonav/io/recorded_dataset.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/storage/memory_file.hpp"
+#include "panonav_recordings/recorded_dataset.hpp"
 
 namespace panonav::command {
 
@@ -29,15 +29,15 @@ struct PictureArguments {
   std::optional<std::string> columns;
   std::optional<double> forward_column;
   std::optional<std::pair<double, double>> elevation_deg;
-  bool recursive = false;  ///< a folder of pictures: those of the folders within, too
-  RecordingTopics topics;  ///< of a recording of topics
+  bool recursive = false;              ///< a folder of pictures: those of the folders within, too
+  recordings::RecordingTopics topics;  ///< of a recording of topics
   PartArguments part;
 };
 
 /// Adds --kind, --camera, --columns-run, --forward-column and --elevation-deg.
 void declare_layout(Arguments& arguments, PictureArguments& pictures);
 /// Adds --image-topic, --odometry-topic, --odometry-frames and --imu-topic.
-void declare_topics(Arguments& arguments, RecordingTopics& topics);
+void declare_topics(Arguments& arguments, recordings::RecordingTopics& topics);
 /// Adds --from and --to, and unless the verb has one of its own, --every.
 void declare_part(Arguments& arguments, PartArguments& part, bool every);
 /// All three.
@@ -74,7 +74,7 @@ void declare_pictures(Arguments& arguments, PictureArguments& pictures);
 
 /// The recording of a run: a data set, or a folder or recording of pictures that lie as those of
 /// the memory.
-[[nodiscard]] Dataset read_run(const std::string& input, const RecordingTopics& topics,
+[[nodiscard]] Dataset read_run(const std::string& input, const recordings::RecordingTopics& topics,
                                const PartArguments& part, const MemoryFile& memory,
                                Session& session);
 

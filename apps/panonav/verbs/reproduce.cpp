@@ -14,12 +14,13 @@ namespace panonav::command {
 namespace {
 
 // "-0.056 (..)  holds", a line each.
-void print_rows(const Reproduction& reproduction, Session& session) {
-  for (const ResultRow& row : reproduction.rows) {
-    std::string line = "  " + row.what + ": " + session.strong(shown_figure(row));
+void print_rows(const lab::Reproduction& reproduction, Session& session) {
+  for (const lab::ResultRow& row : reproduction.rows) {
+    std::string line = "  " + row.what + ": " + session.strong(lab::shown_figure(row));
     if (row.target) {
-      line += "  " + (row.holds() ? session.good("holds")
-                                  : session.bad("DOES NOT HOLD") + ", missed " + miss_text(row));
+      line +=
+          "  " + (row.holds() ? session.good("holds")
+                              : session.bad("DOES NOT HOLD") + ", missed " + lab::miss_text(row));
     }
     session.print(line);
   }
@@ -38,14 +39,14 @@ ExitCode reproduce(const ReproduceArguments& wanted, Session& session) {
   }
   refuse_meaningless(*paper, wanted);
   const std::string out = wanted.out.value_or("reproduction/" + wanted.paper);
-  const Reproduction result = reproduce_paper(*paper, wanted, out, session);
+  const lab::Reproduction result = reproduce_paper(*paper, wanted, out, session);
   if (session.json()) {
     const std::string json = to_json(result.rows);
     session.print(json.substr(0, json.size() - 1));
     return ExitCode::done;
   }
   print_rows(result, session);
-  const TargetCount count = count_targets(result.rows);
+  const lab::TargetCount count = lab::count_targets(result.rows);
   session.print(std::to_string(result.rows.size()) + " rows, " +
                 std::to_string(count.judged - count.held) +
                 " of them miss their target; pictures and tables: " +
@@ -69,13 +70,13 @@ Run declare_reproduce(Arguments& arguments) {
   arguments.flag("--continue", wanted->continues,
                  "all: go on with a run of the same options that was stopped, or help one that "
                  "runs; papers that are finished are not run again");
-  const ReproductionOptions m04;
-  const TrackingReproductionOptions m03;
-  const HomingReproductionOptions s06;
-  const MappingReproductionOptions f11;
-  const RouteReproductionOptions y03;
-  const NavigationReproductionOptions navigation;
-  const ElsewhereReproductionOptions elsewhere;
+  const lab::ReproductionOptions m04;
+  const lab::TrackingReproductionOptions m03;
+  const lab::HomingReproductionOptions s06;
+  const lab::MappingReproductionOptions f11;
+  const lab::RouteReproductionOptions y03;
+  const lab::NavigationReproductionOptions navigation;
+  const lab::ElsewhereReproductionOptions elsewhere;
   const auto defaults = [](auto elsewhere_value, auto f11_value, auto m03_value, auto m04_value,
                            auto navigation_value, auto s06_value, auto y03_value) {
     return " (default: " + std::to_string(elsewhere_value) + " for elsewhere, " +
@@ -113,7 +114,7 @@ Run declare_reproduce(Arguments& arguments) {
                    "Gazebo worlds (default: the "
                    "environment's "
                    "PANONAV_DATA; without it they are left out)");
-  const auto parts = tracking_reproduction_parts();
+  const auto parts = lab::tracking_reproduction_parts();
   arguments.choice("--only", wanted->only, {parts.begin(), parts.end()},
                    "m03: this part of the experiments (default: all)");
   arguments.uncommon({"--queries", "--rows", "--only"});

@@ -7,9 +7,9 @@
 
 #include "cli/json.hpp"
 #include "cli/session.hpp"
+#include "lab/reporting/results_document.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/io/atomic_file.hpp"
-#include "reporting/results_document.hpp"
 #include "reports/results_page.hpp"
 #include "verbs/shared_jobs.hpp"
 
@@ -95,11 +95,11 @@ void remove_file(const fs::path& path) {
 
 }  // namespace
 
-Reproduction reproduce_paper(const ReproducedPaper& paper, const ReproduceArguments& wanted,
-                             const fs::path& out, Session& session) {
+lab::Reproduction reproduce_paper(const ReproducedPaper& paper, const ReproduceArguments& wanted,
+                                  const fs::path& out, Session& session) {
   Progress progress(session, "reproduce " + std::string(paper.name), 100);
   std::size_t shown_percent = 0;
-  const ReproductionProgress report = [&](std::string_view, double fraction) {
+  const lab::ReproductionProgress report = [&](std::string_view, double fraction) {
     const auto percent = static_cast<std::size_t>(100.0 * fraction);
     if (percent > shown_percent) progress.advance(percent - shown_percent);
     shown_percent = std::max(shown_percent, percent);
@@ -109,9 +109,9 @@ Reproduction reproduce_paper(const ReproducedPaper& paper, const ReproduceArgume
   progress.clear();
   const std::string name(paper.name);
   write_file(out / "results.md",
-             to_markdown({.version = PANONAV_VERSION,
-                          .command = "panonav reproduce " + name,
-                          .papers = {{name, std::string(paper.title), result.rows}}}));
+             lab::to_markdown({.version = PANONAV_VERSION,
+                               .command = "panonav reproduce " + name,
+                               .papers = {{name, std::string(paper.title), result.rows}}}));
   write_paper_page(out, paper, lead, result);
   write_file(out / results_file, to_json(result.rows));
   return std::move(result);
@@ -135,10 +135,10 @@ ExitCode reproduce_all(const ReproduceArguments& wanted, Session& session) {
   const auto is_done = [&](const ReproducedPaper& paper) {
     return fs::exists(out / paper.name / results_file);
   };
-  const auto tell = [&](const ReproducedPaper& paper, const std::vector<ResultRow>& rows,
+  const auto tell = [&](const ReproducedPaper& paper, const std::vector<lab::ResultRow>& rows,
                         std::string_view how) {
     if (session.json()) return;
-    const TargetCount count = count_targets(rows);
+    const lab::TargetCount count = lab::count_targets(rows);
     session.print("  " + session.strong(paper.name) + ": " + std::to_string(count.held) + " of " +
                   std::to_string(count.judged) + " targets hold" + std::string(how));
   };
@@ -154,7 +154,7 @@ ExitCode reproduce_all(const ReproduceArguments& wanted, Session& session) {
     }
     shared.release(i);
   }
-  ResultsDocument document{
+  lab::ResultsDocument document{
       .version = PANONAV_VERSION, .command = command_line(wanted), .papers = {}};
   for (std::size_t i = 0; i < papers.size(); ++i) {
     const fs::path file = out / papers[i].name / results_file;
@@ -162,23 +162,23 @@ ExitCode reproduce_all(const ReproduceArguments& wanted, Session& session) {
       session.note("other processes finish the rest");
       return ExitCode::done;
     }
-    PaperResults results{std::string(papers[i].name), std::string(papers[i].title),
-                         from_json(text_of(file), file.string())};
+    lab::PaperResults results{std::string(papers[i].name), std::string(papers[i].title),
+                              lab::from_json(text_of(file), file.string())};
     if (!told[i]) tell(papers[i], results.rows, " (finished by another run)");
     document.papers.push_back(std::move(results));
   }
   const std::string json = to_json(document);
-  write_file(out / "results.md", to_markdown(document));
+  write_file(out / "results.md", lab::to_markdown(document));
   write_results_page(out, document);
   write_file(out / results_file, json);
   if (session.json()) {
     session.print(json.substr(0, json.size() - 1));
     return ExitCode::done;
   }
-  for (const std::string& line : miss_lines(document)) {
+  for (const std::string& line : lab::miss_lines(document)) {
     session.print(session.bad("DOES NOT HOLD") + "  " + line);
   }
-  const TargetCount count = count_targets(document);
+  const lab::TargetCount count = lab::count_targets(document);
   session.print(session.strong(std::to_string(count.held) + " of " + std::to_string(count.judged)) +
                 " targets hold; the table: " + (out / "index.html").string());
   return ExitCode::done;

@@ -14,15 +14,15 @@ namespace {
 // Where they are to begin and how many variants, as wanted.
 template <typename Options>
 void set_scenes(const ReproduceArguments& wanted, Options& options) {
-  if (wanted.quick) options = quick_run(options);
+  if (wanted.quick) options = lab::quick_run(options);
   if (wanted.seed) options.seed = *wanted.seed;
   check_scenes(wanted);
   if (wanted.scenes) options.scenes = *wanted.scenes;
 }
 
 PaperReproduction run_f11(const ReproduceArguments& wanted, const std::filesystem::path& out,
-                          Executor& executor, const ReproductionProgress& progress) {
-  MappingReproductionOptions options{.out = out, .data = data_folder(wanted)};
+                          Executor& executor, const lab::ReproductionProgress& progress) {
+  lab::MappingReproductionOptions options{.out = out, .data = data_folder(wanted)};
   set_scenes(wanted, options);
   if (wanted.runs) options.runs = *wanted.runs;
   std::string lead =
@@ -31,13 +31,13 @@ PaperReproduction run_f11(const ReproduceArguments& wanted, const std::filesyste
       "a corridor of identical doors, Gazebo worlds and recordings where they are at hand, "
       "maps of up to " +
       std::to_string(options.max_views) + " views. Published figures beside ours.";
-  return {std::move(lead), reproduce_f11(options, executor, progress)};
+  return {std::move(lead), lab::reproduce_f11(options, executor, progress)};
 }
 
 PaperReproduction run_m03(const ReproduceArguments& wanted, const std::filesystem::path& out,
-                          Executor& executor, const ReproductionProgress& progress) {
-  TrackingReproductionOptions options{.out = out, .data = data_folder(wanted)};
-  if (wanted.quick) options = quick_run(options);
+                          Executor& executor, const lab::ReproductionProgress& progress) {
+  lab::TrackingReproductionOptions options{.out = out, .data = data_folder(wanted)};
+  if (wanted.quick) options = lab::quick_run(options);
   if (wanted.seed) options.seed = *wanted.seed;
   if (wanted.scenes) options.scenes = *wanted.scenes;
   if (wanted.runs) options.runs = *wanted.runs;
@@ -51,19 +51,19 @@ PaperReproduction run_m03(const ReproduceArguments& wanted, const std::filesyste
       "the open air; Gazebo worlds and recordings where they are at hand. Published figures "
       "beside ours. Few runs give wide intervals, and rows may then miss their target by "
       "chance.";
-  return {std::move(lead), reproduce_m03(options, executor, progress)};
+  return {std::move(lead), lab::reproduce_m03(options, executor, progress)};
 }
 
 PaperReproduction run_m04(const ReproduceArguments& wanted, const std::filesystem::path& out,
-                          Executor& executor, const ReproductionProgress& progress) {
-  ReproductionOptions options{.out = out};
+                          Executor& executor, const lab::ReproductionProgress& progress) {
+  lab::ReproductionOptions options{.out = out};
   set_scenes(wanted, options);
   if (wanted.queries) options.queries = *wanted.queries;
   if (wanted.rows) options.rows = *wanted.rows;
   if (wanted.runs) options.missions = *wanted.runs;
   options.mission_scenes = std::min({options.mission_scenes, options.scenes, options.missions});
   std::string places;
-  for (const MissionGrid& grid : options.mission_grids) {
+  for (const lab::MissionGrid& grid : options.mission_grids) {
     places += (places.empty() ? "" : ", ") + grid.scene;
   }
   std::string lead =
@@ -75,12 +75,12 @@ PaperReproduction run_m04(const ReproduceArguments& wanted, const std::filesyste
       "). Published figures beside "
       "ours. Few offices and questions give wide intervals, and rows may then miss their "
       "target by chance.";
-  return {std::move(lead), reproduce_m04(options, executor, progress)};
+  return {std::move(lead), lab::reproduce_m04(options, executor, progress)};
 }
 
 PaperReproduction run_navigation(const ReproduceArguments& wanted, const std::filesystem::path& out,
-                                 Executor& executor, const ReproductionProgress& progress) {
-  NavigationReproductionOptions options{.out = out, .data = data_folder(wanted)};
+                                 Executor& executor, const lab::ReproductionProgress& progress) {
+  lab::NavigationReproductionOptions options{.out = out, .data = data_folder(wanted)};
   set_scenes(wanted, options);
   if (wanted.runs) options.runs = *wanted.runs;
   options.scenes = std::min(options.scenes, options.runs);
@@ -92,13 +92,13 @@ PaperReproduction run_navigation(const ReproduceArguments& wanted, const std::fi
       std::to_string(options.scenes) +
       " variants of each. The robot sees pictures and feels what is in its way; it knows "
       "neither where it is nor where its references were taken.";
-  return {std::move(lead), reproduce_navigation(options, executor, progress)};
+  return {std::move(lead), lab::reproduce_navigation(options, executor, progress)};
 }
 
 PaperReproduction run_elsewhere(const ReproduceArguments& wanted, const std::filesystem::path& out,
-                                Executor& executor, const ReproductionProgress& progress) {
-  ElsewhereReproductionOptions options{.out = out, .data = data_folder(wanted)};
-  if (wanted.quick) options = quick_run(options);
+                                Executor& executor, const lab::ReproductionProgress& progress) {
+  lab::ElsewhereReproductionOptions options{.out = out, .data = data_folder(wanted)};
+  if (wanted.quick) options = lab::quick_run(options);
   if (wanted.seed) options.seed = *wanted.seed;
   if (wanted.scenes) options.scenes = *wanted.scenes;
   if (wanted.queries) options.queries = *wanted.queries;
@@ -109,12 +109,12 @@ PaperReproduction run_elsewhere(const ReproduceArguments& wanted, const std::fil
       " variants of each built-in scene, and the Gazebo worlds and recordings that "
       "are at hand; places of one asked of the memory of all others, noise, robots "
       "that tilt, whole floors. Rivals see the same pictures in the same run.";
-  return {std::move(lead), reproduce_elsewhere(options, executor, progress)};
+  return {std::move(lead), lab::reproduce_elsewhere(options, executor, progress)};
 }
 
 PaperReproduction run_s06(const ReproduceArguments& wanted, const std::filesystem::path& out,
-                          Executor& executor, const ReproductionProgress& progress) {
-  HomingReproductionOptions options{.out = out, .data = data_folder(wanted)};
+                          Executor& executor, const lab::ReproductionProgress& progress) {
+  lab::HomingReproductionOptions options{.out = out, .data = data_folder(wanted)};
   set_scenes(wanted, options);
   std::string lead =
       "Stürzl, Mallot 2006, run in " + std::to_string(options.scenes) +
@@ -122,12 +122,12 @@ PaperReproduction run_s06(const ReproduceArguments& wanted, const std::filesyste
       "different light, headings at random; pictures are of the first arena. Runs home and "
       "chains of "
       "snapshots in rooms and Gazebo worlds. Published figures beside ours.";
-  return {std::move(lead), reproduce_s06(options, executor, progress)};
+  return {std::move(lead), lab::reproduce_s06(options, executor, progress)};
 }
 
 PaperReproduction run_y03(const ReproduceArguments& wanted, const std::filesystem::path& out,
-                          Executor& executor, const ReproductionProgress& progress) {
-  RouteReproductionOptions options{.out = out, .data = data_folder(wanted)};
+                          Executor& executor, const lab::ReproductionProgress& progress) {
+  lab::RouteReproductionOptions options{.out = out, .data = data_folder(wanted)};
   set_scenes(wanted, options);
   if (wanted.runs) options.runs = *wanted.runs;
   options.swept = std::min(options.swept, options.scenes);
@@ -138,7 +138,7 @@ PaperReproduction run_y03(const ReproduceArguments& wanted, const std::filesyste
       std::to_string(options.runs) +
       " runs in each place, and a real route; Gazebo worlds and the recording where they are "
       "at hand. Published figures beside ours.";
-  return {std::move(lead), reproduce_y03(options, executor, progress)};
+  return {std::move(lead), lab::reproduce_y03(options, executor, progress)};
 }
 
 constexpr std::array<ReproducedPaper, 7> papers{{

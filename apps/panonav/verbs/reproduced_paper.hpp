@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "experiments/reproduction.hpp"
+#include "lab/reproduction.hpp"
 #include "panonav/core/executor.hpp"
 
 namespace panonav::command {
@@ -29,7 +29,7 @@ struct ReproduceArguments {
 
 struct PaperReproduction {
   std::string lead;  ///< what the report says first: how much was run
-  Reproduction result;
+  lab::Reproduction result;
 };
 
 /// The experiments of a paper, and which options mean something to them.
@@ -43,7 +43,7 @@ struct ReproducedPaper {
   bool data = false;
   bool only = false;
   PaperReproduction (*run)(const ReproduceArguments& wanted, const std::filesystem::path& out,
-                           Executor& executor, const ReproductionProgress& progress) = nullptr;
+                           Executor& executor, const lab::ReproductionProgress& progress) = nullptr;
 };
 
 /// All, in the order in which `all` runs them.

@@ -8,17 +8,13 @@
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
+#include "panonav_ros2/localisation_node.hpp"
+#include "panonav_ros2/ros_arguments.hpp"
 #include "verbs/recording.hpp"
-#ifdef PANONAV_COMMAND_SPEAKS_DDS
-#include "ros2/localisation_node.hpp"
-#include "ros2/ros_arguments.hpp"
-#endif
 
 namespace panonav::command {
 
 namespace {
-
-#ifdef PANONAV_COMMAND_SPEAKS_DDS
 
 struct Ros2Arguments {
   std::vector<std::string> remappings;
@@ -168,19 +164,6 @@ Run declare_ros2(Arguments& arguments) {
   return [wanted](Session& session) { return run_node(*wanted, session); };
 }
 
-#else
-
-Run declare_ros2(Arguments& arguments) {
-  auto words = std::make_shared<std::vector<std::string>>();
-  arguments.optional_positionals("WORDS", *words, "Not used");
-  return [words](Session&) -> ExitCode {
-    throw Error(
-        "this panonav was built without Cyclone DDS; install cyclonedds-dev and build it again");
-  };
-}
-
-#endif
-
 }  // namespace
 
 Verb ros2_verb() {
@@ -196,10 +179,7 @@ Verb ros2_verb() {
           "  panonav ros2 office.panonav --pictures compressed --use-sim-time true",
           declare_ros2,
           {},
-#ifdef PANONAV_COMMAND_SPEAKS_DDS
-          without_ros_arguments
-#endif
-  };
+          without_ros_arguments};
 }
 
 }  // namespace panonav::command

@@ -10,14 +10,12 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/trajectory_file.hpp"
 #include "panonav/storage/memory_file.hpp"
+#include "panonav_viewer/page.hpp"
+#include "reports/report_page.hpp"
+#include "reports/route_report.hpp"
 #include "verbs/followed_run.hpp"
 #include "verbs/recording.hpp"
 #include "verbs/run_record.hpp"
-#include "viewer/page.hpp"
-#ifdef PANONAV_COMMAND_SIMULATES
-#include "reports/report_page.hpp"
-#include "reports/route_report.hpp"
-#endif
 
 namespace panonav::command {
 
@@ -26,7 +24,7 @@ namespace {
 struct FollowArguments {
   std::string memory;
   std::string dataset;
-  RecordingTopics topics;
+  recordings::RecordingTopics topics;
   PartArguments part;
   std::optional<std::string> name;
   int every = 1;
@@ -154,22 +152,20 @@ ExitCode follow_run(const Arguments& arguments, const FollowArguments& wanted, S
   const bool headings_known = !truth.empty() && run.entries.front().pose->heading_rad.has_value();
   std::vector<double> seconds;
   if (wanted.tum) seconds = seconds_of(run, wanted, session);
-#ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) prepare_report_folder(*wanted.report, "route follow");
-#endif
   std::vector<FollowedImage> images;
   Progress progress(session, "following", (run.entries.size() - 1) / wanted.every + 1);
   RunRecord record(wanted.record, std::array{wanted.dataset, wanted.memory}, false, session, {});
   std::optional<PanoramaReader> recorded;
   if (record.wanted() || wanted.report) recorded.emplace(run.source, PanoramaShape{});
-  RunPage played("", (run.entries.size() - 1) / static_cast<std::size_t>(wanted.every) + 1);
+  viewer::RunPage played("", (run.entries.size() - 1) / static_cast<std::size_t>(wanted.every) + 1);
   follow(follower, run, truth, wanted.every, recorded ? &*recorded : nullptr, session.executor(),
          [&](FollowedImage&& image) {
            progress.clear();
            session.print(session.json() ? json_line(as_json(image, headings_known))
                                         : as_text(image, session));
            if (wanted.report) {
-             RunMoment moment = *image.moment;
+             recordings::RunMoment moment = *image.moment;
              moment.values.insert(moment.values.begin(), {"picture", image.file});
              played.add(moment);
            }
@@ -190,14 +186,12 @@ ExitCode follow_run(const Arguments& arguments, const FollowArguments& wanted, S
   }
   const FollowSummary summary = summarise_follow(images, headings_known);
   if (!session.json()) print_summary(summary, images, session);
-#ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) {
     const auto panorama = memory.route(follower.name());
     write_follow_report(*wanted.report, {follower.name(), *panorama, follower.tracker().lines()},
                         images, summary, std::move(played));
     tell_report(*wanted.report, session);
   }
-#endif
   return summary.on_route > 0 ? ExitCode::done : ExitCode::no_answer;
 }
 
@@ -220,11 +214,9 @@ Run declare_route_follow(Arguments& arguments) {
                    "ends in .csv");
   declare_record(arguments, wanted->record);
   declare_view(arguments, wanted->record);
-#ifdef PANONAV_COMMAND_SIMULATES
   arguments.option("--report FOLDER", wanted->report,
                    "Write pictures of the route, the fixes, and what was seen beside what the "
                    "route shows into this folder: a new one, or that of an earlier report");
-#endif
   arguments.options("route_tracker", wanted->tracker);
   arguments.options("route_fit", wanted->fit);
   arguments.used_only(

@@ -12,12 +12,10 @@
 #include "panonav/pipeline/view_encoder.hpp"
 #include "panonav/storage/memory_address.hpp"
 #include "panonav/storage/memory_file.hpp"
-#include "verbs/memorising.hpp"
-#include "verbs/recording.hpp"
-#ifdef PANONAV_COMMAND_SIMULATES
 #include "reports/report_page.hpp"
 #include "reports/route_report.hpp"
-#endif
+#include "verbs/memorising.hpp"
+#include "verbs/recording.hpp"
 
 namespace panonav::command {
 
@@ -79,7 +77,7 @@ std::vector<Pose2> recorded_poses(const RecordArguments& wanted, const Dataset& 
                           "'odom_x_m', 'odom_y_m' and 'odom_heading_deg'"
                         : "has neither positions nor odometry" +
                               how_to_add(wanted.dataset, position_columns, position_values) +
-                              (is_recording(wanted.dataset)
+                              (recordings::is_recording(wanted.dataset)
                                    ? ""
                                    : "; or odom_x_m,odom_y_m,odom_heading_deg instead"));
   }
@@ -129,9 +127,7 @@ ExitCode record(const Arguments& arguments, const RecordArguments& wanted, Sessi
                      position_columns, position_values, session);
   choose_lines(arguments, wanted, dataset.source, memory, options);
   const auto poses = recorded_poses(wanted, dataset, options.odometry, session);
-#ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) prepare_report_folder(*wanted.report, "route record");
-#endif
   // Views can be memorised into a new file later; what they need of the pictures is known now.
   RouteRecorder recorder(
       memory ? std::move(*memory)
@@ -146,9 +142,7 @@ ExitCode record(const Arguments& arguments, const RecordArguments& wanted, Sessi
   bar.reset();
   const double length_m = recorded.route.length_m();
   const double bytes_per_km = recorded.bytes_per_km();
-#ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) write_record_report(*wanted.report, wanted.name, recorded.route, bytes_per_km);
-#endif
   if (session.json()) {
     session.print(json_line(ordered_json{{"memory", wanted.memory},
                                          {"route", wanted.name},
@@ -190,11 +184,9 @@ Run declare_route_record(Arguments& arguments) {
                    "elevations are not known; all without it");
   arguments.flag("--odometry", wanted->odometry,
                  "Remember the odometry's poses, even where the data set knows positions");
-#ifdef PANONAV_COMMAND_SIMULATES
   arguments.option("--report FOLDER", wanted->report,
                    "Write a picture of the route panorama into this folder: a new one, or that of "
                    "an earlier report");
-#endif
   declare_pictures(arguments, wanted->pictures);
   arguments.options("line", wanted->line);
   return [wanted, &arguments](Session& session) { return record(arguments, *wanted, session); };

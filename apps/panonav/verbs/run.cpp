@@ -118,9 +118,9 @@ class RunMoments {
   RunMoments(const LiveMemory& memory, std::string path)
       : memory_(memory), path_(std::move(path)) {}
 
-  RunMoment of(const Observation& seen, const LiveMemory::Answer& answer, const RunRecord& record,
-               StageClock& stages) {
-    RunMoment moment = record.moment_of(seen, number_++);
+  recordings::RunMoment of(const Observation& seen, const LiveMemory::Answer& answer,
+                           const RunRecord& record, StageClock& stages) {
+    recordings::RunMoment moment = record.moment_of(seen, number_++);
     stages.put(moment);
     const PlaceRecogniser* const recogniser = memory_.recogniser();
     if (record.wants_pictures()) moment.panorama = memory_.panorama();
@@ -175,7 +175,7 @@ void refuse_to_go_on(const RunArguments& wanted, RoutePoses poses) {
 }
 
 ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& session) {
-  const bool live = is_live(wanted.source);
+  const bool live = recordings::is_live(wanted.source);
   if (!live) refuse_live(arguments, wanted.source, false);
   std::optional<PictureSource> remembered;
   if (memory_exists(wanted.memory)) {

@@ -54,11 +54,11 @@ RunRecord::RunRecord(const RunRecordArguments& wanted, std::span<const std::stri
                          ", which the run reads; allowed: another file");
       }
     }
-    recorder_.emplace(*wanted.file, RunRecorderOptions{.wait = !live});
+    recorder_.emplace(*wanted.file, recordings::RunRecorderOptions{.wait = !live});
   }
   if (wanted.view) {
     const ListeningPlace place = listening_place("--view", *wanted.view);
-    ViewServerOptions options;
+    viewer::ViewServerOptions options;
     options.address = place.address;
     options.port = place.port;
     options.title = "panonav: " + (read.empty() ? std::string() : read.front());
@@ -75,15 +75,15 @@ bool RunRecord::wants_pictures() const {
   return recorder_ || page_ != nullptr || (viewer_ && (!live_ || viewer_->viewers() > 0));
 }
 
-RunMoment RunRecord::moment_of(const Observation& seen, std::size_t number) const {
-  if (wants_pictures()) return panonav::moment_of(seen, number);
+recordings::RunMoment RunRecord::moment_of(const Observation& seen, std::size_t number) const {
+  if (wants_pictures()) return recordings::moment_of(seen, number);
   return {.stamp_s = seen.stamp_s.value_or(static_cast<double>(number)),
           .odometry = seen.odometry,
           .tilt = seen.tilt,
           .truth = seen.pose};
 }
 
-void RunRecord::add(RunMoment moment) {
+void RunRecord::add(recordings::RunMoment moment) {
   if (page_ != nullptr) page_->add(moment);
   if (!recorder_ || failed_) {
     if (viewer_) viewer_->add(std::move(moment));

@@ -8,10 +8,10 @@
 
 #include "cli/arguments.hpp"
 #include "cli/session.hpp"
-#include "panonav/pipeline/run_recorder.hpp"
 #include "panonav/storage/memory_file.hpp"
-#include "viewer/page.hpp"
-#include "viewer/view_server.hpp"
+#include "panonav_recordings/run_recorder.hpp"
+#include "panonav_viewer/page.hpp"
+#include "panonav_viewer/view_server.hpp"
 
 namespace panonav::command {
 
@@ -33,7 +33,7 @@ class RunRecord {
   /// What viewers may ask of a run, and tell it.
   struct Offers {
     std::string memory;  ///< whose thumbnails they see; empty: none
-    ViewWish takes = ViewWish::none;
+    viewer::ViewWish takes = viewer::ViewWish::none;
   };
 
   /// Does nothing where nothing is wanted. Of a live run moments are left out that the disk or a
@@ -44,14 +44,14 @@ class RunRecord {
             Session& session, const Offers& offers);
 
   /// Moments are added to the page, too, which must outlive the run.
-  void also_into(RunPage& page) noexcept { page_ = &page; }
+  void also_into(viewer::RunPage& page) noexcept { page_ = &page; }
   /// Whether `add` does anything.
   [[nodiscard]] bool wanted() const noexcept { return recorder_ || viewer_ || page_ != nullptr; }
   /// Whether somebody looks at pictures: a file, or a viewer who is there or waited for.
   [[nodiscard]] bool wants_pictures() const;
   /// What is known of an observation, with its picture where it is wanted.
-  [[nodiscard]] RunMoment moment_of(const Observation& seen, std::size_t number) const;
-  void add(RunMoment moment);
+  [[nodiscard]] recordings::RunMoment moment_of(const Observation& seen, std::size_t number) const;
+  void add(recordings::RunMoment moment);
   /// What a viewer wished since the last time.
   [[nodiscard]] std::optional<ReferencePose> take_wish() {
     return viewer_ ? viewer_->take_wish() : std::nullopt;
@@ -63,9 +63,9 @@ class RunRecord {
  private:
   Session& session_;
   bool live_;
-  std::optional<RunRecorder> recorder_;
-  std::optional<ViewServer> viewer_;
-  RunPage* page_ = nullptr;
+  std::optional<recordings::RunRecorder> recorder_;
+  std::optional<viewer::ViewServer> viewer_;
+  viewer::RunPage* page_ = nullptr;
   bool failed_ = false;
 };
 

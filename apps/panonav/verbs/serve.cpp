@@ -14,7 +14,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/storage/memory_address.hpp"
-#include "server/localisation_server.hpp"
+#include "panonav_server/localisation_server.hpp"
 #include "verbs/listening_place.hpp"
 
 namespace panonav::command {
@@ -31,7 +31,7 @@ struct ServeArguments {
 };
 
 /// "office=/data/monday.panonav", or a file that gives its own name.
-ServedMemory served_memory(const std::string& text) {
+server::ServedMemory served_memory(const std::string& text) {
   const std::size_t equals = text.find('=');
   const bool named = equals != std::string::npos && text.find('/') > equals;
   if (named) return {text.substr(0, equals), text.substr(equals + 1)};
@@ -67,7 +67,7 @@ ExitCode serve(const Arguments& arguments, const ServeArguments& wanted, Session
     asked.notify_all();
   });
   const ListeningPlace place = listening_place("--listen", wanted.listen);
-  LocalisationServerOptions options;
+  server::LocalisationServerOptions options;
   options.address = place.address;
   options.port = place.port;
   options.threads = session.executor().threads();
@@ -79,12 +79,12 @@ ExitCode serve(const Arguments& arguments, const ServeArguments& wanted, Session
     const std::lock_guard lock(mutex);
     session.note(line);
   };
-  std::vector<ServedMemory> memories;
+  std::vector<server::ServedMemory> memories;
   for (const std::string& memory : wanted.memories) memories.push_back(served_memory(memory));
-  if (std::ranges::none_of(memories, is_server_address, &ServedMemory::path)) {
+  if (std::ranges::none_of(memories, is_server_address, &server::ServedMemory::path)) {
     arguments.refuse_unused({"--max-held-views"}, "where all memories are files");
   }
-  const LocalisationServer server(memories, options);
+  const server::LocalisationServer server(memories, options);
   std::unique_lock lock(mutex);
   if (session.json()) {
     session.print(json_line({{"url", server.url()}}));

@@ -6,7 +6,7 @@
 
 namespace panonav::command {
 
-void put_component(RunMoment& moment, const TopologicalMap& map, std::size_t component,
+void put_component(recordings::RunMoment& moment, const TopologicalMap& map, std::size_t component,
                    const std::vector<std::string>& names) {
   for (std::size_t i = 0; i < map.nodes.size(); ++i) {
     const MapNode& node = map.nodes[i];
@@ -24,7 +24,7 @@ void put_component(RunMoment& moment, const TopologicalMap& map, std::size_t com
   }
 }
 
-void GrowingMap::put(RunMoment& moment, const TopologicalMap& map, bool is_node,
+void GrowingMap::put(recordings::RunMoment& moment, const TopologicalMap& map, bool is_node,
                      const std::string& name) {
   truth_ = moment.truth;
   last_is_node_ = is_node;
@@ -48,7 +48,7 @@ void GrowingMap::put(RunMoment& moment, const TopologicalMap& map, bool is_node,
   put_component(moment, map, component, names_);
 }
 
-void GrowingMap::finish(RunMoment& moment, const TopologicalMap& map) const {
+void GrowingMap::finish(recordings::RunMoment& moment, const TopologicalMap& map) const {
   if (map.nodes.empty()) return;
   const std::size_t component = largest_component(map);
   moment.truth = truth_;
@@ -57,7 +57,8 @@ void GrowingMap::finish(RunMoment& moment, const TopologicalMap& map) const {
   put_component(moment, map, component, names_);
 }
 
-void GrowingMap::place(RunMoment& moment, const TopologicalMap& map, std::size_t component) const {
+void GrowingMap::place(recordings::RunMoment& moment, const TopologicalMap& map,
+                       std::size_t component) const {
   moment.pose.reset();
   if (last_is_node_ && map.nodes.back().component == component) {
     moment.pose = map.nodes.back().pose;

@@ -7,13 +7,13 @@
 
 #include "panonav/io/dataset.hpp"
 #include "panonav/mapping/topological_map.hpp"
-#include "panonav/pipeline/run_recorder.hpp"
+#include "panonav_recordings/run_recorder.hpp"
 
 namespace panonav::command {
 
 /// The nodes and edges of one connected component, as components have no common frame. `names`: of
 /// the nodes.
-void put_component(RunMoment& moment, const TopologicalMap& map, std::size_t component,
+void put_component(recordings::RunMoment& moment, const TopologicalMap& map, std::size_t component,
                    const std::vector<std::string>& names);
 
 /// What people see of a map while it grows: the connected component of the newest node.
@@ -23,12 +23,13 @@ class GrowingMap {
   /// and edges are told when a closure came or a twentieth of the nodes is new. The truth is moved
   /// into the frame of the map, by the first node of the component; without a heading of it there
   /// is none.
-  void put(RunMoment& moment, const TopologicalMap& map, bool is_node, const std::string& name);
+  void put(recordings::RunMoment& moment, const TopologicalMap& map, bool is_node,
+           const std::string& name);
   /// The finished map: its largest component.
-  void finish(RunMoment& moment, const TopologicalMap& map) const;
+  void finish(recordings::RunMoment& moment, const TopologicalMap& map) const;
 
  private:
-  void place(RunMoment& moment, const TopologicalMap& map, std::size_t component) const;
+  void place(recordings::RunMoment& moment, const TopologicalMap& map, std::size_t component) const;
 
   std::vector<std::string> names_;                    // of the nodes
   std::vector<std::optional<ReferencePose>> truths_;  // of the nodes

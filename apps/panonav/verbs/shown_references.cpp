@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "experiments/runs/surroundings.hpp"
 #include "panonav/geometry/voronoi.hpp"
 
 namespace panonav::command {
@@ -18,13 +17,13 @@ ShownReferences::ShownReferences(const VisualMemory& memory) {
   }
 }
 
-void ShownReferences::put(RunMoment& moment) const {
+void ShownReferences::put(recordings::RunMoment& moment) const {
   moment.references = positions_;
   moment.reference_views = views_;
   moment.regions = regions_of(positions_);
 }
 
-void ShownReferences::compare(RunMoment& moment, const VisualMemory& memory,
+void ShownReferences::compare(recordings::RunMoment& moment, const VisualMemory& memory,
                               const PackedSignature& view) const {
   constexpr std::size_t max_compared = 1000;
   const auto top = static_cast<int>(std::min(memory.size(), max_compared));
@@ -36,12 +35,12 @@ void ShownReferences::compare(RunMoment& moment, const VisualMemory& memory,
   }
 }
 
-std::vector<RunRegion> regions_of(const std::vector<Point2>& positions,
-                                  const std::vector<std::size_t>& areas) {
+std::vector<recordings::RunRegion> regions_of(const std::vector<Point2>& positions,
+                                              const std::vector<std::size_t>& areas) {
   constexpr std::size_t max_cells = 5000;
   if (positions.size() > max_cells) return {};
   const VoronoiCells cells(positions);
-  std::vector<RunRegion> regions;
+  std::vector<recordings::RunRegion> regions;
   std::vector<bool> done(cells.sites().size());
   for (std::size_t i = 0; i < positions.size(); ++i) {
     const std::size_t site = cells.site_of()[i];
@@ -52,18 +51,6 @@ std::vector<RunRegion> regions_of(const std::vector<Point2>& positions,
     regions.push_back({std::move(outline), areas.empty() ? 0 : areas[i]});
   }
   return regions;
-}
-
-std::vector<std::vector<Point2>> walls_of(const Scene& scene) {
-  std::vector<std::vector<Point2>> walls;
-  for (const MapLayer& layer : scene_layers(scene)) {
-    walls.insert(walls.end(), layer.lines.begin(), layer.lines.end());
-    for (std::vector<Point2> outline : layer.filled_polygons) {
-      outline.push_back(outline.front());
-      walls.push_back(std::move(outline));
-    }
-  }
-  return walls;
 }
 
 }  // namespace panonav::command

@@ -8,8 +8,7 @@
 #include <vector>
 
 #include "panonav/memory/visual_memory.hpp"
-#include "panonav/pipeline/run_recorder.hpp"
-#include "panonav/simulation/scene.hpp"
+#include "panonav_recordings/run_recorder.hpp"
 
 namespace panonav::command {
 
@@ -19,24 +18,22 @@ class ShownReferences {
   explicit ShownReferences(const VisualMemory& memory);
 
   /// Positions, names and Voronoi cells: of the first moment, and when there are others.
-  void put(RunMoment& moment) const;
+  void put(recordings::RunMoment& moment) const;
   /// How alike the view is to the references, to the 1000 most similar of more. Cost: a search that
   /// sorts them.
-  void compare(RunMoment& moment, const VisualMemory& memory, const PackedSignature& view) const;
+  void compare(recordings::RunMoment& moment, const VisualMemory& memory,
+               const PackedSignature& view) const;
 
  private:
   std::vector<Point2> positions_;
-  std::vector<RunReference> views_;
+  std::vector<recordings::RunReference> views_;
   std::unordered_map<ViewId, std::size_t> place_of_;
 };
 
 /// The cells of positions, all of one area or of those given by position. Empty where there are
 /// more than anybody sees apart, 5000, or fewer than two.
-[[nodiscard]] std::vector<RunRegion> regions_of(const std::vector<Point2>& positions,
-                                                const std::vector<std::size_t>& areas = {});
-
-/// What stands around, as lines: outlines of things end where they begin.
-[[nodiscard]] std::vector<std::vector<Point2>> walls_of(const Scene& scene);
+[[nodiscard]] std::vector<recordings::RunRegion> regions_of(
+    const std::vector<Point2>& positions, const std::vector<std::size_t>& areas = {});
 
 /// Notes how long the stages of a moment take.
 class StageClock {
@@ -53,7 +50,7 @@ class StageClock {
   /// What comes now is not of a stage that was begun.
   void restart() { since_ = std::chrono::steady_clock::now(); }
   /// Appends them to the moment's.
-  void put(RunMoment& moment) {
+  void put(recordings::RunMoment& moment) {
     for (auto& one : stages_) moment.stages_ms.push_back(std::move(one));
     stages_.clear();
   }

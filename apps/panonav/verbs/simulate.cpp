@@ -10,11 +10,9 @@
 #include "panonav/core/text.hpp"
 #include "panonav/io/panorama_reader.hpp"
 #include "panonav/io/trajectory_file.hpp"
+#include "runs/ros2_robot.hpp"
 #include "verbs/run_record.hpp"
 #include "verbs/simulated_recording.hpp"
-#ifdef PANONAV_COMMAND_SPEAKS_DDS
-#include "ros2/simulated_robot.hpp"
-#endif
 
 namespace panonav::command {
 
@@ -30,10 +28,8 @@ struct SimulateArguments {
   std::optional<std::uint64_t> random;
   std::optional<std::string> trajectory;
   RunRecordArguments record;
-  SimulatedWorldOptions simulation;
-#ifdef PANONAV_COMMAND_SPEAKS_DDS
-  ros2::SimulatedRobotOptions robot;
-#endif
+  simulation::SimulatedWorldOptions simulation;
+  Ros2Robot robot;
 };
 
 /// --grid, --random and --trajectory each say all of the way; with the options of [recording] they
@@ -48,7 +44,7 @@ void apply_shorthands(const Arguments& arguments, SimulateArguments& wanted) {
     if (!(*wanted.grid_m > 0.0)) {
       throw UsageError("--grid is " + to_text(*wanted.grid_m) + "; allowed: > 0 metres");
     }
-    recording.path = RecordingPath::grid;
+    recording.path = simulation::RecordingPath::grid;
     recording.spacing_m = *wanted.grid_m;
   }
   if (wanted.random) {
@@ -57,14 +53,15 @@ void apply_shorthands(const Arguments& arguments, SimulateArguments& wanted) {
       throw UsageError("--random is " + std::to_string(*wanted.random) + "; allowed: 1 to " +
                        std::to_string(most));
     }
-    recording.path = RecordingPath::random;
+    recording.path = simulation::RecordingPath::random;
     recording.poses = static_cast<int>(*wanted.random);
   }
   if (arguments.given("recording", "heading")) return;
-  recording.heading = usual_heading(recording.path);
+  recording.heading = simulation::usual_heading(recording.path);
 }
 
-std::vector<RecordedPose> poses_of_file(const std::string& path, const SimulatedWorld& world) {
+std::vector<simulation::RecordedPose> poses_of_file(const std::string& path,
+                                                    const simulation::SimulatedWorld& world) {
   const auto trajectory = read_trajectory(path);
   if (trajectory.empty()) throw FileError(path, "holds no pose; allowed: one or more");
   return world.plan_along(trajectory);
@@ -78,43 +75,18 @@ void check_out(const std::string& out) {
 }
 
 /// What the robot saw, and where it truly was.
-RunMoment moment_of(const DatasetEntry& entry, const Image& picture,
-                    const PanoramaReader& panoramas, std::size_t number) {
-  RunMoment moment{.stamp_s = entry.stamp_s.value_or(static_cast<double>(number)),
-                   .picture = picture,
-                   .panorama = panoramas.convert(picture.view(), entry.tilt.value_or(Tilt{})),
-                   .odometry = entry.odometry,
-                   .tilt = entry.tilt,
-                   .truth = entry.pose};
+recordings::RunMoment moment_of(const DatasetEntry& entry, const Image& picture,
+                                const PanoramaReader& panoramas, std::size_t number) {
+  recordings::RunMoment moment{
+      .stamp_s = entry.stamp_s.value_or(static_cast<double>(number)),
+      .picture = picture,
+      .panorama = panoramas.convert(picture.view(), entry.tilt.value_or(Tilt{})),
+      .odometry = entry.odometry,
+      .tilt = entry.tilt,
+      .truth = entry.pose};
   moment.pose = Pose2{entry.pose->x_m, entry.pose->y_m, *entry.pose->heading_rad};
   return moment;
 }
-
-#ifdef PANONAV_COMMAND_SPEAKS_DDS
-ExitCode drive_robot(const SimulatedWorld& world, const ros2::SimulatedRobotOptions& options,
-                     Session& session) {
-  const auto seed = static_cast<std::uint64_t>(world.options().simulation.scene.seed);
-  Random random(seed, 0);
-  const Scene& scene = world.scene();
-  Pose2 start = world.free_space().random_pose(random);
-  if (scene.tour.size() > 1 && world.free_space().is_free(scene.tour.front())) {
-    const Point2 way{scene.tour[1].x_m - scene.tour[0].x_m, scene.tour[1].y_m - scene.tour[0].y_m};
-    start = {scene.tour[0].x_m, scene.tour[0].y_m, std::atan2(way.y_m, way.x_m)};
-  }
-  ros2::SimulatedRobot robot(
-      {.node = "panonav_simulation"}, options,
-      {start, [&](Point2 place) { return world.free_space().is_free(place); },
-       [&](const Pose2& pose, std::uint64_t number) {
-         return world.take_picture(pose, number, session.executor());
-       }},
-      world.options().odometry, seed, [&](const std::string& line) { session.note(line); });
-  const StopSignals signals([&] { robot.stop(); });
-  session.note("panonav simulate: a robot is in " + scene.name + " at " + fixed(start.x_m, 2) +
-               ", " + fixed(start.y_m, 2) + "; it obeys cmd_vel, and Ctrl-C ends it");
-  robot.run();
-  return ExitCode::done;
-}
-#endif
 
 ExitCode simulate(const Arguments& arguments, SimulateArguments wanted, Session& session) {
   if (wanted.ros2 ? !wanted.out.empty() : wanted.out.size() != 1) {
@@ -124,31 +96,25 @@ ExitCode simulate(const Arguments& arguments, SimulateArguments wanted, Session&
   const std::string out = wanted.ros2 ? "" : wanted.out.front();
   apply_shorthands(arguments, wanted);
   if (!wanted.ros2) check_out(out);
-  const SimulatedWorld world(wanted.scene, wanted.simulation, typed_options(arguments),
-                             session.executor());
+  const simulation::SimulatedWorld world(wanted.scene, wanted.simulation, typed_options(arguments),
+                                         session.executor());
   for (const auto& warning : world.scene().warnings) session.note("warning: " + warning);
-  if (wanted.ros2) {
-#ifdef PANONAV_COMMAND_SPEAKS_DDS
-    return drive_robot(world, wanted.robot, session);
-#else
-    throw Error(
-        "this panonav was built without Cyclone DDS; install cyclonedds-dev and build it again");
-#endif
-  }
+  if (wanted.ros2) return wanted.robot.run(world, session);
   const auto poses = wanted.trajectory ? poses_of_file(*wanted.trajectory, world) : world.plan();
-  const bool with_path =
-      wanted.trajectory.has_value() || world.options().recording.path != RecordingPath::random;
+  const bool with_path = wanted.trajectory.has_value() ||
+                         world.options().recording.path != simulation::RecordingPath::random;
   RunRecord record(wanted.record, {}, false, session, {});
   const PanoramaReader panoramas(world.source(), {});
   std::size_t number = 0;
   Progress progress(session, "rendering", poses.size());
-  const auto dataset = record_dataset(world, out, poses, with_path, session.executor(),
-                                      [&](const DatasetEntry& entry, const Image& picture) {
-                                        if (record.wanted())
-                                          record.add(moment_of(entry, picture, panoramas, number));
-                                        ++number;
-                                        progress.advance();
-                                      });
+  const auto dataset =
+      simulation::record_dataset(world, out, poses, with_path, session.executor(),
+                                 [&](const DatasetEntry& entry, const Image& picture) {
+                                   if (record.wanted())
+                                     record.add(moment_of(entry, picture, panoramas, number));
+                                   ++number;
+                                   progress.advance();
+                                 });
   progress.clear();
   record.close();
   if (session.json()) {
@@ -167,7 +133,7 @@ ExitCode simulate(const Arguments& arguments, SimulateArguments wanted, Session&
 
 Run declare_simulate_verb(Arguments& arguments) {
   auto wanted = std::make_shared<SimulateArguments>();
-  const auto scenes = scene_names();
+  const auto scenes = simulation::scene_names();
   std::string names;
   for (const auto name : scenes) names += (names.empty() ? "" : ", ") + std::string(name);
   arguments.positional("SCENE", wanted->scene,
@@ -185,14 +151,10 @@ Run declare_simulate_verb(Arguments& arguments) {
   declare_record(arguments, wanted->record);
   arguments.uncommon({"--record"});
   declare_simulation(arguments, wanted->simulation);
-#ifdef PANONAV_COMMAND_SPEAKS_DDS
-  arguments.options("robot", wanted->robot);
-  arguments.used_only(
-      {"[robot]"}, [wanted] { return wanted->ros2; }, "without --ros2");
-#endif
+  wanted->robot.declare(arguments, [wanted] { return wanted->ros2; });
   arguments.common({"--path", "--spacing-m", "--poses", "--kind", "--seed", "--light"});
   const auto path = [wanted] {
-    return wanted->random ? RecordingPath::random : wanted->simulation.recording.path;
+    return wanted->random ? simulation::RecordingPath::random : wanted->simulation.recording.path;
   };
   arguments.used_only(
       {"[recording]"}, [wanted] { return !wanted->trajectory; },
@@ -203,18 +165,22 @@ Run declare_simulate_verb(Arguments& arguments) {
       {"--poses"}, [wanted] { return !wanted->random; }, "with --random, which is their number");
   arguments.used_only(
       {"--poses"},
-      [path] { return path() == RecordingPath::walk || path() == RecordingPath::random; },
+      [path] {
+        return path() == simulation::RecordingPath::walk ||
+               path() == simulation::RecordingPath::random;
+      },
       "without --path walk or random");
   arguments.used_only(
       {"--spacing-m", "--speed-m-s", "[odometry]"},
-      [wanted, path] { return wanted->trajectory || path() != RecordingPath::random; },
+      [wanted, path] { return wanted->trajectory || path() != simulation::RecordingPath::random; },
       "on random places, which are no way");
   arguments.used_only(
       {"--heading-rad"},
       [wanted, path, &arguments] {
         return arguments.given("recording", "heading")
-                   ? wanted->simulation.recording.heading == RecordingHeading::fixed
-                   : path() == RecordingPath::grid || path() == RecordingPath::zigzag;
+                   ? wanted->simulation.recording.heading == simulation::RecordingHeading::fixed
+                   : path() == simulation::RecordingPath::grid ||
+                         path() == simulation::RecordingPath::zigzag;
       },
       "without --heading fixed");
   return [wanted, &arguments](Session& session) { return simulate(arguments, *wanted, session); };

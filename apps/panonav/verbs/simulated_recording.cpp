@@ -4,7 +4,7 @@
 
 namespace panonav::command {
 
-void declare_simulation(Arguments& arguments, SimulatedWorldOptions& wanted) {
+void declare_simulation(Arguments& arguments, simulation::SimulatedWorldOptions& wanted) {
   arguments.options("recording", wanted.recording);
   arguments.options("simulation", wanted.simulation);
   arguments.options("frame", wanted.frame);
@@ -23,7 +23,7 @@ void declare_simulation(Arguments& arguments, SimulatedWorldOptions& wanted) {
       "without --kind dual-fisheye");
 }
 
-void require_effects(Arguments& arguments, const SimulatedWorldOptions& wanted) {
+void require_effects(Arguments& arguments, const simulation::SimulatedWorldOptions& wanted) {
   const auto& sensor = wanted.sensor;
   arguments.used_only(
       {"--moved-seed"}, [&wanted] { return wanted.simulation.scene.moved_objects > 0.0; },
@@ -39,7 +39,7 @@ void require_effects(Arguments& arguments, const SimulatedWorldOptions& wanted) 
       "on pictures, whose values always have eight bits");
 }
 
-GivenOption typed_options(const Arguments& arguments) {
+simulation::GivenOption typed_options(const Arguments& arguments) {
   return [&arguments](const std::string& section,
                       const std::string& name) -> std::optional<std::string> {
     if (!arguments.given(section, name)) return std::nullopt;
@@ -49,8 +49,8 @@ GivenOption typed_options(const Arguments& arguments) {
   };
 }
 
-MissionPlace mission_place(const SimulatedWorld& world) {
-  MissionPlace place;
+simulation::MissionPlace mission_place(const simulation::SimulatedWorld& world) {
+  simulation::MissionPlace place;
   place.scene = world.scene();
   place.scene.robot_radius_m = world.options().free_space.robot_radius_m;
   place.scene.camera_height_m = world.options().frame.camera_height_m;

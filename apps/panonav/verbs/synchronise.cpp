@@ -10,7 +10,7 @@
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
-#include "panonav/storage/memory_synchronisation.hpp"
+#include "panonav_fleet/memory_synchronisation.hpp"
 
 namespace panonav::command {
 
@@ -23,18 +23,19 @@ struct SynchroniseArguments {
   std::optional<double> within_m;
 };
 
-SynchronisationOptions options_of(const SynchroniseArguments& wanted) {
-  SynchronisationOptions options;
+fleet::SynchronisationOptions options_of(const SynchroniseArguments& wanted) {
+  fleet::SynchronisationOptions options;
   if (wanted.around.has_value() != wanted.within_m.has_value()) {
     throw UsageError(wanted.around ? "--around needs --within-m" : "--within-m needs --around");
   }
   if (wanted.around) {
-    options.areas = areas_around(wanted.around->first, wanted.around->second, *wanted.within_m);
+    options.areas =
+        fleet::areas_around(wanted.around->first, wanted.around->second, *wanted.within_m);
   }
   return options;
 }
 
-std::string counted(const SynchronisationReport& report) {
+std::string counted(const fleet::SynchronisationReport& report) {
   const std::array<std::pair<std::size_t, const char*>, 12> counts{{
       {report.uploaded, "uploaded"},
       {report.downloaded, "downloaded"},
@@ -58,16 +59,16 @@ std::string counted(const SynchronisationReport& report) {
 }
 
 ExitCode synchronise(const SynchroniseArguments& wanted, Session& session) {
-  const SynchronisationReport report = [&] {
+  const fleet::SynchronisationReport report = [&] {
     std::optional<Progress> progress;
     std::size_t expected = 0;
-    return synchronise_memory(wanted.memory, wanted.server, options_of(wanted),
-                              [&](std::size_t total) {
-                                if (!progress || std::exchange(expected, total) != total) {
-                                  progress.emplace(session, "synchronising", total);
-                                }
-                                progress->advance();
-                              });
+    return fleet::synchronise_memory(wanted.memory, wanted.server, options_of(wanted),
+                                     [&](std::size_t total) {
+                                       if (!progress || std::exchange(expected, total) != total) {
+                                         progress.emplace(session, "synchronising", total);
+                                       }
+                                       progress->advance();
+                                     });
   }();
   {
     MemoryFile file = MemoryFile::open(wanted.memory, Access::read_write);

@@ -15,14 +15,12 @@
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/trajectory_file.hpp"
+#include "reports/report_page.hpp"
+#include "reports/track_report.hpp"
 #include "verbs/live_run.hpp"
 #include "verbs/recording.hpp"
 #include "verbs/run_record.hpp"
 #include "verbs/tracked_run.hpp"
-#ifdef PANONAV_COMMAND_SIMULATES
-#include "reports/report_page.hpp"
-#include "reports/track_report.hpp"
-#endif
 
 namespace panonav::command {
 
@@ -49,7 +47,7 @@ constexpr double farthest_m = 1e9;
 struct TrackArguments {
   std::string memory;
   std::string dataset;
-  RecordingTopics topics;
+  recordings::RecordingTopics topics;
   PartArguments part;
   int every = 1;
   std::optional<double> start_x_m;
@@ -255,14 +253,14 @@ ExitCode track_live(const Arguments& arguments, const TrackArguments& wanted,
                short_number(odometry.scale_m()) + " m, as in the memory");
   start(tracker, wanted);
   RunRecord record(wanted.record, std::span(&wanted.memory, 1), true, session,
-                   {.memory = wanted.memory, .takes = ViewWish::pose});
+                   {.memory = wanted.memory, .takes = viewer::ViewWish::pose});
   std::optional<ShownReferences> shown;
   if (record.wanted()) shown.emplace(tracker.memory());
   const TrackSettings settings{.recorded = &file, .shown = shown ? &*shown : nullptr};
   std::vector<StampedPose> trajectory;
   TrackSummary summary;
   std::size_t index = 0;
-  std::optional<RunMoment> moment;
+  std::optional<recordings::RunMoment> moment;
   LiveRun taking(*source, wanted.part, wanted.live, session);
   taking.take(
       [&](const Observation& seen) -> std::string {
@@ -318,7 +316,7 @@ ExitCode track_live(const Arguments& arguments, const TrackArguments& wanted,
 ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Session& session) {
   check(arguments, wanted);
   const auto file = MemoryFile::open(wanted.memory, Access::read_only);
-  if (is_live(wanted.dataset)) return track_live(arguments, wanted, file, session);
+  if (recordings::is_live(wanted.dataset)) return track_live(arguments, wanted, file, session);
   refuse_live(arguments, wanted.dataset, true);
   Dataset run = read_run(wanted.dataset, wanted.topics, wanted.part, file, session);
   const bool visual = odometry_poses(run).empty();
@@ -337,15 +335,13 @@ ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Ses
   }
   start(tracker, wanted);
   TrackSettings settings{.every = wanted.every};
-#ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) {
     prepare_report_folder(*wanted.report, "track");
     settings.particles_kept = particles_shown(run.entries.size());
   }
-#endif
 
   RunRecord record(wanted.record, std::array{wanted.dataset, wanted.memory}, false, session,
-                   {.memory = wanted.memory, .takes = ViewWish::pose});
+                   {.memory = wanted.memory, .takes = viewer::ViewWish::pose});
   const std::size_t looked_at = (run.entries.size() - 1) / settings.every + 1;
   std::optional<ShownReferences> shown;
   if (record.wanted() || wanted.report) {
@@ -353,7 +349,7 @@ ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Ses
     settings.shown = &shown.emplace(tracker.memory());
     settings.wished = [&] { return start_as_wished(tracker, record); };
   }
-  RunPage played("panonav track: " + readable_line(wanted.dataset), looked_at);
+  viewer::RunPage played("panonav track: " + readable_line(wanted.dataset), looked_at);
   std::vector<TrackedImage> images;
   Progress progress(session, "tracking", looked_at);
   track(tracker, run, settings, session.executor(), [&](TrackedImage&& image) {
@@ -377,13 +373,11 @@ ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Ses
   }
   const TrackSummary summary = summarise_track(images);
   if (!session.json()) print_summary(summary, session);
-#ifdef PANONAV_COMMAND_SIMULATES
   if (wanted.report) {
     write_track_report(*wanted.report, tracker.memory(), tracker.localiser().model().spacing_m,
                        images, summary, played);
     tell_report(*wanted.report, session);
   }
-#endif
   return exit_code_of(summary);
 }
 
@@ -409,11 +403,9 @@ Run declare_track(Arguments& arguments) {
   declare_record(arguments, wanted->record);
   declare_view(arguments, wanted->record);
   declare_live(arguments, wanted->live);
-#ifdef PANONAV_COMMAND_SIMULATES
   arguments.option("--report FOLDER", wanted->report,
                    "Write pictures and a page that plays the run into this "
                    "folder: a new one, or that of an earlier report");
-#endif
   arguments.options("start", wanted->start, "start");
   arguments.options("monte_carlo", wanted->filter);
   arguments.options("odometry", wanted->odometry, "odometry");

@@ -51,15 +51,17 @@ TrackSummary summarise_track(const std::vector<TrackedImage>& images) {
 }
 
 TrackedImage track_image(Tracker& tracker, const PackedSignature& view,
-                         const TrackSettings& settings, std::optional<RunMoment> moment) {
+                         const TrackSettings& settings,
+                         std::optional<recordings::RunMoment> moment) {
   TrackedImage image;
   StageClock clock;
   image.estimate = tracker.observe(view);
   clock.stage("filter");
-  image.particles = even_sample(tracker.localiser().particles(), settings.particles_kept);
+  image.particles =
+      recordings::even_sample(tracker.localiser().particles(), settings.particles_kept);
   if (moment) {
     describe(*moment, image.estimate);
-    moment->particles = even_sample(tracker.localiser().particles(), 500);
+    moment->particles = recordings::even_sample(tracker.localiser().particles(), 500);
     if (moment->panorama) {
       if (settings.shown != nullptr) settings.shown->compare(*moment, tracker.memory(), view);
       const ViewId best = tracker.memory().search(view, {.top = 1}).matches.front().view;
@@ -77,12 +79,12 @@ TrackedImage track_image(Tracker& tracker, const PackedSignature& view,
   return image;
 }
 
-void tell_wish(RunMoment& moment) {
+void tell_wish(recordings::RunMoment& moment) {
   moment.values.emplace_back("event", "a viewer tells where the robot is");
 }
 
-void add(RunPage& page, const TrackedImage& image) {
-  RunMoment moment = *image.moment;
+void add(viewer::RunPage& page, const TrackedImage& image) {
+  recordings::RunMoment moment = *image.moment;
   moment.particles = image.particles;
   constexpr std::size_t max_compared = 50;  // else they would be most of a page of many pictures
   if (moment.comparisons.size() > max_compared) moment.comparisons.resize(max_compared);
@@ -99,7 +101,7 @@ void track(Tracker& tracker, const Dataset& run, const TrackSettings& settings, 
   for (std::size_t begin = 0; begin < looked_at; begin += batch) {
     const std::size_t count = std::min(batch, looked_at - begin);
     std::vector<std::optional<PackedSignature>> signatures(count);
-    std::vector<std::optional<RunMoment>> moments(count);
+    std::vector<std::optional<recordings::RunMoment>> moments(count);
     for_each_entry(executor, count, [&](std::size_t i) {
       const std::size_t index = (begin + i) * every;
       StageClock clock;
@@ -109,7 +111,7 @@ void track(Tracker& tracker, const Dataset& run, const TrackSettings& settings, 
         signatures[i] = tracker.encoder().packed(seen);
         return;
       }
-      RunMoment& moment = moments[i].emplace(moment_of(seen, index));
+      recordings::RunMoment& moment = moments[i].emplace(recordings::moment_of(seen, index));
       clock.restart();
       moment.panorama = tracker.encoder().panorama(seen);
       clock.stage("unwarping");

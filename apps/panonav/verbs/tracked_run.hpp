@@ -10,13 +10,13 @@
 #include "panonav/io/dataset.hpp"
 #include "panonav/localisation/monte_carlo.hpp"
 #include "panonav/memory/visual_memory.hpp"
-#include "panonav/pipeline/run_messages.hpp"
-#include "panonav/pipeline/run_recorder.hpp"
 #include "panonav/pipeline/tracker.hpp"
 #include "panonav/pipeline/visual_motion.hpp"
 #include "panonav/storage/memory_file.hpp"
+#include "panonav_recordings/run_messages.hpp"
+#include "panonav_recordings/run_recorder.hpp"
+#include "panonav_viewer/page.hpp"
 #include "verbs/shown_references.hpp"
-#include "viewer/page.hpp"
 
 namespace panonav::command {
 
@@ -27,8 +27,8 @@ struct TrackedImage {
   std::optional<double> stamp_s;
   std::optional<ReferencePose> truth;
   MonteCarloEstimate estimate;
-  std::vector<Pose2> particles;     ///< an even sample of them, as many as were asked for
-  std::optional<RunMoment> moment;  ///< what was seen, where a record is wanted
+  std::vector<Pose2> particles;  ///< an even sample of them, as many as were asked for
+  std::optional<recordings::RunMoment> moment;  ///< what was seen, where a record is wanted
 };
 
 /// What is true of all runs: whether and how far off the answer was.
@@ -64,13 +64,13 @@ struct TrackSettings {
 /// What the filter says of the image and, where a moment is given, what is recorded of it.
 [[nodiscard]] TrackedImage track_image(Tracker& tracker, const PackedSignature& view,
                                        const TrackSettings& settings,
-                                       std::optional<RunMoment> moment);
+                                       std::optional<recordings::RunMoment> moment);
 
 /// That a viewer has told where the robot is.
-void tell_wish(RunMoment& moment);
+void tell_wish(recordings::RunMoment& moment);
 
 /// Adds the image to the page that plays the run. Its moment must be there.
-void add(RunPage& page, const TrackedImage& image);
+void add(viewer::RunPage& page, const TrackedImage& image);
 
 /// Runs the filter over a recording whose entries all have odometry: it moves with every entry and
 /// looks at every `settings.every`-th picture, the first one included. Signatures are computed on

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "panonav/core/error.hpp"
-#include "panonav/pipeline/internal/stand_back.hpp"
+#include "panonav/core/thread_priority.hpp"
 #include "panonav/storage/memory_address.hpp"
 
 namespace panonav {
@@ -59,7 +59,7 @@ class Storer {
     if (thread_.joinable()) thread_.join();
   }
   void work() {
-    stand_back();
+    lower_thread_priority();
     std::unique_lock lock(mutex_);
     while (true) {
       has_file_ = memoriser_.file() != nullptr;
@@ -135,7 +135,7 @@ struct LiveMemory::Implementation {
     const bool due = !recogniser || added.size() >= std::max(min_new, views / 5);
     if (due && !next.valid() && has_file()) {
       next = std::async(options.in_step ? std::launch::deferred : std::launch::async, [this] {
-        if (!options.in_step) stand_back();
+        if (!options.in_step) lower_thread_priority();
         return make_recogniser();
       });
     }

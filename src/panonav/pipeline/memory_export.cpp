@@ -15,7 +15,7 @@
 #include "panonav/io/camera_file.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/image_file.hpp"
-#include "panonav/pipeline/internal/unfinished_folder.hpp"
+#include "panonav/io/unfinished_folder.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
 #include "panonav/pipeline/view_list.hpp"
 

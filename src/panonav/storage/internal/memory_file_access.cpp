@@ -12,12 +12,10 @@
 #include "panonav/core/temporary_file.hpp"
 #include "panonav/storage/internal/database.hpp"
 #include "panonav/storage/internal/memory_schema.hpp"
-#include "panonav/storage/internal/postgresql_tables.hpp"
-#include "panonav/storage/internal/server_address.hpp"
 #include "panonav/storage/internal/sqlite_tables.hpp"
 #include "panonav/storage/internal/write_ahead_log.hpp"
-#include "panonav/storage/memory_address.hpp"
 #include "panonav/storage/memory_header.hpp"
+#include "panonav/storage/memory_scheme.hpp"
 
 namespace panonav {
 
@@ -133,10 +131,8 @@ void prepare_for_changes(Database& database) {
 
 void make_memory_tables(const fs::path& path, const MemoryHeader& header,
                         const std::function<void(MemoryTables&)>& fill) {
-  if (is_server_address(path)) {
-    return make_postgresql_memory(parse_server_address(path), header, fill);
-  }
   validate(header);
+  if (const auto scheme = find_memory_scheme(path)) return scheme->create(path, header, fill);
   std::error_code ignored;
   const std::string name = path.string();
   const auto refuse_existing = [&] {
@@ -194,8 +190,8 @@ void make_memory_tables(const fs::path& path, const MemoryHeader& header,
 
 OpenedMemory open_memory_tables(const fs::path& path, Access access) {
   std::optional<MemoryHeader> header;
-  if (is_server_address(path)) {
-    auto tables = open_postgresql_tables(parse_server_address(path), access);
+  if (const auto scheme = find_memory_scheme(path)) {
+    auto tables = scheme->open(path, access);
     try {
       header = header_from(tables->settings());
     } catch (const ContractError& error) {

@@ -1,0 +1,45 @@
+#include "runs/ros2_robot.hpp"
+
+#include <cmath>
+
+#include "cli/stop_signals.hpp"
+#include "panonav/core/text.hpp"
+#include "panonav_ros2/simulated_robot.hpp"
+
+namespace panonav::command {
+
+struct Ros2Robot::Options {
+  ros2::SimulatedRobotOptions robot;
+};
+
+Ros2Robot::Ros2Robot() : options_(std::make_shared<Options>()) {}
+
+void Ros2Robot::declare(Arguments& arguments, const std::function<bool()>& is_used) {
+  arguments.options("robot", options_->robot);
+  arguments.used_only({"[robot]"}, is_used, "without --ros2");
+}
+
+ExitCode Ros2Robot::run(const simulation::SimulatedWorld& world, Session& session) const {
+  const auto seed = static_cast<std::uint64_t>(world.options().simulation.scene.seed);
+  Random random(seed, 0);
+  const simulation::Scene& scene = world.scene();
+  Pose2 start = world.free_space().random_pose(random);
+  if (scene.tour.size() > 1 && world.free_space().is_free(scene.tour.front())) {
+    const Point2 way{scene.tour[1].x_m - scene.tour[0].x_m, scene.tour[1].y_m - scene.tour[0].y_m};
+    start = {scene.tour[0].x_m, scene.tour[0].y_m, std::atan2(way.y_m, way.x_m)};
+  }
+  ros2::SimulatedRobot robot(
+      {.node = "panonav_simulation"}, options_->robot,
+      {start, [&](Point2 place) { return world.free_space().is_free(place); },
+       [&](const Pose2& pose, std::uint64_t number) {
+         return world.take_picture(pose, number, session.executor());
+       }},
+      world.options().odometry, seed, [&](const std::string& line) { session.note(line); });
+  const StopSignals signals([&] { robot.stop(); });
+  session.note("panonav simulate: a robot is in " + scene.name + " at " + fixed(start.x_m, 2) +
+               ", " + fixed(start.y_m, 2) + "; it obeys cmd_vel, and Ctrl-C ends it");
+  robot.run();
+  return ExitCode::done;
+}
+
+}  // namespace panonav::command

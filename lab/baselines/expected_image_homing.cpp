@@ -1,0 +1,183 @@
+#include "lab/baselines/expected_image_homing.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/kernels/turn_products.hpp"
+
+namespace panonav::lab {
+
+namespace {
+
+// Expected views that are compared together: they and their products stay in the first cache.
+constexpr std::size_t block = 8;
+
+struct LatticePoint {
+  int x = 0;
+  int y = 0;
+  [[nodiscard]] int square() const noexcept { return x * x + y * y; }
+};
+
+// Points of the square lattice by their distance from (0, 0), so many that more than `least` are
+// certain to be among them.
+std::vector<LatticePoint> lattice(int least) {
+  const int side = static_cast<int>(std::ceil(std::sqrt(static_cast<double>(least)))) + 1;
+  std::vector<LatticePoint> points;
+  for (int y = -side; y <= side; ++y) {
+    for (int x = -side; x <= side; ++x) {
+      if (x * x + y * y <= side * side) points.push_back({x, y});
+    }
+  }
+  std::ranges::stable_sort(points, {}, [](const LatticePoint& p) { return p.square(); });
+  return points;
+}
+
+double mean_of(std::span<const float> values) {
+  double sum = 0.0;
+  for (const float value : values) sum += static_cast<double>(value);
+  return sum / static_cast<double>(values.size());
+}
+
+}  // namespace
+
+void visit_options(ExpectedImageOptions& options, OptionVisitor& visitor) {
+  using T = ExpectedImageOptions;
+  constexpr OptionTable table{
+      option<&T::reach>("how far away positions are tried, in units of the assumed distance", 0.01,
+                        0.99),
+      option<&T::positions>("positions that are tried at most", 5, 10000),
+  };
+  table.visit(options, visitor);
+}
+
+ExpectedImageHoming::ExpectedImageHoming(int columns, const ExpectedImageOptions& options)
+    : columns_(columns), spacing_(0.0) {
+  require(columns >= 4 && columns <= 65536, "columns", columns, "4 .. 65536");
+  validate(options);
+  const auto points = lattice(options.positions);
+  // Whole rings of equally far points, the next of which would lie at the reach.
+  std::size_t count = 0;
+  while (true) {
+    std::size_t next = count;
+    while (points[next].square() == points[count].square()) ++next;
+    if (next > static_cast<std::size_t>(options.positions)) break;
+    count = next;
+  }
+  spacing_ = options.reach / std::sqrt(static_cast<double>(points[count].square()));
+  const double pixels_per_radian = columns / (2.0 * std::numbers::pi);
+  table_.reserve(count * static_cast<std::size_t>(columns));
+  for (std::size_t p = 0; p < count; ++p) {
+    const double xi = spacing_ * points[p].x;
+    const double eta = spacing_ * points[p].y;
+    positions_.push_back({static_cast<float>(xi), static_cast<float>(eta)});
+    for (int i = 0; i < columns; ++i) {
+      const double azimuth = i / pixels_per_radian;
+      const double seen =
+          i + pixels_per_radian * (eta * std::cos(azimuth) - xi * std::sin(azimuth));
+      const int pixel = static_cast<int>(std::nearbyint(seen)) % columns;
+      table_.push_back(static_cast<std::uint16_t>(pixel < 0 ? pixel + columns : pixel));
+    }
+  }
+}
+
+HomeVector ExpectedImageHoming::home_vector(std::span<const float> home,
+                                            std::span<const float> current) const {
+  const auto columns = static_cast<std::size_t>(columns_);
+  for (const auto& row : {home, current}) {
+    require(row.size() == columns, "pixels of a row", static_cast<double>(row.size()),
+            to_text(columns_));
+    for (const float value : row) {
+      require(std::isfinite(value), "pixel", static_cast<double>(value), "a finite number");
+    }
+  }
+  const std::size_t stride = kernels::turn_products_stride(columns);
+  std::vector<float> periodic(columns + stride);
+  std::vector<float> flat(columns);
+  std::vector<float> expected(block * columns);
+  std::vector<float> products(block * stride);
+
+  const double home_mean = mean_of(home);
+  const double current_mean = mean_of(current);
+  double home_energy = 0.0;
+  double current_energy = 0.0;
+  for (std::size_t i = 0; i < columns; ++i) {
+    periodic[i] = static_cast<float>(static_cast<double>(home[i]) - home_mean);
+    flat[i] = static_cast<float>(static_cast<double>(current[i]) - current_mean);
+    home_energy += static_cast<double>(periodic[i]) * static_cast<double>(periodic[i]);
+    current_energy += static_cast<double>(flat[i]) * static_cast<double>(flat[i]);
+  }
+  for (std::size_t i = 0; i < stride; ++i) periodic[columns + i] = periodic[i];
+  // Pixels are of the order of 1, so this is rounding.
+  if (!(home_energy * current_energy > 1e-20)) return {};
+
+  const kernels::Instructions instructions = kernels::chosen_instructions();
+  HomeVector vector;
+  double least = 0.0;
+  std::size_t best = positions_.size();
+  std::size_t best_turn = 0;
+  for (std::size_t first = 0; first < positions_.size(); first += block) {
+    const std::size_t count = std::min(block, positions_.size() - first);
+    std::array<float, block> energies{};
+    std::array<float, block> largest{};
+    for (std::size_t p = 0; p < count; ++p) {
+      const std::uint16_t* const seen = pixels(first + p).data();
+      float* const row = expected.data() + p * columns;
+      // Several sums side by side, so that one does not wait for the other.
+      std::array<float, 4> sums{};
+      std::array<float, 4> squares{};
+      std::size_t i = 0;
+      for (; i + 4 <= columns; i += 4) {
+        for (std::size_t j = 0; j < 4; ++j) {
+          const float value = flat[seen[i + j]];
+          row[i + j] = value;
+          sums[j] += value;
+          squares[j] += value * value;
+        }
+      }
+      for (; i < columns; ++i) {
+        row[i] = flat[seen[i]];
+        sums[0] += row[i];
+        squares[0] += row[i] * row[i];
+      }
+      const float sum = (sums[0] + sums[1]) + (sums[2] + sums[3]);
+      energies[p] = (squares[0] + squares[1]) + (squares[2] + squares[3]) -
+                    sum * sum / static_cast<float>(columns);
+    }
+    kernels::turn_products(std::span(expected).first(count * columns), columns, periodic,
+                           std::span(products).first(count * stride),
+                           std::span(largest).first(count), instructions);
+    for (std::size_t p = 0; p < count; ++p) {
+      // Less the energy of the home view, which is the same for all.
+      const auto difference =
+          static_cast<double>(energies[p]) - 2.0 * static_cast<double>(largest[p]);
+      if (first + p == 0) {
+        vector.correlation = std::clamp(
+            static_cast<double>(largest[p]) / std::sqrt(home_energy * current_energy), -1.0, 1.0);
+      }
+      if (best < positions_.size() && difference >= least) continue;
+      least = difference;
+      best = first + p;
+      const float* const row = products.data() + p * stride;
+      best_turn = static_cast<std::size_t>(std::find(row, row + columns, largest[p]) - row);
+      const double energy = home_energy + static_cast<double>(energies[p]);
+      vector.residual = std::clamp((home_energy + difference) / energy, 0.0, 1.0);
+    }
+  }
+  // Value i of the turned home view is value i + best_turn of the home view [S06 eq. 8: i - s].
+  const std::size_t shift = (columns - best_turn) % columns;
+  vector.xi = static_cast<double>(positions_[best].xi);
+  vector.eta = static_cast<double>(positions_[best].eta);
+  vector.heading_rad = wrap_angle(2.0 * std::numbers::pi * static_cast<double>(shift) / columns_);
+  const double square = vector.xi * vector.xi + vector.eta * vector.eta;
+  // Of a position that may be anywhere in its square of the lattice.
+  vector.confidence = square / (square + spacing_ * spacing_ / 6.0);
+  vector.frequencies = columns_ / 2.0;
+  return vector;
+}
+
+}  // namespace panonav::lab

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "panonav/core/options.hpp"
+#include "panonav/relative_pose/fourier_homing.hpp"
+
+namespace panonav::lab {
+
+struct ExpectedImageOptions {
+  /// Positions lie within this distance, in units of R. Beyond 1 the image would fold over.
+  double reach = 2.0 / 3.0;
+  /// How many there are at most: those of the finest square lattice around (0, 0) with so few. 200
+  /// gives 197.
+  int positions = 200;
+};
+void visit_options(ExpectedImageOptions& options, OptionVisitor& visitor);
+
+/// Homing by expected images (hs_ei, Franz et al. 1998), as [S06 section 2.2] tells it: what the
+/// current view, one row of pixels, would look like from P positions around it if all things were
+/// equally far [S06 eq. 9, nearest pixels from a table of P x N], compared with the home view at
+/// all N turns by whole pixels [S06 eq. 8]. The baseline for Fourier homing: nothing is left out
+/// and nothing approximated; only the sum of squared differences is written as energies less twice
+/// a correlation, which are computed for blocks of positions and turns at once.
+class ExpectedImageHoming {
+ public:
+  struct Position {
+    float xi = 0.0F;
+    float eta = 0.0F;
+  };
+
+  /// For rows of `columns` pixels. Throws ContractError unless 4 <= columns <= 65536; OptionError.
+  explicit ExpectedImageHoming(int columns, const ExpectedImageOptions& options = {});
+
+  [[nodiscard]] int columns() const noexcept { return columns_; }
+  /// From (0, 0) outwards.
+  [[nodiscard]] std::span<const Position> positions() const noexcept { return positions_; }
+  /// Of a square of the lattice, in units of R.
+  [[nodiscard]] double spacing() const noexcept { return spacing_; }
+
+  /// The view from a position: entry i is the pixel of `current` that is seen at pixel i.
+  [[nodiscard]] std::span<const std::uint16_t> pixels(std::size_t position) const noexcept {
+    return std::span(table_).subspan(position * static_cast<std::size_t>(columns_),
+                                     static_cast<std::size_t>(columns_));
+  }
+
+  /// Conventions as `panonav::home_vector`. `residual` is the smallest sum of squared differences
+  /// over the energy of home and expected view; `confidence` knows the spacing of the positions
+  /// only. Of equal differences the position nearest to (0, 0) counts; views without structure give
+  /// zeros and residual 1. Throws ContractError unless both rows have `columns` finite values.
+  /// Safe to call from several threads. Cost: P N^2 multiplications and additions.
+  [[nodiscard]] HomeVector home_vector(std::span<const float> home,
+                                       std::span<const float> current) const;
+
+ private:
+  int columns_;
+  double spacing_;
+  std::vector<Position> positions_;
+  std::vector<std::uint16_t> table_;
+};
+
+}  // namespace panonav::lab

@@ -1,0 +1,435 @@
+#include "lab/baselines/rivals.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <numbers>
+
+#include "panonav/core/error.hpp"
+#include "panonav/signature/dissimilarity.hpp"
+#include "panonav/signature/fourier_signature.hpp"
+
+namespace panonav::lab {
+
+namespace {
+
+void require_references(const std::vector<RivalView>& references) {
+  require(!references.empty(), "number of reference views", 0.0, ">= 1");
+  for (const auto& view : references) {
+    const Panorama& first = references[0].panorama;
+    const Panorama& here = view.panorama;
+    require(here.rows() == first.rows() && here.columns() == first.columns(),
+            "columns of a reference view", here.columns(), "the shape of the first reference view");
+  }
+}
+
+// Index of the smallest value of `distance(i)`, the first of equals; `left_out` is not asked.
+template <class Distance>
+std::size_t argmin(std::size_t count, std::optional<std::size_t> left_out,
+                   const Distance& distance) {
+  require(count >= (left_out ? 2U : 1U), "number of reference views", static_cast<double>(count),
+          ">= 1 beside the one left out");
+  std::optional<std::size_t> best;
+  double smallest = 0.0;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (i == left_out) continue;
+    const double value = distance(i);
+    if (best && !(value < smallest)) continue;
+    smallest = value;
+    best = i;
+  }
+  return *best;
+}
+
+double l1(const std::vector<float>& a, const std::vector<float>& b) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += std::abs(a[i] - b[i]);
+  return sum;
+}
+
+class FourierSignatureRecogniser final : public RivalRecogniser {
+ public:
+  explicit FourierSignatureRecogniser(int components) : components_(components) {}
+  [[nodiscard]] std::string name() const override { return "Fourier signature"; }
+  void memorise(const std::vector<RivalView>& references) override {
+    require_references(references);
+    signatures_.clear();
+    for (const auto& view : references) {
+      signatures_.push_back(compute_signature(view.panorama, components_));
+    }
+  }
+  [[nodiscard]] std::size_t nearest(const RivalView& query,
+                                    std::optional<std::size_t> left_out) const override {
+    const auto signature = compute_signature(query.panorama, components_);
+    return argmin(signatures_.size(), left_out,
+                  [&](std::size_t i) { return dissimilarity_l1(signature, signatures_[i]); });
+  }
+  [[nodiscard]] double bytes_per_view() const override {
+    return signatures_.empty() ? 0.0 : 2.0 * static_cast<double>(signatures_[0].shape().size());
+  }
+
+ private:
+  int components_;
+  std::vector<FourierSignature> signatures_;
+};
+
+// One histogram over the whole view: what Ulrich and Nourbakhsh use, in grey.
+class GreyHistogramRecogniser final : public RivalRecogniser {
+ public:
+  explicit GreyHistogramRecogniser(int bins) : bins_(bins) {
+    require(bins >= 2 && bins <= 256, "histogram bins", bins, "2 .. 256");
+  }
+  [[nodiscard]] std::string name() const override { return "grey histogram"; }
+  void memorise(const std::vector<RivalView>& references) override {
+    require_references(references);
+    histograms_.clear();
+    for (const auto& view : references) histograms_.push_back(histogram(view.panorama));
+  }
+  [[nodiscard]] std::size_t nearest(const RivalView& query,
+                                    std::optional<std::size_t> left_out) const override {
+    const auto wanted = histogram(query.panorama);
+    return argmin(histograms_.size(), left_out,
+                  [&](std::size_t i) { return l1(wanted, histograms_[i]); });
+  }
+  [[nodiscard]] double bytes_per_view() const override { return 2.0 * bins_; }
+
+ private:
+  [[nodiscard]] std::vector<float> histogram(const Panorama& view) const {
+    std::vector<float> counts(static_cast<std::size_t>(bins_));
+    for (const float value : view.values()) {
+      const int bin = static_cast<int>(std::floor(value * static_cast<float>(bins_)));
+      counts[static_cast<std::size_t>(std::clamp(bin, 0, bins_ - 1))] += 1.0F;
+    }
+    for (auto& count : counts) count /= static_cast<float>(view.values().size());
+    return counts;
+  }
+  int bins_;
+  std::vector<std::vector<float>> histograms_;
+};
+
+// One histogram of colours over the whole view. Colour needs no phases and no unwarping, and does
+// not change when the robot turns.
+class ColourHistogramRecogniser final : public RivalRecogniser {
+ public:
+  explicit ColourHistogramRecogniser(int bins_per_channel) : bins_(bins_per_channel) {
+    require(bins_per_channel >= 2 && bins_per_channel <= 32, "histogram bins per channel",
+            bins_per_channel, "2 .. 32");
+  }
+  [[nodiscard]] std::string name() const override { return "colour histogram"; }
+  void memorise(const std::vector<RivalView>& references) override {
+    require_references(references);
+    histograms_.clear();
+    for (const auto& view : references) histograms_.push_back(histogram(view.picture));
+  }
+  [[nodiscard]] std::size_t nearest(const RivalView& query,
+                                    std::optional<std::size_t> left_out) const override {
+    const auto wanted = histogram(query.picture);
+    return argmin(histograms_.size(), left_out,
+                  [&](std::size_t i) { return l1(wanted, histograms_[i]); });
+  }
+  [[nodiscard]] double bytes_per_view() const override { return 2.0 * bins_ * bins_ * bins_; }
+
+ private:
+  [[nodiscard]] std::vector<float> histogram(const Image& view) const {
+    require(view.channels() == 3, "channels of a view", view.channels(), "3");
+    std::vector<float> counts(static_cast<std::size_t>(bins_) * bins_ * bins_);
+    const auto pixels = view.pixels();
+    const float share = 3.0F / static_cast<float>(pixels.size());
+    for (std::size_t i = 0; i < pixels.size(); i += 3) {
+      const auto bin = [&](std::size_t c) { return pixels[i + c] * bins_ / 256; };
+      counts[static_cast<std::size_t>((bin(0) * bins_ + bin(1)) * bins_ + bin(2))] += share;
+    }
+    return counts;
+  }
+  int bins_;
+  std::vector<std::vector<float>> histograms_;
+};
+
+// The zero-phase representation [Pajdla and Hlavac 1999]: the view is turned so that the phase of
+// its first harmonic, summed over rows, becomes zero.
+Panorama turned_to_zero_phase(const Panorama& view) {
+  std::complex<double> first{0.0, 0.0};
+  for (int c = 0; c < view.columns(); ++c) {
+    double column = 0.0;
+    for (int y = 0; y < view.rows(); ++y) column += view.at(y, c);
+    first += column * std::polar(1.0, -view.azimuth_rad(c));
+  }
+  // I(phi) ~ cos(phi + psi) has its crest at phi = -psi, which is brought to column 0.
+  const double columns_per_radian = view.columns() / (2.0 * std::numbers::pi);
+  return turn_columns(view, static_cast<int>(std::lround(-std::arg(first) * columns_per_radian)));
+}
+
+class ZeroPhaseRecogniser final : public RivalRecogniser {
+ public:
+  [[nodiscard]] std::string name() const override { return "zero-phase representation"; }
+  void memorise(const std::vector<RivalView>& references) override {
+    require_references(references);
+    views_.clear();
+    for (const auto& view : references) {
+      const Panorama turned = turned_to_zero_phase(view.panorama);
+      views_.emplace_back(turned.values().begin(), turned.values().end());
+    }
+  }
+  [[nodiscard]] std::size_t nearest(const RivalView& query,
+                                    std::optional<std::size_t> left_out) const override {
+    const Panorama turned = turned_to_zero_phase(query.panorama);
+    const std::vector<float> wanted(turned.values().begin(), turned.values().end());
+    return argmin(views_.size(), left_out, [&](std::size_t i) { return l1(wanted, views_[i]); });
+  }
+  [[nodiscard]] double bytes_per_view() const override {
+    return views_.empty() ? 0.0 : static_cast<double>(views_[0].size());
+  }
+
+ private:
+  std::vector<std::vector<float>> views_;
+};
+
+// Principal components of views turned to zero phase: eigenimages are not indifferent to a turn, so
+// the papers that use them turn the views to a canonical heading first.
+class EigenimageRecogniser final : public RivalRecogniser {
+ public:
+  explicit EigenimageRecogniser(int dimensions) : dimensions_(dimensions) {
+    require(dimensions >= 1, "eigenimages", dimensions, ">= 1");
+  }
+  [[nodiscard]] std::string name() const override { return "eigenimages"; }
+  void memorise(const std::vector<RivalView>& references) override {
+    require_references(references);
+    const auto count = static_cast<Eigen::Index>(references.size());
+    const auto pixels = static_cast<Eigen::Index>(references[0].panorama.values().size());
+    Eigen::MatrixXf views(pixels, count);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      views.col(i) = column(references[static_cast<std::size_t>(i)].panorama);
+    }
+    mean_ = views.rowwise().mean();
+    views.colwise() -= mean_;
+    // Fewer views than pixels: the small matrix of inner products has the same eigenvectors.
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXf> solver(views.transpose() * views);
+    const Eigen::Index kept = std::min<Eigen::Index>(dimensions_, count);
+    basis_ = views * solver.eigenvectors().rightCols(kept);
+    for (Eigen::Index k = 0; k < kept; ++k) {
+      const float length = basis_.col(k).norm();
+      if (length > 0.0F) basis_.col(k) /= length;
+    }
+    coefficients_ = basis_.transpose() * views;
+  }
+  [[nodiscard]] std::size_t nearest(const RivalView& query,
+                                    std::optional<std::size_t> left_out) const override {
+    const Eigen::VectorXf wanted = basis_.transpose() * (column(query.panorama) - mean_);
+    return argmin(static_cast<std::size_t>(coefficients_.cols()), left_out, [&](std::size_t i) {
+      return (coefficients_.col(static_cast<Eigen::Index>(i)) - wanted).squaredNorm();
+    });
+  }
+  /// Coefficients as floats, and this view's share of the eigenimages in bytes.
+  [[nodiscard]] double bytes_per_view() const override {
+    if (coefficients_.cols() == 0) return 0.0;
+    return 4.0 * static_cast<double>(coefficients_.rows()) +
+           static_cast<double>(basis_.size()) / static_cast<double>(coefficients_.cols());
+  }
+
+ private:
+  static Eigen::VectorXf column(const Panorama& view) {
+    const Panorama turned = turned_to_zero_phase(view);
+    return Eigen::Map<const Eigen::VectorXf>(turned.values().data(),
+                                             static_cast<Eigen::Index>(turned.values().size()));
+  }
+  int dimensions_;
+  Eigen::VectorXf mean_;
+  Eigen::MatrixXf basis_;
+  Eigen::MatrixXf coefficients_;
+};
+
+// Every pixel, every turn by whole columns: the most that can be had from pixels, at the highest
+// price. The sum of squared differences over all turns comes from the full spectra, which is the
+// same and takes seconds instead of hours.
+class PixelRecogniser final : public RivalRecogniser {
+ public:
+  [[nodiscard]] std::string name() const override { return "pixels over all turns"; }
+  void memorise(const std::vector<RivalView>& references) override {
+    require_references(references);
+    matrix_ = transform_matrix(references[0].panorama.columns(),
+                               references[0].panorama.columns() / 2 + 1);
+    views_.clear();
+    for (const auto& view : references) views_.push_back(spectrum(view.panorama));
+  }
+  [[nodiscard]] std::size_t nearest(const RivalView& query,
+                                    std::optional<std::size_t> left_out) const override {
+    const Spectrum wanted = spectrum(query.panorama);
+    return argmin(views_.size(), left_out,
+                  [&](std::size_t i) { return distance(wanted, views_[i]); });
+  }
+  [[nodiscard]] double bytes_per_view() const override {
+    return views_.empty() ? 0.0 : static_cast<double>(views_[0].pixels);
+  }
+
+ private:
+  struct Spectrum {
+    Eigen::MatrixXcf rows;  // rows x frequencies 0 .. columns / 2
+    double energy = 0.0;
+    std::size_t pixels = 0;
+    int columns = 0;
+  };
+
+  static Eigen::MatrixXcf transform_matrix(int columns, int frequencies) {
+    Eigen::MatrixXcf matrix(columns, frequencies);
+    for (int c = 0; c < columns; ++c) {
+      for (int k = 0; k < frequencies; ++k) {
+        const int step = static_cast<int>((static_cast<long long>(c) * k) % columns);
+        matrix(c, k) = std::polar(1.0F, -2.0F * std::numbers::pi_v<float> *
+                                            static_cast<float>(step) / static_cast<float>(columns));
+      }
+    }
+    return matrix;
+  }
+
+  [[nodiscard]] Spectrum spectrum(const Panorama& view) const {
+    require(view.columns() == matrix_.rows(), "columns of a view", view.columns(),
+            "those of the reference views");
+    using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    const Eigen::Map<const RowMajor> values(view.values().data(), view.rows(), view.columns());
+    Spectrum result;
+    result.rows = values.cast<std::complex<float>>() * matrix_;
+    result.energy = values.cast<double>().squaredNorm();
+    result.pixels = view.values().size();
+    result.columns = view.columns();
+    return result;
+  }
+
+  // min over turns of the sum of squared differences = |a|^2 + |b|^2 - 2 max correlation.
+  [[nodiscard]] double distance(const Spectrum& a, const Spectrum& b) const {
+    const Eigen::VectorXcf cross =
+        (a.rows.array() * b.rows.array().conjugate()).colwise().sum().transpose();
+    Eigen::VectorXcf weighted = cross;
+    const Eigen::Index last = weighted.size() - 1;
+    for (Eigen::Index k = 1; k <= last; ++k) {
+      if (!(k == last && a.columns % 2 == 0)) weighted(k) *= 2.0F;
+    }
+    // Correlation at turn c: (1/N) Re sum_k w_k cross_k exp(+j 2 pi k c / N).
+    const Eigen::VectorXf correlation = (matrix_.conjugate() * weighted).real();
+    return a.energy + b.energy -
+           2.0 * static_cast<double>(correlation.maxCoeff()) / static_cast<double>(a.columns);
+  }
+
+  Eigen::MatrixXcf matrix_;  // columns x frequencies
+  std::vector<Spectrum> views_;
+};
+
+class PatchNormalisedRecogniser final : public RivalRecogniser {
+ public:
+  [[nodiscard]] std::string name() const override { return "patch-normalised pixels"; }
+  void memorise(const std::vector<RivalView>& references) override {
+    require_references(references);
+    views_.clear();
+    for (const auto& view : references) views_.push_back(normalised(view.panorama));
+  }
+  [[nodiscard]] std::size_t nearest(const RivalView& query,
+                                    std::optional<std::size_t> left_out) const override {
+    const Panorama wanted = normalised(query.panorama);
+    return argmin(views_.size(), left_out,
+                  [&](std::size_t i) { return difference(wanted, views_[i]); });
+  }
+  [[nodiscard]] double bytes_per_view() const override {
+    return views_.empty() ? 0.0 : static_cast<double>(views_[0].values().size());
+  }
+
+ private:
+  // SeqSLAM's 64 x 32 pixels and patches of 8 x 8; a panorama is wider.
+  static constexpr int small_columns = 128;
+  static constexpr int small_rows = 32;
+  static constexpr int half_patch = 4;
+
+  static Panorama shrunk(const Panorama& view) {
+    const int rows = std::min(view.rows(), small_rows);
+    const int columns = std::min(view.columns(), small_columns);
+    Panorama small(rows, columns, std::nullopt);
+    for (int y = 0; y < rows; ++y) {
+      for (int c = 0; c < columns; ++c) {
+        double sum = 0.0;
+        int count = 0;
+        for (int v = y * view.rows() / rows; v < (y + 1) * view.rows() / rows; ++v) {
+          for (int u = c * view.columns() / columns; u < (c + 1) * view.columns() / columns; ++u) {
+            sum += view.at(v, u);
+            ++count;
+          }
+        }
+        small.at(y, c) = static_cast<float>(sum / count);
+      }
+    }
+    return small;
+  }
+
+  static Panorama normalised(const Panorama& view) {
+    const Panorama small = shrunk(view);
+    Panorama result = small;
+    for (int y = 0; y < small.rows(); ++y) {
+      for (int c = 0; c < small.columns(); ++c) {
+        double sum = 0.0;
+        double squares = 0.0;
+        int count = 0;
+        for (int v = std::max(0, y - half_patch); v < std::min(small.rows(), y + half_patch); ++v) {
+          for (int u = c - half_patch; u < c + half_patch; ++u) {
+            const double value = small.at(v, (u + small.columns()) % small.columns());
+            sum += value;
+            squares += value * value;
+            ++count;
+          }
+        }
+        const double mean = sum / count;
+        const double deviation = std::sqrt(std::max(0.0, squares / count - mean * mean));
+        // A patch without structure tells nothing.
+        result.at(y, c) =
+            deviation > 1e-3 ? static_cast<float>((small.at(y, c) - mean) / deviation) : 0.0F;
+      }
+    }
+    return result;
+  }
+
+  static double difference(const Panorama& a, const Panorama& b) {
+    double least = std::numeric_limits<double>::infinity();
+    const auto columns = static_cast<std::size_t>(a.columns());
+    for (std::size_t turn = 0; turn < columns; ++turn) {
+      float sum = 0.0F;
+      for (int y = 0; y < a.rows(); ++y) {
+        const float* const row_a = a.values().data() + static_cast<std::size_t>(y) * columns;
+        const float* const row_b = b.values().data() + static_cast<std::size_t>(y) * columns;
+        for (std::size_t c = 0; c + turn < columns; ++c) {
+          sum += std::abs(row_a[c + turn] - row_b[c]);
+        }
+        for (std::size_t c = columns - turn; c < columns; ++c) {
+          sum += std::abs(row_a[c + turn - columns] - row_b[c]);
+        }
+      }
+      least = std::min(least, static_cast<double>(sum));
+    }
+    return least;
+  }
+
+  std::vector<Panorama> views_;
+};
+
+}  // namespace
+
+std::unique_ptr<RivalRecogniser> fourier_signature_recogniser(int components) {
+  return std::make_unique<FourierSignatureRecogniser>(components);
+}
+std::unique_ptr<RivalRecogniser> grey_histogram_recogniser(int bins) {
+  return std::make_unique<GreyHistogramRecogniser>(bins);
+}
+std::unique_ptr<RivalRecogniser> colour_histogram_recogniser(int bins_per_channel) {
+  return std::make_unique<ColourHistogramRecogniser>(bins_per_channel);
+}
+std::unique_ptr<RivalRecogniser> eigenimage_recogniser(int dimensions) {
+  return std::make_unique<EigenimageRecogniser>(dimensions);
+}
+std::unique_ptr<RivalRecogniser> zero_phase_recogniser() {
+  return std::make_unique<ZeroPhaseRecogniser>();
+}
+std::unique_ptr<RivalRecogniser> pixels_over_all_turns_recogniser() {
+  return std::make_unique<PixelRecogniser>();
+}
+std::unique_ptr<RivalRecogniser> patch_normalised_recogniser() {
+  return std::make_unique<PatchNormalisedRecogniser>();
+}
+
+}  // namespace panonav::lab

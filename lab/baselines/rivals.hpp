@@ -1,0 +1,48 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "panonav/core/image.hpp"
+#include "panonav/panorama/panorama.hpp"
+
+namespace panonav::lab {
+
+/// One view as the rivals may use it.
+struct RivalView {
+  Panorama panorama;
+  /// The same view as a picture, for rivals that use its colours or finer pixels; one grey pixel
+  /// where nobody asks for it.
+  Image picture{1, 1, 1};
+};
+
+/// A way of recognising places that [M04] argues against, as a small and honest baseline on the
+/// same views.
+class RivalRecogniser {
+ public:
+  virtual ~RivalRecogniser() = default;
+  [[nodiscard]] virtual std::string name() const = 0;
+  /// Called once with all reference views, of one shape.
+  virtual void memorise(const std::vector<RivalView>& references) = 0;
+  /// Index of the nearest reference view but for the one that is left out.
+  [[nodiscard]] virtual std::size_t nearest(const RivalView& query,
+                                            std::optional<std::size_t> left_out = {}) const = 0;
+  [[nodiscard]] virtual double bytes_per_view() const = 0;
+};
+
+[[nodiscard]] std::unique_ptr<RivalRecogniser> fourier_signature_recogniser(int components = 15);
+[[nodiscard]] std::unique_ptr<RivalRecogniser> grey_histogram_recogniser(int bins = 64);
+/// One histogram of RGB colours over the whole view, bins_per_channel^3 bins. Memorising throws
+/// ContractError on a view without colour.
+[[nodiscard]] std::unique_ptr<RivalRecogniser> colour_histogram_recogniser(
+    int bins_per_channel = 8);
+[[nodiscard]] std::unique_ptr<RivalRecogniser> eigenimage_recogniser(int dimensions = 15);
+[[nodiscard]] std::unique_ptr<RivalRecogniser> zero_phase_recogniser();
+[[nodiscard]] std::unique_ptr<RivalRecogniser> pixels_over_all_turns_recogniser();
+/// Sums of absolute differences over all turns between small views whose pixels are normalised by
+/// mean and deviation of the patch around them, as SeqSLAM does [Milford and Wyeth 2012].
+[[nodiscard]] std::unique_ptr<RivalRecogniser> patch_normalised_recogniser();
+
+}  // namespace panonav::lab

@@ -1,0 +1,371 @@
+// A place that changes day by day, with a memory that is kept true and with one that is not.
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "lab/elsewhere/experiments.hpp"
+#include "lab/rows.hpp"
+#include "lab/runs/tracking_run.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/core/text.hpp"
+#include "panonav/localisation/memory_update.hpp"
+#include "panonav/motion/odometry.hpp"
+#include "panonav/motion/path.hpp"
+#include "panonav/panorama/preprocessing.hpp"
+#include "panonav_simulation/changing_scene.hpp"
+#include "panonav_simulation/make_each.hpp"
+#include "panonav_simulation/worlds.hpp"
+
+namespace panonav::lab {
+
+namespace {
+
+constexpr double spacing_m = 0.5;
+constexpr int rows = 40;
+constexpr int columns = 256;
+constexpr double moved_share = 0.03;
+
+using FeatureMap = std::map<ViewId, std::optional<LocalFeatures>>;
+using Features = std::shared_ptr<const FeatureMap>;
+
+Features features_of(const simulation::PlaceRecording& place, const VisualMemory& memory) {
+  auto features = std::make_shared<FeatureMap>();
+  for (const ViewId view : memory.views()) {
+    const Point2 at = memory.info(view).pose->position();
+    (*features)[view] = extract_features(place.references[place.nearest_reference(at)].panorama);
+  }
+  return features;
+}
+
+/// A memory with all that localises in it and the features of its views.
+class RememberedPlace {
+ public:
+  RememberedPlace(VisualMemory memory, Features features)
+      : place_(std::move(memory), spacing_m),
+        features_(std::move(features)),
+        localiser_(place_.localiser()) {
+    const FeatureSource source = [kept = features_](ViewId view) { return kept->at(view); };
+    const NeighbourSupport support(*place_.ranking());
+    localiser_.use_features(source, try_features(*place_.ranking(), support, source).tell_more());
+  }
+  [[nodiscard]] Localisation localise(const Panorama& view) const {
+    return localiser_.localise(signature_for(view, place_.memory()), {}, features_of_query(view));
+  }
+  [[nodiscard]] const TrackingPlace& place() const noexcept { return place_; }
+  [[nodiscard]] const Features& features() const noexcept { return features_; }
+
+ private:
+  TrackingPlace place_;
+  Features features_;
+  Localiser localiser_;
+};
+
+/// A memory that is recorded again in a place as it is on that day.
+RememberedPlace recorded_again(simulation::PlaceRecording today, std::uint64_t seed,
+                               Executor& executor) {
+  std::vector<Pose2> grid;
+  for (const auto& point : today.free_space->grid(spacing_m)) {
+    grid.push_back({point.position.x_m, point.position.y_m, 0.0});
+  }
+  today.references = simulation::take_views(today, today.rendering, grid, seed, {}, executor);
+  VisualMemory memory = memory_of_references(today, executor);
+  const Features features = features_of(today, memory);
+  return {std::move(memory), features};
+}
+
+/// How a robot spends its days.
+enum class DailyDrive {
+  errands,  ///< from one random place to the next
+  rounds,   ///< to the places that it has passed longest ago, the nearest of them first
+};
+
+/// A robot that drives through a place day by day and takes a picture each spacing.
+class DrivingRobot {
+ public:
+  explicit DrivingRobot(DailyDrive drive) : drive_(drive) {}
+
+  /// The poses of the day's pictures; the day begins anywhere.
+  std::vector<Pose2> pass_day(const simulation::FreeSpace& space, int pictures, Random& random) {
+    ++day_;
+    std::vector<GridPosition> grid;
+    if (drive_ == DailyDrive::rounds) grid = space.grid(spacing_m);
+    std::vector<Pose2> path;
+    Point2 at = space.random_pose(random).position();
+    double left_m = 0.0;  // to the next picture
+    while (static_cast<int>(path.size()) < pictures) {
+      Point2 goal = space.random_pose(random).position();
+      if (drive_ == DailyDrive::rounds) {
+        goal = longest_ago(grid, at).value_or(goal);
+        passed_[square_of(goal)] = day_;
+      }
+      const auto way = space.shortest_path(at, goal);
+      if (!way) continue;
+      for (const Point2 next : *way) {
+        const double heading_rad = std::atan2(next.y_m - at.y_m, next.x_m - at.x_m);
+        double leg_m = distance(at, next);
+        while (leg_m >= left_m && static_cast<int>(path.size()) < pictures) {
+          at = {at.x_m + left_m * std::cos(heading_rad), at.y_m + left_m * std::sin(heading_rad)};
+          leg_m -= left_m;
+          path.push_back({at.x_m, at.y_m, heading_rad});
+          for (const GridPosition& place : grid) {
+            if (distance(place.position, at) <= spacing_m) {
+              passed_[square_of(place.position)] = day_;
+            }
+          }
+          left_m = spacing_m;
+        }
+        left_m -= leg_m;
+        at = next;
+      }
+    }
+    return path;
+  }
+
+ private:
+  using Square = std::pair<long, long>;
+  static Square square_of(Point2 p) {
+    return {std::lround(p.x_m / spacing_m), std::lround(p.y_m / spacing_m)};
+  }
+  /// Empty where the robot is at the only place that there is.
+  [[nodiscard]] std::optional<Point2> longest_ago(const std::vector<GridPosition>& grid,
+                                                  Point2 at) const {
+    std::optional<Point2> best;
+    std::pair<int, double> least;
+    for (const GridPosition& place : grid) {
+      const auto found = passed_.find(square_of(place.position));
+      const double distance_m = distance(place.position, at);
+      const std::pair rank(found == passed_.end() ? 0 : found->second, distance_m);
+      if (distance_m < 0.5 * spacing_m || (best && least <= rank)) continue;
+      best = place.position;
+      least = rank;
+    }
+    return best;
+  }
+
+  DailyDrive drive_;
+  int day_ = 0;
+  std::map<Square, int> passed_;  ///< the day
+};
+
+/// Known places, and of these positions within one spacing of the truth.
+struct DayAnswers {
+  std::size_t right = 0;
+  std::size_t wrong = 0;
+  std::vector<double> errors_m;
+};
+
+DayAnswers ask(const RememberedPlace& remembered, const std::vector<simulation::PlacedView>& views,
+               Executor& executor) {
+  const auto answers = simulation::make_each(executor, views.size(), [&](std::size_t i) {
+    return remembered.localise(views[i].panorama);
+  });
+  DayAnswers result;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (!answers[i].known || !answers[i].position) continue;
+    const double error_m = distance(answers[i].position->position, views[i].pose.position());
+    result.errors_m.push_back(error_m);
+    ++(error_m <= spacing_m ? result.right : result.wrong);
+  }
+  return result;
+}
+
+RunView run_view(const Pose2& odometry, const PackedSignature& signature,
+                 const Localisation& answer) {
+  RunView view{odometry, signature, answer.known_probability, std::nullopt, std::nullopt};
+  if (answer.position && answer.heading_rad) {
+    const Point2 at = answer.position->position;
+    view.pose = Pose2{at.x_m, at.y_m, *answer.heading_rad};
+    view.radius_m = answer.position->radius_m;
+  }
+  return view;
+}
+
+/// What a robot learns in the course of the days.
+class LearningRobot {
+ public:
+  LearningRobot(VisualMemory memory, Features features)
+      : memory_(std::move(memory)),
+        remembered_(std::make_unique<RememberedPlace>(memory_, std::move(features))) {}
+
+  [[nodiscard]] const RememberedPlace& remembered() const noexcept { return *remembered_; }
+  [[nodiscard]] std::size_t views() const noexcept { return memory_.size(); }
+  [[nodiscard]] std::size_t added() const noexcept { return errors_m_.size(); }
+  [[nodiscard]] std::size_t dropped() const noexcept { return dropped_; }
+  /// Of the poses with which views were learnt.
+  [[nodiscard]] const std::vector<double>& errors_m() const noexcept { return errors_m_; }
+
+  void learn(const std::vector<simulation::PlacedView>& seen, std::uint64_t seed,
+             Executor& executor) {
+    const auto answers = simulation::make_each(executor, seen.size(), [&](std::size_t i) {
+      return remembered_->localise(seen[i].panorama);
+    });
+    SimulatedOdometry odometry(OdometryNoise{}, seed);
+    MemoryUpdate update(*remembered_->place().ranking(), remembered_->place().model(), use_);
+    std::vector<PackedSignature> signatures;
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+      if (i > 0) odometry.advance(inverse(seen[i - 1].pose) * seen[i].pose);
+      signatures.push_back(signature_for(seen[i].panorama, memory_));
+      update.add(run_view(odometry.pose(), signatures.back(), answers[i]));
+    }
+    RunChanges changes = update.finish();
+    use_ = std::move(changes.use);
+    auto features = std::make_shared<FeatureMap>(*remembered_->features());
+    for (const auto* views : {&changes.replaced, &changes.forgotten}) {
+      for (const ViewId view : *views) memory_.remove(view);
+      dropped_ += views->size();
+    }
+    for (const auto& [number, pose] : changes.added) {
+      const std::string name = std::to_string(use_.runs) + "/" + std::to_string(number);
+      const ViewId view = memory_.append(signatures[number], {name, pose, std::nullopt});
+      (*features)[view] = extract_features(seen[number].panorama);
+      use_.views[view] = {.last_run = use_.runs, .learnt = true};
+      errors_m_.push_back(distance(pose.position(), seen[number].pose.position()));
+    }
+    use_.size = static_cast<int>(memory_.size());
+    if (changes.added.empty() && changes.replaced.empty() && changes.forgotten.empty()) return;
+    remembered_ = std::make_unique<RememberedPlace>(memory_, std::move(features));
+  }
+
+ private:
+  VisualMemory memory_;
+  std::unique_ptr<RememberedPlace> remembered_;
+  MemoryUse use_;
+  std::vector<double> errors_m_;
+  std::size_t dropped_ = 0;
+};
+
+}  // namespace
+
+void reproduce_days(const ElsewhereReproductionOptions& options, const std::string& name,
+                    Executor& executor, Reproduction& result) {
+  simulation::Scene first = simulation::scene_named(options.data, name, options.seed);
+  first.name = name;
+  simulation::ChangingScene changing(first, options.seed);
+  const simulation::PlaceRecording place = simulation::record_place(std::move(first),
+                                                                    {.seed = options.seed,
+                                                                     .spacing_m = spacing_m,
+                                                                     .queries = 1,
+                                                                     .rows = rows,
+                                                                     .columns = columns},
+                                                                    executor);
+  const VisualMemory memory = memory_of_references(place, executor);
+  const Features features = features_of(place, memory);
+  const RememberedPlace still(memory, features);
+  struct Robot {
+    std::string id;
+    std::string what;
+    DrivingRobot driving;
+    LearningRobot learning;
+    std::size_t max_views;
+    DayAnswers answers;
+    viewer::Series series;
+  };
+  std::vector<Robot> robots;
+  robots.push_back({".with",
+                    "learning on errands",
+                    DrivingRobot(DailyDrive::errands),
+                    LearningRobot(memory, features),
+                    memory.size(),
+                    {},
+                    {}});
+  robots.push_back({".rounds",
+                    "learning on rounds",
+                    DrivingRobot(DailyDrive::rounds),
+                    LearningRobot(memory, features),
+                    memory.size(),
+                    {},
+                    {}});
+  for (Robot& robot : robots) robot.series.label = robot.what;
+  Random light(options.seed, 91);
+  viewer::Series without_learning{.label = "without learning"};
+  DayAnswers without;
+  DayAnswers rerecorded;
+  const auto asked = static_cast<std::size_t>(3 * options.queries);
+  const int asked_every = std::max(1, options.days / 6);
+  for (int day = 1; day <= options.days; ++day) {
+    changing.pass_day(moved_share);
+    simulation::PlaceRecording today = place;
+    today.scene = changing.scene(light.uniform(0.6, 1.2));
+    today.renderer = std::make_shared<const simulation::Renderer>(
+        today.scene, simulation::RendererOptions{}, executor);
+    today.free_space = std::make_shared<const simulation::FreeSpace>(
+        today.scene, simulation::free_space_options(today.scene));
+    const std::uint64_t seed = options.seed * 1000003U + static_cast<std::uint64_t>(day) * 1000U;
+    if (day == 1 || day % asked_every == 0 || day == options.days) {
+      Random random(seed, 6);
+      std::vector<Pose2> poses;
+      for (std::size_t q = 0; q < asked; ++q) {
+        poses.push_back(today.free_space->random_pose(random));
+      }
+      const auto queries =
+          simulation::take_views(today, place.rendering, poses, seed + 500, {}, executor);
+      without = ask(still, queries, executor);
+      add_point(without_learning, day, success_rate(without.right, asked));
+      for (Robot& robot : robots) {
+        robot.answers = ask(robot.learning.remembered(), queries, executor);
+        add_point(robot.series, day, success_rate(robot.answers.right, asked));
+      }
+      if (day == options.days) {
+        rerecorded = ask(recorded_again(today, seed + 50'000, executor), queries, executor);
+      }
+    }
+    if (day == options.days) break;
+    for (Robot& robot : robots) {
+      Random driving(seed, 5);
+      const auto path = robot.driving.pass_day(*today.free_space, options.day_pictures, driving);
+      robot.learning.learn(simulation::take_views(today, place.rendering, path, seed, {}, executor),
+                           seed, executor);
+      robot.max_views = std::max(robot.max_views, robot.learning.views());
+    }
+  }
+  const std::string id = "elsewhere.days." + name;
+  const std::string what = name + ", day " + std::to_string(options.days) + ", " +
+                           std::to_string(changing.moved()) + " of " +
+                           std::to_string(changing.movable()) + " objects moved: ";
+  add_rate(result, id + ".without",
+           what + "single pictures localised within one spacing, without learning", without.right,
+           asked);
+  add_rate(result, id + ".rerecorded", what + "the same with a memory recorded again that day",
+           rerecorded.right, asked);
+  add_rate(result, id + ".wrong_without",
+           what + "answers farther off than one spacing, without learning", without.wrong, asked);
+  if (!without.errors_m.empty()) {
+    add_median(result, id + ".error_without", what + "error of positions, without learning", "m",
+               without.errors_m);
+  }
+  for (const Robot& robot : robots) {
+    const std::string row = id + robot.id;
+    const std::string which = what + robot.what + ", ";
+    add_rate(result, row, which + "localised within one spacing", robot.answers.right, asked,
+             at_least(0.98));
+    add_rate(result, row + ".wrong", which + "answers farther off than that", robot.answers.wrong,
+             asked);
+    if (!robot.answers.errors_m.empty()) {
+      add_median(result, row + ".error", which + "error of positions", "m", robot.answers.errors_m);
+    }
+    add_row(result, row + ".views",
+            which + "views of the memory, most on any day, over those at first",
+            static_cast<double>(robot.max_views) / static_cast<double>(memory.size()), "",
+            at_most(static_cast<double>(MemoryUpdateOptions{}.appearances)));
+    result.rows.back().over = std::to_string(memory.size()) + " at first, " +
+                              std::to_string(robot.learning.added()) + " learnt, " +
+                              std::to_string(robot.learning.dropped()) + " dropped";
+    if (robot.learning.added() > 0) {
+      const auto astray = static_cast<std::size_t>(std::ranges::count_if(
+          robot.learning.errors_m(), [](double error_m) { return error_m > spacing_m; }));
+      add_rate(result, row + ".astray", which + "views learnt farther off than one spacing", astray,
+               robot.learning.added(), at_most(0.0));
+    }
+  }
+  add_plot(result, options.out, "days_" + name + ".svg",
+           "Single pictures of " + name +
+               " that are localised within one spacing, while objects move and light changes.",
+           viewer::LinePlot{.x_label = "day",
+                            .y_label = "localised",
+                            .series = {robots[0].series, robots[1].series, without_learning}});
+}
+
+}  // namespace panonav::lab

@@ -1,0 +1,264 @@
+// Home vectors where there is a way home, and where there is none.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "lab/elsewhere/experiments.hpp"
+#include "lab/runs/homing_run.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/pipeline/homing_guide.hpp"
+#include "panonav_simulation/make_each.hpp"
+#include "panonav_simulation/worlds.hpp"
+
+namespace panonav::lab {
+
+namespace {
+
+constexpr double homing_radius_m = 1.5;
+constexpr double arrived_m = 0.1;
+
+/// An answer between two views, and how far the direction is off where there is a true one.
+struct HomeAnswered {
+  bool answered = false;
+  double off_rad = 0.0;
+  double probability = 0.0;
+};
+
+HomeAnswered ask_home(const Panorama& goal, const Panorama& current) {
+  const HomingGuide guide(Observation(goal), PictureSource{});
+  const WayHome way = guide.home(Observation(current));
+  return {way.direction_rad.has_value(), way.direction_rad.value_or(0.0), way.probability};
+}
+
+/// How far `direction_rad`, in the frame of a robot at `from`, is from the direction of `to`.
+double off_rad(double direction_rad, const Pose2& from, const Pose2& to) {
+  const double truth = std::atan2(to.y_m - from.y_m, to.x_m - from.x_m);
+  return std::abs(angle_difference(direction_rad + from.heading_rad, truth));
+}
+
+HomeAnswered ask_home(const simulation::PlacedView& goal, const simulation::PlacedView& current) {
+  HomeAnswered answer = ask_home(goal.panorama, current.panorama);
+  answer.off_rad = off_rad(answer.off_rad, current.pose, goal.pose);
+  return answer;
+}
+
+/// Neighbouring pixels alike, as in pictures: white noise smoothed along columns.
+Panorama noise(int rows, int columns, int smoothed, std::uint64_t seed) {
+  Random random(seed, 5);
+  Panorama view(rows, columns, ElevationBand{radians(-30.0), radians(40.0)});
+  std::vector<double> line(static_cast<std::size_t>(columns));
+  for (int y = 0; y < rows; ++y) {
+    for (double& value : line) value = random.uniform(0.0, 1.0);
+    for (int c = 0; c < columns; ++c) {
+      double sum = 0.0;
+      for (int i = 0; i < smoothed; ++i) {
+        sum += line[static_cast<std::size_t>((c + i) % columns)];
+      }
+      view.at(y, c) = static_cast<float>(sum / smoothed);
+    }
+  }
+  return view;
+}
+
+std::vector<const simulation::PlacedView*> views_of(const simulation::PlaceRecording& place) {
+  std::vector<const simulation::PlacedView*> views;
+  for (const simulation::PlacedView& view : place.references) views.push_back(&view);
+  for (const simulation::PlacedView& view : place.queries) views.push_back(&view);
+  return views;
+}
+
+/// What was measured of the runs that do not come home, beside how many level robots do.
+std::string ends_elsewhere(const std::vector<HomingRun>& runs, std::size_t level_home) {
+  std::size_t others = 0;
+  std::size_t away = 0;
+  std::size_t alike = 0;
+  std::size_t wrongly = 0;
+  for (const HomingRun& run : runs) {
+    if (run.succeeds(arrived_m)) continue;
+    ++others;
+    const double first_rad = run.vectors.front().direction_rad();
+    away += off_rad(first_rad, run.path.front(), run.goal) > radians(90.0) ? 1 : 0;
+    alike += run.end_difference < run.start_difference ? 1 : 0;
+    wrongly += run.end == HomingRunEnd::arrived ? 1 : 0;
+  }
+  return "a level robot comes home in " + std::to_string(level_home) + " of these " +
+         std::to_string(runs.size()) + " runs; of the " + std::to_string(others) +
+         " that do not come home, " + std::to_string(away) +
+         " begin with a vector that points away from home, " + std::to_string(alike) +
+         " end where the view is more like that of home than at the start, and " +
+         std::to_string(wrongly) + " say that they arrived";
+}
+
+void add_answers(Reproduction& result, const std::string& id, const std::string& what,
+                 std::span<const HomeAnswered> answers, std::optional<Target> target) {
+  add_rate(result, id, what,
+           static_cast<std::size_t>(std::ranges::count_if(answers, &HomeAnswered::answered)),
+           answers.size(), target);
+}
+
+}  // namespace
+
+void reproduce_home_vectors(const ElsewhereReproductionOptions& options,
+                            const std::vector<RecordedGround>& grounds, Executor& executor,
+                            Reproduction& result) {
+  Random random(options.seed, 11);
+  const auto any = [&random](const std::vector<const simulation::PlacedView*>& views) {
+    return views[random.index(views.size())];
+  };
+  const auto pairs = static_cast<std::size_t>(options.queries);
+  struct Range {
+    std::string id;
+    double low_m;
+    double high_m;
+  };
+  const std::array<Range, 3> ranges{
+      Range{"0_1m", 0.1, 1.0}, {"1_3m", 1.0, 3.0}, {"3_6m", 3.0, 6.0}};
+  std::size_t sure = 0;  // of all ranges
+  std::size_t surely_right = 0;
+  for (const Range& range : ranges) {
+    std::vector<std::pair<const simulation::PlacedView*, const simulation::PlacedView*>> asked;
+    std::vector<const RecordedGround*> ground_of;
+    for (const RecordedGround& ground : grounds) {
+      const auto& place = ground.variants.front();
+      const auto views = views_of(place);
+      std::size_t tries = 0;
+      for (std::size_t found = 0; found < pairs && tries < 200 * pairs; ++tries) {
+        const simulation::PlacedView* goal = any(views);
+        const simulation::PlacedView* current = any(views);
+        const double far_m = distance(goal->pose.position(), current->pose.position());
+        if (far_m < range.low_m || far_m >= range.high_m) continue;
+        // What a wall hides is another place.
+        if (!place.free_space->is_free_between(goal->pose.position(), current->pose.position())) {
+          continue;
+        }
+        asked.emplace_back(goal, current);
+        ground_of.push_back(&ground);
+        ++found;
+      }
+    }
+    const auto answers = simulation::make_each(executor, asked.size(), [&](std::size_t i) {
+      return ask_home(*asked[i].first, *asked[i].second);
+    });
+    const auto answered =
+        static_cast<std::size_t>(std::ranges::count_if(answers, &HomeAnswered::answered));
+    std::size_t off = 0;
+    std::map<std::string, std::size_t> off_in;
+    for (std::size_t i = 0; i < answers.size(); ++i) {
+      if (answers[i].answered && answers[i].probability >= 0.9) {
+        ++sure;
+        surely_right += answers[i].off_rad <= radians(45.0) ? 1 : 0;
+      }
+      if (!answers[i].answered || answers[i].off_rad <= radians(45.0)) continue;
+      ++off;
+      ++off_in[ground_of[i]->name];
+    }
+    const std::string id = "elsewhere.home." + range.id;
+    const std::string what = "views " + centimetres(range.low_m) + " to " +
+                             centimetres(range.high_m) + " apart, the straight way free: ";
+    add_answers(result, id + ".answered", what + "home vectors with a direction", answers,
+                std::nullopt);
+    if (answered > 0) {
+      add_rate(result, id + ".off", what + "of these, off by more than 45 degrees", off, answered,
+               at_most(0.05));
+      std::string& reason = result.rows.back().reason;
+      for (const auto& [name, count] : off_in) {
+        reason +=
+            (reason.empty() ? "by scene or world: " : ", ") + name + " " + std::to_string(count);
+      }
+    }
+  }
+
+  if (sure > 0) {
+    add_rate(
+        result, "elsewhere.home.probability",
+        "views 10 cm to 600 cm apart: of home vectors with a probability of 0.9 and more, within "
+        "45 degrees",
+        surely_right, sure, at_least(0.9));
+  }
+
+  std::vector<std::pair<const simulation::PlacedView*, const simulation::PlacedView*>> foreign;
+  for (const RecordedGround& a : grounds) {
+    for (const RecordedGround& b : grounds) {
+      if (&a == &b) continue;
+      const auto goals = views_of(a.variants.front());
+      const auto currents = views_of(b.variants.front());
+      for (std::size_t i = 0; i < pairs; i += 4) foreign.emplace_back(any(goals), any(currents));
+    }
+  }
+  if (!foreign.empty()) {
+    add_answers(result, "elsewhere.home.foreign",
+                "views of two scenes or worlds: home vectors with a direction",
+                simulation::make_each(executor, foreign.size(),
+                                      [&](std::size_t i) {
+                                        return ask_home(foreign[i].first->panorama,
+                                                        foreign[i].second->panorama);
+                                      }),
+                at_most(0.02));
+  }
+  const simulation::PlacedView& some = grounds.front().variants.front().references.front();
+  const int rows = some.panorama.rows();
+  const int columns = some.panorama.columns();
+  for (const int smoothed : {1, 16}) {
+    add_answers(result, "elsewhere.home.noise_" + std::to_string(smoothed),
+                "noise" +
+                    (smoothed > 1 ? " smoothed over " + std::to_string(smoothed) + " columns"
+                                  : std::string()) +
+                    ": home vectors with a direction",
+                simulation::make_each(executor, pairs,
+                                      [&](std::size_t i) {
+                                        return ask_home(noise(rows, columns, smoothed, 2 * i),
+                                                        noise(rows, columns, smoothed, 2 * i + 1));
+                                      }),
+                at_most(0.02));
+  }
+}
+
+void reproduce_tilted_homing(const ElsewhereReproductionOptions& options, Executor& executor,
+                             Reproduction& result) {
+  for (const std::string& name : elsewhere_grounds(options)) {
+    HomingPlace place =
+        make_homing_place(simulation::scene_named(options.data, name, options.seed), {}, executor);
+    const auto tasks = random_homing_tasks(place, options.runs, homing_radius_m, options.seed);
+    struct Condition {
+      int tilt_deg;
+      bool measured;
+      std::optional<Target> target;
+    };
+    std::size_t level_home = 0;
+    for (const auto& [tilt_deg, measured, target] : {Condition{0, false, std::nullopt},
+                                                     {3, true, at_least(0.95)},
+                                                     {6, true, at_least(0.9)},
+                                                     {3, false, at_least(0.9)},
+                                                     {6, false, std::nullopt}}) {
+      place.camera.frame.tilt_rad = radians(tilt_deg);
+      place.camera.levelled = measured;
+      const auto runs = run_home(place, tasks, {}, options.seed, executor);
+      const auto home = static_cast<std::size_t>(std::ranges::count_if(
+          runs, [](const HomingRun& run) { return run.succeeds(arrived_m); }));
+      if (tilt_deg == 0) level_home = home;
+      std::string how = "level robot";
+      if (tilt_deg > 0) {
+        how = "tilt of " + std::to_string(tilt_deg) +
+              " degrees in a random direction at each view, " + (measured ? "" : "not ") +
+              "measured";
+      }
+      add_rate(
+          result,
+          "elsewhere.tilt." + name + "." + std::to_string(tilt_deg) + (measured ? "_measured" : ""),
+          name + ", starts within " + centimetres(homing_radius_m) + ", " + how + ": home within " +
+              centimetres(arrived_m),
+          home, runs.size(), target);
+      result.rows.back().reason = ends_elsewhere(runs, level_home);
+    }
+  }
+}
+
+}  // namespace panonav::lab

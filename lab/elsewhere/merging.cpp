@@ -1,0 +1,190 @@
+// Memories of two sessions made into one: of one place, and of two that have nothing in common.
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "lab/elsewhere/experiments.hpp"
+#include "lab/rows.hpp"
+#include "panonav/geometry/alignment.hpp"
+#include "panonav/motion/odometry.hpp"
+#include "panonav/pipeline/mapper.hpp"
+#include "panonav/pipeline/memoriser.hpp"
+#include "panonav/pipeline/memory_merge.hpp"
+#include "panonav_simulation/make_each.hpp"
+#include "panonav_simulation/mapping_run.hpp"
+#include "panonav_simulation/recording.hpp"
+#include "panonav_simulation/worlds.hpp"
+
+namespace panonav::lab {
+
+namespace {
+
+constexpr double walk_spacing_m = 0.1;
+constexpr double beside_m = 0.5;        // views so near to each other show one place
+constexpr double shared_much = 0.13;    // of a walk beside the other: they have places in common
+constexpr double shared_hardly = 0.02;  // they have as good as none
+constexpr double wrong_rms_m = 2.0;     // a map that is joined rightly is off by the drift of both
+constexpr std::size_t first_views = 100;  // of which a new memory's scale is learnt
+
+/// A random walk with its memory, whose map the robot made itself: noisy odometry, no positions.
+struct Session {
+  std::filesystem::path memory;
+  std::map<std::string, Point2> truth;  ///< by the names of its views
+  [[nodiscard]] double share_beside(const Session& other) const {
+    const auto beside = std::ranges::count_if(truth, [&](const auto& view) {
+      return std::ranges::any_of(other.truth, [&](const auto& one) {
+        return distance(one.second, view.second) <= beside_m;
+      });
+    });
+    return static_cast<double>(beside) / static_cast<double>(truth.size());
+  }
+};
+
+Session walk_through(const simulation::PlaceRecording& place, const std::string& name, int pictures,
+                     const std::filesystem::path& folder, std::uint64_t seed, Executor& executor) {
+  const auto planned = simulation::plan_recording(place.scene, *place.free_space,
+                                                  {.path = simulation::RecordingPath::walk,
+                                                   .heading = simulation::RecordingHeading::path,
+                                                   .spacing_m = walk_spacing_m,
+                                                   .poses = pictures},
+                                                  OdometryNoise{}, seed);
+  Session session{folder / (name + ".panonav"), {}};
+  std::filesystem::remove(session.memory);
+  auto seen = simulation::make_each(executor, planned.size(), [&](std::size_t i) {
+    Observation observation(simulation::take_view(place, planned[i].pose, seed * 1'000'003U + i));
+    observation.name = name + " " + std::to_string(i);
+    observation.odometry = planned[i].odometry;
+    return observation;
+  });
+  for (std::size_t i = 0; i < planned.size(); ++i) {
+    session.truth[seen[i].name] = planned[i].pose.position();
+  }
+  const std::span<const Observation> first(seen.data(), std::min(first_views, seen.size()));
+  PictureSource source;
+  source.layout.elevations = std::get<Panorama>(seen.front().picture).elevations();
+  Mapper mapper(
+      MemoryFile::create(session.memory, header_from_first(first, source, {}, {}, executor)),
+      source, {.thumbnails = false});
+  const auto encoded = simulation::make_each(executor, seen.size(),
+                                             [&](std::size_t i) { return mapper.encode(seen[i]); });
+  for (const Mapper::EncodedView& view : encoded) mapper.add(view);
+  (void)mapper.finish();
+  return session;
+}
+
+/// What became of two sessions; the map's errors where they were joined.
+struct Joined {
+  double shape_difference = 1.0;
+  double rms_m = 0.0;
+};
+std::optional<Joined> join(const Session& first, const Session& second,
+                           const std::filesystem::path& folder) {
+  const std::filesystem::path both = folder / "both.panonav";
+  std::filesystem::remove(both);
+  std::optional<Joined> joined;
+  const MergedMemory merged = merge_memories(first.memory, second.memory, both);
+  if (merged.alignment) {
+    const MemoryFile file = MemoryFile::open(both, Access::read_only);
+    const TopologicalMap map = file.map(map_name).value();
+    const VisualMemory memory = file.load();
+    const std::size_t largest = largest_component(map);
+    std::vector<Point2> estimate;
+    std::vector<Point2> truth;
+    for (const MapNode& node : map.nodes) {
+      if (node.component != largest) continue;
+      const std::string& name = memory.info(node.view).name;
+      estimate.push_back(node.pose.position());
+      const auto known = first.truth.find(name);
+      truth.push_back(known != first.truth.end() ? known->second : second.truth.at(name));
+    }
+    joined = {simulation::shape_error(estimate, truth), align(estimate, truth).rms_m};
+  }
+  std::filesystem::remove(both);
+  return joined;
+}
+
+}  // namespace
+
+void reproduce_merging(const ElsewhereReproductionOptions& options, Executor& executor,
+                       Reproduction& result) {
+  const std::filesystem::path folder = options.out / "merged";
+  std::filesystem::create_directories(folder);
+  std::map<std::string, std::vector<Session>> sessions;
+  for (const char* const name : {"loop", "small_warehouse", "small_house"}) {
+    if (!simulation::has_scene(options.data, name)) continue;
+    const simulation::PlaceRecording place = simulation::empty_place(
+        simulation::scene_named(options.data, name, options.seed), options.seed, 512, executor);
+    for (int i = 0; i < options.walks; ++i) {
+      sessions[name].push_back(
+          walk_through(place, std::string(name) + "_" + std::to_string(i), options.walk_pictures,
+                       folder, options.seed + 100U + static_cast<std::uint64_t>(i), executor));
+    }
+  }
+  for (const auto& [name, walks] : sessions) {
+    struct Pairs {
+      std::size_t all = 0;
+      std::size_t joined = 0;
+    };
+    Pairs sharing;
+    Pairs between;
+    Pairs apart;
+    std::size_t wrong = 0;
+    double worst_shape = 0.0;
+    for (std::size_t i = 0; i < walks.size(); ++i) {
+      const Session& first = walks[i];
+      const Session& second = walks[(i + 1) % walks.size()];
+      const double share = std::max(first.share_beside(second), second.share_beside(first));
+      const auto found = join(first, second, folder);
+      Pairs& alike = share >= shared_much ? sharing : share < shared_hardly ? apart : between;
+      ++alike.all;
+      if (!found) continue;
+      ++alike.joined;
+      if (found->rms_m > wrong_rms_m) ++wrong;
+      worst_shape = std::max(worst_shape, found->shape_difference);
+    }
+    const std::string id = "elsewhere.merge." + name;
+    const std::string what = "memories of two walks through " + name + " ";
+    if (sharing.all > 0) {
+      add_rate(result, id + ".joined", what + "that share 13 % of the way or more: joined",
+               sharing.joined, sharing.all, at_least(0.95));
+    }
+    if (const auto joined = sharing.joined + between.joined + apart.joined; joined > 0) {
+      add_rate(result, id + ".wrong", what + "that were joined: off by more than 2 m rms", wrong,
+               joined, at_most(0.0));
+      add_row(result, id + ".shape", what + "that were joined: shape difference of the worst map",
+              worst_shape, "", at_most(0.02));
+    }
+    if (between.all > 0) {
+      add_rate(result, id + ".between", what + "that share 2 to 13 % of the way: joined",
+               between.joined, between.all);
+    }
+    if (apart.all > 0) {
+      add_rate(result, id + ".apart", what + "that share less than 2 % of the way: joined",
+               apart.joined, apart.all);
+    }
+  }
+  std::size_t pairs = 0;
+  std::size_t joined = 0;
+  for (auto one = sessions.begin(); one != sessions.end(); ++one) {
+    for (auto other = std::next(one); other != sessions.end(); ++other) {
+      for (std::size_t i = 0; i < one->second.size(); ++i) {
+        ++pairs;
+        if (join(one->second[i], other->second[i], folder)) ++joined;
+      }
+    }
+  }
+  if (pairs > 0) {
+    add_rate(result, "elsewhere.merge.disjoint", "memories of walks through two places: joined",
+             joined, pairs, at_most(0.0));
+  }
+  std::filesystem::remove_all(folder);
+}
+
+}  // namespace panonav::lab

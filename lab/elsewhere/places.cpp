@@ -1,0 +1,193 @@
+// Own places, foreign places, and the radius and covariance that are stated.
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <utility>
+
+#include "lab/elsewhere/experiments.hpp"
+#include "lab/runs/place_experiment.hpp"
+#include "lab/runs/tracking_filter.hpp"
+#include "panonav/core/statistics.hpp"
+#include "panonav/core/text.hpp"
+#include "panonav_simulation/make_each.hpp"
+#include "panonav_simulation/scenes.hpp"
+#include "panonav_simulation/worlds.hpp"
+
+namespace panonav::lab {
+
+namespace {
+
+constexpr int columns = 256;
+constexpr double spacing_m = 0.5;
+
+std::string ground_of(const std::string& place) {
+  return place.substr(0, place.rfind(' '));
+}
+
+/// Rates of the same kind over several places.
+struct Rates {
+  std::size_t successes = 0;
+  std::size_t trials = 0;
+  std::vector<double> each;
+  std::map<std::string, double> named;
+
+  void add(const std::string& name, const Proportion& rate, std::size_t count) {
+    trials += count;
+    successes += static_cast<std::size_t>(rate.value * static_cast<double>(count) + 0.5);
+    each.push_back(rate.value);
+    named[name] = rate.value;
+  }
+  [[nodiscard]] std::string extreme(bool highest) const {
+    const auto by_value = [](const auto& a, const auto& b) { return a.second < b.second; };
+    const auto found = highest ? std::ranges::max_element(named, by_value)
+                               : std::ranges::min_element(named, by_value);
+    if (found == named.end()) return {};
+    const auto percent = static_cast<int>(100.0 * found->second + 0.5);
+    return (highest ? "the highest is " : "the lowest is ") + std::to_string(percent) + " %, of " +
+           found->first;
+  }
+};
+
+/// The median over the variants, with the interval of all together.
+void add_rates(Reproduction& result, const std::string& id, const std::string& what,
+               const Rates& rates, Target target) {
+  const Proportion all = success_rate(rates.successes, rates.trials);
+  ResultRow& row =
+      add_row(result, id, what, {median(rates.each), std::pair{all.low, all.high}}, "", target);
+  row.over = "median of " + std::to_string(rates.each.size()) + ", of " +
+             std::to_string(rates.trials) + " places in all; " + rates.extreme(false);
+}
+
+}  // namespace
+
+std::vector<std::string> elsewhere_grounds(const ElsewhereReproductionOptions& options) {
+  std::vector<std::string> names(options.built_in.begin(), options.built_in.end());
+  for (const std::string& world : simulation::all_worlds_in(options.data)) names.push_back(world);
+  return names;
+}
+
+RecordedGround record_ground(const ElsewhereReproductionOptions& options, const std::string& name,
+                             Executor& executor) {
+  RecordedGround ground{.name = name};
+  ground.built_in =
+      std::ranges::find(simulation::scene_names(), name) != simulation::scene_names().end();
+  for (int i = 0; i < (ground.built_in ? options.scenes : 1); ++i) {
+    const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
+    simulation::Scene scene = simulation::scene_named(options.data, name, seed);
+    scene.name = name;
+    ground.variants.push_back(simulation::record_place(std::move(scene),
+                                                       {.seed = seed,
+                                                        .spacing_m = spacing_m,
+                                                        .queries = options.queries,
+                                                        .rows = options.rows,
+                                                        .columns = columns},
+                                                       executor));
+  }
+  return ground;
+}
+
+void reproduce_known_places(const ElsewhereReproductionOptions& options,
+                            const std::vector<RecordedGround>& grounds, Executor& executor,
+                            Reproduction& result) {
+  const auto asked = static_cast<std::size_t>(options.queries);
+  const auto all_conditions = place_conditions();
+  const std::vector<PlaceCondition> conditions(all_conditions.begin(), all_conditions.begin() + 2);
+  const std::array<std::string, 2> ids{"clean", "hard"};
+  const std::array<double, 2> targets{0.97, 0.93};
+  std::vector<const simulation::PlaceRecording*> places;
+  for (const RecordedGround& ground : grounds) {
+    std::array<Rates, 2> known;
+    std::array<Rates, 2> near;
+    Rates inside;
+    for (const simulation::PlaceRecording& place : ground.variants) {
+      places.push_back(&place);
+      const std::string name = ground.name + " " + std::to_string(place.seed);
+      const auto measured = run_place_experiment(place, conditions, executor);
+      for (std::size_t c = 0; c < conditions.size(); ++c) {
+        known[c].add(name, measured[c].known, asked);
+        near[c].add(name, measured[c].nearest_or_next, asked);
+      }
+      inside.add(name, measured[0].inside, asked);
+    }
+    for (std::size_t c = 0; c < conditions.size(); ++c) {
+      const std::string id = "elsewhere.places." + ground.name + "." + ids[c];
+      const std::string where =
+          ground.name + ", references every " + centimetres(spacing_m) + ", " + conditions[c].name;
+      add_rates(result, id + ".known", where + ": own places known", known[c],
+                at_least(targets[c]));
+      add_rates(result, id + ".near",
+                where + ": the best match is the nearest reference or beside it", near[c],
+                at_least(0.9));
+    }
+    const std::string id = "elsewhere.places." + ground.name + ".radius";
+    const std::string what = ground.name + ": positions within the stated 95 % radius";
+    add_rates(result, id, what, inside, at_least(0.9));
+    add_rates(result, id + "_not_too_wide", what + " (more: wider than need be)", inside,
+              at_most(0.98));
+  }
+
+  Rates other;
+  Rates variant;
+  for (const RecognitionRate& rate : recognition_rates(places, executor)) {
+    if (rate.memory == rate.queries) continue;
+    const std::string name = rate.queries + " in " + rate.memory;
+    (ground_of(rate.memory) == ground_of(rate.queries) ? variant : other)
+        .add(name, rate.known, asked);
+  }
+  const auto add_foreign = [&](const std::string& id, const std::string& what, const Rates& rates,
+                               double most) {
+    if (rates.trials == 0) return;
+    add_rate(result, "elsewhere.places." + id, what, rates.successes, rates.trials, at_most(most));
+    result.rows.back().over += "; " + rates.extreme(true);
+  };
+  add_foreign("other", "places of other scenes and worlds taken for own", other, 0.01);
+  add_foreign("variant", "places of another variant of the same scene taken for own", variant,
+              0.05);
+}
+
+void reproduce_tracked_poses(const ElsewhereReproductionOptions& options,
+                             const std::vector<RecordedGround>& grounds, Executor& executor,
+                             Reproduction& result) {
+  // Of chi squared with two degrees of freedom.
+  constexpr double quantile_95 = 5.991;
+  constexpr double quantile_50 = 1.386;
+  for (const RecordedGround& ground : grounds) {
+    const simulation::PlaceRecording& place = ground.variants.front();
+    const auto remembered = remember_for_tracking(place, executor);
+    const auto walks = record_walks(
+        place, *remembered, clean_condition(),
+        {.variants = 1, .runs_each = std::max(1, options.runs / 2), .seed = options.seed},
+        executor);
+    const auto squares = simulation::make_each(executor, walks.size(), [&](std::size_t i) {
+      std::vector<double> found;
+      const auto observe = [&](std::size_t step, const MonteCarloLocaliser&,
+                               const MonteCarloEstimate& estimate) {
+        const TrackingStep& there = walks[i].steps[step];
+        if (estimate.state != LocalisationState::localised || !there.view) return;
+        const PoseMode& mode = estimate.modes.front();
+        const auto& c = mode.covariance;  // of three rows
+        const double x_m = there.truth.x_m - mode.mean.x_m;
+        const double y_m = there.truth.y_m - mode.mean.y_m;
+        found.push_back((c[4] * x_m * x_m - 2.0 * c[1] * x_m * y_m + c[0] * y_m * y_m) /
+                        (c[0] * c[4] - c[1] * c[1]));
+      };
+      static_cast<void>(track_run(*remembered, walks[i], {}, options.seed + i, observe));
+      return found;
+    });
+    std::vector<double> all;
+    for (const auto& some : squares) all.insert(all.end(), some.begin(), some.end());
+    if (all.empty()) continue;
+    const auto inside = static_cast<std::size_t>(
+        std::ranges::count_if(all, [](double square) { return square <= quantile_95; }));
+    const std::string id = "elsewhere.tracks." + ground.name;
+    add_rate(result, id + ".ellipse",
+             ground.name + ", walks: tracked poses within the 95 % ellipse of their covariance",
+             inside, all.size(), at_least(0.9));
+    result.rows.back().over += "; the median squared error is " +
+                               fixed(median(all) / quantile_50, 2) +
+                               " times that of a Gaussian with this covariance";
+  }
+}
+
+}  // namespace panonav::lab

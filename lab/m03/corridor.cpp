@@ -1,0 +1,242 @@
+// What [M03] section 4.1 announces: a long corridor with a loop, identical doors and junctions.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "lab/m03/experiments.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/core/statistics.hpp"
+#include "panonav/motion/path.hpp"
+#include "panonav_viewer/surroundings.hpp"
+
+namespace panonav::lab {
+
+namespace {
+
+constexpr std::uint64_t seed_of_corridor = 70'000;
+constexpr int max_images = 64;  // 16 m: more than lies between two distinct things of the ring
+constexpr std::size_t images_after = 10;
+constexpr double right_m = 0.5;
+
+// Half a period of the highest of 15 components: what covers less has hardly a part in them.
+constexpr int distinct_degrees = 13;
+
+struct Box {
+  simulation::Vector3 low{1e9, 1e9, 1e9};
+  simulation::Vector3 high{-1e9, -1e9, -1e9};
+  [[nodiscard]] bool holds(const simulation::Vector3& p) const {
+    constexpr double margin = 0.02;
+    return p.x_m >= low.x_m - margin && p.x_m <= high.x_m + margin && p.y_m >= low.y_m - margin &&
+           p.y_m <= high.y_m + margin && p.z_m >= low.z_m - margin && p.z_m <= high.z_m + margin;
+  }
+};
+
+/// The things that stand only once in the corridor.
+std::vector<Box> distinct_things(const simulation::Scene& scene) {
+  std::vector<Box> boxes;
+  for (const std::string_view name : {"window", "notice board", "plant"}) {
+    Box box;
+    for (const simulation::Mesh& mesh : scene.meshes) {
+      if (!std::string_view(mesh.object).starts_with(name)) continue;
+      for (const simulation::Vector3& v : mesh.vertices) {
+        box.low = {std::min(box.low.x_m, v.x_m), std::min(box.low.y_m, v.y_m),
+                   std::min(box.low.z_m, v.z_m)};
+        box.high = {std::max(box.high.x_m, v.x_m), std::max(box.high.y_m, v.y_m),
+                    std::max(box.high.z_m, v.z_m)};
+      }
+    }
+    if (box.low.x_m <= box.high.x_m) boxes.push_back(box);
+  }
+  return boxes;
+}
+
+/// Whether one of the things covers enough of what is seen from here.
+bool is_distinct(const simulation::PlaceRecording& place, std::span<const Box> things, Point2 at) {
+  const simulation::Vector3 eye{at.x_m, at.y_m, place.scene.camera_height_m};
+  std::vector<int> covered(things.size());
+  for (int azimuth = 0; azimuth < 360; ++azimuth) {
+    std::vector<bool> seen(things.size());
+    for (int elevation = -25; elevation <= 35; elevation += 10) {
+      const Direction3 ray = Direction3::from_angles(radians(azimuth), radians(elevation));
+      const double way = place.renderer->distance_along(eye, ray);
+      if (!std::isfinite(way)) continue;
+      const simulation::Vector3 hit{eye.x_m + way * ray.x, eye.y_m + way * ray.y,
+                                    eye.z_m + way * ray.z};
+      for (std::size_t t = 0; t < things.size(); ++t) {
+        if (things[t].holds(hit)) seen[t] = true;
+      }
+    }
+    for (std::size_t t = 0; t < things.size(); ++t) covered[t] += seen[t] ? 1 : 0;
+  }
+  return std::ranges::any_of(covered, [](int degrees) { return degrees >= distinct_degrees; });
+}
+
+/// Along the ring, from anywhere, in either direction, up to 0.3 m beside the middle.
+std::vector<Pose2> drive_around(const simulation::Scene& scene, Random& random) {
+  const double aside = random.uniform(-0.3, 0.3);
+  const bool backwards = random.index(2) == 1;
+  Point2 middle;
+  for (const Point2 p : scene.tour) {
+    middle.x_m += p.x_m / static_cast<double>(scene.tour.size());
+    middle.y_m += p.y_m / static_cast<double>(scene.tour.size());
+  }
+  std::vector<Point2> ring;
+  for (const Point2 p : scene.tour) {
+    ring.push_back({p.x_m + (middle.x_m > p.x_m ? aside : -aside),
+                    p.y_m + (middle.y_m > p.y_m ? aside : -aside)});
+  }
+  if (backwards) std::ranges::reverse(ring);
+  std::vector<Pose2> way;
+  for (std::size_t i = 0; i <= 2 * ring.size(); ++i) {
+    const Point2 p = ring[i % ring.size()];
+    way.push_back({p.x_m, p.y_m, 0.0});
+  }
+  const auto dense = resample(way, 0.01);
+  const auto lap = dense.size() / 2;
+  const auto start = static_cast<std::size_t>(random.index(lap));
+  std::vector<Pose2> poses;
+  for (int i = 0; i < max_images; ++i) {
+    const std::size_t at = start + 25 * static_cast<std::size_t>(i);
+    if (at + 1 >= dense.size()) break;
+    Pose2 pose = dense[at];
+    pose.heading_rad =
+        wrap_angle(std::atan2(dense[at + 1].y_m - pose.y_m, dense[at + 1].x_m - pose.x_m));
+    poses.push_back(pose);
+  }
+  return poses;
+}
+
+struct CorridorRuns {
+  std::vector<RunSet> sets;
+  std::vector<std::optional<std::size_t>> first_distinct;  ///< step of each run
+  std::vector<viewer::MapLayer> things;                    ///< of the first scene
+};
+
+CorridorRuns record_corridors(const TrackingReproductionOptions& options, Executor& executor) {
+  CorridorRuns corridors;
+  const int scenes = std::max(1, (options.scenes + 1) / 2);
+  const int runs_each = 2 * options.variants * options.runs;
+  for (int s = 0; s < scenes; ++s) {
+    const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(s);
+    const simulation::PlaceRecording place =
+        simulation::record_place({.scene = "corridor",
+                                  .seed = seed,
+                                  .spacing_m = m03_spacing_m,
+                                  .queries = 1,
+                                  .rows = options.rows,
+                                  .columns = options.columns / 2},
+                                 executor);
+    const auto remembered = remember_for_tracking(place, executor);
+    const auto things = distinct_things(place.scene);
+    std::vector<std::vector<Pose2>> ways(static_cast<std::size_t>(runs_each));
+    std::vector<std::optional<std::size_t>> first(ways.size());
+    executor.for_chunks(ways.size(), 1, [&](std::size_t r, std::size_t, std::size_t) {
+      Random random(seed * 1000003U + 70U, r);
+      ways[r] = drive_around(place.scene, random);
+      for (std::size_t i = 0; i < ways[r].size(); ++i) {
+        if (!is_distinct(place, things, ways[r][i].position())) continue;
+        first[r] = i;
+        ways[r].resize(std::min(ways[r].size(), i + images_after));
+        break;
+      }
+    });
+    corridors.first_distinct.insert(corridors.first_distinct.end(), first.begin(), first.end());
+    corridors.sets.push_back(make_run_set(
+        remembered,
+        record_along(ways, place, *place.renderer, *remembered, {}, seed * 100003U, executor),
+        executor));
+    if (s == 0) {
+      viewer::MapLayer layer{.label = "stands only once", .colour = viewer::PlotColour::green};
+      for (const Box& box : things) {
+        layer.crosses.push_back(
+            {0.5 * (box.low.x_m + box.high.x_m), 0.5 * (box.low.y_m + box.high.y_m)});
+      }
+      corridors.things = viewer::scene_layers(place.scene);
+      corridors.things.push_back(layer);
+    }
+  }
+  return corridors;
+}
+
+}  // namespace
+
+void reproduce_corridor(const TrackingReproductionOptions& options, Executor& executor,
+                        Reproduction& result) {
+  const CorridorRuns corridors = record_corridors(options, executor);
+  FilterSetting setting;
+  const auto runs = track_sets(corridors.sets, setting, seed_of_corridor, executor);
+  std::size_t before = 0;
+  std::size_t kept = 0;
+  std::size_t sure_before = 0;
+  std::size_t reached = 0;
+  std::size_t right = 0;
+  std::size_t right_for_good = 0;
+  std::vector<double> ways;
+  std::vector<double> hypotheses;
+  for (std::size_t r = 0; r < runs.size(); ++r) {
+    const auto first = corridors.first_distinct[r];
+    std::optional<std::size_t> found;
+    bool lost_again = false;
+    for (const TrackedImage& image : runs[r]) {
+      const bool is_right = image.error_m < right_m;
+      if (!first || image.step < *first) {
+        ++before;
+        kept += image.nearest_mode_m < right_m ? 1 : 0;
+        sure_before += image.state == LocalisationState::localised ? 1 : 0;
+        hypotheses.push_back(static_cast<double>(image.modes));
+        continue;
+      }
+      if (is_right && !found) found = image.step - *first;
+      if (!is_right && image.step >= *first + 3) lost_again = true;
+    }
+    if (!first) continue;  // it never came to a distinct place
+    ++reached;
+    ways.push_back(static_cast<double>(*first));
+    right += found && *found < 3 ? 1 : 0;
+    right_for_good += found && *found < 3 && !lost_again ? 1 : 0;
+  }
+  const std::string what =
+      "corridor of identical doors, from anywhere along the ring; the first distinct place is "
+      "where the window, the notice board or the plant first covers " +
+      std::to_string(distinct_degrees) + " degrees of the view";
+  if (before > 0) {
+    add_rate(result, "m03.corridor.kept_before",
+             what + "; before it, images after which a mode is within 0.5 m of the truth", kept,
+             before, at_least(0.99));
+    tell_single_images(result.rows.back(), corridors.sets);
+    add_rate(result, "m03.corridor.sure_before",
+             "corridor: before the first distinct place, images at which it says localised",
+             sure_before, before);
+    add_mean(result, "m03.corridor.modes_before",
+             "corridor: modes kept before the first distinct place", "modes", hypotheses);
+  }
+  add_confidently_wrong(result, "m03.corridor.wrong", "corridor", runs, at_most(0.0));
+  if (reached > 0) {
+    add_rate(result, "m03.corridor.right_after",
+             "corridor: runs whose heaviest mode is within 0.5 m of the truth at the first "
+             "distinct place or one of the two images after it",
+             right, reached, at_least(0.99));
+    add_rate(result, "m03.corridor.right_for_good",
+             "corridor: the same, and at all images from the fourth to the tenth", right_for_good,
+             reached);
+    add_median(result, "m03.corridor.images_before",
+               "corridor: images before the first distinct place", "images", ways);
+  }
+  const RunSet& shown = corridors.sets.front();
+  const std::size_t last = shown.runs.front().steps.size() - 1;
+  const std::size_t first = std::min(corridors.first_distinct.front().value_or(last), last);
+  const std::array<std::size_t, 4> steps{0, first / 2, first, std::min(first + 2, last)};
+  add_plot(result, options.out, "corridor.svg",
+           "A corridor of identical doors: the particles keep to places that look alike until "
+           "something that stands only once comes into view.",
+           particle_maps(*shown.place, corridors.things, shown.runs.front(), setting,
+                         seed_of_corridor, steps, "Corridor"),
+           2);
+}
+
+}  // namespace panonav::lab

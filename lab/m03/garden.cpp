@@ -1,0 +1,147 @@
+// What [M03] section 4.1 announces: outdoors, and what changing brightness does there.
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <vector>
+
+#include "lab/m03/experiments.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/core/statistics.hpp"
+#include "panonav/motion/path.hpp"
+
+namespace panonav::lab {
+
+namespace {
+
+constexpr std::uint64_t seed_of_garden = 80'000;
+constexpr double garden_spacing_m = 0.5;
+constexpr int images = 16;
+constexpr std::array<double, 7> lights{0.5, 0.7, 0.85, 1.0, 1.2, 1.5, 2.0};
+// A cloud comes and goes, then the sun: a step in each image.
+constexpr std::array<std::size_t, 12> changing{3, 2, 1, 0, 1, 2, 3, 4, 5, 6, 5, 4};
+
+std::string shown(double light) {
+  const auto hundredths = std::lround(100.0 * light);
+  const std::string digits = std::to_string(hundredths % 100);
+  return std::to_string(hundredths / 100) + "." + (digits.size() < 2 ? "0" : "") + digits;
+}
+
+struct GardenRuns {
+  std::array<std::vector<RunSet>, lights.size()> constant;  ///< the same ways in each light
+  std::vector<RunSet> changing;
+};
+
+GardenRuns record_gardens(const TrackingReproductionOptions& options, Executor& executor) {
+  GardenRuns gardens;
+  const int scenes = std::max(1, (options.scenes + 1) / 2);
+  const int runs_each = options.variants * options.runs;
+  for (int s = 0; s < scenes; ++s) {
+    const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(s);
+    const simulation::PlaceRecording place =
+        simulation::record_place({.scene = "garden",
+                                  .seed = seed,
+                                  .spacing_m = garden_spacing_m,
+                                  .queries = 1,
+                                  .rows = options.rows,
+                                  .columns = options.columns / 2},
+                                 executor);
+    const auto remembered = remember_for_tracking(place, executor);
+    std::vector<std::vector<Pose2>> ways;
+    for (int r = 0; r < runs_each; ++r) {
+      Random random(seed * 1000003U + 80U, static_cast<std::uint64_t>(r));
+      const Pose2 start = place.free_space->random_pose(random);
+      ways.push_back(random_walk(
+          start, [&](Point2 p) { return place.free_space->is_free(p); },
+          {.poses = images, .step_m = garden_spacing_m}, random));
+    }
+    std::array<std::vector<TrackingRun>, lights.size()> runs;
+    for (std::size_t l = 0; l < lights.size(); ++l) {
+      const simulation::Scene scene =
+          simulation::make_scene("garden", {.seed = seed, .light = lights[l]});
+      const simulation::Renderer renderer(scene, simulation::RendererOptions{}, executor);
+      runs[l] = record_along(ways, place, renderer, *remembered, {}, seed * 100003U + 20'000U * l,
+                             executor);
+    }
+    std::vector<TrackingRun> under_clouds = runs[0];
+    for (std::size_t r = 0; r < under_clouds.size(); ++r) {
+      for (std::size_t i = 0; i < under_clouds[r].steps.size(); ++i) {
+        under_clouds[r].steps[i].view = runs[changing[(i + r) % changing.size()]][r].steps[i].view;
+      }
+    }
+    for (std::size_t l = 0; l < lights.size(); ++l) {
+      gardens.constant[l].push_back(make_run_set(remembered, std::move(runs[l]), executor));
+    }
+    gardens.changing.push_back(make_run_set(remembered, std::move(under_clouds), executor));
+  }
+  return gardens;
+}
+
+SingleImages sum_of(std::span<const RunSet> sets) {
+  SingleImages sum;
+  for (const RunSet& set : sets) sum.add(set.single_images);
+  return sum;
+}
+
+}  // namespace
+
+void reproduce_garden(const TrackingReproductionOptions& options, Executor& executor,
+                      Reproduction& result) {
+  const GardenRuns gardens = record_gardens(options, executor);
+  const FilterSetting setting;
+  const auto rows = [&](const std::string& id, const std::string& light,
+                        std::span<const RunSet> sets) {
+    const auto runs = track_sets(sets, setting, seed_of_garden, executor);
+    const std::string what = "garden, 50 cm grid, " + light;
+    const auto needed = capped_images(runs, garden_spacing_m);
+    add_median(result, "m03.garden." + id + ".images",
+               what + ": images until the error is below 50 cm from then on", "images", needed);
+    tell_single_images(result.rows.back(), sets);
+    add_rate(result, "m03.garden." + id + ".within_10", what + ": runs localised within 10 images",
+             localised_within(runs, garden_spacing_m, 10), runs.size());
+    add_median(result, "m03.garden." + id + ".error_10", what + ": error after 10 images", "m",
+               errors_after(runs, 10));
+    add_confidently_wrong(result, "m03.garden." + id + ".wrong", what, runs);
+    return runs;
+  };
+  viewer::Series right{.label = "one image alone: nearest place"};
+  viewer::Series near{.label = "one image alone: within 0.5 m"};
+  viewer::Series success{.label = "filter, within 10 images"};
+  viewer::Series first{.label = "filter, first image"};
+  viewer::Series needed{.label = "constant light"};
+  for (std::size_t l = 0; l < lights.size(); ++l) {
+    const auto runs =
+        rows("light_" + shown(lights[l]), "light " + shown(lights[l]) + " times that of the memory",
+             gardens.constant[l]);
+    const SingleImages single = sum_of(gardens.constant[l]);
+    add_point(right, lights[l], success_rate(single.right, single.asked));
+    add_point(near, lights[l], success_rate(single.near, single.asked));
+    const auto share_within = [&](int images) {
+      return success_rate(localised_within(runs, garden_spacing_m, images), runs.size());
+    };
+    add_point(success, lights[l], share_within(10));
+    add_point(first, lights[l], share_within(1));
+    add_point(needed, lights[l], mean_figure(capped_images(runs, garden_spacing_m)));
+  }
+  (void)rows("light_changing", "light that changes at each image between 0.50 and 2.00",
+             gardens.changing);
+  add_plot(result, options.out, "garden_success.svg",
+           "Outdoors in other light than memorised: single images, and the filter.",
+           viewer::LinePlot{.title = "Garden: localisation against brightness",
+                            .x_label = "light, times that of the memory",
+                            .y_label = "share",
+                            .series = {right, near, first, success},
+                            .log_x = true,
+                            .x_range = std::pair{0.4, 2.5},
+                            .y_range = std::pair{0.0, 1.02}});
+  add_plot(result, options.out, "garden_images.svg", "Images until localised against brightness.",
+           viewer::LinePlot{.title = "Garden: mean number of images until localised",
+                            .x_label = "light, times that of the memory",
+                            .y_label = "images",
+                            .series = {needed},
+                            .log_x = true,
+                            .x_range = std::pair{0.4, 2.5},
+                            .y_range = std::pair{0.0, 15.0}});
+}
+
+}  // namespace panonav::lab

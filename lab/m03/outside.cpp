@@ -1,0 +1,233 @@
+// A robot that leaves the memorised area and returns.
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "lab/m03/experiments.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/core/statistics.hpp"
+#include "panonav/motion/path.hpp"
+
+namespace panonav::lab {
+
+namespace {
+
+constexpr std::uint64_t seed_of_outside = 120'000;
+constexpr std::size_t images_before = 5;
+constexpr double outside_m = 1.0;  ///< from the nearest reference
+
+struct OutsideRuns {
+  std::vector<RunSet> sets;
+  /// Of each image of each run: how far the nearest reference is.
+  std::vector<std::vector<double>> ways_m;
+};
+
+/// A free place in a strip of the scene.
+Point2 place_between(const simulation::FreeSpace& space, double low_x, double high_x,
+                     Random& random) {
+  for (;;) {
+    const Pose2 pose = space.random_pose(random);
+    if (pose.x_m >= low_x && pose.x_m <= high_x) return pose.position();
+  }
+}
+
+/// From inside to far outside and back to another place inside, facing the way.
+std::vector<Pose2> excursion(const simulation::FreeSpace& space, double border_m, Random& random) {
+  const double low = space.low().x_m;
+  const double high = space.high().x_m;
+  const Point2 from = place_between(space, low, border_m - 0.5, random);
+  const Point2 out = place_between(space, border_m + 2.0, high, random);
+  const Point2 to = place_between(space, low, border_m - 0.5, random);
+  std::vector<Pose2> way;
+  for (const auto& [a, b] : {std::pair{from, out}, {out, to}}) {
+    for (const Point2 p : space.shortest_path(a, b).value_or(std::vector<Point2>{a, b})) {
+      way.push_back({p.x_m, p.y_m, 0.0});
+    }
+  }
+  auto poses = resample(way, m03_spacing_m);
+  for (std::size_t i = 0; i + 1 < poses.size(); ++i) {
+    poses[i].heading_rad =
+        wrap_angle(std::atan2(poses[i + 1].y_m - poses[i].y_m, poses[i + 1].x_m - poses[i].x_m));
+  }
+  if (poses.size() > 1) poses.back().heading_rad = poses[poses.size() - 2].heading_rad;
+  return poses;
+}
+
+OutsideRuns record_excursions(const TrackingReproductionOptions& options, const std::string& name,
+                              Executor& executor) {
+  OutsideRuns outside;
+  const int scenes = std::max(1, options.scenes / 3);
+  const int runs_each = 2 * options.variants * options.runs;
+  for (int s = 0; s < scenes; ++s) {
+    const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(s);
+    const simulation::PlaceRecording place =
+        simulation::record_place({.scene = name,
+                                  .seed = seed,
+                                  .spacing_m = m03_spacing_m,
+                                  .queries = 1,
+                                  .rows = options.rows,
+                                  .columns = options.columns / 2},
+                                 executor);
+    const double border = 0.5 * (place.scene.floor_low.x_m + place.scene.floor_high.x_m);
+    const auto remembered =
+        remember_for_tracking(place, executor, [&](Point2 p) { return p.x_m < border; });
+    std::vector<std::vector<Pose2>> ways;
+    for (int r = 0; r < runs_each; ++r) {
+      Random random(seed * 1000003U + 120U, static_cast<std::uint64_t>(r));
+      ways.push_back(excursion(*place.free_space, border, random));
+    }
+    const auto references = remembered->reference_positions();
+    for (const auto& way : ways) {
+      std::vector<double> ways_m;
+      for (const Pose2& pose : way) {
+        double nearest = std::numeric_limits<double>::infinity();
+        for (const Point2 p : references) nearest = std::min(nearest, distance(p, pose.position()));
+        ways_m.push_back(nearest);
+      }
+      outside.ways_m.push_back(std::move(ways_m));
+    }
+    RunSet set{
+        remembered,
+        record_along(ways, place, *place.renderer, *remembered, {}, seed * 100003U, executor),
+        {}};
+    // Single images are asked of places that the memory holds.
+    std::vector<TrackingRun> inside = set.runs;
+    for (std::size_t r = 0; r < inside.size(); ++r) {
+      const auto& ways_m = outside.ways_m[outside.ways_m.size() - inside.size() + r];
+      for (std::size_t i = 0; i < inside[r].steps.size(); ++i) {
+        if (ways_m[i] > m03_spacing_m) inside[r].steps[i].view.reset();
+      }
+    }
+    set.single_images = localise_single_images(*remembered, inside, executor);
+    outside.sets.push_back(std::move(set));
+  }
+  return outside;
+}
+
+constexpr double bin_m = 0.25;
+constexpr std::size_t bins = 16;
+
+/// What the filter says of itself over the runs.
+struct Reports {
+  // By the way to the nearest reference, from the sixth image on.
+  std::array<std::size_t, bins> asked{};
+  std::array<std::size_t, bins> lost{};
+  std::array<std::size_t, bins> localised{};
+  std::size_t inside = 0;  ///< images before the robot leaves
+  std::size_t lost_inside = 0;
+  std::size_t outside = 0;  ///< images far from all references
+  std::size_t lost_outside = 0;
+  std::size_t sure_outside = 0;
+  std::vector<double> until_lost;   ///< images, of each run
+  std::vector<double> until_found;  ///< images since the robot is back
+};
+
+void add_run(Reports& reports, const TrackedRun& run, std::span<const double> ways_m) {
+  bool left = false;
+  bool back = false;
+  int images_outside = 0;  // until it says so
+  int images_back = 0;
+  bool said_lost = false;
+  bool said_found = false;
+  for (const TrackedImage& image : run) {
+    const double way = ways_m[image.step];
+    const bool is_lost = image.state == LocalisationState::lost;
+    const bool is_localised = image.state == LocalisationState::localised;
+    if (image.step >= images_before) {
+      const auto bin = std::min(bins - 1, static_cast<std::size_t>(way / bin_m));
+      ++reports.asked[bin];
+      reports.lost[bin] += is_lost ? 1 : 0;
+      reports.localised[bin] += is_localised ? 1 : 0;
+    }
+    if (way > outside_m) {
+      left = true;
+      ++reports.outside;
+      reports.lost_outside += is_lost ? 1 : 0;
+      reports.sure_outside += is_localised ? 1 : 0;
+      images_outside += said_lost ? 0 : 1;
+      said_lost = said_lost || is_lost;
+    } else if (way <= m03_spacing_m && left) {
+      back = true;
+      images_back += said_found ? 0 : 1;
+      said_found = said_found || (is_localised && image.is_within(m03_spacing_m));
+    } else if (way <= m03_spacing_m && image.step >= images_before) {
+      ++reports.inside;
+      reports.lost_inside += is_lost ? 1 : 0;
+    }
+  }
+  const auto capped = [](bool said, int images) {
+    return static_cast<double>(said ? std::min(images, m03_most_images) : m03_most_images);
+  };
+  if (left) reports.until_lost.push_back(capped(said_lost, images_outside));
+  if (back) reports.until_found.push_back(capped(said_found, images_back));
+}
+
+void add_rows(Reproduction& result, const std::string& id, const std::string& what,
+              const Reports& reports, std::span<const RunSet> sets) {
+  if (reports.inside > 0) {
+    add_rate(result, id + ".lost_inside",
+             what + ": images before it leaves, from the sixth on, that are called lost",
+             reports.lost_inside, reports.inside);
+    tell_single_images(result.rows.back(), sets);
+  }
+  if (reports.outside > 0) {
+    add_rate(result, id + ".lost_outside",
+             what + ": images more than 1 m from all references that are called lost",
+             reports.lost_outside, reports.outside);
+    add_rate(result, id + ".sure_outside",
+             what + ": images more than 1 m from all references that are called localised",
+             reports.sure_outside, reports.outside);
+    add_median(result, id + ".images_until_lost",
+               what + ": images until it is called lost, from 1 m outside on", "images",
+               reports.until_lost);
+  }
+  if (!reports.until_found.empty()) {
+    add_median(result, id + ".images_until_found",
+               what + ": images back inside until it is called localised, within 25 cm", "images",
+               reports.until_found);
+    add_rate(result, id + ".found_within_5",
+             what + ": runs called localised, within 25 cm, within 5 images back inside",
+             static_cast<std::size_t>(std::ranges::count_if(
+                 reports.until_found, [](double images) { return images <= 5.0; })),
+             reports.until_found.size());
+  }
+}
+
+}  // namespace
+
+void reproduce_leaving(const TrackingReproductionOptions& options, const std::string& name,
+                       Executor& executor, Reproduction& result) {
+  const OutsideRuns outside = record_excursions(options, name, executor);
+  const FilterSetting setting;
+  const auto runs = track_sets(outside.sets, setting, seed_of_outside, executor);
+  Reports reports;
+  for (std::size_t r = 0; r < runs.size(); ++r) add_run(reports, runs[r], outside.ways_m[r]);
+  add_rows(result, "m03.leaving." + name,
+           name + ", one half memorised, the robot drives out of it and back", reports,
+           outside.sets);
+  add_confidently_wrong(result, "m03.leaving." + name + ".wrong", name + ", leaving and returning",
+                        runs);
+  viewer::Series lost_series{.label = "called lost"};
+  viewer::Series sure_series{.label = "called localised"};
+  for (std::size_t b = 0; b < bins; ++b) {
+    if (reports.asked[b] == 0) continue;
+    for (const auto& [series, counts] :
+         {std::pair{&lost_series, &reports.lost}, {&sure_series, &reports.localised}}) {
+      add_point(*series, (static_cast<double>(b) + 0.5) * bin_m,
+                success_rate((*counts)[b], reports.asked[b]));
+    }
+  }
+  const std::string file = "leaving_" + name + ".svg";
+  add_plot(result, options.out, file,
+           "What the filter says of itself, by how far the robot is from all references.",
+           viewer::LinePlot{.title = "Leaving the memorised half of " + name,
+                            .x_label = "way to the nearest reference [m]",
+                            .y_label = "share of the images",
+                            .series = {lost_series, sure_series},
+                            .y_range = std::pair{0.0, 1.02}});
+}
+
+}  // namespace panonav::lab

@@ -1,0 +1,356 @@
+// [M04] figure 10: how the areas of hierarchical localisation follow the objects around. The
+// authors: "we are investigating the relation between the shape of the localisation areas and the
+// disposition of the objects".
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+#include <optional>
+#include <string>
+
+#include "lab/m04/experiment.hpp"
+#include "lab/m04/support.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/localisation/hierarchical.hpp"
+#include "panonav_viewer/plot.hpp"
+#include "panonav_viewer/surroundings.hpp"
+
+namespace panonav::lab {
+
+namespace {
+
+// A finer grid than the paper's, so that an area of 1 m^2 has a shape; and fewer pixels, because 15
+// components need no more.
+constexpr double kSpacingM = 0.125;
+constexpr int kRows = 40;
+constexpr int kColumns = 256;
+// The shape is looked at where the area is broad, and again where it no longer reaches the border
+// of the grid.
+constexpr std::array kComponents{3, 6};
+constexpr std::size_t kLevels = kComponents.size();
+constexpr double kTolerance = 0.25;
+// The same places in every scene.
+constexpr std::size_t kPlacesX = 6;
+constexpr std::size_t kPlacesY = 3;
+constexpr std::size_t kPlaces = kPlacesX * kPlacesY;
+
+// Size and shape of something around a place: its mean over the directions, and each direction
+// over that mean.
+struct Shape {
+  double size = 0.0;
+  viewer::Directional relative{};
+};
+
+Shape shape_of(const viewer::Directional& values) {
+  Shape shape;
+  shape.size = std::accumulate(values.begin(), values.end(), 0.0) / viewer::shape_directions;
+  for (std::size_t i = 0; i < viewer::shape_directions; ++i) {
+    shape.relative[i] = shape.size > 0.0 ? values[i] / shape.size : 1.0;
+  }
+  return shape;
+}
+
+// What was found at one place of one scene.
+struct Observation {
+  std::array<Shape, kLevels> area;       // equivalent radius of the area in each sector
+  Shape free;                            // free distance
+  Shape parallax;                        // distance for equal parallax
+  std::array<Shape, kLevels> predicted;  // distance for an equal change of the components
+};
+// By place; empty where furniture stands.
+using SceneObservations = std::array<std::optional<Observation>, kPlaces>;
+
+// Radius of the circle whose sector of 45 degrees has the area of the candidates' cells there.
+viewer::Directional extents_of(const VisualMemory& memory, const ReferenceAreas& areas,
+                               Point2 robot, const std::vector<Match>& candidates) {
+  viewer::Directional area_m2{};
+  for (const Match& match : candidates) {
+    const Point2 at = memory.info(match.view).pose->position();
+    const auto cell = areas.cell(match.view);
+    area_m2[viewer::sector_of(std::atan2(at.y_m - robot.y_m, at.x_m - robot.x_m))] +=
+        polygon_area_m2(cell);
+  }
+  viewer::Directional extents{};
+  for (std::size_t i = 0; i < viewer::shape_directions; ++i) {
+    extents[i] = std::sqrt(area_m2[i] * viewer::shape_directions / std::numbers::pi);
+  }
+  return extents;
+}
+
+// Which surroundings and which property of them an area is compared with.
+using Property = double (*)(const Observation&, std::size_t level, std::size_t direction);
+
+struct Relation {
+  std::string id;
+  std::string label;
+  std::string what;
+  Property area;
+  Property surroundings;
+  std::size_t directions;  // 1 for sizes
+};
+
+const std::array<Relation, 5>& relations() {
+  static const std::array<Relation, 5> all{
+      Relation{
+          "size_against_free_distance", "size",
+          "size of the area with the mean free distance to objects",
+          [](const Observation& o, std::size_t level, std::size_t) { return o.area[level].size; },
+          [](const Observation& o, std::size_t, std::size_t) { return o.free.size; }, 1},
+      Relation{"shape_against_free_distance", "free distance",
+               "relative extent of the area per direction with the relative free distance there",
+               [](const Observation& o, std::size_t level, std::size_t i) {
+                 return o.area[level].relative[i];
+               },
+               [](const Observation& o, std::size_t, std::size_t i) { return o.free.relative[i]; },
+               viewer::shape_directions},
+      Relation{
+          "shape_against_parallax", "parallax",
+          "relative extent of the area per direction with the way that parallax allows there",
+          [](const Observation& o, std::size_t level, std::size_t i) {
+            return o.area[level].relative[i];
+          },
+          [](const Observation& o, std::size_t, std::size_t i) { return o.parallax.relative[i]; },
+          viewer::shape_directions},
+      Relation{
+          "size_against_prediction", "size",
+          "size of the area with the size predicted from parallax and contrast",
+          [](const Observation& o, std::size_t level, std::size_t) { return o.area[level].size; },
+          [](const Observation& o, std::size_t level, std::size_t) {
+            return o.predicted[level].size;
+          },
+          1},
+      Relation{"shape_against_prediction", "parallax and contrast",
+               "relative extent of the area per direction with that predicted from parallax and "
+               "contrast",
+               [](const Observation& o, std::size_t level, std::size_t i) {
+                 return o.area[level].relative[i];
+               },
+               [](const Observation& o, std::size_t level, std::size_t i) {
+                 return o.predicted[level].relative[i];
+               },
+               viewer::shape_directions}};
+  return all;
+}
+
+// Values of one relation less their mean over all scenes for the same place and direction: what
+// the shape of the room and of the grid does is the same in all scenes and falls out.
+struct Residuals {
+  // [scene][place * directions + direction]; NaN where there is no observation.
+  std::vector<std::vector<double>> area;
+  std::vector<std::vector<double>> surroundings;
+};
+
+std::vector<std::vector<double>> residuals_of(const std::vector<SceneObservations>& scenes,
+                                              Property property, std::size_t level,
+                                              std::size_t directions) {
+  std::vector<std::vector<double>> result(scenes.size(),
+                                          std::vector<double>(kPlaces * directions, std::nan("")));
+  for (std::size_t p = 0; p < kPlaces; ++p) {
+    for (std::size_t d = 0; d < directions; ++d) {
+      double sum = 0.0;
+      double count = 0.0;
+      for (const auto& scene : scenes) {
+        if (!scene[p]) continue;
+        sum += property(*scene[p], level, d);
+        count += 1.0;
+      }
+      for (std::size_t s = 0; s < scenes.size(); ++s) {
+        if (scenes[s][p]) {
+          result[s][p * directions + d] = property(*scenes[s][p], level, d) - sum / count;
+        }
+      }
+    }
+  }
+  return result;
+}
+
+// Rank correlation of the areas of `scenes` with the surroundings of scenes[i] taken from
+// `partners[i]`; the same list for the true pairing.
+double correlation(const Residuals& residuals, const std::vector<std::size_t>& scenes,
+                   const std::vector<std::size_t>& partners) {
+  std::vector<double> area;
+  std::vector<double> around;
+  for (std::size_t i = 0; i < scenes.size(); ++i) {
+    const auto& here = residuals.area[scenes[i]];
+    const auto& there = residuals.surroundings[partners[i]];
+    for (std::size_t j = 0; j < here.size(); ++j) {
+      if (std::isnan(here[j]) || std::isnan(there[j])) continue;
+      area.push_back(here[j]);
+      around.push_back(there[j]);
+    }
+  }
+  return area.size() >= 3 ? rank_correlation(area, around) : 0.0;
+}
+
+viewer::MapPlot plan_of(const simulation::PlaceRecording& place, const ReferenceAreas& areas,
+                        Point2 robot, const std::vector<Match>& candidates, std::size_t number) {
+  viewer::MapPlot map{.title = "place " + std::to_string(number) + ", " +
+                               std::to_string(kComponents.front()) + " components",
+                      .layers = viewer::scene_layers(place.scene)};
+  viewer::MapLayer area{.label = "where it may be", .colour = viewer::PlotColour::blue};
+  for (const Match& match : candidates) area.filled_polygons.push_back(areas.cell(match.view));
+  viewer::MapLayer truth{
+      .label = "robot", .colour = viewer::PlotColour::vermilion, .crosses = {robot}};
+  map.layers.push_back(area);
+  map.layers.push_back(truth);
+  return map;
+}
+
+class AreaShape final : public Experiment {
+ public:
+  void add(const simulation::PlaceRecording& place, Executor& executor) override {
+    const simulation::PanoramaRendering rendering{.rows = std::min(kRows, place.rendering.rows),
+                                                  .columns = kColumns,
+                                                  .elevations = place.rendering.elevations,
+                                                  .rays_per_axis = 1};
+    std::vector<Pose2> grid;
+    for (const auto& point : place.free_space->grid(kSpacingM)) {
+      grid.push_back({point.position.x_m, point.position.y_m, 0.0});
+    }
+    const std::uint64_t noise = place.seed * 100003U + 80000U;
+    const auto views = simulation::take_views(place, rendering, grid, noise, {}, executor);
+    const VisualMemory memory = memory_of(views, signatures_of(views, m04_components, executor));
+    const ReferenceAreas areas(memory);
+    Random random(place.seed, 80);
+    SceneObservations here;
+    const Point2 low = place.scene.floor_low;
+    const Point2 high = place.scene.floor_high;
+    for (std::size_t p = 0; p < kPlaces; ++p) {
+      const double share_x = (static_cast<double>(p % kPlacesX) + 0.5) / kPlacesX;
+      const double share_y = (static_cast<double>(p / kPlacesX) + 0.5) / kPlacesY;
+      const Pose2 robot{low.x_m + share_x * (high.x_m - low.x_m),
+                        low.y_m + share_y * (high.y_m - low.y_m),
+                        random.uniform(-std::numbers::pi, std::numbers::pi)};
+      if (!place.free_space->is_free(robot.position())) continue;
+      const Panorama view = simulation::take_view(place, rendering, robot, noise + grid.size() + p);
+      const auto levels = localise_hierarchically(
+          memory, areas, pack(compute_signature(view, m04_components), memory.full_scale()),
+          {.tolerance = kTolerance});
+      const viewer::Surroundings around = viewer::surroundings_of(place, robot.position());
+      Observation seen{{}, shape_of(around.free_m), shape_of(around.parallax_m), {}};
+      for (std::size_t level = 0; level < kLevels; ++level) {
+        const auto& candidates =
+            levels.at(static_cast<std::size_t>(kComponents[level] - 1)).candidates;
+        seen.predicted[level] =
+            shape_of(viewer::predicted_extents(place, robot, view, kComponents[level]));
+        seen.area[level] = shape_of(extents_of(memory, areas, robot.position(), candidates));
+        if (scenes_.empty() && level == 0 &&
+            kShownPlaces.end() != std::ranges::find(kShownPlaces, p)) {
+          shown_.push_back(plan_of(place, areas, robot.position(), candidates, shown_.size() + 1));
+        }
+      }
+      here[p] = seen;
+    }
+    scenes_.push_back(here);
+  }
+
+  void report(const std::filesystem::path& folder, Reproduction& result) const override {
+    require(!scenes_.empty(), "places", 0.0, ">= 1");
+    if (!shown_.empty()) {
+      add_plot(result, folder, "fig10_areas_at_places.svg",
+               "Areas after 3 components at places of one office, with its furniture seen from "
+               "above ([M04] figure 10).",
+               shown_, 2);
+    }
+    std::vector<std::size_t> all(scenes_.size());
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    viewer::LinePlot plot{.title = "Does the area reach farther where the surroundings allow it?",
+                          .x_label = "surroundings in that direction [tenths of all]",
+                          .y_label = "extent of the area, against other offices [share]",
+                          .series = {}};
+    for (std::size_t level = 0; level < kLevels; ++level) {
+      for (const Relation& relation : relations()) {
+        const Residuals residuals{
+            residuals_of(scenes_, relation.area, level, relation.directions),
+            residuals_of(scenes_, relation.surroundings, level, relation.directions)};
+        add_rows(relation, level, residuals, all, result);
+        if (relation.directions > 1 && relation.id != "shape_against_parallax") {
+          plot.series.push_back(tenths(relation, level, residuals));
+        }
+      }
+    }
+    add_plot(result, folder, "fig10_shape_against_surroundings.svg",
+             "The open question of figure 10: how much farther or less far the area reaches in a "
+             "direction than in other offices, by how the surroundings there differ from those in "
+             "other offices.",
+             plot);
+  }
+
+ private:
+  static constexpr std::array<std::size_t, 4> kShownPlaces{1, 4, 8, 15};
+  static constexpr int kDraws = 500;
+
+  static void add_rows(const Relation& relation, std::size_t level, const Residuals& residuals,
+                       const std::vector<std::size_t>& all, Reproduction& result) {
+    const std::string components = std::to_string(kComponents[level]);
+    const std::string id = "m04.fig10." + relation.id + "_" + components;
+    Random random(1, 81);
+    std::vector<double> drawn;
+    std::vector<double> shuffled;
+    for (int draw = 0; draw < kDraws; ++draw) {
+      std::vector<std::size_t> scenes(all.size());
+      for (auto& scene : scenes) scene = random.index(all.size());
+      drawn.push_back(correlation(residuals, scenes, scenes));
+      std::vector<std::size_t> partners = all;
+      for (std::size_t i = partners.size(); i > 1; --i) {
+        std::swap(partners[i - 1], partners[random.index(i)]);
+      }
+      shuffled.push_back(correlation(residuals, all, partners));
+    }
+    add_row(result, id,
+            "figure 10, left open by the authors: rank correlation over " +
+                std::to_string(all.size()) + " offices, " + components + " components, of the " +
+                relation.what,
+            Figure(correlation(residuals, all, all),
+                   std::pair{quantile(drawn, 0.025), quantile(drawn, 0.975)}),
+            "");
+    add_row(
+        result, id + ".by_chance",
+        "figure 10: the same with the surroundings of another office at the same place (median of "
+        "500 shuffles)",
+        Figure(median(shuffled), std::pair{quantile(shuffled, 0.025), quantile(shuffled, 0.975)}),
+        "");
+  }
+
+  // Mean residual of the area in each tenth of the residuals of the surroundings.
+  static viewer::Series tenths(const Relation& relation, std::size_t level,
+                               const Residuals& residuals) {
+    std::vector<std::pair<double, double>> pairs;
+    for (std::size_t s = 0; s < residuals.area.size(); ++s) {
+      for (std::size_t j = 0; j < residuals.area[s].size(); ++j) {
+        if (!std::isnan(residuals.area[s][j])) {
+          pairs.emplace_back(residuals.surroundings[s][j], residuals.area[s][j]);
+        }
+      }
+    }
+    std::ranges::stable_sort(pairs, {}, &std::pair<double, double>::first);
+    viewer::Series series{.label = relation.label + ", " + std::to_string(kComponents[level]) +
+                                   " components"};
+    constexpr std::size_t kTenths = 10;
+    for (std::size_t t = 0; t < kTenths; ++t) {
+      std::vector<double> values;
+      for (std::size_t i = t * pairs.size() / kTenths; i < (t + 1) * pairs.size() / kTenths; ++i) {
+        values.push_back(pairs[i].second);
+      }
+      if (values.empty()) continue;
+      const auto interval = mean_interval(values, 1);
+      series.add(static_cast<double>(t + 1), mean(values));
+      series.y_low.push_back(interval.first);
+      series.y_high.push_back(interval.second);
+    }
+    return series;
+  }
+
+  std::vector<SceneObservations> scenes_;
+  std::vector<viewer::MapPlot> shown_;
+};
+
+}  // namespace
+
+std::unique_ptr<Experiment> area_shape_experiment() {
+  return std::make_unique<AreaShape>();
+}
+
+}  // namespace panonav::lab

@@ -1,0 +1,287 @@
+// [M04] figure 6: how well 2, 5, 15, 50 and 256 components tell places apart.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+
+#include "lab/m04/experiment.hpp"
+#include "lab/m04/support.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/signature/dissimilarity.hpp"
+#include "panonav_simulation/make_each.hpp"
+#include "panonav_viewer/plot.hpp"
+
+namespace panonav::lab {
+
+namespace {
+
+constexpr std::array kComponents{2, 5, 15, 50, 256};
+constexpr std::size_t kCounts = kComponents.size();
+constexpr std::size_t kFifteen = 2;
+constexpr std::size_t kConditions = 3;
+constexpr std::size_t kHidden = 1;
+constexpr std::size_t kBands = 4;  // components 0 and 1, 2 .. 14, 15 .. 49, 50 .. 255
+
+// Dissimilarities of one query to all references, for every number of components at once.
+std::array<std::vector<double>, kCounts> dissimilarities(
+    const FourierSignature& query, const std::vector<FourierSignature>& references) {
+  std::array<std::vector<double>, kCounts> values;
+  for (const auto& reference : references) {
+    const auto parts = dissimilarity_by_component(query, reference);
+    double sum = 0.0;
+    std::size_t k = 0;
+    for (std::size_t c = 0; c < kCounts; ++c) {
+      for (; k < static_cast<std::size_t>(kComponents[c]); ++k) sum += parts[k];
+      values[c].push_back(sum);
+    }
+  }
+  return values;
+}
+
+// How far the peak of the similarity profile falls from the right reference to those one spacing
+// away, as a share of its height over all references: 0 for a flat profile.
+double peak_sharpness(const simulation::PlaceRecording& place, std::size_t nearest,
+                      const std::vector<double>& values) {
+  const auto scaled = similarities(values);
+  double sum = 0.0;
+  double count = 0.0;
+  for (std::size_t i = 0; i < scaled.size(); ++i) {
+    const double d =
+        distance(place.references[i].pose.position(), place.references[nearest].pose.position());
+    if (i != nearest && d < 1.01 * place.spacing_m) {
+      sum += scaled[i];
+      count += 1.0;
+    }
+  }
+  return count > 0.0 ? (scaled[nearest] - sum / count) / 1000.0 : 0.0;
+}
+
+class Discrimination final : public Experiment {
+ public:
+  void add(const simulation::PlaceRecording& place, Executor& executor) override {
+    require(place.rendering.columns >= 2 * kComponents.back(), "columns", place.rendering.columns,
+            ">= 512: figure 6 compares 256 components");
+    const auto references = signatures_of(place.references, kComponents.back(), executor);
+    const auto clean = signatures_of(place.queries, kComponents.back(), executor);
+    std::vector<double> sharpness(kCounts);
+    std::vector<double> contrast(kCounts);
+    for (std::size_t condition = 0; condition < kConditions; ++condition) {
+      const auto views = queries_under(place, view_conditions()[condition], executor);
+      const auto queries = signatures_of(views, kComponents.back(), executor);
+      auto values = simulation::make_each(executor, queries.size(), [&](std::size_t q) {
+        return dissimilarities(queries[q], references);
+      });
+      std::array<double, kCounts> right{};
+      const auto n = static_cast<double>(queries.size());
+      for (std::size_t q = 0; q < queries.size(); ++q) {
+        const Point2 position = views[q].pose.position();
+        const std::size_t nearest = place.nearest_reference(position);
+        for (std::size_t c = 0; c < kCounts; ++c) {
+          const std::size_t found = index_of_smallest(values[q][c]);
+          right[c] += found == nearest ? 1.0 / n : 0.0;
+          found_[condition][c] += found == nearest ? 1 : 0;
+          errors_m_[condition][c].push_back(
+              distance(place.references[found].pose.position(), position));
+          if (condition == 0) {
+            sharpness[c] += peak_sharpness(place, nearest, values[q][c]) / n;
+            contrast[c] += values[q][c][nearest] / median(values[q][c]) / n;
+          }
+        }
+      }
+      trials_ += condition == 0 ? queries.size() : 0;
+      for (std::size_t c = 0; c < kCounts; ++c) {
+        success_by_scene_[condition][c].push_back(right[c]);
+      }
+      if (condition == 0 && profile_.empty()) keep_profile(place, values.front());
+      if (condition == kHidden) compare_disturbance(place, clean, queries, references);
+    }
+    for (std::size_t c = 0; c < kCounts; ++c) {
+      sharpness_by_scene_[c].push_back(sharpness[c]);
+      contrast_by_scene_[c].push_back(contrast[c]);
+    }
+  }
+
+  void report(const std::filesystem::path& folder, Reproduction& result) const override {
+    require(trials_ >= 1, "queries", 0.0, ">= 1");
+    draw(folder, result);
+    for (std::size_t condition = 0; condition < kConditions; ++condition) {
+      const std::string& name = view_conditions()[condition].name;
+      const std::string& id = view_conditions()[condition].id;
+      for (std::size_t c = 0; c < kCounts; ++c) {
+        const Proportion found = success_rate(found_[condition][c], trials_);
+        add_row(result, "m04.fig6." + id + ".found_" + text(c),
+                "figure 6: nearest reference found with " + text(c) + " components, " + name, found,
+                "");
+      }
+      for (const std::size_t more : {kFifteen + 1, kFifteen + 2}) {
+        add_difference(condition, "fifteen_against_" + text(more),
+                       "15 components less that with " + text(more), more, at_least(-0.02), result);
+        if (id == "hidden") result.rows.back().reason = reason_of_disturbance();
+      }
+      add_difference(condition, "fifteen_against_2", "15 components less that with 2", 0,
+                     at_least(0.0), result);
+      add_row(
+          result, "m04.fig6." + id + ".error_15",
+          "figure 6: distance to the reference found, 15 components, 25 cm grid (median), " + name,
+          median_figure(errors_m_[condition][kFifteen]), "m", at_most(0.177));
+    }
+    for (std::size_t c = 0; c < kCounts; ++c) {
+      add_row(result, "m04.fig6.sharpness_" + text(c),
+              "figure 6: fall of similarity from the right reference to its neighbours, " +
+                  text(c) + " components (share of the whole range; more is sharper)",
+              mean_figure(sharpness_by_scene_[c]), "");
+      add_row(result, "m04.fig6.contrast_" + text(c),
+              "figure 6: dissimilarity at the right reference over that of a typical one, " +
+                  text(c) + " components (less is better)",
+              mean_figure(contrast_by_scene_[c]), "");
+    }
+    constexpr std::array kBandNames{"0 and 1", "2 to 14", "15 to 49", "50 to 255"};
+    for (std::size_t band = 0; band < kBands; ++band) {
+      if (disturbance_[band].empty()) continue;
+      add_row(result, "m04.fig6.hidden.disturbance_" + std::to_string(band + 1),
+              std::string("figure 6: what hiding 10 % of the azimuths changes in components ") +
+                  kBandNames[band] + ", over what a step of 25 cm changes there",
+              mean_figure(disturbance_[band]), "");
+    }
+    add_row(result, "m04.fig6.sharpness_fifteen_against_2",
+            "figure 6: sharpness with 15 components less that with 2",
+            mean_figure(difference(sharpness_by_scene_[kFifteen], sharpness_by_scene_[0])), "",
+            at_least(0.0));
+  }
+
+ private:
+  static std::string text(std::size_t c) { return std::to_string(kComponents[c]); }
+
+  static std::vector<double> difference(const std::vector<double>& a,
+                                        const std::vector<double>& b) {
+    std::vector<double> result;
+    for (std::size_t i = 0; i < a.size(); ++i) result.push_back(a[i] - b[i]);
+    return result;
+  }
+
+  // Differences are paired: the same queries in the same scenes.
+  void add_difference(std::size_t condition, const std::string& id, const std::string& what,
+                      std::size_t other, Target target, Reproduction& result) const {
+    const auto values =
+        difference(success_by_scene_[condition][kFifteen], success_by_scene_[condition][other]);
+    add_row(result, "m04.fig6." + view_conditions()[condition].id + "." + id,
+            "figure 6: share found with " + what + ", " + view_conditions()[condition].name,
+            mean_figure(values), "", target);
+  }
+
+  // Why more components help with azimuths hidden, where the measured disturbance says so.
+  [[nodiscard]] std::string reason_of_disturbance() const {
+    if (disturbance_[1].empty()) return "";
+    const double low = mean(disturbance_[1]);
+    const double high = mean(disturbance_[3]);
+    if (low <= high) return "";
+    const auto hundredths = [](double value) { return to_text(std::round(100.0 * value) / 100.0); };
+    return "hiding 10 % of the azimuths changes components 2 to 14 " + hundredths(low) +
+           " times as much as a step of 25 cm does, and components 50 to 255 only " +
+           hundredths(high) + " times as much; so more components help";
+  }
+
+  // What the hidden azimuths change in a view, against what the way to a reference one spacing
+  // from the nearest changes: for the components of the signature and for those beyond.
+  void compare_disturbance(const simulation::PlaceRecording& place,
+                           const std::vector<FourierSignature>& clean,
+                           const std::vector<FourierSignature>& hidden,
+                           const std::vector<FourierSignature>& references) {
+    if (references.size() < 2) return;
+    std::array<double, kBands> by_people{};
+    std::array<double, kBands> by_step{};
+    for (std::size_t q = 0; q < clean.size(); ++q) {
+      const std::size_t nearest = place.nearest_reference(place.queries[q].pose.position());
+      const auto people = dissimilarity_by_component(clean[q], hidden[q]);
+      // The raster's next reference, or the one before at its end, is a neighbour but for row ends.
+      const std::size_t next = nearest + 1 < references.size() ? nearest + 1 : nearest - 1;
+      if (distance(place.references[nearest].pose.position(),
+                   place.references[next].pose.position()) > 1.01 * place.spacing_m) {
+        continue;
+      }
+      const auto step = dissimilarity_by_component(references[nearest], references[next]);
+      for (std::size_t k = 0; k < people.size(); ++k) {
+        const std::size_t band = k < 2 ? 0 : k < 15 ? 1 : k < 50 ? 2 : 3;
+        by_people[band] += people[k];
+        by_step[band] += step[k];
+      }
+    }
+    for (std::size_t band = 0; band < kBands; ++band) {
+      if (by_step[band] > 0.0) disturbance_[band].push_back(by_people[band] / by_step[band]);
+    }
+  }
+
+  void keep_profile(const simulation::PlaceRecording& place,
+                    const std::array<std::vector<double>, kCounts>& values) {
+    const simulation::PlacedView& query = place.queries.front();
+    const std::size_t nearest = place.nearest_reference(query.pose.position());
+    const double row_y_m = place.references[nearest].pose.y_m;
+    for (std::size_t c = 0; c < kCounts; ++c) {
+      const auto scaled = similarities(values[c]);
+      viewer::Series line{.label = text(c) + " components"};
+      for (std::size_t i = 0; i < place.references.size(); ++i) {
+        if (std::abs(place.references[i].pose.y_m - row_y_m) < 1e-6) {
+          line.add(place.references[i].pose.x_m, scaled[i]);
+        }
+      }
+      profile_.push_back(std::move(line));
+    }
+    const double x_m = query.pose.x_m;
+    profile_.push_back({.label = "true position",
+                        .x = {x_m, x_m},
+                        .y = {0.0, 1000.0},
+                        .style = viewer::SeriesStyle::lines});
+  }
+
+  void draw(const std::filesystem::path& folder, Reproduction& result) const {
+    add_plot(
+        result, folder, "fig06_similarity_profile.svg",
+        "With 2 components the peak is broad; from 15 on it is narrow and stands at the true "
+        "position.",
+        viewer::LinePlot{
+            .title =
+                "Similarity of one view to the references along a row of the grid ([M04] figure 6)",
+            .x_label = "x of the reference [m]",
+            .y_label = "similarity (0 .. 1000)",
+            .series = profile_});
+    viewer::LinePlot rates{.title = "Nearest reference found, by number of components",
+                           .x_label = "number of components",
+                           .y_label = "share of queries",
+                           .series = {},
+                           .log_x = true,
+                           .x_range = std::pair{1.5, 400.0}};
+    for (std::size_t condition = 0; condition < kConditions; ++condition) {
+      viewer::Series line{.label = view_conditions()[condition].name};
+      for (std::size_t c = 0; c < kCounts; ++c) {
+        const Proportion found = success_rate(found_[condition][c], trials_);
+        // Moved a little apart, so that error bars do not hide each other.
+        line.add(kComponents[c] * (1.0 + 0.03 * static_cast<double>(condition)), found.value);
+        line.y_low.push_back(found.low);
+        line.y_high.push_back(found.high);
+      }
+      rates.series.push_back(std::move(line));
+    }
+    add_plot(result, folder, "fig06_success.svg",
+             "How often the most similar reference is the nearest one: clean views, views with "
+             "people around, and a noisy camera.",
+             rates);
+  }
+
+  std::size_t trials_ = 0;
+  std::array<std::array<std::size_t, kCounts>, kConditions> found_{};
+  std::array<std::array<std::vector<double>, kCounts>, kConditions> errors_m_;
+  std::array<std::array<std::vector<double>, kCounts>, kConditions> success_by_scene_;
+  std::array<std::vector<double>, kCounts> sharpness_by_scene_;
+  std::array<std::vector<double>, kCounts> contrast_by_scene_;
+  std::array<std::vector<double>, kBands> disturbance_;
+  std::vector<viewer::Series> profile_;
+};
+
+}  // namespace
+
+std::unique_ptr<Experiment> discrimination_experiment() {
+  return std::make_unique<Discrimination>();
+}
+
+}  // namespace panonav::lab

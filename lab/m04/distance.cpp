@@ -1,0 +1,297 @@
+// [M04] figures 7 and 8: dissimilarity against distance, and similarity over the whole floor.
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+
+#include "lab/m04/experiment.hpp"
+#include "lab/m04/support.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/signature/dissimilarity.hpp"
+#include "panonav_viewer/plot.hpp"
+
+namespace panonav::lab {
+
+namespace {
+
+constexpr double kStepM = 0.02;
+constexpr double kLineM = 4.0;
+
+// Values at 0, kStepM, 2 kStepM, ..
+using Curve = std::vector<double>;
+
+double distance_of(std::size_t bin) {
+  return kStepM * static_cast<double>(bin);
+}
+
+// Largest deviation of the first `count` values from the line of least squares through them.
+double deviation_from_line(const Curve& curve, std::size_t count) {
+  const auto n = static_cast<double>(count);
+  double sx = 0.0;
+  double sy = 0.0;
+  double sxx = 0.0;
+  double sxy = 0.0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double x = distance_of(i);
+    sx += x;
+    sy += curve[i];
+    sxx += x * x;
+    sxy += x * curve[i];
+  }
+  const double slope = (n * sxy - sx * sy) / (n * sxx - sx * sx);
+  const double start = (sy - slope * sx) / n;
+  double largest = 0.0;
+  for (std::size_t i = 0; i < count; ++i) {
+    largest = std::max(largest, std::abs(curve[i] - start - slope * distance_of(i)));
+  }
+  return largest;
+}
+
+// The largest distance such that the whole curve up to there stays within `tolerance` of one line.
+double linear_range_m(const Curve& curve, double tolerance) {
+  std::size_t last = 2;
+  for (std::size_t count = 4; count <= curve.size(); ++count) {
+    if (deviation_from_line(curve, count) > tolerance) break;
+    last = count - 1;
+  }
+  return distance_of(last);
+}
+
+double first_above_m(const Curve& curve, double value) {
+  const auto found = std::ranges::find_if(curve, [&](double v) { return v >= value; });
+  return distance_of(static_cast<std::size_t>(found - curve.begin()) - (found == curve.end()));
+}
+
+// A straight way of length kLineM with free floor all along, or the longest of the ways drawn.
+std::pair<Point2, Point2> draw_line(const simulation::FreeSpace& space, Random& random) {
+  std::optional<std::pair<Point2, Point2>> best;
+  constexpr int kDraws = 200;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    const Pose2 start = space.random_pose(random);
+    double length = 0.0;
+    Point2 end = start.position();
+    while (length < kLineM - 1e-9) {
+      const double next = length + kStepM;
+      const Point2 there{start.x_m + next * std::cos(start.heading_rad),
+                         start.y_m + next * std::sin(start.heading_rad)};
+      if (!space.is_free_between(end, there)) break;
+      end = there;
+      length = next;
+    }
+    if (!best || length > distance(best->first, best->second)) best = {start.position(), end};
+    if (length >= kLineM - 1e-9) break;
+  }
+  return *best;
+}
+
+class DistanceCurve final : public Experiment {
+ public:
+  void add(const simulation::PlaceRecording& place, Executor& executor) override {
+    Random random(place.seed, 79);
+    Curve sums;
+    Curve counts;
+    const auto count_pair = [&](std::size_t bin, double value) {
+      if (bin >= sums.size()) {
+        sums.resize(bin + 1);
+        counts.resize(bin + 1);
+      }
+      sums[bin] += value;
+      counts[bin] += 1.0;
+    };
+    for (std::size_t line = 0; line < kLines; ++line) {
+      const auto [from, to] = draw_line(*place.free_space, random);
+      const auto steps = static_cast<std::size_t>(std::lround(distance(from, to) / kStepM));
+      std::vector<Pose2> poses;
+      for (std::size_t i = 0; i <= steps; ++i) {
+        const double share = steps > 0 ? static_cast<double>(i) / static_cast<double>(steps) : 0.0;
+        // Any heading: magnitudes do not depend on it.
+        poses.push_back(
+            {from.x_m + share * (to.x_m - from.x_m), from.y_m + share * (to.y_m - from.y_m), 0.0});
+      }
+      const std::uint64_t noise = place.seed * 100003U + 70000U + 5000U * line;
+      const auto views =
+          signatures_of(simulation::take_views(place, place.rendering, poses, noise, {}, executor),
+                        m04_components, executor);
+      std::vector<Pose2> some;
+      for (std::size_t i = 0; i < poses.size(); i += kAgain) some.push_back(poses[i]);
+      const auto again = signatures_of(
+          simulation::take_views(place, place.rendering, some, noise + 2500U, {}, executor),
+          m04_components, executor);
+      for (std::size_t i = 0; i < views.size(); ++i) {
+        // At distance 0 two pictures differ by noise alone.
+        if (i % kAgain == 0) count_pair(0, dissimilarity_l1(views[i], again[i / kAgain]));
+        for (std::size_t j = i + 1; j < views.size(); ++j) {
+          count_pair(j - i, dissimilarity_l1(views[i], views[j]));
+        }
+      }
+      // The paper shows single pairs: one reference, one robot that drives away from it.
+      if (line == 0 && single_.size() < kShown) {
+        viewer::Series one{.label = "pair " + std::to_string(single_.size() + 1),
+                           .style = viewer::SeriesStyle::lines};
+        for (std::size_t j = 0; j < views.size(); ++j) {
+          one.add(distance_of(j), dissimilarity_l1(views[0], j == 0 ? again[0] : views[j]));
+        }
+        single_.push_back(std::move(one));
+      }
+    }
+    Curve curve;
+    for (std::size_t bin = 0; bin < sums.size(); ++bin) curve.push_back(sums[bin] / counts[bin]);
+    require(curve.size() >= 50, "length of the straight ways [m]", distance_of(curve.size() - 1),
+            ">= 1 m");
+    // The absolute value depends on the place and carries no meaning [M04 section 2.2]: 1 is the
+    // level of far views, the mean over the farther half of all distances.
+    const auto middle = curve.begin() + static_cast<std::ptrdiff_t>(curve.size() / 2);
+    const Curve far(middle, curve.end());
+    const double level = mean(far);
+    for (double& value : curve) value /= level;
+    // Single pairs are in the same unit as the curve of their scene.
+    if (single_.size() == curves_.size() + 1) {
+      for (double& value : single_.back().y) value /= level;
+    }
+    noise_.push_back(curve[0]);
+    linear_m_.push_back(linear_range_m(curve, kTolerance));
+    saturation_m_.push_back(first_above_m(curve, 0.95));
+    half_m_.push_back(first_above_m(curve, 0.5));
+    at_grid_.push_back(curve[static_cast<std::size_t>(std::lround(place.spacing_m / kStepM))]);
+    const auto quarter = static_cast<std::ptrdiff_t>(far.size() / 2);
+    rise_.push_back(mean(Curve(far.begin() + quarter, far.end())) /
+                    mean(Curve(far.begin(), far.begin() + quarter)));
+    curves_.push_back(std::move(curve));
+  }
+
+  void report(const std::filesystem::path& folder, Reproduction& result) const override {
+    require(!curves_.empty(), "places", 0.0, ">= 1");
+    viewer::Series average{.label = "mean of " + std::to_string(curves_.size()) + " scenes",
+                           .style = viewer::SeriesStyle::lines_and_points};
+    std::size_t shared = curves_.front().size();
+    for (const Curve& curve : curves_) shared = std::min(shared, curve.size());
+    // Every point up to 30 cm, then one each 10 cm, so that error bars can be told apart.
+    for (std::size_t bin = 0; bin < shared; bin += distance_of(bin) < 0.299 ? 1 : 5) {
+      std::vector<double> here;
+      for (const Curve& curve : curves_) here.push_back(curve[bin]);
+      add_point(average, distance_of(bin), mean_figure(here));
+    }
+    viewer::LinePlot plot{.title = "Dissimilarity against distance ([M04] figure 7)",
+                          .x_label = "distance between the views [m]",
+                          .y_label = "dissimilarity (1: level of far views)",
+                          .series = single_};
+    plot.series.push_back(average);
+    add_plot(result, folder, "fig07_dissimilarity_distance.svg",
+             "Dissimilarity from one view, as the robot drives away from it (thin), and the mean "
+             "over all pairs of views of all scenes with its 95 % interval: steep and straight at "
+             "first, then bent, then level.",
+             plot);
+    add_row(result, "m04.fig7.noise",
+            "figure 7: dissimilarity of two pictures of one place, as a share of far views",
+            mean_figure(noise_), "");
+    add_row(result, "m04.fig7.linear_range",
+            "figure 7: linear range: largest distance up to which the curve stays within 2 % of "
+            "the level of far views of one straight line (mean over scenes)",
+            mean_figure(linear_m_), "m");
+    add_row(result, "m04.fig7.half",
+            "figure 7: distance at half the level of far views (mean over scenes)",
+            mean_figure(half_m_), "m");
+    add_row(result, "m04.fig7.saturation",
+            "figure 7: distance at 95 % of the level of far views (mean over scenes)",
+            mean_figure(saturation_m_), "m");
+    add_row(result, "m04.fig7.at_25_cm",
+            "figure 7: dissimilarity 25 cm away, as a share of far views", mean_figure(at_grid_),
+            "");
+    add_row(result, "m04.fig7.rise_after_saturation",
+            "figure 7: level at 3 .. 4 m over that at 2 .. 3 m (1: fully saturated)",
+            mean_figure(rise_), "");
+  }
+
+ private:
+  static constexpr std::size_t kLines = 2;
+  static constexpr std::size_t kAgain = 10;  // one view in so many is taken twice
+  static constexpr std::size_t kShown = 5;
+  static constexpr double kTolerance = 0.02;
+
+  std::vector<Curve> curves_;
+  std::vector<viewer::Series> single_;
+  std::vector<double> noise_;
+  std::vector<double> linear_m_;
+  std::vector<double> half_m_;
+  std::vector<double> saturation_m_;
+  std::vector<double> at_grid_;
+  std::vector<double> rise_;
+};
+
+// Similarity of the first query of the first place.
+class SimilaritySurface final : public Experiment {
+ public:
+  void add(const simulation::PlaceRecording& place, Executor& executor) override {
+    const auto references = signatures_of(place.references, m04_components, executor);
+    for (const auto& query : place.queries) {
+      const auto wanted = compute_signature(query.panorama, m04_components);
+      std::vector<double> values;
+      std::vector<double> distances;
+      for (std::size_t i = 0; i < references.size(); ++i) {
+        values.push_back(dissimilarity_l1(wanted, references[i]));
+        distances.push_back(-distance(place.references[i].pose.position(), query.pose.position()));
+      }
+      const auto scaled = similarities(values);
+      correlations_.push_back(rank_correlation(scaled, distances));
+      if (!map_) map_ = surface(place, query.pose.position(), scaled);
+    }
+  }
+
+  void report(const std::filesystem::path& folder, Reproduction& result) const override {
+    require(map_.has_value(), "queries", 0.0, ">= 1");
+    add_plot(
+        result, folder, "fig08_similarity_surface.svg",
+        "Similarity is highest around the place where the view was taken and falls on all sides.",
+        *map_);
+    add_row(result, "m04.fig8.monotony",
+            "figure 8: rank correlation of similarity with nearness over all references (1: it "
+            "falls on all sides; median)",
+            median_figure(correlations_), "");
+  }
+
+ private:
+  static viewer::HeatMap surface(const simulation::PlaceRecording& place, Point2 robot,
+                                 const std::vector<double>& scaled) {
+    Point2 low = place.references.front().pose.position();
+    Point2 high = low;
+    for (const auto& reference : place.references) {
+      const Point2 p = reference.pose.position();
+      low = {std::min(low.x_m, p.x_m), std::min(low.y_m, p.y_m)};
+      high = {std::max(high.x_m, p.x_m), std::max(high.y_m, p.y_m)};
+    }
+    viewer::HeatMap map{
+        .title =
+            "Similarity at every reference view; cross: where the view was taken ([M04] figure 8)",
+        .value_label = "similarity (0 .. 1000)"};
+    map.spacing_m = place.spacing_m;
+    map.first_cell = low;
+    map.columns = static_cast<int>(std::lround((high.x_m - low.x_m) / map.spacing_m)) + 1;
+    map.rows = static_cast<int>(std::lround((high.y_m - low.y_m) / map.spacing_m)) + 1;
+    map.values.assign(static_cast<std::size_t>(map.columns) * map.rows, std::nan(""));
+    for (std::size_t i = 0; i < place.references.size(); ++i) {
+      const Point2 p = place.references[i].pose.position();
+      const auto column = std::lround((p.x_m - low.x_m) / map.spacing_m);
+      const auto row = std::lround((p.y_m - low.y_m) / map.spacing_m);
+      map.values[static_cast<std::size_t>(row) * map.columns + static_cast<std::size_t>(column)] =
+          scaled[i];
+    }
+    map.crosses = {robot};
+    return map;
+  }
+
+  std::optional<viewer::HeatMap> map_;
+  std::vector<double> correlations_;
+};
+
+}  // namespace
+
+std::unique_ptr<Experiment> distance_curve_experiment() {
+  return std::make_unique<DistanceCurve>();
+}
+std::unique_ptr<Experiment> similarity_surface_experiment() {
+  return std::make_unique<SimilaritySurface>();
+}
+
+}  // namespace panonav::lab

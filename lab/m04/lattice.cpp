@@ -1,0 +1,281 @@
+// [M04] section 3: figures 12, 15, 16 and 17, and what the authors expect of a 30 cm grid.
+
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <string>
+
+#include "lab/m04/experiment.hpp"
+#include "lab/m04/lattice_support.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/core/statistics.hpp"
+#include "panonav/core/text.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/geometry/positions.hpp"
+#include "panonav/signature/dissimilarity.hpp"
+#include "panonav_simulation/scenes.hpp"
+#include "panonav_viewer/plot.hpp"
+
+namespace panonav::lab {
+
+namespace {
+
+// The paper's uncertainty of motion: of the distance, and of half a turn.
+constexpr double kDistanceShare = 0.10;
+constexpr double kDirectionShare = 0.15;
+// Springs of the plain lattice: with more, views on opposite sides of a hall that look alike by
+// their magnitudes fold it. Chosen on other scenes (seeds 201 to 205).
+constexpr int kPlainNeighbours = 4;
+
+LatticeOptions plain_options() {
+  return {.neighbours = kPlainNeighbours, .phases = false};
+}
+
+/// What is measured of one way of arranging, over scenes.
+struct Arrangements {
+  std::vector<double> shape;
+  std::vector<double> four_of_eight;
+  std::vector<double> border_pull;
+
+  void add(const GridComparison& comparison, bool mirror_allowed) {
+    shape.push_back(mirror_allowed ? comparison.with_reflection : comparison.shape_difference);
+    four_of_eight.push_back(comparison.four_of_eight);
+    border_pull.push_back(comparison.border_pull);
+  }
+};
+
+void add_rows(const std::string& id, const std::string& what, const Arrangements& measured,
+              bool judged, Reproduction& result) {
+  const auto judge = [&](const Target& target) {
+    return judged ? std::optional(target) : std::nullopt;
+  };
+  add_row(result, id + ".shape", what + ": shape difference mu (median over scenes)",
+          median_figure(measured.shape), "", judge(at_most(0.02)));
+  add_row(result, id + ".four_of_eight",
+          what + ": inner views with their four grid neighbours among their eight nearest",
+          median_figure(measured.four_of_eight), "", judge(at_least(1.0)));
+  add_row(result, id + ".border_pull",
+          what + ": how far views on the border lie inwards, laid over the true ones in equal size",
+          median_figure(measured.border_pull), "spacings");
+}
+
+viewer::MapPlot map_of(const std::string& title, const ViewGrid& grid,
+                       std::span<const Point2> positions) {
+  viewer::MapLayer lines{
+      .label = "", .colour = viewer::PlotColour::grey, .lines = grid_lines(grid, positions)};
+  viewer::MapLayer views{.label = "views", .circles = {positions.begin(), positions.end()}};
+  return {.title = title, .layers = {lines, views}};
+}
+
+std::string with_mu(const std::string& title, double mu) {
+  return title + ", mu " + fixed(mu, 4);
+}
+
+class LatticeExperiment {
+ public:
+  LatticeExperiment(const ReproductionOptions& options, Executor& executor)
+      : options_(options), executor_(executor) {}
+
+  void run_scene(int scene) {
+    const std::uint64_t seed = options_.seed + static_cast<std::uint64_t>(scene);
+    const bool first = scene == 0;
+    unordered_in_hall(seed, first);
+    unordered_in_small_room(seed);
+    with_motion(seed, 10, 0.6, coarse_, coarse_without_phases_, first);
+    if (options_.fine_lattice_every > 0 && scene % options_.fine_lattice_every == 0) {
+      with_motion(seed, 19, 0.3, fine_, fine_without_phases_, first);
+    }
+  }
+
+  void report(Reproduction& result) const {
+    add_rows("m04.fig15.phases", "figure 15: 10 x 8 views at 30 cm in the hall, unordered, phases",
+             phases_, true, result);
+    add_rows("m04.fig15.plain", "figure 15: the same by dissimilarity alone, as published", plain_,
+             false, result);
+    add_rows("m04.fig15.small_room", "10 x 8 views at 30 cm in a room of 4 x 3.5 m, phases",
+             small_room_, false, result);
+    add_row(result, "m04.fig15.turn_error",
+            "section 3.4: error of the turn between neighbours 30 cm apart (median over scenes of "
+            "the median; published: about 10 %)",
+            median_figure(turn_error_deg_), "deg", at_most(2.0), std::pair{18.0, 36.0});
+    for (std::size_t i = 0; i < error_.size(); ++i) {
+      add_row(
+          result, "m04.fig12.error_" + std::to_string(i),
+          "figure 12: error of a distance read as " + to_text(kErrorsAt[i]) + " spacings of 30 cm",
+          median_figure(error_[i]), "spacings");
+    }
+    add_row(result, "m04.fig12.range", "figure 12: largest distance at which views correlate (x_1)",
+            median_figure(range_), "spacings");
+    add_rows(
+        "m04.fig17",
+        "figure 17: 540 x 540 cm zigzag at 60 cm in the periodic hall, coarse motion and phases",
+        coarse_, true, result);
+    add_rows("m04.fig17.without_phases", "figure 17: the same without phases",
+             coarse_without_phases_, false, result);
+    add_rows("m04.fig17.plain", "figure 17: the same by dissimilarity alone: it folds", folded_,
+             false, result);
+    if (options_.fine_lattice_every > 0) {
+      add_rows("m04.fig17.fine", "figure 17 at 30 cm, coarse motion and phases", fine_, true,
+               result);
+      add_rows("m04.fig17.fine.without_phases", "figure 17 at 30 cm, without phases",
+               fine_without_phases_, false, result);
+    }
+    add_row(result, "m04.lattice.time", "section 3: time to arrange 80 views, phases",
+            median_figure(time_ms_), "ms");
+    result.pictures.insert(result.pictures.end(), pictures_.begin(), pictures_.end());
+  }
+
+ private:
+  void unordered_in_hall(std::uint64_t seed, bool drawn) {
+    const auto place =
+        place_of(simulation::make_scene("hall", {.seed = seed}), seed, options_.rows, executor_);
+    const ViewGrid grid = take_grid(place, 10, 8, 0.3, GridHeadings::random, executor_);
+    const auto start = std::chrono::steady_clock::now();
+    const Lattice arranged = arrange(grid.memory, {}, {}, executor_);
+    time_ms_.push_back(
+        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+            .count());
+    const Lattice plain = arrange(grid.memory, plain_options(), {}, executor_);
+    const GridComparison ours = compare_with_grid(grid, arranged);
+    const GridComparison published = compare_with_grid(grid, plain);
+    phases_.add(ours, false);
+    plain_.add(published, true);
+    const auto errors = turn_errors(grid, arranged);
+    if (!errors.empty()) turn_error_deg_.push_back(degrees(median(errors)));
+    const DissimilarityCurve curve = curve_of_all_pairs(grid, arranged);
+    range_.push_back(curve.range());
+    for (std::size_t i = 0; i < error_.size(); ++i) error_[i].push_back(curve.error(kErrorsAt[i]));
+    if (!drawn) return;
+    draw("fig15_lattice.svg",
+         "Views of the hall as they were taken and as they arrange themselves, unordered and "
+         "without motion: by phases, and by dissimilarity alone as published.",
+         {map_of("as taken", grid, positions_of(grid.poses)),
+          map_of(with_mu("phases", ours.shape_difference), grid, ours.aligned),
+          map_of(with_mu("dissimilarity alone", published.with_reflection), grid,
+                 published.aligned)});
+    draw_curve(curve);
+  }
+
+  void unordered_in_small_room(std::uint64_t seed) {
+    const auto place = place_of(small_room(seed), seed, options_.rows, executor_);
+    const ViewGrid grid = take_grid(place, 10, 8, 0.3, GridHeadings::random, executor_);
+    small_room_.add(compare_with_grid(grid, arrange(grid.memory, {}, {}, executor_)), false);
+  }
+
+  void with_motion(std::uint64_t seed, int side, double spacing_m, Arrangements& with,
+                   Arrangements& without, bool drawn) {
+    const auto place = place_of(simulation::make_scene("hall_periodic", {.seed = seed}), seed,
+                                options_.rows, executor_);
+    const ViewGrid grid =
+        take_grid(place, side, side, spacing_m, GridHeadings::along_path, executor_);
+    const auto motion = coarse_motion(grid, kDistanceShare, kDirectionShare, seed);
+    const auto ours = compare_with_grid(grid, arrange(grid.memory, {}, motion, executor_));
+    const auto blind =
+        compare_with_grid(grid, arrange(grid.memory, plain_options(), motion, executor_));
+    with.add(ours, false);
+    without.add(blind, true);
+    const bool coarse = side == 10;
+    std::vector<viewer::MapPlot> panels{
+        map_of(with_mu("motion and phases", ours.shape_difference), grid, ours.aligned),
+        map_of(with_mu("motion without phases", blind.with_reflection), grid, blind.aligned)};
+    if (coarse) {
+      const auto plain =
+          compare_with_grid(grid, arrange(grid.memory, plain_options(), {}, executor_));
+      folded_.add(plain, true);
+      panels.push_back(
+          map_of(with_mu("dissimilarity alone", plain.with_reflection), grid, plain.aligned));
+    }
+    if (!drawn) return;
+    if (coarse) draw_path(grid);
+    draw(coarse ? "fig17_lattice.svg" : "fig17_lattice_30cm.svg",
+         "Periodic hall: with the robot's coarse motion and phases its views come out as they were "
+         "taken; without phases the map bends, and by dissimilarity alone it folds.",
+         panels);
+  }
+
+  /// Distance and error over all pairs of the views, as [M04] figure 12 shows them.
+  [[nodiscard]] static DissimilarityCurve curve_of_all_pairs(const ViewGrid& grid,
+                                                             const Lattice& lattice) {
+    const auto views = grid.memory.views();
+    std::vector<PackedSignature> packed;
+    for (const ViewId view : views) packed.push_back(grid.memory.packed(view));
+    std::vector<DissimilarityAtDistance> pairs;
+    std::vector<double> values;
+    for (std::size_t a = 0; a < views.size(); ++a) {
+      for (std::size_t b = a + 1; b < views.size(); ++b) {
+        const double seen = dissimilarity_packed(packed[a], packed[b]);
+        pairs.push_back(
+            {seen, distance(lattice.nodes[a].pose.position(), lattice.nodes[b].pose.position())});
+        values.push_back(seen);
+      }
+    }
+    return DissimilarityCurve(pairs, quantile(values, 0.9));
+  }
+
+  void draw(const std::string& file, std::string caption,
+            const std::vector<viewer::MapPlot>& panels) {
+    viewer::write_plot(options_.out / file, panels, static_cast<int>(panels.size()));
+    pictures_.push_back({file, std::move(caption)});
+  }
+
+  void draw_path(const ViewGrid& grid) {
+    viewer::MapLayer views{.label = "reference images"};
+    viewer::MapLayer path{.label = "path", .colour = viewer::PlotColour::vermilion};
+    viewer::MapLayer arrows{.label = "heading", .colour = viewer::PlotColour::green};
+    auto& way = path.lines.emplace_back();
+    for (const Pose2& pose : grid.poses) {
+      views.circles.push_back(pose.position());
+      way.push_back(pose.position());
+      arrows.lines.push_back({pose.position(), pose * Point2{0.4 * grid.spacing_m, 0.0}});
+    }
+    viewer::write_plot(options_.out / "fig16_path.svg",
+                       viewer::MapPlot{.title = "Path and headings ([M04] figure 16)",
+                                       .layers = {path, arrows, views}});
+    pictures_.push_back({"fig16_path.svg", "Where the images were taken, along a zigzag."});
+  }
+
+  void draw_curve(const DissimilarityCurve& curve) {
+    viewer::Series error{.label = "error E(x)", .style = viewer::SeriesStyle::lines_and_points};
+    viewer::Series stiffness{.label = "stiffness K(x) (eq. 5)",
+                             .style = viewer::SeriesStyle::lines_and_points};
+    for (const auto& knot : curve.knots()) {
+      error.add(knot.distance, knot.error);
+      stiffness.add(knot.distance, curve.stiffness(knot.distance));
+    }
+    viewer::write_plot(
+        options_.out / "fig12_error_stiffness.svg",
+        viewer::LinePlot{.title =
+                             "Error of the distance read from dissimilarity, and what it makes "
+                             "of springs ([M04] figure 12)",
+                         .x_label = "distance x [spacings of 30 cm]",
+                         .y_label = "E [spacings]; K",
+                         .series = {error, stiffness}});
+    pictures_.push_back({"fig12_error_stiffness.svg",
+                         "Estimated from the views alone: the error grows with the distance, so "
+                         "long springs are weak."});
+  }
+
+  static constexpr std::array<double, 3> kErrorsAt{1.0, 2.0, 3.0};
+
+  const ReproductionOptions& options_;
+  Executor& executor_;
+  Arrangements phases_, plain_, small_room_, coarse_, coarse_without_phases_, folded_, fine_,
+      fine_without_phases_;
+  std::vector<double> turn_error_deg_, range_, time_ms_;
+  std::array<std::vector<double>, kErrorsAt.size()> error_;
+  std::vector<ReproductionPicture> pictures_;
+};
+
+}  // namespace
+
+void reproduce_lattice(const ReproductionOptions& options, Executor& executor,
+                       const std::function<void(const std::string&)>& step, Reproduction& result) {
+  LatticeExperiment experiment(options, executor);
+  for (int scene = 0; scene < options.scenes; ++scene) {
+    step("lattice " + std::to_string(scene + 1) + " of " + std::to_string(options.scenes));
+    experiment.run_scene(scene);
+  }
+  experiment.report(result);
+}
+
+}  // namespace panonav::lab

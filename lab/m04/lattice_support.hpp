@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "panonav/mapping/lattice.hpp"
+#include "panonav_simulation/place_recording.hpp"
+
+namespace panonav::lab {
+
+/// A grid of views in the middle of a scene, along a zigzag as in [M04] figure 16.
+struct ViewGrid {
+  int columns = 0;  ///< along x
+  int rows = 0;     ///< along y
+  double spacing_m = 0.3;
+  std::vector<Pose2> poses;
+  VisualMemory memory;
+};
+
+enum class GridHeadings { random, along_path };
+
+/// Takes the views. `place` needs scene, renderer, rendering and seed only.
+[[nodiscard]] ViewGrid take_grid(const simulation::PlaceRecording& place, int columns, int rows,
+                                 double spacing_m, GridHeadings headings, Executor& executor);
+
+/// A scene as `take_grid` needs it.
+[[nodiscard]] simulation::PlaceRecording place_of(simulation::Scene scene, std::uint64_t seed,
+                                                  int rows, Executor& executor);
+
+/// An empty room of 4 x 3.5 m with pictures, windows and a door on its walls.
+[[nodiscard]] simulation::Scene small_room(std::uint64_t seed);
+
+/// What a robot with coarse sense of its motion says of the path: distance and direction of each
+/// step off by up to so much of their size and of half a turn, evenly, and its turn like its
+/// direction [M04 section 3.4].
+[[nodiscard]] std::vector<CoarseMotion> coarse_motion(const ViewGrid& grid, double distance_share,
+                                                      double direction_share, std::uint64_t seed);
+
+/// How an arrangement compares with the grid that it came from.
+struct GridComparison {
+  double shape_difference = 1.0;  ///< as arranged, without a mirror image
+  double with_reflection = 1.0;   ///< the same when a mirror image is allowed
+  double four_of_eight = 0.0;     ///< share of inner views with all grid neighbours among eight
+  double border_pull = 0.0;       ///< how far border views lie inwards, in spacings, mean
+  std::vector<Point2> aligned;    ///< arranged positions laid over the true ones
+};
+/// Views that are not in the largest component lie where they lie in their own: they count as
+/// wrong.
+[[nodiscard]] GridComparison compare_with_grid(const ViewGrid& grid, const Lattice& lattice);
+
+/// Error of the turns that phases tell between views one spacing apart, rad.
+[[nodiscard]] std::vector<double> turn_errors(const ViewGrid& grid, const Lattice& lattice);
+
+/// The lines between neighbours of the grid, for pictures.
+[[nodiscard]] std::vector<std::vector<Point2>> grid_lines(const ViewGrid& grid,
+                                                          std::span<const Point2> positions);
+
+}  // namespace panonav::lab

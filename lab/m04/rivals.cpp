@@ -1,0 +1,177 @@
+// The ways of recognising places that [M04] argues against (sections 1, 2 and 2.1), as baselines on
+// the same views.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "lab/baselines/rivals.hpp"
+#include "lab/m04/experiment.hpp"
+#include "lab/m04/support.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav_simulation/make_each.hpp"
+#include "panonav_viewer/plot.hpp"
+
+namespace panonav::lab {
+
+namespace {
+
+using MakeRecogniser = std::unique_ptr<RivalRecogniser> (*)();
+constexpr std::array<MakeRecogniser, 6> kMakers{
+    [] { return fourier_signature_recogniser(m04_components); },
+    [] { return grey_histogram_recogniser(); }, [] { return colour_histogram_recogniser(); },
+    // As many numbers a view as the signature has components in a row.
+    [] { return eigenimage_recogniser(m04_components); }, [] { return zero_phase_recogniser(); },
+    [] { return pixels_over_all_turns_recogniser(); }};
+constexpr std::size_t kRivals = kMakers.size();
+// Pixels over all turns take long: so many queries of each scene are enough.
+constexpr std::size_t kQueries = 20;
+
+// The conditions of the other experiments, and less light. No view is preprocessed: the ways differ
+// in what they need, and none gets an advantage.
+std::vector<ViewCondition> rival_conditions() {
+  std::vector<ViewCondition> conditions(view_conditions().begin(), view_conditions().end());
+  conditions.push_back({"dim", "30 % less light", {.exposure = 0.7}});
+  return conditions;
+}
+
+// How far a colour is from grey: the difference between its channels, 0 .. 1.
+double mean_colourfulness(const Image& view) {
+  double sum = 0.0;
+  const auto pixels = view.pixels();
+  for (std::size_t i = 0; i < pixels.size(); i += 3) {
+    const auto [low, high] = std::minmax({pixels[i], pixels[i + 1], pixels[i + 2]});
+    sum += (high - low) / 255.0;
+  }
+  return 3.0 * sum / static_cast<double>(pixels.size());
+}
+
+class Rivals final : public Experiment {
+ public:
+  void add(const simulation::PlaceRecording& place, Executor& executor) override {
+    const simulation::Renderer in_colour(place.scene, {.channels = 3}, executor);
+    const auto references = with_colour(place, in_colour, place.references, {}, 90000U, executor);
+    for (const auto& view : references) colourfulness_.push_back(mean_colourfulness(view.picture));
+    std::array<std::unique_ptr<RivalRecogniser>, kRivals> recognisers;
+    for (std::size_t r = 0; r < kRivals; ++r) {
+      recognisers[r] = kMakers[r]();
+      recognisers[r]->memorise(references);
+      names_[r] = recognisers[r]->name();
+      bytes_[r] = recognisers[r]->bytes_per_view();
+    }
+    const auto conditions = rival_conditions();
+    for (std::size_t condition = 0; condition < conditions.size(); ++condition) {
+      auto views = queries_under(place, conditions[condition], executor);
+      views.resize(std::min(views.size(), kQueries), views.front());
+      const auto queries =
+          with_colour(place, in_colour, views, conditions[condition].sensor, 95000U, executor);
+      if (condition == 0) trials_ += queries.size();
+      for (std::size_t r = 0; r < kRivals; ++r) {
+        std::vector<std::size_t> found(queries.size());
+        auto seconds = simulation::make_each(executor, queries.size(), [&](std::size_t q) {
+          const double start = simulation::thread_seconds();
+          found[q] = recognisers[r]->nearest(queries[q]);
+          return simulation::thread_seconds() - start;
+        });
+        for (std::size_t q = 0; q < found.size(); ++q) {
+          const Point2 position = views[q].pose.position();
+          found_[condition][r] += found[q] == place.nearest_reference(position) ? 1 : 0;
+          near_[condition][r] +=
+              distance(place.references[found[q]].pose.position(), position) <= place.spacing_m ? 1
+                                                                                                : 0;
+          milliseconds_[r].push_back(1000.0 * seconds[q]);
+        }
+      }
+    }
+  }
+
+  void report(const std::filesystem::path& folder, Reproduction& result) const override {
+    require(trials_ >= 1, "queries", 0.0, ">= 1");
+    const auto conditions = rival_conditions();
+    viewer::LinePlot plot{.title = "Nearest reference found, by way of recognising places",
+                          .x_label = "",
+                          .y_label = "share of queries",
+                          .series = {},
+                          .x_range = std::pair{-0.6, static_cast<double>(kRivals) - 0.4},
+                          .y_range = std::pair{0.0, 1.05}};
+    plot.x_tick_labels.assign(names_.begin(), names_.end());
+    for (std::size_t condition = 0; condition < conditions.size(); ++condition) {
+      viewer::Series marks{.label = conditions[condition].name,
+                           .style = viewer::SeriesStyle::points};
+      for (std::size_t r = 0; r < kRivals; ++r) {
+        const Proportion exact = success_rate(found_[condition][r], trials_);
+        const Proportion near = success_rate(near_[condition][r], trials_);
+        add_point(marks, static_cast<double>(r) + 0.12 * (static_cast<double>(condition) - 1.5),
+                  exact);
+        const std::string& name = conditions[condition].name;
+        add_rival_row(r, conditions[condition].id + ".found", "nearest reference found, " + name,
+                      exact, "", result);
+        add_rival_row(r, conditions[condition].id + ".near",
+                      "a reference within one spacing found, " + name, near, "", result);
+      }
+      plot.series.push_back(std::move(marks));
+    }
+    for (std::size_t r = 0; r < kRivals; ++r) {
+      add_rival_row(r, "bytes", "bytes a view", bytes_[r], "B", result);
+      add_rival_row(r, "time", "processor time a query, image to answer (median)",
+                    median(milliseconds_[r]), "ms", result);
+    }
+    add_row(result, "m04.rivals.colourfulness",
+            "rivals: difference between the colour channels of a pixel (mean; 0: grey, 1: pure "
+            "colours)",
+            mean_figure(colourfulness_), "");
+    add_plot(result, folder, "rivals.svg",
+             "The Fourier signature beside what the paper argues against, on the same views.",
+             plot);
+  }
+
+ private:
+  static constexpr std::size_t kConditions = 4;
+
+  // The views with their picture in colour, taken at the same pose by the same kind of sensor.
+  static std::vector<RivalView> with_colour(const simulation::PlaceRecording& place,
+                                            const simulation::Renderer& in_colour,
+                                            const std::vector<simulation::PlacedView>& views,
+                                            const simulation::SensorOptions& sensor,
+                                            std::uint64_t noise, Executor& executor) {
+    const Camera camera{.model = EquirectangularModel{place.rendering.elevations.bottom_rad,
+                                                      place.rendering.elevations.top_rad},
+                        .image_size = {place.rendering.columns, place.rendering.rows}};
+    return simulation::make_each(executor, views.size(), [&](std::size_t i) {
+      Executor here(1);
+      const simulation::Radiance light =
+          in_colour.render_image({.pose = views[i].pose, .height_m = place.scene.camera_height_m},
+                                 camera, place.rendering.rays_per_axis, here);
+      return RivalView{
+          views[i].panorama,
+          simulation::apply_sensor(light, camera, sensor, place.seed * 100003U + noise + i)};
+    });
+  }
+
+  void add_rival_row(std::size_t rival, const std::string& key, const std::string& what,
+                     const Figure& ours, const std::string& unit, Reproduction& result) const {
+    std::string id = names_[rival];
+    std::ranges::replace(id, ' ', '_');
+    add_row(result, "m04.rivals." + id + "." + key, "rivals: " + names_[rival] + ", " + what, ours,
+            unit);
+  }
+
+  std::size_t trials_ = 0;
+  std::array<std::string, kRivals> names_;
+  std::array<double, kRivals> bytes_{};
+  std::array<std::array<std::size_t, kRivals>, kConditions> found_{};
+  std::array<std::array<std::size_t, kRivals>, kConditions> near_{};
+  std::array<std::vector<double>, kRivals> milliseconds_;
+  std::vector<double> colourfulness_;
+};
+
+}  // namespace
+
+std::unique_ptr<Experiment> rivals_experiment() {
+  return std::make_unique<Rivals>();
+}
+
+}  // namespace panonav::lab

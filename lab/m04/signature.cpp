@@ -1,0 +1,193 @@
+// [M04] figures 4 and 5, and table 1 of [M03]: what the Fourier signature is and keeps.
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include "lab/m04/experiment.hpp"
+#include "lab/m04/support.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/core/statistics.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/signature/compass.hpp"
+#include "panonav/signature/dissimilarity.hpp"
+#include "panonav_viewer/plot.hpp"
+
+namespace panonav::lab {
+
+namespace {
+
+std::vector<double> mean_power(const Panorama& view, int components) {
+  const FourierSignature signature = compute_signature(view, components);
+  std::vector<double> power(static_cast<std::size_t>(components));
+  for (int k = 0; k < components; ++k) {
+    for (int y = 0; y < signature.rows(); ++y) {
+      const double magnitude = signature.magnitude(y, k);
+      power[static_cast<std::size_t>(k)] += magnitude * magnitude / signature.rows();
+    }
+  }
+  return power;
+}
+
+// Slope of log power against log k, k = 1 .. last, by least squares.
+double spectrum_slope(const std::vector<double>& power, int last) {
+  double n = 0.0;
+  double sx = 0.0;
+  double sy = 0.0;
+  double sxx = 0.0;
+  double sxy = 0.0;
+  for (int k = 1; k <= last; ++k) {
+    const double x = std::log(k);
+    const double y = std::log(power[static_cast<std::size_t>(k)]);
+    n += 1.0;
+    sx += x;
+    sy += y;
+    sxx += x * x;
+    sxy += x * y;
+  }
+  return (n * sxy - sx * sy) / (n * sxx - sx * sx);
+}
+
+class RotationalInvariance final : public Experiment {
+ public:
+  void add(const simulation::PlaceRecording& place, Executor& executor) override {
+    // Pairs of references one spacing apart; in the raster the next one is, but for row ends.
+    std::vector<std::size_t> firsts;
+    for (std::size_t i = 0; i + 1 < place.references.size() && firsts.size() < kPlaces; ++i) {
+      const double step =
+          distance(place.references[i].pose.position(), place.references[i + 1].pose.position());
+      if (step < 1.01 * place.spacing_m) firsts.push_back(i);
+    }
+    Random random(place.seed, 78);
+    std::vector<double> turns_rad;
+    std::vector<Pose2> turned;
+    for (const std::size_t i : firsts) {
+      turns_rad.push_back(random.uniform(-std::numbers::pi, std::numbers::pi));
+      Pose2 pose = place.references[i].pose;
+      pose.heading_rad = wrap_angle(pose.heading_rad + turns_rad.back());
+      turned.push_back(pose);
+    }
+    // A second picture at the same place: other noise and another heading, not a shifted copy.
+    const auto again =
+        signatures_of(simulation::take_views(place, place.rendering, turned,
+                                             place.seed * 100003U + 60000U, {}, executor),
+                      m04_components, executor);
+    for (std::size_t i = 0; i < firsts.size(); ++i) {
+      const auto here = compute_signature(place.references[firsts[i]].panorama, m04_components);
+      const auto there =
+          compute_signature(place.references[firsts[i] + 1].panorama, m04_components);
+      ratios_.push_back(dissimilarity_l1(here, again[i]) / dissimilarity_l1(here, there));
+      if (const auto reading = compass(again[i], here)) {
+        heading_errors_deg_.push_back(
+            degrees(std::abs(angle_difference(reading->heading_rad, turns_rad[i]))));
+      }
+      const auto across = compass(again[i], there);
+      if (across && std::abs(turns_rad[i]) > kLeastTurnRad) {
+        relative_errors_.push_back(
+            std::abs(angle_difference(across->heading_rad, turns_rad[i]) / turns_rad[i]));
+      }
+    }
+  }
+
+  void report(const std::filesystem::path&, Reproduction& result) const override {
+    add_row(result, "m04.fig4.turn_against_step",
+            "figure 4: dissimilarity after a turn on the spot, as a share of that to the next "
+            "reference 25 cm away (median)",
+            median_figure(ratios_), "", at_most(0.5));
+    add_row(result, "m04.fig4.heading_error",
+            "figure 4: error of the turn read from the phases (median)",
+            median_figure(heading_errors_deg_), "deg", at_most(1.0));
+    add_row(result, "m04.heading_error_apart",
+            "section 3.4: error of the heading between views 25 cm apart, as a share of the "
+            "difference in heading (median)",
+            median_figure(relative_errors_), "", at_most(0.1), std::pair{0.1, 0.1});
+  }
+
+ private:
+  static constexpr std::size_t kPlaces = 40;
+  static constexpr double kLeastTurnRad = 0.1;  // below it a share says nothing
+  std::vector<double> ratios_;
+  std::vector<double> relative_errors_;
+  std::vector<double> heading_errors_deg_;
+};
+
+class PowerSpectrum final : public Experiment {
+ public:
+  void add(const simulation::PlaceRecording& place, Executor&) override {
+    const int all_components = place.rendering.columns / 2;
+    total_.resize(static_cast<std::size_t>(all_components));
+    for (const auto& query : place.queries) {
+      const auto power = mean_power(query.panorama, all_components);
+      double all = 0.0;
+      double first = 0.0;
+      for (std::size_t k = 1; k < power.size(); ++k) {
+        all += power[k];
+        if (k < m04_components) first += power[k];
+      }
+      shares_.push_back(first / all);
+      for (std::size_t k = 0; k < power.size(); ++k) total_[k] += power[k];
+      if (one_.empty()) one_ = power;
+    }
+  }
+
+  void report(const std::filesystem::path& folder, Reproduction& result) const override {
+    require(!shares_.empty(), "views", 0.0, ">= 1");
+    viewer::LinePlot plot{
+        .title = "Power spectrum of the panoramic cylinder, mean over rows ([M04] figure 5)",
+        .x_label = "frequency k [cycles per turn]",
+        .y_label = "power A_k^2 [squared brightness]",
+        .series = {},
+        .log_y = true};
+    viewer::Series single{.label = "one view", .style = viewer::SeriesStyle::lines_and_points};
+    viewer::Series average{.label = "mean of " + std::to_string(shares_.size()) + " views"};
+    for (int k = 1; k <= kShown; ++k) {
+      single.add(k, one_[static_cast<std::size_t>(k)]);
+      average.add(k, total_[static_cast<std::size_t>(k)] / static_cast<double>(shares_.size()));
+    }
+    plot.series = {single, average};
+    add_plot(result, folder, "fig05_power_spectrum.svg",
+             "Power falls steeply with frequency: the first 15 components hold most of it.", plot);
+    add_row(result, "m04.fig5.share_15",
+            "figure 5: share of the power (without k = 0) in the first 15 components (median)",
+            median_figure(shares_), "", at_least(0.5));
+    add_row(result, "m04.fig5.slope",
+            "slope of the power spectrum, k = 1 .. 30 ([S06] reports about 1.8)",
+            -spectrum_slope(total_, kShown), "", std::nullopt, std::pair{1.8, 1.8});
+  }
+
+ private:
+  static constexpr int kShown = 30;
+  std::vector<double> total_;
+  std::vector<double> one_;
+  std::vector<double> shares_;
+};
+
+}  // namespace
+
+void reproduce_memory_table(Reproduction& result) {
+  const Image raw(640, 480, 3);
+  const int cylinder_channels = 3;
+  const Panorama cylinder(80, 512, std::nullopt);
+  const PackedSignature packed = pack(compute_signature(cylinder, 15), 1.0F);
+  const auto row = [&](std::string id, std::string what, double published, double bits) {
+    add_row(result, "m04." + id, what, bits / 1000.0, "kbit",
+            Target{Comparison::at_most, published * 1.015}, std::pair{published, published});
+  };
+  row("table1.raw", "[M03] table 1: raw colour image, 640 x 480", 7300.0,
+      8.0 * static_cast<double>(raw.pixels().size()));
+  row("table1.cylinder", "[M03] table 1: panoramic cylinder, 512 x 80, in colour", 980.0,
+      8.0 * cylinder_channels * static_cast<double>(cylinder.values().size()));
+  row("table1.signature", "[M03] table 1: Fourier signature, packed", 19.0,
+      8.0 * static_cast<double>(packed.magnitudes.size() + packed.phases.size()));
+}
+
+std::unique_ptr<Experiment> rotational_invariance_experiment() {
+  return std::make_unique<RotationalInvariance>();
+}
+std::unique_ptr<Experiment> power_spectrum_experiment() {
+  return std::make_unique<PowerSpectrum>();
+}
+
+}  // namespace panonav::lab

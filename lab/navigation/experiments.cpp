@@ -1,0 +1,420 @@
+#include "lab/navigation/experiments.hpp"
+#include "panonav_simulation/make_each.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <numeric>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "lab/rows.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/core/statistics.hpp"
+#include "panonav/motion/path.hpp"
+#include "panonav/route/route_place.hpp"
+#include "panonav_simulation/mapping_run.hpp"
+#include "panonav_simulation/mission.hpp"
+#include "panonav_simulation/recording.hpp"
+#include "panonav_simulation/scenes.hpp"
+#include "panonav_simulation/screen.hpp"
+#include "panonav_simulation/worlds.hpp"
+#include "panonav_viewer/mission_picture.hpp"
+
+namespace panonav::lab {
+
+namespace {
+
+// Of every second variant; the others have as much more light.
+constexpr double light_change = 0.3;
+constexpr double moved_share = 0.1;
+// References along a drive, and how long that is.
+constexpr double drive_spacing_m = 0.25;
+constexpr double drive_m = 60.0;
+// What a start beside a drive is off, as where a robot is set down by hand.
+constexpr double beside_drive_m = 0.3;
+
+// What is measured of missions of one kind.
+struct Measures {
+  std::size_t runs = 0;
+  std::size_t arrived = 0;
+  std::size_t wrongly = 0;  // says that it arrived, but is elsewhere
+  std::map<NavigationState, std::size_t> ends;
+  std::vector<double> lengths;  // of those that arrived, over the shortest
+  std::vector<double> steps;
+  double bytes_read = 0.0;  // by all steps
+
+  void add(const std::vector<simulation::MissionRun>& missions, double radius_m) {
+    for (const simulation::MissionRun& run : missions) {
+      ++runs;
+      const bool arrives = run.arrives(radius_m);
+      arrived += static_cast<std::size_t>(arrives);
+      wrongly += static_cast<std::size_t>(!arrives && run.end == NavigationState::arrived);
+      ++ends[run.end];
+      steps.push_back(static_cast<double>(run.decisions.size()));
+      for (const NavigationDecision& step : run.decisions) {
+        bytes_read += static_cast<double>(step.bytes_read);
+      }
+      if (arrives && run.shortest_m > 0.0) lengths.push_back(run.travelled_m / run.shortest_m);
+    }
+  }
+
+  [[nodiscard]] double bytes_per_step() const {
+    return bytes_read / std::accumulate(steps.begin(), steps.end(), 0.0);
+  }
+};
+
+void report(const std::string& id, const std::string& what, const Measures& measured,
+            std::optional<Target> arrival, std::optional<Target> length, Reproduction& result) {
+  add_rate(result, id + ".arrived", what + ": arrive within half the reference spacing",
+           measured.arrived, measured.runs, arrival);
+  result.rows.back().reason = simulation::other_ends(measured.ends, measured.wrongly);
+  if (!measured.lengths.empty()) {
+    add_median(result, id + ".length", what + ": way driven against the shortest", "",
+               measured.lengths, length);
+  }
+  add_rate(result, id + ".wrongly", what + ": say that they arrived, and are farther off",
+           measured.wrongly, measured.runs);
+  for (const auto& [end, count] : measured.ends) {
+    if (end == NavigationState::arrived) continue;
+    add_rate(result, id + "." + std::string(name_of(end)),
+             what + ": end as " + std::string(name_of(end)), count, measured.runs);
+  }
+  add_median(result, id + ".steps", what + ": steps", "", measured.steps);
+}
+
+int runs_of(const NavigationReproductionOptions& options, int scene) {
+  return options.runs / options.scenes + (scene < options.runs % options.scenes ? 1 : 0);
+}
+
+void draw(const NavigationReproductionOptions& options, const std::string& name,
+          const simulation::MissionPlace& place, const simulation::RememberedPlace& remembered,
+          const simulation::Mission& mission, const simulation::MissionRun& run,
+          Reproduction& result) {
+  const std::string file = "mission_" + name + ".svg";
+  viewer::write_mission_picture(options.out / file, name + "", place, remembered, {}, mission.goal,
+                                run);
+  result.pictures.push_back(
+      {file, "A mission in " + name +
+                 ": every reference view says in which direction the goal lies; the robot takes "
+                 "the direction of the one it is nearest to and looks again."});
+}
+
+simulation::Scene scene_of(const NavigationReproductionOptions& options, const std::string& name,
+                           const simulation::SceneVariation& variation) {
+  const auto names = simulation::scene_names();
+  if (std::ranges::find(names, name) != names.end()) return simulation::make_scene(name, variation);
+  simulation::Scene scene = simulation::read_world(options.data, name);
+  if (variation.light != 1.0) simulation::scale_light(scene, variation.light);
+  return scene;
+}
+
+// A drive of `drive_m`: the scene's round trip again and again, or ways between random places with
+// 10 cm to spare beside the robot.
+std::vector<Pose2> exploring_drive(const simulation::MissionPlace& place, std::uint64_t seed) {
+  Random random(seed, 5);
+  simulation::FreeSpaceOptions roomy = simulation::free_space_options(place.scene);
+  roomy.robot_radius_m += 0.1;
+  const simulation::FreeSpace space(place.scene, roomy);
+  std::vector<Point2> way;
+  while (path_length_m(way) < drive_m) {
+    if (place.scene.tour.empty()) {
+      way.push_back(space.random_pose(random).position());
+    } else {
+      way.insert(way.end(), place.scene.tour.begin(), place.scene.tour.end());
+    }
+  }
+  std::vector<Pose2> poses;
+  for (const simulation::RecordedPose& pose :
+       simulation::plan_recording(place.scene, space,
+                                  {.path = simulation::RecordingPath::tour,
+                                  .heading = simulation::RecordingHeading::path,
+                                  .spacing_m = drive_spacing_m},
+                                  {}, seed, way)) {
+    poses.push_back(pose.pose);
+  }
+  poses.resize(std::min(poses.size(), static_cast<std::size_t>(drive_m / drive_spacing_m) + 1));
+  return poses;
+}
+
+// The scene with screens as high as a robot across the way.
+simulation::Scene with_screens(simulation::Scene scene, std::span<const Pose2> across,
+                               double width_m) {
+  for (const Pose2& at : across) simulation::add_screen(scene, at, width_m, 1.0);
+  return scene;
+}
+
+// How wide screens must be so that no way leads past them; empty: none of these widths does it and
+// leaves room at both ends. At a corner a way leads past screens that shut a straight way.
+std::optional<double> shutting_width_m(const simulation::Scene& scene,
+                                       std::span<const Pose2> across, Point2 from, Point2 to) {
+  for (const double width_m : {2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0}) {
+    const simulation::Scene shut = with_screens(scene, across, width_m);
+    const simulation::FreeSpaceOptions room = simulation::free_space_options(shut);
+    const simulation::FreeSpace largest(shut, room);
+    const double min_m = room.robot_radius_m + 2.0 * room.cell_m;
+    if (largest.clearance_m(from) < min_m || largest.clearance_m(to) < min_m) break;
+    if (!simulation::FreeSpace(shut, room, from).is_free(to)) return width_m;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+void reproduce_grid_missions(const NavigationReproductionOptions& options, const std::string& scene,
+                             double spacing_m, Executor& executor, Reproduction& result) {
+  Measures measured;
+  for (int i = 0; i < options.scenes; ++i) {
+    const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
+    const simulation::MissionPlace place =
+        simulation::make_mission_place(simulation::make_scene(scene, {.seed = seed}), executor);
+    const simulation::RememberedPlace remembered =
+        simulation::remember_grid(place, spacing_m, Random(seed, 1).next(), executor);
+    const auto missions = simulation::random_missions(
+        place, remembered, {.count = runs_of(options, i)}, Random(seed, 2).next());
+    simulation::MissionOptions mission;
+    mission.base.drive = i % 2 == 0 ? DriveKind::differential : DriveKind::holonomic;
+    const auto runs = simulation::run_missions(place, remembered, missions, mission,
+                                               Random(seed, 3).next(), executor);
+    measured.add(runs, 0.5 * spacing_m);
+    if (i == 0) draw(options, scene, place, remembered, missions.front(), runs.front(), result);
+  }
+  report("m04.fig18." + scene,
+         "figure 18: " + scene + ", references every " + centimetres(spacing_m) +
+             " arranged by similarity alone",
+         measured, at_least(0.98), at_most(1.3), result);
+}
+
+void reproduce_drive_missions(const NavigationReproductionOptions& options,
+                              const std::string& scene, Executor& executor, Reproduction& result) {
+  Measures same;
+  Measures changed;
+  Measures kidnapped;
+  Measures believed;
+  for (int i = 0; i < options.scenes; ++i) {
+    const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
+    simulation::SceneVariation variation{.seed = seed};
+    const simulation::MissionPlace place =
+        simulation::make_mission_place(scene_of(options, scene, variation), executor);
+    const simulation::RememberedPlace remembered =
+        simulation::remember_drive(place, exploring_drive(place, seed), simulation::cheap_wheels(),
+                                   Random(seed, 1).next(), executor);
+    variation.light = i % 2 == 0 ? 1.0 - light_change : 1.0 + light_change;
+    variation.moved_objects = moved_share;
+    variation.moved_seed = Random(seed, 4).next();
+    const simulation::MissionPlace other =
+        simulation::make_mission_place(scene_of(options, scene, variation), executor);
+    simulation::MissionOptions mission;
+    mission.base.drive = i % 2 == 0 ? DriveKind::differential : DriveKind::holonomic;
+    const double radius_m = 0.5 * remembered.spacing_m;
+    const auto run = [&](const simulation::MissionPlace& where, bool is_kidnapped,
+                         std::uint64_t stream, Measures& measures) {
+      const auto missions = simulation::random_missions(
+          where, remembered,
+          {.count = runs_of(options, i), .beside_m = beside_drive_m, .kidnapped = is_kidnapped},
+          Random(seed, stream).next());
+      const auto runs = simulation::run_missions(where, remembered, missions, mission,
+                                                 Random(seed, stream + 1).next(), executor);
+      measures.add(runs, radius_m);
+      if (i == 0 && &measures == &same) {
+        draw(options, scene, where, remembered, missions.front(), runs.front(), result);
+      }
+    };
+    run(place, false, 5, same);
+    run(other, false, 7, changed);
+    run(place, true, 9, kidnapped);
+    if (scene == "corridor") {
+      // The missions of before, so that both can be compared.
+      mission.monte_carlo = true;
+      run(place, true, 9, believed);
+    }
+  }
+  const std::string what = scene + ", map of a drive of 60 m";
+  report("navigation." + scene, what, same, at_least(0.95), std::nullopt, result);
+  const bool movable =
+      std::ranges::find(simulation::scene_names(), scene) != simulation::scene_names().end();
+  report("navigation." + scene + ".changed",
+         what + (movable ? ", light changed by 30 % and 10 % of the objects moved"
+                         : ", light changed by 30 %"),
+         changed, at_least(0.9), std::nullopt, result);
+  report("navigation." + scene + ".kidnapped", what + ", kidnapped half way", kidnapped,
+         at_least(0.9), std::nullopt, result);
+  if (believed.runs > 0) {
+    report("navigation." + scene + ".monte_carlo",
+           what + ", the same missions with Monte-Carlo localisation where the place is in doubt",
+           believed, std::nullopt, std::nullopt, result);
+  }
+}
+
+void reproduce_tours(const NavigationReproductionOptions& options, Executor& executor,
+                     Reproduction& result) {
+  constexpr int goals_a_tour = 5;
+  constexpr int people = 3;
+  struct Kind {
+    std::string id;
+    std::string what;
+    simulation::MissionOptions options;
+    Measures measures;
+  };
+  std::vector<Kind> kinds{
+      {"tour", "one goal after the other", {}, {}},
+      {"people", "the same with three people who walk about", {}, {}},
+      {"accurate", "the same with all components compared at each step", {}, {}}};
+  kinds[1].options.people = people;
+  kinds[2].options.navigator.coarse_components = 0;
+  for (int i = 0; i < options.scenes; ++i) {
+    const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
+    const simulation::MissionPlace place =
+        simulation::make_mission_place(simulation::make_scene("loop", {.seed = seed}), executor);
+    const simulation::RememberedPlace remembered =
+        simulation::remember_drive(place, exploring_drive(place, seed), simulation::cheap_wheels(),
+                                   Random(seed, 1).next(), executor);
+    const AreaPlanner planner(remembered.graph);
+    const MemoryViewSource source(remembered.memory);
+    const int tours = (runs_of(options, i) + goals_a_tour - 1) / goals_a_tour;
+    const auto missions = simulation::random_missions(
+        place, remembered, {.count = tours * goals_a_tour, .beside_m = beside_drive_m},
+        Random(seed, 12).next());
+    for (Kind& kind : kinds) {
+      auto runs =
+          simulation::make_each(executor, static_cast<std::size_t>(tours), [&](std::size_t t) {
+            std::vector<ViewId> goals;
+            for (std::size_t k = 0; k < goals_a_tour; ++k) {
+              goals.push_back(missions[t * goals_a_tour + k].goal);
+            }
+            Navigator navigator(source, planner, kind.options.navigator);
+            return simulation::run_tour(place, remembered, navigator,
+                                        missions[t * goals_a_tour].start, goals, kind.options,
+                                        Random(seed, 200 + t).next());
+          });
+      for (const auto& tour : runs) kind.measures.add(tour, 0.5 * remembered.spacing_m);
+    }
+  }
+  for (const Kind& kind : kinds) {
+    report("navigation." + kind.id, "loop, tours of five goals, " + kind.what, kind.measures,
+           std::nullopt, std::nullopt, result);
+    add_row(result, "navigation." + kind.id + ".read",
+            "loop, tours of five goals, " + kind.what +
+                ": read of signatures and index by a step, mean",
+            1e-3 * kind.measures.bytes_per_step(), "kB");
+  }
+}
+
+void reproduce_route_missions(const NavigationReproductionOptions& options, Executor& executor,
+                              Reproduction& result) {
+  struct Kind {
+    std::string id;
+    std::string what;
+    Measures measures;
+    std::vector<double> off_m;  // from the way that was driven before
+  };
+  std::vector<Kind> kinds{{"route", "with the route recorded on it", {}, {}},
+                          {"without_route", "the same missions without the route", {}, {}}};
+  std::vector<double> on_route_m;
+  std::map<NavigationEvent, std::size_t> events;
+  for (int i = 0; i < options.scenes; ++i) {
+    const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
+    simulation::MissionPlace place =
+        simulation::make_mission_place(simulation::make_scene("loop", {.seed = seed}), executor);
+    place.line = simulation::mirror_lines(place);
+    const auto drive = exploring_drive(place, seed);
+    simulation::RememberedPlace remembered = simulation::remember_drive(
+        place, drive, simulation::cheap_wheels(), Random(seed, 1).next(), executor);
+    const auto missions = simulation::random_missions(
+        place, remembered, {.count = runs_of(options, i), .beside_m = beside_drive_m},
+        Random(seed, 13).next());
+    for (Kind& kind : kinds) {
+      const auto runs = simulation::run_missions(place, remembered, missions, {},
+                                                 Random(seed, 14).next(), executor);
+      kind.measures.add(runs, 0.5 * remembered.spacing_m);
+      for (const simulation::MissionRun& run : runs) {
+        for (std::size_t step = 0; step < run.decisions.size(); ++step) {
+          const double off_m = std::abs(place_on_route(drive, run.path[step].position()).lateral_m);
+          kind.off_m.push_back(off_m);
+          if (run.decisions[step].on_route) on_route_m.push_back(off_m);
+          for (const NavigationEvent event : run.decisions[step].events) ++events[event];
+        }
+      }
+      remembered.routes.clear();
+    }
+  }
+  const std::string map = "loop, map of a drive of 60 m, ";
+  for (const Kind& kind : kinds) {
+    report("navigation." + kind.id, map + kind.what, kind.measures, std::nullopt, std::nullopt,
+           result);
+    add_median(result, "navigation." + kind.id + ".off",
+               map + kind.what + ": distance from the way that was driven", "m", kind.off_m);
+  }
+  const std::string what = map + kinds.front().what;
+  add_rate(result, "navigation.route.share", what + ": steps on a leg along the route",
+           on_route_m.size(), kinds.front().off_m.size());
+  if (on_route_m.empty()) return;
+  add_rate(result, "navigation.route.left", what + ": legs that did not come to their end",
+           events[NavigationEvent::route_left], events[NavigationEvent::route]);
+  add_median(result, "navigation.route.leg_off",
+             what + ": distance from the way that was driven, on a leg", "m", on_route_m);
+}
+
+void reproduce_blocked_missions(const NavigationReproductionOptions& options, Executor& executor,
+                                Reproduction& result) {
+  Measures around;
+  Measures shut;
+  for (int i = 0; i < options.scenes; ++i) {
+    const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
+    const simulation::Scene scene = simulation::make_scene("loop", {.seed = seed});
+    const simulation::MissionPlace place = simulation::make_mission_place(scene, executor);
+    const auto way = exploring_drive(place, seed);
+    const simulation::RememberedPlace remembered = simulation::remember_drive(
+        place, way, simulation::cheap_wheels(), Random(seed, 1).next(), executor);
+    double tour_m = 0.0;
+    for (std::size_t k = 0; k < scene.tour.size(); ++k) {
+      tour_m += distance(scene.tour[k], scene.tour[(k + 1) % scene.tour.size()]);
+    }
+    const auto round = static_cast<std::size_t>(tour_m / drive_spacing_m);
+    Random random(seed, 11);
+    for (int k = 0; k < runs_of(options, i);) {
+      // A quarter of the round trip apart, the screen half way between; the other one on the
+      // opposite side.
+      const std::size_t start = random.index(round);
+      const std::size_t goal = (start + round / 4) % round;
+      const std::array<Pose2, 2> screens{way[(start + round / 8) % round],
+                                         way[(start + round / 8 + round / 2) % round]};
+      const simulation::Mission mission{remembered.graph.view(goal), way[start], {}};
+      const auto width_m =
+          shutting_width_m(scene, screens, mission.start.position(), way[goal].position());
+      if (!width_m) continue;
+      for (const bool both : {false, true}) {
+        const simulation::MissionPlace now = simulation::make_mission_place(
+            with_screens(scene, std::span(screens).first(both ? 2 : 1), *width_m), executor,
+            mission.start.position());
+        const auto runs = simulation::run_missions(
+            now, remembered, {mission}, {},
+            Random(seed, 100 + static_cast<std::uint64_t>(k)).next(), executor);
+        (both ? shut : around).add(runs, 0.5 * remembered.spacing_m);
+        if (i == 0 && k == 0 && !both) {
+          draw(options, "loop_blocked", now, remembered, mission, runs.front(), result);
+        }
+      }
+      ++k;
+    }
+  }
+  const std::string what = "loop, a screen across the way";
+  report("navigation.blocked", what + ", another way round", around, at_least(0.9), std::nullopt,
+         result);
+  add_rate(result, "navigation.shut.unreachable", what + " on both sides: told unreachable",
+           shut.ends[NavigationState::unreachable], shut.runs, at_least(0.9));
+  result.rows.back().reason =
+      simulation::other_ends(shut.ends, shut.wrongly, NavigationState::unreachable);
+  add_rate(result, "navigation.shut.arrived", what + " on both sides: say that they arrived",
+           shut.ends[NavigationState::arrived], shut.runs);
+  add_median(result, "navigation.shut.steps", what + " on both sides: steps until told", "",
+             shut.steps);
+  add_row(result, "navigation.shut.max_steps", what + " on both sides: steps, most",
+          *std::ranges::max_element(shut.steps), "");
+}
+
+}  // namespace panonav::lab

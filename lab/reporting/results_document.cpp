@@ -1,0 +1,125 @@
+#include "lab/reporting/results_document.hpp"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+namespace panonav::lab {
+
+namespace {
+
+std::string counted(std::size_t count, const std::string& one, const std::string& many) {
+  return std::to_string(count) + " " + (count == 1 ? one : many);
+}
+
+// Characters that Markdown would take for its own.
+std::string plain(const std::string& text) {
+  std::string result;
+  for (const char c : text) {
+    if (std::string_view("\\`*_[]<>").find(c) != std::string_view::npos) result += '\\';
+    result += c;
+  }
+  return result;
+}
+
+// An item of a list, broken between words.
+std::string list_item(const std::string& text) {
+  constexpr std::size_t width = 120;
+  std::string result = "-";
+  std::size_t column = result.size();
+  std::istringstream words(text);
+  for (std::string word; words >> word;) {
+    if (column + 1 + word.size() > width) {
+      result += "\n ";
+      column = 1;
+    }
+    result += " " + word;
+    column += 1 + word.size();
+  }
+  return result + "\n";
+}
+
+// "**what**: 0.02 (0.01 .. 0.03) m, median of 20; published 0.04; target at most 0.1: holds."
+std::string row_line(const ResultRow& row) {
+  std::string text = "**" + plain(row.what) + "**: " + shown_figure(row);
+  if (!row.over.empty()) text += ", " + plain(row.over);
+  if (row.published) text += "; published " + shown_published(row);
+  return text + "; target " + shown_target(row) + (row.holds() ? ": holds." : ": **missed**.");
+}
+
+}  // namespace
+
+TargetCount count_targets(const ResultsDocument& document) {
+  TargetCount all;
+  for (const PaperResults& paper : document.papers) {
+    const TargetCount count = count_targets(paper.rows);
+    all.judged += count.judged;
+    all.held += count.held;
+  }
+  return all;
+}
+
+std::size_t put_targets_first(std::vector<ResultRow>& rows) {
+  const auto others = std::stable_partition(
+      rows.begin(), rows.end(), [](const ResultRow& row) { return row.target.has_value(); });
+  return static_cast<std::size_t>(others - rows.begin());
+}
+
+std::vector<std::string> miss_lines(const ResultsDocument& document) {
+  std::vector<std::string> lines;
+  for (const PaperResults& paper : document.papers) {
+    for (const ResultRow& row : paper.rows) {
+      if (!row.target || row.holds()) continue;
+      lines.push_back(paper.paper + ": " + row.what + ": " + shown_figure(row) + ", target " +
+                      shown_target(row) + ": missed " + miss_text(row) + ".");
+    }
+  }
+  return lines;
+}
+
+std::string to_json(const ResultsDocument& document) {
+  const TargetCount count = count_targets(document);
+  nlohmann::ordered_json papers = nlohmann::ordered_json::object();
+  for (const PaperResults& paper : document.papers) {
+    papers[paper.paper] = nlohmann::ordered_json::parse(to_json(paper.rows));
+  }
+  const nlohmann::ordered_json object{{"version", document.version},
+                                      {"command", document.command},
+                                      {"targets", count.judged},
+                                      {"held", count.held},
+                                      {"papers", papers}};
+  return object.dump(1) + "\n";
+}
+
+std::string to_markdown(const ResultsDocument& document) {
+  const TargetCount count = count_targets(document);
+  std::size_t rows = 0;
+  for (const PaperResults& paper : document.papers) rows += paper.rows.size();
+  std::string text = "# Results: published and measured\n\n";
+  text += "Written by panonav " + document.version + ":\n\n    " + document.command + "\n\n";
+  text += "**" + std::to_string(count.held) + " of " +
+          counted(count.judged, "target holds", "targets hold") + ".**\n\n";
+  text += "| experiments | targets | hold |\n|---|---|---|\n";
+  for (const PaperResults& paper : document.papers) {
+    const TargetCount of_paper = count_targets(paper.rows);
+    text += "| [" + plain(paper.title) + "](#" + paper.paper + ") | " +
+            std::to_string(of_paper.judged) + " | " + std::to_string(of_paper.held) + " |\n";
+  }
+  text += "\n## Rows that do not hold\n\n";
+  const auto misses = miss_lines(document);
+  for (const std::string& line : misses) text += list_item(plain(line));
+  if (misses.empty()) text += "None.\n";
+  for (const PaperResults& paper : document.papers) {
+    text += "\n<a name=\"" + paper.paper + "\"></a>\n\n## " + plain(paper.title) + "\n\n";
+    text += "`panonav reproduce " + paper.paper + "`\n\n";
+    if (count_targets(paper.rows).judged == 0) text += "No row has a target.\n";
+    for (const ResultRow& row : paper.rows) {
+      if (row.target) text += list_item(row_line(row));
+    }
+  }
+  text +=
+      "\n`results.json` holds " + counted(rows, "row", "rows") + ", those without a target too.\n";
+  return text;
+}
+
+}  // namespace panonav::lab

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "lab/reporting/table.hpp"
+
+namespace panonav::lab {
+
+/// The rows of a group of experiments.
+struct PaperResults {
+  std::string paper;  ///< short: "m04"
+  std::string title;
+  std::vector<ResultRow> rows;
+};
+
+/// The results of all papers, as `reproduce all` writes them.
+struct ResultsDocument {
+  std::string version;  ///< of the program that made it
+  std::string command;  ///< that makes it, as typed
+  std::vector<PaperResults> papers;
+};
+
+/// Over all papers.
+[[nodiscard]] TargetCount count_targets(const ResultsDocument& document);
+
+/// Every row that misses its target, a sentence each: what, ours against the target, and why.
+[[nodiscard]] std::vector<std::string> miss_lines(const ResultsDocument& document);
+
+/// The rows with a target first, in their order; then the others. Gives how many have one.
+std::size_t put_targets_first(std::vector<ResultRow>& rows);
+
+/// One object: `version`, `command`, `targets`, `held`, `papers` (by name, an array of rows each).
+[[nodiscard]] std::string to_json(const ResultsDocument& document);
+/// Markdown: title, command, counts, the rows that do not hold with their reasons, then for each
+/// paper its rows with a target, and how many rows the JSON document holds. Lines are at most 120
+/// bytes long where words allow it.
+[[nodiscard]] std::string to_markdown(const ResultsDocument& document);
+
+}  // namespace panonav::lab

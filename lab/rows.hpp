@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "lab/reproduction.hpp"
+#include "panonav/core/statistics.hpp"
+#include "panonav_viewer/plot.hpp"
+
+namespace panonav::lab {
+
+// What the experiments report: rows of figures with their 95 % intervals, and pictures.
+
+/// A figure, with its interval where it is a statistic.
+struct Figure {
+  double value = 0.0;
+  std::optional<std::pair<double, double>> interval;
+  Figure(double figure) : value(figure) {}  // NOLINT(google-explicit-constructor)
+  Figure(double figure, std::pair<double, double> of) : value(figure), interval(of) {}
+  Figure(const Proportion& rate)  // NOLINT(google-explicit-constructor)
+      : value(rate.value), interval(std::pair(rate.low, rate.high)) {}
+};
+/// With bootstrap intervals.
+[[nodiscard]] Figure mean_figure(std::span<const double> values, std::uint64_t seed = 1);
+[[nodiscard]] Figure median_figure(std::span<const double> values, std::uint64_t seed = 1);
+
+[[nodiscard]] Target at_most(double value);
+[[nodiscard]] Target at_least(double value);
+
+ResultRow& add_row(Reproduction& result, const std::string& id, const std::string& what,
+                   const Figure& ours, const std::string& unit,
+                   std::optional<Target> target = std::nullopt,
+                   std::optional<std::pair<double, double>> published = std::nullopt);
+/// A row of a rate with its Wilson interval; says of how many.
+void add_rate(Reproduction& result, const std::string& id, const std::string& what,
+              std::size_t successes, std::size_t trials,
+              std::optional<Target> target = std::nullopt);
+/// A row of a median; says of how many.
+void add_median(Reproduction& result, const std::string& id, const std::string& what,
+                const std::string& unit, std::span<const double> values,
+                std::optional<Target> target = std::nullopt,
+                std::optional<std::pair<double, double>> published = std::nullopt);
+/// The same of a mean.
+void add_mean(Reproduction& result, const std::string& id, const std::string& what,
+              const std::string& unit, std::span<const double> values);
+
+/// "2.5 cm".
+[[nodiscard]] std::string centimetres(double distance_m);
+/// "2_5cm", for the names of rows.
+[[nodiscard]] std::string centimetres_id(double distance_m);
+
+/// One more point of a curve, with its interval as error bar.
+void add_point(viewer::Series& series, double x, const Figure& y);
+
+/// Writes a plot into the folder and lists it.
+template <typename... Plot>
+void add_plot(Reproduction& result, const std::filesystem::path& folder, const std::string& file,
+              const std::string& caption, const Plot&... plot) {
+  write_plot(folder / file, plot...);
+  result.pictures.push_back({file, caption});
+}
+
+}  // namespace panonav::lab

@@ -1,0 +1,126 @@
+#include "lab/runs/homing_run.hpp"
+
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/signature/fourier_signature.hpp"
+#include "panonav_simulation/make_each.hpp"
+#include "panonav_simulation/simulated_robot.hpp"
+
+namespace panonav::lab {
+
+HomingPlace make_homing_place(simulation::Scene scene, HomingCamera camera, Executor& executor) {
+  HomingPlace place;
+  place.scene = std::move(scene);
+  place.free_space = std::make_shared<const simulation::FreeSpace>(
+      place.scene, simulation::free_space_options(place.scene));
+  place.renderer = std::make_shared<const simulation::Renderer>(
+      place.scene, simulation::RendererOptions{}, executor);
+  camera.frame.camera_height_m = place.scene.camera_height_m;
+  place.camera = camera;
+  return place;
+}
+
+HomingView take_homing_view(const HomingPlace& place, const Pose2& pose, std::uint64_t seed) {
+  Executor here(1);
+  const HomingCamera& camera = place.camera;
+  const Panorama seen = simulation::take_panorama(*place.renderer, pose, camera.rendering,
+                                                  camera.frame, camera.sensor, seed, here);
+  const Tilt measured = camera.levelled ? frame_tilt(camera.frame, seed) : Tilt{};
+  return homing_view(compute_signature(level_panorama(seen, measured), camera.components));
+}
+
+std::string_view name_of(HomingRunEnd end) {
+  switch (end) {
+    case HomingRunEnd::arrived:
+      return "arrived";
+    case HomingRunEnd::wrong_place:
+      return "wrong place";
+    case HomingRunEnd::blocked:
+      return "blocked";
+    case HomingRunEnd::exhausted:
+      return "exhausted";
+  }
+  return "";
+}
+
+bool HomingRun::succeeds(double radius_m) const noexcept {
+  return end == HomingRunEnd::arrived && end_distance_m <= radius_m;
+}
+
+HomingRun run_home(const HomingPlace& place, const HomingView& home, const Pose2& goal,
+                   const Pose2& start, const HomingRunOptions& options, std::uint64_t seed) {
+  HomingPursuit pursuit(home, options.pursuit, options.vector);
+  simulation::SimulatedRobot robot(*place.free_space, options.motion, options.obstacles, start,
+                                   seed);
+  Random noise_of_views(seed, 2);
+  HomingRun run;
+  run.goal = goal;
+  for (;;) {
+    const HomingView view = take_homing_view(place, robot.pose(), noise_of_views.next());
+    const PursuitDecision decision = pursuit.decide(view);
+    if (run.path.empty()) run.start_difference = decision.difference;
+    run.path.push_back(robot.pose());
+    run.vectors.push_back(decision.vector);
+    const auto finish = [&](HomingRunEnd end) {
+      run.end = end;
+      run.end_distance_m = distance(robot.pose().position(), goal.position());
+      run.end_difference = decision.difference;
+      return run;
+    };
+    switch (decision.state) {
+      case PursuitState::moving:
+        break;
+      case PursuitState::arrived:
+        return finish(HomingRunEnd::arrived);
+      case PursuitState::wrong_place:
+        return finish(HomingRunEnd::wrong_place);
+      case PursuitState::exhausted:
+        return finish(HomingRunEnd::exhausted);
+    }
+    const auto direction_rad = robot.free_direction(decision.turn_rad, decision.advance_m);
+    run.met_obstacle = run.met_obstacle || direction_rad != decision.turn_rad;
+    const bool moved = robot.go(direction_rad.value_or(decision.turn_rad), decision.advance_m);
+    if (!direction_rad || (!moved && options.obstacles == simulation::ObstacleRule::stop)) {
+      run.met_obstacle = true;
+      run.path.push_back(robot.pose());
+      return finish(HomingRunEnd::blocked);
+    }
+  }
+}
+
+std::vector<HomingTask> random_homing_tasks(const HomingPlace& place, int count, double radius_m,
+                                            std::uint64_t seed) {
+  require(count >= 1, "runs home", count, ">= 1");
+  require(radius_m > 0.0, "radius of the starts", radius_m, "> 0");
+  std::vector<HomingTask> tasks;
+  Random random(seed);
+  for (int i = 0; i < count; ++i) {
+    HomingTask task;
+    task.goal = place.free_space->random_pose(random);
+    do {
+      const double way_m = radius_m * std::sqrt(random.uniform());
+      const double direction_rad = random.uniform(-std::numbers::pi, std::numbers::pi);
+      task.start = {task.goal.x_m + way_m * std::cos(direction_rad),
+                    task.goal.y_m + way_m * std::sin(direction_rad),
+                    wrap_angle(random.uniform(-std::numbers::pi, std::numbers::pi))};
+    } while (!place.free_space->is_free(task.start.position()));
+    tasks.push_back(task);
+  }
+  return tasks;
+}
+
+std::vector<HomingRun> run_home(const HomingPlace& place, const std::vector<HomingTask>& tasks,
+                                const HomingRunOptions& options, std::uint64_t seed,
+                                Executor& executor) {
+  return simulation::make_each(executor, tasks.size(), [&](std::size_t i) {
+    const std::uint64_t task_seed = Random(seed, i).next();
+    const HomingView home = take_homing_view(place, tasks[i].goal, task_seed);
+    return run_home(place, home, tasks[i].goal, tasks[i].start, options, task_seed + 1);
+  });
+}
+
+}  // namespace panonav::lab

@@ -1,0 +1,137 @@
+#include "lab/runs/place_experiment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <optional>
+
+#include "lab/runs/tracking_run.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav_simulation/recording.hpp"
+
+namespace panonav::lab {
+
+namespace {
+
+/// A recorded place in a memory, with what answers queries, as the command's defaults have it where
+/// columns find the places: local features are evidence, but do not rank.
+/// Neither copied nor moved: the localiser looks at the memory.
+class AskedPlace {
+ public:
+  AskedPlace(const simulation::PlaceRecording& place, Executor& executor)
+      : memory_(memory_of_references(place, executor)), localiser_(memory_) {
+    localiser_.use_features(features_of_references(place, memory_, executor), false);
+  }
+  AskedPlace(const AskedPlace&) = delete;
+  AskedPlace& operator=(const AskedPlace&) = delete;
+
+  [[nodiscard]] const VisualMemory& memory() const noexcept { return memory_; }
+  [[nodiscard]] Localisation ask(const Panorama& view) const {
+    return localiser_.localise(signature_for(view, memory_), {}, features_of_query(view));
+  }
+
+ private:
+  VisualMemory memory_;
+  Localiser localiser_;
+};
+
+// Places in steps of the grid; rounding, as positions are not exact multiples.
+bool is_neighbour(Point2 a, Point2 b, double spacing_m) {
+  return std::abs(std::lround((a.x_m - b.x_m) / spacing_m)) <= 1 &&
+         std::abs(std::lround((a.y_m - b.y_m) / spacing_m)) <= 1;
+}
+
+}  // namespace
+
+std::vector<PlaceCondition> place_conditions() {
+  std::vector<PlaceCondition> conditions(4);
+  conditions[0].name = "as memorised";
+  conditions[1].name = "light 30 % less, 10 % of the columns hidden";
+  conditions[1].sensor.exposure = 0.7;
+  conditions[1].sensor.occluded_fraction = 0.1;
+  conditions[2].name = "light 30 % more, 10 % of the columns hidden";
+  conditions[2].sensor.exposure = 1.3;
+  conditions[2].sensor.occluded_fraction = 0.1;
+  conditions[3].name = "5 degrees of tilt";
+  conditions[3].tilt_rad = radians(5.0);
+  return conditions;
+}
+
+std::vector<PlaceResult> run_place_experiment(const simulation::PlaceRecording& place,
+                                              const std::vector<PlaceCondition>& conditions,
+                                              Executor& executor) {
+  const AskedPlace remembered(place, executor);
+  std::vector<PlaceResult> results;
+  std::uint64_t seed = place.seed * 1000003U;
+  for (const PlaceCondition& condition : conditions) {
+    const std::size_t asked = place.queries.size();
+    std::vector<Localisation> answers(asked);
+    executor.for_chunks(asked, 1, [&](std::size_t begin, std::size_t, std::size_t) {
+      Executor here(1);
+      const simulation::FrameOptions frame{.camera_height_m = place.scene.camera_height_m,
+                                           .tilt_rad = condition.tilt_rad};
+      const Panorama seen =
+          simulation::take_panorama(*place.renderer, place.queries[begin].pose, place.rendering,
+                                    frame, condition.sensor, seed + begin, here);
+      const Tilt measured = condition.levelled ? frame_tilt(frame, seed + begin) : Tilt{};
+      answers[begin] = remembered.ask(level_panorama(seen, measured));
+    });
+    seed += asked;
+    std::size_t nearest = 0;
+    std::size_t next = 0;
+    std::size_t known = 0;
+    std::size_t inside = 0;
+    std::vector<double> heading_errors;
+    std::vector<double> position_errors;
+    for (std::size_t i = 0; i < asked; ++i) {
+      const Pose2& truth = place.queries[i].pose;
+      const Localisation& answer = answers[i];
+      const LocalisedMatch& best = answer.matches.at(0);
+      const ReferencePose& found = *remembered.memory().info(best.view).pose;
+      const Point2 wanted =
+          place.references[place.nearest_reference(truth.position())].pose.position();
+      nearest += found.position() == wanted ? 1 : 0;
+      next += is_neighbour(found.position(), wanted, place.spacing_m) ? 1 : 0;
+      known += answer.known ? 1 : 0;
+      // No reading is as wrong as can be.
+      heading_errors.push_back(
+          best.compass ? std::abs(angle_difference(*found.heading_rad + best.compass->heading_rad,
+                                                   truth.heading_rad))
+                       : std::numbers::pi);
+      if (!answer.position) continue;
+      position_errors.push_back(distance(answer.position->position, truth.position()));
+      inside += position_errors.back() <= answer.position->radius_m.value_or(0.0) ? 1 : 0;
+    }
+    results.push_back({condition.name, success_rate(nearest, asked), success_rate(next, asked),
+                       success_rate(known, asked), quantile(heading_errors, 0.5),
+                       quantile(heading_errors, 0.95), quantile(position_errors, 0.5),
+                       success_rate(inside, position_errors.size())});
+  }
+  return results;
+}
+
+std::vector<RecognitionRate> recognition_rates(
+    std::span<const simulation::PlaceRecording* const> places, Executor& executor) {
+  const auto name = [](const simulation::PlaceRecording& place) {
+    return place.scene.name + " " + std::to_string(place.seed);
+  };
+  std::vector<RecognitionRate> own;
+  std::vector<RecognitionRate> others;
+  for (const simulation::PlaceRecording* const place : places) {
+    const AskedPlace remembered(*place, executor);
+    for (const simulation::PlaceRecording* const asked : places) {
+      std::vector<std::uint8_t> known(asked->queries.size());
+      executor.for_chunks(known.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
+        known[i] = remembered.ask(asked->queries[i].panorama).known ? 1 : 0;
+      });
+      const auto count = static_cast<std::size_t>(std::ranges::count(known, 1));
+      (place == asked ? own : others)
+          .push_back({name(*place), name(*asked), success_rate(count, known.size())});
+    }
+  }
+  own.insert(own.end(), others.begin(), others.end());
+  return own;
+}
+
+}  // namespace panonav::lab

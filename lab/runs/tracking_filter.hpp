@@ -1,0 +1,78 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "lab/runs/tracking_run.hpp"
+#include "panonav/core/executor.hpp"
+#include "panonav/localisation/monte_carlo.hpp"
+#include "panonav/motion/odometry.hpp"
+
+namespace panonav::lab {
+
+/// What one image left the filter with.
+struct TrackedImage {
+  std::size_t step = 0;  ///< of the run
+  LocalisationState state = LocalisationState::lost;
+  bool answered = false;           ///< a pose was given
+  double error_m = 0.0;            ///< of the heaviest mode; infinite when there is none
+  double heading_error_rad = 0.0;  ///< of the same, absolute
+  double nearest_mode_m = 0.0;     ///< error of the mode nearest to the truth
+  std::size_t modes = 0;
+  int particles = 0;
+  int injected = 0;
+
+  /// A pose was given and it is within `radius_m`.
+  [[nodiscard]] bool is_within(double radius_m) const { return answered && error_m < radius_m; }
+  /// Says "localised" and is wrong by more than `radius_m`.
+  [[nodiscard]] bool is_confidently_wrong(double radius_m) const {
+    return state == LocalisationState::localised && !(error_m <= radius_m);
+  }
+};
+using TrackedRun = std::vector<TrackedImage>;
+
+/// A filter and the robot that it runs on.
+struct FilterSetting {
+  MonteCarloOptions options;  ///< but for the seed, which each run has of its own
+  /// As many particles as this times the references, at all times; empty: as the options say.
+  std::optional<double> particles_per_reference;
+  OdometryNoise odometry;       ///< of the robot
+  OdometryNoise told_odometry;  ///< what the filter takes it for
+  bool heading_known = false;   ///< at the start
+};
+
+/// The paper's robot: holonomic, heading known and kept, no compass, as many particles as
+/// references, nothing injected.
+[[nodiscard]] FilterSetting paper_setting();
+/// Heading unknown, compass on, differential drive, as many particles as references.
+[[nodiscard]] FilterSetting compass_setting(ParticleInjection injection);
+
+/// Called after each step, also those without an image.
+using StepObserver = std::function<void(std::size_t step, const MonteCarloLocaliser& filter,
+                                        const MonteCarloEstimate& estimate)>;
+
+/// One run through a filter. `seed` is that of the odometry and of the filter. Same arguments: same
+/// bits.
+[[nodiscard]] TrackedRun track_run(const TrackingPlace& place, const TrackingRun& run,
+                                   const FilterSetting& setting, std::uint64_t seed,
+                                   const StepObserver& observer = {});
+
+/// All runs; run i has the seed `first_seed` + i.
+[[nodiscard]] std::vector<TrackedRun> track_runs(const TrackingPlace& place,
+                                                 std::span<const TrackingRun> runs,
+                                                 const FilterSetting& setting,
+                                                 std::uint64_t first_seed, Executor& executor);
+
+/// How many images, counted from 1 at step `first_step`, until the answer is within `radius_m` and
+/// stays so to the end of the run; empty when the last one is not.
+[[nodiscard]] std::optional<int> images_until_localised(const TrackedRun& run, double radius_m,
+                                                        std::size_t first_step = 0);
+/// The same until the first answer within `radius_m`, whatever follows.
+[[nodiscard]] std::optional<int> images_until_first_right(const TrackedRun& run, double radius_m,
+                                                          std::size_t first_step = 0);
+
+}  // namespace panonav::lab

@@ -1,0 +1,276 @@
+#include "lab/runs/tracking_run.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/motion/odometry.hpp"
+#include "panonav/motion/path.hpp"
+#include "panonav/panorama/preprocessing.hpp"
+#include "panonav_simulation/make_each.hpp"
+
+namespace panonav::lab {
+
+namespace {
+
+constexpr int components = 15;           // [M04]
+constexpr std::size_t first_views = 32;  // of which a memory learns its full scale
+
+FourierSignature signature_of(const Panorama& view) {
+  return compute_signature(preprocess(view, {}), components);
+}
+
+// A number for each of its parts: different parts give different numbers, far apart.
+std::uint64_t mixed(std::uint64_t a, std::uint64_t b) {
+  return a * 1000003U + b;
+}
+
+}  // namespace
+
+TrackingPlace::TrackingPlace(VisualMemory memory, double spacing_m)
+    : memory_(std::move(memory)),
+      spacing_m_(spacing_m),
+      ranking_(std::make_shared<const ColumnRanking>(memory_)),
+      model_(learn_observation_model(*ranking_)),
+      localiser_(memory_) {
+  require(spacing_m > 0.0, "spacing_m", spacing_m, "> 0");
+}
+
+std::vector<Point2> TrackingPlace::reference_positions() const {
+  std::vector<Point2> positions;
+  for (const ViewId view : memory_.views()) {
+    if (const auto& pose = memory_.info(view).pose) positions.push_back(pose->position());
+  }
+  return positions;
+}
+
+VisualMemory memory_of_views(std::span<const ReferencePose> poses,
+                             std::span<const Panorama* const> views, Executor& executor) {
+  require(!views.empty() && views.size() == poses.size(), "reference views",
+          static_cast<double>(views.size()), ">= 1, as many as poses");
+  const auto signatures = simulation::make_each(
+      executor, views.size(), [&](std::size_t i) { return signature_of(*views[i]); });
+  // As the command does: of the first views, without component 0, which says how bright they are.
+  float full_scale = 0.0F;
+  for (std::size_t i = 0; i < std::min(first_views, signatures.size()); ++i) {
+    const auto rows = static_cast<std::size_t>(signatures[i].rows());
+    const auto structure = signatures[i].magnitudes().subspan(rows);
+    full_scale = std::max(full_scale, *std::ranges::max_element(structure));
+  }
+  VisualMemory memory(signatures[0].shape(), full_scale, signatures[0].elevations());
+  for (std::size_t i = 0; i < signatures.size(); ++i) {
+    memory.append(signatures[i], {std::to_string(i), poses[i], {}});
+  }
+  return memory;
+}
+
+VisualMemory memory_of_references(const simulation::PlaceRecording& place, Executor& executor,
+                                  const std::function<bool(Point2)>& kept) {
+  std::vector<ReferencePose> poses;
+  std::vector<const Panorama*> views;
+  for (const simulation::PlacedView& view : place.references) {
+    if (kept && !kept(view.pose.position())) continue;
+    poses.push_back({view.pose.x_m, view.pose.y_m, view.pose.heading_rad});
+    views.push_back(&view.panorama);
+  }
+  return memory_of_views(poses, views, executor);
+}
+
+FeatureSource features_of_references(const simulation::PlaceRecording& place,
+                                     const VisualMemory& memory, Executor& executor) {
+  const std::span<const ViewId> views = memory.views();
+  auto features = simulation::make_each(executor, views.size(), [&](std::size_t i) {
+    const Point2 at = memory.info(views[i]).pose->position();
+    return extract_features(place.references[place.nearest_reference(at)].panorama);
+  });
+  const auto kept = std::make_shared<std::map<ViewId, std::optional<LocalFeatures>>>();
+  for (std::size_t i = 0; i < views.size(); ++i) kept->emplace(views[i], std::move(features[i]));
+  return [kept](ViewId view) { return kept->at(view); };
+}
+
+QueryFeatures features_of_query(const Panorama& view) {
+  return [&view](Handedness handedness) {
+    return extract_features(handedness == Handedness::as_seen ? view : mirrored(view));
+  };
+}
+
+std::shared_ptr<const TrackingPlace> remember_views(std::span<const ReferencePose> poses,
+                                                    std::span<const Panorama* const> views,
+                                                    double spacing_m, Executor& executor) {
+  return std::make_shared<const TrackingPlace>(memory_of_views(poses, views, executor), spacing_m);
+}
+
+std::shared_ptr<const TrackingPlace> remember_for_tracking(
+    const simulation::PlaceRecording& place, Executor& executor,
+    const std::function<bool(Point2)>& kept) {
+  return std::make_shared<const TrackingPlace>(memory_of_references(place, executor, kept),
+                                               place.spacing_m);
+}
+
+PackedSignature signature_for(const Panorama& panorama, const VisualMemory& memory) {
+  return pack(signature_of(panorama), memory.full_scale());
+}
+
+TrackingRun run_through(std::span<const Pose2> poses, std::vector<PackedSignature> views) {
+  require(poses.size() == views.size(), "number of views", static_cast<double>(views.size()),
+          "that of the poses");
+  TrackingRun run;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    std::optional<Pose2> moved;
+    if (i > 0) moved = inverse(poses[i - 1]) * poses[i];
+    run.steps.push_back({poses[i], moved, std::move(views[i])});
+  }
+  return run;
+}
+
+std::optional<TrackingRun> kidnapped(const TrackingRun& before, const TrackingRun& after,
+                                     std::size_t images, double distance_m,
+                                     std::size_t min_images) {
+  if (before.steps.size() < images || images == 0) return std::nullopt;
+  const Point2 left = before.steps[images - 1].truth.position();
+  const auto found = std::ranges::find_if(after.steps, [&](const TrackingStep& step) {
+    return distance(step.truth.position(), left) >= distance_m;
+  });
+  if (after.steps.end() - found < static_cast<std::ptrdiff_t>(min_images)) return std::nullopt;
+  TrackingRun run;
+  run.steps.assign(before.steps.begin(),
+                   before.steps.begin() + static_cast<std::ptrdiff_t>(images));
+  run.steps.insert(run.steps.end(), found, after.steps.end());
+  run.steps[images].moved.reset();
+  return run;
+}
+
+TrackingRun without_images(TrackingRun run, std::size_t first, std::size_t count) {
+  for (std::size_t i = first; i < std::min(first + count, run.steps.size()); ++i) {
+    run.steps[i].view.reset();
+  }
+  return run;
+}
+
+RunCondition clean_condition() {
+  return {.id = "clean", .name = "clean", .sensor = {}};
+}
+
+RunCondition hard_condition() {
+  return {.id = "hard",
+          .name = "hard",
+          .light_change = 0.3,
+          .moved_objects = 0.1,
+          .sensor = {.read_noise = 0.3}};
+}
+
+std::vector<TrackingRun> record_along(const std::vector<std::vector<Pose2>>& poses,
+                                      const simulation::PlaceRecording& place,
+                                      const simulation::Renderer& renderer,
+                                      const TrackingPlace& remembered,
+                                      const simulation::SensorOptions& sensor, std::uint64_t seed,
+                                      Executor& executor) {
+  std::vector<std::pair<std::size_t, std::size_t>> jobs;
+  std::vector<std::vector<PackedSignature>> views(poses.size());
+  for (std::size_t r = 0; r < poses.size(); ++r) {
+    views[r].resize(poses[r].size());
+    for (std::size_t i = 0; i < poses[r].size(); ++i) jobs.emplace_back(r, i);
+  }
+  executor.for_chunks(jobs.size(), 4, [&](std::size_t begin, std::size_t end, std::size_t) {
+    Executor here(1);
+    for (std::size_t j = begin; j < end; ++j) {
+      const auto [r, i] = jobs[j];
+      Panorama view = renderer.render_panorama(
+          {.pose = poses[r][i], .height_m = place.scene.camera_height_m}, place.rendering, here);
+      views[r][i] =
+          signature_for(simulation::apply_sensor(std::move(view), sensor, seed + 1000 * r + i),
+                        remembered.memory());
+    }
+  });
+  std::vector<TrackingRun> runs;
+  for (std::size_t r = 0; r < poses.size(); ++r) {
+    runs.push_back(run_through(poses[r], std::move(views[r])));
+  }
+  return runs;
+}
+
+std::vector<TrackingRun> record_walks(const simulation::PlaceRecording& place,
+                                      const TrackingPlace& remembered,
+                                      const RunCondition& condition, const WalkOptions& options,
+                                      Executor& executor) {
+  require(options.variants >= 1, "variants", options.variants, ">= 1");
+  require(options.runs_each >= 1, "runs_each", options.runs_each, ">= 1");
+  require(options.images >= 1, "images", options.images, ">= 1");
+  const bool changed = condition.light_change > 0.0 || condition.moved_objects > 0.0;
+  std::vector<TrackingRun> runs;
+  for (int v = 0; v < options.variants; ++v) {
+    const std::uint64_t seed =
+        mixed(mixed(options.seed, place.seed), static_cast<std::uint64_t>(v));
+    Random random(seed);
+    std::shared_ptr<const simulation::Renderer> renderer = place.renderer;
+    std::shared_ptr<const simulation::FreeSpace> space = place.free_space;
+    if (changed) {
+      const simulation::Scene scene = simulation::make_scene(
+          place.scene.name,
+          {.seed = place.seed,
+           .moved_objects = condition.moved_objects,
+           .moved_seed = seed,
+           .light = random.uniform(1.0 - condition.light_change, 1.0 + condition.light_change)});
+      renderer = std::make_shared<const simulation::Renderer>(scene, simulation::RendererOptions{},
+                                                              executor);
+      space = std::make_shared<const simulation::FreeSpace>(scene,
+                                                            simulation::free_space_options(scene));
+    }
+    std::vector<std::vector<Pose2>> poses;
+    for (int r = 0; r < options.runs_each; ++r) {
+      Random walk(seed, static_cast<std::uint64_t>(r) + 1);
+      Pose2 start = space->random_pose(walk);
+      auto path = random_walk(
+          start, [&](Point2 p) { return space->is_free(p); },
+          {.poses = options.images, .step_m = options.step_m}, walk);
+      if (options.constant_heading) {
+        for (Pose2& pose : path) pose.heading_rad = 0.0;
+      }
+      poses.push_back(std::move(path));
+    }
+    auto recorded = record_along(poses, place, *renderer, remembered, condition.sensor,
+                                 mixed(seed, 50000), executor);
+    std::ranges::move(recorded, std::back_inserter(runs));
+  }
+  return runs;
+}
+
+void SingleImages::add(const SingleImages& other) {
+  asked += other.asked;
+  right += other.right;
+  near += other.near;
+  right_by_dissimilarity += other.right_by_dissimilarity;
+}
+
+SingleImages localise_single_images(const TrackingPlace& place, std::span<const TrackingRun> runs,
+                                    Executor& executor) {
+  const auto positions = place.reference_positions();
+  std::vector<SingleImages> parts(runs.size());
+  executor.for_chunks(runs.size(), 1, [&](std::size_t r, std::size_t, std::size_t) {
+    for (const TrackingStep& step : runs[r].steps) {
+      if (!step.view) continue;
+      const Point2 truth = step.truth.position();
+      double nearest = distance(positions.at(0), truth);
+      for (const Point2 position : positions) {
+        nearest = std::min(nearest, distance(position, truth));
+      }
+      const auto way_to = [&](ViewId view) {
+        return distance(place.memory().info(view).pose->position(), truth);
+      };
+      const double best = way_to(place.localiser().localise(*step.view).matches.at(0).view);
+      const auto found = place.memory().search(*step.view, {.top = 1});
+      ++parts[r].asked;
+      parts[r].right_by_dissimilarity += way_to(found.matches.at(0).view) <= nearest + 1e-9 ? 1 : 0;
+      parts[r].right += best <= nearest + 1e-9 ? 1 : 0;
+      parts[r].near += best <= place.spacing_m() ? 1 : 0;
+    }
+  });
+  SingleImages sum;
+  for (const SingleImages& part : parts) sum.add(part);
+  return sum;
+}
+
+}  // namespace panonav::lab

@@ -1,0 +1,163 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "panonav/core/executor.hpp"
+#include "panonav/geometry/pose2.hpp"
+#include "panonav/localisation/column_ranking.hpp"
+#include "panonav/localisation/localiser.hpp"
+#include "panonav/localisation/observation_model.hpp"
+#include "panonav/memory/visual_memory.hpp"
+#include "panonav_simulation/place_recording.hpp"
+#include "panonav_simulation/scenes.hpp"
+#include "panonav_simulation/sensor.hpp"
+
+namespace panonav::lab {
+
+/// A memory of posed views with all that localises in it, learnt once and shared by any number of
+/// runs. Neither copied nor moved: its parts look at the memory.
+class TrackingPlace {
+ public:
+  /// `spacing_m`: of the grid of references, > 0: by it errors are judged. Throws ContractError as
+  /// `learn_observation_model`.
+  TrackingPlace(VisualMemory memory, double spacing_m);
+  TrackingPlace(const TrackingPlace&) = delete;
+  TrackingPlace& operator=(const TrackingPlace&) = delete;
+
+  [[nodiscard]] const VisualMemory& memory() const noexcept { return memory_; }
+  [[nodiscard]] double spacing_m() const noexcept { return spacing_m_; }
+  [[nodiscard]] const std::shared_ptr<const ColumnRanking>& ranking() const noexcept {
+    return ranking_;
+  }
+  [[nodiscard]] const ObservationModel& model() const noexcept { return model_; }
+  [[nodiscard]] const Localiser& localiser() const noexcept { return localiser_; }
+  /// Of all posed views.
+  [[nodiscard]] std::vector<Point2> reference_positions() const;
+
+ private:
+  VisualMemory memory_;
+  double spacing_m_;
+  std::shared_ptr<const ColumnRanking> ranking_;
+  ObservationModel model_;
+  Localiser localiser_;
+};
+
+/// Views as a memory, as the command's defaults have it. Throws ContractError on numbers of poses
+/// and views that differ, or no view.
+[[nodiscard]] VisualMemory memory_of_views(std::span<const ReferencePose> poses,
+                                           std::span<const Panorama* const> views,
+                                           Executor& executor);
+/// The same of the references of a recorded place; `kept` chooses which of them; empty: all.
+[[nodiscard]] VisualMemory memory_of_references(const simulation::PlaceRecording& place,
+                                                Executor& executor,
+                                                const std::function<bool(Point2)>& kept = nullptr);
+
+/// The local features of the references that this memory holds.
+[[nodiscard]] FeatureSource features_of_references(const simulation::PlaceRecording& place,
+                                                   const VisualMemory& memory, Executor& executor);
+/// What `Localiser::localise` asks for. The view must outlive it.
+[[nodiscard]] QueryFeatures features_of_query(const Panorama& view);
+
+/// The same with all that localises in them. `spacing_m` as TrackingPlace.
+[[nodiscard]] std::shared_ptr<const TrackingPlace> remember_views(
+    std::span<const ReferencePose> poses, std::span<const Panorama* const> views, double spacing_m,
+    Executor& executor);
+
+[[nodiscard]] std::shared_ptr<const TrackingPlace> remember_for_tracking(
+    const simulation::PlaceRecording& place, Executor& executor,
+    const std::function<bool(Point2)>& kept = nullptr);
+
+/// The signature that a robot with this memory takes of a panorama: the command's defaults.
+[[nodiscard]] PackedSignature signature_for(const Panorama& panorama, const VisualMemory& memory);
+
+/// One step of a run.
+struct TrackingStep {
+  Pose2 truth;  ///< world_from_robot after the step
+  /// robot_old_from_robot_new as it truly was; empty at the start, and where the robot was
+  /// kidnapped to `truth` without noticing.
+  std::optional<Pose2> moved;
+  std::optional<PackedSignature> view;  ///< empty: no picture was taken
+};
+
+/// What a robot did and saw. Odometry is added when a filter runs, so that one run serves several
+/// kinds of it.
+struct TrackingRun {
+  std::vector<TrackingStep> steps;
+};
+
+/// A run through `poses` with a view at each of them.
+[[nodiscard]] TrackingRun run_through(std::span<const Pose2> poses,
+                                      std::vector<PackedSignature> views);
+
+/// The first `images` steps of `before`; then the robot is put down at the first step of `after`
+/// that is at least `distance_m` away, and goes on there. Empty when no such step leaves
+/// `min_images`.
+[[nodiscard]] std::optional<TrackingRun> kidnapped(const TrackingRun& before,
+                                                   const TrackingRun& after, std::size_t images,
+                                                   double distance_m, std::size_t min_images);
+
+/// The same run without the pictures of steps first .. first + count - 1.
+[[nodiscard]] TrackingRun without_images(TrackingRun run, std::size_t first, std::size_t count);
+
+/// How runs differ from memorising.
+struct RunCondition {
+  std::string id;
+  std::string name;
+  double light_change = 0.0;   ///< light is uniform in 1 +- this, drawn for each variant
+  double moved_objects = 0.0;  ///< share of them
+  simulation::SensorOptions sensor;
+};
+
+/// As memorised.
+[[nodiscard]] RunCondition clean_condition();
+/// Light 30 % less to 30 % more, a tenth of the objects moved, and a sensor so noisy that a single
+/// image is right in 60 to 80 % of the cases.
+[[nodiscard]] RunCondition hard_condition();
+
+struct WalkOptions {
+  int variants = 3;               ///< of the scene: other light, other objects moved; >= 1
+  int runs_each = 4;              ///< in each variant, >= 1
+  int images = 25;                ///< of a run, >= 1; fewer where the robot is boxed in
+  double step_m = 0.25;           ///< between images, > 0
+  bool constant_heading = false;  ///< heading 0 throughout, as a holonomic robot can
+  std::uint64_t seed = 1;
+};
+
+/// Random walks through the place under a condition, variant by variant; variant v of condition and
+/// seed is the same whatever the number of runs. `place.scene.name` and `place.seed` name the
+/// scene, which must be a built-in one where the condition changes it. Cost: one renderer for each
+/// variant of a scene that changes, and one view for each image.
+[[nodiscard]] std::vector<TrackingRun> record_walks(const simulation::PlaceRecording& place,
+                                                    const TrackingPlace& remembered,
+                                                    const RunCondition& condition,
+                                                    const WalkOptions& options, Executor& executor);
+
+/// Views along given poses, all through one renderer (of the place's own or a changed scene); view
+/// i of pose list r has the noise seed `seed` + 1000 r + i.
+[[nodiscard]] std::vector<TrackingRun> record_along(const std::vector<std::vector<Pose2>>& poses,
+                                                    const simulation::PlaceRecording& place,
+                                                    const simulation::Renderer& renderer,
+                                                    const TrackingPlace& remembered,
+                                                    const simulation::SensorOptions& sensor,
+                                                    std::uint64_t seed, Executor& executor);
+
+/// How well single images of runs are localised, each by itself.
+struct SingleImages {
+  std::size_t asked = 0;
+  std::size_t right = 0;  ///< the best match is the reference nearest to the truth
+  std::size_t near = 0;   ///< the best match is within one spacing of the truth
+  /// The reference of least dissimilarity is the one nearest to the truth: the paper's way.
+  std::size_t right_by_dissimilarity = 0;
+  void add(const SingleImages& other);
+};
+[[nodiscard]] SingleImages localise_single_images(const TrackingPlace& place,
+                                                  std::span<const TrackingRun> runs,
+                                                  Executor& executor);
+
+}  // namespace panonav::lab

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "lab/baselines/expected_image_homing.hpp"
+#include "panonav/core/executor.hpp"
+#include "panonav/homing/homing_survey.hpp"
+#include "panonav_simulation/free_space.hpp"
+#include "panonav_simulation/renderer.hpp"
+#include "panonav_simulation/scene.hpp"
+
+namespace panonav::lab {
+
+// The toy house arena of [S06 section 4], recorded twice.
+
+inline constexpr double s06_spacing_m = 0.025;
+/// No place is nearer to the border of the floor; so about 1250 places are free, the farthest two
+/// of them 1.4 m apart as in [S06 figure 11].
+inline constexpr double s06_margin_m = 0.15;
+inline constexpr int s06_columns = 72;
+/// Components of a view of 72 pixels: k = 0 .. 35.
+inline constexpr int s06_components = s06_columns / 2;
+
+/// How the robot stands at the places of the grid.
+enum class ArenaHeading {
+  fixed,   ///< the same everywhere, as the published recordings were evaluated
+  random,  ///< any: what a robot without a compass has
+};
+
+struct ArenaOptions {
+  std::uint64_t seed = 1;
+  ArenaHeading heading = ArenaHeading::random;
+  /// Standard deviations of the tracking system [S06 figure 5]: the robot is elsewhere and turned
+  /// otherwise than is believed.
+  double position_noise_m = 0.0;
+  double heading_noise_rad = 0.0;
+  /// Light of the second recording, that of the first being 1.
+  double light = 1.05;
+  double spacing_m = s06_spacing_m;
+};
+
+/// One recording: believed poses, rows of 72 pixels (mean over 10 degrees around the horizon) and
+/// their Fourier coefficients.
+struct ArenaRecording {
+  std::vector<PlacedHomingView> views;
+  std::vector<std::vector<float>> rows;
+};
+
+/// Goals and places have the same numbers: those of the grid, row by row.
+struct Arena {
+  ArenaOptions options;
+  simulation::Scene scene;
+  std::shared_ptr<const simulation::FreeSpace> space;
+  ArenaRecording homes;     ///< first recording
+  ArenaRecording currents;  ///< second, at the same places
+};
+
+/// Throws ContractError when nothing is free at the spacing.
+[[nodiscard]] Arena record_arena(const ArenaOptions& options, Executor& executor);
+
+/// The row of one place of the scene through a camera with noise: 360 pixels of 1 degree and 10
+/// rows, averaged to 72.
+[[nodiscard]] std::vector<float> arena_row(const simulation::Renderer& renderer,
+                                           const simulation::Scene& scene, const Pose2& pose,
+                                           std::uint64_t seed, Executor& executor);
+
+/// Runs as in [S06 section 4.4], for the spacing of the arena.
+[[nodiscard]] HomingSurveyOptions survey_options(const Arena& arena);
+
+/// Homes of every `every`-th place of the first recording, current views of all places of the
+/// second. `rule` gets the numbers of the places.
+[[nodiscard]] HomingSurvey survey_arena(const Arena& arena, const HomingRule& rule,
+                                        Executor& executor, std::size_t every = 1);
+[[nodiscard]] HomingSurvey survey_arena(const Arena& arena, const FourierHomingOptions& homing,
+                                        Executor& executor, std::size_t every = 1);
+[[nodiscard]] HomingSurvey survey_arena(const Arena& arena, const ExpectedImageHoming& homing,
+                                        Executor& executor, std::size_t every = 1);
+
+}  // namespace panonav::lab

@@ -1,0 +1,168 @@
+// Routes driven again along chains of snapshots.
+
+#include "lab/s06/chains.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/motion/path.hpp"
+#include "panonav_simulation/scenes.hpp"
+#include "panonav_simulation/simulated_robot.hpp"
+
+namespace panonav::lab {
+
+namespace {
+
+constexpr double route_m = 30.0;
+constexpr double pose_spacing_m = 0.1;
+constexpr double completed_m = 0.2;
+constexpr int max_steps = 1000;
+
+}  // namespace
+
+HomingCamera chain_camera() {
+  HomingCamera camera;
+  camera.rendering = {.rows = 8, .columns = 128, .rays_per_axis = 2};
+  camera.components = 12;
+  return camera;
+}
+
+std::vector<std::vector<Pose2>> random_routes(const simulation::FreeSpace& space, int count,
+                                              double length_m, double spacing_m,
+                                              std::uint64_t seed) {
+  require(length_m > 0.0, "length of a route", length_m, "> 0");
+  require(spacing_m > 0.0, "spacing of a route", spacing_m, "> 0");
+  std::vector<std::vector<Pose2>> routes;
+  for (int number = 0; number < count; ++number) {
+    Random random(seed, static_cast<std::uint64_t>(number));
+    std::vector<Pose2> corners{space.random_pose(random)};
+    double way_m = 0.0;
+    while (way_m < length_m) {
+      const auto leg =
+          space.shortest_path(corners.back().position(), space.random_pose(random).position());
+      if (!leg) continue;
+      for (const Point2& place : std::span(*leg).subspan(1)) {
+        way_m += distance(corners.back().position(), place);
+        corners.push_back({place.x_m, place.y_m, 0.0});
+      }
+    }
+    std::vector<Pose2> route = resample(corners, spacing_m);
+    for (std::size_t i = 0; i + 1 < route.size(); ++i) {
+      route[i].heading_rad =
+          wrap_angle(std::atan2(route[i + 1].y_m - route[i].y_m, route[i + 1].x_m - route[i].x_m));
+    }
+    if (route.size() > 1) route.back().heading_rad = route[route.size() - 2].heading_rad;
+    routes.push_back(std::move(route));
+  }
+  return routes;
+}
+
+SnapshotChain record_chain(const HomingPlace& place, std::span<const Pose2> route,
+                           std::uint64_t seed) {
+  ChainRecorder recorder;
+  SimulatedOdometry wheels({}, Random(seed, 3).next());
+  Random noise_of_views(seed, 4);
+  for (std::size_t i = 0; i < route.size(); ++i) {
+    const Pose2 before = wheels.pose();
+    if (i > 0) wheels.advance(inverse(route[i - 1]) * route[i]);
+    recorder.add(take_homing_view(place, route[i], noise_of_views.next()),
+                 inverse(before) * wheels.pose());
+  }
+  return recorder.finish();
+}
+
+bool ChainRun::completes(double radius_m) const noexcept {
+  return state == ChainState::finished && end_distance_m <= radius_m;
+}
+
+ChainRun follow_chain(const HomingPlace& place, const SnapshotChain& chain,
+                      std::span<const Pose2> route, ChainDirection direction, std::uint64_t seed) {
+  require(!route.empty(), "poses of the route", 0.0, ">= 1");
+  const bool forward = direction == ChainDirection::forward;
+  const Pose2& start = forward ? route.front() : route.back();
+  const Pose2& end = forward ? route.back() : route.front();
+  ChainFollower follower(chain, direction);
+  simulation::SimulatedRobot robot(*place.free_space, {}, simulation::ObstacleRule::pass, start,
+                                   seed);
+  SimulatedOdometry wheels({}, Random(seed, 3).next());
+  Random noise_of_views(seed, 2);
+  ChainRun run;
+  Pose2 moved;
+  for (int step = 0; step <= max_steps; ++step) {
+    run.path.push_back(robot.pose());
+    run.lateral_m.push_back(simulation::distance_from_route_m(robot.pose().position(), route));
+    const ChainDecision decision =
+        follower.decide(take_homing_view(place, robot.pose(), noise_of_views.next()), moved);
+    run.state = decision.state;
+    if (decision.state != ChainState::following) break;
+    const auto direction_rad = robot.free_direction(decision.turn_rad, decision.advance_m);
+    if (!direction_rad) break;
+    const Pose2 true_before = robot.pose();
+    const Pose2 shown_before = wheels.pose();
+    robot.go(*direction_rad, decision.advance_m);
+    wheels.advance(inverse(true_before) * robot.pose());
+    moved = inverse(shown_before) * wheels.pose();
+  }
+  run.end_distance_m = distance(robot.pose().position(), end.position());
+  return run;
+}
+
+void reproduce_snapshot_chains(const HomingPlace& place, const std::string& name,
+                               std::uint64_t seed, int routes, Executor& executor,
+                               Reproduction& reproduction) {
+  require(routes >= 1, "routes", routes, ">= 1");
+  const auto ways = random_routes(*place.free_space, routes, route_m, pose_spacing_m, seed);
+  constexpr std::size_t directions = 2;
+  std::vector<SnapshotChain> chains(ways.size());
+  std::vector<ChainRun> runs(ways.size() * directions);
+  executor.for_chunks(ways.size(), 1, [&](std::size_t begin, std::size_t end, std::size_t) {
+    for (std::size_t i = begin; i < end; ++i) {
+      chains[i] = record_chain(place, ways[i], seed + i);
+      for (const auto direction : {ChainDirection::forward, ChainDirection::back}) {
+        runs[directions * i + static_cast<std::size_t>(direction)] =
+            follow_chain(place, chains[i], ways[i], direction, seed + i);
+      }
+    }
+  });
+
+  std::size_t completed = 0;
+  std::vector<double> mean_m;
+  std::vector<double> worst_m;
+  for (const ChainRun& run : runs) {
+    completed += run.completes(completed_m) ? 1 : 0;
+    double sum_m = 0.0;
+    for (const double lateral_m : run.lateral_m) sum_m += lateral_m;
+    mean_m.push_back(sum_m / static_cast<double>(run.lateral_m.size()));
+    worst_m.push_back(*std::max_element(run.lateral_m.begin(), run.lateral_m.end()));
+  }
+  std::vector<double> spacing_m;
+  std::vector<double> bytes;
+  for (const SnapshotChain& chain : chains) {
+    spacing_m.push_back(chain_length_m(chain) / static_cast<double>(chain.size() - 1));
+    bytes.push_back(bytes_per_metre(chain));
+  }
+  const std::string id = "s06.chain." + name;
+  const std::string what = "chains of snapshots along 30 m in " + name;
+  add_rate(reproduction, id + ".completed",
+           what + ", forward and back: driven to within 20 cm of the end", completed, runs.size());
+  add_mean(reproduction, id + ".lateral", what + ": mean distance from the route", "m", mean_m);
+  add_median(reproduction, id + ".lateral_worst", what + ": largest distance from the route", "m",
+             worst_m);
+  add_mean(reproduction, id + ".spacing", what + ": way between snapshots", "m", spacing_m);
+  add_mean(reproduction, id + ".bytes", what + ": size", "B/m", bytes);
+}
+
+void reproduce_snapshot_chains(std::uint64_t seed, int routes, Executor& executor,
+                               Reproduction& reproduction) {
+  for (const char* const name : {"office", "hall", "loop", "corridor"}) {
+    const HomingPlace place =
+        make_homing_place(simulation::make_scene(name, {.seed = seed}), chain_camera(), executor);
+    reproduce_snapshot_chains(place, name, seed, routes, executor, reproduction);
+  }
+}
+
+}  // namespace panonav::lab

@@ -1,0 +1,261 @@
+// [S06] figures 9, 14, 15, 16: everything around one goal.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "lab/s06/support.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav_viewer/plot.hpp"
+
+namespace panonav::lab {
+
+namespace {
+
+// A goal and all that the pictures need of it.
+class GoalPictures {
+ public:
+  GoalPictures(ArenaSurveys& surveys, std::size_t goal)
+      : surveys_(surveys), arena_(surveys.arena()), goal_(goal) {}
+
+  [[nodiscard]] const HomingView& home() const {
+    return arena_.homes.views[goal_ * surveys_.goals_every()].view;
+  }
+  [[nodiscard]] Point2 position() const {
+    return arena_.homes.views[goal_ * surveys_.goals_every()].pose.position();
+  }
+  [[nodiscard]] std::vector<double> differences(int highest) const {
+    std::vector<double> values;
+    for (const auto& placed : arena_.currents.views) {
+      values.push_back(image_difference(home(), placed.view, highest));
+    }
+    return values;
+  }
+  [[nodiscard]] std::vector<double> final_distances_of(const HomingStrategy& strategy) {
+    const auto stages = surveys_.stages(strategy);
+    std::vector<double> values;
+    for (const std::uint32_t end : final_places(stages, goal_, survey_options(arena_))) {
+      values.push_back(distance(position(), arena_.currents.views[end].pose.position()));
+    }
+    return values;
+  }
+  [[nodiscard]] std::vector<viewer::MapLayer> shaded(const std::vector<double>& values,
+                                                     const std::vector<double>& limits) const;
+  [[nodiscard]] viewer::MapLayer vectors(const FourierHomingOptions& homing) const;
+  [[nodiscard]] viewer::MapLayer border(const std::vector<bool>& inside) const;
+  [[nodiscard]] viewer::MapLayer goal_mark() const;
+  [[nodiscard]] viewer::MapLayer most_similar(const std::vector<double>& differences) const;
+
+ private:
+  ArenaSurveys& surveys_;
+  const Arena& arena_;
+  std::size_t goal_;
+};
+
+// One layer of cells for each range between limits, the highest values darkest.
+std::vector<viewer::MapLayer> GoalPictures::shaded(const std::vector<double>& values,
+                                                   const std::vector<double>& limits) const {
+  constexpr std::array greys{viewer::PlotColour::yellow,     viewer::PlotColour::pale_grey,
+                             viewer::PlotColour::light_grey, viewer::PlotColour::grey,
+                             viewer::PlotColour::dark_grey,  viewer::PlotColour::black};
+  const double half_m = 0.5 * arena_.options.spacing_m;
+  std::vector<viewer::MapLayer> layers;
+  for (std::size_t level = 0; level <= limits.size(); ++level) {
+    layers.push_back({.colour = greys.at(std::min(level, greys.size() - 1))});
+  }
+  for (std::size_t p = 0; p < values.size(); ++p) {
+    const auto level = static_cast<std::size_t>(
+        std::ranges::count_if(limits, [&](double limit) { return values[p] > limit; }));
+    const Point2 at = arena_.currents.views[p].pose.position();
+    layers[level].filled_polygons.push_back({{at.x_m - half_m, at.y_m - half_m},
+                                             {at.x_m + half_m, at.y_m - half_m},
+                                             {at.x_m + half_m, at.y_m + half_m},
+                                             {at.x_m - half_m, at.y_m + half_m}});
+  }
+  return layers;
+}
+
+// A stroke from each place towards home, a dot where it begins.
+viewer::MapLayer GoalPictures::vectors(const FourierHomingOptions& homing) const {
+  viewer::MapLayer layer{.colour = viewer::PlotColour::blue};
+  for (const auto& placed : arena_.currents.views) {
+    const HomeVector vector = home_vector(home(), placed.view, homing);
+    if (vector.length() == 0.0) continue;
+    const double direction = placed.pose.heading_rad + vector.direction_rad();
+    const double length_m = 0.7 * arena_.options.spacing_m;
+    const Point2 at = placed.pose.position();
+    layer.dots.push_back(at);
+    layer.lines.push_back(
+        {at, {at.x_m + length_m * std::cos(direction), at.y_m + length_m * std::sin(direction)}});
+  }
+  return layer;
+}
+
+// The edges between cells inside and all others.
+viewer::MapLayer GoalPictures::border(const std::vector<bool>& inside) const {
+  viewer::MapLayer layer{.colour = viewer::PlotColour::vermilion};
+  const double spacing_m = arena_.options.spacing_m;
+  const auto is_inside = [&](double x_m, double y_m) {
+    for (std::size_t p = 0; p < inside.size(); ++p) {
+      const Point2 at = arena_.currents.views[p].pose.position();
+      if (std::abs(at.x_m - x_m) < 0.5 * spacing_m && std::abs(at.y_m - y_m) < 0.5 * spacing_m) {
+        return static_cast<bool>(inside[p]);
+      }
+    }
+    return false;
+  };
+  for (std::size_t p = 0; p < inside.size(); ++p) {
+    if (!inside[p]) continue;
+    const Point2 at = arena_.currents.views[p].pose.position();
+    constexpr std::array<std::array<int, 2>, 4> sides{{{1, 0}, {0, 1}, {-1, 0}, {0, -1}}};
+    for (const auto& [dx, dy] : sides) {
+      if (is_inside(at.x_m + dx * spacing_m, at.y_m + dy * spacing_m)) continue;
+      const double h = 0.5 * spacing_m;
+      const double x = at.x_m + dx * h;
+      const double y = at.y_m + dy * h;
+      layer.lines.push_back({{x - dy * h, y - dx * h}, {x + dy * h, y + dx * h}});
+    }
+  }
+  return layer;
+}
+
+viewer::MapLayer GoalPictures::goal_mark() const {
+  return {.label = "goal", .colour = viewer::PlotColour::purple, .squares = {position()}};
+}
+
+viewer::MapLayer GoalPictures::most_similar(const std::vector<double>& differences) const {
+  const auto best = std::ranges::min_element(differences) - differences.begin();
+  return {.label = "most similar",
+          .colour = viewer::PlotColour::green,
+          .circles = {arena_.currents.views[static_cast<std::size_t>(best)].pose.position()}};
+}
+
+const std::vector<double> difference_limits{0.05, 0.1, 0.2, 0.4, 0.8};
+const std::vector<double> distance_limits{0.0126, 0.0501, 0.1001, 0.2001, 0.4001};
+constexpr double reached_m = 0.1 + 1e-6;
+
+std::vector<bool> within(const std::vector<double>& distances, double limit_m) {
+  std::vector<bool> inside;
+  for (const double away_m : distances) inside.push_back(away_m <= limit_m);
+  return inside;
+}
+
+template <typename... Layers>
+viewer::MapPlot map_of(const std::string& title, std::vector<viewer::MapLayer> layers,
+                       Layers... more) {
+  (layers.push_back(std::move(more)), ...);
+  return {title, std::move(layers)};
+}
+
+// Differences along the line of places with the goal's y, or x.
+viewer::Series transect(const Arena& arena, Point2 goal, const std::vector<double>& differences,
+                        bool along_x, const std::string& label) {
+  std::vector<std::pair<double, double>> points;
+  for (std::size_t p = 0; p < differences.size(); ++p) {
+    const Point2 at = arena.currents.views[p].pose.position();
+    const double aside = along_x ? at.y_m - goal.y_m : at.x_m - goal.x_m;
+    if (std::abs(aside) > 0.1 * arena.options.spacing_m) continue;
+    points.emplace_back(along_x ? at.x_m - goal.x_m : at.y_m - goal.y_m, differences[p]);
+  }
+  std::ranges::sort(points);
+  viewer::Series series{.label = label};
+  for (const auto& [x, y] : points) {
+    series.add(x, y);
+  }
+  return series;
+}
+
+}  // namespace
+
+void reproduce_goal_figures(ArenaSurveys& surveys, const std::filesystem::path& folder,
+                            Reproduction& result) {
+  const Arena& arena = surveys.arena();
+  // The goal nearest to the crossing of the streets left of the middle.
+  const HomingSurvey& survey = surveys.published(2);
+  const Point2 wanted{0.5, 0.6};
+  std::size_t goal = 0;
+  for (std::size_t g = 1; g < survey.goals.size(); ++g) {
+    if (distance(survey.goals[g].position(), wanted) <
+        distance(survey.goals[goal].position(), wanted)) {
+      goal = g;
+    }
+  }
+  GoalPictures of(surveys, goal);
+
+  const auto at_five = of.differences(5);
+  const auto ends_five = of.final_distances_of(published_strategy({5}));
+  add_plot(
+      result, folder, "figure_09_vectors.svg",
+      "[S06] figure 9: home vectors to one goal (strokes from the dots), the darker the less "
+      "similar "
+      "the views. Other valleys lead astray.",
+      map_of("Home vectors, K = 5; orange: catchment area at 10 cm",
+             of.shaded(at_five, difference_limits), of.vectors(published_homing(5, s06_iterations)),
+             of.border(within(ends_five, reached_m)), of.goal_mark(), of.most_similar(at_five)));
+
+  std::vector<viewer::MapPlot> panels;
+  viewer::LinePlot along_x{.title = "Image difference along x through the goal",
+                           .x_label = "distance from the goal [m]",
+                           .y_label = "share of the energy of both views"};
+  viewer::LinePlot along_y = along_x;
+  along_y.title = "Image difference along y through the goal";
+  for (const int highest : {2, 4, 10}) {
+    const std::string k = "K = " + std::to_string(highest);
+    const auto differences = of.differences(highest);
+    const auto ends = of.final_distances_of(published_strategy({highest}));
+    panels.push_back(map_of(k + ": image difference, home vectors",
+                            of.shaded(differences, difference_limits),
+                            of.vectors(published_homing(highest, s06_iterations)), of.goal_mark(),
+                            of.most_similar(differences)));
+    panels.push_back(map_of(k + ": where runs end; yellow: at the goal, dark: beyond 40 cm",
+                            of.shaded(ends, distance_limits), of.border(within(ends, reached_m)),
+                            of.goal_mark()));
+    along_x.series.push_back(transect(arena, of.position(), differences, true, k));
+    along_y.series.push_back(transect(arena, of.position(), differences, false, k));
+  }
+  add_plot(result, folder, "figure_14_stages.svg",
+           "[S06] figure 14: the same goal with K = 2, 4 and 10. Left: image difference and home "
+           "vectors; right: how far from the goal runs end that start there.",
+           panels, 2);
+
+  const auto staged = of.final_distances_of(published_strategy({2, 4, 10}));
+  const auto own = of.final_distances_of(own_strategy());
+  const auto images = of.final_distances_of(expected_image_strategy());
+  add_plot(
+      result, folder, "figure_15_areas.svg",
+      "[S06] figure 15: where runs to this goal end, coarse to fine, by our rule and by expected "
+      "images. Yellow: at the goal; dark: beyond 40 cm; orange: the area within 10 cm.",
+      std::vector<viewer::MapPlot>{map_of("K = 2, 4, 10", of.shaded(staged, distance_limits),
+                                          of.border(within(staged, reached_m)), of.goal_mark()),
+                                   map_of("our rule", of.shaded(own, distance_limits),
+                                          of.border(within(own, reached_m)), of.goal_mark()),
+                                   map_of("expected images", of.shaded(images, distance_limits),
+                                          of.border(within(images, reached_m)), of.goal_mark())},
+      3);
+
+  add_plot(result, folder, "figure_16_transect_x.svg",
+           "[S06] figure 16, left: the image difference along a line through the goal. More "
+           "frequencies, a narrower valley.",
+           along_x);
+  add_plot(result, folder, "figure_16_transect_y.svg", "The same across.", along_y);
+  const auto surface = of.differences(10);
+  viewer::HeatMap map{.title = "Image difference to the goal (cross), K = 10",
+                      .value_label = "share of the energy of both views",
+                      .first_cell = {0.0, 0.0},
+                      .spacing_m = arena.options.spacing_m,
+                      .crosses = {of.position()}};
+  map.columns = static_cast<int>(std::lround(arena.scene.floor_high.x_m / map.spacing_m)) + 1;
+  map.rows = static_cast<int>(std::lround(arena.scene.floor_high.y_m / map.spacing_m)) + 1;
+  map.values.assign(static_cast<std::size_t>(map.columns) * static_cast<std::size_t>(map.rows),
+                    std::nan(""));
+  for (std::size_t p = 0; p < surface.size(); ++p) {
+    const Point2 at = arena.currents.views[p].pose.position();
+    const auto column = static_cast<std::size_t>(std::lround(at.x_m / map.spacing_m));
+    const auto row = static_cast<std::size_t>(std::lround(at.y_m / map.spacing_m));
+    map.values.at(row * static_cast<std::size_t>(map.columns) + column) = surface[p];
+  }
+  add_plot(result, folder, "figure_16_surface.svg",
+           "[S06] figure 16, right: the image difference over the arena.", map);
+}
+
+}  // namespace panonav::lab

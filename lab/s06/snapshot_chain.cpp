@@ -1,0 +1,241 @@
+#include "lab/s06/snapshot_chain.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/relative_pose/fourier_homing.hpp"
+
+namespace panonav::lab {
+
+namespace {
+
+// Of the recorder. Vectors between a candidate and the last snapshot may be off by this much.
+constexpr double direction_tolerance_rad = 0.6;
+// A snapshot is taken at this share of the distance over which homing worked, so that a robot
+// beside the route or in other light still reaches it.
+constexpr double margin = 0.7;
+constexpr double min_spacing_m = 0.3;
+// Views nearer to a snapshot are not used for its direction, which is dominated by noise there.
+constexpr double too_near_to_compare_m = 0.15;
+// Between the views that are compared; a view nearer to the one before is skipped.
+constexpr double view_spacing_m = 0.1;
+
+// Of the follower. It continues to the next snapshot where the vector to the present one is shorter
+// than this, in units of R.
+constexpr double switch_length = 0.1;
+// A vector that points farther from where odometry expects the snapshot is not followed.
+constexpr double mistrust_rad = 1.0;
+// The same for the heading that the compass finds, at any distance: odometry drifts less between
+// two snapshots.
+constexpr double mistrust_heading_rad = 0.5;
+// Nearer than this to where odometry expects the snapshot, vectors are followed in any direction,
+// because the drift of odometry dominates there.
+constexpr double near_m = 0.4;
+// The robot is lost after this distance without reaching a snapshot.
+constexpr double max_unseen_m = 10.0;
+
+double length(const Pose2& step) {
+  return std::hypot(step.x_m, step.y_m);
+}
+
+// Whether the home vector from one view to another agrees with odometry.
+bool points_along(const HomingView& from, const HomingView& to, const Pose2& from_to) {
+  if (length(from_to) < too_near_to_compare_m) return true;
+  const HomeVector vector = home_vector(to, from);
+  if (vector.length() == 0.0) return false;
+  const double error_rad = vector.direction_rad() - std::atan2(from_to.y_m, from_to.x_m);
+  return std::abs(wrap_angle(error_rad)) <= direction_tolerance_rad;
+}
+
+}  // namespace
+
+double chain_length_m(const SnapshotChain& chain) noexcept {
+  return chain.empty() ? 0.0 : chain.back().travelled_m - chain.front().travelled_m;
+}
+
+double bytes_per_metre(const SnapshotChain& chain) noexcept {
+  std::size_t floats = 0;
+  for (const Snapshot& snapshot : chain) {
+    floats += 2 * static_cast<std::size_t>(snapshot.view.rows()) *
+                  static_cast<std::size_t>(snapshot.view.components() - 1) +
+              4;
+  }
+  const double length_m = chain_length_m(chain);
+  return length_m > 0.0 ? static_cast<double>(sizeof(float) * floats) / length_m : 0.0;
+}
+
+ChainRecorder::ChainRecorder(double max_spacing_m) : max_spacing_m_(max_spacing_m) {}
+
+// `candidate` is the last of the views passed. Between two views that follow each other the last
+// candidate has asked already for the direction back.
+bool ChainRecorder::is_reachable(const Passed& candidate) const {
+  const auto points_from_to = [](const Passed& from, const Passed& to) {
+    return points_along(from.view, to.view,
+                        inverse(from.snapshot_from_this) * to.snapshot_from_this);
+  };
+  if (!points_from_to(candidate, passed_.front())) return false;
+  return std::all_of(passed_.begin(), passed_.end(), [&](const Passed& view) {
+    return &view == &candidate || points_from_to(view, candidate);
+  });
+}
+
+std::size_t ChainRecorder::add(const HomingView& view, const Pose2& moved) {
+  if (chain_.empty()) {
+    chain_.push_back({view, 0.0, {}});
+    passed_.push_back({view, {}, 0.0});
+    return 1;
+  }
+  snapshot_from_robot_ = snapshot_from_robot_ * moved;
+  way_m_ += length(moved);
+  if (way_m_ - passed_.back().way_m < view_spacing_m) return chain_.size();
+
+  passed_.push_back({view, snapshot_from_robot_, way_m_});
+  const bool too_far = way_m_ > max_spacing_m_;
+  if (!too_far && is_reachable(passed_.back())) return chain_.size();
+  // The last view that is not too far: a share of the way that worked, and at least the shortest.
+  const double worked_m = passed_[passed_.size() - 2].way_m;
+  const double wanted_m = std::max(too_far ? worked_m : margin * worked_m, min_spacing_m);
+  std::size_t chosen = 0;
+  for (std::size_t i = 1; i < passed_.size() && passed_[i].way_m <= wanted_m; ++i) chosen = i;
+  if (chosen == 0 && way_m_ >= min_spacing_m) chosen = 1;
+  if (chosen > 0) take_snapshot(chosen);
+  return chain_.size();
+}
+
+void ChainRecorder::take_snapshot(std::size_t index) {
+  const Pose2 old_from_new = passed_[index].snapshot_from_this;
+  const double way_m = passed_[index].way_m;
+  chain_.push_back({passed_[index].view, chain_.back().travelled_m + way_m, old_from_new});
+  passed_.erase(passed_.begin(), passed_.begin() + static_cast<std::ptrdiff_t>(index));
+  const Pose2 new_from_old = inverse(old_from_new);
+  for (Passed& view : passed_) {
+    view.snapshot_from_this = new_from_old * view.snapshot_from_this;
+    view.way_m -= way_m;
+  }
+  snapshot_from_robot_ = new_from_old * snapshot_from_robot_;
+  way_m_ -= way_m;
+}
+
+SnapshotChain ChainRecorder::finish() const {
+  SnapshotChain chain = chain_;
+  if (passed_.size() > 1) {
+    const Passed& last = passed_.back();
+    chain.push_back({last.view, chain.back().travelled_m + last.way_m, last.snapshot_from_this});
+  }
+  return chain;
+}
+
+ChainFollower::ChainFollower(SnapshotChain chain, ChainDirection direction,
+                             const HomingPursuitOptions& pursuit)
+    : chain_(std::move(chain)), direction_(direction), pursuit_options_(pursuit) {
+  require(!chain_.empty(), "snapshots of the chain", 0.0, ">= 1");
+  validate(pursuit_options_);
+}
+
+bool ChainFollower::is_last(std::size_t target) const noexcept {
+  return direction_ == ChainDirection::forward ? target + 1 == chain_.size() : target == 0;
+}
+
+std::size_t ChainFollower::next(std::size_t target) const noexcept {
+  return direction_ == ChainDirection::forward ? target + 1 : target - 1;
+}
+
+void ChainFollower::aim_at_next(const Pose2& target_from_robot) {
+  const Pose2 target_from_next = direction_ == ChainDirection::forward
+                                     ? chain_[*target_ + 1].previous_from_this
+                                     : inverse(chain_[*target_].previous_from_this);
+  target_from_robot_ = inverse(target_from_next) * target_from_robot;
+  target_ = next(*target_);
+  steps_to_target_ = 0;
+  way_m_ = length(*target_from_robot_);
+  max_steps_to_target_ = 3 + 3 * static_cast<int>(std::ceil(way_m_ / pursuit_options_.max_step_m));
+}
+
+bool ChainFollower::contradicts_odometry(const HomeVector& vector) const noexcept {
+  if (!target_from_robot_) return false;
+  const double drift_rad = wrap_angle(-vector.heading_rad - target_from_robot_->heading_rad);
+  return std::abs(drift_rad) > mistrust_heading_rad;
+}
+
+ChainDecision ChainFollower::approach_last(const HomingView& current) {
+  if (!pursuit_) pursuit_.emplace(chain_[*target_].view, pursuit_options_, FourierHomingOptions{});
+  const PursuitDecision step = pursuit_->decide(current);
+  ChainDecision decision{ChainState::following, *target_, step.turn_rad, step.advance_m};
+  if (step.state == PursuitState::arrived) decision.state = ChainState::finished;
+  if (step.state == PursuitState::wrong_place || step.state == PursuitState::exhausted) {
+    decision.state = ChainState::lost;
+  }
+  return decision;
+}
+
+ChainDecision ChainFollower::decide(const HomingView& current, const Pose2& moved) {
+  if (!target_) {
+    double min_difference = 3.0;
+    for (std::size_t i = 0; i < chain_.size(); ++i) {
+      const double difference = image_difference(chain_[i].view, current);
+      if (difference >= min_difference) continue;
+      min_difference = difference;
+      target_ = i;
+    }
+    if (!target_) target_ = 0;
+    max_steps_to_target_ = pursuit_options_.max_steps;
+  } else if (target_from_robot_) {
+    target_from_robot_ = *target_from_robot_ * moved;
+    unseen_m_ += length(moved);
+  }
+  if (pursuit_) return approach_last(current);
+
+  const double r_m = pursuit_options_.typical_distance_m;
+  HomeVector vector = home_vector(chain_[*target_].view, current);
+  if (!is_last(*target_)) {
+    // What the views say counts where odometry does not exclude it.
+    const bool contradicts = contradicts_odometry(vector);
+    const bool plausible =
+        !target_from_robot_ ||
+        (!contradicts && length(*target_from_robot_) <= std::max(near_m, 0.5 * way_m_));
+    const bool is_near = plausible && vector.length() < switch_length;
+    const bool passed = plausible && !is_near &&
+                        image_difference(chain_[next(*target_)].view, current) <
+                            image_difference(chain_[*target_].view, current);
+    const bool is_there_by_odometry =
+        contradicts && length(*target_from_robot_) < r_m * switch_length;
+    const bool skipped =
+        !is_near && !passed && (is_there_by_odometry || steps_to_target_ >= max_steps_to_target_);
+    if (is_near || passed) unseen_m_ = 0.0;
+    if (is_near || passed || skipped) {
+      // Heading by the compass. Position by the vector where it is short, else by odometry.
+      Pose2 target_from_robot = target_from_robot_.value_or(Pose2{});
+      if (is_near || !target_from_robot_) {
+        target_from_robot =
+            inverse(Pose2{r_m * vector.xi, r_m * vector.eta, wrap_angle(vector.heading_rad)});
+      }
+      aim_at_next(target_from_robot);
+      vector = home_vector(chain_[*target_].view, current);
+    }
+  }
+  ++steps_to_target_;
+  if (unseen_m_ > max_unseen_m) return {ChainState::lost, *target_, 0.0, 0.0};
+
+  if (target_from_robot_) {
+    const bool contradicts = contradicts_odometry(vector);
+    const bool near = length(*target_from_robot_) <= near_m;
+    const Pose2 expected = inverse(*target_from_robot_);
+    const double expected_rad = std::atan2(expected.y_m, expected.x_m);
+    const double off_rad = std::abs(wrap_angle(vector.direction_rad() - expected_rad));
+    const bool at_last = near && is_last(*target_);
+    if (!at_last && (contradicts || vector.length() == 0.0 || (!near && off_rad > mistrust_rad))) {
+      return {ChainState::following, *target_, expected_rad,
+              std::min(pursuit_options_.max_step_m, length(expected))};
+    }
+    // The compass does not drift.
+    if (!contradicts) target_from_robot_->heading_rad = wrap_angle(-vector.heading_rad);
+  }
+  if (is_last(*target_)) return approach_last(current);
+  return {ChainState::following, *target_, vector.direction_rad(),
+          std::min(pursuit_options_.max_step_m, r_m * vector.length())};
+}
+
+}  // namespace panonav::lab

@@ -1,0 +1,101 @@
+#include "lab/s06/support.hpp"
+
+namespace panonav::lab {
+
+namespace {
+
+constexpr std::array<int, 6> own_stages{1, 2, 3, 4, 6, 10};
+constexpr int own_rounds = 3;
+constexpr int own_highest = 10;
+
+std::string joined(std::span<const int> numbers) {
+  std::string text;
+  for (const int number : numbers) {
+    text += (text.empty() ? "" : ", ") + std::to_string(number);
+  }
+  return text;
+}
+
+}  // namespace
+
+HomingStrategy published_strategy(std::vector<int> highest) {
+  std::string label = "K = " + joined(highest);
+  return {std::move(label), HomingStrategy::Rule::published, std::move(highest)};
+}
+
+HomingStrategy own_strategy() {
+  return {"our rule", HomingStrategy::Rule::own, {}};
+}
+
+HomingStrategy expected_image_strategy() {
+  return {"expected images", HomingStrategy::Rule::expected_images, {}};
+}
+
+ArenaSurveys::ArenaSurveys(const Arena& arena, std::size_t goals_every, Executor& executor)
+    : arena_(arena),
+      every_(goals_every),
+      executor_(executor),
+      expected_image_homing_(s06_columns) {}
+
+template <typename Rule>
+const HomingSurvey& ArenaSurveys::survey(const std::string& key, const Rule& rule) {
+  const auto at = surveys_.find(key);
+  if (at != surveys_.end()) return at->second;
+  return surveys_.emplace(key, survey_arena(arena_, rule, executor_, every_)).first->second;
+}
+
+const HomingSurvey& ArenaSurveys::published(int highest, int iterations) {
+  const std::string key = "published " + std::to_string(highest) + " " + std::to_string(iterations);
+  return survey(key, published_homing(highest, iterations));
+}
+
+const HomingSurvey& ArenaSurveys::own(int highest) {
+  return survey("own " + std::to_string(highest), FourierHomingOptions{.highest = highest});
+}
+
+const HomingSurvey& ArenaSurveys::own_again(int highest) {
+  const FourierHomingOptions coarse{.highest = highest, .displacement_search = false};
+  const FourierHomingOptions fine{.highest = own_highest, .displacement_search = false};
+  const auto rule = [&](std::size_t goal, std::size_t place) {
+    const HomingView& home = arena_.homes.views[goal].view;
+    const HomingView& current = arena_.currents.views[place].view;
+    const bool alike = image_difference(home, current, own_highest) < s06_alike;
+    return home_vector_unchecked(home, current, alike ? fine : coarse);
+  };
+  return survey("own again " + std::to_string(highest), HomingRule(rule));
+}
+
+const HomingSurvey& ArenaSurveys::expected_images() {
+  return survey("expected images", expected_image_homing_);
+}
+
+std::vector<const HomingSurvey*> ArenaSurveys::stages(const HomingStrategy& strategy) {
+  if (strategy.rule == HomingStrategy::Rule::expected_images) return {&expected_images()};
+  std::vector<const HomingSurvey*> stages;
+  if (strategy.rule == HomingStrategy::Rule::own) {
+    stages.push_back(&own(own_highest));
+    for (int round = 0; round < own_rounds; ++round) {
+      for (const int highest : own_stages) stages.push_back(&own_again(highest));
+    }
+    stages.push_back(&own(own_highest));
+  }
+  for (const int highest : strategy.highest) stages.push_back(&published(highest));
+  return stages;
+}
+
+std::vector<float> ArenaSurveys::distances(const HomingStrategy& strategy) {
+  return final_distances(stages(strategy), survey_options(arena_), executor_);
+}
+
+std::vector<float> ArenaSurveys::distances(std::span<const HomingSurvey* const> stages) {
+  return final_distances(stages, survey_options(arena_), executor_);
+}
+
+std::vector<double> ArenaSurveys::areas(const HomingStrategy& strategy,
+                                        std::span<const double> accepted_m) {
+  const auto stages_of_it = stages(strategy);
+  return mean_catchment_areas(final_distances(stages_of_it, survey_options(arena_), executor_),
+                              stages_of_it[0]->goals.size(), accepted_m);
+}
+
+}  // namespace panonav::lab

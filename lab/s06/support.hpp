@@ -1,0 +1,104 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "lab/rows.hpp"
+#include "lab/s06/arena.hpp"
+#include "panonav/core/executor.hpp"
+#include "panonav/homing/homing_survey.hpp"
+
+namespace panonav::lab {
+
+// What the experiments of [S06] share.
+
+/// Distances from the goal at which a run may end.
+inline constexpr std::array<double, 3> s06_accepted_m{0.025, 0.05, 0.1};
+/// Iterations of the published rule in the runs: N_it + 1 = 3 [S06 figure 11].
+inline constexpr int s06_iterations = 2;
+
+/// Image difference below which a place looks like home, K = 10.
+inline constexpr double s06_alike = 0.1;
+
+/// A way of homing: rules that follow each other whenever homing stops.
+struct HomingStrategy {
+  enum class Rule { published, own, expected_images };
+  std::string label;
+  Rule rule = Rule::published;
+  std::vector<int> highest;  ///< K of each stage; not for expected images and our rule
+};
+[[nodiscard]] HomingStrategy published_strategy(std::vector<int> highest);
+/// Our own: home vectors with default options and K = 10; where runs stop at a place that does not
+/// look like home, coarse to fine without the search of displacements, three times; default options
+/// last. A place looks like home below `s06_alike`. All this was chosen on arenas of seeds 1 to 4.
+[[nodiscard]] HomingStrategy own_strategy();
+[[nodiscard]] HomingStrategy expected_image_strategy();
+
+/// The surveys of one arena, each computed when it is first asked for.
+class ArenaSurveys {
+ public:
+  /// Keeps references.
+  ArenaSurveys(const Arena& arena, std::size_t goals_every, Executor& executor);
+
+  [[nodiscard]] const Arena& arena() const noexcept { return arena_; }
+  [[nodiscard]] std::size_t goals_every() const noexcept { return every_; }
+  [[nodiscard]] const HomingSurvey& published(int highest, int iterations = s06_iterations);
+  /// Default options.
+  [[nodiscard]] const HomingSurvey& own(int highest);
+  /// Without the search of displacements; K = 10 instead of `highest` where it looks like home.
+  [[nodiscard]] const HomingSurvey& own_again(int highest);
+  [[nodiscard]] const HomingSurvey& expected_images();
+  [[nodiscard]] std::vector<const HomingSurvey*> stages(const HomingStrategy& strategy);
+  /// Goal after goal.
+  [[nodiscard]] std::vector<float> distances(const HomingStrategy& strategy);
+  [[nodiscard]] std::vector<float> distances(std::span<const HomingSurvey* const> stages);
+  [[nodiscard]] std::vector<double> areas(const HomingStrategy& strategy,
+                                          std::span<const double> accepted_m);
+
+ private:
+  template <typename Rule>
+  [[nodiscard]] const HomingSurvey& survey(const std::string& key, const Rule& rule);
+
+  const Arena& arena_;
+  std::size_t every_;
+  Executor& executor_;
+  ExpectedImageHoming expected_image_homing_;
+  std::map<std::string, HomingSurvey> surveys_;
+};
+
+// The experiments; each appends rows and writes pictures into `folder`.
+
+/// [S06] figures 3, 6, 7, 8.
+void reproduce_view_figures(const Arena& arena, const std::filesystem::path& folder,
+                            Executor& executor, Reproduction& result);
+/// Heading where both views are taken at the same place, with the tracker's noise: a row.
+void reproduce_heading_with_pose_noise(const Arena& arena, Reproduction& result);
+/// [S06] figures 10 to 13.
+void reproduce_homing_figures(ArenaSurveys& surveys, const std::filesystem::path& folder,
+                              Executor& executor, Reproduction& result);
+/// [S06] figures 9, 14, 15, 16.
+void reproduce_goal_figures(ArenaSurveys& surveys, const std::filesystem::path& folder,
+                            Reproduction& result);
+/// Three snapshots of K = 3 for the price of one image [S06 section 4.4].
+void reproduce_snapshot_bytes(ArenaSurveys& surveys, Reproduction& result);
+
+/// Mean catchment areas of one arena at `s06_accepted_m`.
+using CatchmentAreas = std::map<std::string, std::array<double, s06_accepted_m.size()>>;
+[[nodiscard]] CatchmentAreas catchment_areas(ArenaSurveys& surveys);
+/// How the rules compare, over arenas.
+void compare_catchment_areas(std::span<const CatchmentAreas> arenas, std::uint64_t seed,
+                             Reproduction& result);
+/// The same two recordings with the tracker's noise, or all at one heading: rows only.
+void report_variant(const std::string& id, const std::string& what, const CatchmentAreas& areas,
+                    Reproduction& result);
+
+/// Time of one home vector and of its rival, N = 360.
+void measure_homing_times(const Arena& arena, Reproduction& result);
+
+}  // namespace panonav::lab

@@ -1,0 +1,387 @@
+// [S06] figures 3, 6, 7, 8: what views are like and how they change with the distance.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "lab/rows.hpp"
+#include "lab/s06/support.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/core/statistics.hpp"
+#include "panonav/kernels/turn_products.hpp"
+#include "panonav/relative_pose/turn_correlation.hpp"
+#include "panonav_viewer/plot.hpp"
+
+namespace panonav::lab {
+
+namespace {
+
+constexpr int top = s06_components - 1;  // highest frequency of a view of 72 pixels
+
+TurnCorrelation correlation_of(const HomingView& home, const HomingView& current, int highest) {
+  TurnCorrelation correlation;
+  correlation.highest = highest;
+  for (int k = 1; k <= highest; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    correlation.real[i] = home.a(0, k) * current.a(0, k) + home.b(0, k) * current.b(0, k);
+    correlation.imaginary[i] = home.a(0, k) * current.b(0, k) - home.b(0, k) * current.a(0, k);
+  }
+  return correlation;
+}
+
+double energy(const HomingView& view) {
+  double sum = 0.0;
+  for (int k = 1; k <= top; ++k) {
+    sum += static_cast<double>(view.a(0, k) * view.a(0, k) + view.b(0, k) * view.b(0, k));
+  }
+  return sum;
+}
+
+double true_turn(const Arena& arena, std::size_t goal, std::size_t place) {
+  return wrap_angle(arena.homes.views[goal].pose.heading_rad -
+                    arena.currents.views[place].pose.heading_rad);
+}
+
+// Figure 3.
+void draw_correlation(const Arena& arena, const std::filesystem::path& folder,
+                      Reproduction& result) {
+  // The place where the headings differ most nearly by 120 degrees, as in the paper.
+  std::size_t shown = 0;
+  double least = 10.0;
+  for (std::size_t i = 0; i < arena.homes.views.size(); ++i) {
+    const double off = std::abs(std::abs(true_turn(arena, i, i)) - 2.0 * std::numbers::pi / 3.0);
+    if (off < least) {
+      least = off;
+      shown = i;
+    }
+  }
+  const HomingView& home = arena.homes.views[shown].view;
+  const HomingView& current = arena.currents.views[shown].view;
+  const double most = std::sqrt(energy(home) * energy(current));
+  const TurnCorrelation all = correlation_of(home, current, top);
+  const double truth = true_turn(arena, shown, shown);
+
+  viewer::LinePlot terms{.title = "Terms of the correlation; true turn " +
+                                  std::to_string(std::lround(degrees(truth))) + " degrees",
+                         .x_label = "turn [degrees]",
+                         .y_label = "share of the largest possible correlation"};
+  for (int k = 0; k <= 5; ++k) {
+    viewer::Series series{.label = k == 0 ? "all" : "k = " + std::to_string(k),
+                          .style = viewer::SeriesStyle::lines};
+    for (int step = -180; step <= 180; step += 2) {
+      const double turn_rad = radians(step);
+      TurnCorrelation one = all;
+      for (int other = 1; k > 0 && other <= top; ++other) {
+        if (other != k) one.real[other] = one.imaginary[other] = 0.0F;
+      }
+      series.add(step, static_cast<double>(one.at(static_cast<float>(turn_rad))) / most);
+    }
+    terms.series.push_back(std::move(series));
+  }
+  add_plot(result, folder, "figure_03_correlation.svg",
+           "[S06] figure 3a: the first five terms of the correlation of two views from one place, "
+           "and the whole. Only the whole has one clear maximum.",
+           terms);
+
+  viewer::LinePlot maxima{.title = "Turn at the largest correlation",
+                          .x_label = "highest frequency K",
+                          .y_label = "error [degrees]"};
+  viewer::Series series;
+  for (int highest = 1; highest <= 20; ++highest) {
+    std::array<float, 1> turn{};
+    if (highest_turns(correlation_of(home, current, highest), turn) == 0) continue;
+    series.add(highest, degrees(angle_difference(static_cast<double>(turn[0]), truth)));
+  }
+  maxima.series.push_back(std::move(series));
+  add_plot(result, folder, "figure_03_maximum.svg",
+           "[S06] figure 3b: the turn of the same two views by their first K frequencies, less the "
+           "truth.",
+           maxima);
+}
+
+// Figure 6.
+void draw_spectrum(const Arena& arena, const std::filesystem::path& folder, Reproduction& result) {
+  viewer::Series series{.style = viewer::SeriesStyle::lines_and_points};
+  std::vector<double> log_k;
+  std::vector<double> log_power;
+  for (int k = 1; k <= top; ++k) {
+    std::vector<double> powers;
+    for (const auto* const recording : {&arena.homes, &arena.currents}) {
+      for (const auto& placed : recording->views) {
+        const auto a = static_cast<double>(placed.view.a(0, k));
+        const auto b = static_cast<double>(placed.view.b(0, k));
+        powers.push_back(a * a + b * b);
+      }
+    }
+    const double mean_power = mean(powers);
+    double square = 0.0;
+    for (const double power : powers) square += (power - mean_power) * (power - mean_power);
+    const double deviation = std::sqrt(square / static_cast<double>(powers.size()));
+    series.add(k, mean_power);
+    // On an axis of logarithms a bar cannot reach 0.
+    series.y_low.push_back(std::max(mean_power - deviation, 0.1 * mean_power));
+    series.y_high.push_back(mean_power + deviation);
+    // Above, pixels of 5 degrees blur what they see: they leave 77 % of the power at k = 20.
+    if (k <= 15) {
+      log_k.push_back(std::log(k));
+      log_power.push_back(std::log(mean_power));
+    }
+  }
+  const double mean_k = mean(log_k);
+  const double mean_log = mean(log_power);
+  double xy = 0.0;
+  double xx = 0.0;
+  for (std::size_t i = 0; i < log_k.size(); ++i) {
+    xy += (log_k[i] - mean_k) * (log_power[i] - mean_log);
+    xx += (log_k[i] - mean_k) * (log_k[i] - mean_k);
+  }
+  const double slope = -xy / xx;
+  add_row(result, "s06.spectrum.slope",
+          "power falls with frequency to the power of minus this, k = 1 .. 15", slope, "",
+          std::nullopt, std::pair(1.8, 1.8));
+  viewer::Series line{
+      .label = "slope " + std::to_string(std::round(100.0 * slope) / 100.0).substr(0, 4),
+      .style = viewer::SeriesStyle::lines};
+  for (int k = 1; k <= top; ++k) {
+    line.add(k, std::exp(mean_log - slope * (std::log(k) - mean_k)));
+  }
+  series.label = "mean and standard deviation";
+  add_plot(result, folder, "figure_06_spectrum.svg",
+           "[S06] figure 6: mean power of the views; a straight line is a power law.",
+           viewer::LinePlot{.title = "Power spectrum of all views of the arena",
+                            .x_label = "frequency k",
+                            .y_label = "squared amplitude",
+                            .series = {std::move(series), std::move(line)},
+                            .log_x = true,
+                            .log_y = true});
+}
+
+struct Sums {
+  explicit Sums(std::size_t bins) : first(bins), second(bins) {}
+  std::vector<double> first, second;
+  void add(const Sums& other) {
+    for (std::size_t i = 0; i < first.size(); ++i) {
+      first[i] += other.first[i];
+      second[i] += other.second[i];
+    }
+  }
+};
+
+// For each of `series` values, sums over all pairs of places by their distance; `values` fills two
+// numbers per series. The same on any number of threads.
+template <typename Values>
+std::pair<std::vector<Sums>, std::vector<double>> sum_pairs(const Arena& arena, std::size_t series,
+                                                            Executor& executor, Values values) {
+  const auto& homes = arena.homes.views;
+  const auto& currents = arena.currents.views;
+  constexpr std::size_t bins = 62;
+  constexpr std::size_t chunk = 64;
+  struct Part {
+    std::vector<Sums> sums;
+    std::vector<double> pairs;
+  };
+  std::vector<Part> parts((homes.size() + chunk - 1) / chunk);
+  executor.for_chunks(
+      homes.size(), chunk, [&](std::size_t begin, std::size_t end, std::size_t number) {
+        Part part{std::vector<Sums>(series, Sums(bins)), std::vector<double>(bins)};
+        std::vector<std::pair<double, double>> of_pair(series);
+        for (std::size_t g = begin; g < end; ++g) {
+          for (std::size_t p = 0; p < currents.size(); ++p) {
+            const double away_m = distance(homes[g].pose.position(), currents[p].pose.position());
+            const auto bin = static_cast<std::size_t>(away_m / arena.options.spacing_m + 0.5);
+            if (bin >= bins) continue;
+            values(g, p, of_pair);
+            part.pairs[bin] += 1.0;
+            for (std::size_t s = 0; s < series; ++s) {
+              part.sums[s].first[bin] += of_pair[s].first;
+              part.sums[s].second[bin] += of_pair[s].second;
+            }
+          }
+        }
+        parts[number] = std::move(part);
+      });
+  Part all{std::vector<Sums>(series, Sums(bins)), std::vector<double>(bins)};
+  for (const Part& part : parts) {
+    for (std::size_t s = 0; s < series; ++s) all.sums[s].add(part.sums[s]);
+    for (std::size_t i = 0; i < bins; ++i) all.pairs[i] += part.pairs[i];
+  }
+  return {std::move(all.sums), std::move(all.pairs)};
+}
+
+// Figure 7.
+void draw_changes(const Arena& arena, const std::filesystem::path& folder, Executor& executor,
+                  Reproduction& result) {
+  constexpr std::array<int, 6> shown{1, 2, 3, 5, 10, 20};
+  // All at one heading, as in the paper.
+  std::vector<HomingView> homes;
+  std::vector<HomingView> currents;
+  for (const auto& placed : arena.homes.views) {
+    homes.push_back(turn(placed.view, -placed.pose.heading_rad));
+  }
+  for (const auto& placed : arena.currents.views) {
+    currents.push_back(turn(placed.view, -placed.pose.heading_rad));
+  }
+  const auto [sums, pairs] = sum_pairs(
+      arena, shown.size() + 1, executor,
+      [&](std::size_t g, std::size_t p, std::vector<std::pair<double, double>>& values) {
+        double all = 0.0;
+        for (int k = 1; k <= top; ++k) {
+          const double da = static_cast<double>(homes[g].a(0, k) - currents[p].a(0, k));
+          const double db = static_cast<double>(homes[g].b(0, k) - currents[p].b(0, k));
+          all += da * da + db * db;
+        }
+        for (std::size_t s = 0; s < shown.size(); ++s) {
+          const int k = shown[s];
+          const auto ha = static_cast<double>(homes[g].a(0, k));
+          const auto hb = static_cast<double>(homes[g].b(0, k));
+          const auto ca = static_cast<double>(currents[p].a(0, k));
+          const auto cb = static_cast<double>(currents[p].b(0, k));
+          const double lengths = std::sqrt((ha * ha + hb * hb) * (ca * ca + cb * cb));
+          const double cosine = lengths > 0.0 ? (ha * ca + hb * cb) / lengths : 0.0;
+          values[s] = {(ha - ca) * (ha - ca) + (hb - cb) * (hb - cb), 2.0 * (1.0 - cosine)};
+        }
+        values[shown.size()] = {all / 5.0, 0.0};
+      });
+  viewer::LinePlot changes{.title = "Change of Fourier coefficients",
+                           .x_label = "distance [m]",
+                           .y_label = "mean squared change"};
+  viewer::LinePlot phases{.title = "Change of Fourier phases (2: unrelated)",
+                          .x_label = "distance [m]",
+                          .y_label = "mean of 2 (1 - cos(change))"};
+  for (std::size_t s = 0; s <= shown.size(); ++s) {
+    viewer::Series change{.style = viewer::SeriesStyle::lines};
+    viewer::Series phase{.style = viewer::SeriesStyle::lines};
+    change.label = phase.label =
+        s < shown.size() ? "k = " + std::to_string(shown[s]) : "all frequencies / 5";
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      if (pairs[i] < 100.0) continue;
+      const double x = static_cast<double>(i) * arena.options.spacing_m;
+      if (x > 1.0) break;
+      change.add(x, sums[s].first[i] / pairs[i]);
+      phase.add(x, sums[s].second[i] / pairs[i]);
+    }
+    changes.series.push_back(std::move(change));
+    if (s < shown.size()) phases.series.push_back(std::move(phase));
+  }
+  add_plot(result, folder, "figure_07_coefficients.svg",
+           "[S06] figure 7a: change of coefficients with the distance, all pairs of places. It "
+           "grows with the square of the distance farther out where frequencies are low.",
+           changes);
+  add_plot(result, folder, "figure_07_phases.svg",
+           "[S06] figure 7b: change of phases. High frequencies soon have nothing to do with each "
+           "other.",
+           phases);
+}
+
+// Figure 8.
+void draw_headings(const Arena& arena, const std::filesystem::path& folder, Executor& executor,
+                   Reproduction& result) {
+  constexpr std::array<int, 5> shown{1, 2, 3, 5, 15};
+  const auto [sums, pairs] =
+      sum_pairs(arena, shown.size() + 1, executor,
+                [&](std::size_t g, std::size_t p, std::vector<std::pair<double, double>>& values) {
+                  const double truth = true_turn(arena, g, p);
+                  TurnCorrelation correlation = correlation_of(
+                      arena.homes.views[g].view, arena.currents.views[p].view, shown.back());
+                  for (std::size_t s = 0; s < shown.size(); ++s) {
+                    correlation.highest = shown[s];
+                    const double error = static_cast<double>(sequential_turn(correlation)) - truth;
+                    values[s] = {std::cos(error), std::sin(error)};
+                  }
+                  values[shown.size()] = {0.0, 0.0};
+                });
+  // All shifts by whole pixels: one home view against all current ones at once.
+  const auto& currents = arena.currents.rows;
+  std::vector<float> rows;
+  for (const auto& row : currents) {
+    double row_mean = 0.0;
+    for (const float value : row) row_mean += static_cast<double>(value) / s06_columns;
+    for (const float value : row) rows.push_back(value - static_cast<float>(row_mean));
+  }
+  const std::size_t stride = kernels::turn_products_stride(s06_columns);
+  std::vector<std::vector<std::uint8_t>> shifts(arena.homes.rows.size());
+  executor.for_chunks(shifts.size(), 8, [&](std::size_t begin, std::size_t end, std::size_t) {
+    std::vector<float> periodic(s06_columns + stride);
+    std::vector<float> products(currents.size() * stride);
+    std::vector<float> largest(currents.size());
+    for (std::size_t g = begin; g < end; ++g) {
+      for (std::size_t i = 0; i < periodic.size(); ++i) {
+        periodic[i] = arena.homes.rows[g][i % s06_columns];
+      }
+      kernels::turn_products(rows, s06_columns, periodic, products, largest,
+                             kernels::chosen_instructions());
+      for (std::size_t p = 0; p < currents.size(); ++p) {
+        const float* const row = products.data() + p * stride;
+        shifts[g].push_back(
+            static_cast<std::uint8_t>(std::find(row, row + s06_columns, largest[p]) - row));
+      }
+    }
+  });
+  const auto [whole, whole_pairs] =
+      sum_pairs(arena, 1, executor,
+                [&](std::size_t g, std::size_t p, std::vector<std::pair<double, double>>& values) {
+                  const double error =
+                      -2.0 * std::numbers::pi * shifts[g][p] / s06_columns - true_turn(arena, g, p);
+                  values[0] = {std::cos(error), std::sin(error)};
+                });
+
+  const auto deviation = [&counts = pairs](const Sums& of, std::size_t bin) {
+    const double length = std::hypot(of.first[bin], of.second[bin]) / counts[bin];
+    return degrees(std::sqrt(std::max(0.0, -2.0 * std::log(length))));
+  };
+  viewer::LinePlot plot{.title = "Error of the heading",
+                        .x_label = "distance [m]",
+                        .y_label = "circular standard deviation [degrees]"};
+  for (std::size_t s = 0; s <= shown.size(); ++s) {
+    viewer::Series series{.label = s < shown.size() ? "K = " + std::to_string(shown[s])
+                                                    : "all shifts by whole pixels"};
+    if (s == shown.size()) series.style = viewer::SeriesStyle::lines;
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      if (pairs[i] < 100.0) continue;
+      const double x = static_cast<double>(i) * arena.options.spacing_m;
+      if (x > 0.6) break;
+      series.add(x, deviation(s < shown.size() ? sums[s] : whole[0], i));
+    }
+    plot.series.push_back(std::move(series));
+  }
+  add_plot(result, folder, "figure_08_headings.svg",
+           "[S06] figure 8: error of the heading that the phases tell, by the distance of the two "
+           "views; all pairs, random headings.",
+           plot);
+  add_row(result, "s06.heading.at_goal", "error of the heading at no distance, K = 15, 72 pixels",
+          deviation(sums[4], 0), "deg", at_most(0.2), std::pair(1.5, 1.5));
+  add_row(result, "s06.heading.at_goal_whole_pixels", "the same by all shifts of whole pixels",
+          deviation(whole[0], 0), "deg");
+}
+
+}  // namespace
+
+void reproduce_view_figures(const Arena& arena, const std::filesystem::path& folder,
+                            Executor& executor, Reproduction& result) {
+  draw_correlation(arena, folder, result);
+  draw_spectrum(arena, folder, result);
+  draw_changes(arena, folder, executor, result);
+  draw_headings(arena, folder, executor, result);
+}
+
+void reproduce_heading_with_pose_noise(const Arena& arena, Reproduction& result) {
+  double cosines = 0.0;
+  double sines = 0.0;
+  const std::size_t places = arena.homes.views.size();
+  for (std::size_t i = 0; i < places; ++i) {
+    const double turned = static_cast<double>(sequential_turn(
+        correlation_of(arena.homes.views[i].view, arena.currents.views[i].view, 15)));
+    const double error = turned - true_turn(arena, i, i);
+    cosines += std::cos(error);
+    sines += std::sin(error);
+  }
+  const double length = std::hypot(cosines, sines) / static_cast<double>(places);
+  add_row(result, "s06.heading.at_goal_pose_noise",
+          "error of the heading at no distance with the tracker's noise (3 mm, 2 degrees in each "
+          "recording)",
+          degrees(std::sqrt(std::max(0.0, -2.0 * std::log(length)))), "deg", std::nullopt,
+          std::pair(1.5, 1.5));
+}
+
+}  // namespace panonav::lab

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "lab/rows.hpp"
+#include "lab/runs/homing_run.hpp"
+#include "panonav/core/executor.hpp"
+
+namespace panonav::lab {
+
+/// A run home counts as a success when the robot says that it arrived, this near.
+inline constexpr double homing_success_m = 0.1;
+/// Starts lie within this distance of their goal.
+inline constexpr double homing_start_radius_m = 1.5;
+
+/// Why a run home failed, for people: "an obstacle stopped it", "stopped at another local minimum
+/// and says so". Empty for a success.
+[[nodiscard]] std::string reason_of_failure(const HomingRun& run);
+
+/// Runs home in the Gazebo world `name` of `data`, from `starts` random starts around random goals:
+/// rows "s06.world.NAME.*" of the success from all starts and from those in sight of the goal, of
+/// wrong places noticed, and of the published rule; pictures in `out`: a map of all runs,
+/// and one of each failure with its reason. Same arguments: same rows and pictures on any number of
+/// threads. Throws FileError, ContractError.
+void reproduce_homing_in_world(const std::filesystem::path& data, const std::string& name,
+                               const std::filesystem::path& out, std::uint64_t seed, int starts,
+                               Executor& executor, Reproduction& reproduction);
+
+/// The same figures over built-in scenes of several seeds: office, lab, hall, loop and garden, the
+/// robot on flat ground and tilted by up to 3 degrees in a random direction at each view, and a
+/// holonomic robot; and how much views differ where runs end at home and where they end elsewhere:
+/// `HomingPursuitOptions::arrived_difference` is to stand between.
+void reproduce_homing_in_scenes(std::uint64_t seed, int starts, Executor& executor,
+                                Reproduction& reproduction);
+
+}  // namespace panonav::lab

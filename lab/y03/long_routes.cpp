@@ -1,0 +1,262 @@
+// Routes of 60 m repeated in closed loop, what they take in a file, and a real route.
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <iterator>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "lab/rows.hpp"
+#include "lab/y03/experiments.hpp"
+#include "lab/y03/routes.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/core/statistics.hpp"
+#include "panonav/geometry/positions.hpp"
+#include "panonav/io/dataset.hpp"
+#include "panonav/io/panorama_reader.hpp"
+#include "panonav/motion/headed_path.hpp"
+#include "panonav/route/horizon_scanline.hpp"
+#include "panonav/route/route_place.hpp"
+#include "panonav/route/route_tracker.hpp"
+#include "panonav/storage/memory_file.hpp"
+#include "panonav_simulation/make_each.hpp"
+#include "panonav_simulation/scenes.hpp"
+#include "panonav_simulation/worlds.hpp"
+#include "panonav_viewer/plot.hpp"
+#include "panonav_viewer/surroundings.hpp"
+
+namespace panonav::lab {
+
+namespace {
+
+constexpr double route_m = 60.0;
+// The way between lines that the paper counts its bytes for [Y03 section 2.2].
+constexpr double spacing_m = 0.1;
+constexpr int runs_each = 10;  // of a route, half of them back
+
+// One route and the robots that repeated it.
+struct RepeatedRoute {
+  std::vector<Pose2> way;
+  RoutePanorama panorama;
+  std::vector<RouteRun> runs;
+};
+
+RepeatedRoute repeat_one(const RouteScene& place, int runs, std::uint64_t seed,
+                         Executor& executor) {
+  RepeatedRoute repeated;
+  repeated.way = curved_route(place, route_m, spacing_m, seed);
+  repeated.panorama = record_route(place, repeated.way, Random(seed, 7).next(), executor);
+  const RouteTracker tracker(repeated.panorama);
+  repeated.runs.resize(static_cast<std::size_t>(runs));
+  executor.for_chunks(
+      repeated.runs.size(), 1, [&](std::size_t begin, std::size_t end, std::size_t) {
+        for (std::size_t i = begin; i < end; ++i) {
+          repeated.runs[i] =
+              repeat_route(place, tracker, {.back = i % 2 == 1}, Random(seed, 100 + i).next());
+        }
+      });
+  return repeated;
+}
+
+viewer::MapPlot map_of(const RouteScene& place, const RepeatedRoute& repeated) {
+  viewer::MapPlot map{.title = place.name, .layers = viewer::scene_layers(place.scene)};
+  std::ranges::move(route_layers(repeated.way, repeated.runs), std::back_inserter(map.layers));
+  return map;
+}
+
+void report_routes(const RouteReproductionOptions& options, const std::string& name,
+                   const RouteScene& first_place, const std::vector<RepeatedRoute>& routes,
+                   Reproduction& result) {
+  std::vector<double> lateral_cm;
+  std::vector<double> lateral_back_cm;
+  std::vector<double> worst_cm;
+  std::vector<double> fix_cm;
+  std::size_t completed = 0;
+  std::size_t runs = 0;
+  std::size_t lines = 0;
+  std::size_t off_route = 0;
+  std::size_t turned_aside = 0;
+  for (const RepeatedRoute& route : routes) {
+    for (std::size_t i = 0; i < route.runs.size(); ++i) {
+      const RouteRun& run = route.runs[i];
+      const double mean_cm = 100.0 * mean(run.lateral_m);
+      lateral_cm.push_back(mean_cm);
+      if (i % 2 == 1) lateral_back_cm.push_back(mean_cm);
+      worst_cm.push_back(100.0 * quantile(run.lateral_m, 0.95));
+      if (!run.position_m.empty()) fix_cm.push_back(100.0 * median(run.position_m));
+      completed += run.completes() ? 1 : 0;
+      lines += run.truth.size();
+      off_route += run.off_route;
+      turned_aside += run.turned_aside;
+      ++runs;
+    }
+  }
+  const std::string id = "y03.route." + name;
+  const std::string what = name + ", 60 m route repeated with wheels 5 % wrong, start 0.3 m off";
+  add_row(result, id + ".lateral", what + ": distance from the route",
+          mean_figure(lateral_cm, options.seed), "cm", at_most(5.0))
+      .over = "mean of " + std::to_string(runs) + " runs";
+  add_rate(result, id + ".completed", what + ": runs that reach the end, none lost", completed,
+           runs, at_least(1.0));
+  if (!lateral_back_cm.empty()) {
+    add_mean(result, id + ".lateral_back", what + ": distance from the route, runs back alone",
+             "cm", lateral_back_cm);
+  }
+  add_mean(result, id + ".lateral_95", what + ": distance that 95 % of a run keep within", "cm",
+           worst_cm);
+  if (!fix_cm.empty()) {
+    add_median(result, id + ".fix", what + ": error of a fix, median of a run", "cm", fix_cm);
+  }
+  add_rate(result, id + ".off_route", what + ": lines taken for not on this route", off_route,
+           lines);
+  add_rate(result, id + ".turned_aside", what + ": steps at which something was in the way",
+           turned_aside, lines);
+  const std::string file = "route_" + name + ".svg";
+  add_plot(result, options.out, file,
+           "A route of 60 m through " + name +
+               ", recorded once and repeated forward and back; the driven ways lie on it.",
+           map_of(first_place, routes.front()));
+}
+
+// Sizes on the disk, with nothing left in the write-ahead log.
+std::uint64_t file_bytes(const std::filesystem::path& path) {
+  std::uint64_t bytes = std::filesystem::file_size(path);
+  const std::filesystem::path log = path.string() + "-wal";
+  if (std::filesystem::exists(log)) bytes += std::filesystem::file_size(log);
+  return bytes;
+}
+
+void measure_file(const RouteReproductionOptions& options, const std::vector<RepeatedRoute>& routes,
+                  Reproduction& result) {
+  const std::filesystem::path path = options.out / "routes.panonav";
+  std::filesystem::remove(path);
+  MemoryHeader header;
+  header.shape = {1, 1};
+  std::uint64_t empty = 0;
+  double length_m = 0.0;
+  std::uint64_t stored = 0;
+  {
+    MemoryFile file = MemoryFile::create(path, header);
+    // The first route makes the tables.
+    RoutePanorama none(routes.front().panorama.columns());
+    none.append({0.0, 0.0, 0.0}, routes.front().panorama.line(0));
+    static_cast<void>(file.append_route("none", none));
+  }
+  empty = file_bytes(path);
+  {
+    MemoryFile file = MemoryFile::open(path, Access::read_write);
+    for (std::size_t i = 0; i < routes.size(); ++i) {
+      const std::string name = "route " + std::to_string(i);
+      static_cast<void>(file.append_route(name, routes[i].panorama));
+      require(file.route(name) == routes[i].panorama, "route read back", 0.0, "the one written");
+      length_m += routes[i].panorama.length_m();
+      stored += file.route_bytes(name);
+    }
+  }
+  const std::uint64_t whole = file_bytes(path);
+  std::filesystem::remove(path);
+  const double megabytes_per_km = 1e-3 / length_m;
+  const std::string what = "memory of routes through loop, a line every 10 cm, ";
+  add_row(result, "y03.memory.file", what + "by what a memory file grows, a kilometre",
+          megabytes_per_km * static_cast<double>(whole - empty), "MB", at_most(3.6),
+          std::pair(3.6, 3.6));
+  add_row(result, "y03.memory.packed", what + "packed lines and poses alone, a kilometre",
+          megabytes_per_km * static_cast<double>(stored), "MB");
+}
+
+int routes_of(const RouteReproductionOptions& options) {
+  return std::max(1, options.runs / runs_each);
+}
+
+}  // namespace
+
+void reproduce_loop_routes(const RouteReproductionOptions& options, Executor& executor,
+                           Reproduction& result) {
+  std::vector<RepeatedRoute> routes;
+  std::optional<RouteScene> first;
+  for (int i = 0; i < routes_of(options); ++i) {
+    const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
+    RouteScene place =
+        make_route_scene(simulation::make_scene("loop", {.seed = seed}), "loop", executor);
+    routes.push_back(repeat_one(place, std::min(runs_each, options.runs), seed, executor));
+    if (!first) first = std::move(place);
+  }
+  report_routes(options, "loop", *first, routes, result);
+  measure_file(options, routes, result);
+}
+
+void reproduce_world_routes(const RouteReproductionOptions& options, const std::string& name,
+                            Executor& executor, Reproduction& result) {
+  const RouteScene place =
+      make_route_scene(simulation::read_world(options.data, name), name, executor);
+  std::vector<RepeatedRoute> routes;
+  for (int i = 0; i < routes_of(options); ++i) {
+    routes.push_back(repeat_one(place, std::min(runs_each, options.runs),
+                                options.seed + static_cast<std::uint64_t>(i), executor));
+  }
+  report_routes(options, name, place, routes, result);
+}
+
+void reproduce_real_route(const RouteReproductionOptions& options, Executor& executor,
+                          Reproduction& result) {
+  const Dataset dataset = read_dataset(options.data / "sussex_route");
+  const PanoramaReader reader(dataset.source, {});
+  auto lines = simulation::make_each(executor, dataset.entries.size(), [&](std::size_t i) {
+    return horizon_scanline(reader.read(dataset.entries[i].path));
+  });
+  std::vector<Point2> places;
+  for (const DatasetEntry& entry : dataset.entries) {
+    if (!entry.pose) throw FileError((options.data / "sussex_route").string(), "has no positions");
+    places.push_back({entry.pose->x_m, entry.pose->y_m});
+  }
+  const std::vector<Pose2> way = headed_along_way(places);
+  constexpr std::size_t every = 10;
+  RoutePanorama route;
+  for (std::size_t i = 0; i < way.size(); i += every) {
+    static_cast<void>(route.append(way[i], std::span<const float>(lines[i])));
+  }
+  const RouteTracker tracker(route);
+  std::vector<std::optional<TrackedRouteFix>> found(way.size());
+  executor.for_chunks(way.size(), 8, [&](std::size_t begin, std::size_t end, std::size_t) {
+    for (std::size_t i = begin; i < end; ++i) {
+      if (i % every != 0) found[i] = tracker.search(lines[i]);
+    }
+  });
+  std::vector<double> along_cm;
+  std::vector<double> beside_cm;
+  std::size_t asked = 0;
+  viewer::MapLayer right{.label = "fixes", .colour = viewer::PlotColour::blue};
+  viewer::MapLayer remembered{.label = "remembered lines", .colour = viewer::PlotColour::black};
+  for (std::size_t i = 0; i < way.size(); ++i) {
+    if (i % every == 0) {
+      remembered.circles.push_back(places[i]);
+      continue;
+    }
+    ++asked;
+    if (!found[i]) continue;
+    const RoutePlace truth = place_on_route(route.poses(), places[i]);
+    along_cm.push_back(100.0 * std::abs(found[i]->along_m - truth.along_m));
+    beside_cm.push_back(100.0 * std::abs(found[i]->lateral_m - truth.lateral_m));
+    right.dots.push_back(found[i]->fix.pose.position());
+  }
+  const std::string what =
+      "sussex_route, outdoors, every 10th line remembered, the others each searched alone";
+  add_median(result, "y03.sussex.along", what + ": error along the route, median", "cm", along_cm,
+             at_most(3.0));
+  add_median(result, "y03.sussex.lateral", what + ": error beside the route, median", "cm",
+             beside_cm);
+  add_rate(result, "y03.sussex.found", what + ": found on the route", along_cm.size(), asked);
+  viewer::MapLayer driven{
+      .label = "driven way", .colour = viewer::PlotColour::grey, .lines = {places}};
+  add_plot(
+      result, options.out, "sussex_route.svg",
+      "A real route outdoors: where each picture between the remembered lines was found, without "
+      "odometry.",
+      viewer::MapPlot{.title = "sussex_route", .layers = {driven, right, remembered}});
+}
+
+}  // namespace panonav::lab

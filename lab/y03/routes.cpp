@@ -1,0 +1,294 @@
+#include "lab/y03/routes.hpp"
+#include "panonav_simulation/make_each.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <span>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/geometry/positions.hpp"
+#include "panonav/motion/path.hpp"
+#include "panonav/motion/steering.hpp"
+#include "panonav_simulation/simulated_robot.hpp"
+
+namespace panonav::lab {
+
+namespace {
+
+constexpr double room_m = 0.1;
+
+// Where the robot has room; where the place has no such part, all that is free.
+simulation::FreeSpace roomy_space(const RouteScene& place) {
+  simulation::FreeSpaceOptions options = simulation::free_space_options(place.scene);
+  options.robot_radius_m += room_m;
+  try {
+    return simulation::FreeSpace(place.scene, options);
+  } catch (const ContractError&) {
+    return *place.free_space;
+  }
+}
+
+// Each place the mean of those within `reach` to either side, the ends as they are.
+std::vector<Pose2> rounded(const std::vector<Pose2>& way, std::size_t reach) {
+  std::vector<Pose2> result = way;
+  for (std::size_t i = 0; i < way.size(); ++i) {
+    const std::size_t half = std::min({reach, i, way.size() - 1 - i});
+    double x = 0.0;
+    double y = 0.0;
+    for (std::size_t j = i - half; j <= i + half; ++j) {
+      x += way[j].x_m;
+      y += way[j].y_m;
+    }
+    const auto n = static_cast<double>(2 * half + 1);
+    result[i] = {x / n, y / n, 0.0};
+  }
+  return result;
+}
+
+// Straight from one place to another, the robot touches nothing.
+bool reaches(const RouteScene& place, Point2 from, Point2 to) {
+  constexpr double fine_m = 0.025;
+  return place.free_space->clearance_m(from) >= place.scene.robot_radius_m &&
+         simulation::has_room_between(*place.free_space, place.scene.robot_radius_m, from, to,
+                                      fine_m);
+}
+
+// Of a way, at the place with the least room.
+double min_clearance_m(const RouteScene& place, const std::vector<Pose2>& way) {
+  double min_m = std::numeric_limits<double>::infinity();
+  for (const Pose2& pose : way) {
+    min_m = std::min(min_m, place.free_space->clearance_m(pose.position()));
+  }
+  return min_m;
+}
+
+double direction(Point2 from, Point2 to) {
+  return std::atan2(to.y_m - from.y_m, to.x_m - from.x_m);
+}
+
+// Distance from the part of the way, in the order of the drive, that is at most 1.5 m from where
+// the robot believes to be: a route may pass by itself.
+double off_part_m(Point2 robot, std::span<const Pose2> way, double along_m) {
+  constexpr double reach_m = 1.5;
+  std::size_t begin = 0;
+  std::size_t end = way.size();
+  double way_m = 0.0;
+  for (std::size_t i = 1; i < way.size(); ++i) {
+    way_m += distance(way[i - 1].position(), way[i].position());
+    if (way_m < along_m - reach_m) begin = i;
+    if (way_m > along_m + reach_m) {
+      end = i + 1;
+      break;
+    }
+  }
+  return simulation::distance_from_route_m(robot, way.subspan(begin, end - begin));
+}
+
+// To the side of the start where there is room, also for the straight way onto the route; else any
+// other way off it.
+Pose2 start_beside(const RouteScene& place, std::span<const Point2> path, const Pose2& start,
+                   double off_m, Random& random) {
+  const std::size_t ahead = std::min<std::size_t>(3, path.size() - 1);
+  const double side = random.uniform() < 0.5 ? 1.0 : -1.0;
+  for (const double angle :
+       {0.5 * std::numbers::pi, -0.5 * std::numbers::pi, 0.75 * std::numbers::pi,
+        -0.75 * std::numbers::pi, 0.25 * std::numbers::pi, -0.25 * std::numbers::pi}) {
+    const Pose2 there =
+        start * Pose2{off_m * std::cos(side * angle), off_m * std::sin(side * angle),
+                      random.normal(0.0, radians(5.0))};
+    if (reaches(place, there.position(), path.front()) &&
+        reaches(place, there.position(), path[ahead])) {
+      return there;
+    }
+  }
+  return start;
+}
+
+// Past what stands in the way: the nearest direction to the wanted one, 15 degrees apart, in which
+// half of the step is free; empty when there is none. A differential drive turns, then drives.
+std::optional<Pose2> step_past(const RouteScene& place, const Pose2& robot, const Pose2& wanted) {
+  if (reaches(place, robot.position(), (robot * wanted).position())) return wanted;
+  const double half_m = 0.5 * std::hypot(wanted.x_m, wanted.y_m);
+  constexpr int feelers_each_side = 11;
+  const auto step_along = [&](double direction_rad) {
+    return Pose2{0.0, 0.0, direction_rad} * Pose2{half_m, 0.0, 0.0};
+  };
+  const auto aside = simulation::feel_aside(0.0, feelers_each_side, 0, [&](double direction_rad) {
+    return reaches(place, robot.position(), (robot * step_along(direction_rad)).position());
+  });
+  return aside ? std::optional(step_along(aside->direction_rad)) : std::nullopt;
+}
+
+// Looking for the route: ever wider around where the robot is, 0.5 m after some 25 steps.
+Pose2 spiral_step(int step) {
+  const double turn = 1.0 / (1.0 + 0.15 * step);
+  constexpr double step_m = 0.1;
+  return {step_m * std::cos(0.5 * turn), step_m * std::sin(0.5 * turn), turn};
+}
+
+}  // namespace
+
+RouteScene make_route_scene(simulation::Scene scene, const std::string& name, Executor& executor) {
+  auto space =
+      std::make_shared<const simulation::FreeSpace>(scene, simulation::free_space_options(scene));
+  auto renderer =
+      std::make_shared<const simulation::Renderer>(scene, simulation::RendererOptions{}, executor);
+  const double height_m = scene.camera_height_m;
+  return {name, std::move(scene), std::move(space), std::move(renderer),
+          simulation::make_line_camera(height_m)};
+}
+
+std::vector<Pose2> curved_route(const RouteScene& place, double length_m, double spacing_m,
+                                std::uint64_t seed) {
+  require(length_m > 0.0, "length of a route", length_m, "> 0");
+  require(spacing_m > 0.0, "spacing of a route", spacing_m, "> 0");
+  const simulation::FreeSpace space = roomy_space(place);
+  Random random(seed, 1);
+  std::vector<Pose2> corners{space.random_pose(random)};
+  double heading = corners.front().heading_rad;
+  double way_m = 0.0;
+  int refused = 0;
+  while (way_m < length_m) {
+    const auto leg =
+        space.shortest_path(corners.back().position(), space.random_pose(random).position());
+    if (!leg || leg->size() < 2 || distance(leg->front(), leg->back()) < 0.5) continue;
+    // At most 100 degrees at once, if there is such a way.
+    constexpr int max_refused = 50;
+    const double turn = angle_difference(direction((*leg)[0], (*leg)[1]), heading);
+    if (corners.size() > 1 && std::abs(turn) > radians(100.0) && ++refused < max_refused) continue;
+    refused = 0;
+    for (std::size_t i = 1; i < leg->size(); ++i) {
+      way_m += distance((*leg)[i - 1], (*leg)[i]);
+      corners.push_back({(*leg)[i].x_m, (*leg)[i].y_m, 0.0});
+    }
+    heading = direction((*leg)[leg->size() - 2], leg->back());
+  }
+  constexpr double fine_m = 0.05;
+  const std::vector<Pose2> sharp = resample(corners, fine_m);
+  // As round as leaves the room that the corners leave, but for a cell of the map.
+  constexpr double cell_m = 0.025;
+  const double room_kept_m = std::min(min_clearance_m(place, sharp) - cell_m,
+                                      place.scene.robot_radius_m + room_m - cell_m);
+  std::vector<Pose2> way = sharp;
+  for (const std::size_t reach : {10U, 7U, 5U, 3U, 2U}) {
+    std::vector<Pose2> round = rounded(rounded(sharp, reach), reach);
+    if (min_clearance_m(place, round) < room_kept_m) continue;
+    way = std::move(round);
+    break;
+  }
+  way = resample(way, spacing_m);
+  const auto most = static_cast<std::size_t>(std::floor(length_m / spacing_m)) + 1;
+  if (way.size() > most) way.resize(most);
+  for (std::size_t i = 0; i + 1 < way.size(); ++i) {
+    way[i].heading_rad = direction(way[i].position(), way[i + 1].position());
+  }
+  if (way.size() > 1) way.back().heading_rad = way[way.size() - 2].heading_rad;
+  return way;
+}
+
+RoutePanorama record_route(const RouteScene& place, const std::vector<Pose2>& way,
+                           std::uint64_t seed, Executor& executor) {
+  auto lines = simulation::make_each(executor, way.size(), [&](std::size_t i) {
+    return simulation::take_line(*place.renderer, way[i], place.camera, Random(seed, i).next());
+  });
+  RoutePanorama route(place.camera.line.columns);
+  for (std::size_t i = 0; i < way.size(); ++i) {
+    static_cast<void>(route.append(way[i], std::span<const float>(lines[i])));
+  }
+  return route;
+}
+
+Pose2 DriftingWheels::true_step(const Pose2& told, Random& random) const {
+  const double travel_m = travel * std::hypot(told.x_m, told.y_m);
+  const double turned = turn * told.heading_rad;
+  const Pose2 step{travel_m * std::cos(0.5 * turned), travel_m * std::sin(0.5 * turned), turned};
+  return sample_step(step, noise, random);
+}
+
+RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const RouteRunOptions& options,
+                      std::uint64_t seed) {
+  std::vector<Pose2> way(tracker.lines().poses().begin(), tracker.lines().poses().end());
+  if (options.back) {
+    std::ranges::reverse(way);
+    for (Pose2& pose : way) pose.heading_rad = wrap_angle(pose.heading_rad + std::numbers::pi);
+  }
+  const std::vector<Point2> path = positions_of(way);
+  const Pose2 start = way.front();
+  Random random(seed, 1);
+  Random noise_of_lines(seed, 2);
+  const auto scale = [&] { return 1.0 + (random.uniform() < 0.5 ? -1.0 : 1.0) * options.drift; };
+  DriftingWheels wheels;
+  wheels.travel = scale();
+  wheels.turn = scale();
+  Pose2 robot = start_beside(place, path, start, options.start_off_m, random);
+  tracker.set_pose(start);
+  PathFollower follower(path, {.steering = {.step_m = options.step_m}});
+  const auto max_steps = static_cast<int>(3.0 * follower.length_m() / options.step_m) + 50;
+  RouteRun run;
+  Pose2 told;
+  // Odometry carries over a few lines that tell nothing; after that the route must be looked for.
+  constexpr int patience = 4;
+  int unknown = 0;
+  for (int step = 0; step < max_steps; ++step) {
+    const auto line =
+        simulation::take_line(*place.renderer, robot, place.camera, noise_of_lines.next());
+    const auto found = tracker.track(line, told);
+    run.truth.push_back(robot);
+    run.lateral_m.push_back(off_part_m(robot.position(), way, follower.along_m()));
+    unknown = found ? 0 : unknown + 1;
+    run.sightings.emplace_back();
+    if (found) {
+      run.sightings.back() = RouteSighting{found->fix.pose, found->along_m};
+      run.position_m.push_back(distance(found->fix.pose.position(), robot.position()));
+    } else {
+      ++run.off_route;
+    }
+    const auto next = follower.next_step(tracker.pose().value_or(start));
+    if (!next) {
+      run.arrived = true;
+      break;
+    }
+    const Pose2 wanted = unknown < patience ? *next : spiral_step(unknown - patience);
+    const auto free_step = step_past(place, robot, wanted);
+    if (!free_step) {
+      run.blocked = true;
+      break;
+    }
+    told = *free_step;
+    run.turned_aside += static_cast<std::size_t>(told != wanted);
+    const Pose2 there = robot * wheels.true_step(told, random);
+    // Where the wheels led it astray it touches something: it turns, but does not move.
+    if (reaches(place, robot.position(), there.position())) {
+      robot = there;
+    } else {
+      robot.heading_rad = there.heading_rad;
+      ++run.turned_aside;
+    }
+  }
+  run.end_distance_m = distance(robot.position(), path.back());
+  return run;
+}
+
+std::vector<viewer::MapLayer> route_layers(std::span<const Pose2> way,
+                                           std::span<const RouteRun> runs) {
+  viewer::MapLayer route{.label = "remembered route",
+                         .colour = viewer::PlotColour::black,
+                         .lines = {positions_of(way)}};
+  viewer::MapLayer forward{.label = "driven forward", .colour = viewer::PlotColour::blue};
+  viewer::MapLayer back{.label = "driven back", .colour = viewer::PlotColour::green};
+  viewer::MapLayer starts{.label = "starts, 0.3 m off", .colour = viewer::PlotColour::orange};
+  viewer::MapLayer lost{.label = "lost", .colour = viewer::PlotColour::vermilion};
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    (i % 2 == 0 ? forward : back).lines.push_back(positions_of(runs[i].truth));
+    starts.circles.push_back(runs[i].truth.front().position());
+    if (!runs[i].completes()) lost.crosses.push_back(runs[i].truth.back().position());
+  }
+  return {route, forward, back, starts, lost};
+}
+
+}  // namespace panonav::lab

@@ -1,0 +1,96 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "lab/reproduction.hpp"
+#include "panonav/core/executor.hpp"
+#include "panonav/geometry/pose2.hpp"
+#include "panonav/motion/odometry.hpp"
+#include "panonav/route/route_panorama.hpp"
+#include "panonav/route/route_tracker.hpp"
+#include "panonav_simulation/free_space.hpp"
+#include "panonav_simulation/line_camera.hpp"
+#include "panonav_simulation/renderer.hpp"
+#include "panonav_simulation/scene.hpp"
+#include "panonav_viewer/plot.hpp"
+
+namespace panonav::lab {
+
+/// A place in which robots repeat routes. Shared by any number of runs on any number of threads.
+struct RouteScene {
+  std::string name;
+  simulation::Scene scene;
+  std::shared_ptr<const simulation::FreeSpace> free_space;  ///< where the robot can be
+  std::shared_ptr<const simulation::Renderer> renderer;
+  simulation::LineCamera camera;
+};
+[[nodiscard]] RouteScene make_route_scene(simulation::Scene scene, const std::string& name,
+                                          Executor& executor);
+
+/// A way of about `length_m` through random places, with room of 10 cm to either side of the robot
+/// where the place has that much: shortest ways, round where they had corners, which do not turn
+/// back on the spot. Poses every `spacing_m`, headings along the way. The same seed gives the same
+/// way. Throws ContractError unless both are above 0.
+[[nodiscard]] std::vector<Pose2> curved_route(const RouteScene& place, double length_m,
+                                              double spacing_m, std::uint64_t seed);
+
+/// What a robot sees along a way.
+[[nodiscard]] RoutePanorama record_route(const RouteScene& place, const std::vector<Pose2>& way,
+                                         std::uint64_t seed, Executor& executor);
+
+/// Wheels that do less or more than they are told, and tell what they were told.
+struct DriftingWheels {
+  double travel = 1.0;  ///< true over told
+  double turn = 1.0;
+  OdometryNoise noise;  ///< on top; only the random part
+  [[nodiscard]] Pose2 true_step(const Pose2& told, Random& random) const;
+};
+
+struct RouteRunOptions {
+  bool back = false;
+  double drift = 0.05;       ///< error of the wheels' travel and turn, either sign for a whole run
+  double start_off_m = 0.3;  ///< beside the start of the route; the robot thinks it is at the start
+  double step_m = 0.15;      ///< driven between two lines
+};
+
+/// Where a line put a robot.
+struct RouteSighting {
+  Pose2 pose;
+  double along_m = 0.0;  ///< way along the route
+};
+
+/// What a robot did that repeated a route.
+struct RouteRun {
+  std::vector<Pose2> truth;
+  std::vector<std::optional<RouteSighting>> sightings;  ///< at these poses; empty: off the route
+  std::vector<double> lateral_m;   ///< from the true place to the part of the way it should be at
+  std::vector<double> position_m;  ///< error of the fixes
+  std::size_t off_route = 0;       ///< lines that it took for not on this route
+  bool arrived = false;            ///< by its own word
+  std::size_t turned_aside = 0;    ///< steps at which something was in its way
+  bool blocked = false;            ///< on all sides
+  double end_distance_m = 0.0;     ///< from the end of the route
+
+  /// Not stopped, and at the end of the route where it says so.
+  [[nodiscard]] bool completes() const noexcept {
+    return arrived && !blocked && end_distance_m <= 0.2;
+  }
+};
+
+/// A robot repeats a route in closed loop: each line is fitted into the route panorama from where
+/// the wheels put it, and the robot steers to the place a little ahead on the path. It feels
+/// what is in its way and goes past, and drives a spiral when some lines one after the other are
+/// not of the route. `tracker` is one of this route. The same seed gives the same run. Cost: a line
+/// a step.
+[[nodiscard]] RouteRun repeat_route(const RouteScene& place, RouteTracker tracker,
+                                    const RouteRunOptions& options, std::uint64_t seed);
+
+/// The route and the robots that repeated it, every second one back, for a map.
+[[nodiscard]] std::vector<viewer::MapLayer> route_layers(std::span<const Pose2> way,
+                                                         std::span<const RouteRun> runs);
+
+}  // namespace panonav::lab

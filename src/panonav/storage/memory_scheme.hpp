@@ -1,0 +1,44 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "panonav/storage/memory_file.hpp"
+
+namespace panonav {
+
+class MemoryTables;
+
+/// Memories that do not lie in files: they have addresses "SCHEME://...". All functions throw
+/// FileError when what keeps the memories cannot be reached or refuses.
+class MemoryScheme {
+ public:
+  virtual ~MemoryScheme() = default;
+  /// Whether there is a memory at the address.
+  [[nodiscard]] virtual bool exists(const std::filesystem::path& address) const = 0;
+  /// Returns what people call the memory. Throws FileError on an address that names none.
+  [[nodiscard]] virtual std::string name_memory(const std::filesystem::path& address) const = 0;
+  /// Makes a memory with what `fill` writes, whole or not at all. Throws FileError when there is
+  /// one already.
+  virtual void create(const std::filesystem::path& address, const MemoryHeader& header,
+                      const std::function<void(MemoryTables&)>& fill) const = 0;
+  /// Opens the rows of a memory. Throws FileError when there is none, and with read_write where
+  /// the user may not change it.
+  [[nodiscard]] virtual std::unique_ptr<MemoryTables> open(const std::filesystem::path& address,
+                                                           Access access) const = 0;
+};
+
+/// Makes addresses of this scheme ("postgresql") stand for memories wherever this process takes the
+/// path of a memory file; the scheme that was registered under the name before is replaced. Any
+/// thread may call.
+void register_memory_scheme(std::string_view name, std::shared_ptr<const MemoryScheme> scheme);
+
+/// Returns the scheme of an address, nullptr for the path of a file. Throws FileError on an address
+/// of a scheme that is not registered.
+[[nodiscard]] std::shared_ptr<const MemoryScheme> find_memory_scheme(
+    const std::filesystem::path& memory);
+
+}  // namespace panonav

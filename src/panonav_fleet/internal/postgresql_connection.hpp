@@ -1,0 +1,143 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "panonav_fleet/internal/server_address.hpp"
+
+struct pg_conn;
+struct pg_result;
+
+namespace panonav::fleet {
+
+/// Values for the places $1, $2, ... of a statement, in order, in PostgreSQL's binary form. They
+/// never become part of the statement's text.
+class PostgresqlValues {
+ public:
+  PostgresqlValues& add(std::int64_t value);
+  PostgresqlValues& add(const std::optional<double>& value);
+  PostgresqlValues& add(std::string_view text);
+  PostgresqlValues& add(std::span<const std::uint8_t> bytes);
+  PostgresqlValues& add(std::span<const std::int64_t> values);
+  PostgresqlValues& add(std::span<const std::string> texts);
+  /// No text.
+  PostgresqlValues& add_null();
+
+  /// As libpq takes them; valid while these values are.
+  struct Bound {
+    std::vector<unsigned> types;
+    std::vector<const char*> data;
+    std::vector<int> lengths, binary;
+  };
+  [[nodiscard]] Bound bound() const;
+
+ private:
+  struct Value {
+    unsigned type = 0;
+    bool null = false;
+    std::string bytes;
+  };
+  Value& next(unsigned type);
+  std::vector<Value> values_;
+};
+
+/// The rows that a statement answered. Fields are read as what they are; a null throws FileError
+/// where the function returns no optional.
+class PostgresqlRows {
+ public:
+  [[nodiscard]] int size() const;
+  [[nodiscard]] bool is_null(int row, int column) const;
+  [[nodiscard]] std::int64_t integer(int row, int column) const;
+  [[nodiscard]] std::optional<double> real(int row, int column) const;
+  [[nodiscard]] std::string_view text(int row, int column) const;
+  [[nodiscard]] std::span<const std::uint8_t> bytes(int row, int column) const;
+  [[nodiscard]] std::vector<std::uint8_t> copy(int row, int column) const;
+
+ private:
+  friend class PostgresqlConnection;
+  struct Clear {
+    void operator()(pg_result* result) const noexcept;
+  };
+  PostgresqlRows(const std::filesystem::path& shown, pg_result* result)
+      : shown_(&shown), result_(result) {}
+  [[nodiscard]] std::string_view field(int row, int column, std::size_t size) const;
+  const std::filesystem::path* shown_;
+  std::unique_ptr<pg_result, Clear> result_;
+};
+
+/// A connection to a PostgreSQL server. Whatever the server refuses and a lost connection are
+/// thrown as a FileError of one line, without a password.
+class PostgresqlConnection {
+ public:
+  /// Throws FileError: no such server, wrong password, no such database, older than version 15.
+  explicit PostgresqlConnection(const ServerAddress& address);
+
+  /// Statements of ours without values, separated by semicolons.
+  void execute(const std::string& sql);
+  /// As `execute`; returns the SQLSTATE of a violated unique constraint ("23505") instead of
+  /// throwing, empty when it is done.
+  [[nodiscard]] std::string try_unique(const std::string& sql);
+  [[nodiscard]] std::string try_unique(const std::string& sql, const PostgresqlValues& values);
+  PostgresqlRows run(const std::string& sql, const PostgresqlValues& values = {});
+  /// Passes one row after the other to `take`, without holding all of them.
+  void stream(const std::string& sql, const PostgresqlValues& values,
+              const std::function<void(const PostgresqlRows&)>& take);
+  /// A COPY ... FROM STDIN with these bytes.
+  void copy_in(const std::string& sql, std::string_view bytes);
+  /// A COPY ... TO STDOUT in the binary form: the fields of one row after the other, empty for
+  /// null.
+  void copy_out(const std::string& sql, int fields,
+                const std::function<void(std::span<const std::optional<std::string_view>>)>& take);
+  /// Not within a transaction: waits until the server sends a notification and returns what it
+  /// says; empty when none came within the time.
+  [[nodiscard]] std::optional<std::string> wait_for_notification(double seconds);
+  /// Rolls back what can still be rolled back.
+  void try_execute(const char* sql) noexcept;
+
+  [[nodiscard]] bool in_transaction() const noexcept;
+  [[nodiscard]] const std::filesystem::path& shown() const noexcept { return shown_; }
+
+ private:
+  struct Close {
+    void operator()(pg_conn* connection) const noexcept;
+  };
+  [[nodiscard]] pg_result* exchange(const std::string& sql, const PostgresqlValues* values);
+  PostgresqlRows checked(pg_result* result);
+  [[noreturn]] void fail(const pg_result* result) const;
+  [[nodiscard]] std::string message() const;
+  void drain() noexcept;
+  /// Asks the server to end the statement that runs.
+  void try_cancel() noexcept;
+  std::filesystem::path shown_;
+  std::unique_ptr<pg_conn, Close> connection_;
+};
+
+/// Numbers as PostgreSQL sends them: the most significant byte first.
+void append_big_endian(std::string& bytes, std::uint64_t value, int size);
+/// Of up to eight bytes.
+[[nodiscard]] std::uint64_t big_endian_word(std::string_view bytes);
+
+/// Rows in COPY's binary form, for `copy_in`.
+class CopyRows {
+ public:
+  /// The next row, which has as many fields as are added before the next one begins.
+  CopyRows& begin_row(int fields);
+  CopyRows& add(std::int64_t value);
+  CopyRows& add(const std::optional<double>& value);
+  CopyRows& add(std::string_view text);
+  CopyRows& add(std::span<const std::uint8_t> bytes);
+  CopyRows& add_null();
+  /// All rows; none may be added after it.
+  [[nodiscard]] std::string_view finish();
+
+ private:
+  std::string bytes_{"PGCOPY\n\377\r\n\0\0\0\0\0\0\0\0\0", 19};  // flags, nothing more
+};
+
+}  // namespace panonav::fleet

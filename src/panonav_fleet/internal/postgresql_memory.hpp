@@ -1,0 +1,173 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "panonav/storage/internal/memory_tables.hpp"
+#include "panonav_fleet/internal/postgresql_connection.hpp"
+#include "panonav_fleet/memory_changes.hpp"
+
+namespace panonav::fleet {
+
+/// name, x_m, y_m, heading_rad, stamp_s: the next values of a statement, or fields of a row.
+template <class Fields>
+void add_info(Fields& fields, const ReferenceInfo& info) {
+  const auto& pose = info.pose;
+  fields.add(std::string_view(info.name))
+      .add(pose ? std::optional(pose->x_m) : std::nullopt)
+      .add(pose ? std::optional(pose->y_m) : std::nullopt)
+      .add(pose ? pose->heading_rad : std::nullopt)
+      .add(info.stamp_s);
+}
+
+[[nodiscard]] inline std::vector<std::int64_t> numbers_of(std::span<const ViewId> views) {
+  std::vector<std::int64_t> numbers;
+  for (const ViewId view : views) numbers.push_back(view.value);
+  return numbers;
+}
+
+/// The rows of one memory on a server, by a connection of its own.
+class PostgresqlTables final : public MemoryTables {
+ public:
+  using Values = PostgresqlValues;
+  using Rows = PostgresqlRows;
+
+  PostgresqlTables(const ServerAddress& address, PostgresqlConnection connection,
+                   std::int64_t memory, std::string channel);
+
+  [[nodiscard]] const std::filesystem::path& path() const noexcept override {
+    return connection_.shown();
+  }
+  [[nodiscard]] const std::filesystem::path& place() const noexcept override { return path(); }
+  [[nodiscard]] std::unique_ptr<Transaction> transaction(Kind kind) override;
+
+  [[nodiscard]] Settings settings() override;
+  void write_setting(const std::string& key, const SettingValue& value) override;
+  void erase_setting(const std::string& key) override;
+
+  [[nodiscard]] std::uint32_t last_id() override;
+  void insert(std::span<const ViewId> ids, std::span<const NewView> views) override;
+  void require_views(std::span<const ViewId> views) override;
+  void remove(std::span<const ViewId> views) override;
+  void write_info(ViewId view, const ReferenceInfo& info, std::int64_t checksum) override;
+  void read_views(const Take<ViewRow>& take) override;
+  void read_views(std::span<const ViewId> views, const Take<ViewRow>& take) override;
+  void read_views_there(std::span<const ViewId> views, const Take<ViewRow>& take) override;
+  void read_magnitudes(ViewId first, ViewId last, std::size_t bytes,
+                       const Take<MagnitudesRow>& take) override;
+  [[nodiscard]] std::optional<ViewId> find(std::string_view name) override;
+  [[nodiscard]] std::vector<std::string> names() override;
+  [[nodiscard]] std::vector<ViewId> views() override;
+  [[nodiscard]] std::vector<PositionRow> views_within(const PositionBounds& bounds) override;
+  [[nodiscard]] std::vector<ViewId> views_with(BesideViews table) override;
+  [[nodiscard]] bool has_any(BesideViews table) override;
+  [[nodiscard]] std::optional<StoredBytes> bytes(BesideViews table, ViewId view) override;
+
+  void write_links(std::span<const Link> links) override;
+  void erase_link(ViewId a, ViewId b) override;
+  void read_links(const Take<LinkRow>& take) override;
+
+  void write_map(std::string_view name, const MapRow& row) override;
+  [[nodiscard]] std::optional<MapRow> map(std::string_view name) override;
+  void erase_map(std::string_view name) override;
+  [[nodiscard]] std::vector<std::string> map_names() override;
+
+  void write_route(std::string_view name, const RouteRow& row) override;
+  [[nodiscard]] std::optional<RouteRow> route(std::string_view name) override;
+  void erase_route(std::string_view name) override;
+  [[nodiscard]] std::vector<std::string> route_names() override;
+  void write_block(std::string_view route, std::int64_t number, std::span<const std::uint8_t> lines,
+                   std::int64_t checksum) override;
+  [[nodiscard]] std::optional<StoredBytes> block(std::string_view route,
+                                                 std::int64_t number) override;
+  [[nodiscard]] std::int64_t blocks(std::string_view route) override;
+  [[nodiscard]] std::int64_t route_bytes(std::string_view route) override;
+  [[nodiscard]] std::vector<std::string> routes_with_blocks() override;
+
+  void keep_for_undo(const std::function<void()>& changes, const std::string& what) override;
+  /// One change at most.
+  [[nodiscard]] std::vector<KeptChange> history() override;
+  void undo() override;
+
+  [[nodiscard]] std::set<ViewId> verify_structure(const Check& check) override;
+  [[nodiscard]] MemoryFileInfo info() override;
+
+  /// Ends the transaction in which the memory was made.
+  void commit_made() { connection_.execute("COMMIT"); }
+
+  /// For what only a server is asked (server_exchange.hpp).
+  [[nodiscard]] PostgresqlConnection& connection() noexcept { return connection_; }
+  [[nodiscard]] std::int64_t memory() const noexcept { return memory_; }
+  /// What a notification says of the areas that were changed since it was asked last: empty for
+  /// many, and where views without a position were changed.
+  [[nodiscard]] std::string take_areas();
+  /// Views say which connection added them: its number.
+  std::int64_t session();
+  /// The notification of the transaction will say so.
+  void changed_at(const std::optional<double>& x_m, const std::optional<double>& y_m) {
+    if (x_m && y_m) {
+      areas_.insert(area_of(*x_m, *y_m));
+    } else {
+      elsewhere_ = true;
+    }
+  }
+  void changed_at(const std::optional<ReferencePose>& pose) {
+    if (pose) {
+      changed_at(pose->x_m, pose->y_m);
+    } else {
+      elsewhere_ = true;
+    }
+  }
+
+ private:
+  class Part;
+  /// With the memory as $1.
+  Rows run(const std::string& sql) { return connection_.run(sql, Values().add(memory_)); }
+  Rows run(const std::string& sql, std::string_view name) {
+    return connection_.run(sql, Values().add(memory_).add(name));
+  }
+  [[nodiscard]] ViewId id_in(const Rows& rows, int row, int column) const {
+    return view_id(rows.integer(row, column));
+  }
+  [[nodiscard]] ViewRow view_in(const Rows& rows) const;
+  [[nodiscard]] std::vector<std::string> texts(const std::string& sql);
+  void changed_rows(const Rows& rows);
+  void notify();
+
+  std::optional<std::string> robot_;
+  PostgresqlConnection connection_;
+  std::int64_t memory_;
+  std::string channel_;
+  std::optional<std::int64_t> session_;
+  bool has_incoming_ = false;   // the table of views on their way
+  std::set<MemoryArea> areas_;  // that the transaction changes
+  bool elsewhere_ = false;      // it also changes views without a position
+};
+
+struct FoundMemory {
+  std::int64_t id = 0;
+  std::string channel;
+};
+
+/// A connection to a database with the schema. With `make_schema` it is made where there is none,
+/// and an older one is brought to this version where the login may; otherwise it may be older.
+/// Throws FileError on a newer one.
+struct MemoriesConnection {
+  PostgresqlConnection connection;
+  int schema_version = 0;  ///< 0: there is none
+};
+[[nodiscard]] MemoriesConnection connect_to_memories(const ServerAddress& address,
+                                                     bool make_schema);
+[[nodiscard]] std::optional<FoundMemory> find_memory(MemoriesConnection& memories,
+                                                     const ServerAddress& address);
+[[noreturn]] void refuse_no_memory(const ServerAddress& address);
+/// Makes an empty memory on the server and, with enough rights, the schema and the roles where
+/// there are none (docs/scale.md); `fill` is run in the same transaction. Throws FileError when
+/// there is a memory of that name.
+void make_postgresql_memory(const ServerAddress& address, const MemoryHeader& header,
+                            const std::function<void(MemoryTables&)>& fill);
+
+}  // namespace panonav::fleet

@@ -1,0 +1,456 @@
+
+#include "panonav_fleet/internal/server_exchange.hpp"
+
+#include <array>
+
+#include "panonav/core/error.hpp"
+#include "panonav/storage/internal/memory_rows.hpp"
+#include "panonav/storage/internal/synchronised_tables.hpp"
+#include "panonav_fleet/internal/postgresql_schema.hpp"
+
+namespace panonav::fleet {
+
+namespace {
+
+using Numbers = std::span<const std::int64_t>;
+
+// The rows of a memory that a file keeps, as v; $1 is the memory, $2 and $3 are the areas' columns
+// and rows. Bare columns are compared with bare numbers: row-level security lets an index be used
+// only where nothing but such comparisons, which cannot fail, sees the rows.
+std::string kept_views(const KeptAreas& areas) {
+  if (!areas) return "panonav.views v WHERE v.memory = $1";
+  return "(SELECT (10 * c)::float8 left_m, (10 * c + 10)::float8 right_m, (10 * r)::float8 "
+         "bottom_m, (10 * r + 10)::float8 top_m FROM unnest($2, $3) u(c, r) OFFSET 0) q JOIN "
+         "panonav.views v ON v.memory = $1 AND v.x_m IS NOT NULL AND v.x_m >= q.left_m AND v.x_m < "
+         "q.right_m AND v.y_m >= q.bottom_m AND v.y_m < q.top_m WHERE true";
+}
+
+std::string kept_links(const KeptAreas& areas) {
+  if (!areas) return "panonav.links l WHERE l.memory = $1";
+  return "panonav.links l WHERE l.memory = $1 AND l.a IN (SELECT id FROM kept) AND l.b IN (SELECT "
+         "id FROM kept)";
+}
+
+void add_areas(PostgresqlValues& values, const KeptAreas& areas) {
+  if (!areas) return;
+  std::vector<std::int64_t> columns, rows;
+  for (const MemoryArea& area : *areas) {
+    columns.push_back(static_cast<std::int64_t>(area.column));
+    rows.push_back(static_cast<std::int64_t>(area.row));
+  }
+  values.add(Numbers(columns)).add(Numbers(rows));
+}
+
+Blocks blocks_in(const PostgresqlRows& rows) {
+  Blocks blocks;
+  for (int i = 0; i < rows.size(); ++i) {
+    blocks[rows.integer(i, 0)] = {rows.integer(i, 1), rows.integer(i, 2)};
+  }
+  return blocks;
+}
+
+const std::string block_of_v = "v.id >> " + std::to_string(block_bits);
+const std::string block_of_l = "l.a >> " + std::to_string(block_bits);
+
+}  // namespace
+
+std::unique_ptr<ServerExchange> ServerExchange::connect(const ServerAddress& address) {
+  MemoriesConnection memories = connect_to_memories(address, true);
+  if (memories.schema_version < postgresql_schema_version) {
+    throw FileError(address.shown.native(),
+                    "cannot be synchronised: the schema's version is " +
+                        std::to_string(memories.schema_version) +
+                        "; allowed: " + std::to_string(postgresql_schema_version) +
+                        ", to which the owner of the schema brings it with panonav memorise or "
+                        "synchronise");
+  }
+  const auto found = find_memory(memories, address);
+  if (!found) return nullptr;
+  return std::unique_ptr<ServerExchange>(
+      new ServerExchange(address, std::move(memories.connection), *found));
+}
+
+ServerExchange::ServerExchange(const ServerAddress& address, PostgresqlConnection connection_,
+                               const FoundMemory& found)
+    : tables_(address, std::move(connection_), found.id, found.channel) {
+  const PostgresqlRows rows = connection().run(
+      "SELECT (has_table_privilege('panonav.views', 'INSERT') AND "
+      "has_table_privilege('panonav.uploads', 'INSERT'))::int4::int8, "
+      "(has_table_privilege('panonav.views', 'UPDATE') AND has_table_privilege('panonav.views', "
+      "'DELETE') AND has_table_privilege('panonav.uploads', 'UPDATE'))::int4::int8, "
+      "session_user::text");
+  may_add_ = rows.integer(0, 0) != 0;
+  may_change_ = may_add_ && rows.integer(0, 1) != 0;
+  robot_ = address.robot.value_or(std::string(rows.text(0, 2)));
+}
+
+PostgresqlValues ServerExchange::values() const {
+  PostgresqlValues values;
+  values.add(tables_.memory());
+  return values;
+}
+
+// id, name, x_m, y_m, heading_rad, stamp_s, checksum
+ServerView ServerExchange::view_in(const PostgresqlRows& rows, int row) const {
+  ServerView view;
+  view.id = id_in(rows, row, 0);
+  view.info.name = rows.text(row, 1);
+  const auto x_m = rows.real(row, 2);
+  const auto y_m = rows.real(row, 3);
+  if (x_m && y_m) view.info.pose = ReferencePose{*x_m, *y_m, rows.real(row, 4)};
+  view.info.stamp_s = rows.real(row, 5);
+  view.checksum = rows.integer(row, 6);
+  return view;
+}
+
+void ServerExchange::refuse_removed() const {
+  throw FileError(tables_.path().native(),
+                  "was removed from its server, or belongs to another fleet now");
+}
+
+ServerExchange::State ServerExchange::state() {
+  const PostgresqlRows rows =
+      connection().run("SELECT identity, last_view FROM panonav.memories WHERE id = $1", values());
+  if (rows.size() == 0) refuse_removed();
+  return {std::string(rows.text(0, 0)), rows.integer(0, 1)};
+}
+
+constexpr const char* upload_fields =
+    "SELECT u.view, u.signature, u.server_view, u.local_checksum, u.server_checksum, u.sent FROM ";
+
+std::vector<Upload> ServerExchange::uploads_in(const PostgresqlRows& rows) const {
+  std::vector<Upload> uploads;
+  for (int i = 0; i < rows.size(); ++i) {
+    uploads.push_back({id_in(rows, i, 0), rows.integer(i, 1), id_in(rows, i, 2), rows.integer(i, 3),
+                       rows.integer(i, 4), rows.integer(i, 5)});
+  }
+  return uploads;
+}
+
+std::vector<Upload> ServerExchange::uploads(const std::string& file,
+                                            std::span<const ViewId> views) {
+  if (views.empty()) return {};
+  const auto numbers = numbers_of(views);
+  return uploads_in(connection().run(
+      upload_fields + std::string("panonav.uploads u WHERE u.memory = $1 AND u.file = $2 AND "
+                                  "u.view = ANY($3) ORDER BY u.server_view"),
+      values().add(std::string_view(file)).add(Numbers(numbers))));
+}
+
+std::vector<Upload> ServerExchange::settled_uploads(const std::string& file,
+                                                    std::span<const ViewId> views) {
+  const auto numbers = numbers_of(views);
+  return uploads_in(
+      connection().run(upload_fields + std::string("panonav.uploads_of($1, $2, $3) u"),
+                       values().add(std::string_view(file)).add(Numbers(numbers))));
+}
+
+std::vector<ServerView> ServerExchange::named(std::span<const std::string> names) {
+  std::vector<ServerView> views;
+  if (names.empty()) return views;
+  const PostgresqlRows rows = connection().run(
+      "SELECT id, name, x_m, y_m, heading_rad, stamp_s, checksum FROM panonav.views WHERE memory = "
+      "$1 AND name = ANY($2)",
+      values().add(names));
+  for (int i = 0; i < rows.size(); ++i) views.push_back(view_in(rows, i));
+  return views;
+}
+
+std::vector<ServerView> ServerExchange::infos(std::span<const ViewId> ids) {
+  std::vector<ServerView> views;
+  if (ids.empty()) return views;
+  const auto numbers = numbers_of(ids);
+  const PostgresqlRows rows = connection().run(
+      "SELECT id, name, x_m, y_m, heading_rad, stamp_s, checksum FROM panonav.views WHERE memory = "
+      "$1 AND id = ANY($2) ORDER BY id",
+      values().add(Numbers(numbers)));
+  for (int i = 0; i < rows.size(); ++i) views.push_back(view_in(rows, i));
+  return views;
+}
+
+std::map<ViewId, std::int64_t> ServerExchange::checksums(std::span<const ViewId> views) {
+  std::map<ViewId, std::int64_t> checksums;
+  if (views.empty()) return checksums;
+  const auto numbers = numbers_of(views);
+  const PostgresqlRows rows =
+      connection().run("SELECT id, checksum FROM panonav.views WHERE memory = $1 AND id = ANY($2)",
+                       values().add(Numbers(numbers)));
+  for (int i = 0; i < rows.size(); ++i) checksums.emplace(id_in(rows, i, 0), rows.integer(i, 1));
+  return checksums;
+}
+
+Blocks ServerExchange::view_blocks(const KeptAreas& areas) {
+  PostgresqlValues given = values();
+  add_areas(given, areas);
+  return blocks_in(connection().run("SELECT " + block_of_v +
+                                        ", count(*), bit_xor(v.checksum) FROM " +
+                                        kept_views(areas) + " GROUP BY 1",
+                                    given));
+}
+
+std::map<ViewId, std::int64_t> ServerExchange::checksums_in(const KeptAreas& areas,
+                                                            std::span<const std::int64_t> blocks) {
+  std::map<ViewId, std::int64_t> checksums;
+  if (blocks.empty()) return checksums;
+  PostgresqlValues given = values();
+  add_areas(given, areas);
+  const PostgresqlRows rows =
+      connection().run("SELECT v.id, v.checksum FROM " + kept_views(areas) + " AND " + block_of_v +
+                           " = ANY(" + (areas ? "$4)" : "$2)"),
+                       given.add(blocks));
+  for (int i = 0; i < rows.size(); ++i) checksums.emplace(id_in(rows, i, 0), rows.integer(i, 1));
+  return checksums;
+}
+
+Blocks ServerExchange::link_blocks(const KeptAreas& areas) {
+  PostgresqlValues given = values();
+  add_areas(given, areas);
+  return blocks_in(connection().run(
+      (areas ? "WITH kept AS MATERIALIZED (SELECT v.id FROM " + kept_views(areas) + ") " : "") +
+          "SELECT " + block_of_l + ", count(*), bit_xor(l.checksum) FROM " + kept_links(areas) +
+          " GROUP BY 1",
+      given));
+}
+
+std::vector<Link> ServerExchange::links_in(const KeptAreas& areas,
+                                           std::span<const std::int64_t> blocks) {
+  std::vector<Link> links;
+  if (blocks.empty()) return links;
+  PostgresqlValues given = values();
+  add_areas(given, areas);
+  const PostgresqlRows rows = connection().run(
+      (areas ? "WITH kept AS MATERIALIZED (SELECT v.id FROM " + kept_views(areas) + ") " : "") +
+          "SELECT l.a, l.b, l.kind, l.checksum FROM " + kept_links(areas) + " AND " + block_of_l +
+          " = ANY(" + (areas ? "$4)" : "$2)"),
+      given.add(blocks));
+  for (int i = 0; i < rows.size(); ++i) {
+    links.push_back(tables_.checked(
+        LinkRow{id_in(rows, i, 0), id_in(rows, i, 1), rows.integer(i, 2), rows.integer(i, 3)}));
+  }
+  return links;
+}
+
+std::map<ViewId, std::int64_t> ServerExchange::signatures(std::span<const ViewId> views) {
+  std::map<ViewId, std::int64_t> signatures;
+  if (views.empty()) return signatures;
+  const auto numbers = numbers_of(views);
+  connection().stream("SELECT id, signature FROM panonav.views WHERE memory = $1 AND id = ANY($2)",
+                      values().add(Numbers(numbers)), [&](const PostgresqlRows& rows) {
+                        signatures.emplace(id_in(rows, 0, 0), signature_checksum(rows.bytes(0, 1)));
+                      });
+  return signatures;
+}
+
+std::vector<WholeServerView> ServerExchange::whole(std::span<const ViewId> ids) {
+  std::vector<WholeServerView> views;
+  if (ids.empty()) return views;
+  const auto numbers = numbers_of(ids);
+  RecordBytes scratch;
+  connection().stream(
+      "SELECT v.id, v.name, v.x_m, v.y_m, v.heading_rad, v.stamp_s, v.checksum, v.signature, "
+      "t.bytes, t.checksum, f.bytes, f.checksum FROM panonav.views v LEFT JOIN panonav.thumbnails "
+      "t ON t.memory = v.memory AND t.view = v.id LEFT JOIN panonav.features f ON f.memory = "
+      "v.memory AND f.view = v.id WHERE v.memory = $1 AND v.id = ANY($2) ORDER BY v.id",
+      values().add(Numbers(numbers)), [&](const PostgresqlRows& rows) {
+        ServerView found = view_in(rows, 0);
+        const auto signature = rows.bytes(0, 7);
+        const auto fail = [&](const char* what) {
+          tables_.fail_damaged(what + std::to_string(found.id.value) +
+                               " does not match its checksum");
+        };
+        if (signature.size() % 2 != 0 ||
+            found.checksum != view_checksum(scratch, found.id, found.info, signature)) {
+          fail("view ");
+        }
+        WholeServerView whole{found.id, {std::move(found.info), {}, {}, {}}, found.checksum};
+        const std::size_t half = signature.size() / 2;
+        whole.view.signature.magnitudes.assign(signature.begin(), signature.begin() + half);
+        whole.view.signature.phases.assign(signature.begin() + half, signature.end());
+        const auto beside = [&](int column, std::vector<std::uint8_t>& bytes, const char* what) {
+          if (rows.is_null(0, column)) return;
+          bytes = rows.copy(0, column);
+          if (rows.integer(0, column + 1) != bytes_checksum(whole.id, bytes)) fail(what);
+        };
+        beside(8, whole.view.thumbnail, "the thumbnail of view ");
+        beside(10, whole.view.features, "what local features view ");
+        views.push_back(std::move(whole));
+      });
+  return views;
+}
+
+void ServerExchange::stage(std::span<const NewView> views) {
+  connection().execute(
+      "CREATE TEMPORARY TABLE IF NOT EXISTS panonav_staged(number bigint, name text COLLATE \"C\", "
+      "x_m double precision, y_m double precision, heading_rad double precision, stamp_s double "
+      "precision, signature bytea, thumbnail bytea, features bytea);"
+      "ALTER TABLE pg_temp.panonav_staged ALTER signature SET STORAGE PLAIN, ALTER thumbnail SET "
+      "STORAGE EXTERNAL, ALTER features SET STORAGE EXTERNAL; TRUNCATE pg_temp.panonav_staged");
+  CopyRows rows;
+  std::vector<std::uint8_t> signature;
+  const auto add_beside = [&](const std::vector<std::uint8_t>& bytes) {
+    if (bytes.empty()) {
+      rows.add_null();
+    } else {
+      rows.add(std::span<const std::uint8_t>(bytes));
+    }
+  };
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    rows.begin_row(9).add(static_cast<std::int64_t>(i));
+    add_info(rows, views[i].info);
+    pack_signature(views[i].signature, signature);
+    add_beside(signature);
+    add_beside(views[i].thumbnail);
+    add_beside(views[i].features);
+    tables_.changed_at(views[i].info.pose);
+  }
+  connection().copy_in("COPY pg_temp.panonav_staged FROM STDIN (FORMAT binary)", rows.finish());
+}
+
+namespace {
+
+std::int64_t empty_recordings_checksum() {
+  return setting_checksum("parameter." + std::string(recordings_parameter), std::string());
+}
+
+}  // namespace
+
+std::uint32_t ServerExchange::reserve_ids(std::size_t count) {
+  const PostgresqlRows rows = connection().run("SELECT panonav.reserve_ids($1, $2)",
+                                               values().add(static_cast<std::int64_t>(count)));
+  if (rows.is_null(0, 0)) refuse_removed();
+  const std::int64_t last = rows.integer(0, 0);
+  if (last < 0 || last + static_cast<std::int64_t>(count) >= std::int64_t{UINT32_MAX}) {
+    tables_.fail_damaged("there is no id left for another view");
+  }
+  return static_cast<std::uint32_t>(last);
+}
+
+std::vector<Upload> ServerExchange::take_views(const std::string& file, std::int64_t sent,
+                                               std::span<const Staged> staged) {
+  std::vector<std::int64_t> views, signatures, ids, local_checksums, server_checksums, numbers,
+      thumbnails, features;
+  for (const Staged& view : staged) {
+    views.push_back(view.upload.view.value);
+    signatures.push_back(view.upload.signature);
+    ids.push_back(view.upload.server_view.value);
+    local_checksums.push_back(view.upload.local_checksum);
+    server_checksums.push_back(view.upload.server_checksum);
+    numbers.push_back(static_cast<std::int64_t>(view.number));
+    thumbnails.push_back(view.thumbnail_checksum);
+    features.push_back(view.features_checksum);
+  }
+  const std::int64_t session = tables_.session();
+  const std::string said = tables_.take_areas();
+  return uploads_in(connection().run(
+      upload_fields +
+          std::string("panonav.take_views($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, "
+                      "$13) u"),
+      values()
+          .add(std::string_view(file))
+          .add(session)
+          .add(sent)
+          .add(std::string_view(said))
+          .add(Numbers(views))
+          .add(Numbers(signatures))
+          .add(Numbers(ids))
+          .add(Numbers(local_checksums))
+          .add(Numbers(server_checksums))
+          .add(Numbers(numbers))
+          .add(Numbers(thumbnails))
+          .add(Numbers(features))));
+}
+
+std::vector<Upload> ServerExchange::take_changes(const std::string& file, std::int64_t sent,
+                                                 std::span<const ChangedView> changes) {
+  std::vector<std::int64_t> views, signatures, ids, local_checksums, former, server_checksums;
+  CopyRows rows;
+  for (const ChangedView& view : changes) {
+    views.push_back(view.upload.view.value);
+    signatures.push_back(view.upload.signature);
+    ids.push_back(view.upload.server_view.value);
+    local_checksums.push_back(view.upload.local_checksum);
+    former.push_back(view.former_checksum);
+    server_checksums.push_back(view.upload.server_checksum);
+    rows.begin_row(6).add(std::int64_t{view.upload.server_view.value});
+    add_info(rows, view.info);
+    tables_.changed_at(view.info.pose);
+  }
+  const PostgresqlRows before =
+      connection().run("SELECT x_m, y_m FROM panonav.views WHERE memory = $1 AND id = ANY($2)",
+                       values().add(Numbers(ids)));
+  for (int i = 0; i < before.size(); ++i) {
+    tables_.changed_at(before.real(i, 0), before.real(i, 1));
+  }
+  connection().execute(
+      "CREATE TEMPORARY TABLE IF NOT EXISTS panonav_changed(id bigint, name text COLLATE \"C\", "
+      "x_m double precision, y_m double precision, heading_rad double precision, stamp_s double "
+      "precision); TRUNCATE pg_temp.panonav_changed");
+  connection().copy_in("COPY pg_temp.panonav_changed FROM STDIN (FORMAT binary)", rows.finish());
+  const std::string said = tables_.take_areas();
+  return uploads_in(connection().run(
+      upload_fields +
+          std::string("panonav.take_changes($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11) u"),
+      values()
+          .add(std::string_view(file))
+          .add(sent)
+          .add(std::string_view(said))
+          .add(empty_recordings_checksum())
+          .add(Numbers(views))
+          .add(Numbers(signatures))
+          .add(Numbers(ids))
+          .add(Numbers(local_checksums))
+          .add(Numbers(former))
+          .add(Numbers(server_checksums))));
+}
+
+std::vector<ViewId> ServerExchange::take_removals(const std::map<ViewId, std::int64_t>& checksums) {
+  std::vector<std::int64_t> ids, sums;
+  for (const auto& [id, checksum] : checksums) {
+    ids.push_back(id.value);
+    sums.push_back(checksum);
+  }
+  const PostgresqlRows there =
+      connection().run("SELECT x_m, y_m FROM panonav.views WHERE memory = $1 AND id = ANY($2)",
+                       values().add(Numbers(ids)));
+  for (int i = 0; i < there.size(); ++i) tables_.changed_at(there.real(i, 0), there.real(i, 1));
+  const std::string said = tables_.take_areas();
+  const PostgresqlRows rows = connection().run("SELECT panonav.take_removals($1, $2, $3, $4, $5)",
+                                               values()
+                                                   .add(std::string_view(said))
+                                                   .add(empty_recordings_checksum())
+                                                   .add(Numbers(ids))
+                                                   .add(Numbers(sums)));
+  std::vector<ViewId> removed;
+  for (int i = 0; i < rows.size(); ++i) removed.push_back(id_in(rows, i, 0));
+  return removed;
+}
+
+std::size_t ServerExchange::take_links(std::span<const Link> added,
+                                       std::span<const ChangedLink> changed) {
+  // a, b, kind, checksum; a, b, former kind, kind, checksum; a, b
+  std::array<std::vector<std::int64_t>, 11> columns;
+  const auto kind_of = [](LinkKind kind) { return std::int64_t{static_cast<int>(kind)}; };
+  for (const Link& link : added) {
+    columns[0].push_back(link.a.value);
+    columns[1].push_back(link.b.value);
+    columns[2].push_back(kind_of(link.kind));
+    columns[3].push_back(link_checksum(link));
+  }
+  for (const ChangedLink& link : changed) {
+    const Link& former = link.former;
+    const std::size_t first = link.wanted ? 4 : 9;
+    columns[first].push_back(former.a.value);
+    columns[first + 1].push_back(former.b.value);
+    if (!link.wanted) continue;
+    columns[6].push_back(kind_of(former.kind));
+    columns[7].push_back(kind_of(*link.wanted));
+    columns[8].push_back(link_checksum({former.a, former.b, *link.wanted}));
+  }
+  PostgresqlValues given = values();
+  for (const auto& column : columns) given.add(Numbers(column));
+  const PostgresqlRows rows = connection().run(
+      "SELECT panonav.take_links($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12)", given);
+  return static_cast<std::size_t>(rows.integer(0, 0));
+}
+
+}  // namespace panonav::fleet

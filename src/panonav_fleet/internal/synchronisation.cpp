@@ -1,0 +1,212 @@
+
+#include "panonav_fleet/internal/synchronisation.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "panonav/core/error.hpp"
+#include "panonav/storage/internal/memory_rows.hpp"
+
+namespace panonav::fleet {
+
+namespace {
+
+void require_comparable(const MemoryHeader& file, const MemoryHeader& server,
+                        const std::filesystem::path& path) {
+  const auto require_same = [&](const char* what, bool same) {
+    if (same) return;
+    throw ContractError(std::string(what) + " of the file", "another",
+                        "that of " + path.string() +
+                            ", as views made in another way cannot be compared; a file that is "
+                            "made by synchronising has it");
+  };
+  require_same("rows and components", file.shape == server.shape);
+  require_same("full scale", file.full_scale == server.full_scale);
+  require_same("elevations of the rows", file.elevations == server.elevations);
+  require_same("number of columns", file.panorama_columns == server.panorama_columns);
+  require_same("preprocessing", file.preprocessing == server.preprocessing);
+}
+
+}  // namespace
+
+Synchronisation::Synchronisation(SqliteTables& file, MemoryHeader header, ServerExchange& server,
+                                 const SynchronisationOptions& options,
+                                 const std::function<void(std::size_t)>& advance)
+    : file_(file), header_(std::move(header)), server_(server), advance_(advance) {
+  if (!options.areas) return;
+  const std::set<MemoryArea> areas(options.areas->begin(), options.areas->end());
+  for (const MemoryArea& area : areas) {
+    constexpr double largest = 1e15;  // whole numbers below it are exact
+    for (const double value : {area.column, area.row}) {
+      require(std::abs(value) <= largest && value == std::floor(value), "column or row of an area",
+              value, "whole numbers up to 1e15");
+    }
+  }
+  areas_.emplace(areas.begin(), areas.end());
+}
+
+SynchronisationReport Synchronisation::run() {
+  join();
+  constexpr int max_rounds = 2;  // the second uploads what a restored server had lost
+  for (int round = 0; round < max_rounds; ++round) {
+    lost_ = false;
+    read_file();
+    ask_for_answers();
+    prepare();
+    if (server_.may_add()) {
+      upload_views();
+      upload_changes();
+      upload_removals();
+      upload_links();
+    }
+    download();
+    if (!lost_ || !server_.may_add()) break;
+  }
+  return report_;
+}
+
+void Synchronisation::join() {
+  stored_state_ = state_ = read_synchronised_state(file_);
+  const ServerExchange::State there = server_.state();
+  if (state_.memory.empty()) {
+    const auto reading = server_.tables().transaction(Kind::reading);
+    require_comparable(header_, header_from(server_.tables().settings()), server_.tables().path());
+  } else if (state_.memory != there.identity) {
+    throw FileError(file_.path().string(),
+                    "is synchronised with another memory than " + server_.tables().path().string() +
+                        " is now; allowed: the same memory, or a copy of the file (panonav "
+                        "copy), which is synchronised with none");
+  }
+  if (state_.file.empty()) state_.file = random_identity(file_);
+  state_.memory = there.identity;
+  sent_ = random_number(file_);
+  restored_ = there.last_view < state_.last_view;
+}
+
+void Synchronisation::read_file() {
+  const auto reading = file_.transaction(Kind::reading);
+  views_ = read_synchronised_views(file_);
+  stored_links_ = links_ = read_synchronised_links(file_);
+  local_ = read_view_checksums(file_);
+  by_server_.clear();
+  for (const auto& [view, row] : views_) {
+    if (row.server_view) by_server_[*row.server_view] = view;
+  }
+  changed_.clear();
+}
+
+void Synchronisation::put(ViewId view, const SynchronisedView& row) {
+  views_[view] = row;
+  if (row.server_view) by_server_[*row.server_view] = view;
+  changed_.insert(view);
+}
+
+void Synchronisation::drop(ViewId view) {
+  const auto found = views_.find(view);
+  if (found == views_.end()) return;
+  if (found->second.server_view) by_server_.erase(*found->second.server_view);
+  views_.erase(found);
+  changed_.insert(view);
+}
+
+bool Synchronisation::is_written() const {
+  return changed_.empty() && links_ == stored_links_ && state_ == stored_state_;
+}
+
+void Synchronisation::commit(MemoryTables::Transaction& writing) {
+  state_.number = random_number(file_);
+  write_synchronised_state(file_, state_);
+  for (const ViewId view : std::exchange(changed_, {})) {
+    const auto found = views_.find(view);
+    if (found == views_.end()) {
+      erase_synchronised_view(file_, view);
+    } else {
+      write_synchronised_view(file_, view, found->second);
+    }
+  }
+  for (const auto& [ends, kind] : links_) {
+    const auto stored = stored_links_.find(ends);
+    if (stored != stored_links_.end() && stored->second == kind) continue;
+    write_synchronised_link(file_, {ends.first, ends.second, kind});
+  }
+  for (const auto& [ends, kind] : stored_links_) {
+    if (!links_.contains(ends)) erase_synchronised_link(file_, ends.first, ends.second);
+  }
+  writing.commit();
+  stored_links_ = links_;
+  stored_state_ = state_;
+}
+
+std::unique_ptr<MemoryTables::Transaction> Synchronisation::change_file() {
+  auto writing = file_.transaction(Kind::writing);
+  if (read_synchronised_state(file_).number != stored_state_.number) {
+    throw FileError(file_.path().string(), "is being synchronised by another program, too");
+  }
+  local_ = read_view_checksums(file_);
+  return writing;
+}
+
+std::optional<Synchronisation::LocalRow> Synchronisation::read_row(ViewId view) {
+  if (!local_.contains(view)) return std::nullopt;
+  LocalRow read;
+  file_.read_views(std::span(&view, 1), [&](const ViewRow& found) {
+    const ViewRow& row = file_.checked(found, header_.shape, scratch_);
+    read = {row.info, row.checksum, Bytes(row.signature.begin(), row.signature.end())};
+  });
+  return read;
+}
+
+void Synchronisation::write_info(ViewId view, const ReferenceInfo& info, const Bytes& signature) {
+  const std::int64_t checksum = view_checksum(scratch_, view, info, signature);
+  file_.write_info(view, info, checksum);
+  local_[view] = checksum;
+}
+
+void Synchronisation::clear_recordings() {
+  const std::string key = "parameter." + std::string(recordings_parameter);
+  const Settings settings = file_.settings();
+  if (settings.contains(key)) file_.write_setting(key, std::string());
+}
+
+std::string Synchronisation::own_name(const std::string& name, int count) const {
+  return server_.robot() + "/" + name +
+         (count == 1 ? std::string() : " (" + std::to_string(count) + ")");
+}
+
+std::uint32_t Synchronisation::require_same_memory() {
+  const ServerExchange::State there = server_.state();
+  if (there.identity != state_.memory) {
+    throw FileError(server_.tables().path().string(), "was replaced by another memory meanwhile");
+  }
+  if (there.last_view < 0 || there.last_view >= std::int64_t{UINT32_MAX}) {
+    server_.tables().fail_damaged("the last view id is out of range");
+  }
+  return static_cast<std::uint32_t>(there.last_view);
+}
+
+SynchronisedLinks Synchronisation::local_links() {
+  SynchronisedLinks links;
+  file_.read_links([&](const LinkRow& row) {
+    const Link link = file_.checked(row);
+    const auto a = views_.find(link.a);
+    const auto b = views_.find(link.b);
+    if (a == views_.end() || b == views_.end()) return;
+    if (!a->second.server_view || !b->second.server_view) return;
+    links[std::minmax(*a->second.server_view, *b->second.server_view)] = link.kind;
+  });
+  return links;
+}
+
+bool Synchronisation::is_in_file(ViewId server_view) const {
+  const auto found = by_server_.find(server_view);
+  return found != by_server_.end() && local_.contains(found->second);
+}
+
+void Synchronisation::forget(ViewId server_view) {
+  drop(by_server_.at(server_view));
+  std::erase_if(links_, [&](const auto& link) {
+    return link.first.first == server_view || link.first.second == server_view;
+  });
+}
+
+}  // namespace panonav::fleet

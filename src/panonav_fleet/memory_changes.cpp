@@ -1,0 +1,50 @@
+#include "panonav_fleet/memory_changes.hpp"
+
+#include <cmath>
+#include <sstream>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/storage/memory_address.hpp"
+#include "panonav_fleet/internal/postgresql_memory.hpp"
+
+namespace panonav::fleet {
+
+MemoryArea area_of(double x_m, double y_m) {
+  return {std::floor(x_m / memory_area_side_m), std::floor(y_m / memory_area_side_m)};
+}
+
+struct MemoryChanges::Implementation {
+  explicit Implementation(const ServerAddress& address)
+      : memories(connect_to_memories(address, false)) {
+    const auto found = find_memory(memories, address);
+    if (!found) refuse_no_memory(address);
+    memories.connection.execute("LISTEN \"" + found->channel + "\"");  // of the server's making
+  }
+  MemoriesConnection memories;
+};
+
+std::optional<MemoryChange> MemoryChanges::wait(std::chrono::milliseconds longest) {
+  const auto said = implementation_->memories.connection.wait_for_notification(
+      std::chrono::duration<double>(longest).count());
+  if (!said) return std::nullopt;
+  MemoryChange change;
+  std::istringstream words(*said);
+  MemoryArea area;
+  char comma = 0;
+  while (words >> area.column >> comma >> area.row) change.areas.push_back(area);
+  return change;
+}
+
+MemoryChanges::MemoryChanges(const std::filesystem::path& memory) {
+  if (!is_postgresql_address(memory)) {
+    throw FileError(memory.string(), "is a file; allowed: the address of a memory on a server");
+  }
+  implementation_ = std::make_unique<Implementation>(parse_server_address(memory));
+}
+
+MemoryChanges::~MemoryChanges() = default;
+MemoryChanges::MemoryChanges(MemoryChanges&&) noexcept = default;
+MemoryChanges& MemoryChanges::operator=(MemoryChanges&&) noexcept = default;
+
+}  // namespace panonav::fleet

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <chrono>
+#include <compare>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <vector>
+
+namespace panonav::fleet {
+
+/// A square of 10 m of a memory's map: column and row count from the origin, and (0, 0) lies
+/// between it and (10 m, 10 m).
+struct MemoryArea {
+  double column = 0.0;  ///< whole numbers, along x
+  double row = 0.0;     ///< whole numbers, along y
+  friend auto operator<=>(const MemoryArea&, const MemoryArea&) = default;
+};
+/// Side of an area.
+inline constexpr double memory_area_side_m = 10.0;
+
+/// The area that a position lies in.
+[[nodiscard]] MemoryArea area_of(double x_m, double y_m);
+
+/// What somebody changed in a memory on a server.
+struct MemoryChange {
+  /// Areas in which views were added, removed or changed; empty: something else, views without a
+  /// position among them, or many areas.
+  std::vector<MemoryArea> areas;
+  friend bool operator==(const MemoryChange&, const MemoryChange&) = default;
+};
+
+/// Waits for changes of a memory on a server, whoever makes them. It holds a connection of its own.
+class MemoryChanges {
+ public:
+  /// From now on no change is missed. Throws FileError as `MemoryFile::open`, and for the path of a
+  /// memory file, which tells nobody.
+  explicit MemoryChanges(const std::filesystem::path& memory);
+  ~MemoryChanges();
+  /// What is left of the other may only be destroyed or assigned to.
+  MemoryChanges(MemoryChanges&&) noexcept;
+  MemoryChanges& operator=(MemoryChanges&&) noexcept;
+
+  /// The next change, as soon as its transaction is on the server's disk; empty when there was none
+  /// within `longest`. Throws FileError when the connection is lost: changes may then be missed.
+  [[nodiscard]] std::optional<MemoryChange> wait(std::chrono::milliseconds longest);
+
+ private:
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace panonav::fleet

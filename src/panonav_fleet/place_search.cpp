@@ -1,0 +1,510 @@
+#include "panonav_fleet/place_search.hpp"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <exception>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <thread>
+#include <unordered_map>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/executor.hpp"
+#include "panonav/storage/internal/memory_file_access.hpp"
+#include "panonav/storage/internal/memory_tables.hpp"
+#include "panonav/storage/memory_address.hpp"
+#include "panonav_fleet/memory_changes.hpp"
+
+namespace panonav::fleet {
+
+namespace {
+
+/// In which area each view lies, by its id: what a change of an area is compared with. Four bytes a
+/// view.
+class AreasOfViews {
+ public:
+  void set(ViewId view, const std::optional<MemoryArea>& area) {
+    if (view.value >= numbers_.size()) {
+      numbers_.resize(std::max<std::size_t>(view.value + std::size_t{1}, numbers_.size() * 5 / 4));
+    }
+    numbers_[view.value] = area ? number_of(*area) : no_area;
+  }
+  void erase(ViewId view) {
+    if (view.value < numbers_.size()) numbers_[view.value] = no_view;
+  }
+  [[nodiscard]] bool has(ViewId view) const {
+    return view.value < numbers_.size() && numbers_[view.value] != no_view;
+  }
+  /// Ascending. Cost: a pass over all ids.
+  [[nodiscard]] std::vector<ViewId> within(const std::set<MemoryArea>& areas) const {
+    std::vector<std::uint32_t> wanted;
+    for (const MemoryArea& area : areas) {
+      const auto found = areas_.find(area);
+      if (found != areas_.end()) wanted.push_back(found->second);
+    }
+    std::ranges::sort(wanted);
+    return with([&](std::uint32_t number) { return std::ranges::binary_search(wanted, number); });
+  }
+  [[nodiscard]] std::vector<ViewId> all() const {
+    return with([](std::uint32_t number) { return number != no_view; });
+  }
+  [[nodiscard]] std::uint64_t bytes() const { return numbers_.size() * sizeof(std::uint32_t); }
+
+ private:
+  static constexpr std::uint32_t no_view = 0;
+  static constexpr std::uint32_t no_area = 1;
+  std::uint32_t number_of(const MemoryArea& area) {
+    return areas_.try_emplace(area, static_cast<std::uint32_t>(areas_.size()) + no_area + 1)
+        .first->second;
+  }
+  template <class Wanted>
+  [[nodiscard]] std::vector<ViewId> with(const Wanted& wanted) const {
+    std::vector<ViewId> views;
+    for (std::size_t id = 0; id < numbers_.size(); ++id) {
+      if (wanted(numbers_[id])) views.push_back({static_cast<std::uint32_t>(id)});
+    }
+    return views;
+  }
+  std::vector<std::uint32_t> numbers_;  // by id
+  std::map<MemoryArea, std::uint32_t> areas_;
+};
+
+std::optional<MemoryArea> area_at(const std::optional<Point2>& position) {
+  if (!position) return std::nullopt;
+  return area_of(position->x_m, position->y_m);
+}
+
+/// Views on their way into sketches.
+class Sketcher {
+ public:
+  explicit Sketcher(SignatureShape shape) : sketches(shape) {}
+  /// Whether a good number of them was sketched just then.
+  bool add(MemoryTables& tables, const MagnitudesRow& row) {
+    if (row.magnitudes.size() != sketches.shape().size()) {
+      tables.fail_damaged("view " + std::to_string(row.id.value) + " has another shape");
+    }
+    ids_.push_back(row.id);
+    magnitudes_.insert(magnitudes_.end(), row.magnitudes.begin(), row.magnitudes.end());
+    areas_.emplace_back(row.id, area_at(row.position));
+    if (ids_.size() < some) return false;
+    flush();
+    return true;
+  }
+  void flush() {
+    sketches.insert(ids_, magnitudes_);
+    ids_.clear();
+    magnitudes_.clear();
+  }
+  void note_areas(AreasOfViews& areas) {
+    for (const auto& [view, area] : areas_) areas.set(view, area);
+    areas_.clear();
+  }
+  ViewSketches sketches;
+
+ private:
+  static constexpr std::size_t some = 1 << 15;
+  std::vector<std::pair<ViewId, std::optional<MemoryArea>>> areas_;
+  std::vector<ViewId> ids_;
+  std::vector<std::uint8_t> magnitudes_;
+};
+
+}  // namespace
+
+struct PlaceSearch::Implementation {
+  /// What searches read: swapped when views come or go.
+  struct Sketched {
+    ViewSketches sketches;
+    std::uint64_t bytes = 0;
+  };
+
+  explicit Implementation(std::filesystem::path memory) : path(std::move(memory)) {
+    // First, so that no change is missed.
+    if (is_postgresql_address(path)) changes.emplace(path);
+    OpenedMemory opened = open_memory_tables(path, Access::read_only);
+    header = std::move(opened.header);
+    own = std::move(opened.tables);
+    read_all();
+  }
+
+  [[nodiscard]] std::unique_ptr<MemoryTables> connect() const {
+    return open_memory_tables(path, Access::read_only).tables;
+  }
+
+  /// The range of ids is cut into a part for each connection; a part is in the order of the ids,
+  /// which is mostly that in which the views were taken.
+  void read_all() {
+    const std::uint32_t last = own->last_id();
+    const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());
+    const std::size_t parts = last < 100000 ? 1 : std::min<std::size_t>(cores, 16);
+    std::vector<Sketcher> sketchers(parts, Sketcher(header.shape));
+    std::vector<std::exception_ptr> faults(parts);
+    const auto read_part = [&](std::size_t part, MemoryTables& tables) {
+      const auto border = [&](std::size_t i) {
+        return static_cast<std::uint32_t>(std::uint64_t{last} * i / parts);
+      };
+      const auto reading = tables.transaction(MemoryTables::Kind::reading);
+      const auto note_areas = [&] {
+        const std::lock_guard lock(mutex);
+        sketchers[part].note_areas(areas);
+      };
+      // Of so many ids at a time, so that a server goes by its index and does not sort them all.
+      constexpr std::uint32_t at_a_time = 20000;
+      for (std::uint32_t before = border(part); before < border(part + 1);) {
+        const std::uint32_t end = before + std::min(at_a_time, border(part + 1) - before);
+        tables.read_magnitudes({before + 1}, {end}, header.shape.size(),
+                               [&](const MagnitudesRow& row) {
+                                 if (sketchers[part].add(tables, row)) note_areas();
+                               });
+        before = end;
+      }
+      sketchers[part].flush();
+      note_areas();
+    };
+    std::vector<std::thread> threads;
+    for (std::size_t part = 1; part < parts; ++part) {
+      threads.emplace_back([&, part] {
+        try {
+          read_part(part, *connect());
+        } catch (...) {
+          faults[part] = std::current_exception();
+        }
+      });
+    }
+    try {
+      read_part(0, *own);
+    } catch (...) {
+      faults[0] = std::current_exception();
+    }
+    for (std::thread& thread : threads) thread.join();
+    for (const std::exception_ptr& fault : faults) {
+      if (fault) std::rethrow_exception(fault);
+    }
+    ViewSketches all(header.shape);
+    for (Sketcher& sketcher : sketchers) {
+      all.insert(sketcher.sketches);
+      sketcher = Sketcher(header.shape);
+    }
+    publish(std::move(all));
+  }
+
+  void publish(ViewSketches sketches) {
+    const std::uint64_t bytes = sketches.bytes() + areas.bytes();
+    auto next = std::make_shared<const Sketched>(Sketched{std::move(sketches), bytes});
+    const std::lock_guard lock(mutex);
+    current.swap(next);
+  }
+  [[nodiscard]] std::shared_ptr<const Sketched> sketched() const {
+    const std::lock_guard lock(mutex);
+    return current;
+  }
+
+  // ---- connections of searches
+
+  [[nodiscard]] std::unique_ptr<MemoryTables> borrow() const {
+    const std::lock_guard lock(mutex);
+    if (idle.empty()) return nullptr;
+    auto tables = std::move(idle.back());
+    idle.pop_back();
+    return tables;
+  }
+  void give_back(std::unique_ptr<MemoryTables> tables) const {
+    const std::lock_guard lock(mutex);
+    idle.push_back(std::move(tables));
+  }
+  /// Those of a server that was away are of no use.
+  void drop_idle() const {
+    std::vector<std::unique_ptr<MemoryTables>> dropped;
+    const std::lock_guard lock(mutex);
+    dropped.swap(idle);
+  }
+
+  // ---- refreshing
+
+  bool refresh() {
+    const std::lock_guard only_one(refreshing);
+    try {
+      std::set<MemoryArea> told;
+      bool all = compare_all || !is_postgresql_address(path);
+      bool any = all;
+      if (is_postgresql_address(path) && !changes) {
+        changes.emplace(path);
+        all = any = true;
+      }
+      while (changes) {
+        const auto change = changes->wait(std::chrono::milliseconds(0));
+        if (!change) break;
+        any = true;
+        all = all || change->areas.empty();
+        told.insert(change->areas.begin(), change->areas.end());
+      }
+      if (!any) return false;
+      if (!own) own = connect();
+      compare_all = true;  // until it is done
+      const bool found = compare(told, all || told.size() > max_areas);
+      compare_all = false;
+      return found || is_postgresql_address(path);
+    } catch (const FileError&) {
+      compare_all = true;
+      own.reset();
+      changes.reset();
+      throw;
+    }
+  }
+
+  /// Whether views came or went.
+  bool compare(const std::set<MemoryArea>& told, bool all) {
+    const auto reading = own->transaction(MemoryTables::Kind::reading);
+    std::vector<ViewId> there;
+    std::vector<ViewId> before;
+    if (all) {
+      static_cast<void>(own->last_id());  // refuses a memory that was removed
+      there = own->views();
+      before = areas.all();
+    } else {
+      for (const MemoryArea& area : told) {
+        const double x_m = area.column * memory_area_side_m;
+        const double y_m = area.row * memory_area_side_m;
+        for (const PositionRow& row :
+             own->views_within({x_m, x_m + memory_area_side_m, y_m, y_m + memory_area_side_m})) {
+          if (area_of(row.pose.x_m, row.pose.y_m) != area) continue;
+          there.push_back(row.id);
+          if (areas.has(row.id)) areas.set(row.id, area);  // it may have moved
+        }
+      }
+      std::ranges::sort(there);
+      before = areas.within(told);
+    }
+    std::vector<ViewId> came;
+    for (const ViewId view : there) {
+      if (!areas.has(view)) came.push_back(view);
+    }
+    std::vector<ViewId> gone;
+    std::ranges::set_difference(before, there, std::back_inserter(gone));
+    if (!all && !gone.empty()) {  // or they are elsewhere now
+      std::vector<ViewId> elsewhere;
+      own->read_views_there(gone, [&](const ViewRow& row) {
+        elsewhere.push_back(row.id);
+        const auto& pose = row.info.pose;
+        areas.set(row.id, area_at(pose ? std::optional(pose->position()) : std::nullopt));
+      });
+      std::ranges::sort(elsewhere);
+      std::erase_if(gone, [&](ViewId view) { return std::ranges::binary_search(elsewhere, view); });
+    }
+    if (came.empty() && gone.empty()) return false;
+    Sketcher sketcher(header.shape);
+    for (std::size_t begin = 0; begin < came.size();) {
+      // Ids one after the other in one statement.
+      std::size_t end = begin + 1;
+      while (end < came.size() && came[end].value == came[end - 1].value + 1) ++end;
+      own->read_magnitudes(came[begin], came[end - 1], header.shape.size(),
+                           [&](const MagnitudesRow& row) { sketcher.add(*own, row); });
+      begin = end;
+    }
+    sketcher.flush();
+    ViewSketches next = sketched()->sketches;
+    next.erase(gone);
+    next.insert(sketcher.sketches);
+    for (const ViewId view : gone) areas.erase(view);
+    sketcher.note_areas(areas);
+    publish(std::move(next));
+    return true;
+  }
+
+  static constexpr std::size_t max_areas = 200;
+
+  std::filesystem::path path;
+  MemoryHeader header;
+  mutable std::mutex mutex;  // of `current` and `idle`
+  std::shared_ptr<const Sketched> current;
+  mutable std::vector<std::unique_ptr<MemoryTables>> idle;
+  mutable std::atomic<int> running = 0;  // searches
+
+  std::mutex refreshing;  // of all below
+  std::unique_ptr<MemoryTables> own;
+  std::optional<MemoryChanges> changes;
+  AreasOfViews areas;
+  bool compare_all = false;
+};
+
+struct PlaceSearch::Snapshot::Implementation {
+  explicit Implementation(const PlaceSearch::Implementation& search_)
+      : search(&search_), sketched(search_.sketched()) {
+    if ((tables = search->borrow())) {
+      try {
+        reading = tables->transaction(MemoryTables::Kind::reading);
+        return;
+      } catch (const FileError&) {  // its server was away; it may be back
+        tables.reset();
+        search->drop_idle();
+      }
+    }
+    tables = search->connect();
+    reading = tables->transaction(MemoryTables::Kind::reading);
+  }
+  Implementation(const Implementation&) = delete;
+  Implementation& operator=(const Implementation&) = delete;
+  ~Implementation() {
+    reading.reset();
+    if (!failed) search->give_back(std::move(tables));
+  }
+
+  /// What `read` throws leaves the connection where it is.
+  template <class Read>
+  void guarded(const Read& read_some) {
+    try {
+      read_some();
+    } catch (...) {
+      failed = true;
+      throw;
+    }
+  }
+
+  void read(std::span<const ViewId> views) {
+    guarded([&] {
+      tables->read_views_there(views, [&](const ViewRow& row) {
+        const auto bytes = tables->checked(row, search->header.shape, scratch).signature;
+        const auto half = static_cast<std::ptrdiff_t>(search->header.shape.size());
+        kept.insert_or_assign(row.id, Kept{row.info,
+                                           {search->header.shape,
+                                            {bytes.begin(), bytes.begin() + half},
+                                            {bytes.begin() + half, bytes.end()}}});
+      });
+    });
+  }
+
+  struct Kept {
+    ReferenceInfo info;
+    PackedSignature signature;
+  };
+  const PlaceSearch::Implementation* search;
+  std::shared_ptr<const PlaceSearch::Implementation::Sketched> sketched;
+  std::unique_ptr<MemoryTables> tables;
+  std::unique_ptr<MemoryTables::Transaction> reading;
+  bool failed = false;
+  RecordBytes scratch;
+  std::unordered_map<ViewId, Kept> kept;
+};
+
+PlaceSearch::Snapshot::Snapshot(std::unique_ptr<Implementation> implementation)
+    : implementation_(std::move(implementation)) {}
+PlaceSearch::Snapshot::~Snapshot() = default;
+PlaceSearch::Snapshot::Snapshot(Snapshot&&) noexcept = default;
+PlaceSearch::Snapshot& PlaceSearch::Snapshot::operator=(Snapshot&&) noexcept = default;
+
+std::size_t PlaceSearch::Snapshot::size() const noexcept {
+  return implementation_->sketched->sketches.size();
+}
+
+SearchResult PlaceSearch::Snapshot::search(const PackedSignature& query,
+                                           const SearchOptions& options, const SearchMask& mask) {
+  Implementation& own = *implementation_;
+  // A search alone takes all cores; several at a time share them.
+  struct Running {
+    explicit Running(std::atomic<int>& all_) : all(all_), number(++all_) {}
+    ~Running() { --all; }
+    Running(const Running&) = delete;
+    Running& operator=(const Running&) = delete;
+    std::atomic<int>& all;
+    int number;
+  };
+  const Running running(own.search->running);
+  const auto cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  Executor executor(size() < 100000 ? 1 : std::clamp(cores / running.number, 1, 16));
+  return own.sketched->sketches.search(
+      query, options, mask,
+      [&own](std::span<const ViewId> views, const ViewSketches::TakeView& take) {
+        std::vector<ViewId> wanted;
+        for (const ViewId view : views) {
+          if (!own.kept.contains(view)) wanted.push_back(view);
+        }
+        if (!wanted.empty()) own.read(wanted);
+        for (const ViewId view : views) {
+          const auto found = own.kept.find(view);
+          if (found != own.kept.end()) take(view, found->second.signature.magnitudes);
+        }
+      },
+      executor);
+}
+
+VisualMemory PlaceSearch::Snapshot::load(std::span<const ViewId> views) {
+  Implementation& own = *implementation_;
+  std::vector<ViewId> ascending(views.begin(), views.end());
+  std::ranges::sort(ascending);
+  ascending.erase(std::unique(ascending.begin(), ascending.end()), ascending.end());
+  std::vector<ViewId> wanted;
+  for (const ViewId view : ascending) {
+    if (!own.kept.contains(view)) wanted.push_back(view);
+  }
+  if (!wanted.empty()) own.read(wanted);
+  const MemoryHeader& header = own.search->header;
+  VisualMemory memory(header.shape, header.full_scale, header.elevations);
+  for (const ViewId view : ascending) {
+    const auto found = own.kept.find(view);
+    if (found == own.kept.end()) continue;
+    try {
+      memory.append_as(view, found->second.signature, found->second.info);
+    } catch (const ContractError& error) {
+      own.tables->fail_damaged(error.what());
+    }
+  }
+  return memory;
+}
+
+std::optional<ViewId> PlaceSearch::Snapshot::find(std::string_view name) {
+  std::optional<ViewId> found;
+  implementation_->guarded([&] { found = implementation_->tables->find(name); });
+  return found;
+}
+
+std::vector<ViewId> PlaceSearch::Snapshot::views_within(std::span<const PositionBounds> bounds) {
+  Implementation& own = *implementation_;
+  std::vector<ViewId> views;
+  own.guarded([&] {
+    for (const PositionBounds& each : bounds) {
+      for (const PositionRow& row : own.tables->views_within(each)) views.push_back(row.id);
+    }
+  });
+  std::ranges::sort(views);
+  views.erase(std::unique(views.begin(), views.end()), views.end());
+  return views;
+}
+
+PlaceSearch::PlaceSearch(const std::filesystem::path& memory)
+    : implementation_(std::make_unique<Implementation>(memory)) {}
+PlaceSearch::~PlaceSearch() = default;
+PlaceSearch::PlaceSearch(PlaceSearch&&) noexcept = default;
+PlaceSearch& PlaceSearch::operator=(PlaceSearch&&) noexcept = default;
+
+const MemoryHeader& PlaceSearch::header() const noexcept {
+  return implementation_->header;
+}
+std::size_t PlaceSearch::size() const {
+  return implementation_->sketched()->sketches.size();
+}
+std::vector<ViewId> PlaceSearch::views() const {
+  return implementation_->sketched()->sketches.views();
+}
+std::uint64_t PlaceSearch::bytes() const {
+  return implementation_->sketched()->bytes;
+}
+
+PlaceSearch::Snapshot PlaceSearch::snapshot() const {
+  return Snapshot(std::make_unique<Snapshot::Implementation>(*implementation_));
+}
+
+SearchResult PlaceSearch::search(const PackedSignature& query, const SearchOptions& options,
+                                 const SearchMask& mask) const {
+  return snapshot().search(query, options, mask);
+}
+
+bool PlaceSearch::refresh() {
+  return implementation_->refresh();
+}
+
+}  // namespace panonav::fleet

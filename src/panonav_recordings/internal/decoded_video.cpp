@@ -1,0 +1,115 @@
+#include "panonav_recordings/internal/decoded_video.hpp"
+
+#include <poll.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+
+namespace panonav::recordings {
+
+std::unique_ptr<ChildProcess> start_ffmpeg(const std::vector<std::string>& arguments,
+                                           const std::string& about) {
+  try {
+    return std::make_unique<ChildProcess>(arguments);
+  } catch (const Error&) {
+    throw FileError(about, "videos need the program " + arguments.front() +
+                               ", which cannot be started; install the package ffmpeg");
+  }
+}
+
+DecodedVideo::DecodedVideo(const std::vector<std::string>& input, const std::string& chosen,
+                           std::string about, const ImageLimits& limits)
+    : about_(std::move(about)), limits_(limits) {
+  std::vector<std::string> arguments{"ffmpeg",   "-nostdin",  "-hide_banner",
+                                     "-nostats", "-loglevel", "level+info"};
+  arguments.insert(arguments.end(), input.begin(), input.end());
+  // showinfo tells stamp and size of a picture on standard error before its bytes come.
+  const std::string filter = (chosen.empty() ? "" : "select='" + chosen + "',") +
+                             std::string("format=rgb24,showinfo=checksum=0");
+  for (const char* word : {"-map", "0:v:0", "-fps_mode", "passthrough", "-vf", filter.c_str(), "-f",
+                           "rawvideo", "pipe:1"}) {
+    arguments.emplace_back(word);
+  }
+  child_ = start_ffmpeg(arguments, about_);
+}
+
+void DecodedVideo::take_line(const std::string& line) {
+  if (line.starts_with("[Parsed_showinfo")) {
+    const auto at = line.find("] [info] n:");
+    if (at == std::string::npos) return;
+    long long stamp = 0;
+    double stamp_s = 0.0;
+    Head head{};
+    const char* const text = line.c_str() + at;
+    const auto size = line.find(" s:", at);
+    if (std::sscanf(text, "] [info] n:%*d pts:%lld pts_time:%lf", &stamp, &stamp_s) == 2 &&
+        size != std::string::npos &&
+        std::sscanf(line.c_str() + size, " s:%dx%d", &head.size.width, &head.size.height) == 2) {
+      head.stamp = stamp;
+      head.stamp_s = stamp_s;
+      heads_.push_back(head);
+    }
+    return;
+  }
+  for (const char* level : {"[error] ", "[fatal] "}) {
+    if (const auto at = line.find(level); at != std::string::npos) trouble_ = line.substr(at + 8);
+  }
+}
+
+bool DecodedVideo::read_messages() {
+  std::array<char, 4096> buffer;
+  const auto got = read(child_->errors(), buffer.data(), buffer.size());
+  if (got <= 0) {
+    messages_end_ = true;
+    return false;
+  }
+  constexpr std::size_t max_line = 4096;
+  for (ssize_t i = 0; i < got; ++i) {
+    const char c = buffer[static_cast<std::size_t>(i)];
+    if (c == '\n') {
+      take_line(line_);
+      line_.clear();
+    } else if (line_.size() < max_line) {
+      line_ += c;
+    }
+  }
+  return true;
+}
+
+std::optional<DecodedFrame> DecodedVideo::next() {
+  while (heads_.empty()) {
+    if (messages_end_ || !read_messages()) return std::nullopt;
+  }
+  const Head head = heads_.front();
+  heads_.pop_front();
+  const auto [width, height] = head.size;
+  if (width < 1 || height < 1 || width > limits_.side_px || height > limits_.side_px ||
+      std::int64_t{width} * height > limits_.area_px) {
+    throw FileError(about_, "its pictures are " + std::to_string(width) + " x " +
+                                std::to_string(height) + " px; allowed: up to " +
+                                std::to_string(limits_.area_px) + " px, sides up to " +
+                                std::to_string(limits_.side_px));
+  }
+  DecodedFrame frame{head.stamp, head.stamp_s, Image(width, height, 3)};
+  auto pixels = frame.picture.pixels();
+  std::size_t filled = 0;
+  while (filled < pixels.size()) {
+    // Messages are read on the way: a full pipe of them would stop the program.
+    std::array<pollfd, 2> pipes{pollfd{child_->output(), POLLIN, 0},
+                                pollfd{messages_end_ ? -1 : child_->errors(), POLLIN, 0}};
+    if (poll(pipes.data(), pipes.size(), -1) < 0) continue;
+    if (pipes[1].revents != 0) read_messages();
+    if (pipes[0].revents == 0) continue;
+    const auto got = read(child_->output(), pixels.data() + filled, pixels.size() - filled);
+    if (got <= 0) return std::nullopt;
+    filled += static_cast<std::size_t>(got);
+  }
+  return frame;
+}
+
+}  // namespace panonav::recordings

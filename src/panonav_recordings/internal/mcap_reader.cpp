@@ -1,0 +1,291 @@
+// MCAP, version 0 (https://mcap.dev/spec).
+#include <zlib.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "panonav_recordings/internal/mcap_records.hpp"
+#include "panonav_recordings/internal/recording_file.hpp"
+
+namespace panonav::recordings {
+
+namespace {
+
+constexpr std::size_t head_bytes = 9;
+constexpr std::size_t message_head_bytes = 22;
+constexpr std::size_t footer_bytes = head_bytes + 20 + 8;
+
+std::int64_t mcap_time(std::uint64_t time) {
+  constexpr auto last = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
+  return static_cast<std::int64_t>(std::min(time, last));
+}
+
+class McapFile : public ChunkedFile {
+ public:
+  McapFile(const std::filesystem::path& path, const RecordingLimits& limits)
+      : ChunkedFile(path, limits) {
+    const bool is_indexed = read_summary();
+    if (!is_indexed) {
+      blocks_.clear();
+      forget_topics();
+      channels_.clear();
+      schemas_.clear();
+      scan();
+    }
+  }
+
+ protected:
+  [[nodiscard]] ChunkHead chunk_head(const Block& block) const override {
+    constexpr std::uint64_t most = head_bytes + 8 + 8 + 8 + 4 + 4 + 32 + 8;
+    const Buffer bytes = bytes_at(block.at, std::min(most, size() - std::min(block.at, size())));
+    Fields fields(bytes.bytes());
+    const auto kind = fields.number<McapRecord>();
+    const auto length = fields.number<std::uint64_t>();
+    fields.bytes(16);  // times
+    ChunkHead head;
+    head.unpacked_bytes = fields.number<std::uint64_t>();
+    head.sum = fields.number<std::uint32_t>();
+    const std::string_view name = fields.text();
+    head.packed_bytes = fields.number<std::uint64_t>();
+    const std::uint64_t fixed = 8 + 8 + 8 + 4 + 4 + name.size() + 8;
+    if (kind != McapRecord::chunk || !fields.good() || length < fixed ||
+        head.packed_bytes != length - fixed) {
+      fail("the chunk at byte " + std::to_string(block.at) + " is damaged: its head is wrong");
+    }
+    const auto packing = packing_named(name);
+    if (!packing || *packing == Packing::bz2) {
+      fail("the chunk at byte " + std::to_string(block.at) + " is packed by '" + std::string(name) +
+           "'; allowed: none, lz4, zstd");
+    }
+    head.packing = *packing;
+    head.at = block.at + head_bytes + fixed;
+    return head;
+  }
+
+  bool list_index(const Block& block, std::vector<Entry>& entries) const override {
+    if (block.index_bytes > limits_.chunk_bytes) return false;
+    const Buffer bytes = bytes_at(block.index_at, block.index_bytes);
+    Fields fields(bytes.bytes());
+    while (fields.left() > 0) {
+      const auto kind = fields.number<McapRecord>();
+      Fields record(fields.bytes(fields.number<std::uint64_t>()));
+      const auto channel = channels_.find(record.number<std::uint16_t>());
+      Fields list(record.prefixed());
+      if (kind != McapRecord::message_index || !fields.good() || !record.good() ||
+          list.left() % 16 != 0 || (list.left() > 0 && channel == channels_.end())) {
+        return false;
+      }
+      while (list.left() > 0) {
+        const auto time = mcap_time(list.number<std::uint64_t>());
+        const auto offset = list.number<std::uint64_t>();
+        if (offset > std::numeric_limits<std::uint32_t>::max()) return false;
+        entries.push_back({time, channel->second, static_cast<std::uint32_t>(offset)});
+      }
+    }
+    return true;
+  }
+
+  [[nodiscard]] std::optional<RecordedMessage> message_at(std::span<const std::uint8_t> block,
+                                                          std::size_t offset) const override {
+    Fields fields(block.subspan(offset));
+    const auto kind = fields.number<McapRecord>();
+    const auto body = fields.bytes(fields.number<std::uint64_t>());
+    if (kind != McapRecord::message || body.size() < message_head_bytes) return std::nullopt;
+    return message_in(body);
+  }
+
+  void declare(std::span<const std::uint8_t> block) override {
+    Fields fields(block);
+    while (fields.left() > 0) {
+      const auto kind = fields.number<McapRecord>();
+      const auto body = fields.bytes(fields.number<std::uint64_t>());
+      if (fields.good()) declare(kind, body);
+    }
+  }
+
+  bool walk(std::span<const std::uint8_t> block, std::vector<Entry>& entries) const override {
+    Fields fields(block);
+    while (fields.left() > 0) {
+      const auto offset = static_cast<std::uint32_t>(block.size() - fields.left());
+      const auto kind = fields.number<McapRecord>();
+      const auto body = fields.bytes(fields.number<std::uint64_t>());
+      if (!fields.good()) return false;
+      if (kind != McapRecord::message) continue;
+      if (body.size() < message_head_bytes) return false;
+      if (const auto message = message_in(body)) {
+        entries.push_back({message->time_ns, message->topic, offset});
+      }
+    }
+    return true;
+  }
+
+ private:
+  // Empty where its channel is not known.
+  [[nodiscard]] std::optional<RecordedMessage> message_in(
+      std::span<const std::uint8_t> body) const {
+    Fields fields(body);
+    const auto number = fields.number<std::uint16_t>();
+    const auto channel = channels_.find(number);
+    if (channel == channels_.end()) {
+      warn("messages of channel " + std::to_string(number) +
+           " are left out: the channel is not described");
+      return std::nullopt;
+    }
+    fields.number<std::uint32_t>();  // sequence
+    RecordedMessage message;
+    message.time_ns = mcap_time(fields.number<std::uint64_t>());
+    message.topic = channel->second;
+    message.bytes = body.subspan(std::min(message_head_bytes, body.size()));
+    return message;
+  }
+
+  void declare(McapRecord kind, std::span<const std::uint8_t> body) {
+    Fields fields(body);
+    if (kind == McapRecord::schema) {
+      const auto number = fields.number<std::uint16_t>();
+      const auto name = fields.text();
+      if (fields.good()) schemas_.try_emplace(number, name);
+    } else if (kind == McapRecord::channel) {
+      const auto number = fields.number<std::uint16_t>();
+      const auto schema_number = fields.number<std::uint16_t>();
+      const auto schema = schemas_.find(schema_number);
+      const auto name = fields.text();
+      const auto encoding = fields.text();
+      if (!fields.good() || channels_.contains(number)) return;
+      if (schema_number != 0 && schema == schemas_.end()) lacks_schemas_ = true;
+      channels_.emplace(number,
+                        topic_of(name, schema == schemas_.end() ? "" : schema->second, encoding));
+    }
+  }
+
+  // Whether the summary stands for the whole file. What is wrong with it is warned of; a file may
+  // also have none, or one without all that is needed.
+  bool read_summary() {
+    if (size() < mcap_magic.size() + footer_bytes) return false;
+    const std::uint64_t footer_at = size() - footer_bytes;
+    const Buffer end = bytes_at(footer_at, footer_bytes);
+    Fields footer(end.bytes());
+    const auto kind = footer.number<McapRecord>();
+    const auto length = footer.number<std::uint64_t>();
+    const auto start = footer.number<std::uint64_t>();
+    footer.number<std::uint64_t>();  // of the offsets of groups
+    const auto sum = footer.number<std::uint32_t>();
+    if (kind != McapRecord::footer || length != 20 || !begins_with(footer.bytes(8), mcap_magic)) {
+      return false;  // the pass over the file says what it lacks
+    }
+    if (start == 0) return false;
+    const auto is_damaged = [&] {
+      warn("its summary is damaged; the whole file is read");
+      return false;
+    };
+    if (start < mcap_magic.size() || start > footer_at || footer_at - start > limits_.chunk_bytes) {
+      return is_damaged();
+    }
+    const Buffer bytes = bytes_at(start, footer_at - start + head_bytes + 16);
+    if (sum != 0 && ::crc32(0, bytes.data.get(), static_cast<uInt>(bytes.size)) != sum) {
+      return is_damaged();
+    }
+    Fields fields(bytes.bytes().first(static_cast<std::size_t>(footer_at - start)));
+    std::uint64_t indexed = 0;
+    std::optional<std::uint64_t> messages;
+    std::vector<std::pair<std::uint16_t, std::uint64_t>> counts;
+    bool is_complete = true;
+    while (fields.left() > 0) {
+      const auto record = fields.number<McapRecord>();
+      const auto body = fields.bytes(fields.number<std::uint64_t>());
+      if (!fields.good()) return is_damaged();
+      declare(record, body);
+      Fields content(body);
+      if (record == McapRecord::chunk_index) {
+        Block block;
+        const TimeSpan time{mcap_time(content.number<std::uint64_t>()),
+                            mcap_time(content.number<std::uint64_t>())};
+        block.at = content.number<std::uint64_t>();
+        const auto chunk_bytes = content.number<std::uint64_t>();
+        const auto lists = content.prefixed();
+        block.index_at = block.at + chunk_bytes;
+        block.index_bytes = content.number<std::uint64_t>();
+        if (!content.good() || block.at < mcap_magic.size() || block.at > start ||
+            chunk_bytes > start - block.at || block.index_bytes > start - block.index_at) {
+          return is_damaged();
+        }
+        // Each list of times and offsets has 15 bytes beside its pairs of 16.
+        const std::uint64_t beside = lists.size() / 10 * 15;
+        if (block.index_bytes < beside || (block.index_bytes - beside) % 16 != 0) {
+          is_complete = false;
+          continue;
+        }
+        block.messages = (block.index_bytes - beside) / 16;
+        indexed += block.messages;
+        if (block.messages > 0) block.time = time;
+        blocks_.push_back(std::move(block));
+      } else if (record == McapRecord::statistics) {
+        messages = content.number<std::uint64_t>();
+        content.bytes(2 + 4 + 4 + 4 + 4 + 8 + 8);
+        Fields list(content.prefixed());
+        while (list.left() > 0) {
+          const auto channel = list.number<std::uint16_t>();
+          counts.emplace_back(channel, list.number<std::uint64_t>());
+        }
+        if (!content.good() || !list.good()) return is_damaged();
+      }
+    }
+    if (!messages || indexed != *messages || !is_complete || lacks_schemas_) return false;
+    for (const auto& [channel, count] : counts) {
+      const auto topic = channels_.find(channel);
+      if (topic == channels_.end()) return false;
+      topics_[topic->second].messages += count;
+    }
+    std::uint64_t counted = 0;
+    for (const RecordedTopic& topic : topics_) counted += topic.messages;
+    if (counted != *messages) return false;
+    std::ranges::sort(blocks_, {}, &Block::at);
+    for (std::size_t i = 1; i < blocks_.size(); ++i) {
+      if (blocks_[i].at < blocks_[i - 1].index_at + blocks_[i - 1].index_bytes) {
+        return is_damaged();
+      }
+    }
+    return true;
+  }
+
+  void scan() {
+    std::uint64_t at = mcap_magic.size();
+    while (true) {
+      const auto head = peek(at, head_bytes + message_head_bytes);
+      Fields fields(head);
+      const auto kind = fields.number<McapRecord>();
+      const auto length = fields.number<std::uint64_t>();
+      if (!fields.good() || kind == McapRecord{}) break;
+      if (kind == McapRecord::data_end || kind == McapRecord::footer) return;
+      const bool is_cut = length > size() - at - head_bytes;
+      if (kind == McapRecord::chunk) {
+        add_chunk(at, is_cut);
+      } else if (is_cut) {
+        break;
+      } else if (kind == McapRecord::message && length >= message_head_bytes) {
+        if (const auto message = message_in(head.subspan(head_bytes))) {
+          add_loose(at, head_bytes + length, message->time_ns, message->topic);
+        }
+      } else if ((kind == McapRecord::schema || kind == McapRecord::channel) &&
+                 length <= limits_.chunk_bytes) {
+        declare(kind, bytes_at(at + head_bytes, length).bytes());
+      }
+      if (is_cut) break;
+      at += head_bytes + length;
+    }
+    warn_cut(at);
+  }
+
+  std::unordered_map<std::uint16_t, std::uint32_t> channels_;  // their topics
+  std::unordered_map<std::uint16_t, std::string> schemas_;     // their names
+  bool lacks_schemas_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<RecordingFile> open_mcap(const std::filesystem::path& path,
+                                         const RecordingLimits& limits) {
+  return std::make_unique<McapFile>(path, limits);
+}
+
+}  // namespace panonav::recordings

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "panonav/io/dataset.hpp"
+
+namespace panonav::recordings {
+
+/// Cuts a stream of JPEG pictures that follow each other ("MJPEG") into pictures. Their segments
+/// are walked over, so a thumbnail within a picture does not end it; bytes between pictures, such
+/// as the heads of a multipart stream, are left out. Memory: one picture, at most `max_bytes`.
+class JpegStream {
+ public:
+  /// Of one picture; longer ones are refused.
+  static constexpr std::size_t max_bytes = std::size_t{64} << 20;
+
+  /// Takes the next bytes of the stream. Throws FileError on `name` when one picture is longer than
+  /// `max_bytes`.
+  void add(std::span<const std::uint8_t> bytes, const std::string& name);
+  /// The next whole picture; empty until more bytes come.
+  [[nodiscard]] std::optional<std::vector<std::uint8_t>> next();
+  /// Bytes of a picture that has begun and not ended.
+  [[nodiscard]] std::size_t unfinished() const noexcept { return buffer_.size(); }
+
+ private:
+  std::vector<std::uint8_t> buffer_;  // from the beginning of a picture on
+  std::size_t walked_ = 0;            // into it; 0: the beginning is still looked for
+};
+
+/// All pictures of such a stream as a data set: it is read to its end into a temporary file, which
+/// goes with the data set, so memory does not grow. Names are "000001.jpg" and so on. Throws
+/// FileError on `name` when no picture comes, or the temporary folder (TMPDIR) is full.
+[[nodiscard]] Dataset read_jpeg_stream(int descriptor, const std::string& name,
+                                       PictureSource source);
+
+}  // namespace panonav::recordings

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace panonav::recordings {
+
+/// How chunks are packed.
+enum class McapCompression {
+  none,  ///< as they are
+  lz4,   ///< fast, larger
+  zstd   ///< slower, smaller
+};
+
+/// How an MCAP file is written.
+struct McapWriterOptions {
+  McapCompression compression = McapCompression::zstd;  ///< of each chunk
+  std::size_t chunk_bytes = 1U << 20U;  ///< a chunk ends with the message that reaches this
+  std::string profile = "ros2";         ///< of the file's header; empty: none
+};
+
+/// Writes an MCAP file (https://mcap.dev/spec, version 0) with everything that readers can use:
+/// chunks with checksums, indexes of messages and chunks, statistics.
+///
+/// The file has its name from the first byte on, and nothing in it is ever changed: what a killed
+/// writer leaves is read up to its last whole chunk, and `path` can be a pipe. An existing file is
+/// replaced. Everything throws FileError when the file cannot be written; what was written before
+/// stays readable, and nothing more can be written then. Not for several threads at a time.
+class McapWriter {
+ public:
+  /// Creates the file, or empties the one that is there, and writes its header.
+  explicit McapWriter(const std::filesystem::path& path, const McapWriterOptions& options = {});
+  ~McapWriter();  ///< Finishes the file as `close` does, but says nothing when that fails.
+  /// What is left of the other may only be destroyed or assigned to.
+  McapWriter(McapWriter&&) noexcept;
+  McapWriter& operator=(McapWriter&&) noexcept;
+
+  /// The format of messages: `name` as "sensor_msgs/msg/Imu", `encoding` as "ros2msg" of the
+  /// definition `data`. Returns its number, from 1 on. At most 65535.
+  std::uint16_t add_schema(std::string_view name, std::string_view encoding, std::string_view data);
+  /// A topic, whose messages are encoded as "cdr", say. `schema`: 0 for none. Returns its number,
+  /// from 0 on. At most 65535.
+  std::uint16_t add_channel(std::string_view topic, std::string_view message_encoding,
+                            std::uint16_t schema,
+                            const std::map<std::string, std::string>& metadata = {});
+  /// Appends a message to the chunk in memory, which is written when it is large enough. Times are
+  /// >= 0. Throws ContractError on a channel that is none. Cost: a copy of the bytes, and packing.
+  void write(std::uint16_t channel, std::int64_t log_time_ns, std::int64_t publish_time_ns,
+             std::span<const std::uint8_t> message);
+  /// A file within the file.
+  void attach(std::string_view name, std::string_view media_type, std::int64_t log_time_ns,
+              std::span<const std::uint8_t> data);
+  /// Names and values that stand in the file beside the messages.
+  void add_metadata(std::string_view name, const std::map<std::string, std::string>& metadata);
+  /// Writes the messages in memory as a chunk of their own, so that a reader finds them.
+  void flush();
+  /// The last chunk, summary and footer; all is on the disk when it returns. Nothing more can be
+  /// written then. Closing twice does nothing.
+  void close();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace panonav::recordings

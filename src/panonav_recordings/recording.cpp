@@ -1,0 +1,358 @@
+#include "panonav_recordings/recording.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <fstream>
+#include <limits>
+#include <map>
+#include <set>
+#include <tuple>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
+#include "panonav_recordings/internal/recording_file.hpp"
+#include "panonav_recordings/internal/rosbag2.hpp"
+
+namespace panonav::recordings {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+using Files = std::vector<std::unique_ptr<const RecordingFile>>;
+
+bool is_earlier(const MessagePlace& a, const MessagePlace& b) {
+  return std::tie(a.time_ns, a.file, a.block, a.offset) <
+         std::tie(b.time_ns, b.file, b.block, b.offset);
+}
+
+class FilesRecording : public Recording {
+ public:
+  FilesRecording(Files files, std::vector<std::string> warnings, const RecordingLimits& limits)
+      : files_(std::move(files)), warnings_(std::move(warnings)), limits_(limits) {
+    std::map<std::tuple<std::string, std::string, MessageEncoding>, std::uint32_t> numbers;
+    for (std::uint32_t file = 0; file < files_.size(); ++file) {
+      auto& topics = topics_of_files_.emplace_back();
+      for (const RecordedTopic& topic : files_[file]->topics()) {
+        const auto [found, is_new] = numbers.try_emplace(
+            {topic.name, topic.type, topic.encoding}, static_cast<std::uint32_t>(topics_.size()));
+        if (is_new) topics_.push_back(RecordedTopic{topic.name, topic.type, topic.encoding, 0});
+        topics_[found->second].messages += topic.messages;
+        topics.push_back(found->second);
+      }
+      const auto times = files_[file]->blocks();
+      for (std::uint64_t block = 0; block < times.size(); ++block) {
+        if (times[block]) blocks_.push_back({*times[block], file, block});
+      }
+    }
+    std::ranges::stable_sort(blocks_, {}, [](const Block& block) { return block.time.begin_ns; });
+    for (const Block& block : blocks_) {
+      if (!time_) time_ = block.time;
+      time_->begin_ns = std::min(time_->begin_ns, block.time.begin_ns);
+      time_->end_ns = std::max(time_->end_ns, block.time.end_ns);
+    }
+  }
+
+  [[nodiscard]] const std::vector<RecordedTopic>& topics() const noexcept override {
+    return topics_;
+  }
+  [[nodiscard]] std::optional<TimeSpan> time() const noexcept override { return time_; }
+
+  [[nodiscard]] std::vector<std::string> warnings() const override {
+    auto lines = warnings_;
+    for (const auto& file : files_) {
+      const auto more = file->warnings();
+      lines.insert(lines.end(), more.begin(), more.end());
+    }
+    return lines;
+  }
+
+  [[nodiscard]] std::vector<MessagePlace> places(std::span<const std::uint32_t> topics,
+                                                 std::optional<TimeSpan> within) const override {
+    const Wanted wanted = wanted_of(topics, within);
+    std::vector<MessagePlace> places;
+    for (const Block& block : blocks_) list(block, wanted, places);
+    std::ranges::sort(places, is_earlier);
+    return places;
+  }
+
+  [[nodiscard]] std::vector<std::uint8_t> read(const MessagePlace& place) const override {
+    const RecordedMessage message = message_at(place);
+    return {message.bytes.begin(), message.bytes.end()};
+  }
+
+  void for_each(std::span<const std::uint32_t> topics, std::optional<TimeSpan> within,
+                const std::function<void(const MessagePlace&, std::span<const std::uint8_t>)>& use)
+      const override {
+    const Wanted wanted = wanted_of(topics, within);
+    // The messages of a block that are still to come. Blocks are opened as time reaches them.
+    struct Open {
+      std::vector<MessagePlace> places;
+      std::size_t next = 0;
+    };
+    const auto is_later = [](const Open& a, const Open& b) {
+      return is_earlier(b.places[b.next], a.places[a.next]);
+    };
+    std::vector<Open> open;
+    std::size_t listed = 0;
+    std::size_t next = 0;
+    std::set<std::pair<std::uint32_t, std::uint64_t>> damaged;
+    while (true) {
+      while (next < blocks_.size() &&
+             (open.empty() ||
+              blocks_[next].time.begin_ns <= open.front().places[open.front().next].time_ns)) {
+        Open block;
+        list(blocks_[next++], wanted, block.places, listed);
+        if (block.places.empty()) continue;
+        listed += block.places.size();
+        std::ranges::sort(block.places, is_earlier);
+        open.push_back(std::move(block));
+        std::ranges::push_heap(open, is_later);
+      }
+      if (open.empty()) return;
+      std::ranges::pop_heap(open, is_later);
+      Open& first = open.back();
+      const MessagePlace place = first.places[first.next++];
+      if (first.next == first.places.size()) {
+        listed -= first.places.size();
+        open.pop_back();
+      } else {
+        std::ranges::push_heap(open, is_later);
+      }
+      if (damaged.contains({place.file, place.block})) continue;
+      std::optional<RecordedMessage> message;
+      try {
+        message = message_at(place);
+      } catch (const FileError& error) {
+        files_[place.file]->warn(error);
+        damaged.emplace(place.file, place.block);
+        continue;
+      }
+      use(place, message->bytes);
+    }
+  }
+
+ private:
+  struct Block {
+    TimeSpan time;
+    std::uint32_t file;
+    std::uint64_t block;
+  };
+  struct Wanted {
+    std::vector<std::vector<bool>> topics;  ///< of each file
+    TimeSpan within;
+  };
+
+  [[nodiscard]] Wanted wanted_of(std::span<const std::uint32_t> topics,
+                                 std::optional<TimeSpan> within) const {
+    constexpr TimeSpan always{std::numeric_limits<std::int64_t>::min(),
+                              std::numeric_limits<std::int64_t>::max()};
+    std::vector<bool> chosen(topics_.size());
+    for (const std::uint32_t topic : topics) {
+      require(topic < topics_.size(), "topic", topic,
+              "less than " + std::to_string(topics_.size()));
+      chosen[topic] = true;
+    }
+    Wanted wanted{{}, within.value_or(always)};
+    for (const auto& of_file : topics_of_files_) {
+      auto& flags = wanted.topics.emplace_back();
+      for (const std::uint32_t topic : of_file) flags.push_back(chosen[topic]);
+    }
+    return wanted;
+  }
+
+  // Appends; `listed`: beside what is in `places`.
+  void list(const Block& block, const Wanted& wanted, std::vector<MessagePlace>& places,
+            std::size_t listed = 0) const {
+    if (block.time.begin_ns > wanted.within.end_ns || block.time.end_ns < wanted.within.begin_ns) {
+      return;
+    }
+    const std::size_t before = places.size();
+    try {
+      files_[block.file]->list(block.block, wanted.topics[block.file], wanted.within,
+                               limits_.messages - std::min(listed, limits_.messages), places);
+    } catch (const FileError& error) {
+      if (places.size() + listed > limits_.messages) throw;
+      files_[block.file]->warn(error);
+    }
+    for (std::size_t i = before; i < places.size(); ++i) {
+      places[i].topic = topics_of_files_[block.file][places[i].topic];
+      places[i].file = block.file;
+    }
+  }
+
+  [[nodiscard]] RecordedMessage message_at(const MessagePlace& place) const {
+    require(place.file < files_.size(), "file of a message", place.file,
+            "less than " + std::to_string(files_.size()));
+    const RecordingFile& file = *files_[place.file];
+    RecordedMessage message = file.read(place);
+    if (message.time_ns != place.time_ns ||
+        topics_of_files_[place.file][message.topic] != place.topic) {
+      throw FileError(file.path().string(),
+                      "is damaged: an index names another message than the "
+                      "one that is there");
+    }
+    // rosbag2 can pack each message. CDR begins with a zero.
+    constexpr std::array<std::uint8_t, 4> zstd_magic{0x28, 0xB5, 0x2F, 0xFD};
+    if (topics_[place.topic].encoding == MessageEncoding::cdr && message.bytes.size() >= 4 &&
+        std::ranges::equal(message.bytes.first(4), zstd_magic)) {
+      auto unpacked = unpack_frame(message.bytes, limits_.chunk_bytes);
+      if (!unpacked.whole) {
+        throw FileError(file.path().string(), "a packed message cannot be unpacked, or not to " +
+                                                  std::to_string(limits_.chunk_bytes) + " bytes");
+      }
+      message.owner = std::make_shared<const Buffer>(std::move(unpacked.content));
+      message.bytes = message.owner->bytes();
+    }
+    return message;
+  }
+
+  Files files_;
+  std::vector<std::string> warnings_;
+  RecordingLimits limits_;
+  std::vector<std::vector<std::uint32_t>> topics_of_files_;
+  std::vector<RecordedTopic> topics_;
+  std::vector<Block> blocks_;  // in the order in which they begin
+  std::optional<TimeSpan> time_;
+};
+
+enum class FileKind { other, mcap, bag, old_bag, database, packed };
+
+FileKind kind_of(const fs::path& path) {
+  std::array<char, 100> first{};
+  std::error_code code;
+  if (!fs::is_regular_file(path, code)) return FileKind::other;
+  std::ifstream(path, std::ios::binary).read(first.data(), first.size());
+  const std::string_view text(first.data(), first.size());
+  if (text.starts_with(mcap_magic)) return FileKind::mcap;
+  if (text.starts_with(bag_magic)) return FileKind::bag;
+  if (text.starts_with("#ROSBAG V") || text.starts_with("#ROSRECORD V")) return FileKind::old_bag;
+  if (text.starts_with("\x28\xB5\x2F\xFD") && path.extension() == ".zstd") return FileKind::packed;
+  // Databases of other programs, such as memory files, carry the mark of their program.
+  constexpr std::size_t mark_at = 68;
+  if (text.starts_with(std::string_view("SQLite format 3\0", 16)) &&
+      text.substr(mark_at, 4) == std::string_view("\0\0\0\0", 4)) {
+    return FileKind::database;
+  }
+  return FileKind::other;
+}
+
+std::unique_ptr<RecordingFile> open_file(const fs::path& path, const RecordingLimits& limits);
+
+/// A new empty file in the folder for temporary ones.
+class UnnamedFile {
+ public:
+  explicit UnnamedFile(const std::string& wanted_for) {
+    std::error_code error;
+    std::string name = (fs::temp_directory_path(error) / "panonav_XXXXXX").string();
+    const int descriptor = error ? -1 : mkstemp(name.data());
+    if (descriptor < 0) throw FileError(wanted_for, "cannot be unpacked: no temporary file");
+    close(descriptor);
+    path_ = name;
+  }
+  ~UnnamedFile() {
+    std::error_code ignored;
+    fs::remove(path_, ignored);
+  }
+  UnnamedFile(const UnnamedFile&) = delete;
+  UnnamedFile& operator=(const UnnamedFile&) = delete;
+  [[nodiscard]] const fs::path& path() const noexcept { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+/// What is open stays there when its name is gone, until it is closed.
+std::unique_ptr<RecordingFile> open_packed(const fs::path& path, const RecordingLimits& limits) {
+  const UnnamedFile copy(path.string());
+  std::error_code unknown;
+  const auto space = fs::space(copy.path().parent_path(), unknown);
+  const std::uint64_t most =
+      unknown ? limits.file_bytes : std::min<std::uint64_t>(limits.file_bytes, space.available / 2);
+  const UnpackedFile unpacked = unpack_file(path, copy.path(), most);
+  if (unpacked.too_long) {
+    throw FileError(path.string(), "unpacks to more than " + std::to_string(most) +
+                                       " bytes, as many as are allowed and half of what is free "
+                                       "in the folder for temporary files (TMPDIR)");
+  }
+  std::unique_ptr<RecordingFile> file;
+  try {
+    file = open_file(copy.path(), limits);
+  } catch (const FileError& error) {
+    const std::string what = error.what();
+    const std::string of_copy = copy.path().string() + ": ";
+    throw FileError(path.string(), what.starts_with(of_copy) ? what.substr(of_copy.size()) : what);
+  }
+  file->call(path);
+  if (!unpacked.whole) {
+    file->warn("is damaged or cut off: " + std::to_string(unpacked.bytes) + " bytes are unpacked");
+  }
+  return file;
+}
+
+std::unique_ptr<RecordingFile> open_file(const fs::path& path, const RecordingLimits& limits) {
+  switch (kind_of(path)) {
+    case FileKind::mcap:
+      return open_mcap(path, limits);
+    case FileKind::bag:
+      return open_ros1_bag(path, limits);
+    case FileKind::old_bag:
+      throw FileError(path.string(), "is a bag of an old version; allowed: 2.0 (rosbag migrate)");
+    case FileKind::database:
+      return open_rosbag2_database(path, limits);
+    case FileKind::packed:
+      return open_packed(path, limits);
+    case FileKind::other:
+      break;
+  }
+  std::error_code code;
+  if (!fs::exists(path, code)) throw FileError(path.string(), "is missing");
+  throw FileError(path.string(),
+                  "is no recording; allowed: MCAP files, ROS 1 bags, .db3 files of rosbag2 and "
+                  "folders of rosbag2 with metadata.yaml");
+}
+
+bool is_rosbag2_folder(const fs::path& path) {
+  std::array<char, 4096> first{};
+  std::error_code code;
+  if (!fs::is_regular_file(path / "metadata.yaml", code)) return false;
+  std::ifstream(path / "metadata.yaml", std::ios::binary).read(first.data(), first.size());
+  return std::string_view(first.data(), first.size()).find("rosbag2_bagfile_information") !=
+         std::string_view::npos;
+}
+
+}  // namespace
+
+std::unique_ptr<const Recording> Recording::open(const fs::path& path,
+                                                 const RecordingLimits& limits) {
+  Files files;
+  std::vector<std::string> warnings;
+  if (!is_rosbag2_folder(path)) {
+    files.push_back(open_file(path, limits));
+  } else {
+    // The other files of a recording are there where one is not.
+    for (const fs::path& file : read_rosbag2_folder(path)) {
+      try {
+        files.push_back(open_file(file, limits));
+      } catch (const FileError& error) {
+        warnings.emplace_back(error.what());
+      }
+    }
+    if (files.empty())
+      throw FileError(path.string(), "has no file that can be read: " + warnings[0]);
+  }
+  return std::make_unique<const FilesRecording>(std::move(files), std::move(warnings), limits);
+}
+
+bool is_recording(const fs::path& path) noexcept {
+  try {
+    return kind_of(path) != FileKind::other || is_rosbag2_folder(path);
+  } catch (...) {
+    return false;
+  }
+}
+
+}  // namespace panonav::recordings

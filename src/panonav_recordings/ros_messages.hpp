@@ -1,0 +1,285 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "panonav/core/image.hpp"
+#include "panonav/geometry/pose2.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav/panorama/tilt.hpp"
+#include "panonav_recordings/recording.hpp"
+
+/// The messages of ROS that panonav reads and writes, as plain values. Members are named and
+/// ordered as in the .msg files, `type` is the type's name; a stamp is one number, `seq` of ROS 1
+/// is left out. Bulk data (pictures, clouds) belongs to somebody else: of a message that was read,
+/// to its bytes.
+namespace panonav::recordings::ros {
+
+/// The type std_msgs/Header: when, and in which frame.
+struct Header {
+  std::int64_t stamp_ns = 0;  ///< since 1970, or since the start of a simulation
+  std::string frame_id;       ///< name of the frame that coordinates are in
+};
+
+/// The types geometry_msgs/Vector3 and geometry_msgs/Point: x forward, y left, z up in frames of
+/// robots.
+struct Vector3 {
+  double x = 0.0;  ///< in the unit of the message's member
+  double y = 0.0;  ///< in the same unit
+  double z = 0.0;  ///< in the same unit
+};
+
+/// The type geometry_msgs/Quaternion: a rotation, of unit length.
+struct Quaternion {
+  double x = 0.0;  ///< x of the axis, times the sine of half the angle
+  double y = 0.0;  ///< the same along y
+  double z = 0.0;  ///< the same along z
+  double w = 1.0;  ///< cosine of half the angle
+};
+
+/// The types geometry_msgs/Pose and geometry_msgs/Transform.
+struct Pose {
+  Vector3 position;        ///< metres
+  Quaternion orientation;  ///< of unit length
+};
+
+/// How far the length of a quaternion that is read may be from 1; as tf2's.
+inline constexpr double quaternion_tolerance = 0.1;
+
+/// A pose, or a transform parent_from_child: q_parent = position + orientation * q_child.
+[[nodiscard]] Pose operator*(const Pose& a_from_b, const Pose& b_from_c);
+/// The pose of a in the frame of b. The orientation must be of unit length.
+[[nodiscard]] Pose inverse(const Pose& a_from_b);
+/// On the line between the positions and on the great circle between the orientations; `share` 0
+/// gives the bits of `a`, 1 those of `b`; beyond them the motion goes on.
+[[nodiscard]] Pose between(const Pose& a, const Pose& b, double share);
+/// Heading about the vertical, then roll and pitch as in `Tilt`: R_z(heading) R_y R_x.
+[[nodiscard]] Pose pose_of(const Pose2& pose, const Tilt& tilt = {});
+/// The pose seen from above: x, y and the turn about the vertical.
+[[nodiscard]] Pose2 planar(const Pose& pose);
+/// Roll and pitch, in radians, of any quaternion but zero.
+[[nodiscard]] Tilt tilt_of(const Quaternion& orientation);
+
+using Covariance3 = std::array<double, 9>;   ///< row-major; [0] = -1: there is no such measurement
+using Covariance6 = std::array<double, 36>;  ///< row-major, x y z and turns about x, y, z
+
+/// A picture as pixels.
+struct Image {
+  static constexpr std::string_view type = "sensor_msgs/Image";  ///< ROS 1's name of the type
+  Header header;                  ///< when it was taken; frame of the camera
+  std::uint32_t height = 0;       ///< rows
+  std::uint32_t width = 0;        ///< columns
+  std::string encoding;           ///< of the pixels, see `picture_of`
+  std::uint8_t is_bigendian = 0;  ///< 1: numbers of several bytes begin with the most significant
+  std::uint32_t step = 0;         ///< bytes from one row to the next
+  std::span<const std::uint8_t> data;  ///< height x step bytes, rows from the top
+};
+
+/// A picture as a file.
+struct CompressedImage {
+  /// ROS 1's name of the type.
+  static constexpr std::string_view type = "sensor_msgs/CompressedImage";
+  Header header;                       ///< when it was taken; frame of the camera
+  std::string format;                  ///< "jpeg", "png", "rgb8; jpeg compressed bgr8"
+  std::span<const std::uint8_t> data;  ///< the bytes of the file
+};
+
+/// What an inertial sensor measures.
+struct Imu {
+  static constexpr std::string_view type = "sensor_msgs/Imu";  ///< ROS 1's name of the type
+  Header header;                                 ///< when it was measured; frame of the sensor
+  Quaternion orientation;                        ///< of the sensor in a level frame
+  Covariance3 orientation_covariance{};          ///< of turns about x, y, z, rad^2
+  Vector3 angular_velocity;                      ///< rad/s
+  Covariance3 angular_velocity_covariance{};     ///< rad^2/s^2
+  Vector3 linear_acceleration;                   ///< m/s^2
+  Covariance3 linear_acceleration_covariance{};  ///< m^2/s^4
+};
+
+/// A pose and how certain it is.
+struct PoseWithCovariance {
+  Pose pose;                 ///< in the frame of the message
+  Covariance6 covariance{};  ///< m^2, m rad and rad^2
+};
+
+/// Where wheels, or another estimate without a map, have the robot.
+struct Odometry {
+  static constexpr std::string_view type = "nav_msgs/Odometry";  ///< ROS 1's name of the type
+  Header header;                                                 ///< frame_id: of the odometry
+  std::string child_frame_id;                                    ///< of the robot
+  PoseWithCovariance pose;         ///< child_frame_id in the frame of the odometry
+  Vector3 linear_velocity;         ///< m/s, in the child frame
+  Vector3 angular_velocity;        ///< rad/s
+  Covariance6 twist_covariance{};  ///< of both velocities, linear first
+};
+
+/// How one frame lies in another at a time.
+struct TransformStamped {
+  Header header;               ///< frame_id: the parent
+  std::string child_frame_id;  ///< of the child
+  Pose transform;              ///< parent_from_child
+};
+
+/// tf2_msgs/TFMessage, and tf/tfMessage of ROS 1.
+struct TFMessage {
+  static constexpr std::string_view type = "tf2_msgs/TFMessage";  ///< ROS 1's name of the type
+  std::vector<TransformStamped> transforms;                       ///< one or several, of any frames
+};
+
+/// A point at a time.
+struct PointStamped {
+  /// ROS 1's name of the type.
+  static constexpr std::string_view type = "geometry_msgs/PointStamped";
+  Header header;  ///< when, and the frame of the point
+  Vector3 point;  ///< metres
+};
+
+/// A pose at a time.
+struct PoseStamped {
+  /// ROS 1's name of the type.
+  static constexpr std::string_view type = "geometry_msgs/PoseStamped";
+  Header header;  ///< when, and the frame of the pose
+  Pose pose;      ///< in the frame of the header
+};
+
+/// A pose at a time and how certain it is.
+struct PoseWithCovarianceStamped {
+  /// ROS 1's name of the type.
+  static constexpr std::string_view type = "geometry_msgs/PoseWithCovarianceStamped";
+  Header header;            ///< when, and the frame of the pose
+  PoseWithCovariance pose;  ///< in the frame of the header
+};
+
+/// Several poses at a time, such as particles.
+struct PoseArray {
+  /// ROS 1's name of the type.
+  static constexpr std::string_view type = "geometry_msgs/PoseArray";
+  Header header;            ///< when, and the frame of the poses
+  std::vector<Pose> poses;  ///< in the frame of the header
+};
+
+/// Poses one after the other, such as a plan.
+struct Path {
+  static constexpr std::string_view type = "nav_msgs/Path";  ///< ROS 1's name of the type
+  Header header;                   ///< when it was made, and the frame of the poses
+  std::vector<PoseStamped> poses;  ///< in the order in which they are passed
+};
+
+/// One value of each point of a cloud.
+struct PointField {
+  std::string name;           ///< "x", "y", "z", or what the value means
+  std::uint32_t offset = 0;   ///< bytes from the beginning of a point
+  std::uint8_t datatype = 7;  ///< 2 UINT8, 6 UINT32, 7 FLOAT32, 8 FLOAT64
+  std::uint32_t count = 1;    ///< numbers of that type one after the other
+};
+
+/// Points with values, packed.
+struct PointCloud2 {
+  /// ROS 1's name of the type.
+  static constexpr std::string_view type = "sensor_msgs/PointCloud2";
+  Header header;                       ///< when, and the frame of the points
+  std::uint32_t height = 1;            ///< 1: the points have no order
+  std::uint32_t width = 0;             ///< points in a row
+  std::vector<PointField> fields;      ///< what a point consists of
+  std::uint8_t is_bigendian = 0;       ///< 1: numbers begin with the most significant byte
+  std::uint32_t point_step = 0;        ///< bytes of a point
+  std::uint32_t row_step = 0;          ///< bytes of a row: width x point_step
+  std::span<const std::uint8_t> data;  ///< height x row_step bytes
+  std::uint8_t is_dense = 1;           ///< 1: no value is NaN
+};
+
+/// A map of cells of floor.
+struct OccupancyGrid {
+  /// ROS 1's name of the type.
+  static constexpr std::string_view type = "nav_msgs/OccupancyGrid";
+  Header header;  ///< when, and the frame of `origin`
+  /// Nanoseconds since 1970, or since the start of a simulation.
+  std::int64_t map_load_time_ns = 0;
+  float resolution = 0.0F;         ///< m
+  std::uint32_t width = 0;         ///< cells along x
+  std::uint32_t height = 0;        ///< cells along y
+  Pose origin;                     ///< of the corner of cell (0, 0)
+  std::vector<std::int8_t> cells;  ///< row-major; 0 .. 100, -1 unknown
+};
+
+/// A name and what is said of it.
+struct KeyValue {
+  std::string key;    ///< unique within a status
+  std::string value;  ///< as text
+};
+
+/// How one part of a robot fares.
+struct DiagnosticStatus {
+  std::uint8_t level = 0;        ///< 0 fine, 1 warning, 2 error, 3 stale
+  std::string name;              ///< of the part
+  std::string message;           ///< one line for people
+  std::string hardware_id;       ///< of the device; may be empty
+  std::vector<KeyValue> values;  ///< figures behind the message
+};
+
+/// How the parts of a robot fare.
+struct DiagnosticArray {
+  /// ROS 1's name of the type.
+  static constexpr std::string_view type = "diagnostic_msgs/DiagnosticArray";
+  Header header;                         ///< when; its frame means nothing
+  std::vector<DiagnosticStatus> status;  ///< one for each part
+};
+
+/// A velocity in space.
+struct Twist {
+  static constexpr std::string_view type = "geometry_msgs/Twist";  ///< ROS 1's name of the type
+  Vector3 linear;                                                  ///< m/s, in the robot's frame
+  Vector3 angular;                                                 ///< rad/s
+};
+
+/// The time of a simulation or a replay.
+struct Clock {
+  static constexpr std::string_view type = "rosgraph_msgs/Clock";  ///< ROS 1's name of the type
+  std::int64_t clock_ns = 0;                                       ///< nanoseconds since its start
+};
+
+/// A text as a message.
+struct String {
+  static constexpr std::string_view type = "std_msgs/String";  ///< ROS 1's name of the type
+  std::string data;                                            ///< UTF-8
+};
+
+/// What ROS 2 calls the `type` of a message: "sensor_msgs/msg/Image".
+[[nodiscard]] std::string ros2_type_name(std::string_view type);
+
+/// The message that the bytes are, in ROS 1's serialisation or as CDR of either byte order (XCDR1,
+/// as ROS 2 writes it). Memory: at most some 20 times the bytes, whatever they say. Throws
+/// ContractError, one line, on bytes that end too early or too late, on stamps out of range and on
+/// poses (of Odometry, transforms, points and poses) that are not finite or whose quaternion is
+/// not near unit length.
+template <class Message>
+[[nodiscard]] Message read_message(std::span<const std::uint8_t> bytes, MessageEncoding encoding);
+
+/// Little endian. Throws ContractError on a stamp that the encoding cannot hold (ROS 2: beyond
+/// 2038).
+template <class Message>
+[[nodiscard]] std::vector<std::uint8_t> write_message(
+    const Message& message, MessageEncoding encoding = MessageEncoding::cdr);
+
+/// What MCAP wants as "ros2msg" of a type above: its definition, then those of all types that it
+/// is made of. Throws ContractError on another type.
+[[nodiscard]] std::string ros2_schema(std::string_view type);
+
+/// The pixels as `read_image` gives them: one channel for grey, three for colour.
+/// - mono8, 8UC1: as they are. mono16: scaled from 0 .. 65535 as a PNG of 16 bits is.
+/// - rgb8, bgr8, rgba8, bgra8, 8UC3 and 8UC4 (OpenCV's order: blue first): alpha is dropped.
+/// - bayer_rggb8, bayer_bggr8, bayer_gbrg8, bayer_grbg8: bilinear interpolation.
+/// - yuv422 or uyvy, yuv422_yuy2 or yuyv: ITU-R BT.601, luma 16 .. 235, as OpenCV takes them.
+/// Throws ContractError on other encodings, sizes beyond the limits, a step shorter than a row and
+/// data of another length than height x step.
+[[nodiscard]] panonav::Image picture_of(const Image& message, const ImageLimits& limits = {});
+/// JPEG or PNG, told apart by content. `name` stands in errors. Throws ContractError on another
+/// format (compressedDepth, h264), FileError on bytes that cannot be decoded.
+[[nodiscard]] panonav::Image picture_of(const CompressedImage& message, std::string_view name,
+                                        const ImageLimits& limits = {});
+
+}  // namespace panonav::recordings::ros

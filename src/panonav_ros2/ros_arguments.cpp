@@ -1,0 +1,188 @@
+#include "panonav_ros2/ros_arguments.hpp"
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <string_view>
+#include <utility>
+
+#include <yaml-cpp/yaml.h>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
+#include "panonav/io/atomic_file.hpp"
+
+namespace panonav::ros2 {
+
+namespace {
+
+using Parameters = std::vector<RosArguments::Parameter>;
+
+constexpr std::size_t max_file_bytes = 1'000'000;
+constexpr int max_depth = 16;
+constexpr int max_nodes = 10'000;
+
+std::pair<std::string, std::string> sides_of(const std::string& text, const std::string& what,
+                                             const std::string& allowed) {
+  const std::size_t at = text.find(":=");
+  if (at == 0 || at == std::string::npos || at + 2 == text.size()) {
+    throw ContractError(what, "'" + readable_line(shortened(text, 80)) + "'", allowed);
+  }
+  return {text.substr(0, at), text.substr(at + 2)};
+}
+
+void set(Parameters& parameters, RosArguments::Parameter parameter) {
+  const auto found = std::ranges::find(parameters, parameter.name, &RosArguments::Parameter::name);
+  if (found == parameters.end()) {
+    parameters.push_back(std::move(parameter));
+  } else {
+    *found = std::move(parameter);
+  }
+}
+
+/// YAML has more forms of true and false than the options have.
+std::string text_of(const YAML::Node& node, const std::string& name, const std::string& where) {
+  if (!node.IsScalar()) throw FileError(where, name + " has a value that is no text or number");
+  const auto text = node.as<std::string>();
+  if (text == "True" || text == "TRUE") return "true";
+  return text == "False" || text == "FALSE" ? "false" : text;
+}
+
+/// Throws YAML's exceptions on what is no parameter. `nodes_left` bounds what aliases of aliases
+/// multiply.
+void flatten(const YAML::Node& node, const std::string& name, const std::string& where, int depth,
+             int& nodes_left, Parameters& parameters) {
+  if (depth > max_depth) throw FileError(where, name + " is nested too deeply");
+  if (--nodes_left < 0) throw FileError(where, "has more than 10,000 parameters");
+  if (node.IsMap()) {
+    for (const auto& entry : node) {
+      const auto inner = entry.first.as<std::string>();
+      flatten(entry.second, name.empty() ? inner : name + "." + inner, where, depth + 1, nodes_left,
+              parameters);
+    }
+    return;
+  }
+  RosArguments::Parameter parameter{name, {}, where};
+  if (node.IsSequence()) {
+    for (const auto& each : node) parameter.values.push_back(text_of(each, name, where));
+  } else {
+    parameter.values.push_back(text_of(node, name, where));
+  }
+  set(parameters, std::move(parameter));
+}
+
+/// A file may hold parameters of many nodes. Keys are names of nodes, with or without a namespace,
+/// "/**" all nodes, "/**/name" those of a name.
+void read_parameter_file(const std::string& path, const std::string& node,
+                         const std::string& name_space, Parameters& parameters) {
+  const auto bytes = read_file(path, max_file_bytes);
+  const std::string inside = name_space == "/" ? "" : name_space;
+  try {
+    const YAML::Node root = YAML::Load(std::string(bytes.begin(), bytes.end()));
+    if (!root.IsMap()) throw FileError(path, "holds no map of nodes' names");
+    const auto take = [&](const YAML::Node& of_node) {
+      if (!of_node.IsMap() || !of_node["ros__parameters"] || !of_node["ros__parameters"].IsMap()) {
+        throw FileError(path,
+                        "has a node without a map ros__parameters; allowed: NODE: "
+                        "{ros__parameters: {NAME: VALUE}}");
+      }
+      int nodes_left = max_nodes;
+      flatten(of_node["ros__parameters"], "", path, 0, nodes_left, parameters);
+    };
+    const std::array<std::string, 4> from_wide_to_narrow{"/**", "/**/" + node, node,
+                                                         inside + "/" + node};
+    for (const std::string& key : from_wide_to_narrow) {
+      if (key == node && !inside.empty()) continue;  // of the node in the root namespace
+      if (root[key]) take(root[key]);
+    }
+    // NAMESPACE: {NODE: {ros__parameters: ...}}
+    if (!inside.empty() && root[inside] && root[inside].IsMap() && root[inside][node]) {
+      take(root[inside][node]);
+    }
+  } catch (const YAML::Exception& error) {
+    throw FileError(path, "is no parameter file: " + readable_line(error.what()));
+  }
+}
+
+}  // namespace
+
+std::pair<std::string, std::string> remapping_of(const std::string& text) {
+  return sides_of(text, "remapping", "FROM:=TO, as image:=/camera/image");
+}
+
+RosArguments read_ros_arguments(std::span<const std::string> words, const std::string& node,
+                                const std::string& name_space) {
+  RosArguments read;
+  std::vector<std::pair<std::string, std::string>> given;  // parameters and files, in order
+  bool of_ros = false;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    const std::string& word = words[i];
+    if (!of_ros || word == "--") {
+      if (word == "--ros-args") {
+        of_ros = true;
+      } else if (of_ros) {
+        of_ros = false;
+      } else {
+        read.words.push_back(word);
+      }
+      continue;
+    }
+    const auto is = [&](std::initializer_list<std::string_view> forms) {
+      return std::ranges::find(forms, word) != forms.end();
+    };
+    if (word == "--ros-args" || word.starts_with("--enable-") || word.starts_with("--disable-")) {
+      continue;
+    }
+    const bool remaps = is({"-r", "--remap"});
+    const bool sets = is({"-p", "--param"});
+    if (!remaps && !sets &&
+        !is({"--params-file", "--log-level", "--log-config-file", "--log-file-name", "-e",
+             "--enclave"})) {
+      throw ContractError("word after --ros-args", "'" + readable_line(shortened(word, 80)) + "'",
+                          "-r FROM:=TO, -p NAME:=VALUE, --params-file FILE");
+    }
+    if (++i == words.size()) throw ContractError("value of " + word, "missing", "one");
+    if (remaps) {
+      auto [from, to] = remapping_of(words[i]);
+      // NODE:from:=to is for one node alone.
+      const std::size_t colon = from.find(':');
+      if (colon != std::string::npos) {
+        if (from.substr(0, colon) != node) continue;
+        from = from.substr(colon + 1);
+      }
+      if (from == "__name") from = "__node";
+      read.remappings.insert_or_assign(from, to);
+    } else if (sets || word == "--params-file") {
+      given.emplace_back(word, words[i]);
+    }
+  }
+  const auto named = [&](const std::string& key, const std::string& initial) {
+    const auto found = read.remappings.find(key);
+    return found == read.remappings.end() ? initial : found->second;
+  };
+  const std::string own_node = named("__node", node);
+  const std::string own_space = named("__ns", name_space);
+  for (const auto& [word, text] : given) {
+    if (word == "--params-file") {
+      read_parameter_file(text, own_node, own_space, read.parameters);
+      continue;
+    }
+    auto [name, value] = sides_of(text, "parameter", "NAME:=VALUE, as use_sim_time:=true");
+    const std::size_t colon = name.find(':');
+    if (colon != std::string::npos) {
+      if (name.substr(0, colon) != own_node) continue;
+      name = name.substr(colon + 1);
+    }
+    try {
+      int nodes_left = max_nodes;
+      flatten(YAML::Load(value), name, word, 0, nodes_left, read.parameters);
+    } catch (const YAML::Exception& error) {
+      throw ContractError("value of " + name, "'" + readable_line(shortened(value, 80)) + "'",
+                          std::string("YAML: ") + readable_line(error.what()));
+    }
+  }
+  return read;
+}
+
+}  // namespace panonav::ros2

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+
+#include "panonav/core/image.hpp"
+#include "panonav/core/options.hpp"
+#include "panonav/geometry/pose2.hpp"
+#include "panonav/motion/odometry.hpp"
+#include "panonav_ros2/participant.hpp"
+
+namespace panonav::ros2 {
+
+struct SimulatedRobotOptions {
+  double picture_rate_hz = 10.0;
+  double odometry_rate_hz = 50.0;
+  double time_factor = 1.0;
+  double velocity_timeout_s = 0.5;
+};
+void visit_options(SimulatedRobotOptions& options, OptionVisitor& visitor);
+
+/// Where the robot is put, what it may not run into, and what it sees. `picture` is asked on a
+/// thread of its own, one picture at a time.
+struct SimulatedSurroundings {
+  Pose2 start;
+  std::function<bool(Point2 place)> is_free;
+  std::function<Image(const Pose2& pose, std::uint64_t seed)> picture;
+};
+
+/// A simulated robot as ROS 2 sees a real one, in time of its own: /clock, odom, odom -> base_link
+/// on /tf and pictures on image out, and for those who judge, ground_truth; cmd_vel in, and
+/// set_pose (PoseStamped), which carries the robot elsewhere without its odometry knowing.
+/// Something that is in its way stops it.
+class SimulatedRobot {
+ public:
+  /// Throws OptionError, and as `Participant`.
+  SimulatedRobot(const ParticipantOptions& participant, const SimulatedRobotOptions& options,
+                 SimulatedSurroundings surroundings, const OdometryNoise& odometry,
+                 std::uint64_t seed, Participant::Note note);
+  ~SimulatedRobot();
+  SimulatedRobot(const SimulatedRobot&) = delete;
+  SimulatedRobot& operator=(const SimulatedRobot&) = delete;
+
+  /// Until `stop` is called.
+  void run();
+  /// From any thread.
+  void stop();
+
+ private:
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace panonav::ros2

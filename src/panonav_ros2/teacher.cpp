@@ -1,0 +1,91 @@
+#include "panonav_ros2/teacher.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/motion/trajectory.hpp"
+#include "panonav/pipeline/memoriser.hpp"
+#include "panonav/storage/memory_address.hpp"
+
+namespace panonav::ros2 {
+
+namespace {
+
+std::filesystem::path new_file(std::filesystem::path path) {
+  if (memory_exists(path)) {
+    throw FileError(path.string(), "is there already; allowed with --learn: a new file");
+  }
+  return path;
+}
+
+}  // namespace
+
+Teacher::Teacher(std::filesystem::path memory, const TeacherOptions& options)
+    : path_(new_file(std::move(memory))), options_(options), encoder_(options.pictures, {}) {}
+
+void Teacher::make_mapper() {
+  Executor alone;
+  mapper_.emplace(
+      MemoryFile::create(path_, header_from_first(waiting_, options_.pictures, options_.signature,
+                                                  options_.preprocessing, alone)),
+      options_.pictures);
+  for (const Observation& seen : std::exchange(waiting_, {})) mapper_->add(seen);
+}
+
+void Teacher::add(Observation seen) {
+  // Half of the spacing that grids of views are made with: steps so short are read from the views
+  // themselves, and wherever the robot comes again, a view is near.
+  constexpr double step_m = 0.25;
+  constexpr double turn_rad = 0.3;
+  const Pose2 pose = seen.odometry.value();
+  if (options_.route && (lines_.empty() || RouteRecorder::is_due(lines_.back().encoded.pose, pose,
+                                                                 RouteRecorderOptions{}.every_m))) {
+    lines_.push_back({{pose, encoder_.line(seen)}, nodes_.empty() ? 0 : nodes_.size() - 1});
+  }
+  if (!nodes_.empty() && distance(nodes_.back().position(), pose.position()) < step_m &&
+      std::abs(angle_difference(pose.heading_rad, nodes_.back().heading_rad)) < turn_rad) {
+    return;
+  }
+  if (mapper_) {
+    mapper_->add(seen);
+  } else {
+    waiting_.push_back(std::move(seen));
+    if (waiting_.size() == Memoriser::scale_views) make_mapper();
+  }
+  nodes_.push_back(pose);
+}
+
+// A line moves as the nodes before and behind it do, by its share of the way between them.
+void Teacher::store_lines(const TopologicalMap& map) {
+  RouteRecorder recorder(
+      MemoryFile::open(path_, Access::read_write), options_.pictures,
+      RouteRecorderOptions{.name = *options_.route, .line = {}, .horizon_rows = {}});
+  for (Line& line : lines_) {
+    const std::size_t before = line.node;
+    const std::size_t behind = std::min(before + 1, nodes_.size() - 1);
+    Pose2& pose = line.encoded.pose;
+    const auto moved_with = [&](std::size_t node) {
+      return map.nodes[node].pose * inverse(nodes_[node]) * pose;
+    };
+    const double from_m = distance(nodes_[before].position(), pose.position());
+    const double to_m = distance(nodes_[behind].position(), pose.position());
+    const double share = from_m > 0.0 ? from_m / (from_m + to_m) : 0.0;
+    pose = interpolate(moved_with(before), moved_with(behind), share);
+    recorder.add(std::move(line.encoded));
+  }
+  (void)recorder.finish();
+}
+
+Pose2 Teacher::finish() {
+  if (nodes_.empty()) throw ContractError("views that were learnt", 0.0, "1 or more");
+  if (!mapper_) make_mapper();
+  const TopologicalMap map = mapper_->finish().map;
+  mapper_.reset();  // the file is another one's now
+  if (options_.route) store_lines(map);
+  return map.nodes.back().pose * inverse(nodes_.back());
+}
+
+}  // namespace panonav::ros2

@@ -1,0 +1,351 @@
+#include "panonav_simulation/free_space.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <queue>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav_simulation/internal/occupancy.hpp"
+
+namespace panonav::simulation {
+
+namespace {
+
+struct Neighbour {
+  int di;
+  int dj;
+  float length;
+};
+constexpr auto diagonal = std::numbers::sqrt2_v<float>;
+constexpr std::array<Neighbour, 8> neighbours{{{1, 0, 1.0F},
+                                               {-1, 0, 1.0F},
+                                               {0, 1, 1.0F},
+                                               {0, -1, 1.0F},
+                                               {1, 1, diagonal},
+                                               {1, -1, diagonal},
+                                               {-1, 1, diagonal},
+                                               {-1, -1, diagonal}}};
+
+bool drivable(const Scene& scene, Point2 p) {
+  return scene.drivable.empty() ||
+         std::any_of(scene.drivable.begin(), scene.drivable.end(), [p](const FloorArea& area) {
+           return p.x_m >= area.low.x_m && p.x_m <= area.high.x_m && p.y_m >= area.low.y_m &&
+                  p.y_m <= area.high.y_m;
+         });
+}
+
+std::string text(Point2 p) {
+  return "(" + to_text(p.x_m) + ", " + to_text(p.y_m) + ")";
+}
+
+}  // namespace
+
+FreeSpaceOptions free_space_options(double robot_radius_m, double camera_height_m) {
+  return {.robot_radius_m = robot_radius_m,
+          .robot_height_m = camera_height_m,
+          .step_height_m = camera_height_m / 12.0,
+          .cell_m = robot_radius_m / 8.0};
+}
+
+FreeSpaceOptions free_space_options(const Scene& scene) {
+  return free_space_options(scene.robot_radius_m, scene.camera_height_m);
+}
+
+void visit_options(FreeSpaceOptions& options, OptionVisitor& visitor) {
+  using T = FreeSpaceOptions;
+  constexpr OptionTable table{
+      option<&T::robot_radius_m>("radius of the robot", 0, 10),
+      option<&T::robot_height_m>("height below which things are in the robot's way", above(0), 100),
+      option<&T::step_height_m>("height below which things are driven over", 0, 10),
+      option<&T::floor_height_m>("height of the floor in the scene"),
+      option<&T::cell_m>("side of the cells of the map of free space", 0.001, 1),
+  };
+  table.visit(options, visitor);
+}
+
+FreeSpace::FreeSpace(const Scene& scene, const FreeSpaceOptions& options,
+                     std::optional<Point2> seed)
+    : low_(scene.floor_low), high_(scene.floor_high), cell_m_(options.cell_m) {
+  validate(options);
+  validate(scene);
+  require(options.step_height_m < options.robot_height_m, "step_height_m", options.step_height_m,
+          "less than robot_height_m, " + to_text(options.robot_height_m));
+  const auto count = [this](const char* field, double extent) {
+    require(extent > 0.0 && extent / cell_m_ <= 1e5, field, extent, "> 0 and at most 100000 cells");
+    return static_cast<int>(std::ceil(extent / cell_m_ - 1e-9));
+  };
+  columns_ = count("extent of the floor in x", high_.x_m - low_.x_m);
+  rows_ = count("extent of the floor in y", high_.y_m - low_.y_m);
+  require(static_cast<double>(columns_) * rows_ <= 1e8, "cells of the floor",
+          static_cast<double>(columns_) * rows_, "<= 100000000; use larger cells");
+
+  // Obstacles just outside the floor's rectangle count too, so the raster has a margin.
+  const int margin = static_cast<int>(std::ceil(options.robot_radius_m / cell_m_)) + 2;
+  const Raster raster{{low_.x_m - margin * cell_m_, low_.y_m - margin * cell_m_},
+                      cell_m_,
+                      columns_ + 2 * margin,
+                      rows_ + 2 * margin};
+  const auto inner = [&](Cell cell) {
+    return static_cast<std::size_t>(cell.j + margin) * static_cast<std::size_t>(raster.columns) +
+           static_cast<std::size_t>(cell.i + margin);
+  };
+  const double z = options.floor_height_m;
+  const auto obstacles =
+      occupied_cells(scene, raster, z + options.step_height_m, z + options.robot_height_m);
+  const auto floor =
+      occupied_cells(scene, raster, z - options.step_height_m, z + options.step_height_m);
+  const bool has_floor = std::find(floor.begin(), floor.end(), 1) != floor.end();
+  const auto distances = distance_to_cells(obstacles, raster);
+
+  const std::size_t cells = static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_);
+  obstacle_.resize(cells);
+  free_.resize(cells);
+  clearance_m_.resize(cells);
+  for (int j = 0; j < rows_; ++j) {
+    for (int i = 0; i < columns_; ++i) {
+      const Cell cell{i, j};
+      const std::size_t k = index(cell);
+      obstacle_[k] = obstacles[inner(cell)];
+      // Between any point of this cell and any of the obstacle's cell: half a diagonal less at
+      // either end.
+      const double clearance =
+          cell_m_ * (static_cast<double>(distances[inner(cell)]) - std::numbers::sqrt2);
+      clearance_m_[k] = static_cast<float>(std::max(0.0, clearance));
+      free_[k] = clearance >= options.robot_radius_m && obstacle_[k] == 0 &&
+                 (!has_floor || floor[inner(cell)] != 0) && drivable(scene, centre(cell));
+    }
+  }
+  keep_connected_component(seed);
+}
+
+void FreeSpace::keep_connected_component(std::optional<Point2> seed) {
+  std::vector<std::uint32_t> component(free_.size(), 0);
+  std::vector<std::size_t> sizes{0};
+  std::vector<Cell> open;
+  for (int j = 0; j < rows_; ++j) {
+    for (int i = 0; i < columns_; ++i) {
+      if (free_[index({i, j})] == 0 || component[index({i, j})] != 0) continue;
+      const auto number = static_cast<std::uint32_t>(sizes.size());
+      sizes.push_back(0);
+      open.push_back({i, j});
+      component[index({i, j})] = number;
+      while (!open.empty()) {
+        const Cell cell = open.back();
+        open.pop_back();
+        ++sizes[number];
+        // Only across edges: a robot does not squeeze through a corner.
+        for (std::size_t n = 0; n < 4; ++n) {
+          const Cell next{cell.i + neighbours[n].di, cell.j + neighbours[n].dj};
+          if (next.i < 0 || next.j < 0 || next.i >= columns_ || next.j >= rows_) continue;
+          if (free_[index(next)] == 0 || component[index(next)] != 0) continue;
+          component[index(next)] = number;
+          open.push_back(next);
+        }
+      }
+    }
+  }
+  std::uint32_t kept = 0;
+  if (seed) {
+    const auto cell = cell_at(*seed);
+    if (cell) kept = component[index(*cell)];
+    if (kept == 0)
+      throw ContractError("seed of the free space", text(*seed),
+                          "a place where the robot can stand");
+  } else {
+    kept = static_cast<std::uint32_t>(std::max_element(sizes.begin(), sizes.end()) - sizes.begin());
+    if (kept == 0) {
+      throw ContractError("free places between " + text(low_) + " and " + text(high_), 0.0,
+                          ">= 1; the robot stands nowhere");
+    }
+  }
+  for (std::size_t k = 0; k < free_.size(); ++k) {
+    free_[k] = component[k] == kept ? 1 : 0;
+    if (free_[k] != 0) free_cells_.push_back(static_cast<std::uint32_t>(k));
+  }
+}
+
+std::optional<FreeSpace::Cell> FreeSpace::cell_at(Point2 position) const noexcept {
+  const double i = std::floor((position.x_m - low_.x_m) / cell_m_);
+  const double j = std::floor((position.y_m - low_.y_m) / cell_m_);
+  if (!(i >= 0.0 && i < columns_ && j >= 0.0 && j < rows_)) return std::nullopt;
+  return Cell{static_cast<int>(i), static_cast<int>(j)};
+}
+
+Point2 FreeSpace::centre(Cell cell) const noexcept {
+  return {low_.x_m + (cell.i + 0.5) * cell_m_, low_.y_m + (cell.j + 0.5) * cell_m_};
+}
+
+bool FreeSpace::is_free(Point2 position) const noexcept {
+  const auto cell = cell_at(position);
+  return cell && free_[index(*cell)] != 0;
+}
+
+double FreeSpace::clearance_m(Point2 position) const noexcept {
+  const auto cell = cell_at(position);
+  return cell ? clearance_m_[index(*cell)] : 0.0;
+}
+
+bool FreeSpace::is_free_between(Point2 a, Point2 b) const noexcept {
+  // Every cell that the segment passes, by the parameters where it crosses the cells' borders.
+  if (!is_free(a) || !is_free(b)) return false;
+  Cell cell = *cell_at(a);
+  const Cell end = *cell_at(b);
+  const double dx = b.x_m - a.x_m;
+  const double dy = b.y_m - a.y_m;
+  constexpr double never = std::numeric_limits<double>::infinity();
+  const auto next_crossing = [this](double start, double low, int cell_number, double d) {
+    if (d == 0.0) return never;
+    return (low + (cell_number + (d > 0.0 ? 1 : 0)) * cell_m_ - start) / d;
+  };
+  const int steps = std::abs(end.i - cell.i) + std::abs(end.j - cell.j);
+  for (int step = 0; step < steps; ++step) {
+    const double tx = cell.i == end.i ? never : next_crossing(a.x_m, low_.x_m, cell.i, dx);
+    const double ty = cell.j == end.j ? never : next_crossing(a.y_m, low_.y_m, cell.j, dy);
+    if (tx <= ty) {
+      cell.i += dx > 0.0 ? 1 : -1;
+    } else {
+      cell.j += dy > 0.0 ? 1 : -1;
+    }
+    if (free_[index(cell)] == 0) return false;
+  }
+  return true;
+}
+
+double FreeSpace::area_m2() const noexcept {
+  return static_cast<double>(free_cells_.size()) * cell_m_ * cell_m_;
+}
+
+std::vector<GridPosition> FreeSpace::grid(double spacing_m, GridOrder order) const {
+  std::vector<GridPosition> places = grid_positions(low_, high_, spacing_m, order);
+  std::erase_if(places, [this](const GridPosition& place) { return !is_free(place.position); });
+  return places;
+}
+
+Pose2 FreeSpace::random_pose(Random& random) const {
+  const std::uint32_t k = free_cells_[random.index(free_cells_.size())];
+  const auto columns = static_cast<std::uint32_t>(columns_);
+  const Point2 middle = centre({static_cast<int>(k % columns), static_cast<int>(k / columns)});
+  const double half = 0.5 * cell_m_;
+  Pose2 pose;
+  pose.x_m = middle.x_m + random.uniform(-half, half);
+  pose.y_m = middle.y_m + random.uniform(-half, half);
+  pose.heading_rad = wrap_angle(random.uniform(-std::numbers::pi, std::numbers::pi));
+  // At the very edge of a cell rounding may fall into the next one.
+  if (!is_free(pose.position())) {
+    pose.x_m = middle.x_m;
+    pose.y_m = middle.y_m;
+  }
+  return pose;
+}
+
+std::optional<std::vector<Point2>> FreeSpace::shortest_path(Point2 a, Point2 b) const {
+  if (!is_free(a) || !is_free(b)) return std::nullopt;
+  const Cell start = *cell_at(a);
+  const Cell goal = *cell_at(b);
+  constexpr float unknown = std::numeric_limits<float>::infinity();
+  std::vector<float> cost(free_.size(), unknown);
+  std::vector<std::uint8_t> came_by(free_.size(), 0);
+  const auto estimate = [goal](Cell cell) {
+    const auto di = static_cast<float>(std::abs(cell.i - goal.i));
+    const auto dj = static_cast<float>(std::abs(cell.j - goal.j));
+    return std::max(di, dj) + (diagonal - 1.0F) * std::min(di, dj);
+  };
+  struct Entry {
+    float total;
+    std::uint32_t cell;
+    // The lower index first among equals: the same path on every machine.
+    bool operator<(const Entry& other) const {
+      return total != other.total ? total > other.total : cell > other.cell;
+    }
+  };
+  std::priority_queue<Entry> open;
+  cost[index(start)] = 0.0F;
+  open.push({estimate(start), static_cast<std::uint32_t>(index(start))});
+  std::vector<std::uint8_t> closed(free_.size(), 0);
+  while (!open.empty() && closed[index(goal)] == 0) {
+    const std::uint32_t k = open.top().cell;
+    open.pop();
+    if (closed[k] != 0) continue;
+    closed[k] = 1;
+    const Cell cell{static_cast<int>(k) % columns_, static_cast<int>(k) / columns_};
+    for (std::uint8_t n = 0; n < neighbours.size(); ++n) {
+      const Cell next{cell.i + neighbours[n].di, cell.j + neighbours[n].dj};
+      if (next.i < 0 || next.j < 0 || next.i >= columns_ || next.j >= rows_) continue;
+      if (free_[index(next)] == 0) continue;
+      // A diagonal step needs both cells beside it.
+      if (n >= 4 && (free_[index({next.i, cell.j})] == 0 || free_[index({cell.i, next.j})] == 0))
+        continue;
+      const float through = cost[k] + neighbours[n].length;
+      if (!(through < cost[index(next)])) continue;
+      cost[index(next)] = through;
+      came_by[index(next)] = n;
+      open.push({through + estimate(next), static_cast<std::uint32_t>(index(next))});
+    }
+  }
+  if (closed[index(goal)] == 0) return std::nullopt;
+
+  std::vector<Point2> cells{b};
+  for (Cell cell = goal; index(cell) != index(start);) {
+    const Neighbour& step = neighbours[came_by[index(cell)]];
+    cell = {cell.i - step.di, cell.j - step.dj};
+    cells.push_back(centre(cell));
+  }
+  cells.back() = a;
+  std::reverse(cells.begin(), cells.end());
+  if (cells.size() == 1) cells.push_back(b);
+  return pulled_tight(cells);
+}
+
+std::vector<Point2> FreeSpace::pulled_tight(std::vector<Point2> path) const {
+  // From each way point to the last one that is seen before the view is blocked; then the same from
+  // the other end with new points between, until the path hardly becomes shorter.
+  constexpr int max_rounds = 20;
+  constexpr double worthwhile = 1e-3;
+  double length = path_length_m(path);
+  for (int round = 0; round < max_rounds; ++round) {
+    std::vector<Point2> tight{path.front()};
+    for (std::size_t from = 0; from + 1 < path.size();) {
+      std::size_t to = from + 1;
+      while (to + 1 < path.size() && is_free_between(path[from], path[to + 1])) ++to;
+      tight.push_back(path[to]);
+      from = to;
+    }
+    const double before = std::exchange(length, path_length_m(tight));
+    const bool done = round > 1 && length > (1.0 - worthwhile) * before;
+    if (done && round % 2 == 0) return tight;
+    path.clear();
+    for (std::size_t i = 0; i < tight.size(); ++i) {
+      if (i > 0) {
+        const Point2 a = tight[i - 1];
+        const Point2 b = tight[i];
+        const int pieces = static_cast<int>(std::ceil(distance(a, b) / (2.0 * cell_m_)));
+        for (int k = 1; k < pieces; ++k) {
+          const double t = static_cast<double>(k) / pieces;
+          path.push_back({a.x_m + t * (b.x_m - a.x_m), a.y_m + t * (b.y_m - a.y_m)});
+        }
+      }
+      path.push_back(tight[i]);
+    }
+    std::reverse(path.begin(), path.end());
+  }
+  if (max_rounds % 2 == 1) std::reverse(path.begin(), path.end());
+  return path;
+}
+
+Image FreeSpace::picture() const {
+  Image image(columns_, rows_);
+  for (int j = 0; j < rows_; ++j) {
+    for (int i = 0; i < columns_; ++i) {
+      const std::size_t k = index({i, j});
+      const bool near = clearance_m_[k] < 1.0F && obstacle_[k] == 0;
+      image.at(i, rows_ - 1 - j) = free_[k] != 0 ? 255 : obstacle_[k] != 0 ? 0 : near ? 160 : 80;
+    }
+  }
+  return image;
+}
+
+}  // namespace panonav::simulation

@@ -1,0 +1,100 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "panonav/core/image.hpp"
+#include "panonav/core/options.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/geometry/pose2.hpp"
+#include "panonav/motion/path.hpp"
+#include "panonav_simulation/scene.hpp"
+
+namespace panonav::simulation {
+
+/// What a robot fits through and drives over.
+struct FreeSpaceOptions {
+  double robot_radius_m = 0.2;  ///< >= 0; the robot is taken for a cylinder
+  double robot_height_m =
+      0.6;  ///< what stands between the step height and this height is in the way
+  double step_height_m = 0.05;  ///< lower things (floor, carpet, sill) are driven over
+  double floor_height_m = 0.0;  ///< z of the floor
+  double cell_m = 0.025;        ///< of the map that is searched
+};
+void visit_options(FreeSpaceOptions& options, OptionVisitor& visitor);
+
+/// The options of a robot of this radius that is as high as its camera and drives over a twelfth of
+/// that.
+[[nodiscard]] FreeSpaceOptions free_space_options(double robot_radius_m, double camera_height_m);
+
+/// The same for the robot that a scene is made for.
+[[nodiscard]] FreeSpaceOptions free_space_options(const Scene& scene);
+
+/// Where a robot can stand and drive in a scene: inside `floor_low .. floor_high` and the
+/// `drivable` areas if there are any; on something to stand on (a surface within the step height of
+/// the floor), unless the scene has no floor at all; and with no surface within the robot's radius
+/// between step height and robot height. Only one connected component is kept, so that every free
+/// place can be reached from every other: the one of `seed`, or else the largest.
+///
+/// Computed on a map of square cells; whole cells are free or not. Distances to obstacles are never
+/// overestimated and underestimated by at most 1.5 cells. Building costs O(cells + triangle area).
+class FreeSpace {
+ public:
+  /// Throws OptionError on options out of range, ContractError when the scene is not valid, its
+  /// floor is larger than 100 million cells, nothing is free, or `seed` is not free.
+  explicit FreeSpace(const Scene& scene, const FreeSpaceOptions& options = {},
+                     std::optional<Point2> seed = std::nullopt);
+
+  /// Whether the middle of the robot may be there. False outside the map.
+  [[nodiscard]] bool is_free(Point2 position) const noexcept;
+  /// Lower bound of the distance from `position` to the nearest obstacle; 0 outside the map.
+  [[nodiscard]] double clearance_m(Point2 position) const noexcept;
+  /// Whether every place on the straight line is free.
+  [[nodiscard]] bool is_free_between(Point2 a, Point2 b) const noexcept;
+
+  [[nodiscard]] double area_m2() const noexcept;  ///< Of all free cells together.
+  /// Lower left corner of the map: that of the scene's floor.
+  [[nodiscard]] Point2 low() const noexcept { return low_; }
+  /// Upper right corner of the map: that of the scene's floor.
+  [[nodiscard]] Point2 high() const noexcept { return high_; }
+
+  /// The free places of a regular grid over the floor.
+  [[nodiscard]] std::vector<GridPosition> grid(double spacing_m,
+                                               GridOrder order = GridOrder::raster) const;
+  /// Uniform over the free area, any heading.
+  [[nodiscard]] Pose2 random_pose(Random& random) const;
+  /// Way points of a short path through free places, first `a`, last `b`; empty when one of them is
+  /// not free. Shortest on the 8-connected map, then pulled tight. O(cells log cells).
+  [[nodiscard]] std::optional<std::vector<Point2>> shortest_path(Point2 a, Point2 b) const;
+
+  /// A map for people, one pixel a cell, y upwards: free white, too near to something grey,
+  /// obstacles black, the rest dark grey.
+  [[nodiscard]] Image picture() const;
+
+ private:
+  struct Cell {
+    int i = 0;
+    int j = 0;
+  };
+  [[nodiscard]] std::optional<Cell> cell_at(Point2 position) const noexcept;
+  [[nodiscard]] std::size_t index(Cell cell) const noexcept {
+    return static_cast<std::size_t>(cell.j) * static_cast<std::size_t>(columns_) +
+           static_cast<std::size_t>(cell.i);
+  }
+  [[nodiscard]] Point2 centre(Cell cell) const noexcept;
+  [[nodiscard]] std::vector<Point2> pulled_tight(std::vector<Point2> path) const;
+  void keep_connected_component(std::optional<Point2> seed);
+
+  Point2 low_, high_;
+  double cell_m_;
+  int columns_ = 0;
+  int rows_ = 0;
+  std::vector<std::uint8_t> obstacle_;
+  std::vector<std::uint8_t> free_;
+  std::vector<float> clearance_m_;
+  std::vector<std::uint32_t> free_cells_;  // indices, ascending
+};
+
+}  // namespace panonav::simulation

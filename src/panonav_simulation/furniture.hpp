@@ -1,0 +1,43 @@
+#pragma once
+
+#include <string>
+
+#include "panonav_simulation/scene_builder.hpp"
+
+namespace panonav::simulation {
+
+// Pieces that the built-in scenes share. Each draws its looks from the builder's random engine.
+
+/// Four plain walls around `room`, seen from inside, with pictures, a door and windows on them.
+void furnish_room_shell(SceneBuilder& builder, const FloorArea& room, double height_m);
+
+/// 1.4 x 0.7 m with drawers, a screen and papers on it.
+void add_desk(SceneBuilder& builder, const std::string& name, const Footing& footing);
+/// An office chair on five legs, with its back along +y of the footing.
+void add_chair(SceneBuilder& builder, const std::string& name, const Footing& footing);
+/// A bookshelf 0.32 m deep with books on both long sides.
+void add_shelf(SceneBuilder& builder, const std::string& name, const Footing& footing,
+               double width_m, double height_m);
+/// Wide, closed and of one tone: what makes the large dark and bright parts of a view.
+void add_wardrobe(SceneBuilder& builder, const std::string& name, const Footing& footing,
+                  double width_m, double height_m);
+/// A chest of drawers, 0.45 to 0.9 m wide, with a thing on it.
+void add_cabinet(SceneBuilder& builder, const std::string& name, const Footing& footing);
+/// A pot with leaves, about 1 m high.
+void add_plant(SceneBuilder& builder, const std::string& name, Point2 centre);
+/// A box of any size, of wood or with a picture on its sides.
+void add_crate(SceneBuilder& builder, const std::string& name, const Footing& footing,
+               Vector3 size);
+
+/// Materials of a kind of tree.
+struct TreeKind {
+  int bark = 0;    ///< number of its material in the scene
+  int leaves = 0;  ///< number of its material in the scene
+};
+/// Adds the materials of a kind to the scene; all trees of a kind share them.
+[[nodiscard]] TreeKind make_tree_kind(SceneBuilder& builder);
+/// A trunk of 0.3 of the height below a crown of four to six clumps of leaves.
+void add_tree(SceneBuilder& builder, const std::string& name, const TreeKind& kind, Point2 centre,
+              double height_m);
+
+}  // namespace panonav::simulation

@@ -1,0 +1,256 @@
+// Scenes with a round trip: loop (rooms and corridors) and corridor (many identical doors).
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "panonav_simulation/furniture.hpp"
+#include "panonav_simulation/internal/built_in_scenes.hpp"
+
+namespace panonav::simulation {
+
+namespace {
+
+std::array<Point2, 4> corners_of(const FloorArea& area) {
+  return {area.low, Point2{area.high.x_m, area.low.y_m}, area.high,
+          Point2{area.low.x_m, area.high.y_m}};
+}
+
+void add_ceiling_lamp(SceneBuilder& builder, int shine, Point2 at, double height_m,
+                      float intensity) {
+  builder.lamp({at.x_m, at.y_m, height_m - 0.15}, intensity);
+  builder.box("lamp", shine, shine, {at, 0.0}, {0.0, 0.0, height_m - 0.07}, {0.6, 0.2, 0.05});
+}
+
+struct CorridorStyle {
+  int plaster, rail, door;
+  double height_m;
+};
+
+// A closed run of walls parallel to the axes, seen from the left, with a rail all along. A door
+// stands at every even coordinate where there is room for it.
+void add_wall_with_doors(SceneBuilder& builder, const std::string& name, const CorridorStyle& look,
+                         std::span<const Point2> corners) {
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const Point2 from = corners[i];
+    const Point2 to = corners[(i + 1) % corners.size()];
+    const double length = distance(from, to);
+    builder.wall(name, look.plaster, from, to, look.height_m, 2.0);
+    builder.on_wall(name + " rail", look.rail, from, to, 0.0, length, 0.85, 0.95, 0.005);
+    const bool along_x = from.y_m == to.y_m;
+    const double a = along_x ? from.x_m : from.y_m;
+    const double b = along_x ? to.x_m : to.y_m;
+    constexpr double kHalfDoor = 0.45;
+    for (double at = 2.0 * std::ceil(0.5 * (std::min(a, b) + kHalfDoor));
+         at <= std::max(a, b) - kHalfDoor; at += 2.0) {
+      builder.on_wall(name + " door", look.door, from, to, std::abs(at - a) - kHalfDoor,
+                      2.0 * kHalfDoor, 0.0, 2.05);
+    }
+  }
+}
+
+// The wall above an opening.
+void add_lintel(SceneBuilder& builder, const CorridorStyle& look, Point2 from, Point2 to) {
+  builder.wall("lintel", look.plaster, from, to, look.height_m, 2.0, 2.3);
+}
+
+}  // namespace
+
+Scene make_loop(const SceneVariation& variation) {
+  SceneBuilder builder("loop", variation);
+  Scene& scene = builder.scene();
+  Random& random = builder.random();
+  // The round trip runs around a block: two rooms, below and above, joined by two corridors.
+  const FloorArea outside{{-1.5, -1.5}, {7.5, 5.5}};
+  const FloorArea block{{1.0, 1.0}, {5.0, 3.0}};
+  constexpr double kHeight = 2.5;
+  scene.floor_low = {-0.5, -0.5};
+  scene.floor_high = {6.5, 4.5};
+  scene.drivable = {{{-0.5, -0.5}, {6.5, 0.5}},
+                    {{-0.5, 3.5}, {6.5, 4.5}},
+                    {{-0.5, -0.5}, {0.5, 4.5}},
+                    {{5.5, -0.5}, {6.5, 4.5}}};
+  scene.ambient = 0.4F;
+  scene.tour = {{0.0, 0.0}, {6.0, 0.0}, {6.0, 4.0}, {0.0, 4.0}};
+  furnish_room_shell(builder, outside, kHeight);
+  const auto inner = corners_of(block);
+  for (std::size_t i = 0; i < 4; ++i) {
+    // Backwards, so that pictures hang on the outer side.
+    const Point2 from = inner[(i + 1) % 4];
+    const Point2 to = inner[i];
+    const auto tone = static_cast<float>(random.uniform(0.4, 0.85));
+    const std::string wall = "block " + std::to_string(i);
+    builder.wall(
+        wall,
+        builder.textured(noise_texture(random, 128, {tone, 0.95F * tone, 0.85F * tone}, 0.07)),
+        from, to, kHeight, 2.0);
+    double along = random.uniform(0.2, 0.6);
+    while (along < distance(from, to) - 0.5) {
+      const double width = random.uniform(0.4, 0.9);
+      const double bottom = random.uniform(0.5, 1.2);
+      const double top = bottom + width * random.uniform(0.7, 1.2);
+      const int picture = builder.textured(poster_texture(random, 128));
+      builder.on_wall(wall + " picture", picture, from, to, along, width, bottom, top);
+      along += width + random.uniform(0.3, 0.9);
+    }
+  }
+  // Walls with a doorway of 1.2 m part rooms from corridors.
+  const int plaster = builder.textured(noise_texture(random, 128, {0.7F, 0.69F, 0.64F}, 0.06));
+  const int frame = builder.textured(wood_texture(random, 64, {0.4F, 0.28F, 0.2F}));
+  int number = 0;
+  for (const double y : {1.0, 3.0}) {
+    for (const bool left : {true, false}) {
+      const double x0 = left ? outside.low.x_m : block.high.x_m;
+      const double x1 = left ? block.low.x_m : outside.high.x_m;
+      const double door = left ? 0.0 : 6.0;
+      const std::string name = "doorway " + std::to_string(number++);
+      const auto piece = [&](double a, double b) {
+        if (b - a > 0.05) {
+          builder.box(name, plaster, plaster, {{0.5 * (a + b), y}, 0.0}, {0.0, 0.0, 0.0},
+                      {b - a, 0.1, kHeight}, 1.5);
+        }
+      };
+      piece(x0, door - 0.65);
+      piece(door + 0.65, x1);
+      builder.box(name + " lintel", plaster, frame, {{door, y}, 0.0}, {0.0, 0.0, 2.1},
+                  {1.3, 0.1, kHeight - 2.1}, 1.5);
+      for (const double side : {-0.65, 0.65}) {
+        builder.box(name + " frame", frame, frame, {{door + side, y}, 0.0}, {0.0, 0.0, 0.0},
+                    {0.08, 0.16, 2.1}, 0.5);
+      }
+    }
+  }
+  // Furniture along the outer walls.
+  const FloorArea inside{{outside.low.x_m + 0.1, outside.low.y_m + 0.1},
+                         {outside.high.x_m - 0.1, outside.high.y_m - 0.1}};
+  const auto furnish = [&](Point2 at, double turn_rad) {
+    const Footing footing = builder.movable({at, turn_rad}, 0.4, inside);
+    const std::string name = "furniture " + std::to_string(number++);
+    switch (random.index(4)) {
+      case 0: {
+        const double height_m = random.uniform(1.0, 2.0);
+        const double width_m = random.uniform(0.7, 1.0);
+        add_shelf(builder, name, footing, width_m, height_m);
+        break;
+      }
+      case 1:
+        add_cabinet(builder, name, footing);
+        break;
+      case 2:
+        add_plant(builder, name, footing.centre);
+        break;
+      default:
+        add_crate(builder, name, footing,
+                  {random.uniform(0.3, 0.6), 0.4, random.uniform(0.4, 1.2)});
+    }
+  };
+  for (double x = -1.0; x < 7.2; x += random.uniform(0.9, 1.7)) {
+    furnish({x, -1.15}, std::numbers::pi);
+    furnish({x + random.uniform(-0.3, 0.3), 5.15}, 0.0);
+  }
+  for (double y = 1.5; y < 2.8; y += random.uniform(0.8, 1.2)) {
+    furnish({-1.2, y}, 0.5 * std::numbers::pi);
+    furnish({7.2, y}, -0.5 * std::numbers::pi);
+  }
+  const int shine = builder.plain({0.98F, 0.98F, 0.95F}, 1.0F);
+  for (const Point2 at : {Point2{0.0, 0.0}, Point2{3.0, 0.0}, Point2{6.0, 0.0}, Point2{6.0, 2.0},
+                          Point2{6.0, 4.0}, Point2{3.0, 4.0}, Point2{0.0, 4.0}, Point2{0.0, 2.0}}) {
+    add_ceiling_lamp(builder, shine, at, kHeight, static_cast<float>(random.uniform(0.6, 1.0)));
+  }
+  return builder.finish();
+}
+
+Scene make_corridor(const SceneVariation& variation) {
+  SceneBuilder builder("corridor", variation);
+  Scene& scene = builder.scene();
+  Random& random = builder.random();
+  // A ring of corridors, 2 m wide, whose middle lines are 12 m and 8 m long. Two narrower ones
+  // cross the block inside and go on outside to a door: eight junctions that look alike.
+  constexpr double kHeight = 2.5;
+  constexpr double kHalf = 1.0;
+  constexpr double kLong = 12.0;
+  constexpr double kShort = 8.0;
+  constexpr std::array<double, 2> kCrossings{4.0, 8.0};
+  constexpr double kHalfCrossing = 0.65;
+  constexpr double kDeadEnd = 2.0;
+  scene.floor_low = {-0.6, -0.6};
+  scene.floor_high = {kLong + 0.6, kShort + 0.6};
+  scene.drivable = {{{-0.6, -0.6}, {kLong + 0.6, 0.6}},
+                    {{-0.6, kShort - 0.6}, {kLong + 0.6, kShort + 0.6}},
+                    {{-0.6, -0.6}, {0.6, kShort + 0.6}},
+                    {{kLong - 0.6, -0.6}, {kLong + 0.6, kShort + 0.6}}};
+  for (const double x : kCrossings) {
+    scene.drivable.push_back({{x - 0.4, -0.6}, {x + 0.4, kShort + 0.6}});
+  }
+  scene.ambient = 0.65F;
+  scene.tour = {{0.0, 0.0}, {kLong, 0.0}, {kLong, kShort}, {0.0, kShort}};
+
+  const Point2 low{-kHalf, -kHalf - kDeadEnd};
+  const Point2 high{kLong + kHalf, kShort + kHalf + kDeadEnd};
+  const int carpet =
+      builder.textured(noise_texture(random, 128, tint(random, 0.15, 0.5, 0.2), 0.08));
+  builder.floor(carpet, low, high, 1.0);
+  builder.ceiling(builder.plain({0.85F, 0.85F, 0.84F}), low, high, kHeight, 1.0);
+  const CorridorStyle look{
+      builder.textured(noise_texture(random, 128, tint(random, 0.5, 0.75, 0.1), 0.04)),
+      builder.plain(tint(random, 0.1, 0.4, 0.2)),
+      builder.textured(door_texture(random, 128, tint(random, 0.1, 0.45, 0.3))), kHeight};
+
+  // The outer wall, counter-clockwise as its inside is seen, with the dead ends.
+  std::vector<Point2> outline;
+  for (const double side : {1.0, -1.0}) {
+    const double y = side > 0.0 ? -kHalf : kShort + kHalf;
+    const double end = y - side * kDeadEnd;
+    outline.push_back({side > 0.0 ? -kHalf : kLong + kHalf, y});
+    for (std::size_t i = 0; i < kCrossings.size(); ++i) {
+      const double x = kCrossings[side > 0.0 ? i : kCrossings.size() - 1 - i];
+      const double half = side * kHalfCrossing;
+      outline.insert(outline.end(),
+                     {{x - half, y}, {x - half, end}, {x + half, end}, {x + half, y}});
+      add_lintel(builder, look, {x - half, y}, {x + half, y});
+    }
+    outline.push_back({side > 0.0 ? kLong + kHalf : -kHalf, y});
+  }
+  add_wall_with_doors(builder, "outer wall", look, outline);
+  // The blocks between the corridors, clockwise.
+  const std::array<double, 6> edges{kHalf,
+                                    kCrossings[0] - kHalfCrossing,
+                                    kCrossings[0] + kHalfCrossing,
+                                    kCrossings[1] - kHalfCrossing,
+                                    kCrossings[1] + kHalfCrossing,
+                                    kLong - kHalf};
+  for (std::size_t i = 0; i < edges.size(); i += 2) {
+    auto corners = corners_of({{edges[i], kHalf}, {edges[i + 1], kShort - kHalf}});
+    std::reverse(corners.begin(), corners.end());
+    add_wall_with_doors(builder, "inner wall " + std::to_string(i / 2), look, corners);
+    if (i == 0) continue;
+    for (const double y : {kHalf, kShort - kHalf}) {
+      add_lintel(builder, look, {edges[i - 1], y}, {edges[i], y});
+    }
+  }
+  // The few distinct places: a window, a notice board and a plant, each on a side of its own.
+  builder.on_wall("window", builder.textured(window_texture(random, 128), 0.8F), {-kHalf, -kHalf},
+                  {kLong + kHalf, -kHalf}, 11.55, 0.9, 0.9, 2.1);
+  const double along = random.uniform() < 0.5 ? 1.5 : 11.5;
+  const int board = builder.textured(poster_texture(random, 128));
+  builder.on_wall("notice board", board, {kLong + kHalf, kShort + kHalf}, {-kHalf, kShort + kHalf},
+                  along, 1.0, 0.8, 1.6);
+  add_plant(builder, "plant", {-kHalf + 0.3, random.uniform(2.0, 6.0)});
+  const int shine = builder.plain({0.98F, 0.98F, 0.95F}, 1.0F);
+  for (double x = 0.0; x <= kLong + 0.1; x += 2.0) {
+    add_ceiling_lamp(builder, shine, {x, 0.0}, kHeight, 0.7F);
+    add_ceiling_lamp(builder, shine, {x, kShort}, kHeight, 0.7F);
+  }
+  for (double y = 2.0; y < kShort - 0.1; y += 2.0) {
+    add_ceiling_lamp(builder, shine, {0.0, y}, kHeight, 0.7F);
+    add_ceiling_lamp(builder, shine, {kLong, y}, kHeight, 0.7F);
+    for (const double x : kCrossings) add_ceiling_lamp(builder, shine, {x, y}, kHeight, 0.7F);
+  }
+  return builder.finish();
+}
+
+}  // namespace panonav::simulation

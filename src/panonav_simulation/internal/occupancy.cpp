@@ -1,0 +1,167 @@
+#include "panonav_simulation/internal/occupancy.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace panonav::simulation {
+
+namespace {
+
+// The part of a convex polygon on one side of a horizontal plane: sign * (z - height) >= 0.
+std::vector<Vector3> clip(const std::vector<Vector3>& polygon, double height, double sign) {
+  std::vector<Vector3> result;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Vector3& a = polygon[i];
+    const Vector3& b = polygon[(i + 1) % polygon.size()];
+    const double da = sign * (a.z_m - height);
+    const double db = sign * (b.z_m - height);
+    if (da >= 0.0) result.push_back(a);
+    if ((da >= 0.0) != (db >= 0.0)) {
+      const double t = da / (da - db);
+      result.push_back({a.x_m + t * (b.x_m - a.x_m), a.y_m + t * (b.y_m - a.y_m), height});
+    }
+  }
+  return result;
+}
+
+struct Interval {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -std::numeric_limits<double>::infinity();
+  void add(double value) {
+    low = std::min(low, value);
+    high = std::max(high, value);
+  }
+};
+
+// x values of the convex polygon's points with y in y_low .. y_high.
+Interval span_between(const std::vector<Vector3>& polygon, double y_low, double y_high) {
+  Interval span;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Vector3& a = polygon[i];
+    const Vector3& b = polygon[(i + 1) % polygon.size()];
+    if (a.y_m >= y_low && a.y_m <= y_high) span.add(a.x_m);
+    for (const double y : {y_low, y_high}) {
+      if ((a.y_m < y) != (b.y_m < y)) {
+        span.add(a.x_m + (y - a.y_m) / (b.y_m - a.y_m) * (b.x_m - a.x_m));
+      }
+    }
+  }
+  return span;
+}
+
+int clamped_cell(double coordinate, int count) {
+  return static_cast<int>(std::clamp(std::floor(coordinate), -1.0, static_cast<double>(count)));
+}
+
+void mark(const std::vector<Vector3>& polygon, const Raster& raster,
+          std::vector<std::uint8_t>& cells) {
+  Interval y;
+  for (const Vector3& v : polygon) y.add(v.y_m);
+  const int first =
+      std::max(0, clamped_cell((y.low - raster.low.y_m) / raster.cell_m, raster.rows));
+  const int last = std::min(raster.rows - 1,
+                            clamped_cell((y.high - raster.low.y_m) / raster.cell_m, raster.rows));
+  for (int j = first; j <= last; ++j) {
+    const double y_low = raster.low.y_m + j * raster.cell_m;
+    const Interval x = span_between(polygon, y_low, y_low + raster.cell_m);
+    if (!(x.low <= x.high)) continue;
+    const int left =
+        std::max(0, clamped_cell((x.low - raster.low.x_m) / raster.cell_m, raster.columns));
+    const int right =
+        std::min(raster.columns - 1,
+                 clamped_cell((x.high - raster.low.x_m) / raster.cell_m, raster.columns));
+    for (int i = left; i <= right; ++i) {
+      cells[static_cast<std::size_t>(j) * static_cast<std::size_t>(raster.columns) +
+            static_cast<std::size_t>(i)] = 1;
+    }
+  }
+}
+
+// Lower envelope of the parabolas f(q) + (p - q)^2 at every p.
+void transform_line(const std::vector<float>& f, std::vector<float>& result,
+                    std::vector<int>& roots, std::vector<float>& borders) {
+  constexpr float infinity = std::numeric_limits<float>::infinity();
+  const int n = static_cast<int>(f.size());
+  int last = -1;
+  for (int q = 0; q < n; ++q) {
+    const float fq = f[static_cast<std::size_t>(q)];
+    if (fq == infinity) continue;
+    float border = -infinity;
+    while (last >= 0) {
+      const int r = roots[static_cast<std::size_t>(last)];
+      const auto qf = static_cast<double>(q);
+      const auto rf = static_cast<double>(r);
+      border = static_cast<float>(((fq + qf * qf) - (f[static_cast<std::size_t>(r)] + rf * rf)) /
+                                  (2.0 * (qf - rf)));
+      if (border > borders[static_cast<std::size_t>(last)]) break;
+      border = -infinity;
+      --last;
+    }
+    ++last;
+    roots[static_cast<std::size_t>(last)] = q;
+    borders[static_cast<std::size_t>(last)] = border;
+  }
+  if (last < 0) {
+    std::fill(result.begin(), result.end(), infinity);
+    return;
+  }
+  int k = 0;
+  for (int p = 0; p < n; ++p) {
+    while (k < last && borders[static_cast<std::size_t>(k) + 1] < static_cast<float>(p)) ++k;
+    const int r = roots[static_cast<std::size_t>(k)];
+    const auto d = static_cast<float>(p - r);
+    result[static_cast<std::size_t>(p)] = d * d + f[static_cast<std::size_t>(r)];
+  }
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> occupied_cells(const Scene& scene, const Raster& raster, double low_z_m,
+                                         double high_z_m) {
+  std::vector<std::uint8_t> cells(
+      static_cast<std::size_t>(raster.columns) * static_cast<std::size_t>(raster.rows), 0);
+  for (const Mesh& mesh : scene.meshes) {
+    for (const auto& triangle : mesh.triangles) {
+      std::vector<Vector3> polygon{mesh.vertices[triangle[0]], mesh.vertices[triangle[1]],
+                                   mesh.vertices[triangle[2]]};
+      const auto [lowest, highest] = std::minmax({polygon[0].z_m, polygon[1].z_m, polygon[2].z_m});
+      if (highest < low_z_m || lowest > high_z_m) continue;
+      if (lowest < low_z_m) polygon = clip(polygon, low_z_m, 1.0);
+      if (highest > high_z_m) polygon = clip(polygon, high_z_m, -1.0);
+      if (!polygon.empty()) mark(polygon, raster, cells);
+    }
+  }
+  return cells;
+}
+
+std::vector<float> distance_to_cells(const std::vector<std::uint8_t>& cells, const Raster& raster) {
+  const auto columns = static_cast<std::size_t>(raster.columns);
+  const auto rows = static_cast<std::size_t>(raster.rows);
+  std::vector<float> squared(cells.size());
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    squared[i] = cells[i] != 0 ? 0.0F : std::numeric_limits<float>::infinity();
+  }
+  const std::size_t longest = std::max(columns, rows);
+  std::vector<int> roots(longest);
+  std::vector<float> borders(longest);
+  std::vector<float> line(rows);
+  std::vector<float> result(rows);
+  for (std::size_t i = 0; i < columns; ++i) {
+    for (std::size_t j = 0; j < rows; ++j) line[j] = squared[j * columns + i];
+    transform_line(line, result, roots, borders);
+    for (std::size_t j = 0; j < rows; ++j) squared[j * columns + i] = result[j];
+  }
+  line.resize(columns);
+  result.resize(columns);
+  for (std::size_t j = 0; j < rows; ++j) {
+    std::copy_n(squared.begin() + static_cast<std::ptrdiff_t>(j * columns), columns, line.begin());
+    transform_line(line, result, roots, borders);
+    std::transform(result.begin(), result.end(),
+                   squared.begin() + static_cast<std::ptrdiff_t>(j * columns),
+                   [](float d2) { return std::sqrt(d2); });
+  }
+  return squared;
+}
+
+}  // namespace panonav::simulation

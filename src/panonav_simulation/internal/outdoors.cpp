@@ -1,0 +1,246 @@
+// Scenes without a room around them: the garden, and the arena on a table.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include "panonav_simulation/furniture.hpp"
+#include "panonav_simulation/internal/built_in_scenes.hpp"
+
+namespace panonav::simulation {
+
+namespace {
+
+// A dome far away, from a little below the horizon up to the zenith: sky and clouds all round.
+void add_sky(SceneBuilder& builder, Point2 centre, double radius_m) {
+  Mesh mesh;
+  mesh.object = "sky";
+  mesh.material = builder.textured(sky_texture(builder.random(), 512, 256), 1.0F);
+  constexpr int kFacets = 48;
+  constexpr int kRings = 16;
+  constexpr double kLowest = -0.05;
+  for (int ring = 0; ring <= kRings; ++ring) {
+    const double share = static_cast<double>(ring) / kRings;
+    const double elevation = kLowest + share * (0.5 * std::numbers::pi - kLowest);
+    for (int i = 0; i <= kFacets; ++i) {
+      const double angle = 2.0 * std::numbers::pi * i / kFacets;
+      const double flat_m = radius_m * std::cos(elevation);
+      mesh.vertices.push_back({centre.x_m + flat_m * std::cos(angle),
+                               centre.y_m + flat_m * std::sin(angle),
+                               radius_m * std::sin(elevation)});
+      mesh.texture_coordinates.push_back(
+          {static_cast<float>(i) / kFacets, static_cast<float>(0.01 + 0.98 * share)});
+    }
+  }
+  for (int ring = 0; ring < kRings; ++ring) {
+    for (int i = 0; i < kFacets; ++i) {
+      const auto a = static_cast<std::uint32_t>(ring * (kFacets + 1) + i);
+      const std::uint32_t b = a + kFacets + 1;
+      mesh.triangles.push_back({a, a + 1, b + 1});
+      mesh.triangles.push_back({a, b + 1, b});
+    }
+  }
+  builder.scene().meshes.push_back(std::move(mesh));
+}
+
+void add_house(SceneBuilder& builder, const std::string& name, const Footing& footing, Vector3 size,
+               Colour wall_colour, Colour roof_colour) {
+  Random& random = builder.random();
+  const int walls = builder.textured(
+      brick_texture(random, 128, 6, 12, wall_colour,
+                    {1.1F * wall_colour[0], 1.1F * wall_colour[1], 1.1F * wall_colour[2]}));
+  const int roof = builder.textured(
+      brick_texture(random, 128, 8, 8, roof_colour,
+                    {0.7F * roof_colour[0], 0.7F * roof_colour[1], 0.7F * roof_colour[2]}));
+  builder.box(name, walls, walls, footing, {0.0, 0.0, 0.0}, size, 0.6 * size.z_m);
+  const double c = std::cos(footing.turn_rad);
+  const double s = std::sin(footing.turn_rad);
+  const auto at = [&](double x, double y, double z) {
+    return Vector3{footing.centre.x_m + c * x - s * y, footing.centre.y_m + s * x + c * y, z};
+  };
+  const double hx = 0.55 * size.x_m;
+  const double hy = 0.6 * size.y_m;
+  const double z0 = 0.97 * size.z_m;
+  const double z1 = 1.5 * size.z_m;
+  builder.quadrilateral(name, roof, at(-hx, -hy, z0), at(hx, -hy, z0), at(hx, 0.0, z1),
+                        at(-hx, 0.0, z1), 3.0, 2.0);
+  builder.quadrilateral(name, roof, at(hx, hy, z0), at(-hx, hy, z0), at(-hx, 0.0, z1),
+                        at(hx, 0.0, z1), 3.0, 2.0);
+  for (const double x : {-hx, hx}) {
+    builder.quadrilateral(name, walls, at(0.9 * x, -hy, z0), at(0.9 * x, hy, z0),
+                          at(0.9 * x, 0.0, z1), at(0.9 * x, 0.0, z1));
+  }
+  const int window = builder.textured(window_texture(random, 64));
+  const int door = builder.textured(door_texture(random, 64, {0.35F, 0.22F, 0.15F}));
+  const double out = 0.5 * size.y_m * 1.01;
+  for (const double side : {-1.0, 1.0}) {
+    const double y = side * out;
+    const double w = 0.12 * size.x_m * side;
+    for (const double x : {-0.3, 0.3}) {
+      builder.quadrilateral(name, window, at(x * size.x_m + w * -1.0, y, 0.4 * size.z_m),
+                            at(x * size.x_m + w, y, 0.4 * size.z_m),
+                            at(x * size.x_m + w, y, 0.8 * size.z_m),
+                            at(x * size.x_m - w, y, 0.8 * size.z_m));
+    }
+    builder.quadrilateral(name, door, at(-0.8 * w, y, 0.0), at(0.8 * w, y, 0.0),
+                          at(0.8 * w, y, 0.7 * size.z_m), at(-0.8 * w, y, 0.7 * size.z_m));
+  }
+}
+
+void add_hedge(SceneBuilder& builder, const std::string& name, Point2 from, Point2 to,
+               double height_m) {
+  Random& random = builder.random();
+  const float green = static_cast<float>(random.uniform(0.18, 0.36));
+  const int leaves =
+      builder.textured(foliage_texture(random, 256, {0.75F * green, green, 0.5F * green}));
+  const double length = distance(from, to);
+  const double turn = std::atan2(to.y_m - from.y_m, to.x_m - from.x_m);
+  // Segments of different height and depth: a hedge grows as it likes.
+  const int segments = std::max(1, static_cast<int>(length / 0.8));
+  for (int i = 0; i < segments; ++i) {
+    const double share = (i + 0.5) / segments;
+    const Footing footing{{from.x_m + share * (to.x_m - from.x_m) + random.normal(0.0, 0.05),
+                           from.y_m + share * (to.y_m - from.y_m) + random.normal(0.0, 0.05)},
+                          turn};
+    builder.box(
+        name, leaves, leaves, footing, {0.0, 0.0, 0.0},
+        {1.05 * length / segments, random.uniform(0.4, 0.7), height_m * random.uniform(0.8, 1.2)},
+        1.5);
+  }
+}
+
+}  // namespace
+
+Scene make_garden(const SceneVariation& variation) {
+  SceneBuilder builder("garden", variation);
+  Scene& scene = builder.scene();
+  Random& random = builder.random();
+  scene.floor_low = {0.0, 0.0};
+  scene.floor_high = {12.0, 10.0};
+  scene.ambient = 0.7F;
+  const double azimuth = random.uniform(-std::numbers::pi, std::numbers::pi);
+  scene.directional_lights.push_back({Direction3::from_angles(azimuth, 0.8), 0.8F});
+  const Point2 middle{6.0, 5.0};
+  add_sky(builder, middle, 150.0);
+  const int grass = builder.textured(noise_texture(random, 256, {0.25F, 0.36F, 0.16F}, 0.2, 1.4));
+  builder.floor(grass, {-160.0, -160.0}, {160.0, 160.0}, 3.0);
+  const int gravel = builder.textured(noise_texture(random, 256, {0.55F, 0.5F, 0.42F}, 0.15, 1.0));
+  builder.floor(gravel, {4.8, -1.0}, {6.4, 11.0}, 2.0, 0.01);
+
+  // Hedges around, with gaps through which far trees are seen.
+  const std::array<Point2, 4> corners{Point2{-1.5, -1.5}, Point2{13.5, -1.5}, Point2{13.5, 11.5},
+                                      Point2{-1.5, 11.5}};
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Point2 a = corners[i];
+    const Point2 b = corners[(i + 1) % 4];
+    const double gap = random.uniform(0.3, 0.6);
+    const auto along = [&](double t) {
+      return Point2{a.x_m + t * (b.x_m - a.x_m), a.y_m + t * (b.y_m - a.y_m)};
+    };
+    const double height = random.uniform(0.9, 1.8);
+    add_hedge(builder, "hedge " + std::to_string(2 * i), a, along(gap), height);
+    add_hedge(builder, "hedge " + std::to_string(2 * i + 1), along(gap + 0.18), b, height);
+  }
+  const FloorArea plot{{-1.0, -1.0}, {13.0, 11.0}};
+  scene.tour = {{1.0, 1.0}, {11.0, 1.0}, {11.0, 9.0}, {1.0, 9.0}};
+  const auto place = [&](double radius_m) {
+    Point2 at;
+    do {
+      at = {random.uniform(0.0, 12.0), random.uniform(0.0, 10.0)};
+    } while (!builder.leaves_tour_free(at, radius_m));
+    return at;
+  };
+  constexpr double kTrunk = 0.4;
+  constexpr double kBox = 0.7;
+  for (int i = 0; i < 7; ++i) {
+    const Footing wanted{place(kTrunk), 0.0};
+    const double height_m = random.uniform(2.0, 4.5);
+    const TreeKind kind = make_tree_kind(builder);
+    add_tree(builder, "tree " + std::to_string(i), kind,
+             builder.movable(wanted, kTrunk, plot).centre, height_m);
+  }
+  for (int i = 0; i < 5; ++i) {
+    const Footing wanted{place(kBox), random.uniform(-3.0, 3.0)};
+    add_crate(builder, "flower box " + std::to_string(i), builder.movable(wanted, kBox, plot),
+              {random.uniform(0.4, 1.2), random.uniform(0.3, 0.6), random.uniform(0.3, 0.8)});
+  }
+  const Colour plaster = tint(random, 0.4, 0.8, 0.2);
+  const Footing house{{random.uniform(2.0, 10.0), 18.0}, random.uniform(-0.2, 0.2)};
+  add_house(builder, "house", house, {9.0, 6.0, 3.2}, plaster, {0.5F, 0.25F, 0.2F});
+  const Colour tar = tint(random, 0.15, 0.4, 0.2);
+  const Footing shed{{-5.0, random.uniform(2.0, 8.0)}, random.uniform(1.2, 1.9)};
+  add_house(builder, "shed", shed, {3.0, 2.2, 2.0}, builder.palette().wood, tar);
+  // Far trees, of a few kinds, make the horizon.
+  std::array<TreeKind, 6> kinds;
+  for (TreeKind& kind : kinds) kind = make_tree_kind(builder);
+  for (int i = 0; i < 60; ++i) {
+    const double angle = 2.0 * std::numbers::pi * (i + random.uniform(-0.5, 0.5)) / 60.0;
+    const double radius = random.uniform(25.0, 90.0);
+    const double height_m = random.uniform(4.0, 12.0);
+    const TreeKind& kind = kinds[random.index(kinds.size())];
+    add_tree(builder, "far tree " + std::to_string(i), kind,
+             {middle.x_m + radius * std::cos(angle), middle.y_m + radius * std::sin(angle)},
+             height_m);
+  }
+  return builder.finish();
+}
+
+Scene make_arena(const SceneVariation& variation) {
+  SceneBuilder builder("arena", variation);
+  Scene& scene = builder.scene();
+  Random& random = builder.random();
+  scene.floor_low = {0.0, 0.0};
+  scene.floor_high = {1.4, 1.2};
+  scene.camera_height_m = 0.08;
+  scene.robot_radius_m = 0.0275;
+  scene.ambient = 0.5F;
+  const int table = builder.textured(noise_texture(random, 128, {0.55F, 0.55F, 0.5F}, 0.06));
+  // A little above the floor of the lab, so that the two do not compete.
+  builder.floor(table, {-0.04, -0.04}, {1.44, 1.24}, 0.4, 0.002);
+  // The lab around the table, seen above the houses.
+  const FloorArea lab{{-2.0, -2.0}, {3.4, 3.2}};
+  furnish_room_shell(builder, lab, 2.2);
+  // One lamp stands to the side, so that houses have a bright and a dark face.
+  builder.lamp({random.uniform(-1.5, -0.5), random.uniform(-1.5, 2.7), 1.9}, 2.5F);
+  builder.lamp({0.7, 0.6, 2.0}, 0.5F);
+
+  // A low wall around the town: painted, dark in places and bright in others.
+  const std::array<Point2, 4> wall{Point2{-0.04, -0.04}, Point2{1.44, -0.04}, Point2{1.44, 1.24},
+                                   Point2{-0.04, 1.24}};
+  for (std::size_t i = 0; i < 4; ++i) {
+    builder.wall(
+        "border " + std::to_string(i),
+        builder.textured(noise_texture(random, 128, tint(random, 0.2, 0.75, 0.15), 0.35, 3.0)),
+        wall[i], wall[(i + 1) % 4], 0.16, 1.0);
+  }
+  // Two rows of three blocks with streets of 20 cm and more around each, one or two houses a block.
+  const FloorArea plot{{0.0, 0.0}, {1.4, 1.2}};
+  int number = 0;
+  for (const double y : {0.38, 0.82}) {
+    for (const double x : {0.3, 0.7, 1.1}) {
+      const Colour paint = tint(random, 0.15, 0.85, 0.3);
+      const Colour tiles = tint(random, 0.15, 0.5, 0.4);
+      const Footing block{
+          {x + random.normal(0.0, 0.015), y + random.normal(0.0, 0.015)},
+          random.uniform() < 0.5 ? random.normal(0.0, 0.12) : 1.57 + random.normal(0.0, 0.12)};
+      const Footing footing = builder.movable(block, 0.1, plot);
+      const bool pair = random.uniform() < 0.4;
+      const double length = pair ? 0.085 : random.uniform(0.12, 0.18);
+      for (const double side : pair ? std::array{-0.05, 0.05} : std::array{0.0, 0.0}) {
+        const Footing place{{footing.centre.x_m + side * std::cos(footing.turn_rad),
+                             footing.centre.y_m + side * std::sin(footing.turn_rad)},
+                            footing.turn_rad};
+        const Colour plaster = alike(random, paint);
+        const Vector3 size{length, random.uniform(0.09, 0.14), random.uniform(0.1, 0.17)};
+        add_house(builder, "house " + std::to_string(number++), place, size, plaster, tiles);
+        if (!pair) break;
+      }
+    }
+  }
+  scene.tour = {{0.1, 0.12}, {1.3, 0.12}, {1.3, 1.08}, {0.1, 1.08}};
+  return builder.finish();
+}
+
+}  // namespace panonav::simulation

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace panonav::simulation {
+
+struct Ray {
+  std::array<float, 3> origin{};
+  std::array<float, 3> direction{};  ///< of unit length
+};
+
+struct RayHit {
+  static constexpr std::uint32_t kNothing = 0xFFFFFFFFU;
+  float distance_m = 0.0F;
+  float u = 0.0F;  ///< weight of the triangle's second corner
+  float v = 0.0F;  ///< weight of its third
+  std::uint32_t triangle = kNothing;
+};
+
+/// Embree behind plain values. Immutable once built, so any number of threads may trace.
+class RayTracer {
+ public:
+  using Vertex = std::array<float, 3>;
+  using Triangle = std::array<std::uint32_t, 3>;
+
+  /// `instructions` is empty (the best that the processor has) or an instruction set as Embree
+  /// names it.
+  RayTracer(std::span<const Vertex> vertices, std::span<const Triangle> triangles,
+            const std::string& instructions);
+  ~RayTracer();
+  RayTracer(const RayTracer&) = delete;
+  RayTracer& operator=(const RayTracer&) = delete;
+
+  /// First hit of each ray. Neighbouring rays should be alike: they are traced in packets.
+  void trace(std::span<const Ray> rays, std::span<RayHit> hits) const;
+  [[nodiscard]] RayHit first_hit(const Ray& ray) const;
+
+ private:
+  struct Handles;
+  std::unique_ptr<Handles> handles_;
+};
+
+}  // namespace panonav::simulation

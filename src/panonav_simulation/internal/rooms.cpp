@@ -1,0 +1,209 @@
+// Scenes that are one room: office, lab, hall.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <string>
+
+#include "panonav_simulation/furniture.hpp"
+#include "panonav_simulation/internal/built_in_scenes.hpp"
+
+namespace panonav::simulation {
+
+namespace {
+
+constexpr double kQuarterTurn = 0.5 * std::numbers::pi;
+
+// Numbers that stand for kinds of furniture in `furnish_row`.
+constexpr double kDesks = 0.15;
+constexpr double kShelves = 0.6;
+
+// A row of furniture along a straight line, in random order and spacing, facing `turn_rad`. It
+// begins with things of `first_kind`, if that is given.
+void furnish_row(SceneBuilder& builder, const FloorArea& room, const std::string& name, Point2 from,
+                 Point2 to, double turn_rad, std::optional<double> first_kind) {
+  Random& random = builder.random();
+  const double length = distance(from, to);
+  const double ux = (to.x_m - from.x_m) / length;
+  const double uy = (to.y_m - from.y_m) / length;
+  double along = random.uniform(0.2, 0.5);
+  int number = 0;
+  double kind = random.uniform();
+  while (along < length - 0.3) {
+    // Things of a kind stand together.
+    if (random.uniform() < 0.35) kind = random.uniform();
+    if (number == 0 && first_kind) kind = *first_kind;
+    const bool is_desk = kind < 0.3;
+    const bool is_wardrobe = !is_desk && kind < 0.5;
+    const bool is_shelf = kind >= 0.5 && kind < 0.67;
+    const double width = is_desk       ? 1.5
+                         : is_wardrobe ? random.uniform(1.1, 2.2)
+                         : is_shelf    ? 1.0
+                                       : 0.7;
+    const Point2 at{from.x_m + ux * (along + 0.5 * width), from.y_m + uy * (along + 0.5 * width)};
+    const std::string piece = name + " " + std::to_string(number++);
+    const Footing wanted{at, turn_rad + random.normal(0.0, 0.05)};
+    // Nobody moves a wardrobe.
+    const Footing footing = is_wardrobe ? wanted : builder.movable(wanted, 0.5 * width, room);
+    if (is_desk) {
+      add_desk(builder, piece, footing);
+      const Point2 before{footing.centre.x_m + 0.45 * std::sin(footing.turn_rad),
+                          footing.centre.y_m - 0.45 * std::cos(footing.turn_rad)};
+      add_chair(builder, piece + " chair", {before, random.uniform(-3.0, 3.0)});
+    } else if (is_wardrobe) {
+      add_wardrobe(builder, piece, footing, width, random.uniform(1.3, 2.1));
+    } else if (is_shelf) {
+      add_shelf(builder, piece, footing, width - 0.1, random.uniform(1.2, 2.1));
+    } else if (kind < 0.82) {
+      add_cabinet(builder, piece, footing);
+    } else if (kind < 0.9) {
+      add_plant(builder, piece, footing.centre);
+    } else {
+      add_crate(builder, piece, footing,
+                {random.uniform(0.3, 0.6), random.uniform(0.3, 0.6), random.uniform(0.3, 1.2)});
+    }
+    along += width + random.uniform(0.0, 0.5);
+  }
+}
+
+// How the rows of furniture along the long walls begin; empty: with anything.
+struct RowBeginnings {
+  std::optional<double> south{};
+  std::optional<double> north{};
+};
+
+// Furniture along all four walls, `depth_m` from them.
+void furnish_walls(SceneBuilder& builder, const FloorArea& room, double depth_m,
+                   const RowBeginnings& beginnings = {}) {
+  const Point2 a{room.low.x_m + depth_m, room.low.y_m + depth_m};
+  const Point2 b{room.high.x_m - depth_m, room.low.y_m + depth_m};
+  const Point2 c{room.high.x_m - depth_m, room.high.y_m - depth_m};
+  const Point2 d{room.low.x_m + depth_m, room.high.y_m - depth_m};
+  furnish_row(builder, room, "south", a, b, 2.0 * kQuarterTurn, beginnings.south);
+  furnish_row(builder, room, "east", b, c, -kQuarterTurn, std::nullopt);
+  furnish_row(builder, room, "north", c, d, 0.0, beginnings.north);
+  furnish_row(builder, room, "west", d, a, kQuarterTurn, std::nullopt);
+}
+
+// Some lamps shine and some hardly: from `weakest` to `strongest`.
+void add_lamps(SceneBuilder& builder, const FloorArea& room, double height_m, double spacing_m,
+               double weakest = 0.1, double strongest = 1.0) {
+  const double width = room.high.x_m - room.low.x_m;
+  const double depth = room.high.y_m - room.low.y_m;
+  const int columns = std::max(1, static_cast<int>(width / spacing_m));
+  const int rows = std::max(1, static_cast<int>(depth / spacing_m));
+  const int shine = builder.plain({0.98F, 0.98F, 0.95F}, 1.0F);
+  for (int i = 0; i < columns; ++i) {
+    for (int j = 0; j < rows; ++j) {
+      const Point2 at{room.low.x_m + (i + 0.5) * width / columns,
+                      room.low.y_m + (j + 0.5) * depth / rows};
+      builder.lamp({at.x_m, at.y_m, height_m - 0.2},
+                   static_cast<float>(builder.random().uniform(weakest, strongest)));
+      builder.box("lamp", shine, shine, {at, 0.0}, {0.0, 0.0, height_m - 0.1}, {1.2, 0.25, 0.06});
+    }
+  }
+}
+
+}  // namespace
+
+Scene make_office(const SceneVariation& variation) {
+  SceneBuilder builder("office", variation);
+  Scene& scene = builder.scene();
+  scene.floor_low = {0.0, 0.0};
+  scene.floor_high = {5.0, 2.0};
+  scene.drivable = {{{-0.25, -0.25}, {5.25, 2.25}}};
+  scene.ambient = 0.4F;
+  const FloorArea room{{-1.6, -1.5}, {6.6, 3.5}};
+  constexpr double kHeight = 2.6;
+  furnish_room_shell(builder, room, kHeight);
+  // So near to the walls that the chairs before the desks leave the 5 x 2 m free.
+  furnish_walls(builder, room, 0.5, {kDesks, kShelves});
+  add_lamps(builder, room, kHeight, 2.5);
+  scene.tour = {{0.3, 0.3}, {4.7, 0.3}, {4.7, 1.7}, {0.3, 1.7}};
+  return builder.finish();
+}
+
+Scene make_lab(const SceneVariation& variation) {
+  SceneBuilder builder("lab", variation);
+  Scene& scene = builder.scene();
+  scene.floor_low = {0.0, 0.0};
+  scene.floor_high = {7.0, 5.0};
+  scene.drivable = {{{0.9, 1.2}, {6.1, 3.8}}};
+  scene.ambient = 0.4F;
+  const FloorArea room{{0.0, 0.0}, {7.0, 5.0}};
+  constexpr double kHeight = 2.8;
+  furnish_room_shell(builder, room, kHeight);
+  furnish_walls(builder, room, 0.5);
+  add_lamps(builder, room, kHeight, 2.5);
+  scene.tour = {{1.6, 1.6}, {5.4, 1.6}, {5.4, 3.4}, {1.6, 3.4}};
+  return builder.finish();
+}
+
+Scene make_hall(const SceneVariation& variation, bool periodic) {
+  SceneBuilder builder(periodic ? "hall_periodic" : "hall", variation);
+  Scene& scene = builder.scene();
+  Random& random = builder.random();
+  scene.floor_low = {0.0, 0.0};
+  scene.floor_high = {7.0, 7.0};
+  scene.drivable = {{{-0.3, -0.3}, {7.3, 7.3}}};
+  scene.ambient = 0.4F;
+  const FloorArea room{{-2.0, -2.0}, {9.0, 9.0}};
+  constexpr double kHeight = 3.5;
+  if (!periodic) {
+    furnish_room_shell(builder, room, kHeight);
+    furnish_walls(builder, room, 0.9);
+    add_lamps(builder, room, kHeight, 3.0);
+    scene.tour = {{0.5, 0.5}, {6.5, 0.5}, {6.5, 6.5}, {0.5, 6.5}};
+    return builder.finish();
+  }
+  // Every wall carries the same picture and pillar every 2 m; one clock and one door tell the walls
+  // apart.
+  const Colour joint = tint(random, 0.1, 0.4, 0.1);
+  const Colour tile = tint(random, 0.3, 0.6, 0.1);
+  builder.floor(builder.textured(brick_texture(random, 128, 2, 2, tile, joint)), room.low,
+                room.high, 1.0);
+  builder.ceiling(builder.plain({0.85F, 0.85F, 0.83F}), room.low, room.high, kHeight, 1.0);
+  const int plaster =
+      builder.textured(noise_texture(random, 128, tint(random, 0.45, 0.8, 0.1), 0.05));
+  const int poster = builder.textured(poster_texture(random, 128));
+  const int door = builder.textured(door_texture(random, 128, tint(random, 0.2, 0.6, 0.3)));
+  const int stone = builder.textured(noise_texture(random, 128, tint(random, 0.15, 0.7, 0.1), 0.1));
+  const std::array<Point2, 4> corners{room.low, Point2{room.high.x_m, room.low.y_m}, room.high,
+                                      Point2{room.low.x_m, room.high.y_m}};
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Point2 from = corners[i];
+    const Point2 to = corners[(i + 1) % 4];
+    const std::string wall = "wall " + std::to_string(i);
+    const double length = distance(from, to);
+    const auto on_line = [&](double along) {
+      const double share = along / length;
+      return Point2{from.x_m + share * (to.x_m - from.x_m), from.y_m + share * (to.y_m - from.y_m)};
+    };
+    constexpr double kPillar = 0.35;
+    double wall_from = 0.0;  // the wall runs from pillar to pillar
+    for (double along = 0.5; along + 1.0 < length; along += 2.0) {
+      const bool is_door = i == 0 && std::abs(along - 4.5) < 1e-9;
+      if (is_door) {
+        builder.on_wall("door", door, from, to, along, 0.9, 0.0, 2.1);
+      } else {
+        builder.on_wall(wall + " picture", poster, from, to, along, 0.9, 0.6, 1.8);
+      }
+      const double pillar = along + 1.45;
+      builder.box(wall + " pillar", stone, stone, {on_line(pillar), 0.0}, {0.0, 0.0, 0.0},
+                  {kPillar, kPillar, kHeight}, 1.0);
+      builder.wall(wall, plaster, on_line(wall_from), on_line(pillar - 0.5 * kPillar), kHeight,
+                   2.0);
+      wall_from = pillar + 0.5 * kPillar;
+    }
+    builder.wall(wall, plaster, on_line(wall_from), to, kHeight, 2.0);
+  }
+  builder.on_wall("clock", builder.textured(poster_texture(random, 64)), corners[2], corners[3],
+                  4.65, 0.6, 2.0, 2.6);
+  add_lamps(builder, room, kHeight, 3.0, 0.6, 0.6);
+  scene.tour = {{0.5, 0.5}, {6.5, 0.5}, {6.5, 6.5}, {0.5, 6.5}};
+  return builder.finish();
+}
+
+}  // namespace panonav::simulation

@@ -1,0 +1,350 @@
+#include "panonav_simulation/load_mesh.hpp"
+
+#include <assimp/material.h>
+#include <assimp/postprocess.h>
+#include <assimp/scene.h>
+
+#include <assimp/DefaultIOSystem.h>
+#include <algorithm>
+#include <assimp/Importer.hpp>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
+#include "panonav_simulation/internal/gazebo_files.hpp"
+#include "panonav_simulation/internal/mesh_library.hpp"
+#include "panonav_simulation/internal/xml.hpp"
+
+namespace panonav::simulation {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+Affine3 affine(const aiMatrix4x4& m) {
+  return {{m.a1, m.a2, m.a3, m.b1, m.b2, m.b3, m.c1, m.c2, m.c3}, {m.a4, m.b4, m.c4}};
+}
+
+std::string lower_ending(const fs::path& path) {
+  return lower_case(path.extension().string());
+}
+
+// What turns the importer's axes into z up. It has turned COLLADA files to y up already.
+Affine3 upright(UpAxis up, const fs::path& path) {
+  const std::string ending = lower_ending(path);
+  const bool y_up_format = ending == ".dae" || ending == ".gltf" || ending == ".glb";
+  const bool y_up = up == UpAxis::y || (up == UpAxis::of_format && y_up_format);
+  if (!y_up) return {};
+  return {{1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0}, {}};
+}
+
+std::array<float, 3> colour(const aiColor3D& c) {
+  const auto clamp = [](float value) {
+    return std::isfinite(value) ? std::clamp(value, 0.0F, 1.0F) : 0.0F;
+  };
+  return {clamp(c.r), clamp(c.g), clamp(c.b)};
+}
+
+Material material_of(const aiMaterial& source, const fs::path& path, TextureStore& textures) {
+  Material material;
+  aiColor3D diffuse;
+  if (source.Get(AI_MATKEY_COLOR_DIFFUSE, diffuse) == AI_SUCCESS) material.colour = colour(diffuse);
+  aiString file;
+  for (const aiTextureType type : {aiTextureType_DIFFUSE, aiTextureType_BASE_COLOR}) {
+    if (material.texture || source.GetTexture(type, 0, &file) != AI_SUCCESS) continue;
+    material.texture = textures.find(file.C_Str(), path.parent_path());
+  }
+  // Formats differ in whether the colour tints the texture, and exporters write black or grey
+  // beside a texture that is meant to be seen as it is.
+  if (material.texture) material.colour = {1.0F, 1.0F, 1.0F};
+  aiColor3D emissive;
+  if (!material.texture && source.Get(AI_MATKEY_COLOR_EMISSIVE, emissive) == AI_SUCCESS) {
+    const auto shine = colour(emissive);
+    const float strength = std::max({shine[0], shine[1], shine[2]});
+    const float body = std::max({material.colour[0], material.colour[1], material.colour[2]});
+    if (strength > body) {
+      material.colour = shine;
+      material.emission = 1.0F;
+    }
+  }
+  return material;
+}
+
+Mesh mesh_of(const aiMesh& source, const Affine3& world_from_mesh) {
+  Mesh mesh;
+  mesh.vertices.reserve(source.mNumVertices);
+  for (unsigned i = 0; i < source.mNumVertices; ++i) {
+    const aiVector3D& v = source.mVertices[i];
+    mesh.vertices.push_back(world_from_mesh * Vector3{v.x, v.y, v.z});
+  }
+  if (source.HasTextureCoords(0)) {
+    mesh.texture_coordinates.reserve(source.mNumVertices);
+    for (unsigned i = 0; i < source.mNumVertices; ++i) {
+      const aiVector3D& t = source.mTextureCoords[0][i];
+      mesh.texture_coordinates.push_back({t.x, t.y});
+    }
+  }
+  for (unsigned i = 0; i < source.mNumFaces; ++i) {
+    const aiFace& face = source.mFaces[i];
+    if (face.mNumIndices != 3) continue;
+    mesh.triangles.push_back({face.mIndices[0], face.mIndices[1], face.mIndices[2]});
+  }
+  return mesh;
+}
+
+bool all_finite(const Mesh& mesh) {
+  return std::all_of(mesh.vertices.begin(), mesh.vertices.end(),
+                     [](const Vector3& v) {
+                       return std::isfinite(v.x_m) && std::isfinite(v.y_m) && std::isfinite(v.z_m);
+                     }) &&
+         std::all_of(mesh.texture_coordinates.begin(), mesh.texture_coordinates.end(),
+                     [](const auto& t) { return std::isfinite(t[0]) && std::isfinite(t[1]); });
+}
+
+struct Collector {
+  const aiScene& source;
+  const fs::path& path;
+  std::vector<Material> materials;
+  std::vector<FileMesh> meshes;
+
+  void visit(const aiNode& node, const Affine3& world_from_parent) {
+    const Affine3 world_from_node = world_from_parent * affine(node.mTransformation);
+    for (unsigned i = 0; i < node.mNumMeshes; ++i) {
+      const aiMesh& mesh = *source.mMeshes[node.mMeshes[i]];
+      FileMesh result{node.mName.C_Str(), mesh.mName.C_Str(), materials.at(mesh.mMaterialIndex),
+                      mesh_of(mesh, world_from_node)};
+      if (result.mesh.triangles.empty()) continue;
+      if (!all_finite(result.mesh)) {
+        throw FileError(path.string(), "mesh \"" + result.geometry +
+                                           "\" has a coordinate that is not a finite number");
+      }
+      meshes.push_back(std::move(result));
+    }
+    for (unsigned i = 0; i < node.mNumChildren; ++i) visit(*node.mChildren[i], world_from_node);
+  }
+};
+
+// Mesh files name others: materials, buffers. Those that are no regular files do not count as
+// there.
+class RegularFiles final : public Assimp::DefaultIOSystem {
+ public:
+  Assimp::IOStream* Open(const char* file, const char* mode) override {
+    try {
+      require_scene_file(file);
+    } catch (const FileError&) {
+      return nullptr;
+    }
+    return Assimp::DefaultIOSystem::Open(file, mode);
+  }
+};
+
+// Collada as the importer refuses it: polygons with holes, blanks before the numbers of a colour.
+// The holes become part of the outline, each joined to it by a cut between the vertices that are
+// nearest to each other.
+class ColladaHoles {
+ public:
+  explicit ColladaHoles(XmlElement& root) {
+    collect(root);
+    for (XmlElement* polygons : polygons_) join_holes(*polygons);
+  }
+
+ private:
+  using Corner = std::vector<double>;  // the indices of one vertex, one for each input
+  using Outline = std::vector<Corner>;
+
+  void collect(XmlElement& element) {
+    if (!element.attribute("id").empty())
+      by_id_.emplace("#" + std::string(element.attribute("id")), &element);
+    if (element.name == "polygons") polygons_.push_back(&element);
+    for (XmlElement& child : element.children) collect(child);
+  }
+
+  [[nodiscard]] const XmlElement* source_of(const XmlElement& element,
+                                            std::string_view semantic) const {
+    for (const XmlElement& input : element.children) {
+      if (input.name != "input" || input.attribute("semantic") != semantic) continue;
+      const auto found = by_id_.find(std::string(input.attribute("source")));
+      return found == by_id_.end() ? nullptr : found->second;
+    }
+    return nullptr;
+  }
+
+  void join_holes(XmlElement& polygons) {
+    const XmlElement* vertices = source_of(polygons, "VERTEX");
+    const XmlElement* source = vertices == nullptr ? nullptr : source_of(*vertices, "POSITION");
+    const XmlElement* array = source == nullptr ? nullptr : source->child("float_array");
+    positions_ = array == nullptr ? std::nullopt : numbers_of(array->text);
+    inputs_ = 1;
+    vertex_input_ = 0;
+    for (const XmlElement& input : polygons.children) {
+      const auto offset = numbers_of(input.attribute("offset"));
+      if (input.name != "input" || !offset || offset->size() != 1) continue;
+      if (!(offset->front() >= 0.0 && offset->front() < 32.0)) return;
+      const auto number = static_cast<std::size_t>(offset->front());
+      inputs_ = std::max(inputs_, number + 1);
+      if (input.attribute("semantic") == "VERTEX") vertex_input_ = number;
+    }
+    for (XmlElement& polygon : polygons.children) {
+      if (polygon.name != "ph") continue;
+      Outline outline;
+      for (const XmlElement& ring : polygon.children) {
+        if (ring.name == "p") outline = corners(ring);
+      }
+      for (const XmlElement& ring : polygon.children) {
+        if (ring.name == "h") join(outline, corners(ring));
+      }
+      polygon = {"p", {}, {}, {}};
+      for (const Corner& corner : outline) {
+        for (const double index : corner) polygon.text += std::to_string(std::lround(index)) + " ";
+      }
+    }
+  }
+
+  [[nodiscard]] Outline corners(const XmlElement& ring) const {
+    const auto indices = numbers_of(ring.text).value_or(std::vector<double>{});
+    Outline outline;
+    for (std::size_t i = 0; i + inputs_ <= indices.size(); i += inputs_)
+      outline.emplace_back(&indices[i], &indices[i] + inputs_);
+    return outline;
+  }
+
+  [[nodiscard]] Vector3 position(const Corner& corner) const {
+    const double index = corner[vertex_input_];
+    if (!positions_ || !(index >= 0.0 && index < static_cast<double>(positions_->size() / 3)))
+      throw Error("a vertex that is not there");
+    const double* p = &(*positions_)[3 * static_cast<std::size_t>(index)];
+    return {p[0], p[1], p[2]};
+  }
+
+  // Twice the area times the normal.
+  [[nodiscard]] Vector3 turn(const Outline& outline) const {
+    Vector3 sum{};
+    for (std::size_t i = 0; i < outline.size(); ++i) {
+      const Vector3 a = position(outline[i]);
+      const Vector3 b = position(outline[(i + 1) % outline.size()]);
+      sum.x_m += a.y_m * b.z_m - a.z_m * b.y_m;
+      sum.y_m += a.z_m * b.x_m - a.x_m * b.z_m;
+      sum.z_m += a.x_m * b.y_m - a.y_m * b.x_m;
+    }
+    return sum;
+  }
+
+  void join(Outline& outline, Outline hole) const {
+    if (outline.empty() || hole.empty()) return;
+    const Vector3 a = turn(outline);
+    const Vector3 b = turn(hole);
+    if (a.x_m * b.x_m + a.y_m * b.y_m + a.z_m * b.z_m > 0.0) std::reverse(hole.begin(), hole.end());
+    constexpr std::size_t max_pairs = 10000000;
+    if (outline.size() > max_pairs / hole.size()) throw Error("too many vertices around a hole");
+    double nearest = std::numeric_limits<double>::infinity();
+    std::size_t at_outline = 0;
+    std::size_t at_hole = 0;
+    for (std::size_t h = 0; h < hole.size(); ++h) {
+      const Vector3 q = position(hole[h]);
+      for (std::size_t o = 0; o < outline.size(); ++o) {
+        const Vector3 p = position(outline[o]);
+        const double distance = std::hypot(p.x_m - q.x_m, p.y_m - q.y_m, p.z_m - q.z_m);
+        if (!(distance < nearest)) continue;
+        nearest = distance;
+        at_outline = o;
+        at_hole = h;
+      }
+    }
+    std::rotate(hole.begin(), hole.begin() + static_cast<std::ptrdiff_t>(at_hole), hole.end());
+    hole.push_back(hole.front());
+    hole.push_back(outline[at_outline]);
+    outline.insert(outline.begin() + static_cast<std::ptrdiff_t>(at_outline) + 1, hole.begin(),
+                   hole.end());
+  }
+
+  std::map<std::string, const XmlElement*> by_id_;
+  std::vector<XmlElement*> polygons_;
+  std::optional<std::vector<double>> positions_;
+  std::size_t inputs_ = 1;
+  std::size_t vertex_input_ = 0;
+};
+
+std::optional<std::string> readable_collada(const fs::path& path) {
+  try {
+    XmlElement root = parse_xml(text_of_scene_file(path));
+    const ColladaHoles joined(root);
+    return to_xml(root);
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
+}  // namespace
+
+const std::vector<FileMesh>& MeshLibrary::read(const fs::path& path, UpAxis up) {
+  const Key key{path.lexically_normal().string(), up};
+  if (const auto known = files_.find(key); known != files_.end()) return known->second;
+  if (const auto known = faults_.find(key); known != faults_.end()) throw known->second;
+  try {
+    return files_.emplace(key, read_new(path, up)).first->second;
+  } catch (const FileError& error) {
+    faults_.emplace(key, error);
+    throw;
+  }
+}
+
+std::vector<FileMesh> MeshLibrary::read_new(const fs::path& path, UpAxis up) {
+  require_scene_file(path);
+  Assimp::Importer importer;
+  importer.SetIOHandler(new RegularFiles);  // the importer owns it
+  importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE,
+                              aiPrimitiveType_LINE | aiPrimitiveType_POINT);
+  importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS,
+                              aiComponent_NORMALS | aiComponent_TANGENTS_AND_BITANGENTS |
+                                  aiComponent_COLORS | aiComponent_BONEWEIGHTS |
+                                  aiComponent_ANIMATIONS | aiComponent_LIGHTS |
+                                  aiComponent_CAMERAS);
+  constexpr unsigned steps = aiProcess_RemoveComponent | aiProcess_Triangulate |
+                             aiProcess_SortByPType | aiProcess_JoinIdenticalVertices |
+                             aiProcess_ValidateDataStructure;
+  const aiScene* source = importer.ReadFile(path.string(), steps);
+  const std::string fault = importer.GetErrorString();
+  if (source == nullptr && lower_ending(path) == ".dae") {
+    if (const auto text = readable_collada(path))
+      source = importer.ReadFileFromMemory(text->data(), text->size(), steps, "dae");
+  }
+  if (source == nullptr || source->mRootNode == nullptr)
+    throw FileError(path.string(), "not a readable mesh file: " + readable_line(fault));
+  Collector collector{*source, path, {}, {}};
+  for (unsigned i = 0; i < source->mNumMaterials; ++i) {
+    collector.materials.push_back(material_of(*source->mMaterials[i], path, textures_));
+  }
+  collector.visit(*source->mRootNode, upright(up, path));
+  if (collector.meshes.empty()) throw FileError(path.string(), "holds no triangles");
+  return std::move(collector.meshes);
+}
+
+Scene load_mesh(const fs::path& path, const MeshOptions& options) {
+  require(options.scale > 0.0 && std::isfinite(options.scale), "scale", options.scale, "> 0");
+  TextureStore textures(options.textures);
+  MeshLibrary library(textures);
+  Scene scene;
+  scene.name = path.stem().string();
+  const Affine3 scaling = Affine3::scaling(options.scale, options.scale, options.scale);
+  for (const FileMesh& part : library.read(path, options.up)) {
+    scene.materials.push_back(part.material);
+    place_mesh(scene, part.mesh, scaling, part.node.empty() ? part.geometry : part.node,
+               static_cast<int>(scene.materials.size()) - 1);
+  }
+  const auto [low, high] = *extent(scene);
+  scene.floor_low = {low.x_m, low.y_m};
+  scene.floor_high = {high.x_m, high.y_m};
+  // Like a ceiling lamp: in the middle, a tenth below the top, as bright at the floor as the
+  // ambient light.
+  const double height = high.z_m - low.z_m;
+  const double lamp = low.z_m + 0.9 * height;
+  scene.lights.push_back({{0.5 * (low.x_m + high.x_m), 0.5 * (low.y_m + high.y_m), lamp},
+                          static_cast<float>(0.5 * (lamp - low.z_m) * (lamp - low.z_m))});
+  scene.warnings = textures.warnings();
+  return scene;
+}
+
+}  // namespace panonav::simulation

@@ -1,0 +1,498 @@
+#include "panonav_simulation/mission.hpp"
+#include "panonav_simulation/make_each.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/localisation/monte_carlo.hpp"
+#include "panonav/mapping/lattice.hpp"
+#include "panonav/motion/path.hpp"
+#include "panonav/motion/trajectory.hpp"
+#include "panonav/panorama/preprocessing.hpp"
+#include "panonav/signature/fourier_signature.hpp"
+#include "panonav_simulation/line_camera.hpp"
+#include "panonav_simulation/mapping_run.hpp"
+#include "panonav_simulation/simulated_robot.hpp"
+
+namespace panonav::simulation {
+
+namespace {
+
+// Between robot and things where references are taken.
+constexpr double room_m = 0.2;
+// Between the lines of a route at most.
+constexpr double line_spacing_m = 0.1;
+
+std::vector<FourierSignature> see_all(const MissionPlace& place, const std::vector<Pose2>& poses,
+                                      std::uint64_t seed, Executor& executor) {
+  return make_each(executor, poses.size(),
+                   [&](std::size_t i) { return see(place, poses[i], Random(seed, i).next()); });
+}
+
+// Without views; packs so that the largest magnitude of these just fits.
+VisualMemory empty_memory(const std::vector<FourierSignature>& views) {
+  float largest = 0.0F;
+  for (const FourierSignature& view : views) {
+    largest = std::max(largest, *std::ranges::max_element(view.magnitudes().subspan(
+                                    static_cast<std::size_t>(view.rows()))));
+  }
+  return {{views.front().rows(), views.front().components()},
+          largest > 0.0F ? largest : 1.0F,
+          views.front().elevations()};
+}
+
+// Of a drive whose poses the map has placed, from the first one in its largest component until one
+// is not.
+RoutePanorama record_route(const MissionPlace& place, const std::vector<Pose2>& poses,
+                           const TopologicalMap& map, std::uint64_t seed, Executor& executor) {
+  struct Stop {
+    Pose2 truth;
+    Pose2 mapped;
+  };
+  std::vector<Stop> stops;
+  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
+    if (map.nodes[i].component != 0) {
+      if (stops.empty()) continue;
+      break;
+    }
+    const Stop next{poses[i], map.nodes[i].pose};
+    if (stops.empty()) {
+      stops.push_back(next);
+      continue;
+    }
+    const Stop last = stops.back();
+    const double far_m = distance(last.mapped.position(), next.mapped.position());
+    const int steps = std::max(1, static_cast<int>(std::ceil(far_m / line_spacing_m)));
+    for (int k = 1; k <= steps; ++k) {
+      const double share = static_cast<double>(k) / steps;
+      stops.push_back({interpolate(last.truth, next.truth, share),
+                       interpolate(last.mapped, next.mapped, share)});
+    }
+  }
+  auto lines = make_each(executor, stops.size(), [&](std::size_t i) {
+    return place.line(stops[i].truth, Random(seed, i).next());
+  });
+  RoutePanorama route(static_cast<int>(lines.front().size()));
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    static_cast<void>(route.append(stops[i].mapped, std::span<const float>(lines[i])));
+  }
+  return route;
+}
+
+// The shortest way, or the straight one where the map of free places has none.
+double shortest_way_m(const FreeSpace& space, Point2 from, Point2 to) {
+  if (!std::isfinite(to.x_m) || !std::isfinite(to.y_m)) return distance(from, to);
+  const auto way = space.shortest_path(from, to);
+  return way ? path_length_m(*way) : distance(from, to);
+}
+
+}  // namespace
+
+MissionPlace make_mission_place(Scene scene, Executor& executor, std::optional<Point2> inside) {
+  MissionPlace place;
+  place.scene = std::move(scene);
+  place.free_space =
+      std::make_shared<const FreeSpace>(place.scene, free_space_options(place.scene), inside);
+  place.renderer = std::make_shared<const Renderer>(place.scene, RendererOptions{}, executor);
+  return place;
+}
+
+std::function<std::vector<float>(const Pose2& pose, std::uint64_t seed)> mirror_lines(
+    const MissionPlace& place) {
+  const auto camera =
+      std::make_shared<const LineCamera>(make_line_camera(place.scene.camera_height_m));
+  return [camera, renderer = place.renderer](const Pose2& pose, std::uint64_t seed) {
+    return take_line(*renderer, pose, *camera, seed);
+  };
+}
+
+FourierSignature see(const MissionPlace& place, const Pose2& pose, std::uint64_t seed,
+                     const People* people) {
+  if (place.sight) return place.sight(pose, seed);
+  Executor here(1);
+  const double height_m = place.scene.camera_height_m;
+  Panorama view =
+      place.renderer->render_panorama({.pose = pose, .height_m = height_m}, place.rendering, here);
+  if (people != nullptr) people->paint(view, pose, height_m);
+  return compute_signature(preprocess(apply_sensor(std::move(view), place.sensor, seed), {}),
+                           place.components);
+}
+
+RememberedPlace remember_grid(const MissionPlace& place, double spacing_m, std::uint64_t seed,
+                              Executor& executor) {
+  Random random(seed, 1);
+  std::vector<Pose2> poses;
+  for (const GridPosition& at : place.free_space->grid(spacing_m)) {
+    const double heading_rad = random.uniform(-std::numbers::pi, std::numbers::pi);
+    if (place.free_space->clearance_m(at.position) < place.scene.robot_radius_m + room_m) continue;
+    poses.push_back({at.position.x_m, at.position.y_m, heading_rad});
+  }
+  const auto views = see_all(place, poses, seed, executor);
+  VisualMemory memory = empty_memory(views);
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    static_cast<void>(memory.append(views[i], {.name = std::to_string(i)}));
+  }
+  const Lattice lattice = arrange(memory, {}, {}, executor);
+  RememberedPlace remembered{std::move(memory), graph_of_lattice(lattice), std::move(poses),
+                             spacing_m};
+  for (const LatticeNode& node : lattice.nodes) {
+    remembered.arranged.push_back(node.component == 0 ? std::optional(node.pose.position())
+                                                      : std::nullopt);
+  }
+  return remembered;
+}
+
+RememberedPlace remember_drive(const MissionPlace& place, const std::vector<Pose2>& poses,
+                               const OdometryNoise& wheels, std::uint64_t seed,
+                               Executor& executor) {
+  const auto views = see_all(place, poses, seed, executor);
+  const auto told = simulate_odometry(poses, wheels, seed);
+  VisualMemory memory = empty_memory(views);
+  TopologicalMapper mapper(memory);
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    std::optional<Pose2> moved;
+    if (i > 0) moved = inverse(told[i - 1]) * told[i];
+    static_cast<void>(mapper.add(memory.append(views[i], {.name = std::to_string(i)}),
+                                 OdometryView(views[i]), moved));
+  }
+  mapper.finish();
+  const TopologicalMap map = mapper.map();
+  for (const MapNode& node : map.nodes) {
+    if (node.component != 0) continue;
+    memory.set_pose(node.view, ReferencePose{node.pose.x_m, node.pose.y_m, node.pose.heading_rad});
+  }
+  const double way_m = path_length_m(poses);
+  NavigationGraph graph = graph_of_map_and_neighbours(map, memory, executor);
+  std::vector<KnownRoute> routes;
+  if (place.line) {
+    std::vector<RouteView> placed;
+    for (const MapNode& node : map.nodes) {
+      if (node.component == 0) placed.push_back({node.view, node.pose});
+    }
+    const std::uint64_t seed_of_lines = Random(seed, 1).next();
+    routes.push_back(known_route(record_route(place, poses, map, seed_of_lines, executor), placed));
+  }
+  return {std::move(memory), std::move(graph), poses,
+          way_m / static_cast<double>(std::max<std::size_t>(1, poses.size() - 1)),
+          std::move(routes)};
+}
+
+MissionRobot::MissionRobot(const MissionPlace& place, const BaseOptions& base,
+                           const OdometryNoise& motion, const Pose2& start, std::uint64_t seed,
+                           int people)
+    : space_(place.free_space.get()),
+      robot_radius_m_(place.scene.robot_radius_m),
+      people_(place.free_space, people, seed),
+      base_(base),
+      motion_(motion),
+      pose_(start),
+      random_(seed, 1) {
+  validate(base_);
+  motion_.drive = base_.drive;
+  validate(motion_);
+}
+
+bool MissionRobot::is_clear(Point2 from, Point2 to) const {
+  // Who stands too near already must not keep it from going away.
+  const bool somebody = people_.touch(to, robot_radius_m_) && !people_.touch(from, robot_radius_m_);
+  constexpr double fine_m = 0.01;
+  return !somebody && has_room_between(*space_, robot_radius_m_, from, to, fine_m);
+}
+
+void MissionRobot::wait(double seconds) {
+  people_.pass(seconds, pose_.position(), robot_radius_m_);
+}
+
+Pose2 MissionRobot::take_odometry() noexcept {
+  return std::exchange(told_, Pose2{});
+}
+
+void MissionRobot::command(const Velocity& velocity) {
+  wait(base_.period_s);
+  const Pose2 told = motion_after(velocity, base_.period_s);
+  const Pose2 step = sample_step(told, motion_, random_);
+  const Pose2 there = pose_ * step;
+  if (!is_clear(pose_.position(), there.position())) {
+    // It touches something: it turns, but does not move. Wheels that slip as it turns on the spot
+    // say nothing of what stands ahead.
+    obstacle_ |= told.x_m != 0.0 || told.y_m != 0.0;
+    pose_.heading_rad = there.heading_rad;
+    told_ = told_ * Pose2{0.0, 0.0, told.heading_rad};
+    return;
+  }
+  told_ = told_ * told;
+  travelled_m_ += std::hypot(step.x_m, step.y_m);
+  pose_ = there;
+}
+
+std::optional<double> MissionRobot::free_direction(double wanted_rad, double distance_m) {
+  const auto is_open = [&](double direction_rad, double way_m) {
+    const Point2 there =
+        pose_ * Point2{way_m * std::cos(direction_rad), way_m * std::sin(direction_rad)};
+    return is_clear(pose_.position(), there);
+  };
+  if (is_open(wanted_rad, distance_m)) {
+    side_ = 0;
+    return wanted_rad;
+  }
+  // Farther round it would turn back: whoever sends it must know that the way is shut.
+  constexpr int feelers_each_side = 6;
+  const auto aside = feel_aside(wanted_rad, feelers_each_side, side_, [&](double direction_rad) {
+    return is_open(direction_rad, 0.5 * distance_m);
+  });
+  side_ = aside ? aside->side : -side_;
+  if (!aside) return std::nullopt;
+  return wrap_angle(aside->direction_rad);
+}
+
+bool MissionRobot::take_obstacle() noexcept {
+  return std::exchange(obstacle_, false);
+}
+
+namespace {
+
+// To a point as far as the robot knows its own speeds, until it is there, something stops it or it
+// should long be there. Returns whether it was stopped.
+bool drive(MissionRobot& robot, const BaseOptions& base, double direction_rad, double distance_m) {
+  Point2 target{distance_m * std::cos(direction_rad), distance_m * std::sin(direction_rad)};
+  constexpr double near_m = 0.003;
+  const double longest_s =
+      2.0 * (std::numbers::pi / base.turn_rad_s + distance_m / base.speed_m_s) + 1.0;
+  for (double time_s = 0.0; time_s < longest_s; time_s += base.period_s) {
+    const double left_m = std::hypot(target.x_m, target.y_m);
+    if (left_m <= near_m) return false;
+    const Velocity velocity = command_towards(std::atan2(target.y_m, target.x_m), left_m, base);
+    robot.command(velocity);
+    if (robot.take_obstacle()) return true;
+    target = remaining_way(target, motion_after(velocity, base.period_s));
+  }
+  return false;
+}
+
+/// Tells the reference where Monte-Carlo localisation has the robot, if it is certain.
+class Estimator {
+ public:
+  Estimator(const VisualMemory& memory, const OdometryNoise& odometry)
+      : memory_(&memory), filter_(memory, {}, odometry) {}
+
+  std::optional<ViewId> observe(const Pose2& moved, const FourierSignature& view) {
+    filter_.move(moved);
+    const auto estimate = filter_.observe(pack(view, memory_->full_scale()));
+    if (estimate.state != LocalisationState::localised || !estimate.pose) return std::nullopt;
+    std::optional<ViewId> nearest;
+    double min_m = std::numeric_limits<double>::infinity();
+    for (const ViewId id : memory_->views()) {
+      const auto& pose = memory_->info(id).pose;
+      if (!pose) continue;
+      const double far_m = distance(pose->position(), estimate.pose->position());
+      if (far_m < min_m) {
+        min_m = far_m;
+        nearest = id;
+      }
+    }
+    return nearest;
+  }
+
+ private:
+  const VisualMemory* memory_;
+  MonteCarloLocaliser filter_;
+};
+
+/// A robot on its missions, one after the other.
+class Voyage {
+ public:
+  Voyage(const MissionPlace& place, const RememberedPlace& remembered, const Pose2& start,
+         const MissionOptions& options, std::uint64_t seed)
+      : place_(place),
+        remembered_(remembered),
+        options_(options),
+        robot_(place, options.base, options.motion, start, seed, options.people),
+        noise_of_views_(seed, 2),
+        noise_of_lines_(seed, 4) {
+    if (options.monte_carlo) estimator_.emplace(remembered.memory, options.motion);
+  }
+
+  MissionRun run(Navigator& navigator, ViewId goal_view, const std::optional<Pose2>& kidnapped_to,
+                 const StepReport& report_step, const GoalSource& other_goal) {
+    Point2 goal = remembered_.truth.at(*remembered_.graph.node_of(goal_view)).position();
+    const FreeSpace& space = *place_.free_space;
+    MissionRun run;
+    run.shortest_m = shortest_way_m(space, robot_.pose().position(), goal);
+    const double begins_at_m = robot_.travelled_m();
+    const double kidnapped_at_m = begins_at_m + 0.5 * run.shortest_m;
+    navigator.set_goal(goal_view);
+    for (;;) {
+      run.path.push_back(robot_.pose());
+      const NavigationDecision decision = step(navigator);
+      run.decisions.push_back(decision);
+      if (report_step) report_step(decision, robot_.pose());
+      if (decision.state != NavigationState::moving) {
+        run.end = decision.state;
+        break;
+      }
+      if (const auto other = other_goal ? other_goal() : std::nullopt) {
+        const Point2 here = robot_.pose().position();
+        const Point2 there = remembered_.truth.at(*remembered_.graph.node_of(*other)).position();
+        run.shortest_m += shortest_way_m(space, here, there) - shortest_way_m(space, here, goal);
+        goal = there;
+        continue;  // it looks again from here
+      }
+      move(decision);
+      if (kidnapped_to && !run.kidnapped_at && robot_.travelled_m() >= kidnapped_at_m) {
+        run.kidnapped_at = run.path.size() - 1;
+        run.shortest_m += shortest_way_m(space, kidnapped_to->position(), goal) -
+                          shortest_way_m(space, robot_.pose().position(), goal);
+        robot_.carry_to(*kidnapped_to);
+        obstacle_ = false;
+      }
+    }
+    run.travelled_m = robot_.travelled_m() - begins_at_m;
+    run.end_distance_m = distance(robot_.pose().position(), goal);
+    return run;
+  }
+
+ private:
+  NavigationDecision step(Navigator& navigator) {
+    const FourierSignature view =
+        see(place_, robot_.pose(), noise_of_views_.next(), &robot_.people());
+    RobotReport report{.obstacle = std::exchange(obstacle_, false)};
+    const Pose2 moved = robot_.take_odometry();
+    if (estimator_) {
+      // Views that tell the place by themselves tell it better.
+      const auto estimate = estimator_->observe(moved, view);
+      if (in_doubt_) report.estimate = estimate;
+    }
+    std::vector<float> line;
+    if (place_.line && !navigator.routes().empty()) {
+      line = place_.line(robot_.pose(), noise_of_lines_.next());
+      report.line = line;
+      report.moved = moved;
+    }
+    const NavigationDecision decision = navigator.observe(view, report);
+    in_doubt_ = std::ranges::any_of(decision.events, [](NavigationEvent event) {
+      return event == NavigationEvent::unknown_place || event == NavigationEvent::relocalised ||
+             event == NavigationEvent::kidnapped;
+    });
+    return decision;
+  }
+
+  void move(const NavigationDecision& decision) {
+    const auto free_rad = robot_.free_direction(decision.direction_rad, decision.advance_m);
+    obstacle_ = !free_rad;
+    if (free_rad) {
+      const bool wanted = *free_rad == decision.direction_rad;
+      obstacle_ =
+          drive(robot_, options_.base, *free_rad, (wanted ? 1.0 : 0.5) * decision.advance_m);
+    }
+    // Who is in the way may go.
+    constexpr double pause_s = 1.0;
+    if (obstacle_ || decision.advance_m == 0.0) robot_.wait(pause_s);
+  }
+
+  const MissionPlace& place_;
+  const RememberedPlace& remembered_;
+  const MissionOptions& options_;
+  MissionRobot robot_;
+  Random noise_of_views_;
+  Random noise_of_lines_;
+  std::optional<Estimator> estimator_;
+  bool in_doubt_ = true;  // where it is, after the last step
+  bool obstacle_ = false;
+};
+
+void require_goal(const RememberedPlace& remembered, ViewId goal) {
+  if (remembered.graph.node_of(goal)) return;
+  throw ContractError("goal", std::to_string(goal.value), "a view of the graph");
+}
+
+}  // namespace
+
+std::string other_ends(const std::map<NavigationState, std::size_t>& ends, std::size_t wrongly,
+                       NavigationState wanted) {
+  std::string text;
+  const auto add = [&](std::size_t count, const std::string& end) {
+    if (count == 0) return;
+    text += (text.empty() ? "of the other runs, " : ", ") + std::to_string(count) + " " + end;
+  };
+  if (wanted == NavigationState::arrived) add(wrongly, "report an arrival but are farther off");
+  for (const auto& [end, count] : ends) {
+    if (end != wanted) add(count, "end as " + std::string(name_of(end)));
+  }
+  return text;
+}
+
+MissionRun run_mission(const MissionPlace& place, const RememberedPlace& remembered,
+                       Navigator& navigator, const Mission& mission, const MissionOptions& options,
+                       std::uint64_t seed, const StepReport& report_step,
+                       const GoalSource& other_goal) {
+  require_goal(remembered, mission.goal);
+  navigator.forget_place();
+  return Voyage(place, remembered, mission.start, options, seed)
+      .run(navigator, mission.goal, mission.kidnapped_to, report_step, other_goal);
+}
+
+std::vector<MissionRun> run_tour(const MissionPlace& place, const RememberedPlace& remembered,
+                                 Navigator& navigator, const Pose2& start,
+                                 std::span<const ViewId> goals, const MissionOptions& options,
+                                 std::uint64_t seed) {
+  for (const ViewId goal : goals) require_goal(remembered, goal);
+  navigator.forget_place();
+  Voyage voyage(place, remembered, start, options, seed);
+  std::vector<MissionRun> runs;
+  for (const ViewId goal : goals) {
+    runs.push_back(voyage.run(navigator, goal, std::nullopt, {}, {}));
+    // A robot that ended lost must not begin from a place in which it did not believe itself.
+    if (runs.back().end == NavigationState::lost) navigator.forget_place();
+  }
+  return runs;
+}
+
+std::vector<MissionRun> run_missions(const MissionPlace& place, const RememberedPlace& remembered,
+                                     const std::vector<Mission>& missions,
+                                     const MissionOptions& options, std::uint64_t seed,
+                                     Executor& executor) {
+  const AreaPlanner planner(remembered.graph, options.planner);
+  const MemoryViewSource source(remembered.memory);
+  return make_each(executor, missions.size(), [&](std::size_t i) {
+    Navigator navigator(source, planner, options.navigator);
+    navigator.set_routes(remembered.routes);
+    return run_mission(place, remembered, navigator, missions[i], options, Random(seed, i).next());
+  });
+}
+
+std::vector<Mission> random_missions(const MissionPlace& place, const RememberedPlace& remembered,
+                                     const RandomMissionOptions& options, std::uint64_t seed) {
+  require(options.count >= 0, "missions", options.count, ">= 0");
+  require(options.beside_m > 0.0, "distance from a reference", options.beside_m, "> 0");
+  Random random(seed, 3);
+  const FreeSpace& space = *place.free_space;
+  const auto anywhere = [&] {
+    if (!std::isfinite(options.beside_m)) return space.random_pose(random);
+    for (;;) {
+      const Pose2& reference = remembered.truth[random.index(remembered.truth.size())];
+      const double off_m = options.beside_m * std::sqrt(random.uniform());
+      const double direction_rad = random.uniform(-std::numbers::pi, std::numbers::pi);
+      const Pose2 there{reference.x_m + off_m * std::cos(direction_rad),
+                        reference.y_m + off_m * std::sin(direction_rad),
+                        random.uniform(-std::numbers::pi, std::numbers::pi)};
+      if (space.is_free_between(reference.position(), there.position())) return there;
+    }
+  };
+  std::vector<Mission> missions;
+  const double min_m = 2.0 * remembered.spacing_m;
+  while (missions.size() < static_cast<std::size_t>(options.count)) {
+    const std::size_t goal = random.index(remembered.truth.size());
+    Mission mission{remembered.graph.view(goal), anywhere(), {}};
+    if (options.kidnapped) mission.kidnapped_to = anywhere();
+    if (distance(mission.start.position(), remembered.truth[goal].position()) < min_m) continue;
+    missions.push_back(mission);
+  }
+  return missions;
+}
+
+}  // namespace panonav::simulation

@@ -1,0 +1,220 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "panonav/core/executor.hpp"
+#include "panonav/core/options.hpp"
+#include "panonav/memory/visual_memory.hpp"
+#include "panonav/motion/odometry.hpp"
+#include "panonav/motion/velocity.hpp"
+#include "panonav/navigation/known_route.hpp"
+#include "panonav/navigation/navigation_graph.hpp"
+#include "panonav/navigation/navigator.hpp"
+#include "panonav_simulation/free_space.hpp"
+#include "panonav_simulation/people.hpp"
+#include "panonav_simulation/renderer.hpp"
+#include "panonav_simulation/scene.hpp"
+#include "panonav_simulation/sensor.hpp"
+
+namespace panonav::simulation {
+
+/// A place to explore and to go about in. Shared by any number of runs on any number of threads.
+struct MissionPlace {
+  Scene scene;
+  std::shared_ptr<const FreeSpace> free_space;
+  std::shared_ptr<const Renderer> renderer;
+  PanoramaRendering rendering{.rows = 40, .columns = 256, .rays_per_axis = 1};
+  SensorOptions sensor;
+  int components = 15;
+  /// What a robot sees through another camera or preprocessing than that of `see`, which then asks
+  /// this instead; any number of threads may ask. Empty: as `see` says.
+  std::function<FourierSignature(const Pose2& pose, std::uint64_t seed)> sight;
+  /// The horizon scanline that a robot takes at a pose, to record and to follow routes; any number
+  /// of threads may ask. Empty: it takes none.
+  std::function<std::vector<float>(const Pose2& pose, std::uint64_t seed)> line;
+};
+
+/// `inside`: of a place in several components, a position in the component that is meant; empty:
+/// the largest. Throws ContractError as the components.
+[[nodiscard]] MissionPlace make_mission_place(Scene scene, Executor& executor,
+                                              std::optional<Point2> inside = std::nullopt);
+
+/// Lines through the simulated mirror camera (line_camera.hpp), as the experiments of [Y03] have
+/// them: for `MissionPlace::line`. People who walk about are not in them.
+[[nodiscard]] std::function<std::vector<float>(const Pose2& pose, std::uint64_t seed)> mirror_lines(
+    const MissionPlace& place);
+
+/// What a robot there sees: the place's `sight`, or a panorama rendered directly, with the people
+/// that are there, and preprocessed as the command's defaults have it. The same pose, seed and
+/// people give the same bits.
+[[nodiscard]] FourierSignature see(const MissionPlace& place, const Pose2& pose, std::uint64_t seed,
+                                   const People* people = nullptr);
+
+/// What a robot remembers of a place, and, for the record, where its views were taken.
+struct RememberedPlace {
+  VisualMemory memory;
+  NavigationGraph graph;
+  std::vector<Pose2> truth;          ///< by node of the graph; NaN where it is not known
+  double spacing_m = 0.0;            ///< of the references
+  std::vector<KnownRoute> routes{};  ///< recorded on the way
+  /// Of an arrangement: by node of the graph, where it puts the views of its largest connected
+  /// component; empty: it leaves the view out.
+  std::vector<std::optional<Point2>> arranged{};
+};
+
+/// Views on a grid, 20 cm or more from all things, each in a heading at random, arranged by their
+/// similarity alone: no positions, no order, no motion [M04 section 3].
+[[nodiscard]] RememberedPlace remember_grid(const MissionPlace& place, double spacing_m,
+                                            std::uint64_t seed, Executor& executor);
+
+/// Views along a drive, mapped by visual odometry and closure of loops, lengths by `wheels`
+/// [F11 section 4]. The memory gets the poses of the map's largest component. Where the place has
+/// lines the robot records a route, too, as far as that component goes without a gap: a line every
+/// 10 cm at most [Y03 section 2.2], posed between the map's views, so that both lie in one frame.
+[[nodiscard]] RememberedPlace remember_drive(const MissionPlace& place,
+                                             const std::vector<Pose2>& poses,
+                                             const OdometryNoise& wheels, std::uint64_t seed,
+                                             Executor& executor);
+
+/// The robot of a mission: drives as it is told, with the errors of its drive, and stops where
+/// something or somebody stands in its way. It feels what is near. Holds the true pose, and the
+/// people around, for whom time passes as it drives.
+class MissionRobot final : public RobotBase {
+ public:
+  /// `place` must outlive the robot. Throws OptionError; ContractError as `People`.
+  MissionRobot(const MissionPlace& place, const BaseOptions& base, const OdometryNoise& motion,
+               const Pose2& start, std::uint64_t seed, int people = 0);
+
+  void command(const Velocity& velocity) override;
+
+  [[nodiscard]] const Pose2& pose() const noexcept { return pose_; }
+  [[nodiscard]] double travelled_m() const noexcept { return travelled_m_; }
+  /// The direction nearest to the wanted one, 15 degrees apart, in which half of the way is free;
+  /// as long as that one is not free it keeps to the side that it chose. Empty: none is, as far as
+  /// it turns.
+  [[nodiscard]] std::optional<double> free_direction(double wanted_rad, double distance_m);
+  /// Since the last time: whether something stopped it.
+  [[nodiscard]] bool take_obstacle() noexcept;
+  /// Stands still.
+  void wait(double seconds);
+  /// Somebody carries it away; its wheels do not tell.
+  void carry_to(const Pose2& pose) noexcept { pose_ = pose; }
+  /// Since the last time: the motion that its wheels tell, robot_old_from_robot_new.
+  [[nodiscard]] Pose2 take_odometry() noexcept;
+  [[nodiscard]] const People& people() const noexcept { return people_; }
+
+ private:
+  [[nodiscard]] bool is_clear(Point2 from, Point2 to) const;
+
+  const FreeSpace* space_;
+  double robot_radius_m_;
+  People people_;
+  BaseOptions base_;
+  OdometryNoise motion_;
+  Pose2 pose_;
+  Random random_;
+  int side_ = 0;  // on which it goes past something: 1 left, -1 right
+  bool obstacle_ = false;
+  double travelled_m_ = 0.0;
+  Pose2 told_;
+};
+
+struct MissionOptions {
+  NavigatorOptions navigator;
+  PlannerOptions planner;
+  BaseOptions base;
+  OdometryNoise motion;  ///< its drive is that of `base`
+  int people = 0;        ///< who walk about
+  /// Beside the navigator runs Monte-Carlo localisation over the references whose poses the memory
+  /// knows. Where it is certain of the place and the navigator is not, the latter goes by it.
+  bool monte_carlo = false;
+};
+
+/// A goal to reach, and what happens on the way.
+struct Mission {
+  ViewId goal;
+  Pose2 start;
+  /// Where somebody carries the robot once half of the way is driven; empty: nobody does.
+  std::optional<Pose2> kidnapped_to;
+};
+
+struct RandomMissionOptions {
+  int count = 100;
+  /// Starts, and places that the robot is kidnapped to, lie within so much of a reference at
+  /// random; infinite: anywhere.
+  double beside_m = std::numeric_limits<double>::infinity();
+  bool kidnapped = false;  ///< somebody kidnaps the robot on its way
+};
+
+/// Missions from random free places, in any heading, to references at random that are at least two
+/// spacings away.
+[[nodiscard]] std::vector<Mission> random_missions(const MissionPlace& place,
+                                                   const RememberedPlace& remembered,
+                                                   const RandomMissionOptions& options,
+                                                   std::uint64_t seed);
+
+struct MissionRun {
+  NavigationState end = NavigationState::moving;
+  std::vector<Pose2> path;  ///< true poses at the steps, and the last one
+  std::vector<NavigationDecision> decisions;
+  std::optional<std::size_t> kidnapped_at;  ///< the step after which the robot was kidnapped
+  double end_distance_m = 0.0;              ///< from where the goal's view was taken; NaN: unknown
+  double travelled_m = 0.0;
+  /// Shortest way through free places, in components when kidnapped or sent to another goal; NaN:
+  /// unknown.
+  double shortest_m = 0.0;
+
+  /// The robot says that it arrived, and is within `radius_m` of the goal.
+  [[nodiscard]] bool arrives(double radius_m) const noexcept {
+    return end == NavigationState::arrived && end_distance_m <= radius_m;
+  }
+};
+
+/// How missions end that do not end as `wanted`: what is known of a target that is missed. `ends`
+/// counts them all, `wrongly` those that report an arrival but are farther off.
+[[nodiscard]] std::string other_ends(const std::map<NavigationState, std::size_t>& ends,
+                                     std::size_t wrongly,
+                                     NavigationState wanted = NavigationState::arrived);
+
+/// Called after each step, with the true pose.
+using StepReport = std::function<void(const NavigationDecision& decision, const Pose2& pose)>;
+
+/// Asked after each step that goes on: another goal, which the navigator has already; empty: none.
+using GoalSource = std::function<std::optional<ViewId>()>;
+
+/// Sends a robot over what is remembered; `place` may differ from the place that was remembered.
+/// Where it is not known where the goal's view was taken, nobody carries the robot away. The robot
+/// takes lines when the navigator has routes. The same seed gives the same run. Cost: a picture a
+/// look.
+[[nodiscard]] MissionRun run_mission(const MissionPlace& place, const RememberedPlace& remembered,
+                                     Navigator& navigator, const Mission& mission,
+                                     const MissionOptions& options, std::uint64_t seed,
+                                     const StepReport& report_step = {},
+                                     const GoalSource& other_goal = {});
+
+/// One goal after the other: each run begins where the one before ended, with the place known that
+/// the robot then believes in. A goal that was not reached does not end the tour. Otherwise as
+/// `run_mission`.
+[[nodiscard]] std::vector<MissionRun> run_tour(const MissionPlace& place,
+                                               const RememberedPlace& remembered,
+                                               Navigator& navigator, const Pose2& start,
+                                               std::span<const ViewId> goals,
+                                               const MissionOptions& options, std::uint64_t seed);
+
+/// All runs, mission by mission, each by a navigator of its own with the routes of what is
+/// remembered; run i has the stream (seed, i).
+[[nodiscard]] std::vector<MissionRun> run_missions(const MissionPlace& place,
+                                                   const RememberedPlace& remembered,
+                                                   const std::vector<Mission>& missions,
+                                                   const MissionOptions& options,
+                                                   std::uint64_t seed, Executor& executor);
+
+}  // namespace panonav::simulation

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "panonav/core/random.hpp"
+#include "panonav/geometry/pose2.hpp"
+#include "panonav/panorama/panorama.hpp"
+#include "panonav_simulation/free_space.hpp"
+
+namespace panonav::simulation {
+
+/// People who walk about in a place: upright cylinders that go from one free position to another,
+/// the shortest way at a walking pace. Before the robot they stop; when it does not go away either,
+/// they choose another way. The same seed and the same robot give the same walks.
+class People {
+ public:
+  /// Throws ContractError unless `count` >= 0.
+  People(std::shared_ptr<const FreeSpace> space, int count, std::uint64_t seed);
+
+  [[nodiscard]] std::size_t size() const noexcept { return people_.size(); }
+  [[nodiscard]] Point2 position(std::size_t person) const { return people_.at(person).position; }
+  /// Whether somebody stands within `radius_m` of a position.
+  [[nodiscard]] bool touch(Point2 position, double radius_m) const;
+  /// Time passes while a robot stands somewhere.
+  void pass(double seconds, Point2 robot, double robot_radius_m);
+  /// As a camera `camera_height_m` above the floor sees them: those whom nothing hides that a robot
+  /// would touch. Changes nothing when elevations are unknown.
+  void paint(Panorama& view, const Pose2& camera, double camera_height_m) const;
+
+ private:
+  struct Person {
+    Point2 position;
+    std::vector<Point2> way;  // the next point last
+    float brightness = 0.0F;  // of what is worn
+    double waited_s = 0.0;
+  };
+  void choose_way(Person& person);
+
+  std::shared_ptr<const FreeSpace> space_;
+  std::vector<Person> people_;
+  Random random_;
+};
+
+}  // namespace panonav::simulation

@@ -1,0 +1,81 @@
+#include "panonav_simulation/place_recording.hpp"
+
+#include <optional>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav_simulation/make_each.hpp"
+#include "panonav_simulation/scenes.hpp"
+
+namespace panonav::simulation {
+
+std::size_t PlaceRecording::nearest_reference(Point2 position) const {
+  std::size_t nearest = 0;
+  for (std::size_t i = 1; i < references.size(); ++i) {
+    if (distance(references[i].pose.position(), position) <
+        distance(references[nearest].pose.position(), position)) {
+      nearest = i;
+    }
+  }
+  return nearest;
+}
+
+Panorama take_view(const PlaceRecording& place, const PanoramaRendering& rendering,
+                   const Pose2& pose, std::uint64_t seed, const SensorOptions& sensor) {
+  Executor here(1);
+  Panorama view = place.renderer->render_panorama(
+      {.pose = pose, .height_m = place.scene.camera_height_m}, rendering, here);
+  return apply_sensor(std::move(view), sensor, seed);
+}
+
+Panorama take_view(const PlaceRecording& place, const Pose2& pose, std::uint64_t seed,
+                   const SensorOptions& sensor) {
+  return take_view(place, place.rendering, pose, seed, sensor);
+}
+
+std::vector<PlacedView> take_views(const PlaceRecording& place, const PanoramaRendering& rendering,
+                                   const std::vector<Pose2>& poses, std::uint64_t first_seed,
+                                   const SensorOptions& sensor, Executor& executor) {
+  return make_each(executor, poses.size(), [&](std::size_t i) {
+    return PlacedView{poses[i], take_view(place, rendering, poses[i], first_seed + i, sensor)};
+  });
+}
+
+std::vector<PlacedView> retake_queries(const PlaceRecording& place, const SensorOptions& sensor,
+                                       std::uint64_t first_seed, Executor& executor) {
+  std::vector<Pose2> poses;
+  for (const PlacedView& query : place.queries) poses.push_back(query.pose);
+  return take_views(place, place.rendering, poses, first_seed, sensor, executor);
+}
+
+PlaceRecording record_place(const PlaceRecordingOptions& options, Executor& executor) {
+  return record_place(make_scene(options.scene, {.seed = options.seed}), options, executor);
+}
+
+PlaceRecording record_place(Scene scene, const PlaceRecordingOptions& options, Executor& executor) {
+  require(options.queries >= 1, "queries", options.queries, ">= 1");
+  PlaceRecording place;
+  place.seed = options.seed;
+  place.scene = std::move(scene);
+  place.spacing_m = options.spacing_m;
+  place.free_space =
+      std::make_shared<const FreeSpace>(place.scene, free_space_options(place.scene));
+  place.renderer = std::make_shared<const Renderer>(place.scene, RendererOptions{}, executor);
+  place.rendering = {.rows = options.rows, .columns = options.columns, .rays_per_axis = 1};
+
+  std::vector<Pose2> grid;
+  for (const auto& point : place.free_space->grid(options.spacing_m)) {
+    grid.push_back({point.position.x_m, point.position.y_m, 0.0});
+  }
+  require(!grid.empty(), "reference views", 0.0, ">= 1");
+  Random random(options.seed, 77);
+  std::vector<Pose2> asked;
+  for (int q = 0; q < options.queries; ++q) asked.push_back(place.free_space->random_pose(random));
+  const std::uint64_t noise = options.seed * 100003U;
+  place.references = take_views(place, place.rendering, grid, noise, {}, executor);
+  place.queries = take_views(place, place.rendering, asked, noise + grid.size(), {}, executor);
+  return place;
+}
+
+}  // namespace panonav::simulation

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "panonav/core/executor.hpp"
+#include "panonav/core/image.hpp"
+#include "panonav/geometry/pose2.hpp"
+#include "panonav/panorama/panorama.hpp"
+#include "panonav_simulation/free_space.hpp"
+#include "panonav_simulation/renderer.hpp"
+#include "panonav_simulation/scene.hpp"
+#include "panonav_simulation/sensor.hpp"
+
+namespace panonav::simulation {
+
+struct PlacedView {
+  Pose2 pose;
+  Panorama panorama;
+};
+
+/// A simulated place as an experiment needs it: reference views on a grid, queries at random poses
+/// in between, and a camera for further views (`take_view`).
+struct PlaceRecording {
+  std::uint64_t seed = 1;
+  Scene scene;
+  std::shared_ptr<const FreeSpace> free_space;
+  std::shared_ptr<const Renderer> renderer;
+  PanoramaRendering rendering;
+  double spacing_m = 0.25;
+  std::vector<PlacedView> references;
+  std::vector<PlacedView> queries;
+
+  /// Index of the reference view that is nearest in space.
+  [[nodiscard]] std::size_t nearest_reference(Point2 position) const;
+};
+
+struct PlaceRecordingOptions {
+  std::string scene = "office";
+  std::uint64_t seed = 1;   ///< varies textures and furniture, and the noise
+  double spacing_m = 0.25;  ///< of the reference grid
+  int queries = 60;
+  int rows = 80;
+  int columns = 512;
+};
+
+/// References with heading 0, queries at random headings, both with the sensor's noise.
+[[nodiscard]] PlaceRecording record_place(const PlaceRecordingOptions& options, Executor& executor);
+/// The same in a scene that the caller made or read; `options.scene` does not count. Throws
+/// ContractError when no place is free at this spacing.
+[[nodiscard]] PlaceRecording record_place(Scene scene, const PlaceRecordingOptions& options,
+                                          Executor& executor);
+
+/// One picture more in that place, at its camera height. The same pose, seed and sensor give the
+/// same bits; views may be taken from several threads.
+[[nodiscard]] Panorama take_view(const PlaceRecording& place, const Pose2& pose, std::uint64_t seed,
+                                 const SensorOptions& sensor = {});
+/// The same with another number of rows and columns over the same elevations.
+[[nodiscard]] Panorama take_view(const PlaceRecording& place, const PanoramaRendering& rendering,
+                                 const Pose2& pose, std::uint64_t seed,
+                                 const SensorOptions& sensor = {});
+
+/// The views at all these poses; view i is taken with `first_seed` + i.
+[[nodiscard]] std::vector<PlacedView> take_views(const PlaceRecording& place,
+                                                 const PanoramaRendering& rendering,
+                                                 const std::vector<Pose2>& poses,
+                                                 std::uint64_t first_seed,
+                                                 const SensorOptions& sensor, Executor& executor);
+
+/// The queries once more through another sensor.
+[[nodiscard]] std::vector<PlacedView> retake_queries(const PlaceRecording& place,
+                                                     const SensorOptions& sensor,
+                                                     std::uint64_t first_seed, Executor& executor);
+
+}  // namespace panonav::simulation

@@ -1,0 +1,202 @@
+#include "panonav_simulation/recording.hpp"
+
+#include <cmath>
+#include <numbers>
+
+#include "panonav/core/error.hpp"
+#include "panonav/motion/path.hpp"
+
+namespace panonav::simulation {
+
+namespace {
+
+// Random streams of one recording.
+constexpr std::uint64_t pose_stream = 0;
+constexpr std::uint64_t heading_stream = 1;
+
+std::uint64_t frame_seed(std::uint64_t seed, std::uint64_t number) {
+  return Random(seed, 1000 + number).next();
+}
+
+double direction(Point2 from, Point2 to) {
+  return std::atan2(to.y_m - from.y_m, to.x_m - from.x_m);
+}
+
+std::string text(Point2 p) {
+  return "(" + to_text(p.x_m) + ", " + to_text(p.y_m) + ")";
+}
+
+std::vector<Pose2> tour_poses(const Scene& scene, const FreeSpace& space,
+                              std::span<const Point2> way_points, double spacing_m) {
+  std::vector<Point2> stations(way_points.begin(), way_points.end());
+  if (stations.empty() && !scene.tour.empty()) {
+    stations = scene.tour;
+    stations.push_back(stations.front());
+  }
+  require(stations.size() >= 2, "way points of a tour", static_cast<double>(stations.size()),
+          ">= 2, or a scene that has a tour");
+  std::vector<Pose2> line;
+  for (std::size_t i = 1; i < stations.size(); ++i) {
+    const auto way = space.is_free_between(stations[i - 1], stations[i])
+                         ? std::optional(std::vector<Point2>{stations[i - 1], stations[i]})
+                         : space.shortest_path(stations[i - 1], stations[i]);
+    if (!way) {
+      const Point2 blocked = space.is_free(stations[i]) ? stations[i - 1] : stations[i];
+      throw ContractError("way point", text(blocked), "a free place of the scene");
+    }
+    for (const Point2 point : *way) line.push_back({point.x_m, point.y_m, 0.0});
+  }
+  return resample(line, spacing_m);
+}
+
+std::vector<Pose2> places(const Scene& scene, const FreeSpace& space,
+                          const RecordingOptions& options, std::span<const Point2> way_points,
+                          Random& random) {
+  std::vector<Pose2> poses;
+  switch (options.path) {
+    case RecordingPath::grid:
+    case RecordingPath::zigzag: {
+      const GridOrder order =
+          options.path == RecordingPath::grid ? GridOrder::raster : GridOrder::zigzag;
+      for (const auto& place : space.grid(options.spacing_m, order)) {
+        poses.push_back({place.position.x_m, place.position.y_m, 0.0});
+      }
+      require(!poses.empty(), "free places of a grid of spacing_m " + to_text(options.spacing_m),
+              0.0, ">= 1; use a smaller spacing");
+      return poses;
+    }
+    case RecordingPath::tour:
+      return tour_poses(scene, space, way_points, options.spacing_m);
+    case RecordingPath::walk: {
+      const FreePredicate is_free = [&space](Point2 p) { return space.is_free(p); };
+      return random_walk(space.random_pose(random), is_free,
+                         {.poses = options.poses, .step_m = options.spacing_m}, random);
+    }
+    case RecordingPath::random:
+      break;
+  }
+  for (int i = 0; i < options.poses; ++i) poses.push_back(space.random_pose(random));
+  return poses;
+}
+
+void set_headings(std::vector<Pose2>& poses, const RecordingOptions& options, Random& random) {
+  const std::vector<Pose2> where = poses;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    switch (options.heading) {
+      case RecordingHeading::fixed:
+        poses[i].heading_rad = wrap_angle(options.heading_rad);
+        break;
+      case RecordingHeading::random:
+        poses[i].heading_rad = wrap_angle(random.uniform(-std::numbers::pi, std::numbers::pi));
+        break;
+      case RecordingHeading::path: {
+        // Along the chord between the neighbours on the path.
+        const std::size_t before = i == 0 ? 0 : i - 1;
+        const std::size_t after = std::min(i + 1, where.size() - 1);
+        if (distance(where[before].position(), where[after].position()) > 0.0) {
+          poses[i].heading_rad =
+              wrap_angle(direction(where[before].position(), where[after].position()));
+        }
+        break;
+      }
+    }
+  }
+}
+
+Viewpoint viewpoint(const Pose2& pose, const FrameOptions& options, std::uint64_t seed) {
+  const Tilt tilt = frame_tilt(options, seed);
+  return {.pose = pose,
+          .height_m = options.camera_height_m,
+          .roll_rad = tilt.roll_rad,
+          .pitch_rad = tilt.pitch_rad};
+}
+
+}  // namespace
+
+void visit_options(RecordingOptions& options, OptionVisitor& visitor) {
+  using T = RecordingOptions;
+  constexpr OptionTable table{
+      choice<&T::path>("where the robot takes its pictures", "grid", "zigzag", "tour", "walk",
+                       "random"),
+      choice<&T::heading>("which way the robot faces", "fixed", "path", "random"),
+      option<&T::heading_rad>("the fixed heading"),
+      option<&T::spacing_m>("spacing of the grid, or along the path", above(0), 1000),
+      option<&T::poses>("number of poses of a walk, or of random ones", 1, 1e7),
+      option<&T::speed_m_s>("speed of the robot, which gives the time stamps", above(0), 100),
+  };
+  table.visit(options, visitor);
+}
+
+void visit_options(FrameOptions& options, OptionVisitor& visitor) {
+  using T = FrameOptions;
+  constexpr OptionTable table{
+      option<&T::camera_height_m>("height of the camera above the floor", above(0), 100),
+      option<&T::tilt_rad>("tilt of the robot, in a random direction at each place", 0, 0.5),
+      option<&T::rays_per_axis>("rays per pixel and axis through a camera", 1, 8),
+  };
+  table.visit(options, visitor);
+}
+
+Tilt frame_tilt(const FrameOptions& options, std::uint64_t seed) {
+  Random random(seed, 1);
+  const double towards = random.uniform(-std::numbers::pi, std::numbers::pi);
+  return {options.tilt_rad * std::sin(towards), options.tilt_rad * std::cos(towards)};
+}
+
+std::vector<RecordedPose> plan_recording(const Scene& scene, const FreeSpace& space,
+                                         const RecordingOptions& options,
+                                         const OdometryNoise& odometry, std::uint64_t seed,
+                                         std::span<const Point2> way_points) {
+  validate(options);
+  Random pose_random(seed, pose_stream);
+  Random heading_random(seed, heading_stream);
+  std::vector<Pose2> poses = places(scene, space, options, way_points, pose_random);
+  set_headings(poses, options, heading_random);
+  const std::vector<Pose2> readings = simulate_odometry(poses, odometry, seed);
+  std::vector<RecordedPose> result;
+  double stamp_s = 0.0;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    if (i > 0) {
+      // Standing still still takes time: stamps ascend.
+      stamp_s += std::max(
+          1e-3, distance(poses[i - 1].position(), poses[i].position()) / options.speed_m_s);
+    }
+    result.push_back({stamp_s, poses[i], readings[i]});
+  }
+  return result;
+}
+
+Panorama take_panorama(const Renderer& renderer, const Pose2& pose,
+                       const PanoramaRendering& rendering, const FrameOptions& options,
+                       const SensorOptions& sensor, std::uint64_t seed, Executor& executor) {
+  validate(options);
+  return apply_sensor(renderer.render_panorama(viewpoint(pose, options, seed), rendering, executor),
+                      sensor, seed);
+}
+
+Image take_picture(const Renderer& renderer, const Pose2& pose, const RecordingCamera& camera,
+                   const FrameOptions& options, const SensorOptions& sensor, std::uint64_t seed,
+                   Executor& executor) {
+  if (const auto* rendering = std::get_if<PanoramaRendering>(&camera)) {
+    return to_picture(take_panorama(renderer, pose, *rendering, options, sensor, seed, executor));
+  }
+  validate(options);
+  const auto& through = std::get<Camera>(camera);
+  return apply_sensor(renderer.render_image(viewpoint(pose, options, seed), through,
+                                            options.rays_per_axis, executor),
+                      through, sensor, seed);
+}
+
+void record(const Renderer& renderer, std::span<const RecordedPose> poses,
+            const RecordingCamera& camera, const FrameOptions& options, const SensorOptions& sensor,
+            std::uint64_t seed, Executor& executor,
+            const std::function<void(const RecordedFrame&)>& frame) {
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const std::uint64_t seed_of_frame = frame_seed(seed, i);
+    const Image picture =
+        take_picture(renderer, poses[i].pose, camera, options, sensor, seed_of_frame, executor);
+    frame({i, poses[i], frame_tilt(options, seed_of_frame), picture});
+  }
+}
+
+}  // namespace panonav::simulation

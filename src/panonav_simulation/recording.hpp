@@ -1,0 +1,110 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <variant>
+#include <vector>
+
+#include "panonav/camera/camera.hpp"
+#include "panonav/core/executor.hpp"
+#include "panonav/core/image.hpp"
+#include "panonav/core/options.hpp"
+#include "panonav/motion/odometry.hpp"
+#include "panonav/panorama/tilt.hpp"
+#include "panonav_simulation/free_space.hpp"
+#include "panonav_simulation/renderer.hpp"
+#include "panonav_simulation/sensor.hpp"
+
+namespace panonav::simulation {
+
+/// Where a simulated robot takes its pictures.
+enum class RecordingPath {
+  grid,    ///< every free place of a grid, row by row
+  zigzag,  ///< the same, every second row backwards
+  tour,    ///< along the scene's round trip, or way points of the caller
+  walk,    ///< a random walk
+  random,  ///< independent random poses
+};
+
+/// The robot's heading at each place.
+enum class RecordingHeading {
+  fixed,   ///< the same heading everywhere
+  path,    ///< the way it goes
+  random,  ///< any
+};
+
+/// Where and how a robot takes its pictures.
+struct RecordingOptions {
+  RecordingPath path = RecordingPath::grid;            ///< from place to place
+  RecordingHeading heading = RecordingHeading::fixed;  ///< at each place
+  double heading_rad = 0.0;                            ///< of fixed headings
+  double spacing_m = 0.5;                              ///< of the grid, or along the path
+  int poses = 200;                                     ///< number of a walk or of random poses
+  double speed_m_s = 0.3;                              ///< gives the stamps
+};
+void visit_options(RecordingOptions& options, OptionVisitor& visitor);
+
+/// One place of a recording and what the robot knows of it.
+struct RecordedPose {
+  double stamp_s = 0.0;  ///< seconds, by way and speed; of a trajectory its own
+  Pose2 pose;            ///< where it truly is
+  Pose2 odometry;        ///< where its odometry says that it is, in the odometry frame
+  friend bool operator==(const RecordedPose&, const RecordedPose&) = default;
+};
+
+/// The poses of a recording, all of them free. `way_points` replace the scene's tour. Straight
+/// lines that are not free are replaced by the shortest free paths. The same seed gives the same
+/// poses. Throws OptionError; ContractError when no place is free at this spacing, a way point is
+/// not free, or a tour is asked for where there is none.
+[[nodiscard]] std::vector<RecordedPose> plan_recording(const Scene& scene, const FreeSpace& space,
+                                                       const RecordingOptions& options,
+                                                       const OdometryNoise& odometry,
+                                                       std::uint64_t seed,
+                                                       std::span<const Point2> way_points = {});
+
+/// What is rendered: a picture through a camera, or the panoramic cylinder directly.
+using RecordingCamera = std::variant<PanoramaRendering, Camera>;
+
+/// How each picture of a recording is taken.
+struct FrameOptions {
+  double camera_height_m = 0.6;  ///< of the viewpoint above the floor, > 0
+  /// Tilt of the robot, in another random direction at each place.
+  double tilt_rad = 0.0;
+  int rays_per_axis = 2;  ///< for pictures through a camera
+};
+void visit_options(FrameOptions& options, OptionVisitor& visitor);
+
+/// How the robot is tilted in the picture of this seed.
+[[nodiscard]] Tilt frame_tilt(const FrameOptions& options, std::uint64_t seed);
+
+/// The picture that the robot takes: a panorama for people (see `to_picture`), or the camera's
+/// image. The same options and seed give the same picture; give each frame its own seed.
+/// Throws OptionError, and ContractError as the renderer does.
+[[nodiscard]] Image take_picture(const Renderer& renderer, const Pose2& pose,
+                                 const RecordingCamera& camera, const FrameOptions& options,
+                                 const SensorOptions& sensor, std::uint64_t seed,
+                                 Executor& executor);
+
+/// The same as a panorama, without the detour through a picture.
+[[nodiscard]] Panorama take_panorama(const Renderer& renderer, const Pose2& pose,
+                                     const PanoramaRendering& rendering,
+                                     const FrameOptions& options, const SensorOptions& sensor,
+                                     std::uint64_t seed, Executor& executor);
+
+/// One picture of a recording, for as long as it is looked at.
+struct RecordedFrame {
+  std::size_t number = 0;    ///< counted from 0
+  const RecordedPose& pose;  ///< belongs to the poses that `record` was given
+  Tilt tilt;                 ///< as it truly is
+  const Image& picture;      ///< as `take_picture` gives it; gone after the call
+};
+
+/// Takes all pictures in order and hands each to `frame`, so that only one is in memory. Frame i
+/// has the random stream (seed, i).
+void record(const Renderer& renderer, std::span<const RecordedPose> poses,
+            const RecordingCamera& camera, const FrameOptions& options, const SensorOptions& sensor,
+            std::uint64_t seed, Executor& executor,
+            const std::function<void(const RecordedFrame&)>& frame);
+
+}  // namespace panonav::simulation

@@ -1,0 +1,171 @@
+#include "panonav_simulation/sensor.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
+
+namespace panonav::simulation {
+
+namespace {
+
+constexpr double kFullTurn = 2.0 * std::numbers::pi;
+
+// Streams of the seed, so that occluders stay where they are when the noise changes its length.
+enum Stream : std::uint64_t { noise_stream = 31, occluder_stream = 32 };
+
+// What stands around the robot and hides a sector of azimuths from top to bottom.
+class Occluders {
+ public:
+  Occluders(const SensorOptions& options, std::uint64_t seed) {
+    if (options.occluded_fraction <= 0.0) return;
+    Random random(seed, occluder_stream);
+    const double first = random.uniform(0.0, kFullTurn);
+    const double sector = kFullTurn / options.occluders;
+    width_rad_ = options.occluded_fraction * sector;
+    for (int i = 0; i < options.occluders; ++i) {
+      // One in each sector: they never overlap, so the hidden share is exact.
+      Occluder occluder;
+      occluder.start_rad =
+          std::fmod(first + sector * i + random.uniform(0.0, sector - width_rad_), kFullTurn);
+      for (float& band : occluder.bands) band = static_cast<float>(random.uniform(0.03, 0.7));
+      occluders_.push_back(occluder);
+    }
+  }
+
+  // Empty where the view is free. `height` runs from 0 (bottom) to 1 (top of the view).
+  [[nodiscard]] std::optional<float> at(double azimuth_rad, double height) const {
+    for (const Occluder& occluder : occluders_) {
+      const double within =
+          std::fmod(azimuth_rad - occluder.start_rad + 2.0 * kFullTurn, kFullTurn);
+      if (within < width_rad_) {
+        const auto band = static_cast<std::size_t>(std::clamp(height * 3.0, 0.0, 2.0));
+        return occluder.bands[band];
+      }
+    }
+    return std::nullopt;
+  }
+  [[nodiscard]] bool none() const noexcept { return occluders_.empty(); }
+
+ private:
+  struct Occluder {
+    double start_rad = 0.0;
+    std::array<float, 3> bands{};
+  };
+  double width_rad_ = 0.0;
+  std::vector<Occluder> occluders_;
+};
+
+// From light to a digital value in 0 .. 1.
+class Pixel {
+ public:
+  Pixel(const SensorOptions& options, std::uint64_t seed)
+      : options_(options), random_(seed, noise_stream) {}
+
+  float value(double light) {
+    const double signal = std::clamp(light * options_.exposure, 0.0, 1.0);
+    const double deviation =
+        std::sqrt(options_.read_noise * options_.read_noise + signal / options_.full_well);
+    const double value = options_.gain * (signal + deviation * random_.normal());
+    return static_cast<float>(std::clamp(value, 0.0, 1.0));
+  }
+
+ private:
+  const SensorOptions& options_;
+  Random random_;
+};
+
+double light_factor(const SensorOptions& options, double azimuth_rad) {
+  return 1.0 + options.directional_light * std::cos(azimuth_rad - options.light_azimuth_rad);
+}
+
+}  // namespace
+
+void visit_options(SensorOptions& options, OptionVisitor& visitor) {
+  using T = SensorOptions;
+  constexpr OptionTable table{
+      option<&T::exposure>("exposure, in units of a full one", above(0), 1000),
+      option<&T::gain>("electronic amplification of signal and noise", above(0), 1000),
+      option<&T::read_noise>("standard deviation of a dark pixel, as a share of full scale", 0, 1),
+      option<&T::full_well>("electrons of a full pixel; fewer make more shot noise", 1, 1e12),
+      option<&T::vignetting>("share of light lost at the mirror's rim", 0, 1),
+      option<&T::directional_light>("share by which things on the light's side are brighter", 0, 1),
+      option<&T::light_azimuth_rad>("direction of that light, counter-clockwise from the heading",
+                                    -kFullTurn, kFullTurn),
+      option<&T::occluded_fraction>("share of all azimuths that people or things hide", 0, 1),
+      option<&T::occluders>("number of people or things that hide it, equally wide", 1, 1000),
+      option<&T::eight_bit>("round values to multiples of 1/255"),
+  };
+  table.visit(options, visitor);
+}
+
+Panorama apply_sensor(Panorama view, const SensorOptions& options, std::uint64_t seed) {
+  validate(options);
+  const Occluders occluders(options, seed);
+  Pixel pixel(options, seed);
+  for (int y = 0; y < view.rows(); ++y) {
+    const double height = 1.0 - (y + 0.5) / view.rows();
+    for (int c = 0; c < view.columns(); ++c) {
+      const double azimuth = view.azimuth_rad(c);
+      const auto hidden = occluders.at(azimuth, height);
+      const double light = hidden ? *hidden : view.at(y, c);
+      const float value = pixel.value(light * light_factor(options, azimuth));
+      view.at(y, c) = options.eight_bit ? std::round(255.0F * value) / 255.0F : value;
+    }
+  }
+  return view;
+}
+
+Image apply_sensor(const Radiance& view, const Camera& camera, const SensorOptions& options,
+                   std::uint64_t seed) {
+  validate(options);
+  validate(camera);
+  require(view.width == camera.image_size.width, "width of the view", view.width,
+          "that of the camera's image");
+  require(view.height == camera.image_size.height, "height of the view", view.height,
+          "that of the camera's image");
+  const Occluders occluders(options, seed);
+  const ElevationBand band = visible_elevations(camera);
+  const std::array<ImageCircle, 2> circles{image_circle(camera, 0),
+                                           image_circle(camera, lens_count(camera) - 1)};
+  // Directions cost time: they are looked up only if something depends on them.
+  const bool directions = options.directional_light > 0.0 || !occluders.none();
+  Pixel pixel(options, seed);
+  Image image(view.width, view.height, view.channels);
+  std::size_t i = 0;
+  for (int v = 0; v < view.height; ++v) {
+    for (int u = 0; u < view.width; ++u) {
+      const PixelPoint point{u + 0.5, v + 0.5};
+      double factor = 1.0;
+      std::optional<float> hidden;
+      const auto direction = directions ? unproject(camera, point) : std::nullopt;
+      if (direction) {
+        const double azimuth = direction->azimuth_rad();
+        factor = light_factor(options, azimuth);
+        hidden = occluders.at(azimuth, (direction->elevation_rad() - band.bottom_rad) /
+                                           (band.top_rad - band.bottom_rad));
+      }
+      const ImageCircle& circle = circles[static_cast<std::size_t>(lens_at(camera, point))];
+      if (circle.rim_radius_px > 0.0) {
+        const double radius =
+            std::hypot(point.u_px - circle.centre.u_px, point.v_px - circle.centre.v_px) /
+            circle.rim_radius_px;
+        factor *= 1.0 - options.vignetting * std::min(1.0, radius * radius);
+      }
+      for (int c = 0; c < view.channels; ++c, ++i) {
+        const double light = hidden ? *hidden : view.values[i];
+        image.at(u, v, c) =
+            static_cast<std::uint8_t>(std::lround(255.0F * pixel.value(light * factor)));
+      }
+    }
+  }
+  return image;
+}
+
+}  // namespace panonav::simulation

@@ -1,0 +1,137 @@
+#include "panonav_simulation/simulated_robot.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "panonav/core/error.hpp"
+
+namespace panonav::simulation {
+
+namespace {
+
+constexpr int feelers_each_side = 11;
+
+Point2 ahead(const Pose2& pose, double direction_rad, double distance_m) {
+  return pose * Point2{distance_m * std::cos(direction_rad), distance_m * std::sin(direction_rad)};
+}
+
+// Length of the free part of the straight way, at most `distance_m`.
+double free_way_m(const FreeSpace& space, Point2 from, Point2 to) {
+  if (space.is_free_between(from, to)) return distance(from, to);
+  double low = 0.0;
+  double high = 1.0;
+  constexpr int halvings = 12;
+  for (int i = 0; i < halvings; ++i) {
+    const double middle = 0.5 * (low + high);
+    const Point2 there{from.x_m + middle * (to.x_m - from.x_m),
+                       from.y_m + middle * (to.y_m - from.y_m)};
+    (space.is_free_between(from, there) ? low : high) = middle;
+  }
+  return low * distance(from, to);
+}
+
+}  // namespace
+
+double distance_from_route_m(Point2 place, std::span<const Pose2> route) {
+  double nearest_m = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < route.size(); ++i) {
+    const Point2 a = route[i > 0 ? i - 1 : 0].position();
+    const Point2 b = route[i].position();
+    const double dx = b.x_m - a.x_m;
+    const double dy = b.y_m - a.y_m;
+    const double square = dx * dx + dy * dy;
+    const double along =
+        square > 0.0 ? ((place.x_m - a.x_m) * dx + (place.y_m - a.y_m) * dy) / square : 0.0;
+    const double t = std::clamp(along, 0.0, 1.0);
+    nearest_m = std::min(nearest_m, distance(place, {a.x_m + t * dx, a.y_m + t * dy}));
+  }
+  return nearest_m;
+}
+
+bool has_room_between(const FreeSpace& space, double robot_radius_m, Point2 from, Point2 to,
+                      double spacing_m) {
+  const int steps = std::max(1, static_cast<int>(std::ceil(distance(from, to) / spacing_m)));
+  for (int i = 1; i <= steps; ++i) {
+    const double share = static_cast<double>(i) / steps;
+    if (space.clearance_m({from.x_m + share * (to.x_m - from.x_m),
+                           from.y_m + share * (to.y_m - from.y_m)}) < robot_radius_m) {
+      return false;
+    }
+  }
+  return true;
+}
+
+std::optional<AsideDirection> feel_aside(double wanted_rad, int feelers_each_side, int side,
+                                         const std::function<bool(double)>& is_open) {
+  constexpr double apart_rad = std::numbers::pi / 12.0;
+  for (int i = 1; i <= feelers_each_side; ++i) {
+    for (const int tried : {1, -1}) {
+      if (side != 0 && tried != side) continue;
+      const double direction_rad = wanted_rad + tried * i * apart_rad;
+      if (is_open(direction_rad)) return AsideDirection{direction_rad, tried};
+    }
+  }
+  return std::nullopt;
+}
+
+SimulatedRobot::SimulatedRobot(const FreeSpace& space, const OdometryNoise& motion,
+                               ObstacleRule obstacles, const Pose2& start, std::uint64_t seed)
+    : space_(&space), motion_(motion), obstacles_(obstacles), pose_(start), random_(seed, 1) {
+  validate(motion);
+  if (!space.is_free(start.position())) {
+    throw ContractError("start of the robot", "an obstacle", "a free place");
+  }
+}
+
+bool SimulatedRobot::is_open(double direction_rad, double distance_m) const {
+  return space_->is_free_between(pose_.position(), ahead(pose_, direction_rad, distance_m));
+}
+
+std::optional<double> SimulatedRobot::free_direction(double wanted_rad, double advance_m) {
+  if (is_open(wanted_rad, advance_m)) {
+    side_ = 0;
+    return wanted_rad;
+  }
+  if (obstacles_ == ObstacleRule::stop) return std::nullopt;
+  const auto feel = [&] {
+    return feel_aside(wanted_rad, feelers_each_side, side_, [&](double direction_rad) {
+      return is_open(direction_rad, 0.5 * advance_m);
+    });
+  };
+  auto aside = feel();
+  if (!aside && side_ != 0) {
+    side_ = -side_;
+    aside = feel();
+  }
+  if (!aside) return std::nullopt;
+  side_ = aside->side;
+  return aside->direction_rad;
+}
+
+bool SimulatedRobot::go(double direction_rad, double advance_m) {
+  const Pose2 before = pose_;
+  Pose2 after;
+  if (motion_.drive == DriveKind::differential) {
+    const Pose2 turned = sample_step({0.0, 0.0, wrap_angle(direction_rad)}, motion_, random_);
+    after = Pose2{before.x_m, before.y_m, wrap_angle(before.heading_rad + turned.heading_rad)} *
+            sample_step({advance_m, 0.0, 0.0}, motion_, random_);
+  } else {
+    after = before * sample_step({advance_m * std::cos(direction_rad),
+                                  advance_m * std::sin(direction_rad), 0.0},
+                                 motion_, random_);
+  }
+  const double way_m = distance(before.position(), after.position());
+  const double free_m = free_way_m(*space_, before.position(), after.position());
+  if (free_m >= way_m) {
+    pose_ = after;
+    return true;
+  }
+  const double share = free_m / way_m;
+  pose_ = {before.x_m + share * (after.x_m - before.x_m),
+           before.y_m + share * (after.y_m - before.y_m), after.heading_rad};
+  return false;
+}
+
+}  // namespace panonav::simulation

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+
+#include "panonav/core/random.hpp"
+#include "panonav/geometry/pose2.hpp"
+#include "panonav/motion/odometry.hpp"
+#include "panonav_simulation/free_space.hpp"
+
+namespace panonav::simulation {
+
+/// Whether a robot touches nothing on the straight way, looked at every `spacing_m` beyond `from`.
+/// Scenes name areas to drive in, too, whose borders are nothing to touch.
+[[nodiscard]] bool has_room_between(const FreeSpace& space, double robot_radius_m, Point2 from,
+                                    Point2 to, double spacing_m);
+
+/// Distance from a place to the nearest one of the polyline through the poses; infinity for none.
+[[nodiscard]] double distance_from_route_m(Point2 place, std::span<const Pose2> route);
+
+/// A direction beside the wanted one, on the left (1) or the right (-1) of it.
+struct AsideDirection {
+  double direction_rad = 0.0;
+  int side = 0;
+};
+/// With feelers left and right of the wanted direction, 15 degrees apart: the nearest direction
+/// that is open; on one side only, unless `side` is 0. Empty: none is.
+[[nodiscard]] std::optional<AsideDirection> feel_aside(
+    double wanted_rad, int feelers_each_side, int side,
+    const std::function<bool(double direction_rad)>& is_open);
+
+/// What a robot does whose way is not free.
+enum class ObstacleRule {
+  stop,  ///< it stops there, and the run ends
+  /// It goes past: with feelers as long as the step, it tries directions left and right of the one
+  /// it wants, 15 degrees apart, up to 165 degrees off, nearest first, and takes the first in which
+  /// half a step is free. As long as the wanted way stays blocked it keeps to the side it has
+  /// chosen, and changes it where that side has no way. Nowhere a way: it stops.
+  pass,
+};
+
+/// A robot base in a simulated place: does what it is told as well as it can. Holds the true pose
+/// and the random stream of its errors.
+class SimulatedRobot {
+ public:
+  /// `space` must outlive the robot. Throws OptionError, and ContractError when `start` is not
+  /// free.
+  SimulatedRobot(const FreeSpace& space, const OdometryNoise& motion, ObstacleRule obstacles,
+                 const Pose2& start, std::uint64_t seed);
+
+  [[nodiscard]] const Pose2& pose() const noexcept { return pose_; }
+
+  /// The direction in which the robot goes when it wants to go `advance_m` along `wanted_rad`, both
+  /// in its own frame; empty when an obstacle stops it. Remembers on which side it goes past.
+  [[nodiscard]] std::optional<double> free_direction(double wanted_rad, double advance_m);
+
+  /// Goes as far as nothing stands in the way. Returns whether that was all of it.
+  bool go(double direction_rad, double advance_m);
+
+ private:
+  [[nodiscard]] bool is_open(double direction_rad, double distance_m) const;
+
+  const FreeSpace* space_;
+  OdometryNoise motion_;
+  ObstacleRule obstacles_;
+  Pose2 pose_;
+  Random random_;
+  int side_ = 0;  // on which it goes past something: 1 left, -1 right
+};
+
+}  // namespace panonav::simulation

@@ -1,0 +1,319 @@
+#include "panonav_simulation/simulated_world.hpp"
+
+#include <fcntl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <fstream>
+#include <functional>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav_simulation/load_gazebo.hpp"
+#include "panonav_simulation/load_mesh.hpp"
+#include "panonav_simulation/mirror.hpp"
+
+namespace panonav::simulation {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// What stands in a scene of a file is as the file says: options that vary built-in scenes would be
+/// ignored.
+void refuse_variations_of_file(const std::string& file, const GivenOption& given) {
+  for (const char* name : {"scene_seed", "moved_objects", "moved_seed"}) {
+    if (const auto called = given("simulation", name)) {
+      throw OptionError(*called + " varies built-in scenes only; '" + file +
+                        "' is a file, leave it out");
+    }
+  }
+}
+
+/// What a world or a mesh may cost to read, in a process of its own.
+constexpr unsigned scene_seconds = 60;
+constexpr rlim_t scene_bytes = rlim_t{4} << 30U;
+
+void limit_this_process() {
+  const rlimit no_core{0, 0};
+  setrlimit(RLIMIT_CORE, &no_core);
+  const rlimit seconds{scene_seconds, scene_seconds};
+  setrlimit(RLIMIT_CPU, &seconds);
+  alarm(2 * scene_seconds);  // what only waits, too
+  rlim_t pages_now = 0;
+  std::ifstream("/proc/self/statm") >> pages_now;
+  const rlim_t bytes = pages_now * static_cast<rlim_t>(sysconf(_SC_PAGESIZE)) + scene_bytes;
+  const rlimit memory{bytes, bytes};
+  setrlimit(RLIMIT_AS, &memory);
+}
+
+/// Reads a file whose textures the argument reads; empty: surfaces get plain colours.
+using ReadScene = std::function<Scene(const TextureReader&)>;
+
+/// The end of a process that read a scene: its exit code is 0, or it wrote an error's message.
+[[noreturn]] void read_and_exit(const ReadScene& read, int answer) {
+  limit_this_process();
+  std::string message;
+  try {
+    (void)read({});
+  } catch (const Error& error) {
+    message = error.what();
+  } catch (const std::exception& error) {
+    message = std::string("the reader of the format failed: ") + error.what();
+  }
+  const ssize_t written = write(answer, message.data(), message.size());
+  _exit(message.empty() || written < 0 ? 0 : 1);
+}
+
+/// The packaged readers of worlds and meshes crash on some damaged files and never end on others.
+/// Such a file ends a process of its own, and this one with a clear line. What can be read is read
+/// again here, with its textures. Between fork and _exit only this thread runs in the child; those
+/// of the executor wait for work and hold no lock.
+Scene read_safely(const std::string& file, const ReadScene& read) {
+  std::array<int, 2> answer{-1, -1};
+  if (pipe2(answer.data(), O_CLOEXEC) != 0) throw FileError(file, "cannot be read: no pipe left");
+  const pid_t child = fork();
+  if (child == 0) read_and_exit(read, answer[1]);
+  close(answer[1]);
+  std::string message;
+  std::array<char, 4096> buffer{};
+  ssize_t count = 0;
+  while ((count = ::read(answer[0], buffer.data(), buffer.size())) > 0 ||
+         (count < 0 && errno == EINTR)) {
+    if (count > 0) message.append(buffer.data(), static_cast<std::size_t>(count));
+  }
+  close(answer[0]);
+  if (child < 0) throw FileError(file, "cannot be read: the system starts no process");
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  if (!message.empty()) throw Error(message);
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) {
+    return read([](const fs::path& path) { return read_image(path); });
+  }
+  const int signal = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
+  if (signal == SIGXCPU || signal == SIGALRM || signal == SIGKILL) {
+    throw FileError(file, "takes more than " + std::to_string(scene_seconds) + " s to read");
+  }
+  throw FileError(file, "is damaged: the reader of its format crashes on it");
+}
+
+Scene load_scene(const std::string& name, const SceneOptions& options, const GivenOption& given) {
+  const auto names = scene_names();
+  if (std::find(names.begin(), names.end(), name) != names.end()) {
+    return make_scene(name, {.seed = static_cast<std::uint64_t>(options.scene_seed),
+                             .moved_objects = options.moved_objects,
+                             .moved_seed = static_cast<std::uint64_t>(options.moved_seed),
+                             .light = options.light});
+  }
+  std::error_code ignored;
+  if (!fs::is_regular_file(name, ignored)) {
+    std::string all;
+    for (const auto known : names) all += (all.empty() ? "" : ", ") + std::string(known);
+    throw OptionError("'" + name + "' is neither a file nor a built-in scene; allowed: " + all);
+  }
+  refuse_variations_of_file(name, given);
+  Scene scene;
+  const std::string ending = lower_case(fs::path(name).extension().string());
+  if (ending == ".world" || ending == ".sdf") {
+    GazeboOptions gazebo;
+    gazebo.model_folders = gazebo_model_folders_of_environment();
+    scene = read_safely(name, [&](const TextureReader& textures) {
+      gazebo.textures.read = textures;
+      return load_gazebo(name, gazebo);
+    });
+  } else {
+    MeshOptions mesh;
+    scene = read_safely(name, [&](const TextureReader& textures) {
+      mesh.textures.read = textures;
+      return load_mesh(name, mesh);
+    });
+  }
+  scale_light(scene, options.light);
+  return scene;
+}
+
+std::string picture_name(std::size_t index) {
+  const std::string digits = std::to_string(index);
+  constexpr std::size_t width = 5;
+  return "view_" + std::string(width - std::min(width, digits.size()), '0') + digits + ".png";
+}
+
+/// Takes a data set away that could not be finished.
+void discard(const Dataset& dataset, bool with_folder) {
+  std::error_code ignored;
+  for (const auto& entry : dataset.entries) fs::remove(entry.path, ignored);
+  for (const char* name : {"poses.csv", "camera.toml"}) fs::remove(dataset.folder / name, ignored);
+  if (with_folder) fs::remove(dataset.folder, ignored);
+}
+
+}  // namespace
+
+void visit_options(SceneOptions& options, OptionVisitor& visitor) {
+  using T = SceneOptions;
+  constexpr OptionTable table{
+      option<&T::seed>("seed of poses, noise, tilt and odometry", 0),
+      option<&T::scene_seed>("seed of the textures and furniture of built-in scenes", 0),
+      option<&T::moved_objects>("share of the movable objects that stand elsewhere", 0, 1),
+      option<&T::moved_seed>("seed of which objects are moved, and where to", 0),
+      option<&T::light>("factor on the brightness of all lamps and the sky", above(0), 100),
+  };
+  table.visit(options, visitor);
+}
+
+void visit_options(SimulationOptions& options, OptionVisitor& visitor) {
+  using T = SimulationOptions;
+  constexpr OptionTable table{
+      choice<&T::kind>("what the camera writes: dual-fisheye is the picture of a 360 degree camera "
+                       "before it is stitched",
+                       "mirror", "panorama", "dual-fisheye"),
+      option<&T::rows>("rows of panoramas", 1, 4096),
+      option<&T::columns>("columns of panoramas", 4, 16384),
+      option<&T::elevation_low_deg>("lower edge of panoramas", -90, 90),
+      option<&T::elevation_high_deg>("upper edge of panoramas", -90, 90),
+      option<&T::lens_seed>("seed of how the two lenses are misaligned and differ; 0: not at all",
+                            0),
+      option<&T::lens_distance_m>("distance of the two lenses, which gives near things a parallax",
+                                  0, 1),
+      options_of<&T::scene>(),
+  };
+  table.visit(options, visitor);
+}
+
+RecordingHeading usual_heading(RecordingPath path) noexcept {
+  switch (path) {
+    case RecordingPath::tour:
+    case RecordingPath::walk:
+      return RecordingHeading::path;
+    case RecordingPath::random:
+      return RecordingHeading::random;
+    case RecordingPath::grid:
+    case RecordingPath::zigzag:
+      break;
+  }
+  return RecordingHeading::fixed;
+}
+
+SimulatedWorld::SimulatedWorld(const std::string& scene, SimulatedWorldOptions wanted,
+                               const GivenOption& given, Executor& executor)
+    : wanted_(std::move(wanted)), scene_(load_scene(scene, wanted_.simulation.scene, given)) {
+  const auto& simulation = wanted_.simulation;
+  if (simulation.elevation_low_deg >= simulation.elevation_high_deg) {
+    throw OptionError("elevation_low_deg is " + to_text(simulation.elevation_low_deg) +
+                      "; allowed: below elevation_high_deg, which is " +
+                      to_text(simulation.elevation_high_deg));
+  }
+  if (!given("frame", "camera_height_m")) wanted_.frame.camera_height_m = scene_.camera_height_m;
+  // What is not said of the robot is as with the robot that the scene is made for.
+  const FreeSpaceOptions usual =
+      free_space_options(scene_.robot_radius_m, wanted_.frame.camera_height_m);
+  FreeSpaceOptions& robot = wanted_.free_space;
+  if (!given("free_space", "robot_radius_m")) robot.robot_radius_m = usual.robot_radius_m;
+  if (!given("free_space", "robot_height_m")) robot.robot_height_m = usual.robot_height_m;
+  if (!given("free_space", "step_height_m")) robot.step_height_m = usual.step_height_m;
+  if (!given("free_space", "cell_m")) robot.cell_m = usual.cell_m;
+  free_space_ = std::make_shared<const FreeSpace>(scene_, wanted_.free_space);
+  renderer_ = std::make_shared<const Renderer>(scene_, RendererOptions{}, executor);
+}
+
+SimulatedWorld SimulatedWorld::with(const RecordingOptions& recording, int seed) const {
+  SimulatedWorld world = *this;
+  world.wanted_.recording = recording;
+  world.wanted_.simulation.scene.seed = seed;
+  return world;
+}
+
+RecordingCamera SimulatedWorld::camera() const {
+  const auto& simulation = wanted_.simulation;
+  if (simulation.kind == 0) return wanted_.mirror.value_or(simulated_mirror_camera());
+  if (simulation.kind == 2) {
+    return simulated_dual_fisheye(static_cast<std::uint64_t>(simulation.lens_seed),
+                                  simulation.lens_distance_m);
+  }
+  return PanoramaRendering{
+      .rows = simulation.rows,
+      .columns = simulation.columns,
+      .elevations = {radians(simulation.elevation_low_deg), radians(simulation.elevation_high_deg)},
+      .rays_per_axis = wanted_.frame.rays_per_axis};
+}
+
+PictureSource SimulatedWorld::source() const {
+  PictureSource source;
+  const auto seen_by = camera();
+  if (const auto* mirror = std::get_if<Camera>(&seen_by)) {
+    source.kind = PictureKind::mirror;
+    source.camera = *mirror;
+  } else {
+    source.layout.elevations = std::get<PanoramaRendering>(seen_by).elevations;
+  }
+  return source;
+}
+
+std::vector<RecordedPose> SimulatedWorld::plan(std::span<const Point2> way_points) const {
+  return plan_recording(scene_, *free_space_, wanted_.recording, wanted_.odometry,
+                        static_cast<std::uint64_t>(wanted_.simulation.scene.seed), way_points);
+}
+
+std::vector<RecordedPose> SimulatedWorld::plan_along(
+    std::span<const StampedPose> trajectory) const {
+  std::vector<Pose2> poses;
+  for (const StampedPose& stamped : trajectory) poses.push_back(stamped.pose);
+  const auto odometry = simulate_odometry(
+      poses, wanted_.odometry, static_cast<std::uint64_t>(wanted_.simulation.scene.seed));
+  std::vector<RecordedPose> recorded;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    recorded.push_back({trajectory[i].stamp_s, poses[i], odometry[i]});
+  }
+  return recorded;
+}
+
+Image SimulatedWorld::take_picture(const Pose2& pose, std::uint64_t seed,
+                                   Executor& executor) const {
+  return simulation::take_picture(*renderer_, pose, camera(), wanted_.frame, wanted_.sensor, seed,
+                                  executor);
+}
+
+Dataset record_dataset(const SimulatedWorld& world, const fs::path& folder,
+                       std::span<const RecordedPose> poses, bool with_path, Executor& executor,
+                       const std::function<void(const DatasetEntry&, const Image&)>& taken) {
+  std::error_code error;
+  const bool made_folder = fs::create_directories(folder, error);
+  if (error) throw FileError(folder.string(), "cannot be made: " + error.message());
+
+  Dataset dataset{folder, world.source(), {}};
+  const auto& wanted = world.options();
+  try {
+    record(world.renderer(), poses, world.camera(), wanted.frame, wanted.sensor,
+           static_cast<std::uint64_t>(wanted.simulation.scene.seed), executor,
+           [&](const RecordedFrame& frame) {
+             const RecordedPose& recorded = frame.pose;
+             DatasetEntry entry;
+             entry.file = picture_name(frame.number);
+             entry.path = folder / entry.file;
+             entry.pose =
+                 ReferencePose{recorded.pose.x_m, recorded.pose.y_m, recorded.pose.heading_rad};
+             if (with_path) {
+               entry.stamp_s = recorded.stamp_s;
+               entry.odometry = recorded.odometry;
+             }
+             if (wanted.frame.tilt_rad > 0.0) entry.tilt = frame.tilt;
+             write_png(entry.path, frame.picture.view());
+             dataset.entries.push_back(std::move(entry));
+             if (taken) taken(dataset.entries.back(), frame.picture);
+           });
+    write_dataset(dataset);
+  } catch (...) {
+    discard(dataset, made_folder);
+    throw;
+  }
+  return dataset;
+}
+
+}  // namespace panonav::simulation

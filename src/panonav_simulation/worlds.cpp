@@ -1,0 +1,66 @@
+#include "panonav_simulation/worlds.hpp"
+
+#include <algorithm>
+
+#include "panonav/io/image_file.hpp"
+#include "panonav_simulation/load_gazebo.hpp"
+#include "panonav_simulation/scenes.hpp"
+
+namespace panonav::simulation {
+
+bool has_data(const std::filesystem::path& data, const std::filesystem::path& part) {
+  return !data.empty() && std::filesystem::is_directory(data / part);
+}
+
+namespace {
+
+std::vector<std::string> those_in(const std::filesystem::path& data,
+                                  std::vector<std::string> worlds) {
+  std::erase_if(worlds, [&](const std::string& name) {
+    return !has_data(data, std::filesystem::path("scenes") / name);
+  });
+  return worlds;
+}
+
+}  // namespace
+
+std::vector<std::string> worlds_in(const std::filesystem::path& data) {
+  return those_in(data, {"small_warehouse", "small_house"});
+}
+
+std::vector<std::string> all_worlds_in(const std::filesystem::path& data) {
+  return those_in(data, {"small_warehouse", "small_house", "industrial_warehouse"});
+}
+
+Scene read_world(const std::filesystem::path& data, const std::string& name) {
+  const std::filesystem::path folder = data / "scenes" / name / "worlds";
+  std::filesystem::path world = folder / (name + ".world");
+  std::error_code ignored;
+  if (!std::filesystem::exists(world, ignored)) {
+    // A folder may hold one world of another name.
+    for (const auto& file : std::filesystem::directory_iterator(folder, ignored)) {
+      if (file.path().extension() == ".world") world = file.path();
+    }
+  }
+  GazeboOptions reading;
+  reading.textures.read = [](const std::filesystem::path& path) { return read_image(path); };
+  return load_gazebo(world, reading);
+}
+
+namespace {
+
+bool is_built_in(const std::string& name) {
+  return std::ranges::find(scene_names(), name) != scene_names().end();
+}
+
+}  // namespace
+
+bool has_scene(const std::filesystem::path& data, const std::string& name) {
+  return is_built_in(name) || !those_in(data, {name}).empty();
+}
+
+Scene scene_named(const std::filesystem::path& data, const std::string& name, std::uint64_t seed) {
+  return is_built_in(name) ? make_scene(name, {.seed = seed}) : read_world(data, name);
+}
+
+}  // namespace panonav::simulation

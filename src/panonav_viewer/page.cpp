@@ -1,0 +1,231 @@
+#include "panonav_viewer/page.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "panonav/core/text.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav_viewer/plot_json.hpp"
+#include "web.hpp"
+
+namespace panonav::viewer {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// What an address that holds text must not hold as it is.
+std::string percent_encoded(std::string_view text) {
+  std::string encoded;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool plain = byte >= 0x20 && byte < 0x7F && c != '%' && c != '#' && c != '<';
+    if (plain) {
+      encoded += c;
+    } else {
+      encoded += '%';
+      encoded += "0123456789ABCDEF"[byte >> 4U];
+      encoded += "0123456789ABCDEF"[byte & 15U];
+    }
+  }
+  return encoded;
+}
+
+/// Browsers load no module from a file beside a page that is itself a file. An import map gives
+/// each module an address that holds its text.
+std::string import_map() {
+  const std::array modules{
+      std::pair{"store", web::store_js},       std::pair{"draw", web::draw_js},
+      std::pair{"sight", web::sight_js},       std::pair{"map", web::map_js},
+      std::pair{"pictures", web::pictures_js}, std::pair{"facts", web::facts_js},
+      std::pair{"timeline", web::timeline_js}, std::pair{"plot", web::plot_js},
+      std::pair{"plan", web::plan_js},         std::pair{"chart", web::chart_js},
+      std::pair{"route", web::route_js},       std::pair{"card", web::card_js},
+      std::pair{"main", web::main_js}};
+  Json imports;
+  for (const auto& [name, text] : modules) {
+    imports["panonav/" + std::string(name)] =
+        "data:text/javascript;charset=utf-8," + percent_encoded(text);
+  }
+  return Json{{"imports", imports}}.dump();
+}
+
+}  // namespace
+
+std::string whole_page(std::string_view title, std::string_view generator, std::string body) {
+  const std::string maker =
+      generator.empty() ? std::string()
+                        : "<meta name=\"generator\" content=\"" + html_escaped(generator) + "\">\n";
+  const bool moving = body.find("<pn-") != std::string::npos;
+  const std::string imports =
+      moving ? "<script type=\"importmap\">" + import_map() + "</script>\n" : std::string();
+  constexpr std::string_view starting =
+      "<script type=\"module\">import 'panonav/main';</script>\n<noscript><p>Runs and plots of "
+      "this "
+      "page are drawn with scripts, which are switched off here.</p></noscript>\n";
+  const std::string_view scripts = moving ? starting : std::string_view();
+  const std::array filled{std::pair{std::string_view("{{title}}"), html_escaped(title)},
+                          std::pair{std::string_view("{{generator}}"), maker},
+                          std::pair{std::string_view("{{style}}"), std::string(web::viewer_css)},
+                          std::pair{std::string_view("{{imports}}"), imports},
+                          std::pair{std::string_view("{{scripts}}"), std::string(scripts)},
+                          std::pair{std::string_view("{{body}}"), std::move(body)}};
+  std::string html;
+  for (std::string_view left = web::index_html; !left.empty();) {
+    const std::size_t at = left.find("{{");
+    html += left.substr(0, at);
+    if (at == std::string_view::npos) break;
+    left.remove_prefix(at);
+    const auto found = std::ranges::find_if(
+        filled, [left](const auto& entry) { return left.starts_with(entry.first); });
+    html += found != filled.end() ? std::string_view(found->second) : left.substr(0, 2);
+    left.remove_prefix(found != filled.end() ? found->first.size() : 2);
+  }
+  return html;
+}
+
+std::string html_escaped(std::string_view text) {
+  std::string html;
+  for (const char c : readable_line(text)) {
+    switch (c) {
+      case '&':
+        html += "&amp;";
+        break;
+      case '<':
+        html += "&lt;";
+        break;
+      case '>':
+        html += "&gt;";
+        break;
+      case '"':
+        html += "&quot;";
+        break;
+      case '\'':
+        html += "&#39;";
+        break;
+      default:
+        html += c;
+    }
+  }
+  return html;
+}
+
+std::string data_element(std::string_view json) {
+  std::string safe = "<script type=\"application/json\">";
+  safe.reserve(json.size() + 64);
+  for (const char c : json) {
+    if (c == '<') {
+      safe += "\\u003c";
+    } else {
+      safe += c;
+    }
+  }
+  return safe + "</script>";
+}
+
+std::string live_page(std::string_view title, bool replay, std::string_view takes) {
+  return whole_page(
+      title, {},
+      "<pn-run class=\"whole\" data-title=\"" + html_escaped(title) + "\">" +
+          data_element(Json{{"live", "events"}, {"replay", replay}, {"takes", takes}}.dump()) +
+          "</pn-run>");
+}
+
+RunPage::RunPage(std::string title, std::size_t moments)
+    : title_(std::move(title)), every_(std::max<std::size_t>(1, (moments + 299) / 300)) {}
+
+void RunPage::add(const recordings::RunMoment& moment) {
+  const std::size_t number = moments_.size();
+  moments_.push_back(moment_json(moment, number));
+  pictures_.emplace_back();
+  staying_.take(moment);
+  // What changes on the way is told where it does.
+  recordings::RunMoment anew;
+  anew.plan = moment.plan;
+  anew.directions = moment.directions;
+  anew.goal = moment.goal;
+  if (const std::string told = staying_json(anew); !told.empty()) {
+    moments_.back().back() = ',';
+    moments_.back() += "\"told\":" + told + "}";
+  }
+  if (number % every_ != 0) return;
+  if (number / every_ >= 600) {  // more came than were expected
+    every_ *= 2;
+    for (std::size_t i = 0; i < number; ++i) {
+      if (i % every_ != 0) pictures_[i].clear();
+    }
+    if (number % every_ != 0) return;
+  }
+  Json pictures = Json::object();
+  if (moment.panorama) {
+    const Image seen = to_picture(*moment.panorama);
+    pictures["panorama"] = data_url("image/jpeg", encode_jpeg(seen.view()));
+  }
+  if (!moment.best_match.empty()) {
+    const Image best = decode_image(moment.best_match, "best match", {.side_px = 4096});
+    pictures["best"] = data_url("image/jpeg", encode_jpeg(best.view()));
+  }
+  pictures_.back() = pictures.dump();
+}
+
+void RunPage::route(const PicturePlot& panorama, const std::vector<RouteMark>& marks) {
+  Json all = Json::array();
+  for (const RouteMark& mark : marks) {
+    Json changed = Json::array();
+    for (const auto& [from, to] : mark.changed_deg) {
+      changed.push_back(std::round(10.0 * from) / 10.0);
+      changed.push_back(std::round(10.0 * to) / 10.0);
+    }
+    all.push_back({mark.along_m ? Json(*mark.along_m) : Json(),
+                   mark.true_along_m ? Json(*mark.true_along_m) : Json(), std::move(changed)});
+  }
+  route_ = plot_json(panorama);
+  route_.back() = ',';
+  route_ += "\"marks\":" + all.dump() + "}";
+}
+
+std::string RunPage::json() const {
+  const std::string staying = staying_json(staying_.moment);
+  std::string all = "{\"moments\":[";
+  for (std::size_t i = 0; i < moments_.size(); ++i) {
+    if (i > 0) all += ",\n";
+    all += moments_[i];
+    if (pictures_[i].empty()) continue;
+    all.back() = ',';
+    all += "\"data\":" + pictures_[i] + "}";
+  }
+  return all + "],\"staying\":" + (staying.empty() ? "{}" : staying) +
+         (unordered_ ? ",\"unordered\":true" : "") +
+         (route_.empty() ? "" : ",\"route\":" + route_) + "}";
+}
+
+std::string RunPage::element() const {
+  return "<pn-run>" + data_element(json()) + "</pn-run>\n";
+}
+
+std::string RunPage::html() const {
+  return whole_page(title_, {},
+                    "<pn-run class=\"whole\" data-title=\"" + html_escaped(title_) + "\">" +
+                        data_element(json()) + "</pn-run>");
+}
+
+std::string data_url(std::string_view type, std::span<const std::uint8_t> bytes) {
+  constexpr std::string_view letters =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text = "data:" + std::string(type) + ";base64,";
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t three = 0;
+    for (std::size_t j = i; j < i + 3; ++j) {
+      three = three << 8U | (j < bytes.size() ? bytes[j] : 0U);
+    }
+    for (std::size_t j = 0; j < 4; ++j) {
+      text += i + j <= bytes.size() ? letters[three >> (18 - 6 * j) & 63U] : '=';
+    }
+  }
+  return text;
+}
+
+}  // namespace panonav::viewer

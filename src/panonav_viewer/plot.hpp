@@ -1,0 +1,113 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "panonav/geometry/pose2.hpp"
+
+namespace panonav::viewer {
+
+/// The colours of all plots: those of Okabe and Ito, which colour-blind readers tell apart, and
+/// greys for what lies behind.
+enum class PlotColour {
+  blue,
+  vermilion,
+  green,
+  purple,
+  orange,
+  sky,
+  black,
+  yellow,
+  dark_grey,
+  grey,
+  light_grey,
+  pale_grey,
+};
+/// "#0072b2".
+[[nodiscard]] std::string_view hex(PlotColour colour);
+
+enum class SeriesStyle { lines, points, lines_and_points, bars };
+
+struct Series {
+  std::string label;  ///< "" leaves the series out of the legend
+  std::vector<double> x;
+  std::vector<double> y;
+  SeriesStyle style = SeriesStyle::lines_and_points;
+  std::vector<double> y_low;  ///< with y_high: error bars; empty for none
+  std::vector<double> y_high;
+
+  void add(double at, double value) {
+    x.push_back(at);
+    y.push_back(value);
+  }
+  void add(double at, double value, double low, double high) {
+    add(at, value);
+    y_low.push_back(low);
+    y_high.push_back(high);
+  }
+};
+
+/// Curves over one axis. Labels carry their units: "distance [m]".
+struct LinePlot {
+  std::string title;
+  std::string x_label;
+  std::string y_label;
+  std::vector<Series> series;
+  bool log_x = false;
+  bool log_y = false;
+  std::optional<std::pair<double, double>> x_range;
+  std::optional<std::pair<double, double>> y_range;
+  std::vector<std::string> x_tick_labels;  ///< for bars: one per x value
+};
+
+/// Values on a regular grid seen from above, lowest row first. The colour bar begins at 0 unless
+/// there are negative values.
+struct HeatMap {
+  std::string title;
+  std::string x_label = "x [m]";
+  std::string y_label = "y [m]";
+  std::string value_label;
+  int columns = 0;
+  int rows = 0;
+  Point2 first_cell;  ///< centre of cell (0, 0)
+  double spacing_m = 1.0;
+  std::vector<double> values;  ///< row-major; NaN leaves a cell empty
+  std::vector<Point2> crosses;
+};
+
+/// A map seen from above.
+struct MapLayer {
+  std::string label;
+  PlotColour colour = PlotColour::blue;
+  std::vector<Point2> circles;
+  std::vector<Point2> crosses;
+  std::vector<std::vector<Point2>> lines;
+  std::vector<std::vector<Point2>> filled_polygons;
+  std::vector<Point2> dots;  ///< small ones, for many points
+  std::vector<Point2> squares;
+};
+struct MapPlot {
+  std::string title;
+  std::vector<MapLayer> layers;  ///< drawn in this order
+  std::string unit = "m";        ///< of both axes
+  /// Two corners of what is shown; empty: everything.
+  std::optional<std::pair<Point2, Point2>> shown = {};
+};
+
+/// Writes a PNG (or, for a path ending in .svg, an SVG) through the external program gnuplot; the
+/// file appears whole or not at all. Throws Error when gnuplot is not installed, FileError when the
+/// file cannot be written, ContractError on series whose x and y differ in size. What holds no
+/// point does not appear in the legend.
+void write_plot(const std::filesystem::path& path, const LinePlot& plot);
+void write_plot(const std::filesystem::path& path, const HeatMap& plot);
+void write_plot(const std::filesystem::path& path, const MapPlot& plot);
+/// Several maps side by side in one picture, of one size and with one legend (as in [M04] figures 9
+/// and 10).
+void write_plot(const std::filesystem::path& path, const std::vector<MapPlot>& panels,
+                int panel_columns);
+
+}  // namespace panonav::viewer

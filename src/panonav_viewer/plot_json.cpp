@@ -1,0 +1,172 @@
+#include "panonav_viewer/plot_json.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/image.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav_viewer/page.hpp"
+
+namespace panonav::viewer {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json six_digits(double value) {
+  if (!std::isfinite(value)) return nullptr;
+  std::array<char, 32> text;
+  const auto end =
+      std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, 6)
+          .ptr;
+  double rounded = value;
+  std::from_chars(text.data(), end, rounded);
+  return rounded;
+}
+
+Json all_of(const std::vector<double>& values) {
+  Json all = Json::array();
+  for (const double value : values) all.push_back(six_digits(value));
+  return all;
+}
+
+Json pair(const std::pair<double, double>& values) {
+  return {six_digits(values.first), six_digits(values.second)};
+}
+
+/// Metres to a tenth of a millimetre; other units are as large.
+Json points(const std::vector<Point2>& given) {
+  Json all = Json::array();
+  const auto rounded = [](double value) { return std::round(value * 1e4) / 1e4; };
+  for (const Point2& point : given) {
+    all.push_back(rounded(point.x_m));
+    all.push_back(rounded(point.y_m));
+  }
+  return all;
+}
+
+Json lists(const std::vector<std::vector<Point2>>& given) {
+  Json all = Json::array();
+  for (const auto& list : given) all.push_back(points(list));
+  return all;
+}
+
+Json layer_json(const MapLayer& layer) {
+  Json json{{"label", layer.label}, {"colour", name_of(layer.colour)}};
+  if (!layer.circles.empty()) json["circles"] = points(layer.circles);
+  if (!layer.crosses.empty()) json["crosses"] = points(layer.crosses);
+  if (!layer.lines.empty()) json["lines"] = lists(layer.lines);
+  if (!layer.filled_polygons.empty()) json["polygons"] = lists(layer.filled_polygons);
+  if (!layer.dots.empty()) json["dots"] = points(layer.dots);
+  if (!layer.squares.empty()) json["squares"] = points(layer.squares);
+  return json;
+}
+
+/// Names in labels may be any bytes.
+std::string dumped(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+}  // namespace
+
+std::string_view name_of(PlotColour colour) {
+  constexpr std::array<std::string_view, 12> names{
+      "blue",  "vermilion", "green",     "purple", "orange",     "sky",
+      "black", "yellow",    "dark_grey", "grey",   "light_grey", "pale_grey"};
+  return names.at(static_cast<std::size_t>(colour));
+}
+
+std::string plot_json(const LinePlot& plot) {
+  Json json{{"title", plot.title}, {"x_label", plot.x_label}, {"y_label", plot.y_label}};
+  Json& all = json["series"] = Json::array();
+  for (const Series& series : plot.series) {
+    require(series.x.size() == series.y.size(), "values of a series",
+            static_cast<double>(series.y.size()), "as many as it has places");
+    constexpr std::array styles{"lines", "points", "lines_and_points", "bars"};
+    Json one{{"label", series.label},
+             {"style", styles.at(static_cast<std::size_t>(series.style))},
+             {"x", all_of(series.x)},
+             {"y", all_of(series.y)}};
+    if (!series.y_low.empty()) {
+      one["low"] = all_of(series.y_low);
+      one["high"] = all_of(series.y_high);
+    }
+    all.push_back(std::move(one));
+  }
+  if (plot.log_x) json["log_x"] = true;
+  if (plot.log_y) json["log_y"] = true;
+  if (plot.x_range) json["x_range"] = pair(*plot.x_range);
+  if (plot.y_range) json["y_range"] = pair(*plot.y_range);
+  if (!plot.x_tick_labels.empty()) json["names"] = plot.x_tick_labels;
+  return dumped(json);
+}
+
+std::string plot_json(const HeatMap& plot) {
+  return dumped(
+      Json{{"title", plot.title},
+           {"heat",
+            {{"columns", plot.columns},
+             {"rows", plot.rows},
+             {"first", {six_digits(plot.first_cell.x_m), six_digits(plot.first_cell.y_m)}},
+             {"spacing", six_digits(plot.spacing_m)},
+             {"values", all_of(plot.values)},
+             {"label", plot.value_label},
+             {"crosses", points(plot.crosses)}}}});
+}
+
+std::string plot_json(std::string_view title, const std::vector<MapPlot>& frames,
+                      const std::vector<MapLayer>& backdrop) {
+  require(!frames.empty(), "frames of a map", 0.0, "at least one");
+  Json json{{"title", title}, {"unit", frames.front().unit}};
+  if (const auto& shown = frames.front().shown) {
+    json["shown"] = {std::min(shown->first.x_m, shown->second.x_m),
+                     std::min(shown->first.y_m, shown->second.y_m),
+                     std::max(shown->first.x_m, shown->second.x_m),
+                     std::max(shown->first.y_m, shown->second.y_m)};
+  }
+  const auto layers_json = [](const std::vector<MapLayer>& layers) {
+    Json all = Json::array();
+    for (const MapLayer& layer : layers) all.push_back(layer_json(layer));
+    return all;
+  };
+  if (!backdrop.empty()) json["backdrop"] = layers_json(backdrop);
+  Json& all = json["frames"] = Json::array();
+  for (const MapPlot& frame : frames) {
+    all.push_back({{"title", frame.title}, {"layers", layers_json(frame.layers)}});
+  }
+  return dumped(json);
+}
+
+std::string plot_json(const PicturePlot& plot) {
+  const auto columns = static_cast<std::size_t>(plot.columns);
+  require(plot.values.size() == columns * static_cast<std::size_t>(plot.rows),
+          "values of a picture plot", static_cast<double>(plot.values.size()), "columns * rows");
+  Image image(plot.columns, plot.rows, 3);
+  for (int row = 0; row < plot.rows; ++row) {
+    for (int column = 0; column < plot.columns; ++column) {
+      const float value =
+          plot.values[static_cast<std::size_t>(row) * columns + static_cast<std::size_t>(column)];
+      const bool known = !std::isnan(value);
+      const auto grey = static_cast<std::uint8_t>(
+          known ? std::lround(255.0F * std::clamp(value, 0.0F, 1.0F)) : 0);
+      const int at = plot.rows - 1 - row;  // the lowest row comes first
+      image.at(column, at, 0) = known ? grey : 170;
+      image.at(column, at, 1) = known ? grey : 214;
+      image.at(column, at, 2) = known ? grey : 240;
+    }
+  }
+  Json json{
+      {"title", plot.title},           {"x_label", plot.x_label},
+      {"y_label", plot.y_label},       {"x_range", pair(plot.x_range)},
+      {"y_range", pair(plot.y_range)}, {"image", data_url("image/png", encode_png(image.view()))}};
+  if (plot.x_tick > 0.0) json["x_tick"] = plot.x_tick;
+  if (plot.y_tick > 0.0) json["y_tick"] = plot.y_tick;
+  return dumped(json);
+}
+
+}  // namespace panonav::viewer

@@ -1,0 +1,214 @@
+#include "panonav_viewer/report_page.hpp"
+
+#include <algorithm>
+#include <numbers>
+#include <type_traits>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
+#include "panonav/io/atomic_file.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav_viewer/plot_json.hpp"
+
+namespace panonav::viewer {
+
+namespace {
+
+std::string element(std::string_view name, std::string_view text) {
+  std::string result = "<";
+  result.append(name).append(">").append(html_escaped(text));
+  return result.append("</").append(name).append(">");
+}
+
+std::string table_row(std::string_view cell, const std::vector<std::string>& texts) {
+  std::string row = "<tr>";
+  for (const auto& text : texts) row += element(cell, text);
+  return row + "</tr>\n";
+}
+
+std::string panel(std::string_view name, std::string_view title, const std::string& json,
+                  std::string_view caption) {
+  return "<figure>" + (title.empty() ? std::string() : element("h3", title)) + "<pn-" +
+         std::string(name) + ">" + data_element(json) + "</pn-" + std::string(name) + ">" +
+         (caption.empty() ? std::string() : element("figcaption", caption)) + "</figure>\n";
+}
+
+std::string command_block(const std::vector<std::string>& command_lines) {
+  std::string html = "<pre>";
+  for (const auto& line : command_lines) html += html_escaped(line) + "\n";
+  return html + "</pre>\n";
+}
+
+std::string plot_element(const ReportPlot& given) {
+  return std::visit(
+      [&](const auto& plot) {
+        using Plot = std::decay_t<decltype(plot)>;
+        if constexpr (std::is_same_v<Plot, UnfoldingMap>) {
+          return panel("plan", plot.title, plot_json(plot.title, plot.frames, plot.backdrop),
+                       given.caption);
+        } else if constexpr (std::is_same_v<Plot, MapPlot>) {
+          return panel("plan", plot.title, plot_json(plot.title, {plot}), given.caption);
+        } else if constexpr (std::is_same_v<Plot, HeatMap>) {
+          return panel("plan", plot.title, plot_json(plot), given.caption);
+        } else {
+          return panel("chart", plot.title, plot_json(plot), given.caption);
+        }
+      },
+      given.plot);
+}
+
+/// The picture itself: as it is where it is PNG or JPEG, as SVG otherwise.
+std::string embedded(const std::filesystem::path& path) {
+  constexpr std::size_t max_bytes = std::size_t{64} << 20U;
+  const auto bytes = read_file(path, max_bytes);
+  if (path.extension() == ".svg") return data_url("image/svg+xml", bytes);
+  const bool png = image_format(bytes, path.string()) == ImageFormat::png;
+  return data_url(png ? "image/png" : "image/jpeg", bytes);
+}
+
+std::string view_element(const ReportView& view) {
+  const Image picture = to_picture(view.panorama);
+  // As wide as high in angle would be true to the eye, but a small view must be seen at all.
+  const double shape =
+      std::clamp(static_cast<double>(picture.width()) / picture.height(), 2.5, 10.0);
+  std::string html = "<figure><div class=\"view\"><img style=\"aspect-ratio:" + fixed(shape, 2) +
+                     "\" alt=\"" + html_escaped(view.caption) + "\" src=\"" +
+                     data_url("image/jpeg", encode_jpeg(picture.view())) + "\">";
+  for (const ViewMark& mark : view.marks) {
+    const double percent = 50.0 - mark.azimuth_rad * 50.0 / std::numbers::pi;
+    html += "<i" + std::string(mark.through ? "" : " class=\"arrow\"") +
+            " style=\"left:" + fixed(percent, 2) + "%;--key:var(--" +
+            std::string(name_of(mark.colour)) + ")\"></i>";
+  }
+  return html + "</div>" + element("figcaption", view.caption) + "</figure>\n";
+}
+
+}  // namespace
+
+ReportPage::ReportPage(std::string title, std::string lead)
+    : title_(std::move(title)), lead_(std::move(lead)) {}
+
+void ReportPage::section(std::string_view title) {
+  body_.emplace_back(element("h2", title) + "\n", "");
+}
+
+void ReportPage::part(std::string_view title,
+                      const std::pair<std::string, std::string>& value_and_meaning) {
+  const std::string number = std::to_string(++parts_);
+  const std::string numbered = number + ". " + std::string(title);
+  overview_ += "<a href=\"#part" + number + "\">" + element("small", numbered) +
+               element("b", value_and_meaning.first) + html_escaped(value_and_meaning.second) +
+               "</a>\n";
+  body_.emplace_back("<h2 id=\"part" + number + "\">" + html_escaped(numbered) + "</h2>\n", "");
+}
+
+void ReportPage::text(std::string_view paragraph) {
+  body_.emplace_back(element("p", paragraph) + "\n", "");
+}
+
+void ReportPage::figures(
+    const std::vector<std::pair<std::string, std::string>>& value_and_meaning) {
+  std::string html = "<div class=\"figures\">\n";
+  for (const auto& [value, meaning] : value_and_meaning) {
+    html += "<div>" + element("b", value) + html_escaped(meaning) + "</div>\n";
+  }
+  body_.emplace_back(html + "</div>\n", "");
+}
+
+void ReportPage::table(const std::vector<std::string>& header,
+                       const std::vector<std::vector<std::string>>& rows) {
+  std::string html = "<div class=\"wide\" tabindex=\"0\"><table>\n" + table_row("th", header);
+  for (const auto& row : rows) {
+    require(row.size() == header.size(), "cells of a table row", static_cast<double>(row.size()),
+            "as many as the header has");
+    html += table_row("td", row);
+  }
+  body_.emplace_back(html + "</table></div>\n", "");
+}
+
+void ReportPage::figure(const ReportPicture& picture) {
+  if (!picture.file.empty()) {
+    const bool plot = std::filesystem::path(picture.file).extension() == ".svg";
+    body_.emplace_back("<figure><img" + std::string(plot ? " class=\"plot\"" : "") + " alt=\"" +
+                           html_escaped(picture.caption) + "\" src=\"",
+                       picture.file);
+    body_.emplace_back("\">", "");
+  } else {
+    body_.emplace_back("<figure>", "");
+  }
+  body_.emplace_back(element("figcaption", picture.caption) + "</figure>\n", "");
+}
+
+void ReportPage::pictures(const std::vector<ReportPicture>& pictures) {
+  body_.emplace_back("<div class=\"pictures\">\n", "");
+  for (const auto& picture : pictures) figure(picture);
+  body_.emplace_back("</div>\n", "");
+}
+
+void ReportPage::thumbnails(const std::vector<ReportPicture>& pictures) {
+  body_.emplace_back("<div class=\"pictures small\">\n", "");
+  for (const auto& picture : pictures) figure(picture);
+  body_.emplace_back("</div>\n", "");
+}
+
+void ReportPage::plots(const std::vector<ReportPlot>& plots) {
+  std::string html = "<div class=\"pictures\">\n";
+  for (const auto& plot : plots) html += plot_element(plot);
+  body_.emplace_back(html + "</div>\n", "");
+}
+
+void ReportPage::views(const std::vector<ReportView>& views) {
+  std::string html = "<div class=\"pictures above\">\n";
+  for (const auto& view : views) html += view_element(view);
+  body_.emplace_back(html + "</div>\n", "");
+}
+
+void ReportPage::run(const RunPage& run) {
+  body_.emplace_back(run.element(), "");
+}
+
+void ReportPage::link(std::string_view file, std::string_view text) {
+  body_.emplace_back("<p class=\"link\"><a href=\"" + html_escaped(file) + "\">" +
+                         html_escaped(text) + "</a></p>\n",
+                     "");
+}
+
+void ReportPage::commands(const std::vector<std::string>& command_lines) {
+  body_.emplace_back(command_block(command_lines), "");
+}
+
+void ReportPage::story(const std::vector<StoryCard>& cards, std::string_view commands_title,
+                       const std::vector<std::string>& command_lines) {
+  story_ = "<div class=\"story\">\n";
+  for (const StoryCard& card : cards) {
+    story_ += "<section><h2><a href=\"#part" + std::to_string(card.part) + "\">" +
+              html_escaped(card.title) + "</a></h2>";
+    if (const auto* picture = std::get_if<ReportPicture>(&card.shown)) {
+      story_ += "<figure><img alt=\"" + html_escaped(picture->caption) + "\" src=\"" +
+                html_escaped(picture->file) + "\"></figure>\n";
+    } else {
+      story_ += plot_element(std::get<ReportPlot>(card.shown));
+    }
+    story_ +=
+        "<p>" + element("b", card.value) + " " + html_escaped(card.meaning) + "</p></section>\n";
+  }
+  story_ += "</div>\n<div class=\"begin\">" + element("h2", commands_title) +
+            command_block(command_lines) + "</div>\n";
+}
+
+void ReportPage::write(const std::filesystem::path& folder, std::string_view file,
+                       std::string_view generator) const {
+  std::string body =
+      "<main>\n" + element("h1", title_) + "\n<p class=\"lead\">" + html_escaped(lead_) + "</p>\n";
+  body += story_;
+  if (!overview_.empty()) body += "<nav class=\"figures\">\n" + overview_ + "</nav>\n";
+  for (const auto& [html, picture] : body_) {
+    body += html;
+    if (picture.empty()) continue;
+    body += picture.starts_with("data:") ? html_escaped(picture) : embedded(folder / picture);
+  }
+  const std::string page = whole_page(title_, generator, body + "</main>");
+  write_file(folder / file, std::string_view(page));
+}
+
+}  // namespace panonav::viewer

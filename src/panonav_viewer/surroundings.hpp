@@ -1,0 +1,49 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "panonav_simulation/place_recording.hpp"
+#include "panonav_viewer/plot.hpp"
+
+namespace panonav::viewer {
+
+/// Directions in which shapes are compared, counter-clockwise from x; each stands for a sector of
+/// 45 degrees around it.
+inline constexpr std::size_t shape_directions = 8;
+using Directional = std::array<double, shape_directions>;
+
+/// What stands around a position of the floor.
+struct Surroundings {
+  /// Harmonic mean of the free distance, over the sector and over the heights 0.3, 0.6 and 0.9 m.
+  Directional free_m{};
+  /// How far a robot can drive in this direction for the same change of its view, relative to the
+  /// other directions, when only parallax counts: a step in direction theta shifts a thing in
+  /// direction phi at distance d by |sin(phi - theta)| / d. The inverse of the mean shift.
+  Directional parallax_m{};
+};
+[[nodiscard]] Surroundings surroundings_of(const simulation::PlaceRecording& place,
+                                           Point2 position);
+
+/// How far the robot can drive in each direction until the first components of its view have
+/// changed by a fixed amount, to first order, for a view taken at `pose` with the place's heights
+/// and elevations: every pixel's brightness gradient times its shift by parallax, the shift read
+/// from the distance of what the pixel shows, transformed, and projected on each magnitude. Only
+/// ratios have a meaning. Directions are those of the scene. Throws ContractError on a view without
+/// elevations.
+[[nodiscard]] Directional predicted_extents(const simulation::PlaceRecording& place,
+                                            const Pose2& pose, const Panorama& view,
+                                            int components);
+
+/// The sector of a direction, 0 .. shape_directions - 1.
+[[nodiscard]] std::size_t sector_of(double azimuth_rad);
+
+/// A scene from above, behind everything else in a plot: what stands around as it is (its convex
+/// bodies, so that screens are slanted and the crowns of trees round), and walls, cut at the height
+/// of the camera so that doors are open.
+[[nodiscard]] std::vector<MapLayer> scene_layers(const simulation::Scene& scene);
+
+/// Returns the same as lines; outlines of closed things end where they begin.
+[[nodiscard]] std::vector<std::vector<Point2>> scene_outlines(const simulation::Scene& scene);
+
+}  // namespace panonav::viewer

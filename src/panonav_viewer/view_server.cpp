@@ -1,0 +1,426 @@
+#include "panonav_viewer/view_server.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <charconv>
+#include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <random>
+#include <span>
+#include <string_view>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "panonav/core/text.hpp"
+#include "panonav/io/image_file.hpp"
+#include "panonav_server/http_server.hpp"
+#include "panonav_viewer/moment_json.hpp"
+#include "panonav_viewer/page.hpp"
+
+namespace panonav::viewer {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr auto answer_headers =
+    "X-Content-Type-Options: nosniff\r\n"
+    "Referrer-Policy: no-referrer\r\n"
+    "Cross-Origin-Resource-Policy: same-origin\r\n"
+    "Content-Security-Policy: default-src 'self'; script-src 'unsafe-inline' data:; "
+    "style-src 'unsafe-inline'; img-src 'self' blob: data:; frame-ancestors 'none'\r\n"
+    "Cache-Control: no-store\r\n";
+
+std::string random_token() {
+  std::random_device device;
+  std::string text;
+  for (int i = 0; i < 32; ++i) text += "0123456789abcdef"[device() & 15U];
+  return text;
+}
+
+/// Of a file of somebody's: a browser gets nothing of it but its pixels.
+std::string safe_picture(std::span<const std::uint8_t> stored) {
+  const Image picture = decode_image(stored, "picture of a view", {.side_px = 4096});
+  const std::vector<std::uint8_t> bytes = encode_jpeg(picture.view());
+  return {bytes.begin(), bytes.end()};
+}
+
+/// Nothing but digits.
+std::optional<std::size_t> number_in(std::string_view text) {
+  std::size_t number = 0;
+  const char* const end = text.data() + text.size();
+  const auto [read, error] = std::from_chars(text.data(), end, number);
+  if (error != std::errc() || read != end) return std::nullopt;
+  return number;
+}
+
+std::string_view name_of(ViewWish wish) {
+  switch (wish) {
+    case ViewWish::goal:
+      return "goal";
+    case ViewWish::pose:
+      return "pose";
+    case ViewWish::none:
+      break;
+  }
+  return "";
+}
+
+/// A moment as viewers ask for it: made ready once, on the server's thread.
+class Frame {
+ public:
+  Frame(recordings::RunMoment moment, std::size_t number)
+      : moment_(std::move(moment)), number_(number) {}
+
+  [[nodiscard]] std::size_t number() const noexcept { return number_; }
+  /// Of its pictures.
+  [[nodiscard]] std::size_t bytes() const noexcept {
+    return moment_.encoded_picture.size() +
+           (moment_.picture ? moment_.picture->pixels().size() : 0) +
+           (moment_.panorama ? moment_.panorama->values().size_bytes() : 0);
+  }
+  const std::string& json() {
+    if (json_.empty()) json_ = moment_json(moment_, number_);
+    return json_;
+  }
+  /// "camera", "panorama" or "best"; empty where there is none.
+  const std::string& picture(const std::string& which) {
+    const auto found = pictures_.find(which);
+    return found != pictures_.end() ? found->second : pictures_[which] = encoded(which);
+  }
+
+ private:
+  [[nodiscard]] std::string encoded(const std::string& which) {
+    std::vector<std::uint8_t> bytes;
+    if (which == "best") {
+      if (!moment_.best_match.empty()) return safe_picture(moment_.best_match);
+    } else if (which == "panorama" && moment_.panorama) {
+      const Image seen = to_picture(*moment_.panorama);
+      bytes = encode_jpeg(seen.view());
+    } else if (which == "camera" && moment_.picture) {
+      bytes = encode_jpeg(moment_.picture->view());
+    } else if (which == "camera") {
+      bytes = moment_.encoded_picture;
+    }
+    return {bytes.begin(), bytes.end()};
+  }
+
+  const recordings::RunMoment moment_;
+  const std::size_t number_;
+  std::string json_;
+  std::map<std::string, std::string> pictures_;
+};
+
+std::string event(const std::string& name, const std::string& data) {
+  return "event: " + name + "\ndata: " + data + "\n\n";
+}
+
+}  // namespace
+
+struct ViewServer::Implementation {
+  explicit Implementation(const ViewServerOptions& wanted)
+      : options(wanted),
+        token(random_token()),
+        page(live_page(options.title, options.replay, name_of(options.takes))),
+        server({.address = options.address, .port = options.port, .headers = answer_headers},
+               [this](const server::HttpRequest& request) { return answer(request); }) {}
+
+  ~Implementation() {
+    std::unique_lock lock(mutex);
+    ended = true;
+    if (viewing == 0) return;
+    server.poke();
+    came.wait_for(lock, std::chrono::seconds(1), [this] { return viewing == 0; });
+    lock.unlock();
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  }
+
+  [[nodiscard]] server::HttpAnswer answer(const server::HttpRequest& request) {
+    const auto only = [](int status) { return server::HttpAnswer{.status = status}; };
+    if (!request.path.starts_with('/') ||
+        !server::same_secret(std::string_view(request.path).substr(1, token.size()), token) ||
+        !server::is_own_host(request.host) ||
+        !(request.origin.empty() || request.origin == "http://" + request.host)) {
+      return only(404);
+    }
+    const std::string_view asked = std::string_view(request.path).substr(1 + token.size());
+    if ((options.replay || options.takes != ViewWish::none) && asked == "/control") {
+      if (request.method != "POST") return only(405);
+      return only(control(request.body) ? 204 : 400);
+    }
+    if (request.method != "GET") return only(405);
+    if (asked == "/") return {.type = "text/html; charset=utf-8", .content = page};
+    if (asked == "/events") return events();
+    constexpr std::string_view views = "/view/";
+    if (asked.starts_with(views)) {
+      const auto wanted = number_in(asked.substr(views.size()));
+      return wanted ? reference(*wanted) : only(404);
+    }
+    constexpr std::string_view pictures = "/picture/";
+    if (!asked.starts_with(pictures)) return only(404);
+    const std::string_view rest = asked.substr(pictures.size());
+    const std::size_t slash = rest.find('/');
+    const auto wanted = number_in(rest.substr(0, slash));
+    if (slash == std::string_view::npos || !wanted) return only(404);
+    return picture(*wanted, std::string(rest.substr(slash + 1)));
+  }
+
+  /// The picture of a reference, by its place among those that were told.
+  [[nodiscard]] server::HttpAnswer reference(std::size_t wanted) {
+    std::string name;
+    {
+      const std::lock_guard lock(mutex);
+      const auto& known = staying.moment.reference_views;
+      if (!options.thumbnail || wanted >= known.size()) return {.status = 404};
+      name = known[wanted].name;
+    }
+    const std::vector<std::uint8_t> stored = options.thumbnail(name);
+    if (stored.empty()) return {.status = 404};
+    const std::string bytes = safe_picture(stored);
+    return {.type = "image/jpeg", .content = bytes};
+  }
+
+  [[nodiscard]] server::HttpAnswer picture(std::size_t wanted, const std::string& which) {
+    std::shared_ptr<Frame> frame;
+    {
+      const std::lock_guard lock(mutex);
+      const auto found = std::ranges::find_if(
+          frames, [wanted](const auto& kept) { return kept->number() == wanted; });
+      if (found != frames.end()) frame = *found;
+    }
+    const std::string* const bytes = frame ? &frame->picture(which) : nullptr;
+    if (bytes == nullptr || bytes->empty()) return {.status = 404};
+    return {.type = bytes->starts_with("\x89PNG") ? "image/png" : "image/jpeg", .content = *bytes};
+  }
+
+  /// One viewer's events, as long as it is there.
+  class Viewer {
+   public:
+    explicit Viewer(Implementation& all) : all_(all) {
+      {
+        const std::lock_guard lock(all.mutex);
+        ++all.viewing;
+      }
+      all.came.notify_all();
+    }
+    ~Viewer() {
+      {
+        const std::lock_guard lock(all_.mutex);
+        --all_.viewing;
+        all_.left = Clock::now();
+      }
+      all_.came.notify_all();
+    }
+    Viewer(const Viewer&) = delete;
+    Viewer& operator=(const Viewer&) = delete;
+
+    std::optional<std::string> more() {
+      if (told_end_) return std::nullopt;
+      std::string text;
+      std::vector<std::shared_ptr<Frame>> untold;
+      {
+        const std::lock_guard lock(all_.mutex);
+        if (!greeted_) {
+          text = "retry: 500\n" + event("past", past_json(all_.past));
+          if (!all_.frames.empty()) next_ = all_.frames.back()->number();
+          greeted_ = true;
+        }
+        if (staying_ != all_.staying.times) {
+          text += event("staying", staying_json(all_.staying.moment));
+          staying_ = all_.staying.times;
+        }
+        for (const auto& frame : all_.frames) {
+          if (frame->number() >= next_) untold.push_back(frame);
+        }
+        told_end_ = all_.ended;
+      }
+      for (const auto& frame : untold) {
+        text += event("moment", frame->json());
+        next_ = frame->number() + 1;
+      }
+      if (told_end_) text += event("ended", "{}");
+      const auto now = Clock::now();
+      // So that a viewer who has gone without a word is noticed.
+      if (text.empty() && now - said_ > std::chrono::seconds(2)) text = ": still there\n\n";
+      if (!text.empty()) said_ = now;
+      return text;
+    }
+
+   private:
+    Implementation& all_;
+    bool greeted_ = false;
+    bool told_end_ = false;
+    std::size_t next_ = 0;     // number of the frame that is still to be told
+    std::size_t staying_ = 0;  // as of `StayingParts::times`
+    Clock::time_point said_ = Clock::now();
+  };
+
+  [[nodiscard]] server::HttpAnswer events() {
+    if (viewing >= options.max_viewers) return {.status = 503};
+    return {.type = "text/event-stream",
+            .more = [viewer = std::make_shared<Viewer>(*this)] { return viewer->more(); }};
+  }
+
+  /// {"play": true} or {"play": false}, {"step": 1}, {"speed": 2} of a replay; {"goal": [x, y]} or
+  /// {"pose": [x, y, heading or null]} where the run takes it: false where it is none of them.
+  bool control(const std::string& text) {
+    const auto json = nlohmann::json::parse(text, nullptr, false);
+    if (!json.is_object()) return false;
+    const std::lock_guard lock(mutex);
+    if (json.contains("goal") || json.contains("pose")) return take(json);
+    if (!options.replay) return false;
+    const auto speed = json.value("speed", nlohmann::json(pace.speed));
+    const auto playing = json.value("play", nlohmann::json(pace.playing));
+    const auto steps = json.value("step", nlohmann::json(0U));
+    constexpr double min_speed = 0.1;
+    constexpr double max_speed = 100.0;
+    if (!speed.is_number() || speed < min_speed || speed > max_speed || !playing.is_boolean() ||
+        !steps.is_number_unsigned() || steps > 1000U) {
+      return false;
+    }
+    pace.speed = speed;
+    pace.playing = playing;
+    pace.steps += steps.get<std::size_t>();
+    came.notify_all();
+    return true;
+  }
+
+  /// A wish of a viewer, alone in its message.
+  bool take(const nlohmann::json& json) {
+    const std::string wanted(name_of(options.takes));
+    if (wanted.empty() || json.size() != 1 || !json.contains(wanted)) return false;
+    const auto& values = json[wanted];
+    const std::size_t size = options.takes == ViewWish::pose ? 3 : 2;
+    if (!values.is_array() || values.size() != size) return false;
+    ReferencePose pose;
+    if (!values[0].is_number() || !values[1].is_number()) return false;
+    pose.x_m = values[0].get<double>();
+    pose.y_m = values[1].get<double>();
+    if (size == 3 && !values[2].is_null()) {
+      if (!values[2].is_number()) return false;
+      pose.heading_rad = values[2].get<double>();
+      constexpr double max_heading = 6.3;  // a turn
+      if (!(std::abs(*pose.heading_rad) <= max_heading)) return false;
+    }
+    const auto& known = staying.moment.references;
+    if (known.empty()) return false;
+    constexpr double beside_m = 10.0;
+    const auto is_beside = [&](double value, double Point2::*axis) {
+      const auto [low, high] = std::ranges::minmax(known, {}, axis);
+      return value >= low.*axis - beside_m && value <= high.*axis + beside_m;
+    };
+    if (!is_beside(pose.x_m, &Point2::x_m) || !is_beside(pose.y_m, &Point2::y_m)) return false;
+    wish = pose;
+    return true;
+  }
+
+  /// Returns when the moment of this stamp may be shown.
+  void wait_for_turn(std::unique_lock<std::mutex>& lock, double stamp_s) {
+    // Stamps may jump: a recording of two days, a clock set back.
+    constexpr double max_gap_s = 2.0;
+    constexpr auto grace = std::chrono::seconds(2);  // a page that is loaded again is soon back
+    if (!pace.last_s) came.wait(lock, [this] { return viewing > 0; });
+    const double gap_s = pace.last_s ? std::clamp(stamp_s - *pace.last_s, 0.0, max_gap_s) : 0.0;
+    pace.last_s = stamp_s;
+    while (pace.steps == 0) {
+      const auto due = pace.shown + std::chrono::duration_cast<Clock::duration>(
+                                        std::chrono::duration<double>(gap_s / pace.speed));
+      const auto now = Clock::now();
+      const bool alone = viewing == 0;
+      if ((pace.playing && now >= due) || (alone && now >= left + grace)) break;
+      if (pace.playing && !alone) {
+        came.wait_until(lock, due);
+      } else if (alone) {
+        came.wait_until(lock, pace.playing ? std::min(due, left + grace) : left + grace);
+      } else {
+        came.wait(lock);
+      }
+    }
+    if (pace.steps > 0) --pace.steps;
+    if (viewing == 0 && !pace.playing) pace.playing = true;  // whoever held it is gone
+    pace.shown = Clock::now();
+  }
+
+  void add(recordings::RunMoment moment) {
+    {
+      std::unique_lock lock(mutex);
+      if (options.replay) wait_for_turn(lock, moment.stamp_s);
+      past.push_back({moment.stamp_s, moment.pose,
+                      moment.truth ? std::optional(moment.truth->position()) : std::nullopt,
+                      moment.probability, moment.sure, moment.state});
+      // Of a long run every second moment is dropped, again and again.
+      constexpr std::size_t max_past = 4096;
+      if (past.size() == max_past) {
+        for (std::size_t i = 1; 2 * i < past.size(); ++i) past[i] = std::move(past[2 * i]);
+        past.resize(max_past / 2);
+      }
+      staying.take(moment);
+      frames.push_back(std::make_shared<Frame>(std::move(moment), number++));
+      kept_bytes += frames.back()->bytes();
+      // A viewer asks for the pictures of a moment some time after it heard of it.
+      const std::size_t max_frames = viewing > 0 ? 16 : 1;
+      constexpr std::size_t max_bytes = 64U << 20U;
+      while (frames.size() > max_frames || (frames.size() > 1 && kept_bytes > max_bytes)) {
+        kept_bytes -= frames.front()->bytes();
+        frames.pop_front();
+      }
+      if (viewing == 0) return;
+    }
+    server.poke();
+  }
+
+  const ViewServerOptions options;
+  const std::string token;
+  const std::string page;
+  std::atomic<std::size_t> viewing = 0;  // changes under the mutex
+  std::mutex mutex;                      // of what follows, up to the server
+  std::condition_variable came;
+  std::deque<std::shared_ptr<Frame>> frames;
+  std::size_t kept_bytes = 0;  // of the frames
+  std::vector<PastMoment> past;
+  StayingParts staying;
+  std::optional<ReferencePose> wish;
+  struct {
+    bool playing = true;
+    double speed = 1.0;
+    std::size_t steps = 0;
+    std::optional<double> last_s;  // stamp of the moment before
+    Clock::time_point shown;
+  } pace;
+  Clock::time_point left;  // when a viewer did, the last time
+  std::size_t number = 0;
+  bool ended = false;
+  server::HttpServer server;  // last: its thread uses the others
+};
+
+ViewServer::ViewServer(const ViewServerOptions& options)
+    : implementation_(std::make_unique<Implementation>(options)) {}
+
+ViewServer::~ViewServer() = default;
+
+std::string ViewServer::url() const {
+  return "http://" + implementation_->options.address + ":" +
+         std::to_string(implementation_->server.port()) + "/" + implementation_->token + "/";
+}
+
+void ViewServer::add(recordings::RunMoment moment) {
+  implementation_->add(std::move(moment));
+}
+
+std::optional<ReferencePose> ViewServer::take_wish() {
+  const std::lock_guard lock(implementation_->mutex);
+  return std::exchange(implementation_->wish, std::nullopt);
+}
+
+std::size_t ViewServer::viewers() const {
+  return implementation_->viewing;
+}
+
+}  // namespace panonav::viewer

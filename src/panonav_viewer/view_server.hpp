@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "panonav_recordings/run_recorder.hpp"
+
+namespace panonav::viewer {
+
+/// What a viewer may tell the run by a click on the map.
+enum class ViewWish {
+  none,
+  goal,  ///< where to go; without a heading
+  pose,  ///< where the robot is
+};
+
+struct ViewServerOptions {
+  std::string address = "127.0.0.1";  ///< an IPv4 address of this machine, to listen at
+  int port = 0;                       ///< 0 .. 65535; 0: one that is free
+  std::string title = "panonav";      ///< of the page
+  std::size_t max_viewers = 8;        ///< at a time; further ones are told to come later
+  /// The run is one of a recording: it waits for the first viewer, goes on at the pace of its
+  /// stamps, and viewers may hold it, take it step by step, and change its pace. Two seconds after
+  /// the last viewer has left it goes on without waiting.
+  bool replay = false;
+  ViewWish takes = ViewWish::none;  ///< anything else is refused
+  /// The picture (PNG or JPEG) of a reference by its name, empty where there is none; the server's
+  /// thread asks. Empty: viewers get no pictures of references.
+  std::function<std::vector<std::uint8_t>(const std::string& name)> thumbnail;
+};
+
+/// Shows a run in browsers while it goes on: a page over HTTP, moments as server-sent events,
+/// pictures on request. A thread of its own makes what viewers ask for: a moment is turned into
+/// text, and a picture into JPEG, once, when the first viewer asks for it. A viewer that is slow
+/// misses moments, and never holds up a live run or other viewers. What a run tells once
+/// (references, edges, plan) and the path so far are kept for those who come later.
+///
+/// The address of the page holds a random token of 128 bits. Whoever does not know it gets nothing,
+/// and neither does a page of another origin, or one that reached this machine by a name that is
+/// not "localhost" (DNS rebinding).
+class ViewServer {
+ public:
+  /// Listens from here on. Throws Error where address and port are not to be had, ContractError
+  /// where the port is out of range.
+  explicit ViewServer(const ViewServerOptions& options = {});
+  /// Viewers are told that the run has ended; those who are there get 0.3 s for the last pictures.
+  ~ViewServer();
+  ViewServer(const ViewServer&) = delete;
+  ViewServer& operator=(const ViewServer&) = delete;
+
+  /// "http://127.0.0.1:41234/6f3a.../": to open in a browser.
+  [[nodiscard]] std::string url() const;
+  /// Of a live run never waits. Cost: that of moving the moment, and of noting its pose. Of a
+  /// replay waits until it is the moment's turn.
+  void add(recordings::RunMoment moment);
+  [[nodiscard]] std::size_t viewers() const;
+  /// What a viewer wished last, once: of what the run takes, finite, and at most 10 m beside the
+  /// references that it has told.
+  [[nodiscard]] std::optional<ReferencePose> take_wish();
+
+ private:
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace panonav::viewer

@@ -1,0 +1,175 @@
+#include "panonav_fleet/searched_recogniser.hpp"
+
+#include <gtest/gtest.h>
+
+#include <thread>
+
+#include "panonav/core/error.hpp"
+#include "panonav/pipeline/memoriser.hpp"
+#include "support/landmark_pictures.hpp"
+#include "support/temporary_folder.hpp"
+
+namespace panonav::fleet {
+using namespace testing;
+namespace {
+
+Image noise_picture(std::uint64_t seed) {
+  Random random(seed);
+  Image image(96, 12);
+  for (int v = 0; v < 12; ++v) {
+    for (int u = 0; u < 96; ++u) image.at(u, v) = static_cast<std::uint8_t>(random.next());
+  }
+  return image;
+}
+
+/// All but `bytes_read`, to the bit.
+void expect_same(const Place& searched, const Place& held) {
+  EXPECT_EQ(searched.known_probability, held.known_probability);
+  EXPECT_EQ(searched.known, held.known);
+  ASSERT_EQ(searched.matches.size(), held.matches.size());
+  for (std::size_t i = 0; i < held.matches.size(); ++i) {
+    const PlaceMatch& a = searched.matches[i];
+    const PlaceMatch& b = held.matches[i];
+    EXPECT_EQ(a.name, b.name);
+    EXPECT_EQ(a.view, b.view);
+    EXPECT_EQ(a.dissimilarity, b.dissimilarity);
+    EXPECT_EQ(a.column_difference, b.column_difference);
+    EXPECT_EQ(a.verified_features, b.verified_features);
+    EXPECT_EQ(a.heading_rad, b.heading_rad);
+  }
+  ASSERT_EQ(searched.position.has_value(), held.position.has_value());
+  if (held.position) {
+    EXPECT_EQ(searched.position->x_m, held.position->x_m);
+    EXPECT_EQ(searched.position->y_m, held.position->y_m);
+    EXPECT_EQ(searched.position->radius_m, held.position->radius_m);
+  }
+  EXPECT_EQ(searched.heading_rad, held.heading_rad);
+  EXPECT_EQ(searched.components, held.components);
+}
+
+class SearchedRecogniserTest : public InTemporaryFolder {
+ protected:
+  /// `posed`: every so many of the views have a pose; 0: none.
+  void memorise(int side, std::size_t posed) {
+    Memoriser memoriser(path_, {.source = landmark_panoramas()});
+    const auto poses = grid_poses(side);
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      Observation seen(landmark_picture(world_, poses[i]));
+      seen.name = view_name(i);
+      if (posed > 0 && i % posed == 0) {
+        seen.pose = ReferencePose{poses[i].x_m, poses[i].y_m, poses[i].heading_rad};
+      }
+      memoriser.add(std::move(seen));
+    }
+    memoriser.finish();
+  }
+  /// In the memory, turned, between its views, elsewhere and nowhere.
+  std::vector<Image> queries() const {
+    std::vector<Image> pictures;
+    for (const Pose2& pose : {Pose2{1.0, 1.5, 0.0}, Pose2{0.5, 2.0, 2.0}, Pose2{1.3, 0.8, -1.0},
+                              Pose2{50.0, 70.0, 0.0}}) {
+      pictures.push_back(landmark_picture(world_, pose));
+    }
+    pictures.push_back(landmark_picture(landmark_world(77), {1.0, 1.0, 0.5}));
+    pictures.push_back(noise_picture(3));
+    return pictures;
+  }
+  void expect_same_answers(const PlaceRecogniserOptions& options = {}) {
+    const PlaceRecogniser held(path_, options);
+    const SearchedRecogniser searched(path_, options);
+    EXPECT_EQ(searched.size(), held.memory().size());
+    const std::vector<std::string> excluded{view_name(8), view_name(3), "nothing"};
+    for (const Image& picture : queries()) {
+      const Observation seen(picture);
+      expect_same(searched.localise(seen), held.localise(seen));
+      expect_same(searched.localise(seen, excluded), held.localise(seen, excluded));
+    }
+    EXPECT_GE(searched.counters().searches, 2 * queries().size());
+    EXPECT_GT(searched.counters().views_read, 0U);
+  }
+
+  const ToyWorld world_ = landmark_world(5);
+  const std::filesystem::path path_ = folder / "m.panonav";
+};
+
+TEST_F(SearchedRecogniserTest, AnswersAsTheHeldMemoryDoes) {
+  memorise(9, 1);
+  expect_same_answers();
+  expect_same_answers({.localiser = {.top = 40}});
+  expect_same_answers({.localiser = {.top = 3, .components = 4}});
+  expect_same_answers({.localiser = {.reranked_views = 0}});
+  expect_same_answers({.localiser = {.reranked_views = 30}});
+}
+
+TEST_F(SearchedRecogniserTest, AnswersAlikeWhereFewViewsOrNoneHavePoses) {
+  memorise(7, 3);
+  expect_same_answers();
+  std::filesystem::remove(path_);
+  memorise(7, 0);
+  expect_same_answers();
+}
+
+TEST_F(SearchedRecogniserTest, AnswersAlikeBeyondAThousandViews) {
+  memorise(33, 1);  // 1089: more than are ranked again, or whose columns are kept
+  expect_same_answers();
+}
+
+TEST_F(SearchedRecogniserTest, OfALargeMemoryWhatIsKeptIsTaken) {
+  memorise(9, 1);
+  const PlaceRecogniser held(path_);
+  SearchedRecogniser searched(path_, {}, 50);  // of 81
+  for (const Image& picture : queries()) {
+    expect_same(searched.localise(Observation(picture)), held.localise(Observation(picture)));
+  }
+  // Others change the views: those that there are now are found, and the models stay.
+  MemoryFile file = MemoryFile::open(path_, Access::read_write);
+  file.remove(std::vector{*file.find(view_name(20))});
+  EXPECT_TRUE(searched.refresh());
+  EXPECT_FALSE(searched.refresh());
+  EXPECT_EQ(searched.size(), 80U);
+  const Place place = searched.localise(Observation(landmark_picture(world_, grid_poses(9)[20])));
+  EXPECT_TRUE(place.known);
+  for (const PlaceMatch& match : place.matches) EXPECT_NE(match.name, view_name(20));
+}
+
+TEST_F(SearchedRecogniserTest, OfALargeMemoryThatKeepsNothingPartsAreLearnt) {
+  for (const std::size_t posed : {1U, 0U}) {
+    std::filesystem::remove(path_);
+    memorise(9, posed);
+    MemoryFile::open(path_, Access::read_write).set_parameter("learnt models", "none");
+    const SearchedRecogniser searched(path_, {}, 50);
+    const PlaceRecogniser held(path_);
+    const Place place = searched.localise(Observation(landmark_picture(world_, {1.0, 1.5, 1.0})));
+    EXPECT_TRUE(place.known);
+    EXPECT_EQ(
+        place.matches.front().name,
+        held.localise(Observation(landmark_picture(world_, {1.0, 1.5, 1.0}))).matches[0].name);
+    EXPECT_FALSE(searched.localise(Observation(noise_picture(4))).known);
+  }
+}
+
+TEST_F(SearchedRecogniserTest, ThreadsAskAtOnce) {
+  memorise(6, 1);
+  const SearchedRecogniser searched(path_);
+  const PlaceRecogniser held(path_);
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 3; ++i) {
+    threads.emplace_back([&] {
+      for (const Image& picture : queries()) {
+        expect_same(searched.localise(Observation(picture)), held.localise(Observation(picture)));
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+}
+
+TEST_F(SearchedRecogniserTest, RefusesWhatItCannotTell) {
+  EXPECT_THROW(SearchedRecogniser{path_}, FileError);
+  memorise(3, 1);
+  EXPECT_THROW(SearchedRecogniser(path_, {.areas = WantedAccuracy{}}), ContractError);
+  EXPECT_THROW(SearchedRecogniser(path_, {.localiser = {.components = 99}}), ContractError);
+  EXPECT_THROW(SearchedRecogniser(path_, {.localiser = {.top = 0}}), Error);
+}
+
+}  // namespace
+}  // namespace panonav::fleet

@@ -1,0 +1,559 @@
+#!/usr/bin/env python3
+"""Memories on a PostgreSQL server: test_server.py PANONAV TEST_FLEET PANONAV_POSTGRESQL. One server for all, in a
+temporary folder. Exits with 77 (skipped) where there is no server program or panonav was built without libpq.
+"""
+import json
+import os
+import pathlib
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.error
+import urllib.request
+
+PANONAV, TEST_FLEET, SERVER = sys.argv[1:4]
+SHARED = ("MemoryFileContent.HeadersComeBack:MemoryFileContent.ContentComesBack:MemoryFileContent.IdsAre*:"
+          "MemoryFileContent.Para*:MemoryFileContent.ABad*:MemoryFileContent.Readers*:MemoryFileContent.TwoW*:"
+          "MapTables.*:RouteTables.W*:RouteTables.B*:MemoryFileUndo.*:"
+          "ViewsOfAMemoryFile.AreThose*:ViewsOfAMemoryFile.See*:MemoryOnServer.*:SynchronisedMemory.*:PlaceSearchTest.*"
+          # What attacks a file, and how many changes a file keeps for undo: a server keeps the last one.
+          "-*Tampered*:MemoryFileUndo.Damage*:MemoryFileUndo.BringsBackAll*:MemoryFileUndo.History*")
+
+
+def run(*words, code=0, **more):
+    done = subprocess.run([str(word) for word in words], capture_output=True, text=True, timeout=120, **more)
+    assert done.returncode == code, (words, done.returncode, done.stdout, done.stderr)
+    return done.stdout
+
+
+def refused(*words, saying):
+    """One line that says so, without a password."""
+    done = subprocess.run([str(word) for word in words], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 2, (words, done.returncode, done.stdout, done.stderr)
+    lines = done.stderr.strip().splitlines()
+    assert len(lines) == 1 and re.search(saying, lines[0]), (words, saying, done.stderr)
+    assert "geheim" not in done.stdout + done.stderr, done.stderr
+
+
+class Server:
+    def __init__(self, folder):
+        self.folder = folder
+
+    def start(self, *settings):
+        run(SERVER, self.folder, "start", *settings)
+
+    def stop(self):
+        run(SERVER, self.folder, "stop")
+
+    def kill(self):
+        """As when the machine loses its power: all of its processes at once."""
+        first = int((self.folder / "data/postmaster.pid").read_text().split()[0])
+        pids = [first] + [int(pid) for pid in subprocess.run(
+            ["pgrep", "-P", str(first)], capture_output=True, text=True).stdout.split()]
+        for pid in pids:
+            os.kill(pid, signal.SIGKILL)
+        for _ in range(200):
+            if not any(pathlib.Path(f"/proc/{pid}/cmdline").exists() and
+                       pathlib.Path(f"/proc/{pid}/cmdline").read_bytes() for pid in pids):
+                return
+            time.sleep(0.05)
+        raise AssertionError("the server is still there")
+
+    def memory(self, name, user="panonav", more=""):
+        return f"postgresql://{user}@/panonav?host={self.folder}&memory={name}{more}"
+
+    def sql(self, text):
+        return run("psql", "-X", "-q", "-t", "-A", "-v", "ON_ERROR_STOP=1", "-h", self.folder, "-U", "panonav",
+                   "-d", "panonav", "-c", text).strip()
+
+
+def same_answers(server, folder):
+    """Every verb that answers says the same of both, to the last digit."""
+    run(PANONAV, "simulate", "hall", folder / "grid", "--grid", "1.2", "--kind", "panorama", "--seed", "3")
+    run(PANONAV, "simulate", "hall", folder / "drive", "--kind", "panorama", "--seed", "3", "--path", "walk",
+        "--spacing-m", "0.1", "--poses", "25")
+    answers = {}
+    for memory, mapped in ((folder / "hall.panonav", folder / "mapped.panonav"),
+                           (server.memory("hall"), server.memory("mapped"))):
+        def answer(*words):
+            done = subprocess.run([PANONAV, *words, "--json"], capture_output=True, text=True, timeout=120)
+            assert done.returncode in (0, 1), (words, done.stderr)  # 1: no answer, for both
+            said = f"{done.returncode} {done.stdout}"
+            for one in (memory, mapped):
+                said = said.replace(json.dumps(str(one)), '"MEMORY"')
+            said = re.sub(r'"(created_s|bytes|file_bytes|\w*_ms)":[^,}]*', "", said)
+            answers.setdefault(str(memory), []).append(said)
+        answer("memorise", folder / "grid", memory)
+        answer("memorise", folder / "grid", memory)  # goes on: nothing is new
+        answer("localise", memory, folder / "drive")
+        answer("home", "view_00003.png", folder / "drive/view_00004.png", "--memory", memory)
+        answer("route", "record", folder / "drive", memory, "--name", "way")
+        answer("route", "follow", memory, folder / "drive")
+        answer("map", folder / "drive", mapped)
+        answer("list", memory)
+        answer("info", memory)
+        answer("rename", memory, "view_00002.png", "the 'door'")
+        answer("forget", memory, "view_00001.png")
+        answer("undo", memory)
+        answer("list", memory)
+        answer("verify", memory)
+        run(PANONAV, "export", memory, "-o", folder / f"export{len(answers)}")
+    file, kept = answers.values()
+    for one, other in zip(file, kept, strict=True):
+        assert one == other, (one[:3000], other[:3000])
+    exported = [{str(path.relative_to(root)): path.read_bytes() for path in root.rglob("*") if path.is_file()}
+                for root in (folder / "export1", folder / "export2")]
+    assert exported[0].keys() == exported[1].keys() and len(exported[0]) > 10
+    assert all(exported[0][name] == exported[1][name] for name in exported[0] if name.endswith(".png"))
+    # merged on the server as in a file
+    run(PANONAV, "memorise", folder / "drive", folder / "second.panonav")
+    for first, out in ((folder / "hall.panonav", folder / "both.panonav"),
+                       (server.memory("hall"), server.memory("both"))):
+        run(PANONAV, "merge", first, folder / "second.panonav", "-o", out, code=1)  # nothing in common: kept apart
+    views = [run(PANONAV, "list", out, "--json") for out in (folder / "both.panonav", server.memory("both"))]
+    assert [re.sub(r'"memory":"[^"]*"', "", view) for view in views][0] == \
+        [re.sub(r'"memory":"[^"]*"', "", view) for view in views][1]
+
+
+def copies(server, folder):
+    """To the server and back: the same, and never instead of something."""
+    def said(memory):
+        return re.sub(r'"(memory|created_s|file_bytes)":[^,}]*', "", run(PANONAV, "list", memory, "--json") +
+                      run(PANONAV, "info", memory, "--json") + run(PANONAV, "verify", memory))
+    run(PANONAV, "copy", folder / "hall.panonav", server.memory("the%20copy"))
+    run(PANONAV, "copy", server.memory("the%20copy"), folder / "back.panonav")
+    assert said(folder / "back.panonav").replace("back.panonav", "hall.panonav") == said(folder / "hall.panonav")
+    refused(PANONAV, "copy", folder / "hall.panonav", server.memory("hall"), saying="is there already")
+    refused(PANONAV, "copy", server.memory("hall"), folder / "back.panonav", saying="is there already")
+
+
+def served(server, folder):
+    """`serve` answers from a memory on a server, and from its new state once somebody changed it."""
+    memory = server.memory("served")
+    run(PANONAV, "memorise", folder / "grid", memory)
+    serving = subprocess.Popen([PANONAV, "serve", memory, "--listen", "0", "--json"], stdout=subprocess.PIPE, text=True)
+    try:
+        url = json.loads(serving.stdout.readline())["url"]
+        def views():
+            with urllib.request.urlopen(url.rstrip("/") + "/v1/memories", timeout=60) as answer:
+                return json.load(answer)
+        before = views()
+        assert "served" in json.dumps(before), before
+        run(PANONAV, "forget", memory, "view_00001.png")
+        for _ in range(600):
+            if views() != before:
+                return
+            time.sleep(0.1)
+        raise AssertionError(views())
+    finally:
+        serving.send_signal(signal.SIGINT)
+        serving.wait(timeout=60)
+
+
+class Serving:
+    """`serve` of one memory in a process of its own."""
+    def __init__(self, memory, *words):
+        self.process = subprocess.Popen([PANONAV, "serve", f"m={memory}", "--listen", "0", "--json", *words],
+                                        stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        self.url = json.loads(self.process.stdout.readline())["url"].rstrip("/")
+
+    def get(self, path, body=None):
+        try:
+            with urllib.request.urlopen(urllib.request.Request(self.url + path, body), timeout=60) as answer:
+                return answer.status, answer.read().decode()
+        except urllib.error.HTTPError as error:
+            return error.code, error.read().decode()
+
+    def localise(self, picture):
+        status, answer = self.get("/v1/memories/m/localise", picture.read_bytes())
+        return status, re.sub(r'"bytes_read":\d+', "", answer)
+
+    def end(self):
+        self.process.send_signal(signal.SIGINT)
+        assert self.process.wait(timeout=60) == 0
+
+
+def searched(server, folder):
+    """Two processes that search a memory on the server where it lies answer as one that holds it, to the last digit,
+    also while others change it and once the server was away."""
+    memory = server.memory("searched")
+    run(PANONAV, "memorise", folder / "grid", memory)
+    pictures = sorted((folder / "drive").glob("*.png"))[::6] + sorted((folder / "grid").glob("*.png"))[:2]
+    assert len(pictures) >= 5
+    serving = [Serving(memory, "--max-held-views", "0"), Serving(memory, "--max-held-views", "0")]
+    try:
+        def same(views):
+            holding = Serving(memory)
+            try:
+                for one in serving:
+                    for _ in range(600):
+                        if f'"views":{views},' in one.get("/v1/memories")[1]:
+                            break
+                        time.sleep(0.05)
+                    assert f'"views":{views},' in one.get("/v1/memories")[1], (views, one.get("/v1/memories"))
+                for picture in pictures:
+                    held = holding.localise(picture)
+                    assert held[0] == 200 and '"matches":[{' in held[1], held
+                    for one in serving:
+                        for _ in range(200):  # what is learnt of new views comes a moment after these
+                            if one.localise(picture) == held:
+                                break
+                            time.sleep(0.05)
+                        assert one.localise(picture) == held, (picture, one.localise(picture), held)
+                assert "panonav_sketch_bytes" not in holding.get("/metrics")[1]
+            finally:
+                holding.end()
+        before = int(json.loads(run(PANONAV, "info", memory, "--json"))["views"])
+        same(before)
+        run(PANONAV, "forget", memory, "view_00001.png", "view_00004.png")
+        same(before - 2)
+        run(PANONAV, "undo", memory)
+        same(before)
+        run(PANONAV, "forget", memory, "view_00002.png", "view_00007.png", "view_00009.png")
+        same(before - 3)
+        run(PANONAV, "memorise", folder / "grid", memory)  # adds them again, under other ids
+        same(before)
+        metrics = serving[0].get("/metrics")[1]
+        for name, least in (("panonav_sketch_bytes", 1000), ("panonav_searches_total", len(pictures)),
+                            ("panonav_search_views_read_total", len(pictures)), ("panonav_memory_views", before)):
+            assert float(re.search(name + r'\{memory="m"\} (\S+)', metrics)[1]) >= least, metrics
+        assert float(re.search(r'panonav_search_seconds_total\{memory="m"\} (\S+)', metrics)[1]) > 0.0
+        server.stop()
+        status, answer = serving[0].localise(pictures[0])
+        assert status == 503 and len(answer.strip().splitlines()) == 1 and "error" in answer, (status, answer)
+        server.start()
+        same(before)
+    finally:
+        for one in serving:
+            one.end()
+
+
+def roles(server, folder):
+    server.sql("""CREATE ROLE reads LOGIN IN ROLE panonav_reader; CREATE ROLE adds LOGIN IN ROLE panonav_contributor;
+        CREATE ROLE curates LOGIN IN ROLE panonav_curator; CREATE ROLE stranger LOGIN;
+        CREATE ROLE other LOGIN IN ROLE panonav_curator; INSERT INTO panonav.members VALUES ('other', 'south')""")
+    reads, adds, curates, other = (server.memory("hall", user) for user in ("reads", "adds", "curates", "other"))
+    before = run(PANONAV, "list", reads, "--json").split('"views"')[1]
+    refused(PANONAV, "memorise", folder / "drive", reads, saying="cannot be changed.*panonav_contributor")
+    refused(PANONAV, "memorise", folder / "grid", server.memory("new", "reads"), saying="permission denied")
+    refused(PANONAV, "localise", server.memory("hall", "stranger"), folder / "drive", saying="permission denied")
+    for verb in (("forget", adds, "view_00001.png"), ("rename", adds, "view_00001.png", "a")):
+        refused(PANONAV, *verb, saying="permission denied.*panonav_curator")
+    refused(PANONAV, "localise", other, folder / "drive", saying="no memory 'hall'")
+    refused(PANONAV, "localise", other + "&fleet=", folder / "drive", saying="no memory 'hall'")
+    refused(PANONAV, "memorise", folder / "grid", other.replace("hall", "new") + "&fleet=", saying="row-level security")
+    assert before == run(PANONAV, "list", reads, "--json").split('"views"')[1]
+    # What each may do.
+    run(PANONAV, "memorise", folder / "grid", server.memory("small", "adds", "&robot=red%20one"))
+    run(PANONAV, "forget", server.memory("small", "curates"), "view_00001.png")
+    run(PANONAV, "memorise", folder / "grid", other)  # of the same name, in the other fleet
+    assert server.sql("SELECT string_agg(fleet || '/' || name, ' ' ORDER BY fleet, name) FROM panonav.memories "
+                      "WHERE name IN ('hall', 'small')") == "/hall /small south/hall"
+    assert server.sql("SELECT r.name || ' ' || s.login || ' ' || count(*) FROM panonav.views v JOIN panonav.sessions s "
+                      "ON s.id = v.session JOIN panonav.robots r ON r.id = s.robot WHERE r.name LIKE 'red%' "
+                      "GROUP BY r.name, s.login").startswith("red one adds ")
+    # Row-level security leaves the index of positions in use.
+    plan = run("psql", "-X", "-q", "-t", "-A", "-h", server.folder, "-U", "adds", "-d", "panonav", "-c",
+               "SET enable_seqscan = off", "-c", "EXPLAIN SELECT id FROM panonav.views WHERE memory = 1 AND x_m IS NOT "
+               "NULL AND x_m BETWEEN 0 AND 0.1 AND y_m BETWEEN 0 AND 0.1")
+    assert re.search(r"views_by_position.*\n? *Index Cond: .*x_m >=.*y_m >=", plan), plan
+    # Not by SQL of one's own, either, nor under the name of a role.
+    assert run("psql", "-X", "-q", "-t", "-A", "-h", server.folder, "-U", "other", "-d", "panonav", "-c",
+               "SET ROLE panonav_curator", "-c", "SELECT fleet || '/' || name FROM panonav.memories").split() == \
+        ["south/hall"]
+    for sql in ("DELETE FROM panonav.views", "UPDATE panonav.settings SET checksum = 0 WHERE key = 'rows' RETURNING "
+                "1 / 0", "INSERT INTO panonav.views VALUES ((SELECT min(id) FROM panonav.memories), 99, 'a', "
+                "NULL, NULL, NULL, NULL, NULL, '', 0)"):
+        done = subprocess.run(["psql", "-X", "-v", "ON_ERROR_STOP=1", "-h", server.folder, "-U", "other", "-d",
+                               "panonav", "-c", "BEGIN", "-c", "SELECT set_config('role', 'adds', true)", "-c", sql],
+                              capture_output=True, text=True)
+        assert done.returncode != 0 or "UPDATE 0" in done.stdout, (sql, done.stdout)
+
+
+def wrong_addresses(server, folder):
+    hba = server.folder / "data/pg_hba.conf"
+    hba.write_text("local all locked scram-sha-256\n" + hba.read_text())
+    server.sql("CREATE ROLE locked LOGIN PASSWORD 'richtig' IN ROLE panonav_reader; SELECT pg_reload_conf()")
+    locked = server.memory("hall", "locked:geheim").replace("@/", "@/")
+    for _ in range(100):  # until the server has read its file again
+        if subprocess.run([PANONAV, "info", locked], capture_output=True).returncode == 2:
+            break
+        time.sleep(0.05)
+    refused(PANONAV, "info", locked, saying="password authentication failed")
+    assert '"views"' in run(PANONAV, "info", server.memory("hall", "locked:richtig"), "--json")
+    assert "richtig" not in run(PANONAV, "info", server.memory("hall", "locked:richtig"), "--json")
+    refused(PANONAV, "info", server.memory("hall").replace("/panonav?", "/nowhere?"), saying='"nowhere" does not exist')
+    refused(PANONAV, "info", server.memory("nothing"), saying="no memory 'nothing'")
+    refused(PANONAV, "info", f"postgresql:///panonav?host={folder}/absent&memory=m", saying="No such file")
+    refused(PANONAV, "info", "postgresql://u:geheim@127.0.0.1:1/d?memory=m", saying="refused")
+    refused(PANONAV, "info", "postgresql://u:geh%eim@h/d?memory=m", saying="libpq")
+    refused(PANONAV, "info", f"postgresql:///panonav?host={server.folder}", saying="names no memory")
+    refused(PANONAV, "info", server.memory("hall", more="&sslmode=sometimes"), saying="sslmode")
+
+
+def certificate(folder, name, *more):
+    run("openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", f"/CN={name}",
+        "-keyout", folder / f"{name}.key", "-out", folder / f"{name}.crt", *more)
+
+
+def encrypted(server, folder):
+    """The settings of TLS reach libpq: over a network a server that takes nothing else, and who it must be."""
+    certificate(folder, "server", "-addext", "subjectAltName=DNS:localhost")
+    certificate(folder, "another")
+    for name in ("server.crt", "server.key"):
+        shutil.copy(folder / name, server.folder / "data" / name)
+    (server.folder / "data/server.key").chmod(0o600)
+    hba = server.folder / "data/pg_hba.conf"
+    before = hba.read_text()
+    hba.write_text("hostssl all all 127.0.0.1/32 trust\nlocal all all trust\n")
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    server.stop()
+    server.start("ssl=on", "listen_addresses=127.0.0.1", f"port={port}")
+    refused(SERVER, server.folder, "start", "ssl=off", saying="runs already")
+
+    def memory(host, mode, root="server"):
+        return f"postgresql://panonav@{host}:{port}/panonav?memory=hall&hostaddr=127.0.0.1&sslmode={mode}" \
+            f"&sslrootcert={folder}/{root}.crt"
+    try:
+        assert "TLS" in run("psql", "-X", "-t", "-A", memory("localhost", "verify-full").replace("memory=hall&", ""),
+                            "-c", "SELECT version FROM pg_stat_ssl WHERE pid = pg_backend_pid()")
+        said = run(PANONAV, "info", memory("localhost", "verify-full"), "--json")
+        assert json.loads(said)["views"] > 0, said
+        refused(PANONAV, "info", memory("localhost", "disable"), saying="no encryption")
+        refused(PANONAV, "info", memory("localhost", "verify-full", "another"), saying="certificate verify failed")
+        refused(PANONAV, "info", memory("elsewhere", "verify-full"), saying='does not match host name "elsewhere"')
+        refused(PANONAV, "memorise", folder / "grid", memory("localhost", "verify-full", "absent"), saying="absent.crt")
+    finally:
+        server.stop()
+        hba.write_text(before)
+        server.start()
+
+
+def recorded(folder, prefix, count):
+    """Pictures of the hall whose names begin so."""
+    run(PANONAV, "simulate", "hall", folder, "--random", count, "--kind", "panorama", "--seed", len(prefix))
+    for picture in folder.glob("view_*.png"):
+        picture.rename(picture.with_name(prefix + picture.name))
+    poses = folder / "poses.csv"
+    poses.write_text(poses.read_text().replace("view_", prefix + "view_"))
+    return folder
+
+
+def synchronised(server, folder):
+    """The verb: what it says, who may what, a server that is older than before, rows that nobody wrote."""
+    address = server.memory("fleet", more="&robot=one")
+    one, two = folder / "one.panonav", folder / "two.panonav"
+    run(PANONAV, "memorise", folder / "grid", one)
+    views = json.loads(run(PANONAV, "list", one, "--json"))["views"]
+
+    def sync(file, address, *more):
+        return json.loads(run(PANONAV, "synchronise", file, address, "--json", *more))
+
+    def names(memory):
+        return sorted(view["name"] for view in json.loads(run(PANONAV, "list", memory, "--json"))["views"])
+
+    first = sync(one, address)
+    assert first["uploaded"] == first["views"] == len(views) and first["seconds"] > 0, first
+    assert "nothing was new" in run(PANONAV, "synchronise", one, address)
+    second = sync(two, address)
+    assert second["downloaded"] == len(views), second
+    assert names(one) == names(two)
+    # The files answer alike, with models that were learnt again.
+    answers = [run(PANONAV, "localise", file, folder / "drive", "--json") for file in (one, two)]
+    assert re.sub("one.panonav", "two.panonav", answers[0]) == answers[1]
+    near = ("--around", "0", "0", "--within-m", "10")
+    assert sync(folder / "part.panonav", address, *near)["downloaded"] == len(views)
+    far = sync(folder / "part.panonav", address, "--around", "500", "0", "--within-m", "10")
+    assert (far["left"], far["removed_on_server"], far["views"]) == (len(views), 0, 0), far
+    for words, saying in ((("--around", "1", "1"), "needs --within-m"), (("--within-m", "1"), "needs --around"),
+                          (("--around", "1", "1", "--within-m", "-1"), "radius_m is -1"),
+                          (("--around", "1", "1", "--within-m", "1e9"), "up to a million")):
+        done = subprocess.run([PANONAV, "synchronise", one, address, *words], capture_output=True, text=True)
+        assert done.returncode == 2 and saying in done.stderr, (words, done.stderr)
+    refused(PANONAV, "synchronise", one, two, saying="two.panonav.*address of a memory on a server")
+    refused(PANONAV, "synchronise", folder / "absent.panonav", server.memory("nothing"), saying="no memory 'nothing'")
+
+    # Whoever may only read takes, whoever may only add adds; the rest stays in the file.
+    reads, adds, curates = (server.memory("fleet", user) for user in ("reads", "adds", "curates"))
+    run(PANONAV, "copy", two, folder / "three.panonav")
+    three = folder / "three.panonav"
+    run(PANONAV, "memorise", recorded(folder / "third", "of_three_", 20), three)
+    run(PANONAV, "forget", three, "view_00001.png")
+    added = len(names(three)) - len(views) + 1
+    assert added == 20
+    said = sync(three, reads)
+    assert said["withheld"] == added and said["uploaded"] == 0 and said["downloaded"] == 1, said
+    run(PANONAV, "forget", three, "view_00001.png")
+    run(PANONAV, "rename", three, "view_00002.png", "renamed")
+    said = sync(three, adds)
+    assert said["uploaded"] == added and said["withheld"] == 2, said
+    assert "renamed" not in names(server.memory("fleet")) and "renamed" in names(three)
+    said = sync(three, curates)
+    assert (said["removed_on_server"], said["updated_on_server"], said["withheld"]) == (1, 1, 0), said
+    sync(one, address)
+    assert names(one) == names(three) == names(server.memory("fleet"))
+    # A view that makes way for another's name takes none that comes with it.
+    run(PANONAV, "rename", server.memory("fleet", "curates"), "of_three_view_00001.png", "red/door")
+    run(PANONAV, "rename", server.memory("fleet", "curates"), "of_three_view_00002.png", "door")
+    five = folder / "five.panonav"
+    run(PANONAV, "copy", one, five)
+    run(PANONAV, "forget", five, *[name for name in names(five) if name != "view_00005.png"])
+    run(PANONAV, "rename", five, "view_00005.png", "door")
+    said = sync(five, reads + "&robot=red")
+    assert (said["renamed"], said["withheld"], said["views"]) == (1, 1, len(names(one)) + 1), said
+    assert {"door", "red/door", "red/door (2)"} < set(names(five))
+    run(PANONAV, "rename", server.memory("fleet", "curates"), "red/door", "of_three_view_00001.png")
+    run(PANONAV, "rename", server.memory("fleet", "curates"), "door", "of_three_view_00002.png")
+    # The other fleet has no such memory, and makes one of its own.
+    run(PANONAV, "copy", one, folder / "south.panonav")
+    assert sync(folder / "south.panonav", server.memory("fleet", "other"))["uploaded"] == len(names(one))
+    refused(PANONAV, "synchronise", one, server.memory("fleet", "other"), saying="with another memory than")
+    refused(PANONAV, "synchronise", one, server.memory("fleet", "stranger"), saying="permission denied")
+
+    # A server that comes back from a backup gets back what it had lost.
+    sync(two, address)
+    backup = folder / "backup"
+    backup.mkdir()
+    tables = ("memories", "views", "thumbnails", "features", "links", "uploads")
+    server.sql("; ".join(f"CREATE TABLE public.{table} AS SELECT * FROM panonav.{table}" for table in tables))
+    run(PANONAV, "memorise", recorded(folder / "more", "more_", 7), one)
+    assert sync(one, address)["uploaded"] == 7
+    assert sync(two, address)["downloaded"] == 7
+    expected = names(two)
+    identity = "(SELECT id FROM panonav.memories WHERE name = 'fleet' AND fleet = '')"
+    server.sql("".join(f"DELETE FROM panonav.{table} WHERE memory = {identity}; INSERT INTO panonav.{table} SELECT * FROM "
+                       f"public.{table} WHERE memory = {identity};" for table in tables[1:]) +
+               f"UPDATE panonav.memories m SET last_view = b.last_view FROM public.memories b WHERE b.id = m.id")
+    run(PANONAV, "memorise", folder / "grid", folder / "four.panonav")
+    # A file that knows nothing of it, with the view that was removed and the one that was renamed.
+    assert sync(folder / "four.panonav", address)["uploaded"] == 2
+    expected = sorted(expected + ["view_00001.png", "view_00002.png"])
+    back = sync(two, address)
+    assert back["restored"] and back["uploaded"] == 7 and back["removed_in_file"] == 0, back
+    again = sync(one, address)
+    assert again["uploaded"] == 0 and again["removed_in_file"] == 0, again
+    for file in (one, two, three, server.memory("fleet")):
+        if file in (one, two, three):
+            sync(file, address)
+        assert names(file) == expected, (file, names(file))
+    # Ids that were given again are other views.
+    server.sql("".join(f"DELETE FROM panonav.{table} WHERE memory = {identity}; INSERT INTO panonav.{table} SELECT * FROM "
+                       f"public.{table} WHERE memory = {identity};" for table in tables[1:]) +
+               f"UPDATE panonav.memories m SET last_view = b.last_view FROM public.memories b WHERE b.id = m.id")
+    run(PANONAV, "memorise", recorded(folder / "others", "other_", 30), server.memory("fleet"))
+    back = sync(two, address)
+    assert back["restored"] and back["uploaded"] == 9 and back["downloaded"] == 30, back
+    sync(one, address)
+    assert names(one) == names(two) == names(server.memory("fleet")) and set(expected) < set(names(one))
+
+    # What nobody of us wrote is refused and changes nothing.
+    before = names(one)
+    server.sql(f"UPDATE panonav.views SET signature = signature || '\\x00' WHERE memory = {identity} AND id = 3; UPDATE "
+               f"panonav.views SET checksum = 5 WHERE memory = {identity} AND id = 3")
+    refused(PANONAV, "synchronise", one, address, saying="is damaged: view 3 does not match")
+    refused(PANONAV, "synchronise", folder / "new.panonav", address, saying="is damaged: view 3 does not match")
+    assert names(one) == before
+    server.sql(f"DELETE FROM panonav.views WHERE memory = {identity} AND id = 3")
+    assert sync(one, address)["removed_in_file"] == 1
+    run(PANONAV, "verify", one)
+    server.sql("; ".join(f"DROP TABLE public.{table}" for table in tables))
+
+
+def older_schema(server, folder):
+    """A server that an older panonav made: used as it is, and brought to this version by whoever may."""
+    server.sql("DROP TABLE panonav.uploads CASCADE; DROP FUNCTION panonav.reserve_ids, panonav.lock_memory, "
+               "panonav.clear_recordings, panonav.notify_changes, panonav.take_removals, panonav.take_links; DROP INDEX "
+               "panonav.views_by_checksum; ALTER TABLE panonav.memories DROP COLUMN identity; UPDATE "
+               "panonav.schema_version SET version = 1")
+    before = run(PANONAV, "list", server.memory("hall"), "--json")
+    refused(PANONAV, "synchronise", folder / "hall.panonav", server.memory("hall", "adds"),
+            saying="schema's version is 1; allowed: 2")
+    run(PANONAV, "memorise", folder / "grid", server.memory("old", "adds"))  # as before
+    assert server.sql("SELECT version FROM panonav.schema_version") == "1"
+    run(PANONAV, "copy", folder / "hall.panonav", folder / "migrated.panonav")
+    run(PANONAV, "synchronise", folder / "migrated.panonav", server.memory("hall"))
+    assert server.sql("SELECT version FROM panonav.schema_version") == "2"
+    assert json.loads(before)["views"] == json.loads(run(PANONAV, "list", server.memory("hall"), "--json"))["views"]
+    assert server.sql("SELECT count(DISTINCT identity) = count(*) FROM panonav.memories") == "t"
+    run(PANONAV, "synchronise", folder / "adds.panonav", server.memory("hall", "adds"))
+    server.sql("UPDATE panonav.schema_version SET version = 3")
+    refused(PANONAV, "info", server.memory("hall"), saying="newer version: schema version is 3; allowed: 1 .. 2")
+    server.sql("UPDATE panonav.schema_version SET version = 2")
+
+
+def killed_server(server):
+    """What was acknowledged is there once, the rest not at all or whole."""
+    address = server.memory("appended")
+    appending = subprocess.Popen([TEST_FLEET, "--gtest_filter=MemoryOnServer.AppendsUntil*"], text=True,
+                                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                                 env=os.environ | {"PANONAV_TEST_SERVER": address, "PANONAV_TEST_APPEND": address})
+    acknowledged = 0
+    killed = False
+    said = []
+    for line in appending.stdout:
+        said.append(line)
+        if line.startswith("acknowledged"):
+            acknowledged = int(line.split()[1])
+            if acknowledged >= 400 and not killed:
+                killed = True
+                server.kill()
+    assert appending.wait() == 0 and acknowledged >= 400, "".join(said)
+    server.start()
+    views = json.loads(run(PANONAV, "list", address, "--json"))["views"]
+    names = [view["name"] for view in views]
+    assert names == [f"view_{i}.png" for i in range(len(names))], names
+    assert len(names) in (acknowledged, acknowledged + 20), (len(names), acknowledged)
+    run(PANONAV, "verify", address)
+
+
+def main():
+    refusal = subprocess.run([PANONAV, "info", "postgresql:///d?memory=m&host=/nowhere"], capture_output=True, text=True)
+    if "built without PostgreSQL" in refusal.stderr:
+        print("skipped: built without PostgreSQL")
+        return 77
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        server = Server(folder / "server")
+        started = subprocess.run([SERVER, server.folder, "start"], capture_output=True, text=True)
+        if "the package postgresql has it" in started.stderr:
+            print("skipped: no PostgreSQL server is installed")
+            return 77
+        assert started.returncode == 0, started.stderr
+        try:
+            same_answers(server, folder)
+            print("same answers")
+            tests = run(TEST_FLEET, f"--gtest_filter={SHARED}",
+                        env=os.environ | {"PANONAV_TEST_SERVER": server.memory("x").replace("&memory=x", "")})
+            assert int(re.search(r"PASSED +\] (\d+)", tests)[1]) >= 20, tests
+            print("storage tests")
+            copies(server, folder)
+            print("copies")
+            served(server, folder)
+            print("served")
+            searched(server, folder)
+            print("searched")
+            roles(server, folder)
+            print("roles")
+            synchronised(server, folder)
+            print("synchronised")
+            older_schema(server, folder)
+            print("older schema")
+            wrong_addresses(server, folder)
+            print("addresses")
+            encrypted(server, folder)
+            print("encrypted")
+            killed_server(server)
+            print("killed server")
+        finally:
+            server.stop()
+    return 0
+
+
+sys.exit(main())

@@ -1,0 +1,160 @@
+// Runs of a robot and what a filter makes of them: bookkeeping by hand, then one small office.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "lab/runs/tracking_filter.hpp"
+#include "lab/runs/tracking_run.hpp"
+#include "panonav/core/error.hpp"
+#include "support/skips.hpp"
+
+namespace panonav::lab {
+namespace {
+
+TrackedRun run_with_errors(const std::vector<double>& errors_m) {
+  TrackedRun run;
+  for (const double error : errors_m) {
+    TrackedImage image;
+    image.step = run.size();
+    image.answered = true;
+    image.error_m = error;
+    run.push_back(image);
+  }
+  return run;
+}
+
+TEST(TrackedRun, CountsImagesUntilTheErrorStaysBelow) {
+  const TrackedRun run = run_with_errors({2.0, 0.1, 0.9, 0.2, 0.1});
+  EXPECT_EQ(images_until_localised(run, 0.25), 4);
+  EXPECT_EQ(images_until_first_right(run, 0.25), 2);
+  EXPECT_EQ(images_until_localised(run, 0.25, 2), 2) << "counted from step 2 on";
+  EXPECT_EQ(images_until_localised(run, 3.0), 1);
+  EXPECT_EQ(images_until_localised(run_with_errors({0.1, 0.1, 0.3}), 0.25), std::nullopt)
+      << "the last one is not below";
+  EXPECT_EQ(images_until_first_right(run_with_errors({0.3, 0.25}), 0.25), std::nullopt);
+  EXPECT_EQ(images_until_localised({}, 0.25), std::nullopt);
+}
+
+TEST(TrackedRun, NoAnswerIsNeverRightAndOnlySureAnswersAreConfidentlyWrong) {
+  TrackedRun run = run_with_errors({0.1, 0.1, 5.0});
+  run[1].answered = false;
+  EXPECT_EQ(images_until_localised(run, 6.0), 3);
+  EXPECT_FALSE(run[2].is_confidently_wrong(1.0));
+  run[2].state = LocalisationState::localised;
+  EXPECT_TRUE(run[2].is_confidently_wrong(1.0));
+  EXPECT_FALSE(run[2].is_confidently_wrong(5.0));
+  run[2].error_m = std::numeric_limits<double>::infinity();
+  EXPECT_TRUE(run[2].is_confidently_wrong(5.0));
+}
+
+TrackingRun straight_run(Point2 from, int steps) {
+  std::vector<Pose2> poses;
+  for (int i = 0; i < steps; ++i) poses.push_back({from.x_m + 0.5 * i, from.y_m, 0.0});
+  return run_through(poses, std::vector<PackedSignature>(poses.size()));
+}
+
+TEST(TrackingRun, StepsLeadFromPoseToPose) {
+  const std::vector<Pose2> poses{{1.0, 2.0, 0.5}, {1.3, 2.4, -2.0}, {0.0, 0.0, 3.0}};
+  const TrackingRun run = run_through(poses, std::vector<PackedSignature>(3));
+  ASSERT_EQ(run.steps.size(), 3U);
+  EXPECT_FALSE(run.steps[0].moved);
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    const Pose2 reached = run.steps[i - 1].truth * run.steps[i].moved.value();
+    EXPECT_NEAR(reached.x_m, poses[i].x_m, 1e-12);
+    EXPECT_NEAR(reached.y_m, poses[i].y_m, 1e-12);
+    EXPECT_NEAR(reached.heading_rad, poses[i].heading_rad, 1e-12);
+  }
+  EXPECT_THROW((void)run_through(poses, std::vector<PackedSignature>(2)), ContractError);
+}
+
+TEST(TrackingRun, IsCarriedAwayUnnoticedAndFarEnough) {
+  const TrackingRun before = straight_run({0.0, 0.0}, 10);
+  const TrackingRun after = straight_run({0.0, 0.0}, 10);
+  const auto run = kidnapped(before, after, 3, 1.5, 4);  // at 1.0 when it is taken
+  ASSERT_TRUE(run);
+  ASSERT_EQ(run->steps.size(), 3U + 5U);
+  EXPECT_EQ(run->steps[3].truth.x_m, 2.5) << "the first place 1.5 m from x = 1";
+  EXPECT_FALSE(run->steps[3].moved);
+  EXPECT_TRUE(run->steps[2].moved);
+  EXPECT_TRUE(run->steps[4].moved);
+  EXPECT_FALSE(kidnapped(before, after, 3, 1.5, 6)) << "only five steps are left";
+  EXPECT_FALSE(kidnapped(before, after, 3, 50.0, 1));
+  EXPECT_FALSE(kidnapped(before, after, 11, 0.1, 1));
+}
+
+TEST(TrackingRun, GoesBlindForAStretch) {
+  const TrackingRun run = without_images(straight_run({0.0, 0.0}, 6), 2, 3);
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_EQ(run.steps[i].view.has_value(), i < 2 || i > 4) << i;
+    EXPECT_EQ(run.steps[i].moved.has_value(), i > 0) << i;
+  }
+}
+
+TEST(Tracking, FindsTheRobotInAnOfficeTheSameOnAnyNumberOfThreads) {
+  PANONAV_SKIP_RATES_UNDER_SANITIZERS();
+  Executor two(2);
+  Executor one(1);
+  const simulation::PlaceRecording place = simulation::record_place(
+      {.scene = "office", .seed = 701, .spacing_m = 0.5, .queries = 1, .rows = 24, .columns = 128},
+      two);
+  const auto remembered = remember_for_tracking(place, two);
+  ASSERT_GE(remembered->memory().size(), 30U);
+  EXPECT_EQ(remembered->reference_positions().size(), remembered->memory().size());
+  const WalkOptions walks{.variants = 1, .runs_each = 6, .images = 12, .seed = 4};
+  const auto clean = record_walks(place, *remembered, clean_condition(), walks, two);
+  const auto again = record_walks(place, *remembered, clean_condition(), walks, one);
+  ASSERT_EQ(clean.size(), 6U);
+  ASSERT_EQ(again.size(), 6U);
+  for (std::size_t r = 0; r < clean.size(); ++r) {
+    ASSERT_EQ(clean[r].steps.size(), again[r].steps.size());
+    for (std::size_t i = 0; i < clean[r].steps.size(); ++i) {
+      EXPECT_EQ(clean[r].steps[i].truth, again[r].steps[i].truth);
+      EXPECT_TRUE(*clean[r].steps[i].view == *again[r].steps[i].view);
+      EXPECT_TRUE(place.free_space->is_free(clean[r].steps[i].truth.position()));
+    }
+  }
+  const SingleImages single = localise_single_images(*remembered, clean, two);
+  EXPECT_GT(single.asked, 50U);
+  EXPECT_LE(single.right, single.near);
+  EXPECT_GT(2 * single.right, single.asked);
+  const auto setting = compass_setting(ParticleInjection::explained);
+  const auto tracked = track_runs(*remembered, clean, setting, 5, two);
+  const auto repeated = track_runs(*remembered, clean, setting, 5, one);
+  std::size_t found = 0;
+  for (std::size_t r = 0; r < tracked.size(); ++r) {
+    ASSERT_EQ(tracked[r].size(), repeated[r].size());
+    for (std::size_t i = 0; i < tracked[r].size(); ++i) {
+      EXPECT_EQ(tracked[r][i].error_m, repeated[r][i].error_m);
+      EXPECT_EQ(tracked[r][i].state, repeated[r][i].state);
+      EXPECT_LE(tracked[r][i].nearest_mode_m, tracked[r][i].error_m);
+      EXPECT_EQ(tracked[r][i].particles, static_cast<int>(remembered->memory().size()));
+    }
+    found += tracked[r].back().error_m < 0.5 ? 1 : 0;
+  }
+  EXPECT_GE(found, 5U) << "of 6 runs";
+}
+
+TEST(Tracking, HardRunsSeeAChangedOfficeThatStaysTheSameForMoreRuns) {
+  Executor two(2);
+  const simulation::PlaceRecording place = simulation::record_place(
+      {.scene = "office", .seed = 702, .spacing_m = 0.5, .queries = 1, .rows = 8, .columns = 64},
+      two);
+  const auto remembered = remember_for_tracking(place, two);
+  WalkOptions walks{.variants = 1, .runs_each = 1, .images = 4, .seed = 4};
+  const auto clean = record_walks(place, *remembered, clean_condition(), walks, two);
+  const auto hard = record_walks(place, *remembered, hard_condition(), walks, two);
+  ASSERT_TRUE(hard[0].steps[0].view && clean[0].steps[0].view);
+  EXPECT_FALSE(*hard[0].steps[0].view == *clean[0].steps[0].view);
+  walks.runs_each = 2;
+  const auto more = record_walks(place, *remembered, hard_condition(), walks, two);
+  ASSERT_EQ(more.size(), 2U);
+  EXPECT_TRUE(*more[0].steps[0].view == *hard[0].steps[0].view);
+  EXPECT_FALSE(more[1].steps[0].truth == more[0].steps[0].truth);
+  walks.variants = 0;
+  EXPECT_THROW((void)record_walks(place, *remembered, hard_condition(), walks, two), ContractError);
+}
+
+}  // namespace
+}  // namespace panonav::lab

@@ -1,0 +1,315 @@
+// Recordings of topics as data sets, whatever file holds them.
+#include "panonav_recordings/recorded_dataset.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/io/image_file.hpp"
+#include "support/picture_samples.hpp"
+#include "support/recorded_messages.hpp"
+#include "support/text.hpp"
+
+namespace panonav::recordings {
+using namespace testing;
+namespace {
+
+constexpr std::int64_t ms = 1'000'000;
+constexpr std::int64_t start_ns = 1'700'000'000'000 * ms;
+
+/// Turns through the branch cut at pi while it moves.
+Pose2 pose_at(double s) {
+  return {0.5 * s, -0.25 * s, wrap_angle(2.9 + 0.4 * s)};
+}
+
+const PictureSource sphere{.kind = PictureKind::equirectangular,
+                           .layout = {.elevations = ElevationBand{-1.5707963, 1.5707963}}};
+
+class RecordedTopics : public ::testing::TestWithParam<MessageEncoding> {
+ protected:
+  void add_picture(std::int64_t after_ns, const std::string& topic = "/camera") {
+    const Image image = random_image(random_, 8, 4, 3);
+    ros::Image message;
+    message.header = {start_ns + after_ns, "camera"};
+    message.width = 8;
+    message.height = 4;
+    message.step = 24;
+    message.encoding = "rgb8";
+    message.data = image.pixels();
+    recorded_->add(topic, start_ns + after_ns + 30 * ms, message);  // it took its time
+    images_.push_back(image);
+  }
+  void add_odometry(std::int64_t after_ns, const std::string& topic = "/odom") {
+    ros::Odometry message;
+    message.header = {start_ns + after_ns, "odom"};
+    message.child_frame_id = "base_link";
+    message.pose.pose = ros::pose_of(pose_at(1e-9 * static_cast<double>(after_ns)));
+    recorded_->add(topic, start_ns + after_ns + 2 * ms, message);
+  }
+  void add_transform(const std::string& topic, const std::string& parent, const std::string& child,
+                     std::int64_t after_ns, const Pose2& pose) {
+    recorded_->add(topic, start_ns + after_ns,
+                   ros::TFMessage{{{{start_ns + after_ns, parent}, child, ros::pose_of(pose)}}});
+  }
+  void add_imu(std::int64_t after_ns, const Tilt& tilt, const std::string& topic = "/imu") {
+    ros::Imu message;
+    message.header = {start_ns + after_ns, "imu"};
+    message.orientation = ros::pose_of({0.0, 0.0, 1.2}, tilt).orientation;
+    recorded_->add(topic, start_ns + after_ns, message);
+  }
+  [[nodiscard]] RecordedDataset read(const RecordingTopics& topics = {},
+                                     const PictureSource& source = sphere) const {
+    return read_recording(recorded_, "drive.bag", source, topics);
+  }
+  [[nodiscard]] std::string error(const RecordingTopics& topics = {}) const {
+    return message_of<FileError>([&] { (void)read(topics); });
+  }
+  void expect_odometry(const DatasetEntry& entry, std::int64_t after_ns) {
+    ASSERT_TRUE(entry.odometry);
+    const Pose2 expected = pose_at(1e-9 * static_cast<double>(after_ns));
+    EXPECT_NEAR(entry.odometry->x_m, expected.x_m, 1e-9);
+    EXPECT_NEAR(entry.odometry->y_m, expected.y_m, 1e-9);
+    EXPECT_NEAR(angle_difference(entry.odometry->heading_rad, expected.heading_rad), 0.0, 1e-9);
+  }
+
+  Random random_{5};
+  std::shared_ptr<RecordedMessages> recorded_ = std::make_shared<RecordedMessages>(GetParam());
+  std::vector<Image> images_;
+};
+INSTANTIATE_TEST_SUITE_P(Encodings, RecordedTopics,
+                         ::testing::Values(MessageEncoding::ros1, MessageEncoding::cdr),
+                         [](const auto& each) {
+                           return each.param == MessageEncoding::ros1 ? "Ros1" : "Cdr";
+                         });
+
+TEST_P(RecordedTopics, BecomePicturesWithStampsAndOdometry) {
+  for (int i = -1; i <= 20; ++i) add_odometry(i * 100 * ms);
+  for (int i = 0; i < 8; ++i) add_picture(i * 240 * ms + 7);
+  const auto [dataset, warnings] = read();
+  EXPECT_TRUE(warnings.empty()) << warnings[0];
+  ASSERT_EQ(dataset.entries.size(), 8U);
+  EXPECT_EQ(dataset.source, sphere);
+  EXPECT_EQ(dataset.entries[1].file, "1700000000_240000007");
+  for (std::size_t i = 0; i < 8; ++i) {
+    const DatasetEntry& entry = dataset.entries[i];
+    const std::int64_t after_ns = static_cast<std::int64_t>(i) * 240 * ms + 7;
+    EXPECT_EQ(read_picture(entry), images_[i]);
+    EXPECT_EQ(entry.path, "drive.bag");
+    EXPECT_NEAR(*entry.stamp_s, 1.7e9 + 1e-9 * static_cast<double>(after_ns), 3e-7);
+    expect_odometry(entry, after_ns);
+    EXPECT_FALSE(entry.tilt);
+    EXPECT_FALSE(entry.pose);
+    EXPECT_EQ(entry.store->encoded(i), std::nullopt);
+    EXPECT_EQ(decode_image(read_encoded_picture(entry), "png"), images_[i]);
+  }
+}
+
+TEST_P(RecordedTopics, OdometryEndsAnIntervalBeyondItsLastMessage) {
+  for (const int after_ms : {500, 600, 700, 1800, 1900}) add_odometry(after_ms * ms);
+  // The span is 500 .. 1900 with a gap of 1.1 s; extrapolation reaches 100 ms further.
+  const std::vector<std::pair<int, bool>> expected{{399, false},  {401, true},  {600, true},
+                                                   {1000, false}, {1800, true}, {1999, true},
+                                                   {2001, false}};
+  for (const auto& [after_ms, has] : expected) add_picture(after_ms * ms);
+  const auto read_back = read();
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    SCOPED_TRACE(expected[i].first);
+    const DatasetEntry& entry = read_back.dataset.entries[i];
+    EXPECT_EQ(entry.odometry.has_value(), expected[i].second);
+    if (expected[i].second) expect_odometry(entry, expected[i].first * ms);
+  }
+  ASSERT_EQ(read_back.warnings.size(), 1U);
+  EXPECT_EQ(
+      read_back.warnings[0],
+      "3 of 7 pictures have no odometry: it begins later, ends before or pauses for more than "
+      "a second");
+}
+
+TEST_P(RecordedTopics, TransformsGiveOdometryAlongTheirChain) {
+  const Pose2 mount{0.3, -0.1, 0.5};
+  add_transform("/tf_static", "/base_footprint", "base_link", -5000 * ms, mount);
+  add_transform("/tf", "map", "odom", 0, {7.0, 7.0, 1.0});
+  for (int i = 0; i <= 20; ++i) {
+    add_transform("/tf", "odom", "base_footprint", i * 100 * ms, pose_at(0.1 * i));
+    add_transform("/tf", "base_link", "wheel", i * 100 * ms, {0.0, 0.3, 0.1 * i});
+  }
+  add_picture(650 * ms);
+  const auto entry = read().dataset.entries.at(0);
+  const Pose2 expected = pose_at(0.65) * mount;
+  ASSERT_TRUE(entry.odometry);
+  EXPECT_NEAR(entry.odometry->x_m, expected.x_m, 1e-9);
+  EXPECT_NEAR(entry.odometry->y_m, expected.y_m, 1e-9);
+  EXPECT_NEAR(entry.odometry->heading_rad, expected.heading_rad, 1e-9);
+
+  const auto other = read({.odometry_frames = std::pair{"odom", "base_footprint"}});
+  expect_odometry(other.dataset.entries[0], 650 * ms);
+  EXPECT_TRUE(contains(error({.odometry_frames = std::pair{"odom", "arm"}}),
+                       "drive.bag: no transforms lead from odom to arm; it has: "));
+  // Who changes the parent is not believed.
+  add_transform("/tf", "elsewhere", "base_footprint", 640 * ms, {50.0, 0.0, 0.0});
+  const auto changed = read();
+  EXPECT_EQ(changed.dataset.entries[0].odometry, entry.odometry);
+  EXPECT_EQ(changed.warnings.at(0),
+            "1 transforms give a frame another parent than before and are left out");
+}
+
+TEST_P(RecordedTopics, TransformsInACircleConnectNothing) {
+  add_transform("/tf", "a", "base_link", 0, {});
+  add_transform("/tf", "b", "a", 0, {});
+  add_transform("/tf", "base_link", "b", 0, {});
+  add_picture(0);
+  EXPECT_FALSE(read().dataset.entries[0].odometry);
+  EXPECT_TRUE(contains(error({.odometry_frames = std::pair{"odom", "base_link"}}),
+                       "no transforms lead from odom to base_link"));
+  EXPECT_THROW((void)read({.odometry_frames = std::pair{"odom", "/odom"}}), ContractError);
+  EXPECT_THROW((void)read({.odometry = "/odom", .odometry_frames = std::pair{"odom", "b"}}),
+               ContractError);
+}
+
+TEST_P(RecordedTopics, TopicsAreChosenByTypeOrNamed) {
+  EXPECT_TRUE(contains(error(),
+                       "drive.bag: has no pictures of sensor_msgs/Image or "
+                       "sensor_msgs/CompressedImage; its topics: none"));
+  add_picture(0, "/left");
+  add_picture(0, "/right");
+  add_odometry(0, "/wheels");
+  add_odometry(0, "/filtered");
+  add_imu(0, {}, "/imu0");
+  add_imu(0, {}, "/imu1");
+  EXPECT_EQ(error(),
+            "drive.bag: has pictures of several topics: /left, /right; name one with "
+            "--image-topic");
+  const auto right = read({.image = "/right"});
+  EXPECT_EQ(read_picture(right.dataset.entries.at(0)), images_[1]);
+  EXPECT_FALSE(right.dataset.entries[0].odometry);
+  ASSERT_EQ(right.warnings.size(), 2U);
+  EXPECT_EQ(right.warnings[0],
+            "odometry of several topics, of which none is used: /filtered, /wheels; name one with "
+            "--odometry-topic");
+  EXPECT_EQ(right.warnings[1],
+            "inertial sensors of several topics, of which none is used: /imu0, /imu1; name one "
+            "with --imu-topic");
+  const auto named = read({.image = "/right", .odometry = "/wheels", .imu = "/imu1"});
+  EXPECT_TRUE(named.warnings.empty());
+  EXPECT_TRUE(named.dataset.entries[0].odometry && named.dataset.entries[0].tilt);
+  EXPECT_EQ(error({.image = "/imu0"}),
+            "drive.bag: has no topic /imu0 of sensor_msgs/Image or sensor_msgs/CompressedImage; it "
+            "has: /left, /right");
+  EXPECT_EQ(error({.image = "/left", .odometry = "/none"}),
+            "drive.bag: has no topic /none of nav_msgs/Odometry; it has: /filtered, /wheels");
+}
+
+TEST_P(RecordedTopics, HostileNamesStayOnOneLine) {
+  add_picture(0, "/left\n\x1b[2J");
+  add_picture(0, std::string(5000, 'x'));
+  const std::string line = error();
+  EXPECT_EQ(line.find_first_of("\n\x1b"), std::string::npos);
+  EXPECT_LE(line.size(), 600U);
+}
+
+TEST_P(RecordedTopics, WithoutStampsTheTimesOfRecordingServe) {
+  for (int i = 0; i <= 10; ++i) add_odometry(i * 100 * ms);
+  ros::CompressedImage message;
+  const Image image = random_image(random_, 5, 4, 1);
+  const auto png = encode_png(image.view());
+  message.data = png;
+  message.format = "png";
+  recorded_->add("/camera", start_ns + 502 * ms, message);
+  const auto [dataset, warnings] = read();
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_EQ(warnings[0], "headers without stamps: the times of recording serve instead");
+  EXPECT_EQ(dataset.entries[0].file, "1700000000_502000000");
+  expect_odometry(dataset.entries[0], 500 * ms);  // which is recorded 2 ms later
+  EXPECT_EQ(read_encoded_picture(dataset.entries[0]), png);
+  EXPECT_EQ(read_picture(dataset.entries[0]), image);
+}
+
+TEST_P(RecordedTopics, TiltIsThatOfAnUprightSensor) {
+  add_imu(0, {0.1, -0.2});
+  add_imu(100 * ms, {0.1, -0.2});
+  add_imu(300 * ms, {1.6, 0.0});
+  add_imu(400 * ms, {1.6, 0.0});
+  add_picture(40 * ms);
+  add_picture(350 * ms);
+  const auto read_back = read();
+  ASSERT_TRUE(read_back.dataset.entries[0].tilt);
+  EXPECT_NEAR(read_back.dataset.entries[0].tilt->roll_rad, 0.1, 1e-12);
+  EXPECT_NEAR(read_back.dataset.entries[0].tilt->pitch_rad, -0.2, 1e-12);
+  EXPECT_FALSE(read_back.dataset.entries[1].tilt);
+  EXPECT_TRUE(
+      contains(read_back.warnings.at(0), "1 of 2 pictures would be tilted by more than 30"));
+  // Panoramas that cannot be levelled.
+  const auto unknown = read({}, {});
+  EXPECT_FALSE(unknown.dataset.entries[0].tilt);
+  EXPECT_TRUE(contains(unknown.warnings.at(0), "roll and pitch of /imu are not used"));
+  EXPECT_TRUE(read({.imu = "/imu"}, {}).dataset.entries[0].tilt);
+}
+
+TEST_P(RecordedTopics, SensorsWithoutOrientationGiveNoTilt) {
+  ros::Imu message;
+  message.orientation_covariance[0] = -1.0;
+  message.header.stamp_ns = start_ns;
+  recorded_->add("/imu", start_ns, message);
+  add_picture(0);
+  const auto read_back = read();
+  EXPECT_FALSE(read_back.dataset.entries[0].tilt);
+  EXPECT_TRUE(contains(read_back.warnings.at(0), "1 messages of the inertial sensor state no"));
+}
+
+TEST_P(RecordedTopics, DamagedMessagesAreLeftOut) {
+  for (int i = 0; i <= 4; ++i) add_odometry(i * 100 * ms);
+  ros::Odometry wrong;
+  wrong.header.stamp_ns = start_ns + 150 * ms;
+  wrong.pose.pose.position.x = std::nan("");
+  recorded_->add("/odom", start_ns + 151 * ms, wrong);
+  add_picture(150 * ms);
+  add_picture(150 * ms);  // the same stamp
+  add_picture(140 * ms);
+  ros::Image late;  // recorded last
+  late.header.stamp_ns = start_ns + 100 * ms;
+  recorded_->add("/camera", start_ns + 400 * ms, late);
+  recorded_->add("/camera", "sensor_msgs/Image", start_ns + 500 * ms, {1, 2, 3});
+  const auto [dataset, warnings] = read();
+  ASSERT_EQ(dataset.entries.size(), 4U);
+  expect_odometry(dataset.entries[1], 150 * ms);
+  ASSERT_EQ(warnings.size(), 3U);
+  EXPECT_TRUE(contains(warnings[0],
+                       "2 messages cannot be read and are left out; the first: "
+                       "nav_msgs/Odometry message: position is nan"));
+  EXPECT_EQ(warnings[1], "stamps run back at 1 of 4 pictures");
+  EXPECT_EQ(warnings[2], "1 of 4 pictures are not of the size of the first, 8 x 4 px");
+  // In the order of recording.
+  EXPECT_EQ(dataset.entries[0].file, "1700000000_140000000");
+  EXPECT_EQ(dataset.entries[1].file, "1700000000_150000000");
+  EXPECT_EQ(dataset.entries[2].file, "1700000000_150000000_2");
+  EXPECT_EQ(dataset.entries[3].file, "1700000000_100000000");
+}
+
+TEST_P(RecordedTopics, GroundTruthGivesPoses) {
+  add_picture(0);
+  add_picture(500 * ms);
+  for (int i = 0; i <= 10; ++i) {
+    const std::int64_t after_ns = i * 100 * ms;
+    recorded_->add(
+        "/ground_truth", start_ns + after_ns,
+        ros::PoseStamped{{start_ns + after_ns, "world"}, ros::pose_of(pose_at(0.1 * i))});
+  }
+  const auto entries = read().dataset.entries;
+  ASSERT_TRUE(entries[1].pose && entries[1].pose->heading_rad);
+  EXPECT_NEAR(entries[1].pose->x_m, pose_at(0.5).x_m, 1e-12);
+  EXPECT_NEAR(*entries[1].pose->heading_rad, pose_at(0.5).heading_rad, 1e-12);
+}
+
+TEST(RecordedTopicsLimit, MorePicturesThanAMillionAreRefused) {
+  const auto recorded = std::make_shared<RecordedMessages>(MessageEncoding::cdr);
+  for (int i = 0; i <= 1'000'000; ++i) recorded->add("/camera", i, ros::CompressedImage{});
+  EXPECT_EQ(message_of<FileError>([&] { (void)read_recording(recorded, "drive.bag", sphere); }),
+            "drive.bag: has more than 1000000 pictures; allowed: as many");
+}
+
+}  // namespace
+}  // namespace panonav::recordings
