@@ -43,9 +43,8 @@ std::optional<FoundMemory> find_memory(MemoriesConnection& memories, const Serve
 }
 
 void refuse_no_memory(const ServerAddress& address) {
-  throw FileError(address.shown.native(),
-                  "there is no memory '" + address.memory +
-                      "' on this server that this login may see; panonav memorise makes one");
+  throw FileError(address.shown.native(), "there is no memory '" + address.memory +
+                                              "' on this server that this login may see");
 }
 
 bool postgresql_memory_exists(const ServerAddress& address) {
