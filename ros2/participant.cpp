@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cstdlib>
 #include <memory>
 #include <mutex>
@@ -314,6 +315,7 @@ struct Participant::Implementation {
   dds_entity_t graph = 0;
   std::vector<Subscription> subscriptions;
   std::vector<dds_entity_t> writers;
+  std::atomic<bool> stopped = false;
 };
 
 Participant::Participant(const ParticipantOptions& options, Note note)
@@ -373,7 +375,21 @@ void Participant::wait(std::chrono::nanoseconds longest) {
   }
 }
 
-void Participant::wake() noexcept {
+void Participant::run(std::chrono::duration<double> period_s, const std::function<void()>& tick) {
+  using Steady = std::chrono::steady_clock;
+  const auto period = std::chrono::duration_cast<Steady::duration>(period_s);
+  auto next = Steady::now();
+  while (!implementation_->stopped) {
+    wait(std::max<Steady::duration>(next - Steady::now(), Steady::duration::zero()));
+    const auto now = Steady::now();
+    if (now < next) continue;
+    next = std::max(next + period, now);
+    tick();
+  }
+}
+
+void Participant::stop() noexcept {
+  implementation_->stopped = true;
   dds_set_guardcondition(implementation_->guard, true);
 }
 

@@ -10,8 +10,12 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
 
+#include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/io/ros_messages.hpp"
+#include "ros2/warning_log.hpp"
 
 namespace panonav::ros2 {
 
@@ -45,9 +49,8 @@ struct ParticipantOptions {
 class Participant {
  public:
   using Receive = std::function<void(std::span<const std::uint8_t> cdr)>;
-  using Note = std::function<void(const std::string& line)>;
 
-  /// `note` hears of peers that offer less than was asked for. Throws Error when DDS cannot begin.
+  /// `note` reports peers that offer less than was requested. Throws Error when DDS cannot begin.
   Participant(const ParticipantOptions& options, Note note);
   ~Participant();
   Participant(const Participant&) = delete;
@@ -73,10 +76,12 @@ class Participant {
   [[nodiscard]] Writer advertise(const std::string& topic, std::string_view type, const Qos& qos);
 
   /// Waits for messages and hands on those that are there, at most `Qos::depth` a topic, to the
-  /// callbacks. Returns at the latest after `longest`, or once `wake` was called.
+  /// callbacks. Returns at the latest after `longest`, or once `stop` was called.
   void wait(std::chrono::nanoseconds longest);
-  /// From any thread.
-  void wake() noexcept;
+  /// Waits for messages until `stop` is called, and calls `tick` once in each period.
+  void run(std::chrono::duration<double> period_s, const std::function<void()>& tick);
+  /// From any thread; for good.
+  void stop() noexcept;
 
  private:
   struct Implementation;
@@ -95,5 +100,25 @@ class Publisher {
  private:
   Participant::Writer writer_;
 };
+
+/// Subscribes to messages of one type: `use` takes each, and its bytes if it wants them. Bytes that
+/// are no such message, and errors that `use` throws, become warnings with the topic in front.
+template <class Message, class Use>
+void subscribe(Participant& participant, WarningLog& log, const std::string& topic, const Qos& qos,
+               Use use) {
+  participant.subscribe(
+      topic, Message::type, qos, [&log, topic, use](std::span<const std::uint8_t> cdr) {
+        try {
+          const auto message = ros::read_message<Message>(cdr, MessageEncoding::cdr);
+          if constexpr (std::is_invocable_v<Use, const Message&>) {
+            use(message);
+          } else {
+            use(message, cdr);
+          }
+        } catch (const Error& error) {
+          log.warn(topic, topic + ": " + readable_line(error.what()));
+        }
+      });
+}
 
 }  // namespace panonav::ros2

@@ -1,6 +1,6 @@
 #include "ros2/simulated_robot.hpp"
 
-#include <atomic>
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <condition_variable>
@@ -27,166 +27,171 @@ void visit_options(SimulatedRobotOptions& options, OptionVisitor& visitor) {
   table.visit(options, visitor);
 }
 
+namespace {
+
+/// A picture from the camera's buffer, as a message; the pixels stay the picture's.
+ros::Image make_message(const Image& picture, std::int64_t stamp_ns) {
+  const auto width = static_cast<std::uint32_t>(picture.width());
+  const bool is_grey = picture.channels() == 1;
+  return {{stamp_ns, "camera"},
+          static_cast<std::uint32_t>(picture.height()),
+          width,
+          is_grey ? "mono8" : "rgb8",
+          0,
+          is_grey ? width : 3 * width,
+          picture.pixels()};
+}
+
+/// Takes pictures on a thread of its own, so that the world does not stand still for one.
+class SimulatedCamera {
+ public:
+  using Take = std::function<void(std::int64_t stamp_ns, const Pose2& pose)>;
+  explicit SimulatedCamera(Take take) : take_(std::move(take)), thread_([this] { work(); }) {}
+  ~SimulatedCamera() {
+    {
+      const std::lock_guard lock(mutex_);
+      is_stopped_ = true;
+    }
+    changed_.notify_all();
+    thread_.join();
+  }
+  SimulatedCamera(const SimulatedCamera&) = delete;
+  SimulatedCamera& operator=(const SimulatedCamera&) = delete;
+
+  /// Begins a picture unless one is being taken. Returns whether it did.
+  bool trigger(std::int64_t stamp_ns, const Pose2& pose) {
+    const std::lock_guard lock(mutex_);
+    if (due_) return false;
+    due_.emplace(stamp_ns, pose);
+    changed_.notify_all();
+    return true;
+  }
+
+ private:
+  void work() {
+    std::unique_lock lock(mutex_);
+    while (true) {
+      changed_.wait(lock, [this] { return is_stopped_ || due_; });
+      if (is_stopped_) return;
+      const auto [stamp_ns, pose] = *due_;
+      lock.unlock();
+      take_(stamp_ns, pose);
+      lock.lock();
+      due_.reset();
+    }
+  }
+
+  Take take_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool is_stopped_ = false;
+  std::optional<std::pair<std::int64_t, Pose2>> due_;  // until it is taken
+  std::thread thread_;
+};
+
+}  // namespace
+
 struct SimulatedRobot::Implementation {
-  Implementation(const ParticipantOptions& setup, const SimulatedRobotOptions& wanted,
+  Implementation(const ParticipantOptions& setup, const SimulatedRobotOptions& robot,
                  SimulatedSurroundings in, const OdometryNoise& noise, std::uint64_t picture_seed,
-                 Participant::Note hears)
-      : options((validate(wanted), wanted)),
+                 Note note)
+      : options((validate(robot), robot)),
         surroundings(std::move(in)),
         base(
             surroundings.start, [this](Point2, Point2 to) { return surroundings.is_free(to); },
             noise, picture_seed),
         seed(picture_seed),
-        note(std::move(hears)),
-        participant(setup, note),
+        log(std::move(note)),
+        participant(setup, [this](const std::string& line) { log.warn("qos", line); }),
         clocks(participant, "/clock"),
         odometries(participant, "odom", {.depth = 50}),
         transforms(participant, "/tf", {.depth = 100}),
         pictures(participant, "image"),
         truths(participant, "ground_truth", {.depth = 50}) {
-    listen<ros::Twist>("cmd_vel", [this](const ros::Twist& twist) {
-      const Velocity wished{twist.linear.x, twist.linear.y, twist.angular.z};
-      if (!std::isfinite(wished.forward_m_s) || !std::isfinite(wished.left_m_s) ||
-          !std::isfinite(wished.turn_rad_s)) {
-        throw ContractError("velocity", "not finite", "finite numbers");
-      }
-      velocity = wished;
-      velocity_until_s = now_s + options.velocity_timeout_s;
-    });
-    listen<ros::PoseStamped>("set_pose", [this](const ros::PoseStamped& message) {
-      const Pose2 wished = ros::planar(message.pose);
-      if (!surroundings.is_free(wished.position())) {
-        throw ContractError("place", fixed(wished.x_m, 2) + ", " + fixed(wished.y_m, 2),
-                            "a free one");
-      }
-      const std::lock_guard lock(mutex);
-      base.carry_to(wished);
-    });
+    subscribe<ros::Twist>(participant, log, "cmd_vel", {},
+                          [this](const ros::Twist& twist) { set_velocity(twist); });
+    subscribe<ros::PoseStamped>(
+        participant, log, "set_pose", {},
+        [this](const ros::PoseStamped& message) { carry_to(ros::planar(message.pose)); });
   }
 
-  template <class Message, class Use>
-  void listen(const std::string& topic, Use use) {
-    participant.subscribe(topic, Message::type, {},
-                          [this, topic, use](std::span<const std::uint8_t> cdr) {
-                            try {
-                              use(ros::read_message<Message>(cdr, MessageEncoding::cdr));
-                            } catch (const Error& error) {
-                              note("warning: " + topic + ": " + readable_line(error.what()));
-                            }
-                          });
+  void set_velocity(const ros::Twist& twist) {
+    for (const double value : {twist.linear.x, twist.linear.y, twist.angular.z}) {
+      if (!std::isfinite(value)) throw ContractError("velocity", "not finite", "finite numbers");
+    }
+    velocity = {twist.linear.x, twist.linear.y, twist.angular.z};
+    velocity_until_s = now_s + options.velocity_timeout_s;
   }
 
-  void step(double step_s) {
-    now_s += step_s;
-    if (now_s > velocity_until_s) velocity = {};
-    Pose2 true_move;
-    {
-      const std::lock_guard lock(mutex);
-      true_move = base.drive(velocity, step_s).moved;
+  void carry_to(const Pose2& pose) {
+    if (!surroundings.is_free(pose.position())) {
+      throw ContractError("place", fixed(pose.x_m, 2) + ", " + fixed(pose.y_m, 2), "a free one");
     }
-    const Pose2& read = base.odometry();
-    const std::int64_t ns = std::llround(1e9 * now_s);
-    clocks.publish({ns});
-    ros::Odometry message;
-    message.header = {ns, "odom"};
-    message.child_frame_id = "base_link";
-    message.pose.pose = ros::pose_of(read);
-    message.linear_velocity = {true_move.x_m / step_s, true_move.y_m / step_s, 0.0};
-    message.angular_velocity = {0.0, 0.0, true_move.heading_rad / step_s};
-    odometries.publish(message);
-    transforms.publish({{{{ns, "odom"}, "base_link", ros::pose_of(read)}}});
-    truths.publish({{ns, "map"}, ros::pose_of(base.pose())});
-    const std::lock_guard lock(mutex);
-    if (now_s >= next_picture_s && !wanted_ns) {
-      next_picture_s = std::max(next_picture_s + 1.0 / options.picture_rate_hz, now_s);
-      wanted_ns = ns;
-      wanted_pose = base.pose();
-      wanted.notify_all();
-    }
-  }
-
-  /// On a thread of its own, so that the world does not stand still for a picture.
-  void take_pictures() {
-    std::uint64_t number = 0;
-    while (true) {
-      std::int64_t ns = 0;
-      Pose2 at;
-      {
-        std::unique_lock lock(mutex);
-        wanted.wait(lock, [this] { return stopped || wanted_ns; });
-        if (stopped) return;
-        ns = *wanted_ns;
-        at = wanted_pose;
-      }
-      try {
-        const Image seen = surroundings.picture(at, Random(seed, ++number).next());
-        const bool grey = seen.channels() == 1;
-        const auto width = static_cast<std::uint32_t>(seen.width());
-        pictures.publish({{ns, "camera"},
-                          static_cast<std::uint32_t>(seen.height()),
-                          width,
-                          grey ? "mono8" : "rgb8",
-                          0,
-                          grey ? width : 3 * width,
-                          seen.pixels()});
-      } catch (const Error& error) {
-        note("warning: " + readable_line(error.what()));
-      }
-      const std::lock_guard lock(mutex);
-      wanted_ns.reset();
-    }
+    base.carry_to(pose);
   }
 
   void run() {
-    using Steady = std::chrono::steady_clock;
-    std::thread camera([this] { take_pictures(); });
-    const double step_s = 1.0 / options.odometry_rate_hz;
-    const auto period = std::chrono::duration_cast<Steady::duration>(
-        std::chrono::duration<double>(step_s / options.time_factor));
-    auto next = Steady::now();
-    while (!stopped) {
-      participant.wait(std::max<Steady::duration>(next - Steady::now(), std::chrono::seconds(0)));
-      if (Steady::now() < next) continue;
-      next = std::max(next + period, Steady::now());
+    std::uint64_t number = 0;
+    SimulatedCamera camera([&](std::int64_t stamp_ns, const Pose2& pose) {
       try {
-        step(step_s);
+        const Image picture = surroundings.picture(pose, Random(seed, ++number).next());
+        pictures.publish(make_message(picture, stamp_ns));
       } catch (const Error& error) {
-        note("warning: " + readable_line(error.what()));
+        log.warn("picture", readable_line(error.what()));
       }
+    });
+    const double step_s = 1.0 / options.odometry_rate_hz;
+    participant.run(std::chrono::duration<double>(step_s / options.time_factor), [&] {
+      try {
+        step(step_s, camera);
+      } catch (const Error& error) {
+        log.warn("step", readable_line(error.what()));
+      }
+    });
+  }
+
+  void step(double step_s, SimulatedCamera& camera) {
+    now_s += step_s;
+    if (now_s > velocity_until_s) velocity = {};
+    const Pose2 moved = base.drive(velocity, step_s).moved;
+    const ros::Pose odom_from_base = ros::pose_of(base.odometry());
+    const std::int64_t stamp_ns = std::llround(1e9 * now_s);
+    clocks.publish({stamp_ns});
+    ros::Odometry message;
+    message.header = {stamp_ns, "odom"};
+    message.child_frame_id = "base_link";
+    message.pose.pose = odom_from_base;
+    message.linear_velocity = {moved.x_m / step_s, moved.y_m / step_s, 0.0};
+    message.angular_velocity = {0.0, 0.0, moved.heading_rad / step_s};
+    odometries.publish(message);
+    transforms.publish({{{{stamp_ns, "odom"}, "base_link", odom_from_base}}});
+    truths.publish({{stamp_ns, "map"}, ros::pose_of(base.pose())});
+    if (now_s >= next_picture_s && camera.trigger(stamp_ns, base.pose())) {
+      next_picture_s = std::max(next_picture_s + 1.0 / options.picture_rate_hz, now_s);
     }
-    {
-      const std::lock_guard lock(mutex);  // the camera waits already, or sees that it may not
-    }
-    wanted.notify_all();
-    camera.join();
   }
 
   SimulatedRobotOptions options;
   SimulatedSurroundings surroundings;
-  SimulatedBase base;  // changed under `mutex`, by the thread of `run` alone
+  SimulatedBase base;
   std::uint64_t seed;
-  Participant::Note note;
+  WarningLog log;
   Participant participant;
   Publisher<ros::Clock> clocks;
   Publisher<ros::Odometry> odometries;
   Publisher<ros::TFMessage> transforms;
   Publisher<ros::Image> pictures;
   Publisher<ros::PoseStamped> truths;
-  std::atomic<bool> stopped = false;
   Velocity velocity;
   double now_s = 0.0;
   double velocity_until_s = 0.0;
   double next_picture_s = 0.0;
-  std::mutex mutex;  // of what follows
-  std::condition_variable wanted;
-  std::optional<std::int64_t> wanted_ns;
-  Pose2 wanted_pose;
 };
 
 SimulatedRobot::SimulatedRobot(const ParticipantOptions& participant,
                                const SimulatedRobotOptions& options,
                                SimulatedSurroundings surroundings, const OdometryNoise& odometry,
-                               std::uint64_t seed, Participant::Note note)
+                               std::uint64_t seed, Note note)
     : implementation_(std::make_unique<Implementation>(
           participant, options, std::move(surroundings), odometry, seed, std::move(note))) {}
 SimulatedRobot::~SimulatedRobot() = default;
@@ -196,8 +201,7 @@ void SimulatedRobot::run() {
 }
 
 void SimulatedRobot::stop() {
-  implementation_->stopped = true;
-  implementation_->participant.wake();
+  implementation_->participant.stop();
 }
 
 }  // namespace panonav::ros2

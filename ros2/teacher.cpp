@@ -16,7 +16,7 @@ namespace {
 
 std::filesystem::path new_file(std::filesystem::path path) {
   if (memory_exists(path)) {
-    throw FileError(path.string(), "is there already; allowed with --learn: a new file");
+    throw FileError(path.string(), "is there already; allowed for a first drive: a new file");
   }
   return path;
 }

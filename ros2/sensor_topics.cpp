@@ -1,0 +1,132 @@
+#include "ros2/sensor_topics.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+
+namespace panonav::ros2 {
+
+SensorTopics::SensorTopics(Participant& participant, const LocalisationNodeOptions& options,
+                           const FrameNames& frames, WarningLog& log, RobotMotion& motion,
+                           WorkQueue& queue)
+    : participant_(participant),
+      options_(options),
+      frames_(frames),
+      log_(log),
+      motion_(motion),
+      queue_(queue) {
+  constexpr int sensor_depth = 50;
+  const auto take_message = [this](const auto& message) { take(message); };
+  if (options.use_sim_time) {
+    listen<ros::Clock>("/clock", {.depth = 10, .reliable = false},
+                       [this](const ros::Clock& clock) { sim_ns_ = clock.clock_ns; });
+  }
+  if (options.motion == MotionInput::odometry) {
+    listen<ros::Odometry>("odom", {.depth = sensor_depth}, take_message);
+  } else {
+    listen<ros::TFMessage>("/tf", {.depth = 100}, take_message);
+    listen<ros::TFMessage>("/tf_static", {.depth = 100, .transient_local = true}, take_message);
+  }
+  if (options.tilt_from_imu) listen<ros::Imu>("imu", {.depth = sensor_depth}, take_message);
+  const auto take_bytes = [this](const auto& message, std::span<const std::uint8_t> cdr) {
+    take_picture(message.header.stamp_ns, cdr);
+  };
+  if (options.pictures == PictureInput::raw) {
+    listen<ros::Image>(picture_topic(), {}, take_bytes);
+  } else {
+    listen<ros::CompressedImage>(picture_topic(), {}, take_bytes);
+  }
+}
+
+template <class Message, class Use>
+void SensorTopics::listen(const std::string& topic, const Qos& qos, Use use) {
+  subscribe<Message>(participant_, log_, topic, qos, std::move(use));
+}
+
+std::int64_t SensorTopics::now_ns() const {
+  if (options_.use_sim_time) return sim_ns_;
+  return std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+std::string SensorTopics::picture_topic() const {
+  return options_.pictures == PictureInput::raw ? "image" : "image/compressed";
+}
+
+std::string SensorTopics::motion_source() const {
+  if (options_.motion == MotionInput::odometry) return "topic odom";
+  return "TF from " + frames_.odom + " to " + frames_.base;
+}
+
+void SensorTopics::check_publishers() const {
+  for (const std::string& topic : {picture_topic(), std::string("odom")}) {
+    const std::size_t publishers = participant_.publishers(topic);
+    if (publishers < 2) continue;
+    log_.warn("publishers of " + topic, topic + " has " + std::to_string(publishers) +
+                                            " publishers; one is expected, all are heard");
+  }
+}
+
+std::pair<Observation, std::int64_t> SensorTopics::decode(
+    std::span<const std::uint8_t> message) const {
+  if (options_.pictures == PictureInput::raw) {
+    const auto read = ros::read_message<ros::Image>(message, MessageEncoding::cdr);
+    return {ros::picture_of(read), read.header.stamp_ns};
+  }
+  const auto read = ros::read_message<ros::CompressedImage>(message, MessageEncoding::cdr);
+  return {ros::picture_of(read, picture_topic()), read.header.stamp_ns};
+}
+
+void SensorTopics::take(const ros::Odometry& odometry) {
+  require_frame("odom", odometry.header.frame_id, frames_.odom);
+  require_frame("odom", odometry.child_frame_id, frames_.base);
+  add_motion("odom", odometry.header.stamp_ns, odometry.pose.pose);
+}
+
+void SensorTopics::take(const ros::TFMessage& message) {
+  std::optional<std::int64_t> stamp_ns;
+  for (const ros::TransformStamped& each : message.transforms) {
+    if (each.child_frame_id == frames_.odom) continue;  // what the node sends itself
+    tree_.set(each);
+    if (each.header.stamp_ns > 0) stamp_ns = std::max(stamp_ns.value_or(0), each.header.stamp_ns);
+  }
+  const auto odom_from_base = tree_.lookup(frames_.odom, frames_.base);
+  if (!odom_from_base || !stamp_ns) return;
+  // Transforms that others send meanwhile, of wheels, say, bring no news of the base.
+  if (std::exchange(has_transform_, true) && *stamp_ns <= motion_.newest_ns()) return;
+  add_motion("/tf", *stamp_ns, *odom_from_base);
+}
+
+void SensorTopics::take(const ros::Imu& imu) {
+  if (imu.orientation_covariance[0] == -1.0) {
+    throw ContractError("orientation_covariance[0]", -1.0,
+                        "another value: the sensor must state an orientation");
+  }
+  const Tilt tilt = ros::tilt_of(imu.orientation);
+  if (!std::isfinite(tilt.roll_rad) || !std::isfinite(tilt.pitch_rad)) {
+    throw ContractError("orientation", "not finite", "a unit quaternion");
+  }
+  motion_.set_tilt(tilt);
+}
+
+void SensorTopics::take_picture(std::int64_t stamp_ns, std::span<const std::uint8_t> cdr) {
+  if (queue_.set_picture(stamp_ns, cdr)) return;
+  log_.warn("order of pictures",
+            picture_topic() + ": a stamp is not after the one before it; the picture is left out");
+}
+
+void SensorTopics::add_motion(const std::string& topic, std::int64_t stamp_ns,
+                              const ros::Pose& pose) {
+  const MotionHistory::Added added = motion_.add(stamp_ns, ros::planar(pose));
+  if (added == MotionHistory::Added::late) {
+    log_.warn("order of " + topic,
+              topic + ": a stamp is not after the one before it; the message is left out");
+  } else if (added == MotionHistory::Added::restarted) {
+    log_.warn("start of " + topic,
+              topic + ": the motion begins again, elsewhere or at an earlier time");
+  }
+}
+
+}  // namespace panonav::ros2
