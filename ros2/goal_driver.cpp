@@ -11,9 +11,9 @@ namespace panonav::ros2 {
 
 using Steady = std::chrono::steady_clock;
 
-GoalDriver::GoalDriver(Participant& participant, GoalDriverOptions options, WarningLog& log,
-                       const RobotMotion& motion, Now now_ns)
-    : options_(std::move(options)),
+GoalDriver::GoalDriver(Participant& participant, const LocalisationNodeSetup& setup,
+                       WarningLog& log, const RobotMotion& motion, NowNs now_ns)
+    : setup_(setup),
       log_(log),
       motion_(motion),
       now_ns_(std::move(now_ns)),
@@ -27,7 +27,7 @@ void GoalDriver::set_memory(const LoadedMemory& memory) {
   navigator_.reset();
   route_driver_.reset();
   memory_ = &memory;
-  mission_file_.emplace(memory.path, options_.resume_s);
+  mission_file_.emplace(memory.path, setup_.node.resume_s);
 }
 
 std::optional<Mission> GoalDriver::load_interrupted_mission() {
@@ -59,10 +59,10 @@ void GoalDriver::start(const Mission& mission) {
 
 void GoalDriver::make_route_driver(const Mission& mission) {
   RouteDriverOptions options{.follower = {.name = mission.route, .tracker = {}, .fit = {}},
-                             .base = options_.navigator.base,
+                             .base = setup_.navigator.base,
                              .resume_m = mission.along_m};
   options.follower.tracker.min_correlation = mission.min_correlation;
-  route_driver_.emplace(memory_->file, options_.source, options);
+  route_driver_.emplace(memory_->file, setup_.tracker.source, options);
 }
 
 void GoalDriver::set_goal(Point2 goal) {
@@ -70,7 +70,7 @@ void GoalDriver::set_goal(Point2 goal) {
   if (navigator_) {
     navigator_->set_goal(name);
   } else {
-    navigator_.emplace(memory_->path, name, options_.navigator);
+    navigator_.emplace(memory_->path, name, setup_.navigator);
     publish_areas();
   }
 }
@@ -151,12 +151,12 @@ void GoalDriver::end(const std::string& why, std::uint8_t level) {
 }
 
 void GoalDriver::stop_if_silent() {
-  const std::chrono::duration<double> timeout(options_.command_timeout_s);
+  const std::chrono::duration<double> timeout(setup_.node.command_timeout_s);
   const std::lock_guard lock(mutex_);
   if (!has_mission_ || Steady::now() - last_command_ < timeout) return;
   velocities_.publish({});
   last_command_ = Steady::now();
-  log_.warn("command", "no picture for " + fixed(options_.command_timeout_s, 2) +
+  log_.warn("command", "no picture for " + fixed(setup_.node.command_timeout_s, 2) +
                            " s; the robot is stopped until one comes");
 }
 
@@ -168,7 +168,7 @@ void GoalDriver::publish_areas() {
     const auto& pose = memory_->tracker.memory().info(planner.graph().view(node)).pose;
     if (pose) cloud.add(pose->position(), static_cast<double>(planner.areas().area_of[node]));
   }
-  areas_.publish(cloud.message(now_ns_(), options_.map_frame, "area"));
+  areas_.publish(cloud.message(now_ns_(), setup_.frames.map, "area"));
 }
 
 bool GoalDriver::has_mission() const {
@@ -178,7 +178,7 @@ bool GoalDriver::has_mission() const {
 
 ros::DiagnosticArray GoalDriver::make_message(std::uint8_t level, const std::string& state,
                                               std::vector<ros::KeyValue> values) const {
-  return {{now_ns_(), options_.map_frame},
+  return {{now_ns_(), setup_.frames.map},
           {{level, "panonav: goal", readable_line(state), {}, std::move(values)}}};
 }
 

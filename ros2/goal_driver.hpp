@@ -3,18 +3,14 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "panonav/pipeline/robot_navigator.hpp"
 #include "panonav/pipeline/route_driver.hpp"
-#include "panonav/pipeline/tracker.hpp"
 #include "ros2/mission.hpp"
-#include "ros2/node_options.hpp"
-#include "ros2/participant.hpp"
+#include "ros2/node_setup.hpp"
 #include "ros2/robot_motion.hpp"
 
 namespace panonav::ros2 {
@@ -26,21 +22,12 @@ struct LoadedMemory {
   Tracker tracker;
 };
 
-struct GoalDriverOptions {
-  RobotNavigatorOptions navigator;      ///< of ways to a goal; its base of routes, too
-  std::optional<PictureSource> source;  ///< how pictures lie; `nullopt`: as the memory's
-  double command_timeout_s = 0.5;
-  double resume_s = 30.0;
-  std::string map_frame;
-};
-
 /// Drives a robot to a goal or along a route, by velocities on `cmd_vel`, and reports on
 /// `~/goal/feedback` and `~/goal/result`. On the thread that localises, unless said otherwise.
 class GoalDriver {
  public:
-  using Now = std::function<std::int64_t()>;  ///< time of the robot's world in ns
-  GoalDriver(Participant& participant, GoalDriverOptions options, WarningLog& log,
-             const RobotMotion& motion, Now now_ns);
+  GoalDriver(Participant& participant, const LocalisationNodeSetup& setup, WarningLog& log,
+             const RobotMotion& motion, NowNs now_ns);
 
   /// Ends the mission, and takes the next ones by this memory, which outlives *this or the next
   /// call.
@@ -77,10 +64,10 @@ class GoalDriver {
   [[nodiscard]] ros::DiagnosticArray make_message(std::uint8_t level, const std::string& state,
                                                   std::vector<ros::KeyValue> values) const;
 
-  GoalDriverOptions options_;
+  const LocalisationNodeSetup& setup_;
   WarningLog& log_;
   const RobotMotion& motion_;
-  Now now_ns_;
+  NowNs now_ns_;
   Publisher<ros::Twist> velocities_;
   Publisher<ros::DiagnosticArray> feedback_, results_;
   Publisher<ros::PointCloud2> areas_;

@@ -3,18 +3,14 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
-#include <map>
 #include <thread>
 #include <utility>
 #include <vector>
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
-#include "panonav/geometry/angles.hpp"
-#include "panonav/pipeline/memoriser.hpp"
-#include "panonav/pipeline/named_view.hpp"
 #include "ros2/goal_driver.hpp"
-#include "ros2/localisation_topics.hpp"
+#include "ros2/memory_localiser.hpp"
 #include "ros2/sensor_topics.hpp"
 
 namespace panonav::ros2 {
@@ -24,30 +20,24 @@ namespace {
 using Steady = std::chrono::steady_clock;
 using namespace std::chrono_literals;  // NOLINT(google-build-using-namespace)
 
-std::string quoted(const std::string& text) {
-  return "'" + readable_line(shortened(text, 80)) + "'";
-}
-
 }  // namespace
 
 struct LocalisationNode::Implementation {
   Implementation(const LocalisationNodeSetup& options, Note note)
       : setup((validate(options.node), options)),
         log(std::move(note)),
-        participant(options.participant,
-                    [this](const std::string& line) { log.warn("qos", line); }),
-        sensors(participant, options.node, options.frames, log, motion, queue),
-        topics(participant, options.frames),
-        driver(participant,
-               {options.navigator, options.tracker.source, options.node.command_timeout_s,
-                options.node.resume_s, options.frames.map},
-               log, motion, [this] { return sensors.now_ns(); }),
+        participant(setup.participant, [this](const std::string& line) { log.warn("qos", line); }),
+        sensors(participant, setup.node, setup.frames, log, motion, queue),
+        driver(participant, setup, log, motion, [this] { return sensors.now_ns(); }),
+        localiser(participant, setup, motion, driver, [this] { return sensors.now_ns(); }),
+        transforms(participant, "/tf", {.depth = 100}),
+        diagnostics(participant, "/diagnostics"),
         answers(participant, "~/command/result") {
     if (setup.teacher) {
       teacher.emplace(setup.memory, *setup.teacher);
     } else {
-      load_memory(setup.memory);
-      interrupted = driver.load_interrupted_mission();
+      localiser.load(setup.memory);
+      localiser.load_interrupted_mission();
     }
     subscribe_to_requests();
   }
@@ -75,13 +65,10 @@ struct LocalisationNode::Implementation {
       throw ContractError("covariance of x, y and heading",
                           to_text(position_m2) + ", " + to_text(heading_rad2), ">= 0, finite");
     }
-    const Pose2 pose = ros::planar(message.pose.pose);
-    queue.add(
-        [this, pose, position_m = std::sqrt(position_m2), heading_rad = std::sqrt(heading_rad2)] {
-          if (!memory) throw Error("the memory is being learnt; allowed: finish, then this");
-          memory->tracker.start_at(pose * base_from_camera, position_m, heading_rad);
-          motion.set_pose(pose);
-        });
+    queue.add([this, position_m2, heading_rad2, pose = ros::planar(message.pose.pose)] {
+      localiser.start_at(pose, std::sqrt(position_m2), std::sqrt(heading_rad2));
+      motion.set_pose(pose);
+    });
   }
 
   // On the thread of `run`.
@@ -91,10 +78,7 @@ struct LocalisationNode::Implementation {
     auto next_check = Steady::now() + 1s;
     participant.run(std::chrono::duration<double>(1.0 / setup.node.transform_rate_hz), [&] {
       try {
-        if (const auto map_from_odom = motion.map_from_odom()) {
-          const auto ahead_ns = static_cast<std::int64_t>(1e9 * setup.node.transform_tolerance_s);
-          topics.send_transform(*map_from_odom, sensors.now_ns() + ahead_ns);
-        }
+        send_transform();
         driver.stop_if_silent();
         if (Steady::now() < next_check) return;
         next_check = Steady::now() + 1s;
@@ -110,12 +94,23 @@ struct LocalisationNode::Implementation {
     if (teacher && teacher->views() > 0) teacher->finish();
   }
 
+  void send_transform() {
+    const auto map_from_odom = motion.map_from_odom();
+    if (!map_from_odom) return;
+    const auto ahead_ns = static_cast<std::int64_t>(1e9 * setup.node.transform_tolerance_s);
+    const std::int64_t stamp_ns = sensors.now_ns() + ahead_ns;
+    // While a clock stands nothing is sent: TF takes no two transforms of one time.
+    if (std::exchange(last_transform_ns, stamp_ns) == stamp_ns) return;
+    transforms.publish(
+        {{{{stamp_ns, setup.frames.map}, setup.frames.odom, ros::pose_of(*map_from_odom)}}});
+  }
+
   void check_inputs() const {
     sensors.check_publishers();
     if (queue.time_without_picture() < 2s) return;
     RunMoment moment;
     moment.state = "no pictures on " + sensors.picture_topic();
-    topics.publish_state(moment, sensors.now_ns());
+    diagnostics.publish(diagnostics_message(moment, sensors.now_ns()));
   }
 
   // On the thread that works.
@@ -144,81 +139,38 @@ struct LocalisationNode::Implementation {
                              "); the picture is left out");
       return;
     }
-    observation.tilt = motion.tilt();
-    observation.odometry = moved->path_from_base * base_from_camera;
     observation.stamp_s = 1e-9 * static_cast<double>(stamp_ns);
+    observation.tilt = motion.tilt();
+    observation.odometry = moved->path_from_base * setup.node.base_from_camera();
     RunMoment moment;
     if (teacher) {
-      teach(std::move(observation), moment);
+      moment = teach(std::move(observation));
     } else {
-      localise(std::move(observation), stamp_ns, *moved, moment);
+      moment = localiser.localise(std::move(observation), stamp_ns, *moved);
+      if (moment.sure && moment.pose) ++localised;
       const std::chrono::duration<double, std::milli> delay = Steady::now() - came;
       moment.values.emplace_back("delay_ms", fixed(delay.count(), 1));
       moment.values.emplace_back("dropped", std::to_string(queue.dropped()));
       moment.values.emplace_back("warnings", std::to_string(log.count()));
     }
     ++pictures;
-    topics.publish_state(moment, stamp_ns);
+    diagnostics.publish(diagnostics_message(moment, stamp_ns));
   }
 
-  void teach(Observation observation, RunMoment& moment) {
+  RunMoment teach(Observation observation) {
     observation.name = "view_" + std::to_string(pictures + 1);
     teacher->add(std::move(observation));
     learnt = teacher->views();
     motion.set_map_from_path(teacher->map_from_odometry());
+    RunMoment moment;
     moment.state = "learning";
     moment.values = {{"views", std::to_string(teacher->views())},
                      {"lines", std::to_string(teacher->lines())}};
-  }
-
-  void localise(Observation observation, std::int64_t stamp_ns, const RobotMotion::Motion& moved,
-                RunMoment& moment) {
-    if (interrupted) resume(*std::exchange(interrupted, std::nullopt), moved);
-    observation.name = sensors.picture_topic();
-    Tracker& tracker = memory->tracker;
-    tracker.move_to(*observation.odometry);
-    const PackedSignature view = tracker.encoder().packed(observation);
-    MonteCarloEstimate estimate = tracker.observe(view);
-    last_pose = estimate.pose;
-    if (estimate.pose) estimate.pose = *estimate.pose * inverse(base_from_camera);
-    describe(moment, estimate);
-    if (moment.sure && estimate.pose) {
-      correct_motion(*estimate.pose, moved.path_from_base, moment);
-    } else {
-      last_pose.reset();
-    }
-    driver.drive(observation, last_pose);
-    last_observation = std::move(observation);
-    topics.publish_estimate(moment, stamp_ns, *memory, view);
-    if (last_pose) ++localised;
-  }
-
-  void correct_motion(const Pose2& map_from_base, const Pose2& path_from_base, RunMoment& moment) {
-    const auto former = motion.set_map_from_path(map_from_base * inverse(path_from_base));
-    if (!former) return;
-    const Pose2 before = *former * path_from_base;
-    moment.values.emplace_back("correction_m",
-                               fixed(distance(before.position(), map_from_base.position()), 4));
-    moment.values.emplace_back(
-        "correction_rad",
-        fixed(std::abs(angle_difference(before.heading_rad, map_from_base.heading_rad)), 4));
-  }
-
-  void resume(const Mission& mission, const RobotMotion::Motion& now) {
-    const Pose2 pose = mission.map_from_odom * now.odom_from_base;
-    start_tracker_at(pose * base_from_camera);
-    motion.set_map_from_path(pose * inverse(now.path_from_base));
-    driver.start(mission);
+    return moment;
   }
 
   /// Executes a command of `~/command`, and returns the answer.
   std::string execute(const std::string& words) {
-    using Command = std::function<void(const std::string& argument)>;
-    const std::map<std::string, Command> with_argument{
-        {"repeat", [this](const std::string& route) { driver.start({.route = route}); }},
-        {"learn", [this](const std::string& name) { add_view(name); }},
-        {"forget", [this](const std::string& name) { remove_view(name); }},
-        {"load", [this](const std::string& path) { load_neighbour(path); }}};
     const std::size_t blank = words.find(' ');
     const std::string command = words.substr(0, blank);
     const std::string argument = blank == std::string::npos ? "" : words.substr(blank + 1);
@@ -228,15 +180,19 @@ struct LocalisationNode::Implementation {
       } else if (command == "cancel") {
         driver.end("cancelled");
       } else if (teacher) {
-        throw ContractError("command", quoted(words), "finish, as the memory is being learnt");
+        refuse(words, "finish, as the memory is being learnt");
       } else if (command == "relocalise") {
-        memory->tracker.start_anywhere();
-      } else if (const auto found = with_argument.find(command);
-                 found != with_argument.end() && !argument.empty()) {
-        found->second(argument);
+        localiser.start_anywhere();
+      } else if (command == "repeat" && !argument.empty()) {
+        driver.start({.route = argument});
+      } else if (command == "learn" && !argument.empty()) {
+        localiser.add_view(argument);
+      } else if (command == "forget" && !argument.empty()) {
+        localiser.remove_view(argument);
+      } else if (command == "load" && !argument.empty()) {
+        localiser.load_neighbour(argument);
       } else {
-        throw ContractError("command", quoted(words),
-                            "relocalise, cancel, repeat ROUTE, learn NAME, forget NAME, load FILE");
+        refuse(words, "relocalise, cancel, repeat ROUTE, learn NAME, forget NAME, load FILE");
       }
     } catch (const Error& error) {
       return "refused: " + readable_line(error.what());
@@ -244,94 +200,32 @@ struct LocalisationNode::Implementation {
     return command + " done";
   }
 
+  [[noreturn]] static void refuse(const std::string& words, std::string_view allowed) {
+    throw ContractError("command", "'" + readable_line(shortened(words, 80)) + "'", allowed);
+  }
+
   void finish_teaching() {
     const Pose2 map_from_path = teacher->finish();
-    load_memory(setup.memory);
+    localiser.load(setup.memory);
     teacher.reset();
     motion.set_map_from_path(map_from_path);
-    if (const auto pose = motion.map_from_base()) start_tracker_at(*pose * base_from_camera);
+    if (const auto pose = motion.map_from_base()) localiser.start_at(*pose);
   }
 
-  /// Adds the last picture to the memory.
-  void add_view(const std::string& name) {
-    if (!last_observation || !last_pose) {
-      throw Error("the robot is not localised, so a view of this place has no position");
-    }
-    last_observation->pose = ReferencePose{last_pose->x_m, last_pose->y_m, last_pose->heading_rad};
-    last_observation->name = name;
-    Memoriser memoriser(setup.memory, {.source = setup.tracker.source});
-    memoriser.add(*last_observation);
-    memoriser.finish();
-    reload_memory();
-  }
-
-  void remove_view(const std::string& name) {
-    MemoryFile writable = MemoryFile::open(setup.memory, Access::read_write);
-    const ViewId view = named_view(writable, name);
-    writable.remove({&view, 1});
-    reload_memory();
-  }
-
-  /// Loads another memory of the same folder: who may write to a topic may not open any file that
-  /// the node may read.
-  void load_neighbour(const std::string& name) {
-    namespace fs = std::filesystem;
-    std::error_code code;
-    const fs::path folder = fs::weakly_canonical(fs::absolute(setup.memory), code).parent_path();
-    const fs::path path = fs::weakly_canonical(folder / name, code);
-    if (code || path.parent_path() != folder) {
-      throw ContractError("file to load", quoted(name),
-                          "the name of a file in the folder of the memory");
-    }
-    load_memory(path);
-    motion.set_map_from_path(std::nullopt);  // it was in the frame of the other memory
-  }
-
-  /// Loads the memory again, with the robot where it is.
-  void reload_memory() {
-    const auto pose = last_pose;
-    load_memory(setup.memory);
-    if (pose) start_tracker_at(*pose);
-  }
-
-  /// If this throws, the memory stays as it is.
-  void load_memory(const std::filesystem::path& path) {
-    MemoryFile file = MemoryFile::open(path, Access::read_only);
-    Tracker tracker(file, setup.tracker);
-    std::unique_ptr<LoadedMemory> loaded(
-        new LoadedMemory{path, std::move(file), std::move(tracker)});
-    driver.set_memory(*loaded);
-    memory = std::move(loaded);
-    setup.memory = path;
-    last_observation.reset();
-    last_pose.reset();
-    topics.publish_references(memory->tracker.memory(), sensors.now_ns());
-  }
-
-  void start_tracker_at(const Pose2& map_from_camera) {
-    constexpr double heading_deviation_rad = 0.1;  // of a pose that was found or carried on
-    memory->tracker.start_at(map_from_camera, 0.5 * memory->tracker.localiser().model().spacing_m,
-                             heading_deviation_rad);
-  }
-
-  LocalisationNodeSetup setup;
+  const LocalisationNodeSetup setup;
   WarningLog log;
   RobotMotion motion;
   WorkQueue queue;
   Participant participant;
   SensorTopics sensors;
-  LocalisationTopics topics;  // transforms and states on the thread of `run`
   GoalDriver driver;
+  MemoryLocaliser localiser;
+  Publisher<ros::TFMessage> transforms;
+  Publisher<ros::DiagnosticArray> diagnostics;
   Publisher<ros::String> answers;
+  std::optional<Teacher> teacher;  // of the thread that works: instead of the localiser
   std::atomic<std::size_t> pictures = 0, localised = 0, learnt = 0;
-
-  // Of the thread that works: either a teacher, or a memory that it localises by.
-  std::optional<Teacher> teacher;
-  std::unique_ptr<LoadedMemory> memory;
-  const Pose2 base_from_camera{setup.node.camera_x_m, setup.node.camera_y_m, 0.0};
-  std::optional<Mission> interrupted;  // until the first picture
-  std::optional<Observation> last_observation;
-  std::optional<Pose2> last_pose;  // of the camera in the map; `nullopt`: not localised by it
+  std::int64_t last_transform_ns = 0;
 };
 
 LocalisationNode::LocalisationNode(const LocalisationNodeSetup& setup, Note note)

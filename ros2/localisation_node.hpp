@@ -1,28 +1,11 @@
 #pragma once
 
 #include <cstddef>
-#include <filesystem>
 #include <memory>
-#include <optional>
 
-#include "panonav/pipeline/robot_navigator.hpp"
-#include "panonav/pipeline/tracker.hpp"
-#include "ros2/node_options.hpp"
-#include "ros2/participant.hpp"
-#include "ros2/teacher.hpp"
+#include "ros2/node_setup.hpp"
 
 namespace panonav::ros2 {
-
-struct LocalisationNodeSetup {
-  std::filesystem::path memory;
-  ParticipantOptions participant;
-  FrameNames frames;
-  LocalisationNodeOptions node;
-  TrackerOptions tracker;
-  RobotNavigatorOptions navigator;  ///< of ways to a goal; its base of routes, too
-  /// The memory is a new one that the first drive makes, until the command "finish".
-  std::optional<TeacherOptions> teacher;
-};
 
 /// Localises a robot for ROS 2 by its pictures and odometry and a memory (`Tracker`), as AMCL does
 /// by laser scans: the transform from map to odom, which a picture corrects and odometry continues

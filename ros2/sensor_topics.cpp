@@ -21,29 +21,26 @@ SensorTopics::SensorTopics(Participant& participant, const LocalisationNodeOptio
   constexpr int sensor_depth = 50;
   const auto take_message = [this](const auto& message) { take(message); };
   if (options.use_sim_time) {
-    listen<ros::Clock>("/clock", {.depth = 10, .reliable = false},
-                       [this](const ros::Clock& clock) { sim_ns_ = clock.clock_ns; });
+    subscribe<ros::Clock>(participant, log, "/clock", {.depth = 10, .reliable = false},
+                          [this](const ros::Clock& clock) { sim_ns_ = clock.clock_ns; });
   }
   if (options.motion == MotionInput::odometry) {
-    listen<ros::Odometry>("odom", {.depth = sensor_depth}, take_message);
+    subscribe<ros::Odometry>(participant, log, "odom", {.depth = sensor_depth}, take_message);
   } else {
-    listen<ros::TFMessage>("/tf", {.depth = 100}, take_message);
-    listen<ros::TFMessage>("/tf_static", {.depth = 100, .transient_local = true}, take_message);
+    subscribe<ros::TFMessage>(participant, log, "/tf", {.depth = 100}, take_message);
+    subscribe<ros::TFMessage>(participant, log, "/tf_static",
+                              {.depth = 100, .transient_local = true}, take_message);
   }
-  if (options.tilt_from_imu) listen<ros::Imu>("imu", {.depth = sensor_depth}, take_message);
+  if (options.tilt_from_imu)
+    subscribe<ros::Imu>(participant, log, "imu", {.depth = sensor_depth}, take_message);
   const auto take_bytes = [this](const auto& message, std::span<const std::uint8_t> cdr) {
     take_picture(message.header.stamp_ns, cdr);
   };
   if (options.pictures == PictureInput::raw) {
-    listen<ros::Image>(picture_topic(), {}, take_bytes);
+    subscribe<ros::Image>(participant, log, picture_topic(), {}, take_bytes);
   } else {
-    listen<ros::CompressedImage>(picture_topic(), {}, take_bytes);
+    subscribe<ros::CompressedImage>(participant, log, picture_topic(), {}, take_bytes);
   }
-}
-
-template <class Message, class Use>
-void SensorTopics::listen(const std::string& topic, const Qos& qos, Use use) {
-  subscribe<Message>(participant_, log_, topic, qos, std::move(use));
 }
 
 std::int64_t SensorTopics::now_ns() const {
@@ -71,12 +68,17 @@ void SensorTopics::check_publishers() const {
 
 std::pair<Observation, std::int64_t> SensorTopics::decode(
     std::span<const std::uint8_t> message) const {
+  const auto named = [this](Image picture, std::int64_t stamp_ns) {
+    Observation observation(std::move(picture));
+    observation.name = picture_topic();
+    return std::pair(std::move(observation), stamp_ns);
+  };
   if (options_.pictures == PictureInput::raw) {
     const auto read = ros::read_message<ros::Image>(message, MessageEncoding::cdr);
-    return {ros::picture_of(read), read.header.stamp_ns};
+    return named(ros::picture_of(read), read.header.stamp_ns);
   }
   const auto read = ros::read_message<ros::CompressedImage>(message, MessageEncoding::cdr);
-  return {ros::picture_of(read, picture_topic()), read.header.stamp_ns};
+  return named(ros::picture_of(read, picture_topic()), read.header.stamp_ns);
 }
 
 void SensorTopics::take(const ros::Odometry& odometry) {
@@ -112,9 +114,15 @@ void SensorTopics::take(const ros::Imu& imu) {
 }
 
 void SensorTopics::take_picture(std::int64_t stamp_ns, std::span<const std::uint8_t> cdr) {
-  if (queue_.set_picture(stamp_ns, cdr)) return;
-  log_.warn("order of pictures",
-            picture_topic() + ": a stamp is not after the one before it; the picture is left out");
+  if (last_picture_ns_ && stamp_ns <= *last_picture_ns_ &&
+      stamp_ns > *last_picture_ns_ - MotionHistory::late_ns) {
+    log_.warn(
+        "order of pictures",
+        picture_topic() + ": a stamp is not after the one before it; the picture is left out");
+    return;
+  }
+  last_picture_ns_ = stamp_ns;
+  queue_.set_picture(cdr);
 }
 
 void SensorTopics::add_motion(const std::string& topic, std::int64_t stamp_ns,

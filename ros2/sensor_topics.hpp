@@ -7,7 +7,7 @@
 #include <string>
 
 #include "panonav/pipeline/observation.hpp"
-#include "ros2/node_options.hpp"
+#include "ros2/node_setup.hpp"
 #include "ros2/participant.hpp"
 #include "ros2/robot_motion.hpp"
 #include "ros2/work_queue.hpp"
@@ -20,8 +20,6 @@ class SensorTopics {
  public:
   SensorTopics(Participant& participant, const LocalisationNodeOptions& options,
                const FrameNames& frames, WarningLog& log, RobotMotion& motion, WorkQueue& queue);
-  SensorTopics(const SensorTopics&) = delete;
-  SensorTopics& operator=(const SensorTopics&) = delete;
 
   /// Returns the time of the robot's world, from any thread.
   [[nodiscard]] std::int64_t now_ns() const;
@@ -29,13 +27,12 @@ class SensorTopics {
   [[nodiscard]] std::string motion_source() const;  ///< "topic odom", for messages to people
   /// Warns of inputs that several programs publish.
   void check_publishers() const;
-  /// Decodes the message of a picture, with its stamp in ns. Throws as `ros::picture_of`.
+  /// Decodes the message of a picture, which is named by its topic; with its stamp in ns. Throws as
+  /// `ros::picture_of`.
   [[nodiscard]] std::pair<Observation, std::int64_t> decode(
       std::span<const std::uint8_t> message) const;
 
  private:
-  template <class Message, class Use>
-  void listen(const std::string& topic, const Qos& qos, Use use);
   void take(const ros::Odometry& odometry);
   void take(const ros::TFMessage& message);
   void take(const ros::Imu& imu);
@@ -50,6 +47,7 @@ class SensorTopics {
   WorkQueue& queue_;
   FrameTree tree_;
   bool has_transform_ = false;
+  std::optional<std::int64_t> last_picture_ns_;
   std::atomic<std::int64_t> sim_ns_ = 0;
 };
 

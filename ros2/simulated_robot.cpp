@@ -1,17 +1,16 @@
 #include "ros2/simulated_robot.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
-#include <condition_variable>
-#include <mutex>
-#include <optional>
 #include <thread>
 #include <utility>
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/motion/simulated_base.hpp"
+#include "ros2/work_queue.hpp"
 
 namespace panonav::ros2 {
 
@@ -29,7 +28,7 @@ void visit_options(SimulatedRobotOptions& options, OptionVisitor& visitor) {
 
 namespace {
 
-/// A picture from the camera's buffer, as a message; the pixels stay the picture's.
+/// The message refers to the pixels of the picture.
 ros::Image make_message(const Image& picture, std::int64_t stamp_ns) {
   const auto width = static_cast<std::uint32_t>(picture.width());
   const bool is_grey = picture.channels() == 1;
@@ -41,53 +40,6 @@ ros::Image make_message(const Image& picture, std::int64_t stamp_ns) {
           is_grey ? width : 3 * width,
           picture.pixels()};
 }
-
-/// Takes pictures on a thread of its own, so that the world does not stand still for one.
-class SimulatedCamera {
- public:
-  using Take = std::function<void(std::int64_t stamp_ns, const Pose2& pose)>;
-  explicit SimulatedCamera(Take take) : take_(std::move(take)), thread_([this] { work(); }) {}
-  ~SimulatedCamera() {
-    {
-      const std::lock_guard lock(mutex_);
-      is_stopped_ = true;
-    }
-    changed_.notify_all();
-    thread_.join();
-  }
-  SimulatedCamera(const SimulatedCamera&) = delete;
-  SimulatedCamera& operator=(const SimulatedCamera&) = delete;
-
-  /// Begins a picture unless one is being taken. Returns whether it did.
-  bool trigger(std::int64_t stamp_ns, const Pose2& pose) {
-    const std::lock_guard lock(mutex_);
-    if (due_) return false;
-    due_.emplace(stamp_ns, pose);
-    changed_.notify_all();
-    return true;
-  }
-
- private:
-  void work() {
-    std::unique_lock lock(mutex_);
-    while (true) {
-      changed_.wait(lock, [this] { return is_stopped_ || due_; });
-      if (is_stopped_) return;
-      const auto [stamp_ns, pose] = *due_;
-      lock.unlock();
-      take_(stamp_ns, pose);
-      lock.lock();
-      due_.reset();
-    }
-  }
-
-  Take take_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  bool is_stopped_ = false;
-  std::optional<std::pair<std::int64_t, Pose2>> due_;  // until it is taken
-  std::thread thread_;
-};
 
 }  // namespace
 
@@ -131,26 +83,22 @@ struct SimulatedRobot::Implementation {
   }
 
   void run() {
-    std::uint64_t number = 0;
-    SimulatedCamera camera([&](std::int64_t stamp_ns, const Pose2& pose) {
-      try {
-        const Image picture = surroundings.picture(pose, Random(seed, ++number).next());
-        pictures.publish(make_message(picture, stamp_ns));
-      } catch (const Error& error) {
-        log.warn("picture", readable_line(error.what()));
-      }
+    std::thread camera([this] {
+      while (const auto work = camera_work.next()) work->request();
     });
     const double step_s = 1.0 / options.odometry_rate_hz;
     participant.run(std::chrono::duration<double>(step_s / options.time_factor), [&] {
       try {
-        step(step_s, camera);
+        step(step_s);
       } catch (const Error& error) {
         log.warn("step", readable_line(error.what()));
       }
     });
+    camera_work.stop();
+    camera.join();
   }
 
-  void step(double step_s, SimulatedCamera& camera) {
+  void step(double step_s) {
     now_s += step_s;
     if (now_s > velocity_until_s) velocity = {};
     const Pose2 moved = base.drive(velocity, step_s).moved;
@@ -166,9 +114,20 @@ struct SimulatedRobot::Implementation {
     odometries.publish(message);
     transforms.publish({{{{stamp_ns, "odom"}, "base_link", odom_from_base}}});
     truths.publish({{stamp_ns, "map"}, ros::pose_of(base.pose())});
-    if (now_s >= next_picture_s && camera.trigger(stamp_ns, base.pose())) {
-      next_picture_s = std::max(next_picture_s + 1.0 / options.picture_rate_hz, now_s);
+    if (now_s < next_picture_s || is_taking_picture.exchange(true)) return;
+    next_picture_s = std::max(next_picture_s + 1.0 / options.picture_rate_hz, now_s);
+    camera_work.add([this, stamp_ns, pose = base.pose()] { take_picture(stamp_ns, pose); });
+  }
+
+  /// On a thread of its own, so that the world does not stand still for a picture.
+  void take_picture(std::int64_t stamp_ns, const Pose2& pose) {
+    try {
+      const Image picture = surroundings.picture(pose, Random(seed, ++picture_number).next());
+      pictures.publish(make_message(picture, stamp_ns));
+    } catch (const Error& error) {
+      log.warn("picture", readable_line(error.what()));
     }
+    is_taking_picture = false;
   }
 
   SimulatedRobotOptions options;
@@ -186,6 +145,9 @@ struct SimulatedRobot::Implementation {
   double now_s = 0.0;
   double velocity_until_s = 0.0;
   double next_picture_s = 0.0;
+  WorkQueue camera_work;
+  std::atomic<bool> is_taking_picture = false;
+  std::uint64_t picture_number = 0;
 };
 
 SimulatedRobot::SimulatedRobot(const ParticipantOptions& participant,

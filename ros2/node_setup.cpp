@@ -1,4 +1,4 @@
-#include "ros2/node_options.hpp"
+#include "ros2/node_setup.hpp"
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
