@@ -19,11 +19,11 @@
 
 namespace panonav::ros2 {
 
-/// How samples are handed on, in the words of ROS 2. Histories are keep-last.
+/// How messages are delivered, in the words of ROS 2. Histories are keep-last.
 struct Qos {
   int depth = 5;
   bool reliable = true;
-  /// What was written last reaches those who come later.
+  /// Those who subscribe later receive what was written last.
   bool transient_local = false;
 };
 
@@ -31,21 +31,20 @@ struct ParticipantOptions {
   std::string node = "panonav";
   std::string name_space = "/";
   std::map<std::string, std::string> remappings;  ///< of names of topics and services
-  /// Empty: as the environment says, ROS_DOMAIN_ID and ROS_LOCALHOST_ONLY.
-  std::optional<int> domain;
-  std::optional<bool> localhost_only;
-  /// Of the graph's messages: 24 in Humble and before, 16 later. Empty: as ROS_DISTRO says, 16
-  /// where it says nothing.
+  std::optional<int> domain;                      ///< `nullopt`: ROS_DOMAIN_ID, or 0
+  std::optional<bool> localhost_only;             ///< `nullopt`: as ROS_LOCALHOST_ONLY says
+  /// Length of ids in messages about the graph: 24 up to Humble, 16 later. `nullopt`: as ROS_DISTRO
+  /// says, 16 without it.
   std::optional<int> gid_bytes;
 };
 
-/// The full name of a topic or service: relative names are in the namespace, those after ~ in that
-/// of the node; then remappings count. Throws ContractError on what is no name in ROS 2.
+/// Returns the full name of a topic or service: relative names are in the namespace, those after ~
+/// in that of the node; then remappings apply. Throws ContractError on what is no name in ROS 2.
 [[nodiscard]] std::string full_name(std::string_view name, const ParticipantOptions& options);
 
 /// A node on a ROS 2 graph: topics by name and message type over DDS, seen by `ros2 node list`.
-/// Messages are bytes of CDR here; a callback has to bear with any, and throws nothing. Writing may
-/// happen on any thread, all else on one.
+/// Messages are bytes of CDR here; a callback must accept any bytes, and throws nothing. Any thread
+/// may write; everything else happens on one thread.
 class Participant {
  public:
   using Receive = std::function<void(std::span<const std::uint8_t> cdr)>;
@@ -56,15 +55,15 @@ class Participant {
   Participant(const Participant&) = delete;
   Participant& operator=(const Participant&) = delete;
 
-  /// Messages come out of `wait`. `type` as "sensor_msgs/Image". A reliable subscription becomes a
-  /// best-effort one as soon as a publisher offers no more: then it hears both kinds.
+  /// Calls `receive` from `wait`. `type` as "sensor_msgs/Image". A reliable subscription becomes a
+  /// best-effort one as soon as a publisher offers no more: then it receives from both kinds.
   void subscribe(const std::string& topic, std::string_view type, const Qos& qos, Receive receive);
-  /// Publishers of a subscribed topic that match now.
+  /// Returns the number of publishers of a subscribed topic that match now.
   [[nodiscard]] std::size_t publishers(const std::string& topic) const;
 
   class Writer {
    public:
-    /// Throws Error when DDS does not take it, as on a reliable peer that is far behind.
+    /// Throws Error when DDS does not accept it, as when a reliable subscriber is far behind.
     void write(std::span<const std::uint8_t> cdr) const;
     [[nodiscard]] std::size_t subscribers() const;
 
@@ -75,7 +74,7 @@ class Participant {
   };
   [[nodiscard]] Writer advertise(const std::string& topic, std::string_view type, const Qos& qos);
 
-  /// Waits for messages and hands on those that are there, at most `Qos::depth` a topic, to the
+  /// Waits for messages and passes those that came, at most `Qos::depth` of a topic, to the
   /// callbacks. Returns at the latest after `longest`, or once `stop` was called.
   void wait(std::chrono::nanoseconds longest);
   /// Waits for messages until `stop` is called, and calls `tick` once in each period.
@@ -88,7 +87,7 @@ class Participant {
   std::unique_ptr<Implementation> implementation_;
 };
 
-/// Messages of one type on one topic.
+/// Publishes messages of one type on one topic.
 template <class Message>
 class Publisher {
  public:
