@@ -30,7 +30,7 @@ RouteSource source_for(const MemoryFile& file, const RouteRecorderOptions& optio
   if (wanted.line != before.line || wanted.horizon_rows != before.horizon_rows) {
     throw ContractError(
         route_text(file, options.name) +
-        " was recorded with other values of the option columns, the option half_band_rad or "
+        " was recorded with another value of the option columns, the option half_band_rad or "
         "the option horizon_rows; leave them out or take another name");
   }
   if (wanted.from_odometry != before.from_odometry) {
