@@ -316,7 +316,7 @@ class Collector {
                             listed(names_of(recording_, [](std::string_view) { return true; })));
       }
       throw FileError(path_.string(), "has pictures of several topics: " + listed(names) +
-                                          "; name one with --image-topic");
+                                          "; name one with the option image_topic");
     }
     use(wanted_topic(recording_, path_, *wanted.image, is_picture_type, types), Job::picture);
   }
@@ -337,7 +337,7 @@ class Collector {
     }
     if (!wanted.odometry_frames && !names.empty()) {
       warn("odometry of several topics, of which none is used: " + listed(names) +
-           "; name one with --odometry-topic");
+           "; name one with the option odometry_topic");
       return;
     }
     frames_named_ = wanted.odometry_frames.has_value();
@@ -359,7 +359,7 @@ class Collector {
     if (names.empty()) return;
     if (names.size() > 1) {
       warn("inertial sensors of several topics, of which none is used: " + listed(names) +
-           "; name one with --imu-topic");
+           "; name one with the option imu_topic");
     } else if (source.kind == PictureKind::panorama && !source.layout.elevations) {
       warn("roll and pitch of " + readable_line(names[0]) +
            " are not used: panoramas of unknown elevations cannot be levelled");

@@ -12,27 +12,27 @@
 
 namespace panonav::ros2 {
 
-/// Where odometry has a robot, over the last seconds. A publisher that starts again begins at
-/// another pose or time; then the motion so far is joined to what comes.
+/// Stores the odometry of the last seconds. A publisher that starts again begins at another pose or
+/// time; then what follows is joined to the motion so far.
 class MotionHistory {
  public:
   static constexpr std::int64_t kept_ns = 10'000'000'000;
   static constexpr std::size_t max_samples = 10'000;
-  /// What moves faster between two messages is no robot that drives.
+  /// A faster motion between two messages is a jump of the odometry.
   static constexpr double max_speed_m_s = 20.0;
-  /// Of messages: what is older than the newest by less comes late, by more is of another clock.
+  /// A message that is older than the newest by less is late, by more it is of another clock.
   static constexpr std::int64_t late_ns = 1'000'000'000;
 
   struct Motion {
     Pose2 odom_from_base;  ///< as published
-    /// In a frame of our own, in which the motion has no jumps.
+    /// In a frame of this class, in which the motion has no jumps.
     Pose2 path_from_base;
   };
 
   enum class Added { yes, late, restarted };
   Added add(std::int64_t stamp_ns, const Pose2& odom_from_base);
 
-  /// Interpolated. Empty before the first message, and after the newest.
+  /// Interpolates. `nullopt` before the first message, and after the newest.
   [[nodiscard]] std::optional<Motion> at(std::int64_t stamp_ns) const;
   [[nodiscard]] std::optional<Motion> newest() const;
   [[nodiscard]] std::optional<std::int64_t> newest_ns() const;
@@ -49,14 +49,14 @@ class MotionHistory {
   Pose2 path_from_odom_;
 };
 
-/// The transforms that were heard last.
+/// Stores the last transform of each frame to its parent.
 class FrameTree {
  public:
   static constexpr std::size_t max_frames = 1000;
 
-  /// Frames beyond the limit are not kept.
+  /// Ignores new frames beyond the limit.
   void set(const recordings::ros::TransformStamped& transform);
-  /// top_from_bottom. Empty where no chain connects them. Throws ContractError on a cycle.
+  /// Returns top_from_bottom. `nullopt` if no chain connects them. Throws ContractError on a cycle.
   [[nodiscard]] std::optional<recordings::ros::Pose> lookup(const std::string& top,
                                                             const std::string& bottom) const;
 

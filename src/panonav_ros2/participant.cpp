@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cstdlib>
 #include <memory>
 #include <mutex>
@@ -29,20 +30,20 @@ std::string environment(const char* name) {
   return value == nullptr ? "" : value;
 }
 
-int domain_of(const ParticipantOptions& options) {
-  constexpr int highest = 232;
+int domain_number(const ParticipantOptions& options) {
+  constexpr int max_domain = 232;  // whose UDP ports are below 65536
   if (options.domain) return *options.domain;
   const std::string text = environment("ROS_DOMAIN_ID");
   if (text.empty()) return 0;
   const bool digits = std::ranges::all_of(text, [](char c) { return c >= '0' && c <= '9'; });
   const int domain = digits && text.size() <= 3 ? std::stoi(text) : -1;
-  if (domain < 0 || domain > highest) {
+  if (domain < 0 || domain > max_domain) {
     throw ContractError("ROS_DOMAIN_ID", readable_line(text), "0 .. 232");
   }
   return domain;
 }
 
-int gid_bytes_of(const ParticipantOptions& options) {
+int gid_bytes(const ParticipantOptions& options) {
   constexpr int before_iron = 24;
   constexpr int since_iron = 16;
   if (options.gid_bytes) return *options.gid_bytes;
@@ -72,17 +73,17 @@ struct QosDeleter {
 };
 using DdsQos = std::unique_ptr<dds_qos_t, QosDeleter>;
 
-DdsQos dds_qos(const Qos& wanted) {
-  // Not the usual 100 ms: what is as usual is not said to others, and some (@foxglove/ros2) hear
-  // only writers that say how reliable they are.
+DdsQos make_dds_qos(const Qos& options) {
+  // Differs from the default of 100 ms: defaults are not announced, and some peers
+  // (@foxglove/ros2) match only writers that announce how reliable they are.
   constexpr dds_duration_t max_blocking = DDS_MSECS(99);
   DdsQos qos(dds_create_qos());
-  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, wanted.depth);
+  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, options.depth);
   dds_qset_reliability(qos.get(),
-                       wanted.reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT,
+                       options.reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT,
                        max_blocking);
-  dds_qset_durability(
-      qos.get(), wanted.transient_local ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
+  dds_qset_durability(qos.get(), options.transient_local ? DDS_DURABILITY_TRANSIENT_LOCAL
+                                                         : DDS_DURABILITY_VOLATILE);
   dds_qset_writer_data_lifecycle(qos.get(), false);
   return qos;
 }
@@ -108,7 +109,7 @@ class CdrWriter {
   std::vector<std::uint8_t> bytes{0, 1, 0, 0};
 };
 
-/// What a process tells DDS of a domain holds for all its participants in it.
+/// Configures a domain, for all participants of this process in it.
 class Domain {
  public:
   Domain(int number, const std::optional<bool>& localhost_only) {
@@ -137,7 +138,8 @@ class Domain {
   dds_entity_t entity_ = 0;
 };
 
-std::shared_ptr<const Domain> domain_in_use(int number, const std::optional<bool>& localhost_only) {
+std::shared_ptr<const Domain> get_or_create_domain(int number,
+                                                   const std::optional<bool>& localhost_only) {
   static std::mutex mutex;
   static std::map<int, std::weak_ptr<const Domain>> domains;
   const std::lock_guard lock(mutex);
@@ -192,11 +194,11 @@ struct Participant::Implementation {
     Receive receive;
   };
 
-  Implementation(const ParticipantOptions& wanted, Note hears)
-      : options(wanted), note(std::move(hears)) {
+  Implementation(const ParticipantOptions& options_, Note note_)
+      : options(options_), note(std::move(note_)) {
     (void)full_name("~/name", options);  // node and namespace are names
-    const int number = domain_of(options);
-    domain = domain_in_use(number, options.localhost_only);
+    const int number = domain_number(options);
+    domain = get_or_create_domain(number, options.localhost_only);
     const DdsQos qos(dds_create_qos());
     const std::string enclave = "enclave=/;";
     dds_qset_userdata(qos.get(), enclave.data(), enclave.size());
@@ -207,8 +209,8 @@ struct Participant::Implementation {
       waitset = checked(dds_create_waitset(participant), "waitset");
       guard = checked(dds_create_guardcondition(participant), "guard condition");
       checked(dds_waitset_attach(waitset, guard, -1), "guard condition");
-      graph = writer_of("ros_discovery_info", "rmw_dds_common/ParticipantEntitiesInfo",
-                        {.depth = 1, .reliable = true, .transient_local = true});
+      graph = make_writer("ros_discovery_info", "rmw_dds_common/ParticipantEntitiesInfo",
+                          {.depth = 1, .reliable = true, .transient_local = true});
     } catch (...) {
       end();
       throw;
@@ -222,22 +224,22 @@ struct Participant::Implementation {
     if (participant > 0) dds_delete(participant);
   }
 
-  [[nodiscard]] dds_entity_t topic_of(const std::string& name, std::string_view type) const {
+  [[nodiscard]] dds_entity_t make_topic(const std::string& name, std::string_view type) const {
     ddsi_sertype* raw = make_raw_type(dds_type_name(type));
     return checked(
         dds_create_topic_sertype(participant, name.c_str(), &raw, nullptr, nullptr, nullptr),
         "topic " + name);
   }
-  [[nodiscard]] dds_entity_t writer_of(const std::string& name, std::string_view type,
-                                       const Qos& qos) const {
+  [[nodiscard]] dds_entity_t make_writer(const std::string& name, std::string_view type,
+                                         const Qos& qos) const {
     return checked(
-        dds_create_writer(participant, topic_of(name, type), dds_qos(qos).get(), nullptr),
+        dds_create_writer(participant, make_topic(name, type), make_dds_qos(qos).get(), nullptr),
         "publisher of " + name);
   }
-  void read(std::size_t index) {
+  void make_reader(std::size_t index) {
     Subscription& subscription = subscriptions[index];
     subscription.reader = checked(dds_create_reader(participant, subscription.dds_topic,
-                                                    dds_qos(subscription.qos).get(), nullptr),
+                                                    make_dds_qos(subscription.qos).get(), nullptr),
                                   "subscription of " + subscription.topic);
     checked(dds_set_status_mask(subscription.reader,
                                 DDS_DATA_AVAILABLE_STATUS | DDS_REQUESTED_INCOMPATIBLE_QOS_STATUS),
@@ -246,14 +248,14 @@ struct Participant::Implementation {
             "subscription");
   }
 
-  /// Tells the graph of what there is now.
+  /// Announces the endpoints that there are now to the graph.
   void announce() const {
     CdrWriter message;
     const auto gid = [&](dds_entity_t entity) {
       dds_guid_t guid{};
       checked(dds_get_guid(entity, &guid), "guid");
       message.bytes.insert(message.bytes.end(), std::begin(guid.v), std::end(guid.v));
-      message.bytes.resize(message.bytes.size() + gid_bytes_of(options) - sizeof guid.v);
+      message.bytes.resize(message.bytes.size() + gid_bytes(options) - sizeof guid.v);
     };
     gid(participant);
     message.number(1);
@@ -294,13 +296,13 @@ struct Participant::Implementation {
         subscription.qos.reliable = false;
         dds_waitset_detach(waitset, subscription.reader);
         dds_delete(subscription.reader);
-        read(index);
+        make_reader(index);
         announce();
         return;
       }
       note("a publisher of " + subscription.topic +
-           " does not offer what is asked for (QoS policy " +
-           std::to_string(refused.last_policy_id) + "), and is not heard");
+           " does not offer what is requested (QoS policy " +
+           std::to_string(refused.last_policy_id) + "), and is not received");
     }
     take(subscription);
   }
@@ -314,6 +316,7 @@ struct Participant::Implementation {
   dds_entity_t graph = 0;
   std::vector<Subscription> subscriptions;
   std::vector<dds_entity_t> writers;
+  std::atomic<bool> stopped = false;
 };
 
 Participant::Participant(const ParticipantOptions& options, Note note)
@@ -324,8 +327,8 @@ void Participant::subscribe(const std::string& topic, std::string_view type, con
                             Receive receive) {
   auto& self = *implementation_;
   const std::string name = dds_topic_name(full_name(topic, self.options), type);
-  self.subscriptions.push_back({topic, self.topic_of(name, type), 0, qos, std::move(receive)});
-  self.read(self.subscriptions.size() - 1);
+  self.subscriptions.push_back({topic, self.make_topic(name, type), 0, qos, std::move(receive)});
+  self.make_reader(self.subscriptions.size() - 1);
   self.announce();
 }
 
@@ -351,7 +354,7 @@ Participant::Writer Participant::advertise(const std::string& topic, std::string
                                            const Qos& qos) {
   auto& self = *implementation_;
   const std::string name = dds_topic_name(full_name(topic, self.options), type);
-  self.writers.push_back(self.writer_of(name, type, qos));
+  self.writers.push_back(self.make_writer(name, type, qos));
   self.announce();
   return Writer(self.writers.back());
 }
@@ -373,7 +376,21 @@ void Participant::wait(std::chrono::nanoseconds longest) {
   }
 }
 
-void Participant::wake() noexcept {
+void Participant::run(std::chrono::duration<double> period_s, const std::function<void()>& tick) {
+  using Steady = std::chrono::steady_clock;
+  const auto period = std::chrono::duration_cast<Steady::duration>(period_s);
+  auto next = Steady::now();
+  while (!implementation_->stopped) {
+    wait(std::max<Steady::duration>(next - Steady::now(), Steady::duration::zero()));
+    const auto now = Steady::now();
+    if (now < next) continue;
+    next = std::max(next + period, now);
+    tick();
+  }
+}
+
+void Participant::stop() noexcept {
+  implementation_->stopped = true;
   dds_set_guardcondition(implementation_->guard, true);
 }
 

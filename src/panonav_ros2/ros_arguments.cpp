@@ -105,6 +105,64 @@ void read_parameter_file(const std::string& path, const std::string& node,
   }
 }
 
+/// An option of ROS with its value, as typed after --ros-args.
+struct RosOption {
+  std::string flag;
+  std::string value;
+  [[nodiscard]] bool is(std::initializer_list<std::string_view> forms) const {
+    return std::ranges::find(forms, flag) != forms.end();
+  }
+};
+
+/// Appends what stands outside `--ros-args ... --` to `others`, and returns the options inside.
+std::vector<RosOption> split_words(std::span<const std::string> words,
+                                   std::vector<std::string>& others) {
+  std::vector<RosOption> options;
+  bool is_inside = false;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    const std::string& word = words[i];
+    if (word == "--ros-args") {
+      is_inside = true;
+    } else if (is_inside && word == "--") {
+      is_inside = false;
+    } else if (!is_inside) {
+      others.push_back(word);
+    } else if (!word.starts_with("--enable-") && !word.starts_with("--disable-")) {
+      RosOption option{word, {}};
+      if (!option.is({"-r", "--remap", "-p", "--param", "--params-file", "--log-level",
+                      "--log-config-file", "--log-file-name", "-e", "--enclave"})) {
+        throw ContractError("word after --ros-args", "'" + readable_line(shortened(word, 80)) + "'",
+                            "-r FROM:=TO, -p NAME:=VALUE, --params-file FILE");
+      }
+      if (++i == words.size()) throw ContractError("value of " + word, "missing", "one");
+      option.value = words[i];
+      options.push_back(std::move(option));
+    }
+  }
+  return options;
+}
+
+/// Removes "NODE:" from a name. Returns false if it is for another node.
+bool is_for_node(std::string& name, const std::string& node) {
+  const std::size_t colon = name.find(':');
+  if (colon == std::string::npos) return true;
+  const bool is_own = name.substr(0, colon) == node;
+  name = name.substr(colon + 1);
+  return is_own;
+}
+
+void read_parameter(const RosOption& option, const std::string& node, Parameters& parameters) {
+  auto [name, value] = sides_of(option.value, "parameter", "NAME:=VALUE, as use_sim_time:=true");
+  if (!is_for_node(name, node)) return;
+  try {
+    int nodes_left = max_nodes;
+    flatten(YAML::Load(value), name, option.flag, 0, nodes_left, parameters);
+  } catch (const YAML::Exception& error) {
+    throw ContractError("value of " + name, "'" + readable_line(shortened(value, 80)) + "'",
+                        std::string("YAML: ") + readable_line(error.what()));
+  }
+}
+
 }  // namespace
 
 std::pair<std::string, std::string> remapping_of(const std::string& text) {
@@ -114,72 +172,24 @@ std::pair<std::string, std::string> remapping_of(const std::string& text) {
 RosArguments read_ros_arguments(std::span<const std::string> words, const std::string& node,
                                 const std::string& name_space) {
   RosArguments read;
-  std::vector<std::pair<std::string, std::string>> given;  // parameters and files, in order
-  bool of_ros = false;
-  for (std::size_t i = 0; i < words.size(); ++i) {
-    const std::string& word = words[i];
-    if (!of_ros || word == "--") {
-      if (word == "--ros-args") {
-        of_ros = true;
-      } else if (of_ros) {
-        of_ros = false;
-      } else {
-        read.words.push_back(word);
-      }
-      continue;
-    }
-    const auto is = [&](std::initializer_list<std::string_view> forms) {
-      return std::ranges::find(forms, word) != forms.end();
-    };
-    if (word == "--ros-args" || word.starts_with("--enable-") || word.starts_with("--disable-")) {
-      continue;
-    }
-    const bool remaps = is({"-r", "--remap"});
-    const bool sets = is({"-p", "--param"});
-    if (!remaps && !sets &&
-        !is({"--params-file", "--log-level", "--log-config-file", "--log-file-name", "-e",
-             "--enclave"})) {
-      throw ContractError("word after --ros-args", "'" + readable_line(shortened(word, 80)) + "'",
-                          "-r FROM:=TO, -p NAME:=VALUE, --params-file FILE");
-    }
-    if (++i == words.size()) throw ContractError("value of " + word, "missing", "one");
-    if (remaps) {
-      auto [from, to] = remapping_of(words[i]);
-      // NODE:from:=to is for one node alone.
-      const std::size_t colon = from.find(':');
-      if (colon != std::string::npos) {
-        if (from.substr(0, colon) != node) continue;
-        from = from.substr(colon + 1);
-      }
-      if (from == "__name") from = "__node";
-      read.remappings.insert_or_assign(from, to);
-    } else if (sets || word == "--params-file") {
-      given.emplace_back(word, words[i]);
-    }
+  const auto options = split_words(words, read.words);
+  for (const RosOption& option : options) {
+    if (!option.is({"-r", "--remap"})) continue;
+    auto [from, to] = remapping_of(option.value);
+    if (!is_for_node(from, node)) continue;
+    read.remappings.insert_or_assign(from == "__name" ? "__node" : from, to);
   }
-  const auto named = [&](const std::string& key, const std::string& initial) {
+  const auto renamed = [&](const std::string& key, const std::string& initial) {
     const auto found = read.remappings.find(key);
     return found == read.remappings.end() ? initial : found->second;
   };
-  const std::string own_node = named("__node", node);
-  const std::string own_space = named("__ns", name_space);
-  for (const auto& [word, text] : given) {
-    if (word == "--params-file") {
-      read_parameter_file(text, own_node, own_space, read.parameters);
-      continue;
-    }
-    auto [name, value] = sides_of(text, "parameter", "NAME:=VALUE, as use_sim_time:=true");
-    const std::size_t colon = name.find(':');
-    if (colon != std::string::npos) {
-      if (name.substr(0, colon) != own_node) continue;
-      name = name.substr(colon + 1);
-    }
-    try {
-      int nodes_left = max_nodes;
-      flatten(YAML::Load(value), name, word, 0, nodes_left, read.parameters);
-    } catch (const YAML::Exception& error) {
-      throw ContractError("value of " + name, "'" + readable_line(shortened(value, 80)) + "'",
-                          std::string("YAML: ") + readable_line(error.what()));
+  const std::string own_node = renamed("__node", node);
+  const std::string own_space = renamed("__ns", name_space);
+  for (const RosOption& option : options) {
+    if (option.is({"--params-file"})) {
+      read_parameter_file(option.value, own_node, own_space, read.parameters);
+    } else if (option.is({"-p", "--param"})) {
+      read_parameter(option, own_node, read.parameters);
     }
   }
   return read;

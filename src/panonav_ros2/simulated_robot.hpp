@@ -37,7 +37,7 @@ class SimulatedRobot {
   /// Throws OptionError, and as `Participant`.
   SimulatedRobot(const ParticipantOptions& participant, const SimulatedRobotOptions& options,
                  SimulatedSurroundings surroundings, const OdometryNoise& odometry,
-                 std::uint64_t seed, Participant::Note note);
+                 std::uint64_t seed, Note note);
   ~SimulatedRobot();
   SimulatedRobot(const SimulatedRobot&) = delete;
   SimulatedRobot& operator=(const SimulatedRobot&) = delete;

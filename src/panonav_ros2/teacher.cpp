@@ -14,9 +14,9 @@ namespace panonav::ros2 {
 
 namespace {
 
-std::filesystem::path new_file(std::filesystem::path path) {
+std::filesystem::path require_new(std::filesystem::path path) {
   if (memory_exists(path)) {
-    throw FileError(path.string(), "is there already; allowed with --learn: a new file");
+    throw FileError(path.string(), "exists; allowed for a first drive: a new file");
   }
   return path;
 }
@@ -24,7 +24,7 @@ std::filesystem::path new_file(std::filesystem::path path) {
 }  // namespace
 
 Teacher::Teacher(std::filesystem::path memory, const TeacherOptions& options)
-    : path_(new_file(std::move(memory))), options_(options), encoder_(options.pictures, {}) {}
+    : path_(require_new(std::move(memory))), options_(options), encoder_(options.pictures, {}) {}
 
 void Teacher::make_mapper() {
   Executor alone;
@@ -32,48 +32,48 @@ void Teacher::make_mapper() {
       MemoryFile::create(path_, header_from_first(waiting_, options_.pictures, options_.signature,
                                                   options_.preprocessing, alone)),
       options_.pictures);
-  for (const Observation& seen : std::exchange(waiting_, {})) mapper_->add(seen);
+  for (const Observation& first : std::exchange(waiting_, {})) mapper_->add(first);
 }
 
-void Teacher::add(Observation seen) {
-  // Half of the spacing that grids of views are made with: steps so short are read from the views
-  // themselves, and wherever the robot comes again, a view is near.
+void Teacher::add(Observation observation) {
+  // Half of the usual spacing of grids of views: views measure steps of this length themselves, and
+  // a robot that returns finds a view near.
   constexpr double step_m = 0.25;
   constexpr double turn_rad = 0.3;
-  const Pose2 pose = seen.odometry.value();
+  const Pose2 pose = observation.odometry.value();
   if (options_.route && (lines_.empty() || RouteRecorder::is_due(lines_.back().encoded.pose, pose,
                                                                  RouteRecorderOptions{}.every_m))) {
-    lines_.push_back({{pose, encoder_.line(seen)}, nodes_.empty() ? 0 : nodes_.size() - 1});
+    lines_.push_back({{pose, encoder_.line(observation)}, nodes_.empty() ? 0 : nodes_.size() - 1});
   }
   if (!nodes_.empty() && distance(nodes_.back().position(), pose.position()) < step_m &&
       std::abs(angle_difference(pose.heading_rad, nodes_.back().heading_rad)) < turn_rad) {
     return;
   }
   if (mapper_) {
-    mapper_->add(seen);
+    mapper_->add(observation);
   } else {
-    waiting_.push_back(std::move(seen));
+    waiting_.push_back(std::move(observation));
     if (waiting_.size() == Memoriser::scale_views) make_mapper();
   }
   nodes_.push_back(pose);
 }
 
-// A line moves as the nodes before and behind it do, by its share of the way between them.
+/// Moves each line as the nodes before and after it moved, weighted by its position between them.
 void Teacher::store_lines(const TopologicalMap& map) {
   RouteRecorder recorder(
       MemoryFile::open(path_, Access::read_write), options_.pictures,
       RouteRecorderOptions{.name = *options_.route, .line = {}, .horizon_rows = {}});
   for (Line& line : lines_) {
     const std::size_t before = line.node;
-    const std::size_t behind = std::min(before + 1, nodes_.size() - 1);
+    const std::size_t after = std::min(before + 1, nodes_.size() - 1);
     Pose2& pose = line.encoded.pose;
     const auto moved_with = [&](std::size_t node) {
       return map.nodes[node].pose * inverse(nodes_[node]) * pose;
     };
     const double from_m = distance(nodes_[before].position(), pose.position());
-    const double to_m = distance(nodes_[behind].position(), pose.position());
+    const double to_m = distance(nodes_[after].position(), pose.position());
     const double share = from_m > 0.0 ? from_m / (from_m + to_m) : 0.0;
-    pose = interpolate(moved_with(before), moved_with(behind), share);
+    pose = interpolate(moved_with(before), moved_with(after), share);
     recorder.add(std::move(line.encoded));
   }
   (void)recorder.finish();

@@ -21,17 +21,17 @@ struct TeacherOptions {
 /// whose frame the drive begins at the origin, and the drive as a route. One thread at a time.
 class Teacher {
  public:
-  /// Throws FileError when the file is there already, and as `LineEncoder`.
+  /// Throws FileError when the file exists, and as `LineEncoder`.
   Teacher(std::filesystem::path memory, const TeacherOptions& options);
 
-  /// An observation with odometry, which becomes a view where the robot moved on. Throws as
+  /// Adds an observation with odometry, as a view if the robot moved since the last one. Throws as
   /// `Mapper::add` and `LineEncoder::line`.
-  void add(Observation seen);
-  /// Maps what was seen, stores all, and tells map_from_odometry at the end of the drive. Throws
+  void add(Observation observation);
+  /// Maps the views, stores all, and returns map_from_odometry at the end of the drive. Throws
   /// FileError; ContractError when nothing was added.
   Pose2 finish();
 
-  /// Until the drive ends: its beginning is the origin.
+  /// Returns the frame until the drive ends: its beginning is the origin.
   [[nodiscard]] Pose2 map_from_odometry() const { return inverse(nodes_.front()); }
   [[nodiscard]] std::size_t views() const noexcept { return nodes_.size(); }
   [[nodiscard]] std::size_t lines() const noexcept { return lines_.size(); }

@@ -218,7 +218,7 @@ TEST_F(RouteVerbs, ARouteGrowsWhereItEndsAndNowhereElse) {
   const auto second = record({"--name", "by wheels", "--odometry", "--every-m", "0.2"});
   EXPECT_EQ(second["lines"], 21);  // 4.08 m by the wheels, 0.204 m apart
   EXPECT_TRUE(contains(refusal({"route", "follow", folder_ / "m.panonav", folder_ / "repeat"}),
-                       "by wheels, route"));
+                       "say which with --name: by wheels, route"));
   EXPECT_TRUE(contains(
       refusal({"route", "follow", folder_ / "m.panonav", folder_ / "repeat", "--name", "other"}),
       "holds no route 'other'"));
@@ -299,7 +299,7 @@ TEST_F(RouteVerbs, WrongUseIsRefused) {
   (void)record();
   const auto rows = refusal(
       {"route", "record", folder_ / "teach", memory, "--name", "b", "--horizon-rows", "1-2"});
-  EXPECT_TRUE(contains(rows, "elevations are not known"));
+  EXPECT_TRUE(contains(rows, "--horizon-rows goes with panoramas whose elevations are not known"));
   EXPECT_TRUE(
       contains(refusal({"route", "record", folder_ / "teach", memory, "--horizon-rows", "2-1"}),
                "FIRST-LAST"));

@@ -101,16 +101,20 @@ class LocalisationNodeOnTheWire : public ::testing::Test {
 
   /// The answer on ~/command/result. Until the node has answered once it may not know of our writer
   /// yet: what nobody hears is said again.
-  std::string ask(FastPeer::Endpoint& command, FastPeer::Endpoint& answer,
-                  const std::string& words) {
-    for (int i = 0; i < 50 && !answers_; ++i) {
-      FastPeer::write(command, recordings::ros::write_message(recordings::ros::String{"hello"}));
-      answers_ = !FastPeer::next(answer, 100ms).empty();
+  std::string ask(const std::string& words) {
+    if (command_ == nullptr) {
+      command_ = &peer_.talk<recordings::ros::String>("panonav/command");
+      answer_ = &peer_.listen<recordings::ros::String>("panonav/command/result");
+      EXPECT_TRUE(peer_.all_matched(10s));
+      for (int i = 0; i < 50 && FastPeer::waiting(*answer_) == 0; ++i) {
+        FastPeer::write(*command_, recordings::ros::String{"hello"});
+        std::this_thread::sleep_for(100ms);
+      }
     }
-    while (!FastPeer::next(answer, 100ms).empty()) {
+    while (!FastPeer::next(*answer_, 100ms).empty()) {
     }
-    FastPeer::write(command, recordings::ros::write_message(recordings::ros::String{words}));
-    const auto cdr = FastPeer::next(answer, 20s);
+    FastPeer::write(*command_, recordings::ros::String{words});
+    const auto cdr = FastPeer::next(*answer_, 20s);
     return cdr.empty() ? "nothing" : read<recordings::ros::String>(cdr).data;
   }
 
@@ -147,8 +151,7 @@ class LocalisationNodeOnTheWire : public ::testing::Test {
     Pose2 pose{0.6, 0.8, 0.0};
     for (int i = 0; i < steps; ++i) {
       const std::int64_t ns = now_ns();
-      EXPECT_TRUE(
-          FastPeer::write(odom, recordings::ros::write_message(odometry_message(ns, pose))));
+      EXPECT_TRUE(FastPeer::write(odom, odometry_message(ns, pose)));
       const auto looked_at = [&] { return node_->counts().pictures + node_->counts().dropped; };
       const std::size_t before = looked_at();
       see(ns, pose);
@@ -167,24 +170,19 @@ class LocalisationNodeOnTheWire : public ::testing::Test {
   FastPeer peer_;
   std::optional<LocalisationNode> node_;
   std::thread thread_;
-  FastPeer::Endpoint* graph_ = nullptr;
-  bool answers_ = false;
+  FastPeer::Endpoint *graph_ = nullptr, *command_ = nullptr, *answer_ = nullptr;
 };
 
 TEST_F(LocalisationNodeOnTheWire, TellsAnotherVendorsProgramsWhereTheRobotIs) {
   start({}, {.name_space = "/robot", .remappings = {{"image", "/camera/image_raw"}}});
-  auto& tf = peer_.listen("rt/tf", "tf2_msgs::msg::dds_::TFMessage_");
-  auto& particles =
-      peer_.listen("rt/robot/panonav/particles", "geometry_msgs::msg::dds_::PoseArray_");
-  auto& best = peer_.listen("rt/robot/panonav/best_match/compressed",
-                            "sensor_msgs::msg::dds_::CompressedImage_");
-  auto& diagnostics =
-      peer_.listen("rt/diagnostics", "diagnostic_msgs::msg::dds_::DiagnosticArray_");
-  auto& odom = peer_.talk("rt/robot/odom", "nav_msgs::msg::dds_::Odometry_");
-  auto& image = peer_.talk("rt/camera/image_raw", "sensor_msgs::msg::dds_::Image_", false);
-  for (auto* each : {&tf, &particles, &best, &diagnostics, &odom, &image}) {
-    ASSERT_TRUE(FastPeer::matched(*each, 10s));
-  }
+  auto& tf = peer_.listen<recordings::ros::TFMessage>("tf");
+  auto& particles = peer_.listen<recordings::ros::PoseArray>("robot/panonav/particles");
+  auto& best =
+      peer_.listen<recordings::ros::CompressedImage>("robot/panonav/best_match/compressed");
+  auto& diagnostics = peer_.listen<recordings::ros::DiagnosticArray>("diagnostics");
+  auto& odom = peer_.talk<recordings::ros::Odometry>("robot/odom");
+  auto& image = peer_.talk<recordings::ros::Image>("camera/image_raw", false);
+  ASSERT_TRUE(peer_.all_matched(10s));
   const Pose2 truth = drive(odom, [&](std::int64_t ns, const Pose2& pose) {
     EXPECT_TRUE(FastPeer::write(image, image_message(ns, picture(pose))));
   });
@@ -192,10 +190,10 @@ TEST_F(LocalisationNodeOnTheWire, TellsAnotherVendorsProgramsWhereTheRobotIs) {
   EXPECT_GE(node_->counts().localised, 10U);
 
   // Who comes later hears the last pose, and the references.
-  auto& pose = peer_.listen("rt/robot/panonav/pose",
-                            "geometry_msgs::msg::dds_::PoseWithCovarianceStamped_", true, true);
-  auto& references = peer_.listen("rt/robot/panonav/references",
-                                  "sensor_msgs::msg::dds_::PointCloud2_", true, true);
+  auto& pose =
+      peer_.listen<recordings::ros::PoseWithCovarianceStamped>("robot/panonav/pose", true, true);
+  auto& references =
+      peer_.listen<recordings::ros::PointCloud2>("robot/panonav/references", true, true);
   const auto told = read<recordings::ros::PoseWithCovarianceStamped>(FastPeer::next(pose, 10s));
   EXPECT_EQ(told.header.frame_id, "map");
   const Pose2 found = recordings::ros::planar(told.pose.pose);
@@ -252,34 +250,29 @@ TEST_F(LocalisationNodeOnTheWire, TakesCompressedPicturesTransformsASimulatedClo
          .pictures = PictureInput::compressed,
          .use_sim_time = true,
          .tilt_from_imu = true});
-  auto& tf = peer_.talk("rt/tf", "tf2_msgs::msg::dds_::TFMessage_");
-  auto& heard = peer_.listen("rt/tf", "tf2_msgs::msg::dds_::TFMessage_");
-  auto& clock = peer_.talk("rt/clock", "rosgraph_msgs::msg::dds_::Clock_", false);
-  auto& imu = peer_.talk("rt/imu", "sensor_msgs::msg::dds_::Imu_");
-  auto& image = peer_.talk("rt/image/compressed", "sensor_msgs::msg::dds_::CompressedImage_");
-  auto& start_pose =
-      peer_.talk("rt/initialpose", "geometry_msgs::msg::dds_::PoseWithCovarianceStamped_");
-  auto& pose =
-      peer_.listen("rt/panonav/pose", "geometry_msgs::msg::dds_::PoseWithCovarianceStamped_");
-  for (auto* each : {&tf, &heard, &clock, &imu, &image, &start_pose, &pose}) {
-    ASSERT_TRUE(FastPeer::matched(*each, 10s));
-  }
+  auto& tf = peer_.talk<recordings::ros::TFMessage>("tf");
+  auto& heard = peer_.listen<recordings::ros::TFMessage>("tf");
+  auto& clock = peer_.talk<recordings::ros::Clock>("clock", false);
+  auto& imu = peer_.talk<recordings::ros::Imu>("imu");
+  auto& image = peer_.talk<recordings::ros::CompressedImage>("image/compressed");
+  auto& start_pose = peer_.talk<recordings::ros::PoseWithCovarianceStamped>("initialpose");
+  auto& pose = peer_.listen<recordings::ros::PoseWithCovarianceStamped>("panonav/pose");
+  ASSERT_TRUE(peer_.all_matched(10s));
   const Pose2 first{0.6, 0.8, 0.0};
   const auto step = [&](int i) {
     const std::int64_t ns = 50'000'000LL * (i + 1);
     const Pose2 at{first.x_m + 0.05 * i, first.y_m, 0.0};
-    FastPeer::write(clock, recordings::ros::write_message(recordings::ros::Clock{ns}));
+    FastPeer::write(clock, recordings::ros::Clock{ns});
     FastPeer::write(tf,
-                    recordings::ros::write_message(recordings::ros::TFMessage{
+                    recordings::ros::TFMessage{
                         {{{ns, "odom"}, "base_footprint", recordings::ros::pose_of(odometry(at))},
-                         {{ns, "base_footprint"}, "base_link", {}}}}));
+                         {{ns, "base_footprint"}, "base_link", {}}}});
     recordings::ros::Imu level;
     level.header = {ns, "imu"};
-    FastPeer::write(imu, recordings::ros::write_message(level));
+    FastPeer::write(imu, level);
     const Image seen = picture(at);
     const auto png = encode_png(seen.view());
-    FastPeer::write(image, recordings::ros::write_message(
-                               recordings::ros::CompressedImage{{ns, "camera"}, "png", png}));
+    FastPeer::write(image, recordings::ros::CompressedImage{{ns, "camera"}, "png", png});
     std::this_thread::sleep_for(50ms);
   };
   step(0);
@@ -287,7 +280,7 @@ TEST_F(LocalisationNodeOnTheWire, TakesCompressedPicturesTransformsASimulatedClo
                                                    {recordings::ros::pose_of(first), {}}};
   begin.pose.covariance[0] = begin.pose.covariance[7] = 0.01;
   begin.pose.covariance[35] = 0.01;
-  FastPeer::write(start_pose, recordings::ros::write_message(begin));
+  FastPeer::write(start_pose, begin);
   std::this_thread::sleep_for(100ms);
   for (int i = 1; i < 12 || (i < 40 && FastPeer::waiting(pose) == 0); ++i) step(i);
   const auto told = FastPeer::next(pose, 10s);
@@ -316,13 +309,11 @@ TEST_F(LocalisationNodeOnTheWire, TakesCompressedPicturesTransformsASimulatedClo
 
 TEST_F(LocalisationNodeOnTheWire, BadMessagesGetOneLineEachAndTheRobotIsFoundAllTheSame) {
   start();
-  auto& odom = peer_.talk("rt/odom", "nav_msgs::msg::dds_::Odometry_");
-  auto& image = peer_.talk("rt/image", "sensor_msgs::msg::dds_::Image_");
-  auto& start_pose =
-      peer_.talk("rt/initialpose", "geometry_msgs::msg::dds_::PoseWithCovarianceStamped_");
-  for (auto* each : {&odom, &image, &start_pose}) ASSERT_TRUE(FastPeer::matched(*each, 10s));
-  auto& second = peer_.talk("rt/odom", "nav_msgs::msg::dds_::Odometry_");  // and says nothing
-  ASSERT_TRUE(FastPeer::matched(second, 10s));
+  auto& odom = peer_.talk<recordings::ros::Odometry>("odom");
+  auto& image = peer_.talk<recordings::ros::Image>("image");
+  auto& start_pose = peer_.talk<recordings::ros::PoseWithCovarianceStamped>("initialpose");
+  (void)peer_.talk<recordings::ros::Odometry>("odom");  // a second publisher, which is silent
+  ASSERT_TRUE(peer_.all_matched(10s));
 
   int number = 0;
   const std::int64_t begin_ns = now_ns();
@@ -345,22 +336,22 @@ TEST_F(LocalisationNodeOnTheWire, BadMessagesGetOneLineEachAndTheRobotIsFoundAll
         FastPeer::write(image, image_message(ns + 1, other));
         std::this_thread::sleep_for(30ms);
         recordings::ros::Image strange{{ns + 2, "camera"}, 1, 1, "rgb565", 0, 2, {}};
-        FastPeer::write(image, recordings::ros::write_message(strange));
+        FastPeer::write(image, strange);
         break;
       }
       case 23: {  // odometry that is no number, of another robot, and late
         auto bad = odometry_message(ns + 1, pose);
         bad.pose.pose.position.x = std::numeric_limits<double>::quiet_NaN();
-        FastPeer::write(odom, recordings::ros::write_message(bad));
+        FastPeer::write(odom, bad);
         auto foreign = odometry_message(ns + 2, pose);
         foreign.header.frame_id = "other_odom";
-        FastPeer::write(odom, recordings::ros::write_message(foreign));
-        FastPeer::write(odom, recordings::ros::write_message(odometry_message(ns - 1000, pose)));
+        FastPeer::write(odom, foreign);
+        FastPeer::write(odom, odometry_message(ns - 1000, pose));
         break;
       }
       case 24: {
         recordings::ros::PoseWithCovarianceStamped nowhere{{0, "moon"}, {}};
-        FastPeer::write(start_pose, recordings::ros::write_message(nowhere));
+        FastPeer::write(start_pose, nowhere);
         FastPeer::write(image, image_message(begin_ns - 10'000'000, picture(pose)));
         break;
       }
@@ -382,17 +373,16 @@ TEST_F(LocalisationNodeOnTheWire, BadMessagesGetOneLineEachAndTheRobotIsFoundAll
 
 TEST_F(LocalisationNodeOnTheWire, TransformsThatAreMissingOrGoRoundGetOneLineEach) {
   start({.motion = MotionInput::tf});
-  auto& tf = peer_.talk("rt/tf", "tf2_msgs::msg::dds_::TFMessage_");
-  auto& image = peer_.talk("rt/image", "sensor_msgs::msg::dds_::Image_");
-  for (auto* each : {&tf, &image}) ASSERT_TRUE(FastPeer::matched(*each, 10s));
+  auto& tf = peer_.talk<recordings::ros::TFMessage>("tf");
+  auto& image = peer_.talk<recordings::ros::Image>("image");
+  ASSERT_TRUE(peer_.all_matched(10s));
   const Image seen = picture({0.6, 0.8, 0.0});
   const auto is_said = [&](const std::string& words, const std::string& parent) {
     for (int i = 0; i < 200 && notes_with(words) == 0; ++i) {
       const std::int64_t ns = now_ns();
-      FastPeer::write(tf, recordings::ros::write_message(
-                              recordings::ros::TFMessage{{{{ns, "odom"}, "wheel", {}},
-                                                          {{ns, parent}, "base_link", {}},
-                                                          {{ns, "base_link"}, "foot", {}}}}));
+      FastPeer::write(tf, recordings::ros::TFMessage{{{{ns, "odom"}, "wheel", {}},
+                                                      {{ns, parent}, "base_link", {}},
+                                                      {{ns, "base_link"}, "foot", {}}}});
       FastPeer::write(image, image_message(ns, seen));
       std::this_thread::sleep_for(20ms);
     }
@@ -405,9 +395,9 @@ TEST_F(LocalisationNodeOnTheWire, TransformsThatAreMissingOrGoRoundGetOneLineEac
 
 TEST_F(LocalisationNodeOnTheWire, AFloodOfMessagesLeavesItLocalisedWithinItsMemory) {
   start();
-  auto& odom = peer_.talk("rt/odom", "nav_msgs::msg::dds_::Odometry_", false);
-  auto& image = peer_.talk("rt/image", "sensor_msgs::msg::dds_::Image_", false);
-  for (auto* each : {&odom, &image}) ASSERT_TRUE(FastPeer::matched(*each, 10s));
+  auto& odom = peer_.talk<recordings::ros::Odometry>("odom", false);
+  auto& image = peer_.talk<recordings::ros::Image>("image", false);
+  ASSERT_TRUE(peer_.all_matched(10s));
   const auto resident_pages = [] {
     std::size_t total = 0;
     std::size_t resident = 0;
@@ -418,7 +408,7 @@ TEST_F(LocalisationNodeOnTheWire, AFloodOfMessagesLeavesItLocalisedWithinItsMemo
   drive(odom, [&](std::int64_t ns, const Pose2& pose) {
     const Image seen = picture(pose);
     for (int i = 0; i < 50; ++i) {  // 1,000 a second
-      FastPeer::write(odom, recordings::ros::write_message(odometry_message(ns + i + 1, pose)));
+      FastPeer::write(odom, odometry_message(ns + i + 1, pose));
       FastPeer::write(image, image_message(ns + i, seen));
     }
   });
@@ -450,21 +440,16 @@ class DrivenRobot {
 
 TEST_F(LocalisationNodeOnTheWire, DrivesASimulatedRobotToAGoalFindsItKidnappedAndStopsIt) {
   start({.use_sim_time = true});
-  auto& goal = peer_.talk("rt/goal_pose", "geometry_msgs::msg::dds_::PoseStamped_");
-  auto& set_pose = peer_.talk("rt/set_pose", "geometry_msgs::msg::dds_::PoseStamped_");
-  auto& result =
-      peer_.listen("rt/panonav/goal/result", "diagnostic_msgs::msg::dds_::DiagnosticArray_");
-  auto& feedback =
-      peer_.listen("rt/panonav/goal/feedback", "diagnostic_msgs::msg::dds_::DiagnosticArray_");
-  auto& velocity = peer_.listen("rt/cmd_vel", "geometry_msgs::msg::dds_::Twist_");
-  auto& truth = peer_.listen("rt/ground_truth", "geometry_msgs::msg::dds_::PoseStamped_", false);
-  auto& pose =
-      peer_.listen("rt/panonav/pose", "geometry_msgs::msg::dds_::PoseWithCovarianceStamped_");
+  auto& goal = peer_.talk<recordings::ros::PoseStamped>("goal_pose");
+  auto& set_pose = peer_.talk<recordings::ros::PoseStamped>("set_pose");
+  auto& result = peer_.listen<recordings::ros::DiagnosticArray>("panonav/goal/result");
+  auto& feedback = peer_.listen<recordings::ros::DiagnosticArray>("panonav/goal/feedback");
+  auto& velocity = peer_.listen<recordings::ros::Twist>("cmd_vel");
+  auto& truth = peer_.listen<recordings::ros::PoseStamped>("ground_truth", false);
+  auto& pose = peer_.listen<recordings::ros::PoseWithCovarianceStamped>("panonav/pose");
   std::optional<DrivenRobot> robot;
   robot.emplace(world_, picture, 6.0);
-  for (auto* each : {&goal, &set_pose, &result, &feedback, &velocity, &truth}) {
-    ASSERT_TRUE(FastPeer::matched(*each, 10s));
-  }
+  ASSERT_TRUE(peer_.all_matched(10s));
   const auto robot_is = [&] { return newest_pose(truth); };
   const auto state_of = [](const FastPeer::Bytes& cdr) {
     return cdr.empty() ? std::string("nothing")
@@ -475,13 +460,12 @@ TEST_F(LocalisationNodeOnTheWire, DrivesASimulatedRobotToAGoalFindsItKidnappedAn
   // Who writes before both sides know of each other may not be heard: a goal in another frame,
   // which is refused, tells that the node hears.
   ASSERT_TRUE(comes_true([&] {
-    FastPeer::write(goal,
-                    recordings::ros::write_message(recordings::ros::PoseStamped{{0, "moon"}, {}}));
+    FastPeer::write(goal, recordings::ros::PoseStamped{{0, "moon"}, {}});
     return notes_with("moon") > 0;
   }));
   const auto send_to = [&](Point2 place) {
-    FastPeer::write(goal, recordings::ros::write_message(recordings::ros::PoseStamped{
-                              {0, "map"}, recordings::ros::pose_of({place.x_m, place.y_m, 0.0})}));
+    FastPeer::write(goal, recordings::ros::PoseStamped{
+                              {0, "map"}, recordings::ros::pose_of({place.x_m, place.y_m, 0.0})});
     return state_of(FastPeer::next(feedback, 20s));
   };
   const Point2 there{2.8, 2.8};
@@ -495,8 +479,8 @@ TEST_F(LocalisationNodeOnTheWire, DrivesASimulatedRobotToAGoalFindsItKidnappedAn
   const std::size_t before = node_->counts().pictures;
   while (FastPeer::waiting(pose) > 0) (void)FastPeer::next(pose, 1s);
   FastPeer::write(set_pose,
-                  recordings::ros::write_message(recordings::ros::PoseStamped{
-                      {0, "map"}, recordings::ros::pose_of({elsewhere.x_m, elsewhere.y_m, 2.0})}));
+                  recordings::ros::PoseStamped{
+                      {0, "map"}, recordings::ros::pose_of({elsewhere.x_m, elsewhere.y_m, 2.0})});
   EXPECT_TRUE(comes_true([&] {
     const auto told = FastPeer::next(pose, 1s);
     return !told.empty() && node_->counts().pictures > before &&
@@ -541,28 +525,20 @@ TEST_F(LocalisationNodeOnTheWire, LearnsADriveRepeatsItAndGoesOnAfterItDied) {
   setup.teacher =
       TeacherOptions{.pictures = source(), .route = "drive", .signature = {}, .preprocessing = {}};
   start(setup);
-  auto& command = peer_.talk("rt/panonav/command", "std_msgs::msg::dds_::String_");
-  auto& answer = peer_.listen("rt/panonav/command/result", "std_msgs::msg::dds_::String_");
-  auto& velocity = peer_.talk("rt/cmd_vel", "geometry_msgs::msg::dds_::Twist_");
-  auto& set_pose = peer_.talk("rt/set_pose", "geometry_msgs::msg::dds_::PoseStamped_");
-  auto& truth = peer_.listen("rt/ground_truth", "geometry_msgs::msg::dds_::PoseStamped_", false);
-  auto& result =
-      peer_.listen("rt/panonav/goal/result", "diagnostic_msgs::msg::dds_::DiagnosticArray_");
-  for (auto* each : {&command, &answer, &velocity, &set_pose, &truth, &result}) {
-    ASSERT_TRUE(FastPeer::matched(*each, 10s));
-  }
+  auto& velocity = peer_.talk<recordings::ros::Twist>("cmd_vel");
+  auto& set_pose = peer_.talk<recordings::ros::PoseStamped>("set_pose");
+  auto& truth = peer_.listen<recordings::ros::PoseStamped>("ground_truth", false);
+  auto& result = peer_.listen<recordings::ros::DiagnosticArray>("panonav/goal/result");
+  ASSERT_TRUE(peer_.all_matched(10s));
   const auto robot_is = [&] { return newest_pose(truth); };
-  const auto ask = [&](const std::string& words) {
-    return LocalisationNodeOnTheWire::ask(command, answer, words);
-  };
   ASSERT_TRUE(comes_true([&] { return node_->counts().pictures >= 3; }));
   EXPECT_EQ(ask("repeat drive").find("refused: "), 0U);
   for (int i = 0; i < 70; ++i) {  // a bend of 2.3 m
-    FastPeer::write(velocity, recordings::ros::write_message(recordings::ros::Twist{
-                                  {0.3, 0.0, 0.0}, {0.0, 0.0, i < 35 ? -0.05 : 0.3}}));
+    FastPeer::write(velocity,
+                    recordings::ros::Twist{{0.3, 0.0, 0.0}, {0.0, 0.0, i < 35 ? -0.05 : 0.3}});
     std::this_thread::sleep_for(28ms);
   }
-  FastPeer::write(velocity, recordings::ros::write_message(recordings::ros::Twist{}));
+  FastPeer::write(velocity, recordings::ros::Twist{});
   std::this_thread::sleep_for(200ms);
   const Pose2 end = robot_is();
   EXPECT_GT(end.x_m, 2.0);
@@ -570,8 +546,8 @@ TEST_F(LocalisationNodeOnTheWire, LearnsADriveRepeatsItAndGoesOnAfterItDied) {
   EXPECT_GE(node_->counts().learnt, 8U);
 
   const auto carried_back = [&] {
-    FastPeer::write(set_pose, recordings::ros::write_message(recordings::ros::PoseStamped{
-                                  {0, "map"}, recordings::ros::pose_of({0.8, 0.8, 0.2})}));
+    FastPeer::write(set_pose, recordings::ros::PoseStamped{
+                                  {0, "map"}, recordings::ros::pose_of({0.8, 0.8, 0.2})});
     std::this_thread::sleep_for(100ms);
   };
   const auto arrives = [&] {
@@ -616,19 +592,12 @@ TEST_F(LocalisationNodeOnTheWire, LearnsADriveRepeatsItAndGoesOnAfterItDied) {
 
 TEST_F(LocalisationNodeOnTheWire, DoesWhatUsersAskForAndSaysSo) {
   start();
-  auto& command = peer_.talk("rt/panonav/command", "std_msgs::msg::dds_::String_");
-  auto& answer = peer_.listen("rt/panonav/command/result", "std_msgs::msg::dds_::String_");
-  auto& odom = peer_.talk("rt/odom", "nav_msgs::msg::dds_::Odometry_");
-  auto& image = peer_.talk("rt/image", "sensor_msgs::msg::dds_::Image_");
+  auto& odom = peer_.talk<recordings::ros::Odometry>("odom");
+  auto& image = peer_.talk<recordings::ros::Image>("image");
   const fs::path own = *folder_ / "own.panonav";
   fs::copy_file(memory(), own);
   fs::create_symlink("/etc/hostname", *folder_ / "linked.panonav");
-  for (auto* each : {&command, &answer, &odom, &image}) {
-    ASSERT_TRUE(FastPeer::matched(*each, 10s));
-  }
-  const auto ask = [&](const std::string& words) {
-    return LocalisationNodeOnTheWire::ask(command, answer, words);
-  };
+  ASSERT_TRUE(peer_.all_matched(10s));
   EXPECT_EQ(ask("dance").find("refused: command is 'dance'; allowed: relocalise, "), 0U);
   EXPECT_NE(ask("learn here").find("refused: the robot is not localised"), std::string::npos);
   for (const char* outside : {"/nowhere.panonav", "../own.panonav", "linked.panonav"}) {

@@ -12,7 +12,7 @@ namespace {
 /// Another process of a test's: it says words until somebody heard some.
 int say_words() {
   using namespace panonav::ros2;
-  const Participant::Note quiet = [](const std::string&) {};
+  const Note quiet = [](const std::string&) {};
   Participant participant({}, quiet);
   const Publisher<panonav::recordings::ros::String> words(participant, "words");
   for (int i = 0; i < 500; ++i) {

@@ -63,8 +63,8 @@ TEST(Participant, NothingIsLostBothWaysWithAnotherVendorsDds) {
   FastPeer peer;
   Participant participant({}, [](const std::string& line) { ADD_FAILURE() << line; });
   constexpr int messages = 200;
-  auto& heard = peer.listen("rt/words", "std_msgs::msg::dds_::String_");
-  auto& said = peer.talk("rt/pictures", "sensor_msgs::msg::dds_::CompressedImage_");
+  auto& heard = peer.listen<recordings::ros::String>("words");
+  auto& said = peer.talk<recordings::ros::CompressedImage>("pictures");
   const Publisher<recordings::ros::String> words(participant, "words", {.depth = messages});
   std::vector<std::size_t> sizes;
   std::vector<std::int64_t> stamps;
@@ -79,15 +79,13 @@ TEST(Participant, NothingIsLostBothWaysWithAnotherVendorsDds) {
                           ++came;
                         });
   const Served served(participant);
-  ASSERT_TRUE(FastPeer::matched(heard, 10s));
-  ASSERT_TRUE(FastPeer::matched(said, 10s));
+  ASSERT_TRUE(peer.all_matched(10s));
   while (words.subscribers() == 0) std::this_thread::sleep_for(10ms);
   for (int i = 0; i < messages; ++i) {
     words.publish({std::string(static_cast<std::size_t>(i), 'x')});
     const std::vector<std::uint8_t> data(static_cast<std::size_t>(700 * i), 7);
     ASSERT_TRUE(
-        FastPeer::write(said, recordings::ros::write_message(
-                                  recordings::ros::CompressedImage{{i, "camera"}, "jpeg", data})));
+        FastPeer::write(said, recordings::ros::CompressedImage{{i, "camera"}, "jpeg", data}));
     std::this_thread::sleep_for(2ms);
   }
   for (int i = 0; i < messages; ++i) {
@@ -113,11 +111,10 @@ TEST(Participant, HearsPublishersThatOfferBestEffortOnly) {
   participant.subscribe("words", recordings::ros::String::type, {},
                         [&](std::span<const std::uint8_t>) { ++came; });
   const Served served(participant);
-  auto& said = peer.talk("rt/words", "std_msgs::msg::dds_::String_", false);
-  ASSERT_TRUE(FastPeer::matched(said, 10s));
+  auto& said = peer.talk<recordings::ros::String>("words", false);
+  ASSERT_TRUE(peer.all_matched(10s));
   for (int i = 0; i < 100 && came == 0; ++i) {
-    EXPECT_TRUE(
-        FastPeer::write(said, recordings::ros::write_message(recordings::ros::String{"here"})));
+    EXPECT_TRUE(FastPeer::write(said, recordings::ros::String{"here"}));
     std::this_thread::sleep_for(50ms);
   }
   EXPECT_GT(came, 0);
@@ -130,7 +127,7 @@ TEST(Participant, WhatWasSaidLastReachesThoseWhoComeLater) {
   words.publish({"old"});
   words.publish({"new"});
   FastPeer peer;
-  auto& heard = peer.listen("rt/words", "std_msgs::msg::dds_::String_", true, true);
+  auto& heard = peer.listen<recordings::ros::String>("words", true, true);
   const auto cdr = FastPeer::next(heard, 10s);
   ASSERT_FALSE(cdr.empty());
   EXPECT_EQ(

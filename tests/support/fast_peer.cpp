@@ -8,9 +8,11 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <condition_variable>
-#include <cstdio>
 #include <cstring>
+#include <deque>
+#include <mutex>
 
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
@@ -63,6 +65,19 @@ class BytesType : public dds::TopicDataType {
   void deleteData(void* data) override { delete static_cast<FastPeer::Bytes*>(data); }
   bool getKey(void*, InstanceHandle_t*, bool) override { return false; }
 };
+
+template <class EndpointQos>
+EndpointQos make_qos(bool reliable, bool transient_local) {
+  EndpointQos qos;
+  qos.reliability().kind =
+      reliable ? dds::RELIABLE_RELIABILITY_QOS : dds::BEST_EFFORT_RELIABILITY_QOS;
+  qos.durability().kind =
+      transient_local ? dds::TRANSIENT_LOCAL_DURABILITY_QOS : dds::VOLATILE_DURABILITY_QOS;
+  qos.history().depth = 200;
+  qos.endpoint().history_memory_policy =
+      eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
+  return qos;
+}
 
 }  // namespace
 
@@ -143,37 +158,25 @@ FastPeer::~FastPeer() {
 FastPeer::Endpoint& FastPeer::listen(const std::string& topic, const std::string& type,
                                      bool reliable, bool transient_local) {
   Endpoint& endpoint = implementation_->make(topic, type);
-  dds::DataReaderQos qos;
-  qos.reliability().kind =
-      reliable ? dds::RELIABLE_RELIABILITY_QOS : dds::BEST_EFFORT_RELIABILITY_QOS;
-  qos.durability().kind =
-      transient_local ? dds::TRANSIENT_LOCAL_DURABILITY_QOS : dds::VOLATILE_DURABILITY_QOS;
-  qos.history().depth = 200;
-  qos.endpoint().history_memory_policy =
-      eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
+  const auto qos = make_qos<dds::DataReaderQos>(reliable, transient_local);
   endpoint.reader = implementation_->subscriber->create_datareader(endpoint.topic, qos, &endpoint);
   return endpoint;
 }
 
-FastPeer::Endpoint& FastPeer::talk(const std::string& topic, const std::string& type, bool reliable,
-                                   bool transient_local) {
+FastPeer::Endpoint& FastPeer::talk(const std::string& topic, const std::string& type,
+                                   bool reliable) {
   Endpoint& endpoint = implementation_->make(topic, type);
-  dds::DataWriterQos qos;
-  qos.reliability().kind =
-      reliable ? dds::RELIABLE_RELIABILITY_QOS : dds::BEST_EFFORT_RELIABILITY_QOS;
-  qos.durability().kind =
-      transient_local ? dds::TRANSIENT_LOCAL_DURABILITY_QOS : dds::VOLATILE_DURABILITY_QOS;
-  qos.history().depth = 200;
-  qos.endpoint().history_memory_policy =
-      eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
+  auto qos = make_qos<dds::DataWriterQos>(reliable, false);
   qos.publish_mode().kind = dds::ASYNCHRONOUS_PUBLISH_MODE;
   endpoint.writer = implementation_->publisher->create_datawriter(endpoint.topic, qos, &endpoint);
   return endpoint;
 }
 
-bool FastPeer::matched(Endpoint& endpoint, std::chrono::milliseconds within) {
-  std::unique_lock lock(endpoint.mutex);
-  return endpoint.changed.wait_for(lock, within, [&] { return endpoint.peers > 0; });
+bool FastPeer::all_matched(std::chrono::milliseconds within) {
+  return std::ranges::all_of(implementation_->endpoints, [&](const auto& endpoint) {
+    std::unique_lock lock(endpoint->mutex);
+    return endpoint->changed.wait_for(lock, within, [&] { return endpoint->peers > 0; });
+  });
 }
 
 bool FastPeer::write(Endpoint& endpoint, const Bytes& cdr) {

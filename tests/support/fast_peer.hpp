@@ -2,11 +2,11 @@
 
 #include <chrono>
 #include <cstdint>
-#include <deque>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
+
+#include "panonav_recordings/ros_messages.hpp"
 
 namespace panonav::ros2 {
 
@@ -25,16 +25,33 @@ class FastPeer {
   /// Names as they are on the wire: "rt/tf", "tf2_msgs::msg::dds_::TFMessage_".
   Endpoint& listen(const std::string& topic, const std::string& type, bool reliable = true,
                    bool transient_local = false);
-  Endpoint& talk(const std::string& topic, const std::string& type, bool reliable = true,
-                 bool transient_local = false);
-  /// Whether somebody matches within the time.
-  static bool matched(Endpoint& endpoint, std::chrono::milliseconds within);
+  Endpoint& talk(const std::string& topic, const std::string& type, bool reliable = true);
+  /// Topics of messages, "tf" is "rt/tf" on the wire.
+  template <class Message>
+  Endpoint& listen(const std::string& topic, bool reliable = true, bool transient_local = false) {
+    return listen("rt/" + topic, wire_type(Message::type), reliable, transient_local);
+  }
+  template <class Message>
+  Endpoint& talk(const std::string& topic, bool reliable = true) {
+    return talk("rt/" + topic, wire_type(Message::type), reliable);
+  }
+  /// Whether each endpoint of this peer is matched by somebody within the time.
+  bool all_matched(std::chrono::milliseconds within);
   static bool write(Endpoint& endpoint, const Bytes& cdr);
+  template <class Message>
+  static bool write(Endpoint& endpoint, const Message& message) {
+    return write(endpoint, recordings::ros::write_message(message));
+  }
   /// The next one that came and was not asked for yet; empty when none comes within the time.
   static Bytes next(Endpoint& endpoint, std::chrono::milliseconds within);
   static std::size_t waiting(Endpoint& endpoint);
 
  private:
+  static std::string wire_type(std::string_view type) {  // "std_msgs::msg::dds_::String_"
+    const std::size_t slash = type.find('/');
+    return std::string(type.substr(0, slash)) +
+           "::msg::dds_::" + std::string(type.substr(slash + 1)) + "_";
+  }
   struct Implementation;
   std::unique_ptr<Implementation> implementation_;
 };

@@ -53,14 +53,7 @@ struct Arguments::Implementation {
 
 namespace {
 
-/// `cell_size_m` as `--cell-size-m`.
-std::string flag_of(std::string_view name) {
-  std::string flag = "--" + std::string(name);
-  std::replace(flag.begin(), flag.end(), '_', '-');
-  return flag;
-}
-
-/// And back.
+/// `--cell-size-m` as `cell_size_m`.
 std::string member_of(std::string_view flag) {
   std::string name(flag.substr(2));
   std::replace(name.begin(), name.end(), '-', '_');

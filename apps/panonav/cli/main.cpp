@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "cli/arguments.hpp"
+#include "cli/option_values.hpp"
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
@@ -21,7 +22,9 @@ using panonav::command::ExitCode;
 /// One line, whatever the message holds.
 void report(std::string_view verb, std::string_view message) {
   std::cerr << "panonav" << (verb.empty() ? "" : " ") << verb << ": "
-            << panonav::readable_line(panonav::without_passwords(message)) << '\n';
+            << panonav::readable_line(
+                   panonav::without_passwords(panonav::command::name_flags(message)))
+            << '\n';
 }
 
 ExitCode run(std::string_view& verb, std::span<const std::string> words) {

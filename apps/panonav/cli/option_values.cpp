@@ -1,5 +1,6 @@
 #include "cli/option_values.hpp"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -17,6 +18,26 @@ namespace {
 }
 
 }  // namespace
+
+std::string flag_of(std::string_view option) {
+  std::string flag = "--" + std::string(option);
+  std::replace(flag.begin(), flag.end(), '_', '-');
+  return flag;
+}
+
+std::string name_flags(std::string_view message) {
+  constexpr std::string_view lead = "the option ";
+  std::string named;
+  for (std::size_t at = message.find(lead); at != std::string_view::npos; at = message.find(lead)) {
+    const std::size_t begin = at + lead.size();
+    const std::size_t end =
+        std::min(message.find_first_not_of("abcdefghijklmnopqrstuvwxyz_", begin), message.size());
+    named += message.substr(0, begin == end ? end : at);
+    if (begin < end) named += flag_of(message.substr(begin, end - begin));
+    message.remove_prefix(end);
+  }
+  return named.append(message);
+}
 
 double number_from_text(std::string_view flag, std::string_view text) {
   double value = 0.0;

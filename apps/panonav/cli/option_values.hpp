@@ -20,6 +20,13 @@ struct OptionEntry {
 /// By the option's name.
 using OptionEntries = std::map<std::string, OptionEntry>;
 
+/// `cell_size_m` as `--cell-size-m`.
+[[nodiscard]] std::string flag_of(std::string_view option);
+
+/// Replaces "the option NAME", as messages of the library have it, by the flag: "the option
+/// image_topic" becomes "--image-topic".
+[[nodiscard]] std::string name_flags(std::string_view message);
+
 /// Throws UsageError unless the whole text is one finite number.
 [[nodiscard]] double number_from_text(std::string_view flag, std::string_view text);
 

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "cli/json.hpp"
+#include "cli/option_values.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/storage/memory_address.hpp"
 
@@ -66,7 +67,7 @@ Session::Session(const SessionOptions& options)
 
 void Session::say(std::string_view line) {
   clear_bar();
-  std::cerr << readable(without_passwords(line)) << '\n';
+  std::cerr << readable(without_passwords(name_flags(line))) << '\n';
 }
 
 void Session::print(std::string_view text) {

@@ -53,7 +53,7 @@ RouteSource route_source(const MemoryFile& memory, const std::string& name, int 
   }
   if (!good) {
     throw FileError(memory.path().string(), "parameter " + parameter_of(name) + " is '" + *text +
-                                                "'; allowed: what panonav route record writes");
+                                                "'; allowed: what a RouteRecorder writes");
   }
   return source;
 }
@@ -73,7 +73,8 @@ LineEncoder::LineEncoder(const PictureSource& pictures, const RouteSource& route
   if (route.horizon_rows &&
       (pictures.kind != PictureKind::panorama || pictures.layout.elevations)) {
     throw ContractError(
-        "--horizon-rows goes with panoramas whose elevations are not known; these pictures say "
+        "the option horizon_rows goes with panoramas whose elevations are not known; these "
+        "pictures say "
         "where the horizon is");
   }
 }
@@ -91,7 +92,7 @@ std::vector<float> LineEncoder::line_of(const Panorama& panorama) const {
   if (!route_.horizon_rows) return horizon_scanline(panorama, route_.line);
   const auto [first, last] = *route_.horizon_rows;
   if (last >= panorama.rows()) {
-    throw ContractError("last of --horizon-rows", last,
+    throw ContractError("last of the option horizon_rows", last,
                         "0 to " + std::to_string(panorama.rows() - 1));
   }
   const auto columns = static_cast<std::size_t>(panorama.columns());
@@ -108,15 +109,16 @@ std::string route_named(const MemoryFile& memory, const std::optional<std::strin
   std::string all;
   for (const auto& known : names) all += (all.empty() ? "" : ", ") + known;
   if (names.empty()) {
-    throw FileError(memory.path().string(), "holds no route; panonav route record makes one");
+    throw FileError(memory.path().string(), "holds no route; allowed: one that was recorded");
   }
   if (!name) {
     if (names.size() == 1) return names.front();
-    throw FileError(memory.path().string(), "holds several routes; say which with --name: " + all);
+    throw FileError(memory.path().string(),
+                    "holds several routes; say which with the option name: " + all);
   }
   if (std::ranges::find(names, *name) == names.end()) {
     throw FileError(memory.path().string(),
-                    "holds no route '" + *name + "'; allowed for --name: " + all);
+                    "holds no route '" + *name + "'; allowed for the option name: " + all);
   }
   return *name;
 }

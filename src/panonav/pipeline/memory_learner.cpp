@@ -71,7 +71,7 @@ ObservationModel model_for(const MemoryFile& file, const ColumnRanking& ranking)
   if (oriented < ObservationModel::min_views) {
     throw FileError(file.path().string(),
                     "holds " + std::to_string(oriented) +
-                        " views with position and heading; allowed for --learn: " +
+                        " views with position and heading; allowed where it learns: " +
                         std::to_string(ObservationModel::min_views) + " or more");
   }
   const auto models = kept_models(file, memory);

@@ -54,8 +54,8 @@ NavigationGraph graph_of(const MemoryFileViews& source, const std::optional<Grap
     origin = *wanted;
     auto graph = graph_from(origin, source, executor);
     if (graph) return std::move(*graph);
-    throw FileError(
-        path, "has no " + std::string(name_of(origin)) + "; leave out --edges for what there is");
+    throw FileError(path, "has no " + std::string(name_of(origin)) +
+                              "; leave out the option edges for what there is");
   }
   for (std::size_t i = 0;; ++i) {
     origin = static_cast<GraphOrigin>(i);
@@ -73,8 +73,8 @@ KnownRoute route_among_views(const MemoryFileViews& source, const std::string& n
   if (!file.route(name)) {
     std::string all;
     for (const auto& known : file.route_names()) all += (all.empty() ? "" : ", ") + known;
-    throw FileError(path, "holds no route '" + name + "'; allowed for --route: " +
-                              (all.empty() ? "none, as panonav route record made none" : all));
+    throw FileError(path, "holds no route '" + name + "'; allowed for the option route: " +
+                              (all.empty() ? "none, as none was recorded" : all));
   }
   const RoutePanorama route = route_to_follow(file, name);
   if (route_source(file, name, route.columns()).from_odometry) {
@@ -95,10 +95,11 @@ KnownRoute route_among_views(const MemoryFileViews& source, const std::string& n
   }
   KnownRoute known = known_route(route, views, options);
   if (known.references.empty()) {
-    throw FileError(
-        path, "none of the " + std::to_string(views.size()) + " views with a pose lies within " +
-                  short_number(options.beside_m) + " m of the route '" + name +
-                  "'; allowed: views and a route in one frame, or a larger --route-beside-m");
+    throw FileError(path, "none of the " + std::to_string(views.size()) +
+                              " views with a pose lies within " + short_number(options.beside_m) +
+                              " m of the route '" + name +
+                              "'; allowed: views and a route in one frame, or a larger value of "
+                              "the option route_beside_m");
   }
   return known;
 }

@@ -28,14 +28,15 @@ RouteSource source_for(const MemoryFile& file, const RouteRecorderOptions& optio
   if (!options.line) wanted.line = before.line;
   if (!options.horizon_rows) wanted.horizon_rows = before.horizon_rows;
   if (wanted.line != before.line || wanted.horizon_rows != before.horizon_rows) {
-    throw ContractError(route_text(file, options.name) +
-                        " was recorded with other --columns, --half-band-rad or "
-                        "--horizon-rows; leave them out or take another --name");
+    throw ContractError(
+        route_text(file, options.name) +
+        " was recorded with another value of the option columns, the option half_band_rad or "
+        "the option horizon_rows; leave them out or take another name");
   }
   if (wanted.from_odometry != before.from_odometry) {
     throw ContractError(route_text(file, options.name) + " is in the frame of " +
                         (before.from_odometry ? "its odometry" : "its data set") +
-                        ", these poses are not; take another --name");
+                        ", these poses are not; take another name");
   }
   return wanted;
 }
@@ -114,7 +115,7 @@ void RouteRecorder::add(EncodedLine line) {
       throw FileError(file_.path().string(), "the first line lies " + short_number(gap_m) +
                                                  " m from the end of the route '" + options_.name +
                                                  "'; allowed: at most " + short_number(max_gap_m) +
-                                                 " m, or another --name");
+                                                 " m, or another name");
     }
   }
   last_ = line.pose;

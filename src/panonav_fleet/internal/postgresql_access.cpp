@@ -41,9 +41,8 @@ std::optional<FoundMemory> find_memory(MemoriesConnection& memories, const Serve
 }
 
 void refuse_no_memory(const ServerAddress& address) {
-  throw FileError(address.shown.native(),
-                  "there is no memory '" + address.memory +
-                      "' on this server that this login may see; panonav memorise makes one");
+  throw FileError(address.shown.native(), "there is no memory '" + address.memory +
+                                              "' on this server that this login may see");
 }
 
 void make_postgresql_memory(const ServerAddress& address, const MemoryHeader& header,

@@ -57,12 +57,12 @@ const std::string block_of_l = "l.a >> " + std::to_string(block_bits);
 std::unique_ptr<ServerExchange> ServerExchange::connect(const ServerAddress& address) {
   MemoriesConnection memories = connect_to_memories(address, true);
   if (memories.schema_version < postgresql_schema_version) {
-    throw FileError(address.shown.native(),
-                    "cannot be synchronised: the schema's version is " +
-                        std::to_string(memories.schema_version) +
-                        "; allowed: " + std::to_string(postgresql_schema_version) +
-                        ", to which the owner of the schema brings it with panonav memorise or "
-                        "synchronise");
+    throw FileError(
+        address.shown.native(),
+        "cannot be synchronised: the schema's version is " +
+            std::to_string(memories.schema_version) +
+            "; allowed: " + std::to_string(postgresql_schema_version) +
+            ", to which the owner of the schema brings it by opening a memory to write");
   }
   const auto found = find_memory(memories, address);
   if (!found) return nullptr;

@@ -151,7 +151,7 @@ void require_memory_file(const std::filesystem::path& path) {
   if (code != SQLITE_OK && code != SQLITE_IOERR_SHORT_READ) database.fail(code);
   constexpr std::string_view magic("SQLite format 3\0", 16);
   if (code != SQLITE_OK || std::memcmp(head.data(), magic.data(), magic.size()) != 0) {
-    throw FileError(name, "is no memory file; allowed: files that panonav memorise made");
+    throw FileError(name, "is no memory file; allowed: memory files that panonav made");
   }
   const std::uint32_t application_id = big_endian(head.data() + 68);
   if (application_id != memory_application_id) {

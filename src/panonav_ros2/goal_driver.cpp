@@ -1,0 +1,186 @@
+#include "panonav_ros2/goal_driver.hpp"
+
+#include <limits>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
+#include "panonav_recordings/run_messages.hpp"
+
+namespace panonav::ros2 {
+
+using Steady = std::chrono::steady_clock;
+
+GoalDriver::GoalDriver(Participant& participant, const LocalisationNodeSetup& setup,
+                       WarningLog& log, const RobotMotion& motion, NowNs now_ns)
+    : setup_(setup),
+      log_(log),
+      motion_(motion),
+      now_ns_(std::move(now_ns)),
+      velocities_(participant, "cmd_vel", {.depth = 1}),
+      feedback_(participant, "~/goal/feedback"),
+      results_(participant, "~/goal/result"),
+      areas_(participant, "~/areas", {.depth = 1, .transient_local = true}) {}
+
+void GoalDriver::set_memory(const LoadedMemory& memory) {
+  end("another memory");
+  navigator_.reset();
+  route_driver_.reset();
+  memory_ = &memory;
+  mission_file_.emplace(memory.path, setup_.node.resume_s);
+}
+
+std::optional<Mission> GoalDriver::load_interrupted_mission() {
+  return mission_file_.value().load(log_);
+}
+
+void GoalDriver::start(const Mission& mission) {
+  end("another goal");
+  try {
+    if (memory_ == nullptr) throw Error("the memory is being learnt; allowed: finish, then this");
+    route_driver_.reset();
+    if (mission.goal) {
+      set_goal(mission.goal->position());
+    } else {
+      make_route_driver(mission);
+    }
+  } catch (const Error& refusal) {
+    if (mission_file_) mission_file_->remove();
+    results_.publish(make_message(error, std::string("refused: ") + refusal.what(), {}));
+    throw;
+  }
+  mission_ = mission;
+  if (route_driver_)
+    mission_.min_correlation = route_driver_->follower().tracker().min_correlation();
+  const std::lock_guard lock(mutex_);
+  has_mission_ = true;
+  last_command_ = Steady::now();
+}
+
+void GoalDriver::make_route_driver(const Mission& mission) {
+  RouteDriverOptions options{.follower = {.name = mission.route, .tracker = {}, .fit = {}},
+                             .base = setup_.navigator.base,
+                             .resume_m = mission.along_m};
+  options.follower.tracker.min_correlation = mission.min_correlation;
+  route_driver_.emplace(memory_->file, setup_.tracker.source, options);
+}
+
+void GoalDriver::set_goal(Point2 goal) {
+  const std::string name = memory_->tracker.memory().info(find_nearest_view(goal)).name;
+  if (navigator_) {
+    navigator_->set_goal(name);
+  } else {
+    navigator_.emplace(memory_->path, name, setup_.navigator);
+    publish_areas();
+  }
+}
+
+ViewId GoalDriver::find_nearest_view(Point2 position) const {
+  const VisualMemory& memory = memory_->tracker.memory();
+  ViewId nearest;  // there is one: no tracker is made of a memory without positions
+  double nearest_m = std::numeric_limits<double>::infinity();
+  for (const ViewId view : memory.views()) {
+    const auto& pose = memory.info(view).pose;
+    if (!pose || distance(pose->position(), position) >= nearest_m) continue;
+    nearest_m = distance(pose->position(), position);
+    nearest = view;
+  }
+  return nearest;
+}
+
+void GoalDriver::drive(const Observation& observation, const std::optional<Pose2>& pose) {
+  if (!has_mission()) return;
+  mission_file_->store_if_due(mission_, motion_.map_from_odom());
+  if (route_driver_) {
+    drive_along_route(observation, pose);
+  } else {
+    drive_to_goal(observation, pose);
+  }
+}
+
+void GoalDriver::drive_to_goal(const Observation& observation, const std::optional<Pose2>& pose) {
+  RobotReport report;
+  if (pose) report.estimate = find_nearest_view(pose->position());
+  const NavigationStep step = navigator_->step(observation, report);
+  const NavigationDecision& decision = step.decision;
+  const std::string state(name_of(decision.state));
+  if (decision.state != NavigationState::moving) {
+    end(state, decision.state == NavigationState::arrived ? fine : error);
+    return;
+  }
+  send(step.velocity);
+  if (!step.decided) return;
+  feedback_.publish(make_message(
+      fine, state,
+      {{"way", fixed(decision.way, 3)},
+       {"probability", fixed(decision.probability, 4)},
+       {"nearest", decision.nearest ? navigator_->info(*decision.nearest).name : std::string()}}));
+}
+
+void GoalDriver::drive_along_route(const Observation& observation,
+                                   const std::optional<Pose2>& pose) {
+  const RouteDriveStep step = route_driver_->step(observation, pose);
+  mission_.along_m = step.along_m;
+  const std::string state(name_of(step.state));
+  if (step.state == RouteDriveState::arrived || step.state == RouteDriveState::lost) {
+    end(state, step.state == RouteDriveState::arrived ? fine : error);
+    return;
+  }
+  send(step.velocity);
+  std::vector<recordings::ros::KeyValue> values{{"along_m", fixed(step.along_m, 3)},
+                                                {"length_m", fixed(step.length_m, 3)}};
+  if (step.fix) values.push_back({"lateral_m", fixed(step.fix->lateral_m, 3)});
+  feedback_.publish(make_message(fine, state, std::move(values)));
+}
+
+void GoalDriver::send(const Velocity& velocity) {
+  const std::lock_guard lock(mutex_);
+  velocities_.publish(
+      {{velocity.forward_m_s, velocity.left_m_s, 0.0}, {0.0, 0.0, velocity.turn_rad_s}});
+  last_command_ = Steady::now();
+}
+
+void GoalDriver::end(const std::string& why, std::uint8_t level) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!std::exchange(has_mission_, false)) return;
+    velocities_.publish({});
+  }
+  mission_file_->remove();
+  results_.publish(make_message(level, why, {}));
+}
+
+void GoalDriver::stop_if_silent() {
+  const std::chrono::duration<double> timeout(setup_.node.command_timeout_s);
+  const std::lock_guard lock(mutex_);
+  if (!has_mission_ || Steady::now() - last_command_ < timeout) return;
+  velocities_.publish({});
+  last_command_ = Steady::now();
+  log_.warn("command", "no picture for " + fixed(setup_.node.command_timeout_s, 2) +
+                           " s; the robot is stopped until one comes");
+}
+
+/// Publishes the areas that ways are planned over, a number for each view.
+void GoalDriver::publish_areas() {
+  recordings::PointValues cloud;
+  const auto& planner = navigator_->planner();
+  for (std::size_t node = 0; node < planner.graph().size(); ++node) {
+    const auto& pose = memory_->tracker.memory().info(planner.graph().view(node)).pose;
+    if (pose) cloud.add(pose->position(), static_cast<double>(planner.areas().area_of[node]));
+  }
+  areas_.publish(cloud.message(now_ns_(), setup_.frames.map, "area"));
+}
+
+bool GoalDriver::has_mission() const {
+  const std::lock_guard lock(mutex_);
+  return has_mission_;
+}
+
+recordings::ros::DiagnosticArray GoalDriver::make_message(
+    std::uint8_t level, const std::string& state,
+    std::vector<recordings::ros::KeyValue> values) const {
+  return {{now_ns_(), setup_.frames.map},
+          {{level, "panonav: goal", readable_line(state), {}, std::move(values)}}};
+}
+
+}  // namespace panonav::ros2

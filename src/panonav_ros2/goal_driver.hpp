@@ -1,0 +1,86 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "panonav/pipeline/route_driver.hpp"
+#include "panonav_ros2/mission.hpp"
+#include "panonav_ros2/node_setup.hpp"
+#include "panonav_ros2/robot_motion.hpp"
+
+namespace panonav::ros2 {
+
+/// A memory that a robot is localised by.
+struct LoadedMemory {
+  std::filesystem::path path;
+  MemoryFile file;
+  Tracker tracker;
+};
+
+/// Drives a robot to a goal or along a route, by velocities on `cmd_vel`, and reports on
+/// `~/goal/feedback` and `~/goal/result`. On the thread that localises, unless said otherwise.
+class GoalDriver {
+ public:
+  GoalDriver(Participant& participant, const LocalisationNodeSetup& setup, WarningLog& log,
+             const RobotMotion& motion, NowNs now_ns);
+
+  /// Ends the mission, and takes the next ones by this memory, which outlives *this or the next
+  /// call.
+  void set_memory(const LoadedMemory& memory);
+  /// Returns the mission of a node that used the same memory and died.
+  [[nodiscard]] std::optional<Mission> load_interrupted_mission();
+
+  /// Begins a mission in place of the one before. Throws Error, having reported it, when there is
+  /// no way.
+  void start(const Mission& mission);
+  /// Sends the velocity for the picture, if there is a mission. `pose`: the camera's in the map,
+  /// `nullopt` where the robot is not localised.
+  void drive(const Observation& observation, const std::optional<Pose2>& pose);
+  /// Stops the robot and reports why, if there is a mission. From any thread, as long as no other
+  /// one is in a function above.
+  void end(const std::string& why, std::uint8_t level = warning);
+  /// Stops the robot, on any thread, when no velocity was sent for `command_timeout_s`: whatever
+  /// holds up pictures.
+  void stop_if_silent();
+
+ private:
+  static constexpr std::uint8_t fine = 0;  // levels of diagnostic_msgs/DiagnosticStatus
+  static constexpr std::uint8_t warning = 1;
+  static constexpr std::uint8_t error = 2;
+
+  [[nodiscard]] ViewId find_nearest_view(Point2 position) const;
+  void make_route_driver(const Mission& mission);
+  void set_goal(Point2 goal);
+  void drive_to_goal(const Observation& observation, const std::optional<Pose2>& pose);
+  void drive_along_route(const Observation& observation, const std::optional<Pose2>& pose);
+  void send(const Velocity& velocity);
+  void publish_areas();
+  [[nodiscard]] bool has_mission() const;
+  [[nodiscard]] recordings::ros::DiagnosticArray make_message(
+      std::uint8_t level, const std::string& state,
+      std::vector<recordings::ros::KeyValue> values) const;
+
+  const LocalisationNodeSetup& setup_;
+  WarningLog& log_;
+  const RobotMotion& motion_;
+  NowNs now_ns_;
+  Publisher<recordings::ros::Twist> velocities_;
+  Publisher<recordings::ros::DiagnosticArray> feedback_, results_;
+  Publisher<recordings::ros::PointCloud2> areas_;
+  const LoadedMemory* memory_ = nullptr;
+  std::optional<MissionFile> mission_file_;
+  Mission mission_;
+  std::optional<RobotNavigator> navigator_;
+  std::optional<RouteDriver> route_driver_;  // instead of the navigator, along a route
+
+  mutable std::mutex mutex_;  // of these, and of the order of velocities
+  bool has_mission_ = false;
+  std::chrono::steady_clock::time_point last_command_;
+};
+
+}  // namespace panonav::ros2

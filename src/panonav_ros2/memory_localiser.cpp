@@ -1,0 +1,175 @@
+#include "panonav_ros2/memory_localiser.hpp"
+
+#include <cmath>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/pipeline/memoriser.hpp"
+#include "panonav/pipeline/named_view.hpp"
+
+namespace panonav::ros2 {
+
+MemoryLocaliser::MemoryLocaliser(Participant& participant, const LocalisationNodeSetup& setup,
+                                 RobotMotion& motion, GoalDriver& driver, NowNs now_ns)
+    : setup_(setup),
+      motion_(motion),
+      driver_(driver),
+      now_ns_(std::move(now_ns)),
+      poses_(participant, "~/pose", {.depth = 1, .transient_local = true}),
+      particles_(participant, "~/particles"),
+      references_(participant, "~/references", {.depth = 1, .transient_local = true}),
+      best_matches_(participant, "~/best_match/compressed"),
+      base_from_camera_(setup.node.base_from_camera()) {}
+
+LoadedMemory& MemoryLocaliser::loaded() const {
+  if (!memory_) throw Error("the memory is being learnt; allowed: finish, then this");
+  return *memory_;
+}
+
+void MemoryLocaliser::load(std::filesystem::path path) {
+  MemoryFile file = MemoryFile::open(path, Access::read_only);
+  Tracker tracker(file, setup_.tracker);
+  std::unique_ptr<LoadedMemory> memory(
+      new LoadedMemory{std::move(path), std::move(file), std::move(tracker)});
+  driver_.set_memory(*memory);
+  memory_ = std::move(memory);
+  last_observation_.reset();
+  last_pose_.reset();
+  publish_references();
+}
+
+void MemoryLocaliser::load_neighbour(const std::string& name) {
+  namespace fs = std::filesystem;
+  std::error_code code;
+  const fs::path folder = fs::weakly_canonical(fs::absolute(loaded().path), code).parent_path();
+  const fs::path path = fs::weakly_canonical(folder / name, code);
+  if (code || path.parent_path() != folder) {
+    throw ContractError("file to load", "'" + readable_line(shortened(name, 80)) + "'",
+                        "the name of a file in the folder of the memory");
+  }
+  load(path);
+  motion_.set_map_from_path(std::nullopt);  // it was in the frame of the other memory
+}
+
+/// Loads the memory again, with the robot where it is.
+void MemoryLocaliser::reload() {
+  const auto pose = last_pose_;
+  load(loaded().path);
+  if (pose) start_tracker_at(*pose);
+}
+
+void MemoryLocaliser::load_interrupted_mission() {
+  interrupted_ = driver_.load_interrupted_mission();
+}
+
+void MemoryLocaliser::add_view(const std::string& name) {
+  if (!last_observation_ || !last_pose_) {
+    throw Error("the robot is not localised, so a view of this place has no position");
+  }
+  last_observation_->pose =
+      ReferencePose{last_pose_->x_m, last_pose_->y_m, last_pose_->heading_rad};
+  last_observation_->name = name;
+  Memoriser memoriser(loaded().path, {.source = setup_.tracker.source});
+  memoriser.add(*last_observation_);
+  memoriser.finish();
+  reload();
+}
+
+void MemoryLocaliser::remove_view(const std::string& name) {
+  MemoryFile writable = MemoryFile::open(loaded().path, Access::read_write);
+  const ViewId view = named_view(writable, name);
+  writable.remove({&view, 1});
+  reload();
+}
+
+void MemoryLocaliser::start_anywhere() {
+  loaded().tracker.start_anywhere();
+}
+
+void MemoryLocaliser::start_at(const Pose2& map_from_base, double deviation_m,
+                               double heading_deviation_rad) {
+  loaded().tracker.start_at(map_from_base * base_from_camera_, deviation_m, heading_deviation_rad);
+}
+
+void MemoryLocaliser::start_at(const Pose2& map_from_base) {
+  start_tracker_at(map_from_base * base_from_camera_);
+}
+
+void MemoryLocaliser::start_tracker_at(const Pose2& map_from_camera) {
+  constexpr double heading_deviation_rad = 0.1;  // about the largest error of a localised heading
+  Tracker& tracker = loaded().tracker;
+  tracker.start_at(map_from_camera, 0.5 * tracker.localiser().model().spacing_m,
+                   heading_deviation_rad);
+}
+
+recordings::RunMoment MemoryLocaliser::localise(Observation observation, std::int64_t stamp_ns,
+                                                const RobotMotion::Motion& moved) {
+  if (interrupted_) resume(*std::exchange(interrupted_, std::nullopt), moved);
+  Tracker& tracker = loaded().tracker;
+  tracker.move_to(*observation.odometry);
+  const PackedSignature view = tracker.encoder().packed(observation);
+  MonteCarloEstimate estimate = tracker.observe(view);
+  last_pose_ = estimate.pose;
+  if (estimate.pose) estimate.pose = *estimate.pose * inverse(base_from_camera_);
+  recordings::RunMoment moment;
+  describe(moment, estimate);
+  if (!moment.sure) last_pose_.reset();
+  if (last_pose_) correct_motion(*moment.pose, moved.path_from_base, moment);
+  driver_.drive(observation, last_pose_);
+  last_observation_ = std::move(observation);
+  publish_estimate(moment, stamp_ns, view);
+  return moment;
+}
+
+/// Takes the robot to be where its odometry puts it since the mission was stored.
+void MemoryLocaliser::resume(const Mission& mission, const RobotMotion::Motion& now) {
+  const Pose2 pose = mission.map_from_odom * now.odom_from_base;
+  start_at(pose);
+  motion_.set_map_from_path(pose * inverse(now.path_from_base));
+  driver_.start(mission);
+}
+
+void MemoryLocaliser::correct_motion(const Pose2& map_from_base, const Pose2& path_from_base,
+                                     recordings::RunMoment& moment) {
+  const auto former = motion_.set_map_from_path(map_from_base * inverse(path_from_base));
+  if (!former) return;
+  const Pose2 before = *former * path_from_base;
+  const double turn_rad = angle_difference(before.heading_rad, map_from_base.heading_rad);
+  moment.values.emplace_back("correction_m",
+                             fixed(distance(before.position(), map_from_base.position()), 4));
+  moment.values.emplace_back("correction_rad", fixed(std::abs(turn_rad), 4));
+}
+
+/// Publishes a pose where the moment is sure of one; particles and the best match if somebody
+/// subscribes.
+void MemoryLocaliser::publish_estimate(recordings::RunMoment& moment, std::int64_t stamp_ns,
+                                       const PackedSignature& view) const {
+  constexpr std::size_t max_shown_particles = 500;  // of thousands, no more tell a person more
+  const Tracker& tracker = memory_->tracker;
+  if (last_pose_) poses_.publish(recordings::pose_message(moment, stamp_ns, setup_.frames.map));
+  if (particles_.subscribers() > 0) {
+    moment.particles =
+        recordings::even_sample(tracker.localiser().particles(), max_shown_particles);
+    particles_.publish(recordings::poses_message(moment.particles, stamp_ns, setup_.frames.map));
+  }
+  if (best_matches_.subscribers() > 0) {
+    const auto found = tracker.memory().search(view, {.top = 1});
+    const auto thumbnail = memory_->file.thumbnail(found.matches.front().view);
+    if (thumbnail) best_matches_.publish({{stamp_ns, setup_.frames.base}, "png", *thumbnail});
+  }
+}
+
+/// Publishes the positions of the views, with the number of each.
+void MemoryLocaliser::publish_references() const {
+  recordings::PointValues cloud;
+  const VisualMemory& memory = memory_->tracker.memory();
+  for (const ViewId view : memory.views()) {
+    const auto& pose = memory.info(view).pose;
+    if (pose) cloud.add(pose->position(), static_cast<double>(cloud.values.size() / 4));
+  }
+  references_.publish(cloud.message(now_ns_(), setup_.frames.map, "number"));
+}
+
+}  // namespace panonav::ros2

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "panonav_recordings/run_messages.hpp"
+#include "panonav_ros2/goal_driver.hpp"
+#include "panonav_ros2/node_setup.hpp"
+#include "panonav_ros2/participant.hpp"
+#include "panonav_ros2/robot_motion.hpp"
+
+namespace panonav::ros2 {
+
+/// Localises a robot by a memory: corrects its motion, drives it by the driver, and publishes pose,
+/// particles, references and best match. Before the first `load`, functions throw Error.
+class MemoryLocaliser {
+ public:
+  MemoryLocaliser(Participant& participant, const LocalisationNodeSetup& setup, RobotMotion& motion,
+                  GoalDriver& driver, NowNs now_ns);
+
+  /// Loads a memory. If this throws, the one before stays.
+  void load(std::filesystem::path path);
+  /// Loads another memory of the same folder: who may write to a topic may not open any file that
+  /// the node may read.
+  void load_neighbour(const std::string& name);
+  /// Continues the mission of a node that died, with the next picture.
+  void load_interrupted_mission();
+  /// Adds the last picture to the memory as a view.
+  void add_view(const std::string& name);
+  void remove_view(const std::string& name);
+
+  void start_anywhere();
+  void start_at(const Pose2& map_from_base, double deviation_m, double heading_deviation_rad);
+  /// Starts at a pose that is known as well as poses in the map are.
+  void start_at(const Pose2& map_from_base);
+
+  /// Localises by a picture with odometry, that of the camera after `moved`. Returns the state.
+  [[nodiscard]] recordings::RunMoment localise(Observation observation, std::int64_t stamp_ns,
+                                               const RobotMotion::Motion& moved);
+
+ private:
+  [[nodiscard]] LoadedMemory& loaded() const;
+  void reload();
+  void start_tracker_at(const Pose2& map_from_camera);
+  void resume(const Mission& mission, const RobotMotion::Motion& now);
+  void correct_motion(const Pose2& map_from_base, const Pose2& path_from_base,
+                      recordings::RunMoment& moment);
+  void publish_estimate(recordings::RunMoment& moment, std::int64_t stamp_ns,
+                        const PackedSignature& view) const;
+  void publish_references() const;
+
+  const LocalisationNodeSetup& setup_;
+  RobotMotion& motion_;
+  GoalDriver& driver_;
+  NowNs now_ns_;
+  Publisher<recordings::ros::PoseWithCovarianceStamped> poses_;
+  Publisher<recordings::ros::PoseArray> particles_;
+  Publisher<recordings::ros::PointCloud2> references_;
+  Publisher<recordings::ros::CompressedImage> best_matches_;
+  Pose2 base_from_camera_;
+  std::unique_ptr<LoadedMemory> memory_;
+  std::optional<Mission> interrupted_;  // until the first picture
+  std::optional<Observation> last_observation_;
+  std::optional<Pose2> last_pose_;  // of the camera in the map; `nullopt`: not localised then
+};
+
+}  // namespace panonav::ros2

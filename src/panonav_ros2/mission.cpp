@@ -1,0 +1,79 @@
+#include "panonav_ros2/mission.hpp"
+
+#include <fstream>
+#include <istream>
+#include <system_error>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
+#include "panonav/io/atomic_file.hpp"
+
+namespace panonav::ros2 {
+
+namespace {
+
+std::string to_line(const Pose2& pose) {
+  return to_text(pose.x_m) + " " + to_text(pose.y_m) + " " + to_text(pose.heading_rad) + "\n";
+}
+
+std::istream& operator>>(std::istream& in, Pose2& pose) {
+  return in >> pose.x_m >> pose.y_m >> pose.heading_rad;
+}
+
+std::optional<Mission> read_mission(std::istream& in) {
+  Mission mission;
+  std::string kind;
+  in >> mission.map_from_odom >> kind;
+  if (kind == "goal") {
+    in >> mission.goal.emplace();
+  } else if (kind == "repeat") {
+    in >> mission.along_m.emplace() >> mission.min_correlation >> std::ws;
+    std::getline(in, mission.route);
+  } else {
+    return std::nullopt;
+  }
+  if (!in || (!mission.goal && mission.route.empty())) return std::nullopt;
+  return mission;
+}
+
+}  // namespace
+
+MissionFile::MissionFile(const std::filesystem::path& memory, double max_age_s)
+    : path_(memory.string() + ".mission"), max_age_s_(max_age_s) {}
+
+void MissionFile::store_if_due(const Mission& mission, const std::optional<Pose2>& map_from_odom) {
+  const auto now = std::chrono::steady_clock::now();
+  if (max_age_s_ <= 0.0 || now - stored_ < std::chrono::seconds(1)) return;
+  stored_ = now;
+  if (!map_from_odom) return;
+  const std::string target = mission.goal
+                                 ? "goal " + to_line(*mission.goal)
+                                 : "repeat " + to_text(mission.along_m.value_or(0.0)) + " " +
+                                       to_text(mission.min_correlation) + " " + mission.route;
+  write_file(path_, to_line(*map_from_odom) + target);
+}
+
+void MissionFile::remove() {
+  std::error_code ignored;
+  std::filesystem::remove(path_, ignored);
+  stored_ = {};
+}
+
+std::optional<Mission> MissionFile::load(WarningLog& log) {
+  namespace fs = std::filesystem;
+  std::error_code code;
+  const auto written = fs::last_write_time(path_, code);
+  if (code) return std::nullopt;
+  const double age_s =
+      std::chrono::duration<double>(fs::file_time_type::clock::now() - written).count();
+  std::ifstream in(path_);
+  auto mission = read_mission(in);
+  if (mission && age_s <= max_age_s_) return mission;
+  log.warn("mission", path_.string() +
+                          (mission ? " is " + fixed(age_s, 0) + " s old" : " is damaged") +
+                          "; the robot is not sent on");
+  remove();
+  return std::nullopt;
+}
+
+}  // namespace panonav::ros2

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "panonav/core/options.hpp"
+#include "panonav/pipeline/robot_navigator.hpp"
+#include "panonav/pipeline/tracker.hpp"
+#include "panonav_ros2/participant.hpp"
+#include "panonav_ros2/teacher.hpp"
+
+namespace panonav::ros2 {
+
+/// Where the motion of the robot is read.
+enum class MotionInput { odometry, tf };
+/// How pictures come: "image" as sensor_msgs/Image, or "image/compressed" as CompressedImage.
+enum class PictureInput { raw, compressed };
+
+struct LocalisationNodeOptions {
+  MotionInput motion = MotionInput::odometry;
+  PictureInput pictures = PictureInput::raw;
+  double transform_tolerance_s = 1.0;
+  double transform_rate_hz = 50.0;
+  bool use_sim_time = false;
+  bool tilt_from_imu = false;
+  double command_timeout_s = 0.5;
+  double resume_s = 30.0;
+  double camera_x_m = 0.0;
+  double camera_y_m = 0.0;
+
+  /// The camera is upright, and looks where the robot does.
+  [[nodiscard]] Pose2 base_from_camera() const { return {camera_x_m, camera_y_m, 0.0}; }
+};
+void visit_options(LocalisationNodeOptions& options, OptionVisitor& visitor);
+
+/// As REP 105 names them.
+struct FrameNames {
+  std::string map = "map";
+  std::string odom = "odom";
+  std::string base = "base_link";
+};
+
+struct LocalisationNodeSetup {
+  std::filesystem::path memory;
+  ParticipantOptions participant;
+  FrameNames frames;
+  LocalisationNodeOptions node;
+  TrackerOptions tracker;
+  RobotNavigatorOptions navigator;  ///< of ways to a goal; its base of routes, too
+  /// The memory is a new one that the first drive makes, until the command "finish".
+  std::optional<TeacherOptions> teacher;
+};
+
+using NowNs = std::function<std::int64_t()>;  ///< time of the world that the robot is in
+
+/// Throws ContractError unless a message on `topic` is in the frame that the parameters name.
+void require_frame(const std::string& topic, const std::string& frame, const std::string& expected);
+
+}  // namespace panonav::ros2

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "panonav/pipeline/observation.hpp"
+#include "panonav_ros2/node_setup.hpp"
+#include "panonav_ros2/participant.hpp"
+#include "panonav_ros2/robot_motion.hpp"
+#include "panonav_ros2/work_queue.hpp"
+
+namespace panonav::ros2 {
+
+/// Subscribes to what a robot measures (odometry or TF, tilt, pictures, the time of a simulation),
+/// checks it and hands it on. Lives on the thread that serves the participant.
+class SensorTopics {
+ public:
+  SensorTopics(Participant& participant, const LocalisationNodeOptions& options,
+               const FrameNames& frames, WarningLog& log, RobotMotion& motion, WorkQueue& queue);
+
+  /// Returns the time of the robot's world, from any thread.
+  [[nodiscard]] std::int64_t now_ns() const;
+  [[nodiscard]] std::string picture_topic() const;
+  [[nodiscard]] std::string motion_source() const;  ///< "topic odom", for messages to people
+  /// Warns of inputs that several programs publish.
+  void check_publishers() const;
+  /// Decodes the message of a picture, which is named by its topic; with its stamp in ns. Throws as
+  /// `ros::picture_of`.
+  [[nodiscard]] std::pair<Observation, std::int64_t> decode(
+      std::span<const std::uint8_t> message) const;
+
+ private:
+  void take(const recordings::ros::Odometry& odometry);
+  void take(const recordings::ros::TFMessage& message);
+  void take(const recordings::ros::Imu& imu);
+  void take_picture(std::int64_t stamp_ns, std::span<const std::uint8_t> cdr);
+  void add_motion(const std::string& topic, std::int64_t stamp_ns,
+                  const recordings::ros::Pose& pose);
+
+  Participant& participant_;
+  LocalisationNodeOptions options_;
+  FrameNames frames_;
+  WarningLog& log_;
+  RobotMotion& motion_;
+  WorkQueue& queue_;
+  FrameTree tree_;
+  bool has_transform_ = false;
+  std::optional<std::int64_t> last_picture_ns_;
+  std::atomic<std::int64_t> sim_ns_ = 0;
+};
+
+}  // namespace panonav::ros2
