@@ -12,8 +12,8 @@
 
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/geometry/least_squares.hpp"
 #include "panonav/mapping/internal/lattice_springs.hpp"
-#include "panonav/mapping/internal/normal_equations.hpp"
 #include "panonav/mapping/lattice_graph.hpp"
 
 namespace panonav {
@@ -496,7 +496,7 @@ class Grower {
         }
       }
     }
-    NormalEquations equations;
+    SparseEquations equations;
     // `rest`: what link k lacks; `weight`: of its square.
     const auto solve = [&](const auto& rest, const auto& weight) -> std::optional<Eigen::VectorXd> {
       equations.begin(static_cast<int>(views.size()) - 1);
@@ -508,11 +508,11 @@ class Grower {
         const int b = unknown.at(links_[k].b);
         if (a >= 0) {
           equations.add(a, a, w);
-          equations.gradient(a) += w * r;
+          equations.right(a) -= w * r;
         }
         if (b >= 0) {
           equations.add(b, b, w);
-          equations.gradient(b) -= w * r;
+          equations.right(b) += w * r;
         }
         if (a >= 0 && b >= 0) equations.add(a, b, -w);
       }
