@@ -7,8 +7,8 @@
 #include "lab/m04/support.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/alignment.hpp"
+#include "panonav/geometry/nearest_points.hpp"
 #include "panonav/geometry/positions.hpp"
-#include "panonav/mapping/lattice_graph.hpp"
 #include "panonav_simulation/furniture.hpp"
 
 namespace panonav::lab {

@@ -21,7 +21,7 @@ constexpr double half_band_rad = 5.0 * std::numbers::pi / 180.0;
 ArenaRecording record(const simulation::Renderer& renderer, const simulation::Scene& scene,
                       std::span<const GridPosition> grid, const ArenaOptions& options,
                       std::uint64_t stream, Executor& executor) {
-  std::vector<std::optional<PlacedHomingView>> views(grid.size());
+  std::vector<std::optional<ArenaView>> views(grid.size());
   std::vector<std::vector<float>> rows(grid.size());
   executor.for_chunks(grid.size(), 8, [&](std::size_t begin, std::size_t end, std::size_t) {
     Executor here(1);
@@ -39,8 +39,8 @@ ArenaRecording record(const simulation::Renderer& renderer, const simulation::Sc
                         wrap_angle(heading + options.heading_noise_rad * error_heading)};
       rows[i] = arena_row(renderer, scene, truth, random.next(), here);
       const Panorama one_row(1, s06_columns, std::nullopt, rows[i]);
-      views[i] = PlacedHomingView{{position.x_m, position.y_m, heading},
-                                  homing_view(compute_signature(one_row, s06_components))};
+      views[i] = ArenaView{{position.x_m, position.y_m, heading},
+                           homing_view(compute_signature(one_row, s06_components))};
     }
   });
   ArenaRecording recording;

@@ -42,10 +42,17 @@ struct ArenaOptions {
   double spacing_m = s06_spacing_m;
 };
 
+/// A view and where it was taken. The heading is the truth that home vectors are judged by; rules
+/// never see it.
+struct ArenaView {
+  Pose2 pose;
+  HomingView view;
+};
+
 /// One recording: believed poses, rows of 72 pixels (mean over 10 degrees around the horizon) and
 /// their Fourier coefficients.
 struct ArenaRecording {
-  std::vector<PlacedHomingView> views;
+  std::vector<ArenaView> views;
   std::vector<std::vector<float>> rows;
 };
 

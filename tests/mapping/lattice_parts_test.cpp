@@ -12,9 +12,9 @@
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/mapping/dissimilarity_curve.hpp"
+#include "panonav/mapping/internal/lattice_graph.hpp"
 #include "panonav/mapping/internal/lattice_growth.hpp"
 #include "panonav/mapping/internal/lattice_solver.hpp"
-#include "panonav/mapping/lattice_graph.hpp"
 
 namespace panonav {
 namespace {
@@ -86,28 +86,6 @@ TEST(LatticeGraph, PartsAndWays) {
   EXPECT_EQ(ways[2], 3.0);
   EXPECT_TRUE(std::isinf(ways[5]));
   EXPECT_THROW(LatticeGraph(2, edges), ContractError);
-}
-
-TEST(LatticeGraph, NearestPointsAreThoseOfAFullScan) {
-  Random random(3);
-  std::vector<Point2> points;
-  std::vector<std::size_t> group;
-  for (int i = 0; i < 200; ++i) {
-    points.push_back({random.uniform(0.0, 3.0), random.uniform(0.0, 2.0)});
-    group.push_back(random.index(3));
-  }
-  points.push_back(points.front());  // one twice
-  group.push_back(group.front());
-  const auto found = nearest_points(points, group, 5);
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    std::vector<std::pair<double, std::size_t>> all;
-    for (std::size_t j = 0; j < points.size(); ++j) {
-      if (j != i && group[j] == group[i]) all.emplace_back(distance(points[i], points[j]), j);
-    }
-    std::ranges::sort(all);
-    ASSERT_EQ(found[i].size(), 5U);
-    for (std::size_t k = 0; k < 5; ++k) EXPECT_EQ(found[i][k], all[k].second);
-  }
 }
 
 struct World {

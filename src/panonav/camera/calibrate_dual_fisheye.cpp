@@ -11,8 +11,10 @@
 #include "panonav/camera/internal/circle_search.hpp"
 #include "panonav/camera/internal/edge_field.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/core/statistics.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/geometry/least_squares.hpp"
 
 namespace panonav {
 namespace {
@@ -293,6 +295,7 @@ class Calibrator {
   [[nodiscard]] MatrixXd normal(const State& state, const std::vector<Match>& matches,
                                 VectorXd& right) const;
   [[nodiscard]] double cost(const VectorXd& offset, const std::vector<Match>& matches) const;
+  class Problem;
   void solve(const std::vector<Match>& matches);
   /// Ends the lenses at their circles; false where the radius does not grow up to there.
   [[nodiscard]] bool close_lenses();
@@ -615,39 +618,43 @@ double Calibrator::cost(const VectorXd& offset, const std::vector<Match>& matche
   return sum;
 }
 
+/// All parameters as `minimise` sees them.
+class Calibrator::Problem {
+ public:
+  Problem(Calibrator& calibrator, const std::vector<Match>& matches)
+      : calibrator_(calibrator), matches_(matches), trial_(calibrator.offset_) {}
+
+  bool linearise(DenseEquations<Eigen::Dynamic>& equations) {
+    const State now = calibrator_.state();
+    std::vector<double> lengths;
+    const std::vector<Stance> here = calibrator_.stances(now);
+    for (const Match& match : matches_) {
+      lengths.push_back(calibrator_.residual(here, match).norm());
+    }
+    // The median length of a Gaussian in the plane is 1.18 deviations.
+    calibrator_.deviation_rad_ =
+        std::max(0.02 * calibrator_.fine_rad_, upper_median_in_place(std::span(lengths)) / 1.1774);
+    equations.matrix = calibrator_.normal(now, matches_, equations.right);
+    return true;
+  }
+  [[nodiscard]] double cost() const { return calibrator_.cost(trial_, matches_); }
+  void move(const VectorXd& change) { trial_ = calibrator_.offset_ + change; }
+  void accept() { calibrator_.offset_ = trial_; }
+  void undo() { trial_ = calibrator_.offset_; }
+
+ private:
+  Calibrator& calibrator_;
+  const std::vector<Match>& matches_;
+  VectorXd trial_;
+};
+
 void Calibrator::solve(const std::vector<Match>& matches) {
   if (matches.empty()) return;
-  double damping = 1e-3;
-  for (int round = 0; round < 20; ++round) {
-    const State now = state();
-    std::vector<double> lengths;
-    const std::vector<Stance> here = stances(now);
-    for (const Match& match : matches) lengths.push_back(residual(here, match).norm());
-    std::ranges::nth_element(lengths,
-                             lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2));
-    // The median length of a Gaussian in the plane is 1.18 deviations.
-    deviation_rad_ = std::max(0.02 * fine_rad_, lengths[lengths.size() / 2] / 1.1774);
-    VectorXd right;
-    const MatrixXd matrix = normal(now, matches, right);
-    const double before = cost(offset_, matches);
-    bool better = false;
-    double fallen = 0;
-    for (int trial = 0; trial < 8 && !better; ++trial) {
-      MatrixXd damped = matrix;
-      damped.diagonal() *= 1 + damping;
-      const VectorXd next = offset_ + damped.ldlt().solve(right);
-      const double after = next.allFinite() ? cost(next, matches) : before;
-      better = after < before;
-      if (better) {
-        fallen = before - after;
-        offset_ = next;
-        damping = std::max(1e-9, 0.1 * damping);
-      } else {
-        damping *= 10;
-      }
-    }
-    if (!better || fallen < 0.01) return;
-  }
+  Problem problem(*this, matches);
+  DenseEquations<Eigen::Dynamic> equations;
+  // The cost is counted in variances: a hundredth moves no parameter by a tenth of its deviation.
+  static_cast<void>(
+      minimise(problem, equations, {.max_steps = 20, .damping = 1e-3, .min_decrease = 0.01}));
 }
 
 bool Calibrator::close_lenses() {

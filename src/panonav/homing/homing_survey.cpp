@@ -135,22 +135,6 @@ HomingSurvey survey_homing(std::span<const Pose2> goals, std::span<const Pose2> 
   return survey;
 }
 
-HomingSurvey survey_homing(std::span<const PlacedHomingView> goals,
-                           std::span<const PlacedHomingView> places,
-                           const FourierHomingOptions& homing, const HomingSurveyOptions& options,
-                           Executor& executor, const SurveyProgress& progress) {
-  std::vector<Pose2> goal_poses;
-  std::vector<Pose2> place_poses;
-  for (const auto& goal : goals) goal_poses.push_back(goal.pose);
-  for (const auto& place : places) place_poses.push_back(place.pose);
-  return survey_homing(
-      goal_poses, place_poses,
-      [&](std::size_t goal, std::size_t place) {
-        return home_vector(goals[goal].view, places[place].view, homing);
-      },
-      options, executor, progress);
-}
-
 std::vector<HomewardBin> homeward_by_distance(const HomingSurvey& survey, double bin_m) {
   require(bin_m > 0.0, "bin_m", bin_m, "> 0");
   std::vector<HomewardBin> bins;

@@ -12,13 +12,6 @@
 
 namespace panonav {
 
-/// A view and where it was taken. The heading is the truth that home vectors are judged by; rules
-/// never see it.
-struct PlacedHomingView {
-  Pose2 pose;       ///< in the frame of the recording's truth
-  HomingView view;  ///< as the rule compares it
-};
-
 /// The home vector to the view number `goal` of one set from the view number `place` of another.
 /// Called from several threads at once.
 using HomingRule = std::function<HomeVector(std::size_t goal, std::size_t place)>;
@@ -61,13 +54,6 @@ using SurveyProgress = std::function<void(double fraction)>;
 /// throws. Cost: goals x places home vectors, and 8 bytes for each.
 [[nodiscard]] HomingSurvey survey_homing(std::span<const Pose2> goals,
                                          std::span<const Pose2> places, const HomingRule& rule,
-                                         const HomingSurveyOptions& options, Executor& executor,
-                                         const SurveyProgress& progress = {});
-
-/// The same with Fourier homing between placed views. Throws ContractError as `home_vector`.
-[[nodiscard]] HomingSurvey survey_homing(std::span<const PlacedHomingView> goals,
-                                         std::span<const PlacedHomingView> places,
-                                         const FourierHomingOptions& homing,
                                          const HomingSurveyOptions& options, Executor& executor,
                                          const SurveyProgress& progress = {});
 

@@ -9,7 +9,7 @@ namespace panonav {
 
 namespace {
 
-constexpr double kShareOfLevel = 0.95;  // where the curve counts as level, as in [M04] figure 7
+constexpr double share_of_level = 0.95;  // where the curve counts as level, as in [M04] figure 7
 
 struct DistanceGroup {
   double dissimilarity = 0.0;
@@ -50,10 +50,10 @@ double interpolated(double x, double x0, double y0, double x1, double y1) {
 
 DissimilarityCurve::DissimilarityCurve(double slope) {
   require(std::isfinite(slope) && slope > 0.0, "slope of a dissimilarity curve", slope, "> 0");
-  constexpr double kLarge = 1e12;
-  knots_ = {{}, {kLarge, kLarge * slope, 0.0}};
-  range_ = kLarge * slope;
-  max_dissimilarity_ = kLarge;
+  constexpr double large = 1e12;
+  knots_ = {{}, {large, large * slope, 0.0}};
+  range_ = large * slope;
+  max_dissimilarity_ = large;
 }
 
 DissimilarityCurve::DissimilarityCurve(std::span<const DissimilarityAtDistance> pairs,
@@ -104,7 +104,7 @@ DissimilarityCurve::DissimilarityCurve(std::span<const DissimilarityAtDistance> 
   }
   if (knots_.size() == 1) knots_.push_back({1.0, 0.0, 0.0});
 
-  max_dissimilarity_ = kShareOfLevel * level;
+  max_dissimilarity_ = share_of_level * level;
   range_ = distance(max_dissimilarity_);
 }
 

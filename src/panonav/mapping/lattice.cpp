@@ -2,88 +2,104 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numbers>
-#include <numeric>
 #include <set>
 
-#include "panonav/core/error.hpp"
-#include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/geometry/nearest_points.hpp"
 #include "panonav/geometry/positions.hpp"
+#include "panonav/mapping/internal/lattice_curve.hpp"
+#include "panonav/mapping/internal/lattice_graph.hpp"
 #include "panonav/mapping/internal/lattice_growth.hpp"
 #include "panonav/mapping/internal/lattice_solver.hpp"
 #include "panonav/mapping/internal/lattice_springs.hpp"
 #include "panonav/mapping/internal/lattice_start.hpp"
-#include "panonav/mapping/lattice_graph.hpp"
+#include "panonav/mapping/internal/node_motions.hpp"
 
 namespace panonav {
 
 namespace {
 
-constexpr double kSmallestLengthError = 0.02;  // of the lengths that phases tell, relative
-constexpr double kAgreeing = 0.25;             // of the weights that growing gives
-constexpr double kGivenUp = 0.25;              // springs of less weight do not count for the curve
-constexpr std::size_t kFarPairs = 2000;        // drawn for the level of far views
-// Of headings laid out by motion and phases; below what symmetric rooms may turn places by.
-constexpr double kLargestTurnError = 0.25 * std::numbers::pi;
-// More than half of the triangles of a spring must close.
-constexpr double kClosing = 0.5;
+/// Weight of a link at the limit of what agrees, which `GrownLayout::weights` says.
+constexpr double min_grown_weight = 0.25;
+/// Largest error of headings laid out by motion and phases; below what symmetric rooms may turn
+/// places by, which is a quarter turn.
+constexpr double max_turn_error_rad = 0.25 * std::numbers::pi;
+/// Share of the triangles of a spring that must close, where no motion tells which views are near:
+/// more than half (docs/decisions.md).
+constexpr double min_closing_triangles = 0.5;
 
-void check(const CoarseMotion& motion) {
-  const double sum = motion.step.x_m + motion.step.y_m + motion.step.heading_rad;
-  require(std::isfinite(sum), "step of a motion", sum, "finite");
-  for (const double deviation :
-       {motion.distance_deviation_m, motion.direction_deviation_rad, motion.turn_deviation_rad}) {
-    require(std::isfinite(deviation) && deviation > 0.0, "deviation of a motion", deviation,
-            "finite and > 0");
+/// Pairs of views that were measured, each once, ascending.
+class MeasuredPairs {
+ public:
+  MeasuredPairs(const SpringViews& views, Executor& executor)
+      : views_(views), executor_(executor) {}
+
+  [[nodiscard]] const std::vector<LatticeSpring>& springs() const { return springs_; }
+
+  /// Measures the pairs that are not known yet; `hint(pair)`: what is known of their turns.
+  template <class Hint>
+  void add(const std::vector<NodePair>& pairs, const Hint& hint) {
+    std::vector<NodePair> added;
+    for (const NodePair& pair : pairs) {
+      if (known_.insert(pair).second) added.push_back(pair);
+    }
+    const std::size_t before = springs_.size();
+    springs_.resize(before + added.size());
+    executor_.for_chunks(added.size(), 16, [&](std::size_t begin, std::size_t end, std::size_t) {
+      for (std::size_t i = begin; i < end; ++i) {
+        springs_[before + i] = views_.measure(added[i], hint(added[i]));
+      }
+    });
+    std::ranges::sort(springs_, {}, [](const auto& s) { return NodePair{s.a, s.b}; });
   }
-}
+  void clear() {
+    springs_.clear();
+    known_.clear();
+  }
+
+ private:
+  const SpringViews& views_;
+  Executor& executor_;
+  std::set<NodePair> known_;
+  std::vector<LatticeSpring> springs_;
+};
 
 class Arranger {
  public:
   Arranger(const VisualMemory& memory, const LatticeOptions& options,
            std::span<const CoarseMotion> motion, Executor& executor, const LatticeWatch& watch)
-      : options_(options), executor_(executor), watch_(watch), views_(memory, options) {
-    const auto ids = memory.views();
-    for (const ViewId view : ids) lattice_.nodes.push_back({.view = view});
-    for (const CoarseMotion& step : motion) {
-      check(step);
-      for (const ViewId view : {step.from, step.to}) {
-        require(memory.contains(view), "view of a motion", view.value, "a view of the memory");
-      }
-      const auto node_of = [&](ViewId view) {
-        return static_cast<std::size_t>(std::ranges::lower_bound(ids, view) - ids.begin());
-      };
-      // A robot that went nowhere says nothing.
-      if (step.from == step.to) continue;
-      motions_.push_back({node_of(step.from), node_of(step.to), step});
-      motion_between_.try_emplace(std::minmax(motions_.back().a, motions_.back().b),
-                                  motions_.size() - 1);
-    }
+      : options_(options),
+        executor_(executor),
+        watch_(watch),
+        views_(memory, options),
+        motions_(memory, motion),
+        measured_(views_, executor) {
+    for (const ViewId view : memory.views()) lattice_.nodes.push_back({.view = view});
+    by_motion_ = motions_.connect(size());
     lattice_.metric = !motions_.empty();
   }
 
   Lattice arrange() {
     if (size() == 0) return std::move(lattice_);
-    measure_first();
-    first_curve();
+    measure_first_pairs();
+    lattice_.curve = make_first_curve(measured_.springs(), motions_, views_, lattice_.errors);
+    if (by_motion_) lay_out();  // [M04 section 3.4]
     for (int round = 0; round < options_.rounds; ++round) {
-      if (round > 0 || by_motion_) {
-        if (by_motion_ && round == 0) start();
-        link_near_views();
-        fit_curve();
+      if (!layout_.poses.empty()) {
+        measure_near_views();
+        fit_curve_to_layout();  // [M04 section 3.2, figure 12]
       }
-      if (grows()) {
-        grow();
+      if (options_.phases && motions_.empty()) {
+        grow_from_most_certain();
       } else {
-        choose_springs();
-        start_where_needed();
-        relax();
+        choose_springs();  // [M04 eq. 5]
+        lay_out_if_needed();
+        relax();  // [M04 section 3.2]
       }
       set_unit();
-      if (watch_) watch_(start_.poses, start_.components);
+      if (watch_) watch_(layout_.poses, layout_.components);
     }
     finish();
     return std::move(lattice_);
@@ -92,49 +108,23 @@ class Arranger {
  private:
   [[nodiscard]] std::size_t size() const { return lattice_.nodes.size(); }
 
-  /// What motion or the headings so far say of the turn between two nodes.
+  /// Returns what motion or the headings so far say of the turn between two nodes.
   [[nodiscard]] std::optional<TurnHint> hint(NodePair pair) const {
     if (!by_motion_) return std::nullopt;
-    if (!start_.poses.empty()) {
-      return TurnHint{angle_difference(start_.poses[pair.second].heading_rad,
-                                       start_.poses[pair.first].heading_rad),
-                      kLargestTurnError};
-    }
-    const auto moved = motion_between_.find(pair);
-    if (moved != motion_between_.end()) {
-      const auto& [a, b, motion] = motions_[moved->second];
-      return TurnHint{a < b ? motion.step.heading_rad : -motion.step.heading_rad,
-                      std::min(std::numbers::pi, 3.0 * motion.turn_deviation_rad)};
-    }
-    return std::nullopt;
+    if (layout_.poses.empty()) return motions_.turn_between(pair);
+    return TurnHint{angle_difference(layout_.poses[pair.second].heading_rad,
+                                     layout_.poses[pair.first].heading_rad),
+                    max_turn_error_rad};
   }
-
   void measure(const std::vector<NodePair>& pairs) {
-    std::vector<NodePair> wanted;
-    for (const NodePair& pair : pairs) {
-      if (known_.insert(pair).second) wanted.push_back(pair);
-    }
-    const std::size_t before = measured_.size();
-    measured_.resize(before + wanted.size());
-    executor_.for_chunks(wanted.size(), 16, [&](std::size_t begin, std::size_t end, std::size_t) {
-      for (std::size_t i = begin; i < end; ++i)
-        measured_[before + i] = views_.measure(wanted[i], hint(wanted[i]));
-    });
-    std::ranges::sort(measured_, {}, [](const auto& s) { return NodePair{s.a, s.b}; });
+    measured_.add(pairs, [this](NodePair pair) { return hint(pair); });
   }
 
-  void measure_first() {
+  /// Where motion tells how all views are connected, similarity is asked later, and only for views
+  /// that it brings near to each other.
+  void measure_first_pairs() {
     std::vector<NodePair> pairs;
-    std::vector<GraphEdge> edges;
-    for (const auto& step : motions_) {
-      pairs.push_back(std::minmax(step.a, step.b));
-      edges.push_back({step.a, step.b, 1.0});
-    }
-    // Where motion tells how all views hang together, similarity is asked only for views that it
-    // brings near to each other.
-    const auto components = LatticeGraph(size(), edges).components();
-    by_motion_ =
-        !motions_.empty() && std::ranges::count(components, 0U) == static_cast<long>(size());
+    for (const auto& step : motions_.all()) pairs.push_back(std::minmax(step.a, step.b));
     if (!by_motion_) {
       const auto alike = views_.most_similar(options_, executor_);
       pairs.insert(pairs.end(), alike.begin(), alike.end());
@@ -142,280 +132,116 @@ class Arranger {
     measure(pairs);
   }
 
-  /// Proportional to the dissimilarity: in metres where there is motion, else in the unit that
-  /// phases give, else so that the median view has its nearest one at 1.
-  void first_curve() {
-    std::vector<double> slopes;
-    std::vector<double> units;
-    for (const auto& spring : measured_) {
-      if (!spring.phases || !spring.phases->points || !agrees(spring)) continue;
-      const auto moved = motion_between_.find({spring.a, spring.b});
-      if (moved != motion_between_.end()) {
-        const Pose2& step = motions_[moved->second].motion.step;
-        units.push_back(std::hypot(step.x_m, step.y_m) / spring.phases->length);
-      }
-      if (spring.dissimilarity > 0.0) {
-        slopes.push_back(spring.phases->length / spring.dissimilarity);
-      }
-    }
-    if (!units.empty()) lattice_.errors.phase_unit = upper_median(units);
-    for (double& slope : slopes) slope *= lattice_.errors.phase_unit;
-    if (!motions_.empty()) slopes.clear();
-    for (const auto& step : motions_) {
-      const double seen = views_.dissimilarity(std::minmax(step.a, step.b));
-      const double travel = std::hypot(step.motion.step.x_m, step.motion.step.y_m);
-      if (seen > 0.0 && travel > 0.0) slopes.push_back(travel / seen);
-    }
-    if (slopes.empty()) {
-      std::vector<double> nearest(size(), INFINITY);
-      for (const auto& spring : measured_) {
-        nearest[spring.a] = std::min(nearest[spring.a], spring.dissimilarity);
-        nearest[spring.b] = std::min(nearest[spring.b], spring.dissimilarity);
-      }
-      for (const double value : nearest) {
-        if (std::isfinite(value) && value > 0.0) slopes.push_back(1.0 / value);
-      }
-    }
-    lattice_.curve = DissimilarityCurve(slopes.empty() ? 1.0 : upper_median(slopes));
+  [[nodiscard]] std::vector<std::vector<std::size_t>> nearest_nodes(std::size_t count) const {
+    return nearest_points(positions_of(layout_.poses), layout_.components, count);
   }
 
-  [[nodiscard]] std::vector<Point2> positions() const { return positions_of(start_.poses); }
-
-  void link_near_views() {
-    const auto near = nearest_points(positions(), start_.components,
-                                     static_cast<std::size_t>(options_.neighbours));
+  void measure_near_views() {
+    const auto near = nearest_nodes(static_cast<std::size_t>(options_.neighbours));
     std::vector<NodePair> pairs;
     for (std::size_t i = 0; i < near.size(); ++i) {
       for (const std::size_t j : near[i]) pairs.push_back(std::minmax(i, j));
     }
     if (by_motion_) {
       // Headings are better known now, and so is which of several turns is meant.
-      for (const auto& spring : measured_) pairs.emplace_back(spring.a, spring.b);
+      for (const auto& spring : measured_.springs()) pairs.emplace_back(spring.a, spring.b);
       measured_.clear();
-      known_.clear();
     }
     measure(pairs);
   }
 
-  [[nodiscard]] double laid_out(std::size_t a, std::size_t b) const {
-    return distance(start_.poses[a].position(), start_.poses[b].position());
-  }
-
-  /// Dissimilarity of far views: the mean over the farther quarter of pairs drawn. Empty where no
-  /// views are far from each other: when those lie no farther apart than twice `near`.
-  [[nodiscard]] std::optional<double> level_of_far_views(double near) const {
-    Random random(1);
-    std::vector<DissimilarityAtDistance> drawn;
-    for (std::size_t i = 0; i < kFarPairs; ++i) {
-      const auto a = static_cast<std::size_t>(random.index(size()));
-      const auto b = static_cast<std::size_t>(random.index(size()));
-      if (a == b || start_.components[a] != start_.components[b]) continue;
-      drawn.push_back({views_.dissimilarity(std::minmax(a, b)), laid_out(a, b)});
-    }
-    if (drawn.empty()) return std::nullopt;
-    std::ranges::sort(drawn, [](const auto& a, const auto& b) {
-      return a.distance != b.distance ? a.distance > b.distance : a.dissimilarity < b.dissimilarity;
-    });
-    drawn.resize(drawn.size() / 4 + 1);
-    double dissimilarity = 0.0;
-    double distance = 0.0;
-    for (const auto& pair : drawn) {
-      dissimilarity += pair.dissimilarity / static_cast<double>(drawn.size());
-      distance += pair.distance / static_cast<double>(drawn.size());
-    }
-    if (distance <= 2.0 * near) return std::nullopt;
-    return dissimilarity;
-  }
-
-  void fit_curve() {
-    std::vector<DissimilarityAtDistance> pairs;
-    if (lattice_.springs.empty()) {
-      for (const auto& spring : measured_) {
-        pairs.push_back({spring.dissimilarity, laid_out(spring.a, spring.b)});
-      }
-    }
-    for (const auto& spring : lattice_.springs) {
-      if (spring.weight < kGivenUp) continue;
-      pairs.push_back({spring.dissimilarity, laid_out(spring.a, spring.b)});
-    }
-    if (pairs.empty()) return;
-    std::vector<double> lengths;
-    double most = 0.0;
-    for (const auto& pair : pairs) {
-      lengths.push_back(pair.distance);
-      most = std::max(most, pair.dissimilarity);
-    }
-    // Where all views are near, correlation ends nowhere.
-    lattice_.curve =
-        DissimilarityCurve(pairs, level_of_far_views(upper_median(lengths)).value_or(2.0 * most));
+  void fit_curve_to_layout() {
+    const auto curve = fit_curve(measured_.springs(), lattice_.springs, views_, layout_);
+    if (!curve) return;
+    lattice_.curve = *curve;
     curve_is_fitted_ = true;
-    fit_phase_unit();
+    fit_phase_unit(lattice_.springs, layout_.poses, lattice_.errors);
   }
 
-  /// How long the unit of phases is in the arrangement, and how far single lengths are off.
-  void fit_phase_unit() {
-    std::vector<double> ratios;
-    for (const auto& spring : lattice_.springs) {
-      if (spring.weight < kGivenUp || !spring.phases || !spring.phases->points) continue;
-      ratios.push_back(laid_out(spring.a, spring.b) / spring.phases->length);
-    }
-    if (ratios.empty()) return;
-    const double unit = upper_median(ratios);
-    if (!(unit > 0.0)) return;
-    for (double& ratio : ratios) ratio = std::abs(ratio / unit - 1.0);
-    lattice_.errors.phase_unit = unit;
-    lattice_.errors.phase_length =
-        std::max(kSmallestLengthError, normal_over_median * upper_median(ratios));
-  }
-
-  /// Where motion tells nothing and phases are read, the layout grows from what is certain.
-  [[nodiscard]] bool grows() const { return options_.phases && motions_.empty(); }
-
-  /// The springs are those inside the components that agree with the layout. Views that none of
-  /// these holds to their component leave it.
-  void grow() {
+  /// Where motion tells nothing and phases are read, the layout grows from what is certain. The
+  /// springs are those inside the components that agree with the layout. Views that none of these
+  /// holds to their component leave it.
+  void grow_from_most_certain() {
     measure(proposals_);
-    auto grown = grow_components(size(), measured_, lattice_.errors.phase_unit, start_, watch_);
-    start_ = std::move(grown.start);
+    const double unit = lattice_.errors.phase_unit;
+    auto grown = grow_components(size(), measured_.springs(), unit, layout_, watch_);
+    layout_ = std::move(grown.start);
     proposals_ = std::move(grown.proposals);
     lattice_.energy = grown.energy;
     lattice_.iterations += grown.iterations;
-    auto& springs = lattice_.springs;
-    springs.clear();
+    lattice_.springs.clear();
     std::vector<GraphEdge> edges;
-    for (const LatticeSpring& spring : measured_) {
+    for (const LatticeSpring& spring : measured_.springs()) {
       const auto weight = grown.weights.find({spring.a, spring.b});
       const bool points = spring.phases && spring.phases->points;
-      if (weight == grown.weights.end() || (!points && weight->second < kAgreeing) ||
-          !fits(spring, lattice_.errors.phase_unit, start_.poses[spring.a],
-                start_.poses[spring.b])) {
+      if (weight == grown.weights.end() || (!points && weight->second < min_grown_weight) ||
+          !fits(spring, unit, layout_.poses[spring.a], layout_.poses[spring.b])) {
         continue;
       }
-      springs.push_back(spring);
-      springs.back().length = rest_length(spring);
-      springs.back().stiffness = lattice_.curve.stiffness(springs.back().length);
-      springs.back().weight = weight->second;
+      add_spring(spring).weight = weight->second;
       edges.push_back({spring.a, spring.b, 1.0});
     }
-    start_.components = LatticeGraph(size(), edges).components();
-    start_.handedness_known.assign(size(), 0);
-    for (const GraphEdge& edge : edges) start_.handedness_known[start_.components[edge.a]] = 1;
+    layout_.components = LatticeGraph(size(), edges).components();
+    layout_.handedness_known.assign(size(), 0);
+    for (const GraphEdge& edge : edges) layout_.handedness_known[layout_.components[edge.a]] = 1;
   }
 
   /// Springs within the curve's range whose views agree with each other and with a third one.
   void choose_springs() {
-    auto& springs = lattice_.springs;
-    springs.clear();
-    for (const LatticeSpring& spring : measured_) {
-      if (spring.dissimilarity > lattice_.curve.max_dissimilarity() || !agrees(spring)) {
-        continue;
-      }
-      springs.push_back(spring);
-      springs.back().length = rest_length(spring);
-      springs.back().stiffness = lattice_.curve.stiffness(springs.back().length);
+    lattice_.springs.clear();
+    for (const LatticeSpring& spring : measured_.springs()) {
+      if (spring.dissimilarity > lattice_.curve.max_dissimilarity() || !agrees(spring)) continue;
+      add_spring(spring);
     }
-    if (options_.phases) keep_confirmed();
+    if (options_.phases) {
+      keep_confirmed(size(), by_motion_ ? 0.0 : min_closing_triangles, lattice_.springs);
+    }
   }
 
-  /// Leaves out springs most of whose triangles do not close, or, where motion has told which views
-  /// are near, none. A view without any that does hangs on the one component
-  /// to which most of its springs lead, so that it never joins two; or on others of its kind.
-  void keep_confirmed() {
-    auto& springs = lattice_.springs;
-    const auto closes = closing_triangles(size(), springs);
-    const double enough = by_motion_ ? 0.0 : kClosing;
-    std::vector<GraphEdge> confirmed;
-    std::vector<unsigned char> has_support(size());
-    for (std::size_t s = 0; s < springs.size(); ++s) {
-      if (!(closes[s] > enough)) continue;
-      confirmed.push_back({springs[s].a, springs[s].b, 1.0});
-      has_support[springs[s].a] = 1;
-      has_support[springs[s].b] = 1;
-    }
-    const auto components = LatticeGraph(size(), confirmed).components();
-    std::vector<std::map<std::size_t, std::size_t>> leads_to(size());
-    for (const LatticeSpring& spring : springs) {
-      if (has_support[spring.b] != 0) ++leads_to[spring.a][components[spring.b]];
-      if (has_support[spring.a] != 0) ++leads_to[spring.b][components[spring.a]];
-    }
-    const auto hangs_on = [&](std::size_t node) -> std::optional<std::size_t> {
-      if (leads_to[node].empty()) return std::nullopt;
-      return std::ranges::max_element(leads_to[node], {}, [](const auto& p) { return p.second; })
-          ->first;
-    };
-    std::vector<LatticeSpring> kept;
-    for (std::size_t s = 0; s < springs.size(); ++s) {
-      const auto [a, b] = std::pair{springs[s].a, springs[s].b};
-      const bool supported_a = has_support[a] != 0;
-      const bool supported_b = has_support[b] != 0;
-      const bool keep = closes[s] > enough ||
-                        (!supported_a && supported_b && hangs_on(a) == components[b]) ||
-                        (supported_a && !supported_b && hangs_on(b) == components[a]) ||
-                        (!supported_a && !supported_b && !hangs_on(a) && !hangs_on(b));
-      if (keep) kept.push_back(springs[s]);
-    }
-    springs = std::move(kept);
+  LatticeSpring& add_spring(const LatticeSpring& measured) {
+    LatticeSpring& spring = lattice_.springs.emplace_back(measured);
+    // Before the curve is known the views' own idea of the distance is the better one.
+    spring.length = !curve_is_fitted_ && spring.phases
+                        ? lattice_.errors.phase_unit * spring.phases->length
+                        : lattice_.curve.distance(spring.dissimilarity);
+    spring.stiffness = lattice_.curve.stiffness(spring.length);
+    return spring;
   }
 
-  /// Before the curve is known the views' own idea of the distance is the better one.
-  [[nodiscard]] double rest_length(const LatticeSpring& spring) const {
-    if (!curve_is_fitted_ && spring.phases)
-      return lattice_.errors.phase_unit * spring.phases->length;
-    return lattice_.curve.distance(spring.dissimilarity);
-  }
-
-  void start() {
-    start_ = by_motion_ ? lay_out_by_motion(size(), motions_, measured_)
-                        : lay_out_by_springs(size(), joined(), options_.landmarks);
-  }
-
-  /// The springs, and the motions where there is no spring.
-  [[nodiscard]] std::vector<LatticeSpring> joined() const {
+  /// Returns the springs, and the motions where there is no spring.
+  [[nodiscard]] std::vector<LatticeSpring> springs_and_motions() const {
     std::vector<LatticeSpring> all = lattice_.springs;
-    for (const auto& step : motions_) {
+    for (const auto& step : motions_.all()) {
       const NodePair pair = std::minmax(step.a, step.b);
-      all.push_back({.a = pair.first,
-                     .b = pair.second,
-                     .length = std::hypot(step.motion.step.x_m, step.motion.step.y_m)});
+      all.push_back({.a = pair.first, .b = pair.second, .length = travel(step)});
     }
     return all;
   }
 
-  /// A new start when springs hold together other views than before.
-  void start_where_needed() {
+  void lay_out() {
+    layout_ = by_motion_ ? lay_out_by_motion(size(), motions_.all(), measured_.springs())
+                         : lay_out_by_springs(size(), springs_and_motions(), options_.landmarks);
+  }
+  /// Lays out the nodes again when springs hold together other views than before.
+  void lay_out_if_needed() {
     if (by_motion_) return;
     std::vector<GraphEdge> edges;
-    for (const auto& spring : joined()) edges.push_back({spring.a, spring.b, 1.0});
-    if (start_.poses.empty() || LatticeGraph(size(), edges).components() != start_.components)
-      start();
-  }
-
-  [[nodiscard]] std::vector<SpringTerm> terms() const {
-    std::vector<SpringTerm> result;
-    for (const auto& spring : lattice_.springs) {
-      result.push_back(spring_term(spring, lattice_.errors, curve_is_fitted_));
+    for (const auto& spring : springs_and_motions()) edges.push_back({spring.a, spring.b, 1.0});
+    if (layout_.poses.empty() || LatticeGraph(size(), edges).components() != layout_.components) {
+      lay_out();
     }
-    for (const auto& [a, b, motion] : motions_) {
-      const double travel = std::hypot(motion.step.x_m, motion.step.y_m);
-      SpringTerm term{.a = a,
-                      .b = b,
-                      .length = travel,
-                      .length_deviation = motion.distance_deviation_m,
-                      .certain = true};
-      if (travel > 0.0) {
-        term.direction = SpringDirection{std::atan2(motion.step.y_m, motion.step.x_m), std::nullopt,
-                                         motion.direction_deviation_rad};
-      }
-      term.turn = SpringTurn{motion.step.heading_rad, motion.turn_deviation_rad};
-      result.push_back(term);
-    }
-    return result;
   }
 
   void relax() {
     learn_errors(lattice_.springs, lattice_.curve, lattice_.errors);
-    const auto solution = solve_lattice(terms(), start_.poses, {}, [this] {
-      if (watch_) watch_(start_.poses, start_.components);
+    std::vector<SpringTerm> terms;
+    for (const auto& spring : lattice_.springs) {
+      terms.push_back(spring_term(spring, lattice_.errors, curve_is_fitted_));
+    }
+    const auto of_motions = motions_.terms();
+    terms.insert(terms.end(), of_motions.begin(), of_motions.end());
+    const auto solution = solve_lattice(terms, layout_.poses, {}, [this] {
+      if (watch_) watch_(layout_.poses, layout_.components);
     });
     for (std::size_t s = 0; s < lattice_.springs.size(); ++s) {
       lattice_.springs[s].weight = solution.weights[s];
@@ -425,56 +251,45 @@ class Arranger {
   }
 
   /// Makes the median distance of a view to its nearest one 1, or, where there is motion, its
-  /// length a metre by least squares.
+  /// length a metre.
   void set_unit() {
-    if (lattice_.metric) {
-      double moved = 0.0;
-      double laid = 0.0;
-      for (const auto& [a, b, motion] : motions_) {
-        const double certainty = 1.0 / (motion.distance_deviation_m * motion.distance_deviation_m);
-        const double length = laid_out(a, b);
-        moved += certainty * length * std::hypot(motion.step.x_m, motion.step.y_m);
-        laid += certainty * length * length;
-      }
-      if (moved > 0.0) rescale(moved / laid);
-      return;
+    const auto scale = lattice_.metric ? motions_.scale_of(layout_.poses) : unit_scale();
+    if (!scale) return;
+    for (Pose2& pose : layout_.poses) {
+      pose.x_m *= *scale;
+      pose.y_m *= *scale;
     }
+    for (auto& spring : lattice_.springs) spring.length *= *scale;
+  }
+  [[nodiscard]] std::optional<double> unit_scale() const {
     std::vector<double> nearest;
-    const auto near = nearest_points(positions(), start_.components, 1);
+    const auto near = nearest_nodes(1);
     for (std::size_t i = 0; i < near.size(); ++i) {
       if (near[i].empty()) continue;
-      const double length = laid_out(i, near[i].front());
+      const double length =
+          distance(layout_.poses[i].position(), layout_.poses[near[i].front()].position());
       if (length > 0.0) nearest.push_back(length);
     }
-    if (nearest.empty()) return;
-    rescale(1.0 / upper_median(nearest));
-  }
-
-  void rescale(double scale) {
-    for (Pose2& pose : start_.poses) {
-      pose.x_m *= scale;
-      pose.y_m *= scale;
-    }
-    for (auto& spring : lattice_.springs) spring.length *= scale;
+    if (nearest.empty()) return std::nullopt;
+    return 1.0 / upper_median(nearest);
   }
 
   void finish() {
-    lattice_.candidates = measured_.size();
-    // In the unit of the result.
-    fit_curve();
+    lattice_.candidates = measured_.springs().size();
+    fit_curve_to_layout();  // in the unit of the result
     learn_errors(lattice_.springs, lattice_.curve, lattice_.errors);
     auto& components = lattice_.components;
-    for (const std::size_t component : start_.components)
+    for (const std::size_t component : layout_.components)
       components.resize(std::max(components.size(), component + 1));
     std::vector<std::optional<Pose2>> component_from_frame(components.size());
     for (std::size_t i = 0; i < size(); ++i) {
-      const std::size_t component = start_.components[i];
+      const std::size_t component = layout_.components[i];
       if (!component_from_frame[component])
-        component_from_frame[component] = inverse(start_.poses[i]);
+        component_from_frame[component] = inverse(layout_.poses[i]);
       lattice_.nodes[i].component = component;
-      lattice_.nodes[i].pose = *component_from_frame[component] * start_.poses[i];
+      lattice_.nodes[i].pose = *component_from_frame[component] * layout_.poses[i];
       ++components[component].views;
-      components[component].handedness_known = start_.handedness_known[component] != 0;
+      components[component].handedness_known = layout_.handedness_known[component] != 0;
     }
   }
 
@@ -482,13 +297,11 @@ class Arranger {
   Executor& executor_;
   const LatticeWatch& watch_;
   SpringViews views_;
-  std::vector<NodeMotion> motions_;
-  std::map<NodePair, std::size_t> motion_between_;  // the first motion of two nodes
-  bool by_motion_ = false;                          // motion connects all views
-  std::set<NodePair> known_;
-  std::vector<LatticeSpring> measured_;  // ascending (a, b)
+  NodeMotions motions_;
+  bool by_motion_ = false;  // motion connects all views
+  MeasuredPairs measured_;
   bool curve_is_fitted_ = false;
-  LatticeStart start_;
+  LatticeStart layout_;              // empty before the first
   std::vector<NodePair> proposals_;  // worth measuring in the next round
   Lattice lattice_;
 };
@@ -523,8 +336,9 @@ void visit_options(CoarseMotionOptions& options, OptionVisitor& visitor) {
 CoarseMotion coarse_motion(ViewId from, ViewId to, const Pose2& step,
                            const CoarseMotionOptions& options) {
   validate(options);
-  constexpr double kSmallestTravelM = 0.01;
-  const double travel_m = std::max(kSmallestTravelM, std::hypot(step.x_m, step.y_m));
+  // A robot that turns on the spot still has deviations above 0.
+  constexpr double min_travel_m = 0.01;
+  const double travel_m = std::max(min_travel_m, std::hypot(step.x_m, step.y_m));
   return {.from = from,
           .to = to,
           .step = step,

@@ -11,8 +11,14 @@ namespace panonav {
 
 namespace {
 
-// Views looked at beyond the candidates: several of each place are found.
+/// Views that are searched for each place: several of one place are found.
 constexpr int views_per_candidate = 4;
+/// Of the shortest loop; candidates nearer to each other along the path are one place.
+constexpr double place_share_of_loop = 0.25;
+/// Share of the drift per metre that is left where closures have been found since.
+constexpr double drift_share_within_closed = 0.2;
+/// Error of odometry over a metre or two, as a share of the path.
+constexpr double local_drift = 0.1;
 
 double gap(const Pose2& a, const Pose2& b) {
   return distance(a.position(), b.position());
@@ -121,7 +127,8 @@ std::optional<LoopClosure> LoopClosureFinder::best_closure(std::span<const Passe
     if (!candidate) continue;
     // Of neighbours on the way the first, which is the most similar, stands for the place.
     const bool known = std::ranges::any_of(looked_at, [&](std::size_t i) {
-      return std::abs(nodes[i].way_m - nodes[*candidate].way_m) < 0.25 * options_.min_loop_m;
+      return std::abs(nodes[i].way_m - nodes[*candidate].way_m) <
+             place_share_of_loop * options_.min_loop_m;
     });
     if (known) continue;
     if (static_cast<int>(looked_at.size()) == options_.candidates) break;
@@ -166,9 +173,9 @@ bool LoopClosureFinder::is_in_reach(std::span<const PassedNode> nodes, std::span
   const double here_m = nodes[closure.later].way_m;
   const double loop_m = here_m - nodes[closure.earlier].way_m;
   const double since_m = std::min(loop_m, here_m - closed_way_m_);
-  constexpr double share_within_closed = 0.2;
   const double allowed_m =
-      odometry_.scale_m + options_.max_drift * (since_m + share_within_closed * (loop_m - since_m));
+      odometry_.scale_m +
+      options_.max_drift * (since_m + drift_share_within_closed * (loop_m - since_m));
   // A heading error that grows evenly to an angle is a drift by half of it for each metre.
   const double allowed_rad = options_.heading_tolerance_rad + 2.0 * options_.max_drift;
   const Pose2 closed = poses[closure.earlier] * closure.earlier_from_later;
@@ -184,11 +191,10 @@ bool LoopClosureFinder::agree(const LoopClosure& a, const LoopClosure& b,
   const Pose2 across = inverse(a.earlier_from_later) *
                        (inverse(poses[a.earlier]) * poses[b.earlier]) * b.earlier_from_later;
   const Pose2 difference = inverse(along) * across;
-  // What views leave unexplained shortens the way between them; odometry of a metre or two is
-  // right to a tenth.
+  // What views leave unexplained shortens the displacement between them.
   const double allowed_m =
       (options_.return_tolerance + a.residual + b.residual) * odometry_.scale_m +
-      0.1 * std::hypot(along.x_m, along.y_m);
+      local_drift * std::hypot(along.x_m, along.y_m);
   return std::hypot(difference.x_m, difference.y_m) < allowed_m &&
          std::abs(difference.heading_rad) < options_.heading_tolerance_rad;
 }

@@ -8,7 +8,7 @@
 
 #include "panonav/core/disjoint_sets.hpp"
 #include "panonav/core/error.hpp"
-#include "panonav/mapping/internal/normal_equations.hpp"
+#include "panonav/geometry/least_squares.hpp"
 
 namespace panonav {
 
@@ -56,45 +56,97 @@ double square(const EdgeError& error) {
   return error.x * error.x + error.y * error.y + error.heading * error.heading;
 }
 
-/// The graph with its unknowns, one Gauss-Newton step at a time.
-class Problem {
+/// Returns the nodes that stay where they are: those of `fixed`, and the first one of each
+/// component without any.
+std::vector<std::uint8_t> hold_components(std::size_t nodes, std::span<const PoseEdge> edges,
+                                          std::span<const std::uint8_t> fixed) {
+  std::vector<std::uint8_t> held(nodes, 0);
+  std::ranges::copy(fixed, held.begin());
+  const auto components = connected_components(nodes, edges);
+  std::vector<std::uint8_t> is_held(nodes, 0);  // by component
+  for (std::size_t i = 0; i < nodes; ++i) is_held[components[i]] |= held[i];
+  for (std::size_t i = 0; i < nodes; ++i) {
+    if (is_held[components[i]] != 0) continue;
+    held[i] = 1;
+    is_held[components[i]] = 1;
+  }
+  return held;
+}
+
+/// The graph with its unknowns as `minimise` sees it. Steps narrow the loss of doubtful edges
+/// (graduated non-convexity).
+class Graph {
  public:
-  Problem(std::span<Pose2> nodes, std::span<const PoseEdge> edges,
-          std::span<const std::uint8_t> fixed)
-      : nodes_(nodes), edges_(edges) {
-    fixed_.assign(nodes.size(), 0);
-    std::ranges::copy(fixed, fixed_.begin());
-    const auto components = connected_components(nodes.size(), edges);
-    std::vector<std::uint8_t> held(nodes.size(), 0);  // by component
-    for (std::size_t i = 0; i < nodes.size(); ++i) held[components[i]] |= fixed_[i];
-    for (std::size_t i = 0; i < nodes.size(); ++i) {
-      if (held[components[i]] != 0) continue;
-      fixed_[i] = 1;
-      held[components[i]] = 1;
-    }
-    weights_.assign(edges.size(), 1.0);
+  Graph(std::span<Pose2> nodes, std::span<const PoseEdge> edges,
+        std::span<const std::uint8_t> fixed, const PoseGraphOptions& options)
+      : nodes_(nodes),
+        edges_(edges),
+        options_(options),
+        final_scale_(options.doubt_deviations * options.doubt_deviations),
+        weights_(edges.size(), 1.0),
+        fixed_(hold_components(nodes.size(), edges, fixed)) {
+    // The first steps trust every edge.
+    const bool doubtful = std::ranges::any_of(edges, &PoseEdge::doubtful);
+    scale_ = doubtful ? std::numeric_limits<double>::infinity() : final_scale_;
   }
 
-  /// Doubtful edges weigh by their errors against `scale` (squared deviations). Returns the largest
-  /// squared error of a doubtful edge.
-  double weigh(double scale) {
+  bool linearise(SparseEquations& equations) {
+    equations.begin(static_cast<int>(nodes_.size() * unknowns));
+    for (std::size_t i = 0; i < nodes_.size() * unknowns; ++i) {
+      // A component may hang on nothing but edges whose weight has fallen to almost nothing.
+      const double held = fixed_[i / unknowns] != 0 ? 1.0 : 1e-9;
+      equations.add(static_cast<int>(i), static_cast<int>(i), held);
+    }
+    for (std::size_t i = 0; i < edges_.size(); ++i) add_edge(i, equations);
+    for (std::size_t i = 0; i < nodes_.size() * unknowns; ++i) {
+      if (fixed_[i / unknowns] != 0) equations.right(static_cast<int>(i)) = 0.0;
+    }
+    equations.assemble();
+    return true;
+  }
+
+  /// True when all edges have their final weights and no pose moves any more.
+  bool move(const Eigen::VectorXd& change) {
+    ++steps_;
+    const double moved = move_nodes(change);
+    if (std::isinf(scale_)) {
+      // Where edges lose their weight, positions need not be exact.
+      constexpr double nearly_m = 0.05;
+      if (moved > nearly_m && steps_ < options_.max_iterations / 4) return false;
+      scale_ = std::max(final_scale_, weigh());
+    } else if (scale_ > final_scale_) {
+      scale_ = std::max(final_scale_, 0.25 * scale_);
+    } else if (moved <= options_.settled_m) {
+      return true;
+    }
+    weigh();
+    return false;
+  }
+
+  [[nodiscard]] double half_cost() const {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < edges_.size(); ++i) sum += weights_[i] * square(edge_error(i));
+    return 0.5 * sum;
+  }
+  [[nodiscard]] const std::vector<double>& weights() const { return weights_; }
+
+ private:
+  /// Weighs doubtful edges by their errors against the scale (squared deviations). Returns the
+  /// largest squared error of a doubtful edge.
+  double weigh() {
     double largest = 0.0;
     for (std::size_t i = 0; i < edges_.size(); ++i) {
       if (!edges_[i].doubtful) continue;
       const double error = square(edge_error(i));
       largest = std::max(largest, error);
-      const double root = scale / (scale + error);
-      weights_[i] = std::isfinite(scale) ? root * root : 1.0;
+      const double root = scale_ / (scale_ + error);
+      weights_[i] = std::isfinite(scale_) ? root * root : 1.0;
     }
     return largest;
   }
 
   /// Returns the largest change of a position or, in radians, of a heading.
-  double step() {
-    assemble();
-    const auto solution = equations_.solve();
-    if (!solution) return 0.0;
-    const Eigen::VectorXd& change = *solution;
+  double move_nodes(const Eigen::VectorXd& change) {
     double largest = 0.0;
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
       if (fixed_[i] != 0) continue;
@@ -108,45 +160,11 @@ class Problem {
     return largest;
   }
 
-  [[nodiscard]] double cost() const {
-    double sum = 0.0;
-    for (std::size_t i = 0; i < edges_.size(); ++i) sum += weights_[i] * square(edge_error(i));
-    return 0.5 * sum;
-  }
-  [[nodiscard]] const std::vector<double>& weights() const { return weights_; }
-
- private:
   [[nodiscard]] EdgeError edge_error(std::size_t i) const {
     return error_of(edges_[i], nodes_[edges_[i].a], nodes_[edges_[i].b]);
   }
 
-  void add(std::size_t row, std::size_t column, double value) {
-    // Fixed poses keep their equation x = 0; the pattern stays the same.
-    if (fixed_[row / unknowns] != 0 || fixed_[column / unknowns] != 0) value = 0.0;
-    equations_.add(static_cast<int>(row), static_cast<int>(column), value);
-  }
-
-  void assemble() {
-    equations_.begin(static_cast<int>(nodes_.size() * unknowns));
-    for (std::size_t i = 0; i < nodes_.size(); ++i) {
-      for (std::size_t u = 0; u < unknowns; ++u) {
-        // A component may hang on nothing but edges whose weight has fallen to almost nothing.
-        const double held = fixed_[i] != 0 ? 1.0 : 1e-9;
-        const auto at = static_cast<int>(i * unknowns + u);
-        equations_.add(at, at, held);
-      }
-    }
-    for (std::size_t i = 0; i < edges_.size(); ++i) add_edge(i);
-    for (std::size_t i = 0; i < nodes_.size(); ++i) {
-      if (fixed_[i] == 0) continue;
-      for (std::size_t u = 0; u < unknowns; ++u) {
-        equations_.gradient(static_cast<int>(i * unknowns + u)) = 0.0;
-      }
-    }
-    equations_.assemble();
-  }
-
-  void add_edge(std::size_t i) {
+  void add_edge(std::size_t i, SparseEquations& equations) const {
     const PoseEdge& edge = edges_[i];
     const Pose2& a = nodes_[edge.a];
     const Pose2& b = nodes_[edge.b];
@@ -172,20 +190,26 @@ class Problem {
     for (std::size_t m = 0; m < columns; ++m) {
       double slope = 0.0;
       for (std::size_t r = 0; r < 3; ++r) slope += jacobian[r][m] * residual[r];
-      equations_.gradient(static_cast<int>(index(m))) += weight * slope;
+      equations.right(static_cast<int>(index(m))) -= weight * slope;
       for (std::size_t n = 0; n <= m; ++n) {
         double sum = 0.0;
         for (std::size_t r = 0; r < 3; ++r) sum += jacobian[r][m] * jacobian[r][n];
-        add(index(m), index(n), weight * sum);
+        // Fixed poses keep their equation x = 0; the pattern stays the same.
+        const bool stays = fixed_[index(m) / unknowns] != 0 || fixed_[index(n) / unknowns] != 0;
+        equations.add(static_cast<int>(index(m)), static_cast<int>(index(n)),
+                      stays ? 0.0 : weight * sum);
       }
     }
   }
 
   std::span<Pose2> nodes_;
   std::span<const PoseEdge> edges_;
+  const PoseGraphOptions& options_;
+  double final_scale_;  // squared deviations
+  double scale_ = 0.0;
+  int steps_ = 0;
   std::vector<double> weights_;
   std::vector<std::uint8_t> fixed_;
-  NormalEquations equations_;
 };
 
 }  // namespace
@@ -213,30 +237,13 @@ PoseGraphReport optimise_pose_graph(std::span<Pose2> nodes, std::span<const Pose
   PoseGraphReport report;
   report.edge_weights.assign(edges.size(), 1.0);
   if (edges.empty()) return report;
-  Problem problem(nodes, edges, fixed);
-  const double wanted = options.doubt_deviations * options.doubt_deviations;
-  const bool doubtful = std::ranges::any_of(edges, &PoseEdge::doubtful);
-  // The first steps trust every edge.
-  double scale = doubtful ? std::numeric_limits<double>::infinity() : wanted;
-  report.settled = false;
-  while (report.iterations < options.max_iterations) {
-    ++report.iterations;
-    const double change = problem.step();
-    const bool still = change <= options.settled_m;
-    if (std::isinf(scale)) {
-      // Where edges lose their weight, positions need not be exact.
-      constexpr double nearly_m = 0.05;
-      if (change > nearly_m && report.iterations < options.max_iterations / 4) continue;
-      scale = std::max(wanted, problem.weigh(scale));
-    } else if (scale > wanted) {
-      scale = std::max(wanted, 0.25 * scale);
-    } else if (still) {
-      report.settled = true;
-      break;
-    }
-    problem.weigh(scale);
-  }
-  report.cost = problem.cost();
+  Graph problem(nodes, edges, fixed, options);
+  SparseEquations equations;
+  const LeastSquaresReport solved =
+      minimise(problem, equations, {.max_steps = options.max_iterations});
+  report.iterations = solved.steps;
+  report.settled = solved.settled;
+  report.cost = problem.half_cost();
   report.edge_weights = problem.weights();
   return report;
 }

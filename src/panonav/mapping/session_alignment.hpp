@@ -42,11 +42,6 @@ struct SessionAlignment {
   std::size_t refuted = 0;   ///< matches that lead elsewhere
 };
 
-/// Metres for each unit of length that the views of the map's edges give; empty where none of the
-/// first 200 can be read. Cost: 0.3 ms an edge.
-[[nodiscard]] std::optional<double> view_scale_m(const VisualMemory& memory,
-                                                 const TopologicalMap& map);
-
 /// Finds the places that two sessions have in common, by appearance alone: for each view of the
 /// second in turn, `LoopClosureFinder` looks for closures among those of the first. Each closure
 /// tells how the second map lies in the frame of the first; the largest set of closures that agree

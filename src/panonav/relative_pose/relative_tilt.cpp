@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "panonav/geometry/angles.hpp"
+#include "panonav/geometry/least_squares.hpp"
 #include "panonav/signature/fourier_signature.hpp"
 
 namespace panonav {
@@ -64,68 +65,77 @@ Panorama smoothed_over_rows(const Panorama& panorama, double sigma_rows) {
   return result;
 }
 
-/// Turn, displacement in two directions, pitch, roll.
-constexpr std::size_t unknowns = 5;
-struct TiltNormal {
-  std::array<std::array<double, unknowns>, unknowns> matrix{};
-  std::array<double, unknowns> right{};
-  double energy = 0.0;
-  double values = 0.0;
-};
+/// The tilt at one stage as `minimise` sees it. Unknowns: turn, displacement in two directions,
+/// pitch, roll; the first three are found again at each step.
+class TiltProblem {
+ public:
+  using Equations = DenseEquations<5>;
 
-/// What is left of the home view once the current one is levelled, and how the unknowns change it.
-TiltNormal tilt_normal(const Panorama& home, const Panorama& level, int margin) {
-  TiltNormal normal;
-  const int columns = level.columns();
-  const int rows = level.rows();
-  const auto& band = *level.elevations();
-  const double across = columns / (4.0 * std::numbers::pi);
-  const double down = rows / (2.0 * (band.top_rad - band.bottom_rad));
-  for (int y = margin; y < rows - margin; ++y) {
-    const double elevation = level.elevation_rad(y);
-    const double tangent = std::tan(elevation);
-    const double approach = std::sin(elevation) * std::cos(elevation);
-    for (int c = 0; c < columns; ++c) {
-      const int left = c == 0 ? columns - 1 : c - 1;
-      const int right = c + 1 == columns ? 0 : c + 1;
-      const double cosine = std::cos(2.0 * std::numbers::pi * c / columns);
-      const double sine = std::sin(2.0 * std::numbers::pi * c / columns);
-      const double aside = across * static_cast<double>(level.at(y, right) - level.at(y, left));
-      const double up = down * static_cast<double>(level.at(y - 1, c) - level.at(y + 1, c));
-      const std::array<double, unknowns> slopes{
-          aside, aside * sine + up * approach * cosine, -aside * cosine + up * approach * sine,
-          up * cosine + aside * tangent * sine, -up * sine + aside * tangent * cosine};
-      const auto rest = static_cast<double>(home.at(y, c) - level.at(y, c));
-      for (std::size_t i = 0; i < unknowns; ++i) {
-        for (std::size_t j = 0; j <= i; ++j) normal.matrix[i][j] += slopes[i] * slopes[j];
-        normal.right[i] += slopes[i] * rest;
+  TiltProblem(const Panorama& home, const Panorama& current, int margin, Tilt& tilt)
+      : home_(home), current_(current), margin_(margin), tilt_(tilt) {}
+
+  /// False where nothing is left to explain.
+  bool linearise(Equations& equations) const {
+    equations.begin();
+    const Panorama level = level_panorama(current_, tilt_);
+    const double values = static_cast<double>((level.rows() - 2 * margin_) * level.columns());
+    const double noise = add_rows(level, equations) / values;
+    if (!(noise > 0.0)) return false;
+    const double certain = noise / (usual_tilt_rad * usual_tilt_rad);
+    equations.matrix(0, 0) += noise / (usual_turn_rad * usual_turn_rad);
+    equations.matrix(1, 1) += noise / (usual_displacement * usual_displacement);
+    equations.matrix(2, 2) += noise / (usual_displacement * usual_displacement);
+    equations.matrix(3, 3) += certain;
+    equations.matrix(4, 4) += certain;
+    equations.right[3] -= certain * tilt_.pitch_rad;
+    equations.right[4] -= certain * tilt_.roll_rad;
+    return true;
+  }
+
+  bool move(const Equations::Vector& change) {
+    constexpr double max_rad = 0.2;  // of robots that tilt by 6 degrees, twice
+    tilt_.pitch_rad = std::clamp(tilt_.pitch_rad + change[3], -max_rad, max_rad);
+    tilt_.roll_rad = std::clamp(tilt_.roll_rad + change[4], -max_rad, max_rad);
+    return false;
+  }
+
+ private:
+  /// Adds what is left of the home view once the current one is levelled, and how the unknowns
+  /// change it. Returns its energy.
+  double add_rows(const Panorama& level, Equations& equations) const {
+    const int columns = level.columns();
+    const auto& band = *level.elevations();
+    const double across = columns / (4.0 * std::numbers::pi);
+    const double down = level.rows() / (2.0 * (band.top_rad - band.bottom_rad));
+    double energy = 0.0;
+    for (int y = margin_; y < level.rows() - margin_; ++y) {
+      const double elevation = level.elevation_rad(y);
+      const double tangent = std::tan(elevation);
+      const double approach = std::sin(elevation) * std::cos(elevation);
+      for (int c = 0; c < columns; ++c) {
+        const int left = c == 0 ? columns - 1 : c - 1;
+        const int right = c + 1 == columns ? 0 : c + 1;
+        const double cosine = std::cos(2.0 * std::numbers::pi * c / columns);
+        const double sine = std::sin(2.0 * std::numbers::pi * c / columns);
+        const double aside = across * static_cast<double>(level.at(y, right) - level.at(y, left));
+        const double up = down * static_cast<double>(level.at(y - 1, c) - level.at(y + 1, c));
+        const Equations::Vector slopes(
+            aside, aside * sine + up * approach * cosine, -aside * cosine + up * approach * sine,
+            up * cosine + aside * tangent * sine, -up * sine + aside * tangent * cosine);
+        const auto rest = static_cast<double>(home_.at(y, c) - level.at(y, c));
+        equations.matrix += slopes * slopes.transpose();
+        equations.right += rest * slopes;
+        energy += rest * rest;
       }
-      normal.energy += rest * rest;
-      normal.values += 1.0;
     }
+    return energy;
   }
-  return normal;
-}
 
-/// Of a symmetric, positive definite system of which the lower half is given: Cholesky's rule.
-std::array<double, unknowns> solved(TiltNormal normal) {
-  auto& m = normal.matrix;
-  auto& x = normal.right;
-  for (std::size_t i = 0; i < unknowns; ++i) {
-    for (std::size_t j = 0; j <= i; ++j) {
-      double sum = m[i][j];
-      for (std::size_t k = 0; k < j; ++k) sum -= m[i][k] * m[j][k];
-      m[i][j] = i == j ? std::sqrt(std::max(sum, 1e-300)) : sum / m[j][j];
-    }
-    for (std::size_t k = 0; k < i; ++k) x[i] -= m[i][k] * x[k];
-    x[i] /= m[i][i];
-  }
-  for (std::size_t i = unknowns; i-- > 0;) {
-    for (std::size_t k = i + 1; k < unknowns; ++k) x[i] -= m[k][i] * x[k];
-    x[i] /= m[i][i];
-  }
-  return x;
-}
+  const Panorama& home_;
+  const Panorama& current_;
+  int margin_;  // rows at either end that do not count
+  Tilt& tilt_;
+};
 
 }  // namespace
 
@@ -143,28 +153,13 @@ Tilt relative_tilt(const HomingView& home, const HomingView& current, double hea
   const HomingView aligned = turn(home, -heading_rad);
   for (const TiltStage& stage : tilt_stages) {
     const double sigma_rows = stage.smoothed_rad / row_rad;
-    const Panorama wanted =
+    const Panorama smooth_home =
         smoothed_over_rows(cylinder(aligned, stage.frequencies, tilt_columns), sigma_rows);
-    const Panorama seen =
+    const Panorama smooth_current =
         smoothed_over_rows(cylinder(current, stage.frequencies, tilt_columns), sigma_rows);
-    for (int i = 0; i < tilt_iterations; ++i) {
-      TiltNormal normal = tilt_normal(wanted, level_panorama(seen, tilt), margin);
-      if (!(normal.energy > 0.0)) return tilt;
-      const double noise = normal.energy / normal.values;
-      const double certain = noise / (usual_tilt_rad * usual_tilt_rad);
-      normal.matrix[0][0] += noise / (usual_turn_rad * usual_turn_rad);
-      for (const std::size_t displacement : {1U, 2U})
-        normal.matrix[displacement][displacement] +=
-            noise / (usual_displacement * usual_displacement);
-      normal.matrix[3][3] += certain;
-      normal.matrix[4][4] += certain;
-      normal.right[3] -= certain * tilt.pitch_rad;
-      normal.right[4] -= certain * tilt.roll_rad;
-      const auto step = solved(normal);
-      constexpr double largest_rad = 0.2;  // of robots that tilt by 6 degrees, twice
-      tilt.pitch_rad = std::clamp(tilt.pitch_rad + step[3], -largest_rad, largest_rad);
-      tilt.roll_rad = std::clamp(tilt.roll_rad + step[4], -largest_rad, largest_rad);
-    }
+    TiltProblem problem(smooth_home, smooth_current, margin, tilt);
+    TiltProblem::Equations equations;
+    if (!minimise(problem, equations, {.max_steps = tilt_iterations}).solvable) return tilt;
   }
   return tilt;
 }

@@ -1,7 +1,5 @@
 #include "panonav/route/route_contours.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,6 +9,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/geometry/least_squares.hpp"
 #include "panonav/route/internal/line_sampling.hpp"
 
 namespace panonav {
@@ -48,6 +47,8 @@ std::vector<int> edge_columns(std::span<const float> edges, int most) {
   std::ranges::sort(columns);
   return columns;
 }
+
+constexpr std::size_t min_points = 8;  // control points of a pose, which three would determine
 
 double wrap_columns(double columns, double size) {
   return columns - size * std::floor(columns / size + 0.5);
@@ -174,24 +175,71 @@ void RouteContours::move(std::vector<ContourPoint>& contour, const std::vector<C
   contour = std::move(moved);
 }
 
-// Eq. 5 in least squares: along the path, weighted by how well an azimuth tells the way.
-bool RouteContours::fit_pose(RouteContourFix& fix) const {
-  using Matrix = Eigen::Matrix3d;
-  using Vector = Eigen::Vector3d;
-  const double columns_per_rad = columns_ / (2.0 * std::numbers::pi);
-  const auto size = static_cast<long long>(columns_);
-  constexpr int steps = 20;
-  std::vector<double> sizes;
-  for (int step = 0; step <= steps; ++step) {
-    const auto crossings = curve(fix.pose.position());
-    struct Term {
-      double difference, weight;
-      Vector slope;
-    };
+/// The pose that explains two contours by eq. 5, as `minimise` sees it: along the path, weighted by
+/// how well an azimuth determines the path length.
+class RouteContours::PoseProblem {
+ public:
+  using Equations = DenseEquations<3>;
+
+  PoseProblem(const RouteContours& contours, RouteContourFix& fix) : of_(contours), fix_(fix) {}
+
+  bool linearise(Equations& equations) {
+    std::vector<Term> terms = terms_along();
+    if (terms.size() < min_points) return false;
+    const std::size_t along_terms = terms.size();
+    std::vector<double> sizes;
+    for (const Term& term : terms) {
+      sizes.push_back(std::abs(term.difference) * std::sqrt(term.weight));
+    }
+    noise_ = std::max(0.1, 1.4826 * upper_median_in_place(std::span(sizes)));
+    add_azimuths(terms);
+    equations.begin();
+    double left = 0.0;
+    double weights = 0.0;
+    for (std::size_t i = 0; i < terms.size(); ++i) {
+      const Term& term = terms[i];
+      const double ratio = term.difference * std::sqrt(term.weight) / (2.0 * noise_);
+      const double weight = term.weight * cauchy_weight(ratio * ratio);
+      equations.matrix += weight * term.slope * term.slope.transpose();
+      equations.right += weight * term.difference * term.slope;
+      if (i >= along_terms) continue;
+      left += weight * term.difference * term.difference;
+      weights += weight;
+    }
+    fix_.residual_m = std::sqrt(left / weights) * of_.spacing_m_;
+    // Directions in which nothing changes stay where they are.
+    equations.matrix.diagonal() *= 1.0 + 1e-6;
+    return true;
+  }
+
+  bool move(const Eigen::Vector3d& change) {
+    constexpr double max_step_m = 0.1;
+    const double length_m = std::hypot(change[0], change[1]);
+    if (length_m < 1e-5 && std::abs(change[2]) < 1e-6) return true;
+    const double scale = std::min(1.0, max_step_m / std::max(1e-12, length_m));
+    fix_.pose.x_m += scale * change[0];
+    fix_.pose.y_m += scale * change[1];
+    fix_.pose.heading_rad = wrap_angle(fix_.pose.heading_rad + scale * change[2]);
+    return false;
+  }
+
+  /// Robust standard deviation of a residual, in those that its term expects.
+  [[nodiscard]] double noise() const { return noise_; }
+
+ private:
+  struct Term {
+    double difference, weight;
+    Eigen::Vector3d slope;
+  };
+
+  [[nodiscard]] double columns_per_rad() const { return of_.columns_ / (2.0 * std::numbers::pi); }
+
+  [[nodiscard]] std::vector<Term> terms_along() const {
     std::vector<Term> terms;
-    sizes.clear();
-    for (std::size_t i = 0; i < fix.columns.size(); ++i) {
-      const double azimuth = fix.columns[i] + fix.pose.heading_rad * columns_per_rad;
+    const auto crossings = of_.curve(fix_.pose.position());
+    const auto size = static_cast<long long>(of_.columns_);
+    for (std::size_t i = 0; i < fix_.columns.size(); ++i) {
+      const double azimuth = fix_.columns[i] + fix_.pose.heading_rad * columns_per_rad();
       const double whole = std::floor(azimuth);
       const double f = azimuth - whole;
       const auto c0 =
@@ -201,61 +249,50 @@ bool RouteContours::fit_pose(RouteContourFix& fix) const {
       if (a.along < 0.0F || b.along < 0.0F) continue;
       const auto turn = static_cast<double>(b.along - a.along);  // lines a column
       // A jump from one part of the path to another, or next to a pole.
-      if (std::abs(turn) * spacing_m_ > 1.0) continue;
+      if (std::abs(turn) * of_.spacing_m_ > 1.0) continue;
       const double along = static_cast<double>(a.along) + f * turn;
-      const double middle = 0.5 * (fix.first[i].along + fix.second[i].along);
-      const double difference = middle - along;
+      const double middle = 0.5 * (fix_.first[i].along + fix_.second[i].along);
       // Half a line along the path, half a column of azimuth.
       const double variance = 0.25 + 0.25 * turn * turn;
-      terms.push_back({difference, 1.0 / variance,
-                       Vector(static_cast<double>(a.along_by_x), static_cast<double>(a.along_by_y),
-                              turn * columns_per_rad)});
-      sizes.push_back(std::abs(difference) / std::sqrt(variance));
+      terms.push_back({middle - along,
+                       1.0 / variance,
+                       {static_cast<double>(a.along_by_x), static_cast<double>(a.along_by_y),
+                        turn * columns_per_rad()}});
     }
-    if (terms.size() < 8) return false;
-    const std::size_t along_terms = terms.size();
-    // From the path itself all lines of sight start at one place, and eq. 5 says nothing of the
-    // heading; but the contours' azimuths do, to a column each.
-    for (std::size_t i = 0; i < fix.columns.size(); ++i) {
-      const double azimuth = fix.columns[i] + fix.pose.heading_rad * columns_per_rad;
+    return terms;
+  }
+
+  /// From the path itself all lines of sight start at one place, and eq. 5 says nothing of the
+  /// heading; but the contours' azimuths do, to a column each.
+  void add_azimuths(std::vector<Term>& terms) const {
+    for (std::size_t i = 0; i < fix_.columns.size(); ++i) {
+      const double azimuth = fix_.columns[i] + fix_.pose.heading_rad * columns_per_rad();
       const double middle =
-          fix.first[i].azimuth +
-          0.5 * wrap_columns(fix.second[i].azimuth - fix.first[i].azimuth, columns_);
+          fix_.first[i].azimuth +
+          0.5 * wrap_columns(fix_.second[i].azimuth - fix_.first[i].azimuth, of_.columns_);
       terms.push_back(
-          {wrap_columns(middle - azimuth, columns_), 1.0, Vector(0.0, 0.0, columns_per_rad)});
+          {wrap_columns(middle - azimuth, of_.columns_), 1.0, {0.0, 0.0, columns_per_rad()}});
     }
-    const double noise = std::max(0.1, 1.4826 * upper_median_in_place(std::span(sizes)));
-    Matrix matrix = Matrix::Zero();
-    Vector right = Vector::Zero();
-    double left = 0.0;
-    double weights = 0.0;
-    for (std::size_t i = 0; i < terms.size(); ++i) {
-      const Term& term = terms[i];
-      const double ratio = term.difference * std::sqrt(term.weight) / (2.0 * noise);
-      const double weight = term.weight / (1.0 + ratio * ratio);
-      matrix += weight * term.slope * term.slope.transpose();
-      right += weight * term.difference * term.slope;
-      if (i >= along_terms) continue;
-      left += weight * term.difference * term.difference;
-      weights += weight;
+  }
+
+  const RouteContours& of_;
+  RouteContourFix& fix_;
+  double noise_ = 0.0;
+};
+
+bool RouteContours::fit_pose(RouteContourFix& fix) const {
+  PoseProblem problem(*this, fix);
+  PoseProblem::Equations equations;
+  const LeastSquaresReport solved = minimise(problem, equations, {.max_steps = 20});
+  if (!solved.solvable || (!solved.settled && !problem.linearise(equations))) return false;
+  const Eigen::Matrix3d inverse = equations.matrix.ldlt().solve(Eigen::Matrix3d::Identity());
+  if (!inverse.allFinite()) return false;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      fix.covariance[3 * i + j] =
+          problem.noise() * problem.noise() *
+          inverse(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
     }
-    fix.residual_m = std::sqrt(left / weights) * spacing_m_;
-    matrix.diagonal() *= 1.0 + 1e-6;
-    const Vector change = matrix.ldlt().solve(right);
-    const Matrix inverse = matrix.ldlt().solve(Matrix::Identity());
-    if (!change.allFinite() || !inverse.allFinite()) return false;
-    for (std::size_t i = 0; i < 3; ++i) {
-      for (std::size_t j = 0; j < 3; ++j) {
-        fix.covariance[3 * i + j] =
-            noise * noise * inverse(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
-      }
-    }
-    const double length_m = std::hypot(change[0], change[1]);
-    const double scale = std::min(1.0, 0.1 / std::max(1e-12, length_m));
-    if (step == steps || (length_m < 1e-5 && std::abs(change[2]) < 1e-6)) break;
-    fix.pose.x_m += scale * change[0];
-    fix.pose.y_m += scale * change[1];
-    fix.pose.heading_rad = wrap_angle(fix.pose.heading_rad + scale * change[2]);
   }
   return true;
 }
@@ -295,7 +332,7 @@ std::optional<RouteContourFix> RouteContours::fit(std::span<const float> line,
     fix.first.push_back({azimuth, along + margin});
     fix.second.push_back({azimuth, along - margin});
   }
-  if (fix.columns.size() < 8) return std::nullopt;
+  if (fix.columns.size() < min_points) return std::nullopt;
   // Steps of a line and a column first, then of half, until nothing moves.
   double step = 1.0;
   for (; fix.iterations < options_.max_iterations; ++fix.iterations) {

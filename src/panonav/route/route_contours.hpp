@@ -68,6 +68,7 @@ class RouteContours {
             const std::vector<int>& columns, std::span<const float> edges,
             const std::vector<bool>& joined, double step) const;
   [[nodiscard]] std::vector<RouteCrossing> curve(Point2 viewpoint) const;
+  class PoseProblem;
   bool fit_pose(RouteContourFix& fix) const;
 
   int columns_;

@@ -12,6 +12,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/geometry/least_squares.hpp"
 #include "panonav/motion/path.hpp"
 #include "panonav/route/internal/line_sampling.hpp"
 
@@ -216,7 +217,7 @@ std::optional<RouteLines::Linearised> RouteLines::linearise(const std::vector<Te
     const double off = difference(term);
     // Cauchy's weight; three deviations are usual, more are likely a change of the scene.
     const double ratio = off / (3.0 * noise);
-    const double weight = options_.robust ? 1.0 / (1.0 + ratio * ratio) : 1.0;
+    const double weight = options_.robust ? cauchy_weight(ratio * ratio) : 1.0;
     const std::array<double, 5> slope{
         static_cast<double>(term.shown_x), static_cast<double>(term.shown_y),
         result.gain * static_cast<double>(term.seen_turn), -static_cast<double>(term.seen), -1.0};
@@ -283,32 +284,62 @@ std::vector<float> RouteLines::what_no_shift_explains(const std::vector<Term>& t
   return left;
 }
 
-// Gauss-Newton from level to level.
+/// The pose at one level as `minimise` sees it.
+class RouteLines::LevelProblem {
+ public:
+  LevelProblem(const RouteLines& lines, const Level& level, const Window& near, Workspace& work,
+               Pose2& pose)
+      : lines_(lines), level_(level), near_(near), work_(work), pose_(pose) {
+    // At the last level the noise of lines is a hundred times as much.
+    constexpr double settled_m = 3e-4;
+    constexpr double share_of_smoothing = 0.05;
+    const double smoothed_rad = level.sigma * 2.0 * std::numbers::pi / lines.columns_;
+    const bool last = &level == &lines.levels_.back();
+    settled_m_ = last ? settled_m : share_of_smoothing * usual_distance_m * smoothed_rad;
+  }
+
+  bool linearise(DenseEquations<5>& equations) {
+    if (!lines_.collect(level_, work_.seen, pose_, near_, work_.crossings, work_.terms)) {
+      return false;
+    }
+    const auto normal = lines_.linearise(work_.terms, work_.scratch);
+    if (!normal) return false;
+    equations.matrix = normal->matrix;
+    equations.right = normal->right;
+    return true;
+  }
+
+  bool move(const Vector& change) {
+    // No step is longer than what smoothing lets it see.
+    constexpr double max_step_m = 0.25;
+    constexpr double max_turn_rad = 0.2;
+    const double length_m = std::hypot(change[0], change[1]);
+    const double scale = std::min({1.0, max_step_m / std::max(1e-12, length_m),
+                                   max_turn_rad / std::max(1e-12, std::abs(change[2]))});
+    pose_.x_m += scale * change[0];
+    pose_.y_m += scale * change[1];
+    pose_.heading_rad = wrap_angle(pose_.heading_rad + scale * change[2]);
+    return length_m < settled_m_ && std::abs(change[2]) < settled_m_;
+  }
+
+ private:
+  const RouteLines& lines_;
+  const Level& level_;
+  const Window& near_;
+  Workspace& work_;
+  Pose2& pose_;
+  double settled_m_;  // of a step, and in radians of a turn
+};
+
 bool RouteLines::descend(std::span<const Level> levels, std::span<const float> line,
                          const Window& near, Workspace& work, Pose2& pose) const {
+  // Directions in which nothing changes stay where they are.
+  const LeastSquaresOptions options{.max_steps = options_.max_steps, .damping = 1e-3};
   for (const Level& level : levels) {
     work.seen = smoothed_line(line, level.sigma);
-    const bool last = &level == &levels_.back();
-    const double near_enough_m =
-        last ? 3e-4 : 0.05 * usual_distance_m * level.sigma * 2.0 * std::numbers::pi / columns_;
-    for (int step = 0; step < options_.max_steps; ++step) {
-      if (!collect(level, work.seen, pose, near, work.crossings, work.terms)) return false;
-      const auto normal = linearise(work.terms, work.scratch);
-      if (!normal) return false;
-      // A little damping: directions in which nothing changes stay where they are.
-      Matrix damped = normal->matrix;
-      damped.diagonal() *= 1.0 + 1e-3;
-      const Vector change = damped.ldlt().solve(normal->right);
-      if (!change.allFinite()) return false;
-      // No step is longer than what smoothing lets it see.
-      const double length_m = std::hypot(change[0], change[1]);
-      const double scale = std::min(
-          {1.0, 0.25 / std::max(1e-12, length_m), 0.2 / std::max(1e-12, std::abs(change[2]))});
-      pose.x_m += scale * change[0];
-      pose.y_m += scale * change[1];
-      pose.heading_rad = wrap_angle(pose.heading_rad + scale * change[2]);
-      if (length_m < near_enough_m && std::abs(change[2]) < near_enough_m) break;
-    }
+    LevelProblem problem(*this, level, near, work, pose);
+    DenseEquations<5> equations;
+    if (!minimise(problem, equations, options).solvable) return false;
   }
   return true;
 }

@@ -99,6 +99,7 @@ class RouteLines {
   struct Term;
   struct Linearised;
   struct Workspace;
+  class LevelProblem;
   [[nodiscard]] bool descend(std::span<const Level> levels, std::span<const float> line,
                              const Window& near, Workspace& work, Pose2& pose) const;
   [[nodiscard]] std::optional<Window> window(Point2 position) const;

@@ -1,6 +1,5 @@
 #include "panonav/camera/internal/circle_search.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +9,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
+#include "panonav/geometry/least_squares.hpp"
 
 namespace panonav {
 namespace {
@@ -243,50 +243,71 @@ std::optional<EdgePoint> edge_on_ray(std::span<const SmoothPlanes> images,
   return EdgePoint{circle.u + r * cosine, circle.v + r * sine};
 }
 
-/// Least squares of the distances to the circle with Tukey's weights; the residual is the weighted
-/// root mean square. Empty when the points do not determine a circle.
-std::optional<CircleFit> fit_points(const std::vector<EdgePoint>& points, FieldCircle circle) {
-  constexpr double tukey = 4.685;  // 95 % efficiency for normal errors
-  CircleFit fit;
-  for (int iteration = 0; iteration < 20; ++iteration) {
+/// A circle through points as `minimise` sees it: Tukey's weights of their distances to it.
+class CircleProblem {
+ public:
+  using Equations = DenseEquations<3>;
+
+  CircleProblem(const std::vector<EdgePoint>& points, const FieldCircle& start)
+      : points_(points), fit_{.circle = start} {}
+
+  bool linearise(Equations& equations) {
+    constexpr double tukey = 4.685;  // 95 % efficiency for normal errors
+    constexpr int min_points = 12;
+    const FieldCircle& circle = fit_.circle;
     std::vector<double> deviations;
-    for (const EdgePoint& p : points) {
+    for (const EdgePoint& p : points_) {
       deviations.push_back(std::abs(std::hypot(p.u - circle.u, p.v - circle.v) - circle.radius));
     }
     // A tenth of a pixel is what the parabola of the edge gives at best.
     const double scale = tukey * std::max(0.1, 1.4826 * upper_median(deviations));
-    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d right = Eigen::Vector3d::Zero();
+    equations.begin();
     double weights = 0;
     double squares = 0;
     int used = 0;
-    for (const EdgePoint& p : points) {
+    for (const EdgePoint& p : points_) {
       const double distance = std::hypot(p.u - circle.u, p.v - circle.v);
       const double residual = distance - circle.radius;
       if (distance == 0 || std::abs(residual) >= scale) continue;
       const double t = residual / scale;
-      const double weight = (1 - t * t) * (1 - t * t);
+      const double weight = tukey_weight(t * t);
       const Eigen::Vector3d row((p.u - circle.u) / distance, (p.v - circle.v) / distance, 1.0);
-      normal += weight * row * row.transpose();
-      right += weight * residual * row;
+      equations.matrix += weight * row * row.transpose();
+      equations.right += weight * residual * row;
       weights += weight;
       squares += weight * residual * residual;
       ++used;
     }
-    if (used < 12) return std::nullopt;
-    const Eigen::LDLT<Eigen::Matrix3d> solver(normal);
-    // An arc too short leaves centre and radius undetermined.
-    if (solver.info() != Eigen::Success || solver.rcond() < 1e-5) return std::nullopt;
-    const Eigen::Vector3d step = solver.solve(right);
-    circle.u += step(0);
-    circle.v += step(1);
-    circle.radius += step(2);
-    fit.residual = std::sqrt(squares / weights);
-    if (!step.allFinite() || circle.radius <= 0) return std::nullopt;
-    if (step.norm() < 1e-4) break;
+    if (used < min_points) return false;
+    fit_.residual = std::sqrt(squares / weights);
+    return true;
   }
-  fit.circle = circle;
-  return fit;
+
+  bool move(const Eigen::Vector3d& step) {
+    constexpr double settled_px = 1e-4;
+    fit_.circle.u += step(0);
+    fit_.circle.v += step(1);
+    fit_.circle.radius += step(2);
+    return fit_.circle.radius <= 0 || step.norm() < settled_px;
+  }
+
+  [[nodiscard]] const CircleFit& fit() const { return fit_; }
+
+ private:
+  const std::vector<EdgePoint>& points_;
+  CircleFit fit_;
+};
+
+/// Returns the circle of least squares, its residual the weighted root mean square. Empty when the
+/// points do not determine a circle.
+std::optional<CircleFit> fit_points(const std::vector<EdgePoint>& points, FieldCircle circle) {
+  CircleProblem problem(points, circle);
+  CircleProblem::Equations equations;
+  // An arc too short leaves centre and radius undetermined.
+  equations.min_reciprocal_condition = 1e-5;
+  const LeastSquaresReport solved = minimise(problem, equations, {.max_steps = 20});
+  if (!solved.solvable || problem.fit().circle.radius <= 0) return std::nullopt;
+  return problem.fit();
 }
 
 }  // namespace

@@ -1,6 +1,5 @@
 #include "panonav/mapping/internal/azimuth_flow.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
@@ -9,6 +8,8 @@
 #include <cstddef>
 #include <numbers>
 #include <vector>
+
+#include "panonav/geometry/least_squares.hpp"
 
 namespace panonav {
 
@@ -106,6 +107,105 @@ Pixels elevation_slopes(const Pixels& values, double band_height_rad) {
   return slopes;
 }
 
+/// Two views whose pixels a flow relates, as `minimise` sees them.
+class FlowProblem {
+ public:
+  using Equations = DenseEquations<unknowns>;
+
+  FlowProblem(const HomingView& before, const HomingView& after, const AzimuthFlow& start)
+      : flow_(start) {
+    const int bands = std::min(max_bands, after.rows());
+    const int highest = std::min({before.components(), after.components(), columns / 2}) - 1;
+    earlier_ = bands_of(before, bands, highest);
+    std::array<double, columns> unmoved{};
+    for (std::size_t c = 0; c < columns; ++c) unmoved[c] = azimuths_[c].phi;
+    now_ = sample(bands_of(after, bands, highest), unmoved);
+    rise_ = Eigen::VectorXf::Zero(bands);
+    if (after.elevations()) {
+      const double height = after.elevations()->top_rad - after.elevations()->bottom_rad;
+      band_height_rad_ = height / bands;
+      for (int band = 0; band < bands; ++band) {
+        const double elevation = after.elevations()->top_rad - (band + 0.5) * band_height_rad_;
+        rise_[band] = static_cast<float>(std::sin(elevation) * std::cos(elevation));
+      }
+    }
+    now_up_ = elevation_slopes(now_.values, band_height_rad_);
+    compare();
+  }
+
+  [[nodiscard]] const AzimuthFlow& flow() const { return flow_; }
+
+  [[nodiscard]] bool linearise(Equations& equations) const {
+    equations.begin();
+    const auto sums_of = [](const Pixels& x, const Pixels& y) -> Eigen::RowVectorXd {
+      return x.cwiseProduct(y).colwise().sum().cast<double>();
+    };
+    const Eigen::RowVectorXd across_across = sums_of(across_, across_);
+    const Eigen::RowVectorXd across_up = sums_of(across_, up_);
+    const Eigen::RowVectorXd up_up = sums_of(up_, up_);
+    const Eigen::RowVectorXd across_difference = sums_of(across_, difference_);
+    const Eigen::RowVectorXd up_difference = sums_of(up_, difference_);
+    for (int c = 0; c < columns; ++c) {
+      const Azimuth& at = azimuths_[static_cast<std::size_t>(c)];
+      // A pixel's equation is across * turns + up * rises.
+      const Equations::Vector turns(1.0, at.c1, at.s1, at.c2, at.s2);
+      const Equations::Vector rises(0.0, -at.s1, at.c1, 0.0, 0.0);
+      const Equations::Matrix mixed = turns * rises.transpose();
+      equations.matrix += across_across[c] * turns * turns.transpose() +
+                          up_up[c] * rises * rises.transpose() +
+                          across_up[c] * (mixed + mixed.transpose());
+      equations.right += across_difference[c] * turns + up_difference[c] * rises;
+    }
+    // A weak prior: what no pixel shows stays 0.
+    const double prior = 1e-6 * equations.matrix.trace() + 1e-12;
+    equations.matrix.diagonal().array() += prior;
+    return true;
+  }
+
+  bool move(const Equations::Vector& change) {
+    flow_.g0 += change[0];
+    flow_.a1 += change[1];
+    flow_.b1 += change[2];
+    flow_.a2 += change[3];
+    flow_.b2 += change[4];
+    compare();
+    return false;
+  }
+
+ private:
+  /// Sets what the flow leaves unexplained, and how pixels change with it.
+  void compare() {
+    std::array<double, columns> moved{};
+    for (std::size_t c = 0; c < columns; ++c) {
+      const Azimuth& at = azimuths_[c];
+      moved[c] = at.phi + flow_.g0 + flow_.a1 * at.c1 + flow_.b1 * at.s1 + flow_.a2 * at.c2 +
+                 flow_.b2 * at.s2;
+    }
+    const Sampled then = sample(earlier_, moved);
+    const Pixels then_up = elevation_slopes(then.values, band_height_rad_);
+    across_ = 0.5F * (now_.slopes + then.slopes);
+    up_ = rise_.asDiagonal() * (0.5F * (now_up_ + then_up));
+    difference_ = now_.values - then.values;
+    for (int c = 0; c < columns; ++c) {
+      const Azimuth& at = azimuths_[static_cast<std::size_t>(c)];
+      // The displacement in this direction, of the flow so far.
+      difference_.col(c) += static_cast<float>(flow_.a1 * at.s1 - flow_.b1 * at.c1) * up_.col(c);
+    }
+    const double left = static_cast<double>(difference_.squaredNorm());
+    const double energy =
+        static_cast<double>(now_.values.squaredNorm() + then.values.squaredNorm());
+    flow_.residual = energy > 0.0 ? std::min(1.0, left / energy) : 1.0;
+  }
+
+  std::array<Azimuth, columns> azimuths_ = all_azimuths();
+  AzimuthFlow flow_;
+  Bands earlier_;
+  Sampled now_;
+  Eigen::VectorXf rise_;  // how much a band moves up for each unit ahead: sin e cos e
+  double band_height_rad_ = 1.0;
+  Pixels now_up_, across_, up_, difference_;
+};
+
 }  // namespace
 
 double AzimuthFlow::direction_rad() const noexcept {
@@ -123,80 +223,10 @@ double AzimuthFlow::turn_rad() const noexcept {
 
 AzimuthFlow refine_flow(const HomingView& before, const HomingView& after, const AzimuthFlow& start,
                         int iterations) {
-  const int bands = std::min(max_bands, after.rows());
-  const int highest = std::min({before.components(), after.components(), columns / 2}) - 1;
-  const Bands earlier = bands_of(before, bands, highest);
-  const Bands later = bands_of(after, bands, highest);
-  const auto azimuths = all_azimuths();
-  std::array<double, columns> unmoved{};
-  for (int c = 0; c < columns; ++c) {
-    unmoved[static_cast<std::size_t>(c)] = azimuths[static_cast<std::size_t>(c)].phi;
-  }
-  const Sampled now = sample(later, unmoved);
-  // How much a band moves up for each unit of way ahead: sin e cos e.
-  Eigen::VectorXf rise = Eigen::VectorXf::Zero(bands);
-  double band_height_rad = 1.0;
-  if (after.elevations()) {
-    const double height = after.elevations()->top_rad - after.elevations()->bottom_rad;
-    band_height_rad = height / bands;
-    for (int band = 0; band < bands; ++band) {
-      const double elevation = after.elevations()->top_rad - (band + 0.5) * band_height_rad;
-      rise[band] = static_cast<float>(std::sin(elevation) * std::cos(elevation));
-    }
-  }
-  AzimuthFlow flow = start;
-  const Pixels now_up = elevation_slopes(now.values, band_height_rad);
-  for (int iteration = 0;; ++iteration) {
-    std::array<double, columns> moved{};
-    for (int c = 0; c < columns; ++c) {
-      const Azimuth& at = azimuths[static_cast<std::size_t>(c)];
-      moved[static_cast<std::size_t>(c)] =
-          at.phi + flow.g0 + flow.a1 * at.c1 + flow.b1 * at.s1 + flow.a2 * at.c2 + flow.b2 * at.s2;
-    }
-    const Sampled then = sample(earlier, moved);
-    const Pixels then_up = elevation_slopes(then.values, band_height_rad);
-    const Pixels across = 0.5F * (now.slopes + then.slopes);
-    const Pixels up = rise.asDiagonal() * (0.5F * (now_up + then_up));
-    Pixels difference = now.values - then.values;
-    for (int c = 0; c < columns; ++c) {
-      const Azimuth& at = azimuths[static_cast<std::size_t>(c)];
-      // The way ahead in this direction, of the flow so far.
-      difference.col(c) += static_cast<float>(flow.a1 * at.s1 - flow.b1 * at.c1) * up.col(c);
-    }
-    const double left = static_cast<double>(difference.squaredNorm());
-    const double energy = static_cast<double>(now.values.squaredNorm() + then.values.squaredNorm());
-    flow.residual = energy > 0.0 ? std::min(1.0, left / energy) : 1.0;
-    if (iteration >= iterations) return flow;
-    Eigen::Matrix<double, unknowns, unknowns> normal =
-        Eigen::Matrix<double, unknowns, unknowns>::Zero();
-    Eigen::Matrix<double, unknowns, 1> right = Eigen::Matrix<double, unknowns, 1>::Zero();
-    const auto sums_of = [](const Pixels& x, const Pixels& y) -> Eigen::RowVectorXd {
-      return x.cwiseProduct(y).colwise().sum().cast<double>();
-    };
-    const Eigen::RowVectorXd across_across = sums_of(across, across);
-    const Eigen::RowVectorXd across_up = sums_of(across, up);
-    const Eigen::RowVectorXd up_up = sums_of(up, up);
-    const Eigen::RowVectorXd across_difference = sums_of(across, difference);
-    const Eigen::RowVectorXd up_difference = sums_of(up, difference);
-    for (int c = 0; c < columns; ++c) {
-      const Azimuth& at = azimuths[static_cast<std::size_t>(c)];
-      // A pixel's equation is across * turns + up * rises.
-      const Eigen::Matrix<double, unknowns, 1> turns(1.0, at.c1, at.s1, at.c2, at.s2);
-      const Eigen::Matrix<double, unknowns, 1> rises(0.0, -at.s1, at.c1, 0.0, 0.0);
-      const Eigen::Matrix<double, unknowns, unknowns> mixed = turns * rises.transpose();
-      normal += across_across[c] * turns * turns.transpose() +
-                up_up[c] * rises * rises.transpose() + across_up[c] * (mixed + mixed.transpose());
-      right += across_difference[c] * turns + up_difference[c] * rises;
-    }
-    const double damping = 1e-6 * normal.trace() + 1e-12;
-    normal.diagonal().array() += damping;
-    const Eigen::Matrix<double, unknowns, 1> change = normal.ldlt().solve(right);
-    flow.g0 += change[0];
-    flow.a1 += change[1];
-    flow.b1 += change[2];
-    flow.a2 += change[3];
-    flow.b2 += change[4];
-  }
+  FlowProblem problem(before, after, start);
+  FlowProblem::Equations equations;
+  static_cast<void>(minimise(problem, equations, {.max_steps = iterations}));
+  return problem.flow();
 }
 
 }  // namespace panonav

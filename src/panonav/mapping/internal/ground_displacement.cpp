@@ -9,6 +9,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
+#include "panonav/geometry/least_squares.hpp"
 
 namespace panonav {
 
@@ -147,48 +148,71 @@ class Ground {
   Pixels earlier_;
 };
 
-std::optional<GroundDisplacement> solve(const Ground& ground, const Pose2& start) {
-  Pose2 motion = start;
-  std::vector<Equation> equations;
-  std::vector<double> sizes;
-  for (int iteration = 0;; ++iteration) {
-    ground.linearise(motion, equations);
-    if (equations.size() < ground.pixels() / 4) return std::nullopt;
-    sizes.clear();
-    for (const Equation& equation : equations) sizes.push_back(std::abs(equation.difference));
-    const double middle = upper_median_in_place(std::span(sizes));
-    const double scale = 1.4826 * middle + 1e-9;
-    Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
-    Eigen::Vector2d right = Eigen::Vector2d::Zero();
+/// The motion over the ground as `minimise` sees it.
+class GroundProblem {
+ public:
+  using Equations = DenseEquations<2>;
+
+  GroundProblem(const Ground& ground, const Pose2& start) : ground_(ground), motion_(start) {}
+
+  /// False where both views show too little in common, or nothing that changes with the motion.
+  bool linearise(Equations& normal) {
+    ground_.linearise(motion_, equations_);
+    if (equations_.size() < ground_.pixels() / 4) return false;
+    sizes_.clear();
+    for (const Equation& equation : equations_) sizes_.push_back(std::abs(equation.difference));
+    middle_ = upper_median_in_place(std::span(sizes_));
+    const double scale = 1.4826 * middle_ + 1e-9;
+    normal.begin();
     double left = 0.0;
     double weights = 0.0;
-    for (const Equation& equation : equations) {
+    for (const Equation& equation : equations_) {
       const double relative = equation.difference / scale;
-      const double weight = 1.0 / (1.0 + relative * relative);
-      normal += weight * equation.slopes * equation.slopes.transpose();
-      right += weight * equation.difference * equation.slopes;
+      const double weight = cauchy_weight(relative * relative);
+      normal.matrix += weight * equation.slopes * equation.slopes.transpose();
+      normal.right += weight * equation.difference * equation.slopes;
       left += weight * equation.difference * equation.difference;
       weights += weight;
     }
-    const double trace = normal.trace();
-    if (!(trace > 0.0)) return std::nullopt;
-    const Eigen::Matrix2d covariance =
-        (normal + 1e-9 * trace * Eigen::Matrix2d::Identity()).inverse();
-    if (iteration == iterations) {
-      const double length = std::hypot(motion.x_m, motion.y_m);
-      const Eigen::Vector2d along = length > 0.0
-                                        ? Eigen::Vector2d(motion.x_m / length, motion.y_m / length)
-                                        : Eigen::Vector2d(1.0, 0.0);
-      // The shortest wave of 15 components covers four coarse_columns, which say the same.
-      const double variance = 4.0 * left / weights;
-      return GroundDisplacement{motion.x_m, motion.y_m,
-                                std::sqrt(variance * along.dot(covariance * along)), middle};
-    }
-    const Eigen::Vector2d change = covariance * right;
-    motion.x_m += change.x();
-    motion.y_m += change.y();
-    if (!is_finite(motion)) return std::nullopt;
+    const double trace = normal.matrix.trace();
+    if (!(trace > 0.0)) return false;
+    normal.matrix.diagonal().array() += 1e-9 * trace;
+    // The shortest wave of 15 components covers four coarse_columns, which say the same.
+    variance_ = 4.0 * left / weights;
+    return true;
   }
+
+  bool move(const Eigen::Vector2d& change) {
+    motion_.x_m += change.x();
+    motion_.y_m += change.y();
+    return false;
+  }
+
+  /// What the last `linearise` says of the motion.
+  [[nodiscard]] GroundDisplacement result(const Equations& normal) const {
+    const double length = std::hypot(motion_.x_m, motion_.y_m);
+    const Eigen::Vector2d along = length > 0.0
+                                      ? Eigen::Vector2d(motion_.x_m / length, motion_.y_m / length)
+                                      : Eigen::Vector2d(1.0, 0.0);
+    const double spread = along.dot(normal.matrix.inverse() * along);
+    return {motion_.x_m, motion_.y_m, std::sqrt(variance_ * spread), middle_};
+  }
+
+ private:
+  const Ground& ground_;
+  Pose2 motion_;
+  std::vector<Equation> equations_;
+  std::vector<double> sizes_;
+  double middle_ = 0.0;    // of the differences' sizes
+  double variance_ = 0.0;  // of a difference
+};
+
+std::optional<GroundDisplacement> solve(const Ground& ground, const Pose2& start) {
+  GroundProblem problem(ground, start);
+  GroundProblem::Equations normal;
+  const auto solved = minimise(problem, normal, {.max_steps = iterations});
+  if (!solved.solvable || !problem.linearise(normal)) return std::nullopt;
+  return problem.result(normal);
 }
 
 }  // namespace

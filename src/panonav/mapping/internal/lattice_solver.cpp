@@ -9,16 +9,20 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/mapping/internal/normal_equations.hpp"
+#include "panonav/geometry/least_squares.hpp"
 
 namespace panonav {
 
 namespace {
 
-constexpr double kWidth = 3.0;            // in deviations: where a spring begins to be rejected
-constexpr int kIterationsPerWidth = 20;   // at most
-constexpr double kEnough = 1e-7;          // relative change of the energy
-constexpr double kEnoughOnTheWay = 1e-3;  // the same before the widths are narrow
+// Width of the losses in deviations, where a spring begins to be rejected: what normal errors
+// exceed once in 370 times.
+constexpr double final_width = 3.0;
+constexpr int max_steps_per_width = 20;
+// Relative decrease of the energy below which a width is done with: positions then move by less
+// than 1e-4 of a spring. While widths are still narrowed the next one corrects what is left.
+constexpr double min_final_decrease = 1e-7;
+constexpr double min_decrease_while_narrowing = 1e-3;
 
 using Row = std::array<double, 6>;  // derivatives by x, y, heading of a and of b
 
@@ -26,7 +30,7 @@ using Row = std::array<double, 6>;  // derivatives by x, y, heading of a and of 
 enum Group : std::size_t { phases, length, length_by_phases, groups };
 /// Median of the squared strain of a group when deviations are right (chi-squared of two rows and
 /// of one).
-constexpr std::array<double, groups> kMedianSquare{1.386, 0.455, 0.455};
+constexpr std::array<double, groups> median_square{1.386, 0.455, 0.455};
 
 /// The strain of one spring in deviations, and its derivatives.
 struct Strain {
@@ -131,10 +135,11 @@ void check(std::span<const SpringTerm> springs, std::span<const Pose2> poses,
   }
 }
 
-class Solver {
+/// The energy of the springs as `minimise` sees it: poses, robust weights and their widths.
+class SpringEnergy {
  public:
-  Solver(std::span<const SpringTerm> springs, std::span<Pose2> poses,
-         std::span<const unsigned char> moving, const std::function<void()>& moved)
+  SpringEnergy(std::span<const SpringTerm> springs, std::span<Pose2> poses,
+               std::span<const unsigned char> moving, const std::function<void()>& moved)
       : moved_(moved), springs_(springs), poses_(poses), unknown_(poses.size(), -1) {
     for (std::size_t i = 0; i < poses.size(); ++i) {
       if (moving.empty() || moving[i] != 0) {
@@ -142,36 +147,21 @@ class Solver {
         unknowns_ += 3;
       }
     }
-    solution_.weights.assign(springs.size(), 1.0);
     trust_.resize(springs.size());
   }
 
-  LatticeSolution solve() {
-    if (unknowns_ > 0 && !springs_.empty()) {
-      widths_.fill(kWidth);
-      for (const SpringTerm& spring : springs_) {
-        if (spring.certain) continue;
-        const auto squares = squares_of(spring);
-        for (std::size_t g = 0; g < groups; ++g) {
-          widths_[g] = std::max(widths_[g], 2.0 * std::sqrt(squares[g].value_or(0.0)));
-        }
-      }
-      while (narrow()) relax(kEnoughOnTheWay);
-      relax(kEnough);
-    }
-    solution_.energy = energy();
-    for (std::size_t s = 0; s < springs_.size(); ++s) {
-      const auto squares = squares_of(springs_[s]);
-      const Group group = squares[phases] ? phases : length;
-      solution_.weights[s] = weight(s, group, squares[group].value_or(0.0));
-    }
-    return solution_;
-  }
+  [[nodiscard]] bool has_unknowns() const { return unknowns_ > 0 && !springs_.empty(); }
 
- private:
-  [[nodiscard]] std::array<std::optional<double>, groups> squares_of(
-      const SpringTerm& spring) const {
-    return strain_of(spring, poses_[spring.a], poses_[spring.b]).squares();
+  /// Widens the losses until no spring is beyond half of them.
+  void widen() {
+    widths_.fill(final_width);
+    for (const SpringTerm& spring : springs_) {
+      if (spring.certain) continue;
+      const auto squares = squares_of(spring);
+      for (std::size_t g = 0; g < groups; ++g) {
+        widths_[g] = std::max(widths_[g], 2.0 * std::sqrt(squares[g].value_or(0.0)));
+      }
+    }
   }
 
   /// Halves the widths, down to three deviations, which the median strain corrects where they were
@@ -187,10 +177,10 @@ class Solver {
     }
     bool narrowed = false;
     for (std::size_t g = 0; g < groups; ++g) {
-      double least = kWidth;
+      double least = final_width;
       if (!squares[g].empty()) {
         const double middle = upper_median_in_place(std::span(squares[g]));
-        least *= std::max(1.0, std::sqrt(middle / kMedianSquare[g]));
+        least *= std::max(1.0, std::sqrt(middle / median_square[g]));
       }
       if (widths_[g] <= least) continue;
       widths_[g] = std::max(least, 0.5 * widths_[g]);
@@ -199,17 +189,30 @@ class Solver {
     return narrowed;
   }
 
-  /// What counts of a group of a spring's strains. Where the views tell direction and turn, lengths
-  /// are believed as far as these are, and then pull for ever: else a node could leave along a
-  /// direction.
-  [[nodiscard]] double weight(std::size_t s, Group group, double square) const {
-    if (springs_[s].certain) return 1.0;
-    const double share = square / (widths_[group] * widths_[group]);
-    if (group == phases || !trust_[s]) return 1.0 / ((1.0 + share) * (1.0 + share));
-    return *trust_[s] / std::sqrt(1.0 + share);
+  /// The weight of each spring in the end, by its phases where it has them.
+  [[nodiscard]] std::vector<double> weights() const {
+    std::vector<double> result(springs_.size(), 1.0);
+    for (std::size_t s = 0; s < springs_.size(); ++s) {
+      const auto squares = squares_of(springs_[s]);
+      const Group group = squares[phases] ? phases : length;
+      result[s] = weight(s, group, squares[group].value_or(0.0));
+    }
+    return result;
   }
+
+  bool linearise(SparseEquations& equations) {
+    start_.assign(poses_.begin(), poses_.end());
+    set_trust();
+    equations.begin(unknowns_);
+    // Every diagonal entry is there, whatever the springs touch.
+    for (int i = 0; i < unknowns_; ++i) equations.add(i, i, 0.0);
+    for (std::size_t s = 0; s < springs_.size(); ++s) add_spring(s, equations);
+    equations.assemble();
+    return true;
+  }
+
   /// The loss that the weights belong to.
-  [[nodiscard]] double energy() const {
+  [[nodiscard]] double cost() const {
     double sum = 0.0;
     for (std::size_t s = 0; s < springs_.size(); ++s) {
       const auto squares = squares_of(springs_[s]);
@@ -228,77 +231,8 @@ class Solver {
     }
     return sum;
   }
-  /// Makes up the mind on whose lengths to believe.
-  void judge() {
-    for (std::size_t s = 0; s < springs_.size(); ++s) {
-      const auto square = squares_of(springs_[s])[phases];
-      trust_[s] = square ? std::optional(weight(s, phases, *square)) : std::nullopt;
-    }
-  }
 
-  void relax(double enough) {
-    double damping = 1e-6;
-    for (int i = 0; i < kIterationsPerWidth; ++i) {
-      ++solution_.iterations;
-      judge();
-      const double before = energy();
-      assemble();
-      bool better = false;
-      double after = before;
-      const std::vector<Pose2> start(poses_.begin(), poses_.end());
-      for (int attempt = 0; attempt < 8 && !better; ++attempt) {
-        if (step(damping)) after = energy();
-        better = after < before;
-        if (better) {
-          damping = std::max(1e-9, damping * 0.1);
-        } else {
-          std::ranges::copy(start, poses_.begin());
-          damping *= 10.0;
-        }
-      }
-      if (better && moved_) moved_();
-      if (!better || before - after <= enough * before) break;
-    }
-  }
-
-  void assemble() {
-    equations_.begin(unknowns_);
-    // Every diagonal entry is there, whatever the springs touch.
-    for (int i = 0; i < unknowns_; ++i) equations_.add(i, i, 0.0);
-    for (std::size_t s = 0; s < springs_.size(); ++s) {
-      const SpringTerm& spring = springs_[s];
-      const int first = unknown_[spring.a];
-      const int second = unknown_[spring.b];
-      if (first < 0 && second < 0) continue;
-      const Strain strain = strain_of(spring, poses_[spring.a], poses_[spring.b]);
-      const auto squares = strain.squares();
-      const auto column = [&](int i) {
-        const int base = i < 3 ? first : second;
-        return base < 0 ? -1 : base + i % 3;
-      };
-      for (const auto& entry : strain.used()) {
-        const double w = weight(s, entry.group, *squares[entry.group]);
-        for (int i = 0; i < 6; ++i) {
-          const double si = entry.slope[static_cast<std::size_t>(i)];
-          const int ci = column(i);
-          if (ci < 0 || si == 0.0) continue;
-          equations_.gradient(ci) += w * si * entry.value;
-          for (int j = 0; j < 6; ++j) {
-            const double sj = entry.slope[static_cast<std::size_t>(j)];
-            const int cj = column(j);
-            if (cj >= 0 && cj <= ci && sj != 0.0) equations_.add(ci, cj, w * si * sj);
-          }
-        }
-      }
-    }
-    equations_.assemble();
-  }
-
-  /// False when the system cannot be solved with so little damping.
-  bool step(double damping) {
-    const auto solution = equations_.solve(damping);
-    if (!solution) return false;
-    const Eigen::VectorXd& change = *solution;
+  void move(const Eigen::VectorXd& change) {
     for (std::size_t i = 0; i < poses_.size(); ++i) {
       const int base = unknown_[i];
       if (base < 0) continue;
@@ -306,18 +240,70 @@ class Solver {
       poses_[i].y_m += change(base + 1);
       poses_[i].heading_rad = wrap_angle(poses_[i].heading_rad + change(base + 2));
     }
-    return true;
+  }
+  void undo() { std::ranges::copy(start_, poses_.begin()); }
+  void accept() {
+    if (moved_) moved_();
+  }
+
+ private:
+  [[nodiscard]] std::array<std::optional<double>, groups> squares_of(
+      const SpringTerm& spring) const {
+    return strain_of(spring, poses_[spring.a], poses_[spring.b]).squares();
+  }
+
+  /// Returns the weight of a group of a spring's strains. Where the views tell direction and turn,
+  /// lengths are believed as far as these are, and then pull for ever: else a node could leave
+  /// along a direction.
+  [[nodiscard]] double weight(std::size_t s, Group group, double square) const {
+    if (springs_[s].certain) return 1.0;
+    const double share = square / (widths_[group] * widths_[group]);
+    if (group == phases || !trust_[s]) return geman_mcclure_weight(share);
+    return *trust_[s] / std::sqrt(1.0 + share);
+  }
+  /// Sets how far the lengths of each spring with phases are believed.
+  void set_trust() {
+    for (std::size_t s = 0; s < springs_.size(); ++s) {
+      const auto square = squares_of(springs_[s])[phases];
+      trust_[s] = square ? std::optional(weight(s, phases, *square)) : std::nullopt;
+    }
+  }
+
+  void add_spring(std::size_t s, SparseEquations& equations) const {
+    const SpringTerm& spring = springs_[s];
+    const int first = unknown_[spring.a];
+    const int second = unknown_[spring.b];
+    if (first < 0 && second < 0) return;
+    const Strain strain = strain_of(spring, poses_[spring.a], poses_[spring.b]);
+    const auto squares = strain.squares();
+    const auto column = [&](int i) {
+      const int base = i < 3 ? first : second;
+      return base < 0 ? -1 : base + i % 3;
+    };
+    for (const auto& entry : strain.used()) {
+      const double w = weight(s, entry.group, *squares[entry.group]);
+      for (int i = 0; i < 6; ++i) {
+        const double si = entry.slope[static_cast<std::size_t>(i)];
+        const int ci = column(i);
+        if (ci < 0 || si == 0.0) continue;
+        equations.right(ci) -= w * si * entry.value;
+        for (int j = 0; j < 6; ++j) {
+          const double sj = entry.slope[static_cast<std::size_t>(j)];
+          const int cj = column(j);
+          if (cj >= 0 && cj <= ci && sj != 0.0) equations.add(ci, cj, w * si * sj);
+        }
+      }
+    }
   }
 
   const std::function<void()>& moved_;
   std::span<const SpringTerm> springs_;
   std::span<Pose2> poses_;
+  std::vector<Pose2> start_;  // of the present step
   std::vector<int> unknown_;  // first unknown of each pose, -1: it stays
   int unknowns_ = 0;
-  NormalEquations equations_;
   std::vector<std::optional<double>> trust_;  // in the lengths of each spring with phases
-  std::array<double, groups> widths_{kWidth, kWidth, kWidth};
-  LatticeSolution solution_;
+  std::array<double, groups> widths_{final_width, final_width, final_width};
 };
 
 }  // namespace
@@ -326,7 +312,24 @@ LatticeSolution solve_lattice(std::span<const SpringTerm> springs, std::span<Pos
                               std::span<const unsigned char> moving,
                               const std::function<void()>& moved) {
   check(springs, poses, moving);
-  return Solver(springs, poses, moving, moved).solve();
+  SpringEnergy energy(springs, poses, moving, moved);
+  LatticeSolution solution;
+  SparseEquations equations;
+  const auto relax = [&](double min_relative_decrease) {
+    solution.iterations += minimise(energy, equations,
+                                    {.max_steps = max_steps_per_width,
+                                     .damping = 1e-6,  // springs hold most nodes well
+                                     .min_relative_decrease = min_relative_decrease})
+                               .steps;
+  };
+  if (energy.has_unknowns()) {
+    energy.widen();
+    while (energy.narrow()) relax(min_decrease_while_narrowing);
+    relax(min_final_decrease);
+  }
+  solution.energy = energy.cost();
+  solution.weights = energy.weights();
+  return solution;
 }
 
 }  // namespace panonav

@@ -2,25 +2,31 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
+#include <utility>
 
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/mapping/lattice_graph.hpp"
+#include "panonav/mapping/internal/lattice_graph.hpp"
 #include "panonav/signature/dissimilarity.hpp"
 
 namespace panonav {
 
 namespace {
 
-// Answers of two views that differ by more say nothing. Unrelated views agree so well in direction
-// and turn by chance once in 16 times.
-constexpr double kAgreement = 0.25 * std::numbers::pi;
-// Three turns that should cancel; three displacements, relative to the longest.
-constexpr double kTurnsCancel = 10.0 * std::numbers::pi / 180.0;
-constexpr double kWaysCancel = 0.5;
-constexpr double kUnknownError = 0.25;     // of a length, before the curve is known
-constexpr double kSmallestAngle = 0.0035;  // rad; phases are packed in steps of 0.025
+/// Answers of two views that differ by more say nothing. Unrelated views agree so well in direction
+/// and turn by chance once in 16 times.
+constexpr double max_disagreement_rad = 0.25 * std::numbers::pi;
+/// Largest sum of three turns that cancel: those of phases err by some 5 degrees each.
+constexpr double turn_closing_rad = 10.0 * std::numbers::pi / 180.0;
+/// The same of three displacements, as a share of the longest, whose lengths err by a quarter.
+constexpr double displacement_closing = 0.5;
+/// Error of a length as a share of it, before the curve is known.
+constexpr double default_length_error = 0.25;
+/// Least deviation of an angle, 0.2 degrees: rounding of packed phases, whose steps of 0.025 rad
+/// leave 0.4 degrees each, averaged over the components.
+constexpr double min_angle_deviation_rad = 0.0035;
 
 /// Displacement and turn of the spring from one of its ends.
 Pose2 step_from(std::size_t from, const LatticeSpring& spring) {
@@ -81,8 +87,8 @@ LatticeSpring SpringViews::measure(NodePair pair, const std::optional<TurnHint>&
 
 bool agrees(const LatticeSpring& spring) {
   if (!spring.phases) return true;
-  return spring.phases->disagreement_rad <= kAgreement &&
-         spring.phases->turn_disagreement_rad <= kAgreement;
+  return spring.phases->disagreement_rad <= max_disagreement_rad &&
+         spring.phases->turn_disagreement_rad <= max_disagreement_rad;
 }
 
 void learn_errors(std::span<const LatticeSpring> springs, const DissimilarityCurve& curve,
@@ -99,12 +105,12 @@ void learn_errors(std::span<const LatticeSpring> springs, const DissimilarityCur
   // The median spring errs by E, the others as their stiffness says [M04 eq. 5].
   const double middle = lengths.empty() ? 1.0 : upper_median(lengths);
   double error = curve.error(middle);
-  if (!(error > 0.0)) error = kUnknownError * (middle > 0.0 ? middle : 1.0);
+  if (!(error > 0.0)) error = default_length_error * (middle > 0.0 ? middle : 1.0);
   errors.length = error * std::sqrt(curve.stiffness(middle));
   // Two readings of deviation s differ by sqrt(2) s; their mean errs by s / sqrt(2).
   const auto deviation = [](const std::vector<double>& differences) {
-    if (differences.empty()) return kSmallestAngle;
-    return std::max(kSmallestAngle, 0.5 * normal_over_median * upper_median(differences));
+    if (differences.empty()) return min_angle_deviation_rad;
+    return std::max(min_angle_deviation_rad, 0.5 * normal_over_median * upper_median(differences));
   };
   errors.direction_rad = deviation(disagreements);
   errors.turn_rad = deviation(turn_disagreements);
@@ -154,8 +160,9 @@ std::vector<double> closing_triangles(std::size_t nodes, std::span<const Lattice
         const Pose2 straight = step_from(a, ac);
         const double longest = std::max({ab.length, bc.length, ac.length});
         const bool closes =
-            std::abs(angle_difference(by_b.heading_rad, straight.heading_rad)) <= kTurnsCancel &&
-            distance(by_b.position(), straight.position()) <= kWaysCancel * longest;
+            std::abs(angle_difference(by_b.heading_rad, straight.heading_rad)) <=
+                turn_closing_rad &&
+            distance(by_b.position(), straight.position()) <= displacement_closing * longest;
         for (const std::size_t edge : {n.edge, m.edge, across}) {
           all[edge] += 1.0;
           closing[edge] += closes ? 1.0 : 0.0;
@@ -168,6 +175,41 @@ std::vector<double> closing_triangles(std::size_t nodes, std::span<const Lattice
     if (all[s] > 0.0) closing[s] /= all[s];
   }
   return closing;
+}
+
+void keep_confirmed(std::size_t nodes, double min_closing, std::vector<LatticeSpring>& springs) {
+  const auto closes = closing_triangles(nodes, springs);
+  std::vector<GraphEdge> confirmed;
+  std::vector<unsigned char> has_support(nodes);
+  for (std::size_t s = 0; s < springs.size(); ++s) {
+    if (!(closes[s] > min_closing)) continue;
+    confirmed.push_back({springs[s].a, springs[s].b, 1.0});
+    has_support[springs[s].a] = 1;
+    has_support[springs[s].b] = 1;
+  }
+  const auto components = LatticeGraph(nodes, confirmed).components();
+  std::vector<std::map<std::size_t, std::size_t>> leads_to(nodes);
+  for (const LatticeSpring& spring : springs) {
+    if (has_support[spring.b] != 0) ++leads_to[spring.a][components[spring.b]];
+    if (has_support[spring.a] != 0) ++leads_to[spring.b][components[spring.a]];
+  }
+  const auto main_component = [&](std::size_t node) -> std::optional<std::size_t> {
+    if (leads_to[node].empty()) return std::nullopt;
+    return std::ranges::max_element(leads_to[node], {}, [](const auto& p) { return p.second; })
+        ->first;
+  };
+  std::vector<LatticeSpring> kept;
+  for (std::size_t s = 0; s < springs.size(); ++s) {
+    const auto [a, b] = std::pair{springs[s].a, springs[s].b};
+    const bool supported_a = has_support[a] != 0;
+    const bool supported_b = has_support[b] != 0;
+    const bool keep = closes[s] > min_closing ||
+                      (!supported_a && supported_b && main_component(a) == components[b]) ||
+                      (supported_a && !supported_b && main_component(b) == components[a]) ||
+                      (!supported_a && !supported_b && !main_component(a) && !main_component(b));
+    if (keep) kept.push_back(springs[s]);
+  }
+  springs = std::move(kept);
 }
 
 }  // namespace panonav

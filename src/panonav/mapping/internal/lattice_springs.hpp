@@ -27,7 +27,7 @@ class SpringViews {
   [[nodiscard]] std::vector<NodePair> most_similar(const LatticeOptions& options,
                                                    Executor& executor) const;
   [[nodiscard]] double dissimilarity(NodePair pair) const;
-  /// Dissimilarity and, where wanted, phases; no length yet. `hint`: turn from the first to the
+  /// Dissimilarity and, with the option, phases; no length yet. `hint`: turn from the first to the
   /// second node.
   [[nodiscard]] LatticeSpring measure(NodePair pair,
                                       const std::optional<TurnHint>& hint = std::nullopt) const;
@@ -56,5 +56,10 @@ void learn_errors(std::span<const LatticeSpring> springs, const DissimilarityCur
 /// springs * springs of a node.
 [[nodiscard]] std::vector<double> closing_triangles(std::size_t nodes,
                                                     std::span<const LatticeSpring> springs);
+
+/// Leaves out springs of whose triangles no more than the share `min_closing` close. A view without
+/// any that does hangs on the one component to which most of its springs lead, so that it never
+/// joins two; or on others of its kind.
+void keep_confirmed(std::size_t nodes, double min_closing, std::vector<LatticeSpring>& springs);
 
 }  // namespace panonav

@@ -11,8 +11,8 @@
 
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/mapping/internal/lattice_graph.hpp"
 #include "panonav/mapping/internal/multidimensional_scaling.hpp"
-#include "panonav/mapping/lattice_graph.hpp"
 
 namespace panonav {
 
@@ -149,14 +149,14 @@ LatticeStart lay_out_by_springs(std::size_t nodes, std::span<const LatticeSpring
 }
 
 bool is_compatible(const PhaseReading& phases, const CoarseMotion& motion) {
-  constexpr double kDeviations = 3.0;
+  constexpr double max_deviations = 3.0;  // which normal errors exceed once in 370 times
   const double turn = std::abs(angle_difference(phases.turn_rad, motion.step.heading_rad));
-  if (turn > kDeviations * motion.turn_deviation_rad) return false;
+  if (turn > max_deviations * motion.turn_deviation_rad) return false;
   const double travel = std::hypot(motion.step.x_m, motion.step.y_m);
-  if (!phases.points || travel <= kDeviations * motion.distance_deviation_m) return true;
+  if (!phases.points || travel <= max_deviations * motion.distance_deviation_m) return true;
   const double direction = std::abs(
       angle_difference(phases.direction_a_rad, std::atan2(motion.step.y_m, motion.step.x_m)));
-  return direction <= kDeviations * motion.direction_deviation_rad;
+  return direction <= max_deviations * motion.direction_deviation_rad;
 }
 
 LatticeStart lay_out_by_motion(std::size_t nodes, std::span<const NodeMotion> motions,

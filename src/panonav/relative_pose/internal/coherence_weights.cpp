@@ -1,15 +1,41 @@
 #include "panonav/relative_pose/internal/coherence_weights.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
 
 namespace panonav {
 
-PerFrequency fitted_gaussian(const PerFrequency& coherences, int highest) {
+namespace {
+
+/// Correlation of both views in component k, and the energies of each.
+struct Coherence {
+  float common = 0.0F, home = 0.0F, current = 0.0F;
+};
+Coherence coherence_of(PairCoefficients& c, int k, std::size_t rows) {
+  const float* const ha = c.home_a(k);
+  const float* const hb = c.home_b(k);
+  const float* const ca = c.current_a(k);
+  const float* const cb = c.current_b(k);
+  Coherence sum;
+  for (std::size_t y = 0; y < rows; ++y) {
+    sum.common += ha[y] * ca[y] + hb[y] * cb[y];
+    sum.home += ha[y] * ha[y] + hb[y] * hb[y];
+    sum.current += ca[y] * ca[y] + cb[y] * cb[y];
+  }
+  return sum;
+}
+
+/// Returns the Gaussian exp(-k^2 / (2 width^2)) that is nearest to the coherences in least squares,
+/// up to its height: noise lowers all coherences, distance the high ones first. One row gives
+/// little more than a sign for each frequency, so only one number is asked of all of them.
+PerFrequency fit_gaussian(const PerFrequency& coherences, int highest) {
   PerFrequency best{};
   double most = -std::numeric_limits<double>::infinity();
-  for (double width = 1.5; width < 3.0 * highest; width *= 1.19) {
+  constexpr double narrowest = 1.5;    // the first frequency counts four fifths
+  constexpr double width_step = 1.19;  // a quarter of an octave
+  for (double width = narrowest; width < 3.0 * highest; width *= width_step) {
     PerFrequency gaussian{};
     const double step = std::exp(-0.5 / (width * width));
     double value = step;
@@ -33,7 +59,8 @@ PerFrequency fitted_gaussian(const PerFrequency& coherences, int highest) {
   return best;
 }
 
-void over_amplitude(PerFrequency& weights, const PerFrequency& powers, double power, int highest) {
+/// Divides weights by amplitudes; their sum stays. `power`: the mean of the powers.
+void whiten_weights(PerFrequency& weights, const PerFrequency& powers, double power, int highest) {
   if (!(power > 0.0)) return;
   constexpr double faint = 0.02;  // of the mean: fainter ones are mostly noise
   double before = 0.0;
@@ -45,6 +72,52 @@ void over_amplitude(PerFrequency& weights, const PerFrequency& powers, double po
     after += weights[i];
   }
   for (int k = 1; k <= highest; ++k) weights[static_cast<std::size_t>(k)] *= before / after;
+}
+
+}  // namespace
+
+PerFrequency weigh_components(PairCoefficients& coefficients, int highest, std::size_t rows) {
+  PerFrequency coherences{};
+  PerFrequency powers{};
+  double power = 0.0;
+  for (int k = 1; k <= highest; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    const Coherence sum = coherence_of(coefficients, k, rows);
+    const float most = std::sqrt(sum.home) * std::sqrt(sum.current);
+    if (most > 0.0F) coherences[i] = static_cast<double>(sum.common / most);
+    powers[i] = static_cast<double>(sum.home + sum.current);
+    power += powers[i] / highest;
+  }
+  PerFrequency weights = fit_gaussian(coherences, highest);
+  whiten_weights(weights, powers, power, highest);
+  return weights;
+}
+
+std::vector<float> weigh_rows(PairCoefficients& coefficients, int highest, std::size_t rows,
+                              const PerFrequency& weights) {
+  std::vector<double> common(rows);
+  std::vector<double> home(rows);
+  std::vector<double> current(rows);
+  for (int k = 1; k <= highest; ++k) {
+    const double weight = weights[static_cast<std::size_t>(k)];
+    const float* const ha = coefficients.home_a(k);
+    const float* const hb = coefficients.home_b(k);
+    const float* const ca = coefficients.current_a(k);
+    const float* const cb = coefficients.current_b(k);
+    for (std::size_t y = 0; y < rows; ++y) {
+      common[y] += weight * static_cast<double>(ha[y] * ca[y] + hb[y] * cb[y]);
+      home[y] += weight * static_cast<double>(ha[y] * ha[y] + hb[y] * hb[y]);
+      current[y] += weight * static_cast<double>(ca[y] * ca[y] + cb[y] * cb[y]);
+    }
+  }
+  constexpr double min_weight = 0.05;  // no row is left out, so that a bad compass can recover
+  std::vector<float> result(rows);
+  for (std::size_t y = 0; y < rows; ++y) {
+    const double most = std::sqrt(home[y]) * std::sqrt(current[y]);
+    result[y] =
+        static_cast<float>(most > 0.0 ? std::clamp(common[y] / most, min_weight, 1.0) : min_weight);
+  }
+  return result;
 }
 
 }  // namespace panonav

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <vector>
 
-#include "panonav/relative_pose/turn_correlation.hpp"
+#include "panonav/relative_pose/internal/turn_coefficients.hpp"
 
 namespace panonav {
 
@@ -190,6 +190,46 @@ BestDisplacement best_displacement(std::span<const float> home_a, std::span<cons
     }
   }
   return best;
+}
+
+DisplacementStart find_start(const HomingView& home, const HomingView& current, int known,
+                             const TurnWindow& window) {
+  constexpr std::size_t max_bands = 8;
+  const auto rows = static_cast<std::size_t>(home.rows());
+  // The current view is known to more frequencies than are compared.
+  const int frequencies = std::min(known, 2 * searched_frequencies);
+  const std::size_t bands = std::min(max_bands, rows);
+  const auto stride = static_cast<std::size_t>(frequencies) + 1;
+  std::vector<float> values(4 * bands * stride);
+  const auto part = [&](std::size_t i) {
+    return std::span(values).subspan(i * bands * stride, bands * stride);
+  };
+  float ahead_a = 0.0F;
+  float ahead_b = 0.0F;
+  for (std::size_t band = 0; band < bands; ++band) {
+    const std::size_t begin = band * rows / bands;
+    const std::size_t end = (band + 1) * rows / bands;
+    for (int k = 0; k <= frequencies; ++k) {
+      const std::size_t at = band * stride + static_cast<std::size_t>(k);
+      for (std::size_t y = begin; y < end; ++y) {
+        part(0)[at] += home.cosines(k)[y];
+        part(1)[at] += home.sines(k)[y];
+        part(2)[at] += current.cosines(k)[y];
+        part(3)[at] += current.sines(k)[y];
+      }
+    }
+    ahead_a += part(2)[band * stride + 1];
+    ahead_b += part(3)[band * stride + 1];
+  }
+  const double ahead_rad = std::atan2(static_cast<double>(ahead_b), static_cast<double>(ahead_a));
+  for (std::size_t band = 0; band < bands; ++band) {
+    turn_row(part(2).subspan(band * stride, stride), part(3).subspan(band * stride, stride),
+             ahead_rad);
+  }
+  const BestDisplacement best =
+      best_displacement(part(0), part(1), part(2), part(3), static_cast<int>(bands), frequencies,
+                        {window.middle_rad - static_cast<float>(ahead_rad), window.half_width_rad});
+  return {best.displacement, ahead_rad, static_cast<double>(best.turn_rad) + ahead_rad};
 }
 
 }  // namespace panonav

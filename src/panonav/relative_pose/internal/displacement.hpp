@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <span>
 
+#include "panonav/relative_pose/homing_view.hpp"
 #include "panonav/relative_pose/turn_correlation.hpp"
 
 namespace panonav {
@@ -51,5 +52,19 @@ struct BestDisplacement {
                                                  std::span<const float> current_a,
                                                  std::span<const float> current_b, int rows,
                                                  int frequencies, const TurnWindow& window = {});
+
+/// Where the least squares of two views start, with the heading that fits there.
+struct DisplacementStart {
+  Displacement displacement;
+  double ahead_rad = 0.0;  ///< from which the displacement's direction is counted
+  double turn_rad = 0.0;   ///< heading of home minus heading of the current view
+};
+
+/// The same for two views, whose rows are averaged to a few bands: things move less than a band up
+/// or down, and coarse structure decides. Directions are counted from where the first frequency of
+/// the current view has its maximum, so that a turn of the robot changes nothing. `known`: the
+/// highest frequency that both have.
+[[nodiscard]] DisplacementStart find_start(const HomingView& home, const HomingView& current,
+                                           int known, const TurnWindow& window);
 
 }  // namespace panonav

@@ -1,0 +1,51 @@
+#include "panonav/geometry/nearest_points.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+
+namespace panonav {
+
+std::vector<std::vector<std::size_t>> nearest_points(std::span<const Point2> points,
+                                                     std::span<const std::size_t> group,
+                                                     std::size_t count) {
+  require(group.size() == points.size(), "size of group", static_cast<double>(group.size()),
+          "the number of points");
+  std::vector<std::vector<std::size_t>> result(points.size());
+  if (count == 0) return result;
+  std::vector<std::size_t> order(points.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::ranges::sort(order, [&](auto a, auto b) {
+    if (group[a] != group[b]) return group[a] < group[b];
+    return points[a].x_m != points[b].x_m ? points[a].x_m < points[b].x_m : a < b;
+  });
+  std::vector<std::pair<double, std::size_t>> best;
+  for (std::size_t rank = 0; rank < order.size(); ++rank) {
+    const std::size_t here = order[rank];
+    best.clear();
+    // False once points that way are farther along x than the farthest of the best.
+    const auto insert_if_near = [&](std::size_t other) {
+      if (group[other] != group[here]) return false;
+      const bool full = best.size() == count;
+      if (full && std::abs(points[other].x_m - points[here].x_m) > best.back().first) return false;
+      const std::pair candidate{distance(points[here], points[other]), other};
+      if (full && !(candidate < best.back())) return true;
+      best.insert(std::ranges::upper_bound(best, candidate), candidate);
+      if (best.size() > count) best.pop_back();
+      return true;
+    };
+    bool left = true;
+    bool right = true;
+    for (std::size_t step = 1; left || right; ++step) {
+      left = left && step <= rank && insert_if_near(order[rank - step]);
+      right = right && rank + step < order.size() && insert_if_near(order[rank + step]);
+    }
+    for (const auto& [unused, other] : best) result[here].push_back(other);
+  }
+  return result;
+}
+
+}  // namespace panonav

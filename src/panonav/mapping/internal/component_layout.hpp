@@ -1,0 +1,74 @@
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <span>
+#include <vector>
+
+#include "panonav/mapping/internal/lattice_links.hpp"
+#include "panonav/mapping/internal/lattice_start.hpp"
+
+namespace panonav {
+
+/// Views in connected components that grow: their poses, each in the frame of its component, and
+/// the links inside and between the components. A component is named after one of its views.
+class ComponentLayout {
+ public:
+  /// Begins with the components of `start`, or with single views where it is empty.
+  ComponentLayout(std::size_t nodes, std::vector<LatticeLink> links, const LatticeStart& start);
+
+  /// The ends of a link between two components.
+  struct Ends {
+    std::size_t in_p, in_q;
+    Pose2 step;  ///< in_p_from_in_q
+  };
+
+  [[nodiscard]] std::span<const LatticeLink> links() const { return links_; }
+  [[nodiscard]] std::span<const Pose2> poses() const { return poses_; }
+  [[nodiscard]] std::span<const std::size_t> components() const { return component_; }
+  [[nodiscard]] std::size_t size() const { return component_.size(); }
+  [[nodiscard]] const std::vector<std::size_t>& members(std::size_t p) const { return members_[p]; }
+  [[nodiscard]] const std::vector<std::size_t>& links_of(std::size_t view) const {
+    return links_of_[view];
+  }
+  /// Numbers of the links to each other component.
+  [[nodiscard]] const std::map<std::size_t, std::vector<std::size_t>>& neighbours(
+      std::size_t p) const {
+    return between_[p];
+  }
+  [[nodiscard]] int iterations() const { return iterations_; }
+  /// Median length of the links that are more likely right than wrong.
+  [[nodiscard]] double typical_length() const { return typical_; }
+
+  [[nodiscard]] bool is_inside(const LatticeLink& link) const {
+    return component_[link.a] == component_[link.b];
+  }
+  [[nodiscard]] Ends ends_of(std::size_t k, std::size_t p) const;
+  /// Whether a link between two components agrees with their relative pose.
+  [[nodiscard]] bool agrees_with(std::size_t k, const Ends& ends, const Pose2& p_from_q) const;
+  /// Whether a link inside a component agrees with the layout.
+  [[nodiscard]] bool agrees_inside(const LatticeLink& link) const;
+
+  /// Makes component q a part of p with its links. Averages p where it has grown much since the
+  /// last time. Returns the components whose links to p have changed.
+  std::vector<std::size_t> join(std::size_t p, std::size_t q, const Pose2& p_from_q);
+  /// Makes a single view a part of p; nothing grows from it.
+  void attach(std::size_t p, std::size_t view, const Pose2& p_from_view);
+  /// Averages headings, then positions, over the links inside a component that agree with it.
+  void average(std::size_t p);
+
+ private:
+  void move_members(std::size_t p, std::size_t q, const Pose2& p_from_q);
+
+  std::vector<LatticeLink> links_;
+  std::vector<Pose2> poses_;
+  std::vector<std::size_t> component_;
+  std::vector<std::vector<std::size_t>> members_;
+  std::vector<std::vector<std::size_t>> links_of_;
+  std::vector<std::map<std::size_t, std::vector<std::size_t>>> between_;
+  std::vector<std::size_t> averaged_at_;  // number of views
+  int iterations_ = 0;
+  double typical_ = 1.0;
+};
+
+}  // namespace panonav

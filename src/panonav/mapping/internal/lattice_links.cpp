@@ -1,0 +1,227 @@
+#include "panonav/mapping/internal/lattice_links.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "panonav/core/statistics.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/mapping/internal/lattice_graph.hpp"
+#include "panonav/mapping/internal/lattice_springs.hpp"
+
+namespace panonav {
+
+namespace {
+
+// Where no other source is given, values were chosen as `lattice_growth.hpp` says.
+
+/// Links of smaller ranks make the triangles that support others: half of a view's 12 springs.
+constexpr std::size_t low_rank = 6;
+/// Largest gap of a triangle that closes, as a share of its longest side.
+constexpr double max_triangle_gap = 0.5;
+/// Bounds of probabilities: by the rank alone, and with the triangles. Springs of the lowest ranks
+/// are right in 97 of 100 cases (docs/decisions.md).
+constexpr double min_probability = 0.01;
+constexpr double max_probability_by_rank = 0.985;
+constexpr double max_probability = 0.999;
+/// Links of the lowest ranks that stand for right ones: so many, and of each view.
+constexpr double min_reference_links = 20.0;
+constexpr double reference_links_per_node = 0.1;
+/// Bounds of the share of right links whose triangles close, and of wrong ones.
+constexpr double min_closing_share = 0.3;
+constexpr double max_closing_share = 0.98;
+constexpr double min_chance_share = 0.02;
+constexpr double max_chance_share = 0.5;
+/// Share of what the spacing of the views differs from the median that is taken for a difference of
+/// the unit. In `garden` 0 leaves a shape difference of 0.042, 0.5 of 0.027, 1 of 0.033.
+constexpr double spacing_share = 0.5;
+/// Links of known length from which the spacing around a view is read: the second shortest of them.
+constexpr std::size_t min_spacing_links = 3;
+
+/// For each link the larger one of its ranks at its two views by residual.
+std::vector<std::size_t> mutual_ranks(std::size_t nodes, std::span<const LatticeLink> links) {
+  auto of = links_by_node(nodes, links);
+  std::vector<std::size_t> ranks(links.size(), 0);
+  for (auto& own : of) {
+    std::ranges::sort(own, {}, [&](std::size_t k) { return std::pair(links[k].residual, k); });
+    for (std::size_t r = 0; r < own.size(); ++r) ranks[own[r]] = std::max(ranks[own[r]], r);
+  }
+  return ranks;
+}
+
+/// Returns for each link 1 where it closes a triangle with two links of low rank.
+std::vector<unsigned char> find_supported(std::size_t nodes, std::span<const LatticeLink> links,
+                                          std::span<const std::size_t> ranks) {
+  std::vector<GraphEdge> edges;
+  for (const LatticeLink& link : links) edges.push_back({link.a, link.b, 1.0});
+  const LatticeGraph graph(nodes, edges);
+  std::vector<std::size_t> link_to(nodes, links.size());
+  std::vector<unsigned char> supported(links.size());
+  const auto from = [&](std::size_t node, const LatticeLink& link) {
+    return node == link.a ? link.step : inverse(link.step);
+  };
+  for (std::size_t a = 0; a < nodes; ++a) {
+    for (const auto& n : graph.neighbours(a)) link_to[n.node] = n.edge;
+    for (const auto& n : graph.neighbours(a)) {
+      if (ranks[n.edge] >= low_rank) continue;
+      for (const auto& m : graph.neighbours(n.node)) {
+        const std::size_t across = link_to[m.node];
+        if (m.node <= a || across == links.size() || ranks[m.edge] >= low_rank) continue;
+        const double longest =
+            std::max({links[n.edge].length, links[m.edge].length, links[across].length});
+        const Pose2 around = from(a, links[n.edge]) * from(n.node, links[m.edge]);
+        if (is_near(around, from(a, links[across]), max_triangle_gap * longest)) {
+          supported[across] = 1;
+        }
+      }
+    }
+    for (const auto& n : graph.neighbours(a)) link_to[n.node] = links.size();
+  }
+  return supported;
+}
+
+/// Links of one rank, or of several pooled ones.
+struct RankPool {
+  double closing, count;
+  std::size_t ranks = 1;
+  [[nodiscard]] double share() const { return count > 0.0 ? closing / count : 0.0; }
+};
+
+/// Returns the links of each rank, and how many of them are supported.
+std::vector<RankPool> count_ranks(std::span<const std::size_t> ranks,
+                                  std::span<const unsigned char> supported) {
+  std::vector<RankPool> counts(ranks.empty() ? 0 : *std::ranges::max_element(ranks) + 1);
+  for (std::size_t k = 0; k < ranks.size(); ++k) {
+    counts[ranks[k]].count += 1.0;
+    counts[ranks[k]].closing += supported[k] != 0 ? 1.0 : 0.0;
+  }
+  return counts;
+}
+
+/// Returns the share of right links that are supported: links of the lowest ranks stand for right
+/// ones, which have no triangle everywhere either.
+double closing_share_of_right(std::span<const RankPool> counts, std::size_t nodes) {
+  const double enough = min_reference_links + reference_links_per_node * static_cast<double>(nodes);
+  RankPool lowest{0.0, 0.0};
+  for (std::size_t r = 0; r < counts.size() && lowest.count < enough; ++r) {
+    lowest.count += counts[r].count;
+    lowest.closing += counts[r].closing;
+  }
+  return std::clamp(lowest.share(), min_closing_share, max_closing_share);
+}
+
+/// Pools neighbouring ranks until no rank is more certain than those below it (isotonic
+/// regression).
+std::vector<RankPool> pool_ranks(std::span<const RankPool> counts, double reference) {
+  std::vector<RankPool> pools;
+  for (const RankPool& rank : counts) {
+    pools.push_back({rank.closing / reference, rank.count});
+    while (pools.size() > 1 && pools[pools.size() - 2].share() <= pools.back().share()) {
+      const RankPool last = pools.back();
+      pools.pop_back();
+      pools.back() = {pools.back().closing + last.closing, pools.back().count + last.count,
+                      pools.back().ranks + last.ranks};
+    }
+  }
+  return pools;
+}
+
+/// Sets the probability of each link by its rank, then by whether a triangle closes (Bayes), which
+/// happens by chance as often as at the rank that is least certain. Two views have no triangles.
+void learn_probabilities(std::size_t nodes, std::vector<LatticeLink>& links) {
+  const auto ranks = mutual_ranks(nodes, links);
+  const auto supported = find_supported(nodes, links, ranks);
+  const auto counts = count_ranks(ranks, supported);
+  const double reference = closing_share_of_right(counts, nodes);
+  const auto pools = pool_ranks(counts, reference);
+  std::vector<double> probability;
+  for (const RankPool& pool : pools) {
+    probability.insert(probability.end(), pool.ranks,
+                       std::clamp(pool.share(), min_probability, max_probability_by_rank));
+  }
+  const double by_chance = pools.empty()
+                               ? max_chance_share
+                               : std::clamp(pools.back().share() * reference, min_chance_share,
+                                            max_chance_share * reference);
+  for (std::size_t k = 0; k < links.size(); ++k) {
+    const double right = probability[ranks[k]];
+    const double as_right = supported[k] != 0 ? reference : 1.0 - reference;
+    const double as_wrong = supported[k] != 0 ? by_chance : 1.0 - by_chance;
+    const double share = as_right * right / (as_right * right + as_wrong * (1.0 - right));
+    links[k].probability =
+        nodes < 3 ? max_probability_by_rank : std::clamp(share, min_probability, max_probability);
+  }
+}
+
+/// Rescales links to the spacing of the views around. The phases count in the distance of the
+/// things around, which is large in halls and small in corridors. As little is known of how evenly
+/// the views lie: half of what the spacing (in that unit) differs from the median one is taken for
+/// a difference of the unit.
+void count_in_spacings(std::size_t nodes, std::vector<LatticeLink>& links) {
+  const auto of = links_by_node(nodes, links);
+  std::vector<double> spacings(nodes, 0.0);
+  std::vector<double> known;
+  for (std::size_t i = 0; i < nodes; ++i) {
+    std::vector<double> own;
+    for (const std::size_t k : of[i]) {
+      if (links[k].probability > 0.5 && links[k].length > 0.0) own.push_back(links[k].length);
+    }
+    if (own.size() < min_spacing_links) continue;
+    std::ranges::nth_element(own, own.begin() + 1);
+    spacings[i] = own[1];
+    known.push_back(own[1]);
+  }
+  if (known.empty()) return;
+  const double median = upper_median(known);
+  for (LatticeLink& link : links) {
+    const auto excess = [&](std::size_t view) {
+      return spacings[view] > 0.0 ? std::log(spacings[view] / median) : 0.0;
+    };
+    const double factor = std::exp(-spacing_share * 0.5 * (excess(link.a) + excess(link.b)));
+    link.length *= factor;
+    link.step.x_m *= factor;
+    link.step.y_m *= factor;
+  }
+}
+
+}  // namespace
+
+Pose2 step_of(const LatticeSpring& spring, double unit) {
+  const PhaseReading& phases = *spring.phases;
+  if (!phases.points) return {0.0, 0.0, phases.turn_rad};
+  const double from_b = phases.direction_b_rad + phases.turn_rad - std::numbers::pi;
+  const double direction =
+      phases.direction_a_rad + 0.5 * angle_difference(from_b, phases.direction_a_rad);
+  return {unit * phases.length * std::cos(direction), unit * phases.length * std::sin(direction),
+          phases.turn_rad};
+}
+
+bool is_near(const Pose2& a, const Pose2& b, double within) {
+  return std::abs(angle_difference(a.heading_rad, b.heading_rad)) <= turn_tolerance_rad &&
+         distance(a.position(), b.position()) <= within;
+}
+
+std::vector<LatticeLink> make_links(std::size_t nodes, std::span<const LatticeSpring> springs,
+                                    double unit) {
+  std::vector<LatticeLink> links;
+  for (const LatticeSpring& spring : springs) {
+    if (!spring.phases || !agrees(spring)) continue;
+    links.push_back({spring.a, spring.b, step_of(spring, unit), unit * spring.phases->length,
+                     spring.phases->residual, 0.0});
+  }
+  learn_probabilities(nodes, links);
+  count_in_spacings(nodes, links);
+  return links;
+}
+
+std::vector<std::vector<std::size_t>> links_by_node(std::size_t nodes,
+                                                    std::span<const LatticeLink> links) {
+  std::vector<std::vector<std::size_t>> of(nodes);
+  for (std::size_t k = 0; k < links.size(); ++k) {
+    of[links[k].a].push_back(k);
+    of[links[k].b].push_back(k);
+  }
+  return of;
+}
+
+}  // namespace panonav

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstddef>
+#include <numbers>
+#include <span>
+#include <vector>
+
+#include "panonav/mapping/lattice.hpp"
+
+namespace panonav {
+
+/// Largest difference between a turn read from phases and the same turn in the layout: three times
+/// the error of phases between places that are the same.
+inline constexpr double turn_tolerance_rad = 15.0 * std::numbers::pi / 180.0;
+/// The same of a position, as a share of the link's length. Chosen as `lattice_growth.hpp` says.
+inline constexpr double position_tolerance = 0.6;
+
+/// A spring whose two views agree, as a relative pose that may be wrong.
+struct LatticeLink {
+  std::size_t a, b;
+  Pose2 step;  ///< a_from_b
+  double length, residual;
+  double probability;  ///< that it joins views that lie so
+};
+
+/// The relative pose a_from_b that the phases of a spring say; `unit`: of their lengths.
+[[nodiscard]] Pose2 step_of(const LatticeSpring& spring, double unit);
+
+/// Whether two poses have the same heading within the tolerance, and positions within `within`.
+[[nodiscard]] bool is_near(const Pose2& a, const Pose2& b, double within);
+
+/// The springs whose views agree, with probabilities learnt from their ranks and triangles, and
+/// with lengths in the spacing of the views around. Links of no length stay so.
+[[nodiscard]] std::vector<LatticeLink> make_links(std::size_t nodes,
+                                                  std::span<const LatticeSpring> springs,
+                                                  double unit);
+
+/// For each node the numbers of its links.
+[[nodiscard]] std::vector<std::vector<std::size_t>> links_by_node(
+    std::size_t nodes, std::span<const LatticeLink> links);
+
+}  // namespace panonav
