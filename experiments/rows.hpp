@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "experiments/reproduction.hpp"
-#include "panonav/core/statistics.hpp"
+#include "experiments/statistics.hpp"
 #include "reporting/plot.hpp"
 
 namespace panonav {

@@ -10,6 +10,7 @@
 #include "experiments/runs/place_experiment.hpp"
 #include "experiments/runs/tracking_filter.hpp"
 #include "experiments/runs/worlds.hpp"
+#include "experiments/statistics.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/simulation/scenes.hpp"

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "experiments/m03/experiments.hpp"
-#include "panonav/core/statistics.hpp"
+#include "experiments/statistics.hpp"
 
 namespace panonav {
 

@@ -12,8 +12,10 @@
 #include "experiments/m04/experiment.hpp"
 #include "experiments/m04/support.hpp"
 #include "experiments/runs/surroundings.hpp"
+#include "experiments/statistics.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
+#include "panonav/core/statistics.hpp"
 #include "panonav/localisation/hierarchical.hpp"
 #include "reporting/plot.hpp"
 

@@ -6,6 +6,7 @@
 #include "experiments/m04/experiment.hpp"
 #include "experiments/m04/support.hpp"
 #include "experiments/runs/surroundings.hpp"
+#include "experiments/statistics.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/localisation/hierarchical.hpp"
 #include "reporting/plot.hpp"

@@ -12,7 +12,9 @@
 #include "experiments/m04/experiment.hpp"
 #include "experiments/m04/support.hpp"
 #include "experiments/runs/make_each.hpp"
+#include "experiments/statistics.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/core/statistics.hpp"
 #include "reporting/plot.hpp"
 
 namespace panonav {

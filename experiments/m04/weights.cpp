@@ -9,6 +9,7 @@
 #include "experiments/m04/experiment.hpp"
 #include "experiments/m04/learn_weights.hpp"
 #include "experiments/m04/support.hpp"
+#include "experiments/statistics.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/signature/dissimilarity.hpp"
 #include "reporting/plot.hpp"

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "experiments/runs/tracking_run.hpp"
+#include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/simulation/recording.hpp"
 

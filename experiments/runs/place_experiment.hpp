@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "experiments/runs/place_recording.hpp"
+#include "experiments/statistics.hpp"
 #include "panonav/core/executor.hpp"
-#include "panonav/core/statistics.hpp"
 #include "panonav/localisation/localiser.hpp"
 #include "panonav/panorama/preprocessing.hpp"
 

@@ -7,8 +7,8 @@
 #include <memory>
 #include <numbers>
 
+#include "experiments/statistics.hpp"
 #include "panonav/core/random.hpp"
-#include "panonav/core/statistics.hpp"
 #include "panonav/signature/dissimilarity.hpp"
 #include "panonav/simulation/scenes.hpp"
 #include "panonav/simulation/screen.hpp"

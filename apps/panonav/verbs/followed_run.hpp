@@ -24,7 +24,7 @@ struct FollowedImage {
   std::string file;
   std::optional<double> stamp_s;
   std::vector<float> line;             ///< what was seen
-  std::optional<TrackedRouteFix> fix;  ///< empty: not on this route
+  std::optional<RouteFix> fix;  ///< empty: not on this route
   std::vector<AzimuthRange> changed;   ///< where the scene is not as remembered
   std::optional<Pose2> truth;          ///< in the route's frame, where it is known
   std::optional<RoutePlace> true_place;
@@ -58,6 +58,6 @@ struct FollowSummary {
 [[nodiscard]] std::vector<std::pair<double, double>> changed_stretches(
     const std::vector<FollowedImage>& images);
 
-[[nodiscard]] std::string_view name_of(RouteFixOrigin origin);
+[[nodiscard]] std::string_view name_of(RouteFix::Origin origin);
 
 }  // namespace panonav::command

@@ -34,7 +34,7 @@ enum class RouteDriveState {
 struct RouteDriveStep {
   RouteDriveState state = RouteDriveState::searching;  ///< after this observation
   Velocity velocity;                   ///< for the next period of the base; 0 unless driving
-  std::optional<TrackedRouteFix> fix;  ///< empty: odometry carries the robot on
+  std::optional<RouteFix> fix;  ///< empty: odometry carries the robot on
   double along_m = 0.0;                ///< way along the route
   double length_m = 0.0;               ///< of the route
 };

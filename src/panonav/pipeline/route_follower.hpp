@@ -24,7 +24,7 @@ struct RouteFollowerOptions {
 /// Where the robot is beside the route.
 struct RouteStep {
   std::vector<float> line;             ///< what was seen
-  std::optional<TrackedRouteFix> fix;  ///< empty: not on this route
+  std::optional<RouteFix> fix;  ///< empty: not on this route
   std::vector<AzimuthRange> changed;   ///< where the scene is not as remembered
 };
 

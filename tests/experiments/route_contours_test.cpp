@@ -1,4 +1,4 @@
-#include "panonav/route/route_contours.hpp"
+#include "experiments/y03/route_contours.hpp"
 
 #include <gtest/gtest.h>
 
