@@ -12,8 +12,8 @@
 
 #include "panonav/memory/view_source.hpp"
 #include "panonav/navigation/area_planner.hpp"
-#include "panonav/navigation/area_views.hpp"
 #include "panonav/navigation/navigator.hpp"
+#include "panonav/navigation/search_everywhere.hpp"
 #include "panonav/storage/memory_file_views.hpp"
 #include "support/fifty_rooms.hpp"
 

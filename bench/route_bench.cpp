@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
+#include "lab/y03/route_contours.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/pose2.hpp"
-#include "panonav/route/route_contours.hpp"
 #include "panonav/route/route_fit.hpp"
 #include "panonav/route/route_panorama.hpp"
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "panonav/core/statistics.hpp"
+
 namespace panonav::lab {
 
 Figure mean_figure(std::span<const double> values, std::uint64_t seed) {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "lab/reproduction.hpp"
-#include "panonav/core/statistics.hpp"
+#include "lab/statistics.hpp"
 #include "panonav_viewer/plot.hpp"
 
 namespace panonav::lab {

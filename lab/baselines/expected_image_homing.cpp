@@ -6,9 +6,9 @@
 #include <numbers>
 #include <string>
 
+#include "lab/baselines/turn_products.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/kernels/turn_products.hpp"
 
 namespace panonav::lab {
 
@@ -95,7 +95,7 @@ HomeVector ExpectedImageHoming::home_vector(std::span<const float> home,
       require(std::isfinite(value), "pixel", static_cast<double>(value), "a finite number");
     }
   }
-  const std::size_t stride = kernels::turn_products_stride(columns);
+  const std::size_t stride = turn_products_stride(columns);
   std::vector<float> periodic(columns + stride);
   std::vector<float> flat(columns);
   std::vector<float> expected(block * columns);
@@ -115,7 +115,6 @@ HomeVector ExpectedImageHoming::home_vector(std::span<const float> home,
   // Pixels are of the order of 1, so this is rounding.
   if (!(home_energy * current_energy > 1e-20)) return {};
 
-  const kernels::Instructions instructions = kernels::chosen_instructions();
   HomeVector vector;
   double least = 0.0;
   std::size_t best = positions_.size();
@@ -148,9 +147,8 @@ HomeVector ExpectedImageHoming::home_vector(std::span<const float> home,
       energies[p] = (squares[0] + squares[1]) + (squares[2] + squares[3]) -
                     sum * sum / static_cast<float>(columns);
     }
-    kernels::turn_products(std::span(expected).first(count * columns), columns, periodic,
-                           std::span(products).first(count * stride),
-                           std::span(largest).first(count), instructions);
+    turn_products(std::span(expected).first(count * columns), columns, periodic,
+                  std::span(products).first(count * stride), std::span(largest).first(count));
     for (std::size_t p = 0; p < count; ++p) {
       // Less the energy of the home view, which is the same for all.
       const auto difference =

@@ -8,6 +8,7 @@
 #include "lab/elsewhere/experiments.hpp"
 #include "lab/runs/place_experiment.hpp"
 #include "lab/runs/tracking_filter.hpp"
+#include "lab/statistics.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav_simulation/make_each.hpp"

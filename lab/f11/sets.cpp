@@ -19,7 +19,7 @@
 #include "panonav/signature/dissimilarity.hpp"
 #include "panonav_simulation/scenes.hpp"
 #include "panonav_viewer/plot.hpp"
-#include "panonav_viewer/surroundings.hpp"
+#include "panonav_viewer/scene_drawing.hpp"
 
 namespace panonav::lab {
 

@@ -26,7 +26,7 @@
 #include "panonav_simulation/worlds.hpp"
 #include "panonav_viewer/picture_plot.hpp"
 #include "panonav_viewer/plot.hpp"
-#include "panonav_viewer/surroundings.hpp"
+#include "panonav_viewer/scene_drawing.hpp"
 
 namespace panonav::lab {
 

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "lab/m03/experiments.hpp"
+#include "lab/statistics.hpp"
 #include "panonav/core/random.hpp"
-#include "panonav/core/statistics.hpp"
 #include "panonav/motion/path.hpp"
 
 namespace panonav::lab {

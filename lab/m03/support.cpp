@@ -6,7 +6,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
-#include "panonav_viewer/surroundings.hpp"
+#include "panonav_viewer/scene_drawing.hpp"
 
 namespace panonav::lab {
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "lab/m03/experiments.hpp"
-#include "panonav/core/statistics.hpp"
+#include "lab/statistics.hpp"
 
 namespace panonav::lab {
 
@@ -19,9 +19,8 @@ struct Curve {
 };
 
 void add_point(Curve& curve, double x, std::span<const TrackedRun> runs) {
-  lab::add_point(curve.success, x,
-                 success_rate(localised_within(runs, m03_spacing_m, 10), runs.size()));
-  lab::add_point(curve.images, x, mean_figure(capped_images(runs, m03_spacing_m)));
+  add_point(curve.success, x, success_rate(localised_within(runs, m03_spacing_m, 10), runs.size()));
+  add_point(curve.images, x, mean_figure(capped_images(runs, m03_spacing_m)));
 }
 
 void add_rows(Reproduction& result, const std::string& id, const std::string& what,

@@ -11,11 +11,14 @@
 
 #include "lab/m04/experiment.hpp"
 #include "lab/m04/support.hpp"
+#include "lab/m04/surroundings.hpp"
+#include "lab/statistics.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
+#include "panonav/core/statistics.hpp"
 #include "panonav/localisation/hierarchical.hpp"
 #include "panonav_viewer/plot.hpp"
-#include "panonav_viewer/surroundings.hpp"
+#include "panonav_viewer/scene_drawing.hpp"
 
 namespace panonav::lab {
 
@@ -40,13 +43,13 @@ constexpr std::size_t kPlaces = kPlacesX * kPlacesY;
 // over that mean.
 struct Shape {
   double size = 0.0;
-  viewer::Directional relative{};
+  Directional relative{};
 };
 
-Shape shape_of(const viewer::Directional& values) {
+Shape shape_of(const Directional& values) {
   Shape shape;
-  shape.size = std::accumulate(values.begin(), values.end(), 0.0) / viewer::shape_directions;
-  for (std::size_t i = 0; i < viewer::shape_directions; ++i) {
+  shape.size = std::accumulate(values.begin(), values.end(), 0.0) / shape_directions;
+  for (std::size_t i = 0; i < shape_directions; ++i) {
     shape.relative[i] = shape.size > 0.0 ? values[i] / shape.size : 1.0;
   }
   return shape;
@@ -63,18 +66,17 @@ struct Observation {
 using SceneObservations = std::array<std::optional<Observation>, kPlaces>;
 
 // Radius of the circle whose sector of 45 degrees has the area of the candidates' cells there.
-viewer::Directional extents_of(const VisualMemory& memory, const ReferenceAreas& areas,
-                               Point2 robot, const std::vector<Match>& candidates) {
-  viewer::Directional area_m2{};
+Directional extents_of(const VisualMemory& memory, const ReferenceAreas& areas, Point2 robot,
+                       const std::vector<Match>& candidates) {
+  Directional area_m2{};
   for (const Match& match : candidates) {
     const Point2 at = memory.info(match.view).pose->position();
     const auto cell = areas.cell(match.view);
-    area_m2[viewer::sector_of(std::atan2(at.y_m - robot.y_m, at.x_m - robot.x_m))] +=
-        polygon_area_m2(cell);
+    area_m2[sector_of(std::atan2(at.y_m - robot.y_m, at.x_m - robot.x_m))] += polygon_area_m2(cell);
   }
-  viewer::Directional extents{};
-  for (std::size_t i = 0; i < viewer::shape_directions; ++i) {
-    extents[i] = std::sqrt(area_m2[i] * viewer::shape_directions / std::numbers::pi);
+  Directional extents{};
+  for (std::size_t i = 0; i < shape_directions; ++i) {
+    extents[i] = std::sqrt(area_m2[i] * shape_directions / std::numbers::pi);
   }
   return extents;
 }
@@ -104,7 +106,7 @@ const std::array<Relation, 5>& relations() {
                  return o.area[level].relative[i];
                },
                [](const Observation& o, std::size_t, std::size_t i) { return o.free.relative[i]; },
-               viewer::shape_directions},
+               shape_directions},
       Relation{
           "shape_against_parallax", "parallax",
           "relative extent of the area per direction with the way that parallax allows there",
@@ -112,7 +114,7 @@ const std::array<Relation, 5>& relations() {
             return o.area[level].relative[i];
           },
           [](const Observation& o, std::size_t, std::size_t i) { return o.parallax.relative[i]; },
-          viewer::shape_directions},
+          shape_directions},
       Relation{
           "size_against_prediction", "size",
           "size of the area with the size predicted from parallax and contrast",
@@ -130,7 +132,7 @@ const std::array<Relation, 5>& relations() {
                [](const Observation& o, std::size_t level, std::size_t i) {
                  return o.predicted[level].relative[i];
                },
-               viewer::shape_directions}};
+               shape_directions}};
   return all;
 }
 
@@ -228,13 +230,12 @@ class AreaShape final : public Experiment {
       const auto levels = localise_hierarchically(
           memory, areas, pack(compute_signature(view, m04_components), memory.full_scale()),
           {.tolerance = kTolerance});
-      const viewer::Surroundings around = viewer::surroundings_of(place, robot.position());
+      const Surroundings around = surroundings_of(place, robot.position());
       Observation seen{{}, shape_of(around.free_m), shape_of(around.parallax_m), {}};
       for (std::size_t level = 0; level < kLevels; ++level) {
         const auto& candidates =
             levels.at(static_cast<std::size_t>(kComponents[level] - 1)).candidates;
-        seen.predicted[level] =
-            shape_of(viewer::predicted_extents(place, robot, view, kComponents[level]));
+        seen.predicted[level] = shape_of(predicted_extents(place, robot, view, kComponents[level]));
         seen.area[level] = shape_of(extents_of(memory, areas, robot.position(), candidates));
         if (scenes_.empty() && level == 0 &&
             kShownPlaces.end() != std::ranges::find(kShownPlaces, p)) {

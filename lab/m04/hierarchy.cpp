@@ -5,10 +5,11 @@
 
 #include "lab/m04/experiment.hpp"
 #include "lab/m04/support.hpp"
+#include "lab/statistics.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/localisation/hierarchical.hpp"
 #include "panonav_viewer/plot.hpp"
-#include "panonav_viewer/surroundings.hpp"
+#include "panonav_viewer/scene_drawing.hpp"
 
 namespace panonav::lab {
 

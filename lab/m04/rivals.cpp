@@ -11,7 +11,9 @@
 #include "lab/baselines/rivals.hpp"
 #include "lab/m04/experiment.hpp"
 #include "lab/m04/support.hpp"
+#include "lab/statistics.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/core/statistics.hpp"
 #include "panonav_simulation/make_each.hpp"
 #include "panonav_viewer/plot.hpp"
 

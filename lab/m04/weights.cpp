@@ -9,6 +9,7 @@
 #include "lab/m04/experiment.hpp"
 #include "lab/m04/learn_weights.hpp"
 #include "lab/m04/support.hpp"
+#include "lab/statistics.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/signature/dissimilarity.hpp"
 #include "panonav_viewer/plot.hpp"

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "lab/statistics.hpp"
 #include "panonav/core/executor.hpp"
-#include "panonav/core/statistics.hpp"
 #include "panonav/localisation/localiser.hpp"
 #include "panonav/panorama/preprocessing.hpp"
 #include "panonav_simulation/place_recording.hpp"

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <numbers>
 
+#include "lab/baselines/turn_products.hpp"
 #include "lab/rows.hpp"
 #include "lab/s06/support.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
-#include "panonav/kernels/turn_products.hpp"
 #include "panonav/relative_pose/turn_correlation.hpp"
 #include "panonav_viewer/plot.hpp"
 
@@ -299,7 +299,7 @@ void draw_headings(const Arena& arena, const std::filesystem::path& folder, Exec
     for (const float value : row) row_mean += static_cast<double>(value) / s06_columns;
     for (const float value : row) rows.push_back(value - static_cast<float>(row_mean));
   }
-  const std::size_t stride = kernels::turn_products_stride(s06_columns);
+  const std::size_t stride = turn_products_stride(s06_columns);
   std::vector<std::vector<std::uint8_t>> shifts(arena.homes.rows.size());
   executor.for_chunks(shifts.size(), 8, [&](std::size_t begin, std::size_t end, std::size_t) {
     std::vector<float> periodic(s06_columns + stride);
@@ -309,8 +309,7 @@ void draw_headings(const Arena& arena, const std::filesystem::path& folder, Exec
       for (std::size_t i = 0; i < periodic.size(); ++i) {
         periodic[i] = arena.homes.rows[g][i % s06_columns];
       }
-      kernels::turn_products(rows, s06_columns, periodic, products, largest,
-                             kernels::chosen_instructions());
+      turn_products(rows, s06_columns, periodic, products, largest);
       for (std::size_t p = 0; p < currents.size(); ++p) {
         const float* const row = products.data() + p * stride;
         shifts[g].push_back(

@@ -14,7 +14,7 @@
 #include "panonav_simulation/scenes.hpp"
 #include "panonav_simulation/worlds.hpp"
 #include "panonav_viewer/plot.hpp"
-#include "panonav_viewer/surroundings.hpp"
+#include "panonav_viewer/scene_drawing.hpp"
 
 namespace panonav::lab {
 

@@ -13,7 +13,7 @@
 #include "panonav_simulation/scenes.hpp"
 #include "panonav_viewer/picture_plot.hpp"
 #include "panonav_viewer/plot.hpp"
-#include "panonav_viewer/surroundings.hpp"
+#include "panonav_viewer/scene_drawing.hpp"
 
 namespace panonav::lab {
 

@@ -4,9 +4,9 @@
 #include <memory>
 #include <vector>
 
+#include "lab/y03/route_contours.hpp"
 #include "panonav/core/executor.hpp"
 #include "panonav/geometry/pose2.hpp"
-#include "panonav/route/route_contours.hpp"
 #include "panonav/route/route_fit.hpp"
 #include "panonav/route/route_panorama.hpp"
 #include "panonav_simulation/renderer.hpp"

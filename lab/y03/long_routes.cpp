@@ -27,7 +27,7 @@
 #include "panonav_simulation/scenes.hpp"
 #include "panonav_simulation/worlds.hpp"
 #include "panonav_viewer/plot.hpp"
-#include "panonav_viewer/surroundings.hpp"
+#include "panonav_viewer/scene_drawing.hpp"
 
 namespace panonav::lab {
 
@@ -220,7 +220,7 @@ void reproduce_real_route(const RouteReproductionOptions& options, Executor& exe
     static_cast<void>(route.append(way[i], std::span<const float>(lines[i])));
   }
   const RouteTracker tracker(route);
-  std::vector<std::optional<TrackedRouteFix>> found(way.size());
+  std::vector<std::optional<RouteFix>> found(way.size());
   executor.for_chunks(way.size(), 8, [&](std::size_t begin, std::size_t end, std::size_t) {
     for (std::size_t i = begin; i < end; ++i) {
       if (i % every != 0) found[i] = tracker.search(lines[i]);
@@ -241,7 +241,7 @@ void reproduce_real_route(const RouteReproductionOptions& options, Executor& exe
     const RoutePlace truth = place_on_route(route.poses(), places[i]);
     along_cm.push_back(100.0 * std::abs(found[i]->along_m - truth.along_m));
     beside_cm.push_back(100.0 * std::abs(found[i]->lateral_m - truth.lateral_m));
-    right.dots.push_back(found[i]->fix.pose.position());
+    right.dots.push_back(found[i]->pose.position());
   }
   const std::string what =
       "sussex_route, outdoors, every 10th line remembered, the others each searched alone";

@@ -243,8 +243,8 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
     unknown = found ? 0 : unknown + 1;
     run.sightings.emplace_back();
     if (found) {
-      run.sightings.back() = RouteSighting{found->fix.pose, found->along_m};
-      run.position_m.push_back(distance(found->fix.pose.position(), robot.position()));
+      run.sightings.back() = RouteSighting{found->pose, found->along_m};
+      run.position_m.push_back(distance(found->pose.position(), robot.position()));
     } else {
       ++run.off_route;
     }

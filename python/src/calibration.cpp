@@ -134,8 +134,8 @@ void bind_calibration(py::module_& m) {
         const py::gil_scoped_release free;
         InterruptibleExecutor executor(threads);
         auto answer = calibrate_dual_fisheye(all.views(), known, executor);
-        if (const auto* refusal = std::get_if<DualFisheyeRefusal>(&answer)) {
-          throw Error("the pictures do not determine the lenses: " + refusal->reason);
+        if (const auto* refusal = std::get_if<std::string>(&answer)) {
+          throw Error("the pictures do not determine the lenses: " + *refusal);
         }
         return std::get<DualFisheyeCalibration>(std::move(answer));
       },

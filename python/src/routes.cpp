@@ -18,14 +18,10 @@ struct NamedStep : RouteStep {
 };
 
 template <class Value>
-std::optional<Value> of_fix(const NamedStep& step, const Value TrackedRouteFix::*member) {
-  return step.fix ? std::optional((*step.fix).*member) : std::nullopt;
-}
-template <class Value>
 auto fix_field(Value RouteFix::*member) {
   return [member](const NamedStep& step) -> std::optional<Value> {
     if (!step.fix) return std::nullopt;
-    return step.fix->fix.*member;
+    return (*step.fix).*member;
   };
 }
 
@@ -53,14 +49,9 @@ void bind_following(py::module_& m) {
             return origin_names[static_cast<std::size_t>(s.fix->origin)];
           },
           "'prediction', 'recovery' or 'search'.")
-      .field(
-          "along_m",
-          [](const NamedStep& s) { return of_fix<double>(s, &TrackedRouteFix::along_m); },
-          "Way along the route.")
-      .field(
-          "lateral_m",
-          [](const NamedStep& s) { return of_fix<double>(s, &TrackedRouteFix::lateral_m); },
-          "From the route to the robot; positive to the left.")
+      .field("along_m", fix_field(&RouteFix::along_m), "Path length along the route.")
+      .field("lateral_m", fix_field(&RouteFix::lateral_m),
+             "From the route to the robot; positive to the left.")
       .field("correlation", fix_field(&RouteFix::correlation),
              "Of what is seen and what the route shows from there, -1 to 1.")
       .field("residual", fix_field(&RouteFix::residual),
@@ -72,7 +63,7 @@ void bind_following(py::module_& m) {
           "covariance",
           [](const NamedStep& s) -> std::optional<py::array_t<double>> {
             if (!s.fix) return std::nullopt;
-            return py::array_t<double>({3, 3}, s.fix->fix.covariance.data());
+            return py::array_t<double>({3, 3}, s.fix->covariance.data());
           },
           "(3, 3) of x, y in m and heading in rad.")
       .field("changed", &NamedStep::changed, "Where the scene is not as remembered.")

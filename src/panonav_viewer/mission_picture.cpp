@@ -8,7 +8,7 @@
 #include "panonav/navigation/area_planner.hpp"
 #include "panonav/navigation/direction_field.hpp"
 #include "panonav_viewer/plot.hpp"
-#include "panonav_viewer/surroundings.hpp"
+#include "panonav_viewer/scene_drawing.hpp"
 
 namespace panonav::viewer {
 

@@ -285,8 +285,8 @@ TEST_F(RouteVerbs, TheLibraryRecordsAndFollowsTheSameOnePictureAtATime) {
   for (std::size_t i = 0; i < said.size(); ++i) {
     const RouteStep step = follower.step(read_observation(repeat.entries[i]));
     ASSERT_TRUE(step.fix);
-    EXPECT_EQ(said[i]["pose"]["x_m"].get<double>(), step.fix->fix.pose.x_m);
-    EXPECT_EQ(said[i]["pose"]["y_m"].get<double>(), step.fix->fix.pose.y_m);
+    EXPECT_EQ(said[i]["pose"]["x_m"].get<double>(), step.fix->pose.x_m);
+    EXPECT_EQ(said[i]["pose"]["y_m"].get<double>(), step.fix->pose.y_m);
     EXPECT_EQ(said[i]["lateral_m"].get<double>(), step.fix->lateral_m);
   }
 }

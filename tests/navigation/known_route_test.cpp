@@ -12,6 +12,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/motion/path.hpp"
+#include "panonav/navigation/internal/route_stretch.hpp"
 #include "support/smooth_path.hpp"
 
 namespace panonav::testing {

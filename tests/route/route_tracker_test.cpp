@@ -41,8 +41,8 @@ TEST_F(RouteTracking, FindsTheRobotWithoutAPrediction) {
                                random.uniform(-std::numbers::pi, std::numbers::pi));
     const auto fix = tracker.search(room.line(truth));
     if (!fix) continue;
-    EXPECT_EQ(fix->origin, RouteFixOrigin::search);
-    if (distance(fix->fix.pose.position(), truth.position()) < 0.05) ++found;
+    EXPECT_EQ(fix->origin, RouteFix::Origin::search);
+    if (distance(fix->pose.position(), truth.position()) < 0.05) ++found;
   }
   EXPECT_GE(found, 28);
 }
@@ -74,10 +74,10 @@ TEST_F(RouteTracking, FollowsADriveAndTellsWayAndSide) {
     step.heading_rad += 0.03;
     const auto fix = tracker.track(room.line(next), step);
     ASSERT_TRUE(fix.has_value());
-    EXPECT_EQ(fix->origin, RouteFixOrigin::prediction);
+    EXPECT_EQ(fix->origin, RouteFix::Origin::prediction);
     EXPECT_NEAR(fix->lateral_m, 0.2, 0.03);
     EXPECT_NEAR(fix->along_m, 0.1 * static_cast<double>(i), 0.06);
-    EXPECT_LT(distance(fix->fix.pose.position(), next.position()), 0.03);
+    EXPECT_LT(distance(fix->pose.position(), next.position()), 0.03);
     robot = next;
   }
 }
@@ -94,7 +94,7 @@ TEST_F(RouteTracking, RecoversWhenThePredictionIsOff) {
     tracker.set_pose({truth.x_m + 0.5 * std::cos(angle), truth.y_m + 0.5 * std::sin(angle),
                       wrap_angle(truth.heading_rad + random.uniform(-0.3, 0.3))});
     const auto fix = tracker.track(room.line(truth), {});
-    if (fix && distance(fix->fix.pose.position(), truth.position()) < 0.05) ++right;
+    if (fix && distance(fix->pose.position(), truth.position()) < 0.05) ++right;
   }
   EXPECT_GE(right, 38);
 }

@@ -24,7 +24,7 @@
 #include "panonav/pipeline/arrangement.hpp"
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/observation_source.hpp"
-#include "panonav_viewer/surroundings.hpp"
+#include "panonav_viewer/scene_drawing.hpp"
 #include "reports/report_page.hpp"
 
 namespace panonav::command {

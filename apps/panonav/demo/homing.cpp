@@ -10,7 +10,7 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/positions.hpp"
 #include "panonav_viewer/plot.hpp"
-#include "panonav_viewer/surroundings.hpp"
+#include "panonav_viewer/scene_drawing.hpp"
 
 namespace panonav::command {
 

@@ -16,7 +16,7 @@
 #include "panonav/pipeline/arrangement.hpp"
 #include "panonav_simulation/scenes.hpp"
 #include "panonav_viewer/plot.hpp"
-#include "panonav_viewer/surroundings.hpp"
+#include "panonav_viewer/scene_drawing.hpp"
 
 namespace panonav::command {
 

@@ -19,7 +19,7 @@
 #include "panonav_simulation/screen.hpp"
 #include "panonav_viewer/mission_picture.hpp"
 #include "panonav_viewer/plot.hpp"
-#include "panonav_viewer/surroundings.hpp"
+#include "panonav_viewer/scene_drawing.hpp"
 #include "verbs/navigated_run.hpp"
 #include "verbs/shown_references.hpp"
 

@@ -10,7 +10,7 @@
 #include "panonav_simulation/recording.hpp"
 #include "panonav_viewer/picture_plot.hpp"
 #include "panonav_viewer/plot.hpp"
-#include "panonav_viewer/surroundings.hpp"
+#include "panonav_viewer/scene_drawing.hpp"
 #include "verbs/shown_references.hpp"
 
 namespace panonav::command {

@@ -5,7 +5,7 @@
 
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/positions.hpp"
-#include "panonav_viewer/surroundings.hpp"
+#include "panonav_viewer/scene_drawing.hpp"
 #include "reports/track_pictures.hpp"
 #include "reports/track_report.hpp"
 #include "verbs/shown_references.hpp"

@@ -104,7 +104,7 @@ viewer::PicturePlot plot_of_lines(const RouteLines& route, const std::vector<Fol
                      std::numeric_limits<float>::quiet_NaN());
   for (std::size_t k = 0; k < chosen.size(); ++k) {
     const FollowedImage& image = images[chosen[k]];
-    const auto shown = route.synthesise(image.fix->fix.pose);
+    const auto shown = route.synthesise(image.fix->pose);
     for (int row = 0; row < 2 * band; ++row) {
       const auto& line = row < band ? shown : image.line;
       put_line(line,
@@ -124,9 +124,9 @@ viewer::MapPlot plot_of_path(const RouteLines& route, const std::vector<Followed
   std::vector<Point2> true_path;
   for (const FollowedImage& image : images) {
     if (image.truth) true_path.push_back(image.truth->position());
-    if (image.fix) fixes.dots.push_back(image.fix->fix.pose.position());
+    if (image.fix) fixes.dots.push_back(image.fix->pose.position());
     if (image.fix && !image.changed.empty()) {
-      changed.circles.push_back(image.fix->fix.pose.position());
+      changed.circles.push_back(image.fix->pose.position());
     }
     if (!image.fix && image.truth) off.crosses.push_back(image.truth->position());
   }
@@ -144,8 +144,7 @@ viewer::LinePlot plot_of_errors(const std::vector<FollowedImage>& images) {
     if (!image.fix) {
       lost.add(number, 0.0);
     } else if (image.truth) {
-      position.add(number,
-                   100.0 * distance(image.fix->fix.pose.position(), image.truth->position()));
+      position.add(number, 100.0 * distance(image.fix->pose.position(), image.truth->position()));
       along.add(number, 100.0 * std::abs(image.fix->along_m - image.true_place->along_m));
     }
   }
@@ -160,7 +159,7 @@ viewer::LinePlot plot_of_correlations(const std::vector<FollowedImage>& images) 
                              .style = viewer::SeriesStyle::lines_and_points};
   for (std::size_t i = 0; i < images.size(); ++i) {
     if (!images[i].fix) continue;
-    correlation.add(static_cast<double>(i + 1), images[i].fix->fix.correlation);
+    correlation.add(static_cast<double>(i + 1), images[i].fix->correlation);
   }
   return {.title = "How well the route explains the pictures",
           .x_label = "picture",

@@ -250,9 +250,9 @@ ExitCode calibrate_lenses(const CalibrateArguments& wanted, const std::vector<st
   if (options.turn_deg != 0) known.turn_rad = radians(options.turn_deg);
   if (wanted.mirror.direction != 0) known.direction = ColumnDirection::counter_clockwise;
   const auto answer = calibrate_dual_fisheye(views, known, session.executor());
-  if (const auto* refusal = std::get_if<DualFisheyeRefusal>(&answer)) {
+  if (const auto* refusal = std::get_if<std::string>(&answer)) {
     return session.no_answer("panonav calibrate: " + names.front() +
-                             (views.size() > 1 ? " and the others: " : ": ") + refusal->reason);
+                             (views.size() > 1 ? " and the others: " : ": ") + *refusal);
   }
   const auto& found = std::get<DualFisheyeCalibration>(answer);
   if (wanted.overlay) {

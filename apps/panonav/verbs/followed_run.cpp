@@ -21,12 +21,12 @@ void describe(recordings::RunMoment& moment, const FollowedImage& image) {
     moment.truth = {image.truth->x_m, image.truth->y_m, image.truth->heading_rad};
   }
   if (!image.fix) return;
-  moment.pose = image.fix->fix.pose;
-  moment.covariance = image.fix->fix.covariance;
+  moment.pose = image.fix->pose;
+  moment.covariance = image.fix->covariance;
   moment.values = {{"origin", std::string(name_of(image.fix->origin))},
                    {"along_m", fixed(image.fix->along_m, 3)},
                    {"lateral_m", fixed(image.fix->lateral_m, 3)},
-                   {"correlation", fixed(image.fix->fix.correlation, 4)},
+                   {"correlation", fixed(image.fix->correlation, 4)},
                    {"changed", std::to_string(image.changed.size())}};
 }
 
@@ -91,18 +91,18 @@ FollowSummary summarise_follow(const std::vector<FollowedImage>& images, bool he
     if (!image.fix) continue;
     ++summary.on_route;
     switch (image.fix->origin) {
-      case RouteFixOrigin::prediction:
+      case RouteFix::Origin::prediction:
         ++summary.predicted;
         break;
-      case RouteFixOrigin::recovery:
+      case RouteFix::Origin::recovery:
         ++summary.recovered;
         break;
-      case RouteFixOrigin::search:
+      case RouteFix::Origin::search:
         ++summary.searched;
         break;
     }
     if (!image.truth) continue;
-    const Pose2& pose = image.fix->fix.pose;
+    const Pose2& pose = image.fix->pose;
     summary.position_m.push_back(distance(pose.position(), image.truth->position()));
     summary.along_m.push_back(std::abs(image.fix->along_m - image.true_place->along_m));
     summary.lateral_m.push_back(std::abs(image.fix->lateral_m - image.true_place->lateral_m));
@@ -130,13 +130,13 @@ std::vector<std::pair<double, double>> changed_stretches(const std::vector<Follo
   return stretches;
 }
 
-std::string_view name_of(RouteFixOrigin origin) {
+std::string_view name_of(RouteFix::Origin origin) {
   switch (origin) {
-    case RouteFixOrigin::prediction:
+    case RouteFix::Origin::prediction:
       return "prediction";
-    case RouteFixOrigin::recovery:
+    case RouteFix::Origin::recovery:
       return "recovery";
-    case RouteFixOrigin::search:
+    case RouteFix::Origin::search:
       return "search";
   }
   return "search";

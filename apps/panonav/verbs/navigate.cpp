@@ -20,7 +20,7 @@
 #include "panonav/relative_pose/fourier_homing.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "panonav_viewer/mission_picture.hpp"
-#include "panonav_viewer/surroundings.hpp"
+#include "panonav_viewer/scene_drawing.hpp"
 #include "reports/navigate_report.hpp"
 #include "reports/report_page.hpp"
 #include "verbs/navigated_run.hpp"

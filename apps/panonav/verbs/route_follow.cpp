@@ -51,7 +51,7 @@ ordered_json as_json(const FollowedImage& image, bool headings_known) {
                     {"changed", ordered_json::array()},
                     {"ground_truth", nullptr}};
   if (image.fix) {
-    const RouteFix& fix = image.fix->fix;
+    const RouteFix& fix = *image.fix;
     json["pose"] = pose_json(fix.pose);
     json["origin"] = name_of(image.fix->origin);
     json["along_m"] = image.fix->along_m;
@@ -77,7 +77,7 @@ ordered_json as_json(const FollowedImage& image, bool headings_known) {
 
 std::string as_text(const FollowedImage& image, Session& session) {
   if (!image.fix) return image.file + "  " + session.bad("not on this route");
-  const RouteFix& fix = image.fix->fix;
+  const RouteFix& fix = *image.fix;
   std::string line = image.file + "  " + session.good(name_of(image.fix->origin)) + "  x " +
                      fixed(fix.pose.x_m, 3) + " m  y " + fixed(fix.pose.y_m, 3) + " m  heading " +
                      fixed(degrees(fix.pose.heading_rad), 1) + " degrees  along " +
@@ -180,7 +180,7 @@ ExitCode follow_run(const Arguments& arguments, const FollowArguments& wanted, S
   if (wanted.tum) {
     std::vector<StampedPose> trajectory;
     for (const FollowedImage& image : images) {
-      if (image.fix) trajectory.push_back({seconds[image.index], image.fix->fix.pose});
+      if (image.fix) trajectory.push_back({seconds[image.index], image.fix->pose});
     }
     write_trajectory(*wanted.tum, trajectory);
   }

@@ -86,10 +86,10 @@ class RunRouteRecorder {
 ordered_json as_json(const RouteStep& step) {
   if (!step.fix) return {{"on_route", false}};
   return {{"on_route", true},
-          {"pose", pose_json(step.fix->fix.pose)},
+          {"pose", pose_json(step.fix->pose)},
           {"along_m", step.fix->along_m},
           {"lateral_m", step.fix->lateral_m},
-          {"correlation", step.fix->fix.correlation}};
+          {"correlation", step.fix->correlation}};
 }
 
 std::string as_text(const RouteStep& step, Session& session) {

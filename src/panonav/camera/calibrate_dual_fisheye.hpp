@@ -40,11 +40,6 @@ struct DualFisheyeCalibration {
   std::vector<double> turns_rad;  ///< of each picture against the first, in [-pi, pi)
 };
 
-/// Why no camera was found.
-struct DualFisheyeRefusal {
-  std::string reason;  ///< one line: what is missing in the pictures
-};
-
 /// Finds the lenses of a dual fisheye camera (centres, focal lengths, distortion, rotations, fields
 /// of view, gain) from pictures of one place, between which the camera is turned about its vertical
 /// axis: what both lenses see, or one lens in two pictures, must lie in the same direction, and
@@ -52,10 +47,11 @@ struct DualFisheyeRefusal {
 /// correlation, from coarse to fine; all parameters and the turns follow by robust least squares
 /// (Levenberg-Marquardt) with weak priors of how cameras are made. The axis of the turns becomes
 /// the vertical. One picture alone shows the lenses only where they overlap.
-/// Refuses pictures that do not determine the camera. Throws ContractError on no picture, different
-/// sizes, or a height below 64 px. Same pictures: same bits on any number of threads. Cost: some
-/// seconds for four pictures of 1280 x 640 on one thread.
-[[nodiscard]] std::variant<DualFisheyeCalibration, DualFisheyeRefusal> calibrate_dual_fisheye(
+/// Returns one line, what is missing in the pictures, where they do not determine the camera.
+/// Throws ContractError on no picture, different sizes, or a height below 64 px. Same pictures:
+/// same bits on any number of threads. Cost: some seconds for four pictures of 1280 x 640 on one
+/// thread.
+[[nodiscard]] std::variant<DualFisheyeCalibration, std::string> calibrate_dual_fisheye(
     std::span<const ImageView> pictures, const DualFisheyeKnowledge& known, Executor& executor);
 
 }  // namespace panonav

@@ -12,33 +12,39 @@
 namespace panonav {
 namespace {
 
-/// The longest side of the fields on which circles are climbed, and on which all of them are tried.
+// The shares and counts below were chosen on the recordings of the README, as the least quality of
+// a rim was (docs/decisions.md).
+
+/// Longest side of the field on which circles are climbed; the fit in the picture starts there.
 constexpr int middle_side_px = 400;
+/// Longest side of the field on which all centres and radii are tried; the cost grows with its
+/// cube.
 constexpr int coarse_side_px = 200;
-constexpr int candidates = 48;
-/// How many of those are fitted to the pixels.
-constexpr int fitted = 8;
-/// A ring around the mirror is narrower than this part of its outer radius. Wider plain bands are
+/// Circles of the coarse field that are climbed on the middle one, best first.
+constexpr int climbed_circles = 48;
+/// Circles of the middle field that are fitted to the picture, best first.
+constexpr int fitted_circles = 8;
+/// Circles whose centres and radii differ by less in all, in pixels of the middle field, are one.
+constexpr double same_circle_px = 3.0;
+
+/// Largest width of a ring around the mirror, as share of its outer radius: wider plain bands are
 /// sky or ceiling above a horizon.
-constexpr double widest_ring = 0.2;
-/// A ring has less than this part of the slope along the circle that the scene inside it has.
-constexpr double plain_ring = 0.35;
+constexpr double max_ring_width = 0.2;
+/// A ring has less than this share of the scene's structure inside it.
+constexpr double max_ring_structure = 0.35;
+/// Largest distance of the centres of circles that belong together, as share of the radius.
+constexpr double max_centre_distance = 0.04;
+/// A circle replaces the clearest one as rim, or as disc, if it has this share of its quality.
+constexpr double min_relative_quality = 0.6;
 
-/// Circles belong together when their centres differ by at most this part of the radius, ..
-constexpr double concentric = 0.04;
-/// .. and another circle is taken for the rim instead of the clearest only if it is nearly as
-/// clear.
-constexpr double as_clear = 0.6;
-
-/// The disc in the middle is sought among these radii, in radii of the rim; its centre may be off
-/// by a lens that is not quite on the mirror's axis.
-constexpr double min_disc = 0.04;
-constexpr double max_disc = 0.65;
-constexpr double disc_off_centre = 0.02;
+/// Smallest and largest radius of the disc in the middle, as shares of the rim's.
+constexpr double min_disc_radius = 0.04, max_disc_radius = 0.65;
+/// Largest distance of its centre from the rim's, as share of the rim's radius: a lens need not be
+/// quite on the mirror's axis.
+constexpr double max_disc_offset = 0.02;
 /// Least quality of its circle: lower when its inside is plain, because the scene around it is
 /// often as dark as the disc, which leaves gaps in its edge.
-constexpr double min_disc_quality = 0.5;
-constexpr double min_plain_disc_quality = 0.3;
+constexpr double min_disc_quality = 0.5, min_plain_disc_quality = 0.3;
 
 /// What one search needs of one or several images.
 struct Evidence {
@@ -132,14 +138,14 @@ std::size_t rim_among(const std::vector<FoundCircle>& circles,
   for (std::size_t inner = rim; inner-- > 0;) {
     const double outer_px = circles[rim].radius_px;
     const double inner_px = circles[inner].radius_px;
-    if (inner_px < (1 - widest_ring) * outer_px) break;
+    if (inner_px < (1 - max_ring_width) * outer_px) break;
     // Blur of the two edges; a thin ring has less to spare.
     const double margin_px = std::min(std::max(2.0, 0.02 * outer_px), 0.35 * (outer_px - inner_px));
     const double ring =
         structure(planes, circles[rim].centre, inner_px + margin_px, outer_px - margin_px);
     const double scene =
         structure(planes, circles[inner].centre, 0.5 * inner_px, inner_px - margin_px);
-    if (ring < plain_ring * scene) rim = inner;
+    if (ring < max_ring_structure * scene) rim = inner;
   }
   return rim;
 }
@@ -150,11 +156,11 @@ std::optional<double> disc_within(const Evidence& seen, std::span<const SmoothPl
                                   const FoundCircle& rim) {
   const double rim_radius = rim.radius_px / seen.middle_reduction;
   CircleRange range;
-  range.lowest_radius = std::max(3.0, min_disc * rim_radius);
-  range.highest_radius = max_disc * rim_radius;
+  range.lowest_radius = std::max(3.0, min_disc_radius * rim_radius);
+  range.highest_radius = max_disc_radius * rim_radius;
   range.visible_fraction = 0.75;
   range.evenness = Evenness::mean;  // where the scene is dark, the dark disc has no edge
-  const double reach_px = std::max(2.0, disc_off_centre * rim.radius_px);
+  const double reach_px = std::max(2.0, max_disc_offset * rim.radius_px);
   const PixelPoint centre{rim.centre.u_px / seen.middle_reduction,
                           rim.centre.v_px / seen.middle_reduction};
   struct Disc {
@@ -166,13 +172,14 @@ std::optional<double> disc_within(const Evidence& seen, std::span<const SmoothPl
   for (const FieldCircle& candidate : concentric_candidates(
            seen.middle, centre.u_px, centre.v_px, reach_px / seen.middle_reduction, range, 1.0)) {
     const auto found = refined(seen, planes, climb(seen.middle, candidate, range));
-    if (!found || found->radius_px > max_disc * rim.radius_px) continue;
+    if (!found || found->radius_px > max_disc_radius * rim.radius_px) continue;
     const double off_px = distance_px(found->centre, rim.centre);
     if (off_px > reach_px) continue;
     const double inside = structure(planes, found->centre, 0.0, 0.9 * found->radius_px);
     const double outside =
         structure(planes, rim.centre, 1.1 * found->radius_px, 0.95 * rim.radius_px);
-    const double needed = inside < plain_ring * outside ? min_plain_disc_quality : min_disc_quality;
+    const double needed =
+        inside < max_ring_structure * outside ? min_plain_disc_quality : min_disc_quality;
     if (found->quality < needed) continue;
     discs.push_back({found->quality, found->radius_px + off_px});
     best_quality = std::max(best_quality, found->quality);
@@ -180,7 +187,8 @@ std::optional<double> disc_within(const Evidence& seen, std::span<const SmoothPl
   // A camera shows several circles, its lens and its body: the widest clear one covers them all.
   std::optional<double> radius_px;
   for (const Disc& disc : discs) {
-    if (disc.quality >= as_clear * best_quality && disc.radius_px > radius_px.value_or(0.0)) {
+    if (disc.quality >= min_relative_quality * best_quality &&
+        disc.radius_px > radius_px.value_or(0.0)) {
       radius_px = disc.radius_px;
     }
   }
@@ -195,8 +203,8 @@ std::vector<FieldCircle> best_circles(const Evidence& seen, const CircleRange& r
     FieldCircle circle;
   };
   std::vector<Scored> climbed;
-  for (const FieldCircle& candidate :
-       circle_candidates(seen.coarse, scaled(range, 1.0 / seen.coarse_reduction), candidates)) {
+  for (const FieldCircle& candidate : circle_candidates(
+           seen.coarse, scaled(range, 1.0 / seen.coarse_reduction), climbed_circles)) {
     const FieldCircle circle = climb(seen.middle, scaled(candidate, seen.coarse_reduction), range);
     if (circle.radius < range.lowest_radius || circle.radius > range.highest_radius) continue;
     const CircleScore found = score(seen.middle, circle, range.evenness);
@@ -210,11 +218,11 @@ std::vector<FieldCircle> best_circles(const Evidence& seen, const CircleRange& r
     const bool known = std::any_of(result.begin(), result.end(), [&](const FieldCircle& other) {
       return std::abs(other.u - scored.circle.u) + std::abs(other.v - scored.circle.v) +
                  std::abs(other.radius - scored.circle.radius) <
-             3;
+             same_circle_px;
     });
     if (known) continue;
     result.push_back(scored.circle);
-    if (static_cast<int>(result.size()) == fitted) break;
+    if (static_cast<int>(result.size()) == fitted_circles) break;
   }
   return result;
 }
@@ -250,11 +258,11 @@ std::optional<Search> search(const Evidence& seen, std::span<const SmoothPlanes>
 
   std::vector<FoundCircle> circles{*clearest};
   for (const FieldCircle& candidate : concentric_candidates(
-           seen.middle, start.u, start.v, concentric * start.radius, range, 2.0)) {
+           seen.middle, start.u, start.v, max_centre_distance * start.radius, range, 2.0)) {
     const auto found = refined(seen, planes, climb(seen.middle, candidate, range));
-    if (!found || found->quality < as_clear * clearest->quality ||
+    if (!found || found->quality < min_relative_quality * clearest->quality ||
         (found->radius_px > clearest->radius_px && found->quality < options.min_quality) ||
-        distance_px(found->centre, clearest->centre) > concentric * found->radius_px) {
+        distance_px(found->centre, clearest->centre) > max_centre_distance * found->radius_px) {
       continue;
     }
     const bool known = std::any_of(circles.begin(), circles.end(), [&](const FoundCircle& other) {

@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <cstdint>
 #include <span>
-#include <utility>
 #include <vector>
 
 namespace panonav {
@@ -37,26 +35,5 @@ template <typename Value>
 /// order, rounded down: one of them, where `quantile` interpolates. Throws ContractError on no
 /// values. Cost: O(n).
 [[nodiscard]] double order_statistic(std::vector<double> values, double fraction);
-
-/// A share of trials and how certain it is.
-struct Proportion {
-  double value = 0.0;  ///< successes / trials, 0 .. 1
-  double low = 0.0;    ///< of the 95 % Wilson score interval
-  double high = 0.0;   ///< of the same interval; exactly 1 where every trial succeeded
-};
-/// Throws ContractError unless 0 <= successes <= trials and trials >= 1.
-[[nodiscard]] Proportion success_rate(std::size_t successes, std::size_t trials);
-
-/// 95 % percentile bootstrap interval of the median. Same seed, same bits.
-[[nodiscard]] std::pair<double, double> median_interval(std::span<const double> values,
-                                                        std::uint64_t seed, int samples = 1000);
-
-/// The same of the mean. For figures per scene: the scenes are what is drawn.
-[[nodiscard]] std::pair<double, double> mean_interval(std::span<const double> values,
-                                                      std::uint64_t seed, int samples = 1000);
-
-/// Spearman's rank correlation, -1 .. 1; ties share their mean rank. Throws ContractError on
-/// different sizes or fewer than 3.
-[[nodiscard]] double rank_correlation(std::span<const double> a, std::span<const double> b);
 
 }  // namespace panonav

@@ -107,6 +107,12 @@ VoronoiCells::VoronoiCells(std::span<const Point2> positions, std::optional<doub
     require(std::isfinite(p.x_m), "x_m of a position", p.x_m, "any finite number");
     require(std::isfinite(p.y_m), "y_m of a position", p.y_m, "any finite number");
   }
+  merge_positions(positions);
+  sort_sites();
+  spacing_m_ = spacing_m ? *spacing_m : typical_spacing_m();
+}
+
+void VoronoiCells::merge_positions(std::span<const Point2> positions) {
   // Equal positions become neighbours in this order; the first of them founds the site.
   std::vector<std::size_t> order(positions.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -131,7 +137,9 @@ VoronoiCells::VoronoiCells(std::span<const Point2> positions, std::optional<doub
       site_of_[i] = site_of_[founder[i]];
     }
   }
+}
 
+void VoronoiCells::sort_sites() {
   if (!sites_.empty()) {
     Point2 low = sites_[0];
     Point2 high = sites_[0];
@@ -148,36 +156,35 @@ VoronoiCells::VoronoiCells(std::span<const Point2> positions, std::optional<doub
   });
   rank_.resize(sites_.size());
   for (std::size_t i = 0; i < by_sweep_.size(); ++i) rank_[by_sweep_[i]] = i;
+}
 
-  if (spacing_m) {
-    spacing_m_ = *spacing_m;
-  } else if (sites_.size() >= 2) {
-    std::vector<double> second(sites_.size());
-    for (std::size_t site = 0; site < sites_.size(); ++site) {
-      std::array<double, 2> nearest = {infinity, infinity};
-      const auto consider = [&](std::size_t other) {
-        const double d = distance(sites_[site], sites_[other]);
-        if (d < nearest[0]) {
-          nearest = {d, nearest[0]};
-        } else if (d < nearest[1]) {
-          nearest[1] = d;
-        }
-      };
-      const double here = along(sites_[site]);
-      std::size_t below = rank_[site];
-      std::size_t above = rank_[site] + 1;
-      // Outwards on both sides until no site there can be nearer than the second found.
-      while (below > 0 && here - along(sites_[by_sweep_[below - 1]]) < nearest[1]) {
-        consider(by_sweep_[--below]);
-        if (above < sites_.size()) consider(by_sweep_[above++]);
+double VoronoiCells::typical_spacing_m() const {
+  if (sites_.size() < 2) return 0.0;
+  std::vector<double> second(sites_.size());
+  for (std::size_t site = 0; site < sites_.size(); ++site) {
+    std::array<double, 2> nearest = {infinity, infinity};
+    const auto consider = [&](std::size_t other) {
+      const double d = distance(sites_[site], sites_[other]);
+      if (d < nearest[0]) {
+        nearest = {d, nearest[0]};
+      } else if (d < nearest[1]) {
+        nearest[1] = d;
       }
-      while (above < sites_.size() && along(sites_[by_sweep_[above]]) - here < nearest[1]) {
-        consider(by_sweep_[above++]);
-      }
-      second[site] = std::isfinite(nearest[1]) ? nearest[1] : nearest[0];
+    };
+    const double here = along(sites_[site]);
+    std::size_t below = rank_[site];
+    std::size_t above = rank_[site] + 1;
+    // Outwards on both sides until no site there can be nearer than the second found.
+    while (below > 0 && here - along(sites_[by_sweep_[below - 1]]) < nearest[1]) {
+      consider(by_sweep_[--below]);
+      if (above < sites_.size()) consider(by_sweep_[above++]);
     }
-    spacing_m_ = order_statistic(std::move(second), 0.5);
+    while (above < sites_.size() && along(sites_[by_sweep_[above]]) - here < nearest[1]) {
+      consider(by_sweep_[above++]);
+    }
+    second[site] = std::isfinite(nearest[1]) ? nearest[1] : nearest[0];
   }
+  return order_statistic(std::move(second), 0.5);
 }
 
 template <class Visit>

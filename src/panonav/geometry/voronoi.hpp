@@ -57,6 +57,12 @@ class VoronoiCells {
   [[nodiscard]] double area_m2(std::size_t site) const;
 
  private:
+  // Sets sites_ and site_of_.
+  void merge_positions(std::span<const Point2> positions);
+  // Sets sweep_x_, by_sweep_ and rank_.
+  void sort_sites();
+  // The median distance to the second-nearest other site; 0 below two sites.
+  [[nodiscard]] double typical_spacing_m() const;
   template <class Visit>
   void visit_near(std::size_t site, double radius_m, const Visit& visit) const;
   [[nodiscard]] double along(Point2 p) const noexcept { return sweep_x_ ? p.x_m : p.y_m; }

@@ -1,27 +1,16 @@
 #include "panonav/memory/view_sketches.hpp"
 
 #include <algorithm>
-#include <array>
-#include <limits>
 #include <string>
 #include <utility>
 
 #include "panonav/core/error.hpp"
-#include "panonav/kernels/dispatch.hpp"
 #include "panonav/memory/internal/comparison.hpp"
-#include "panonav/memory/internal/sketch_segment.hpp"
+#include "panonav/memory/internal/sketch_search.hpp"
 
 namespace panonav {
 
 namespace {
-
-/// A segment and which of its views are there.
-struct LiveSegment {
-  std::shared_ptr<const SketchSegment> sketches;
-  std::vector<std::uint64_t> live;  // a bit for each row of its blocks
-  std::size_t count = 0;
-  [[nodiscard]] bool has(std::size_t row) const { return (live[row / 64] >> (row % 64) & 1U) != 0; }
-};
 
 LiveSegment all_live(std::shared_ptr<const SketchSegment> sketches) {
   LiveSegment segment{std::move(sketches), {}, 0};
@@ -31,339 +20,6 @@ LiveSegment all_live(std::shared_ptr<const SketchSegment> sketches) {
   return segment;
 }
 
-/// A view on its way through the levels.
-struct SketchedView {
-  std::uint32_t bound = 0;
-  std::uint32_t segment = 0;  // its number
-  std::uint32_t row = 0;
-  ViewId view;
-};
-
-/// What a thread needs to look at one segment after the other.
-struct SegmentScratch {
-  explicit SegmentScratch(const SegmentLayout& layout)
-      : room(layout),
-        tables(layout.dimensions(0) * 16),
-        bounds(layout.max_rows()),
-        indices(layout.max_rows()),
-        level_bounds(layout.max_rows()) {}
-  SketchSegment::Encoded room;
-  AlignedVector<std::uint8_t> tables, bounds;
-  std::vector<std::uint32_t> indices, level_bounds;
-  std::uint64_t bytes_read = 0;
-};
-
-class SketchSearch {
- public:
-  SketchSearch(const SegmentLayout& layout, std::span<const LiveSegment> segments,
-               const PackedSignature& query, int components, const SearchMask& mask,
-               std::size_t top, const ViewSketches::ReadViews& read, Executor& executor)
-      : layout_(layout),
-        segments_(segments),
-        kernels_(kernels::distance_kernels(kernels::chosen_instructions())),
-        read_(read),
-        executor_(executor),
-        top_(top),
-        nearest_(top, std::numeric_limits<std::int32_t>::max()) {
-    const auto rows = static_cast<std::size_t>(layout.shape().rows);
-    magnitudes_.assign(query.magnitudes.begin(), query.magnitudes.end());
-    compared_bytes_ = static_cast<std::size_t>(components) * rows;
-    if (!mask.allowed_rows.empty()) {
-      for (std::size_t i = 0; i < compared_bytes_; ++i) {
-        mask_.push_back(mask.allowed_rows[i % rows] != 0 ? 255 : 0);
-      }
-    }
-    excluded_.assign(mask.excluded_views.begin(), mask.excluded_views.end());
-    std::ranges::sort(excluded_);
-    query_.sums.resize(layout.total());
-    layout.sum_blocks(query.magnitudes.data(), query_.sums.data());
-    query_.counted = layout.counted(components, mask.allowed_rows);
-  }
-
-  SearchResult run() {
-    find_limit();
-    scan();
-    result_.matches = std::move(nearest_).sorted();
-    return std::move(result_);
-  }
-
- private:
-  [[nodiscard]] bool excluded(ViewId view) const {
-    return !excluded_.empty() && std::ranges::binary_search(excluded_, view);
-  }
-
-  void compare(ViewId view, std::span<const std::uint8_t> magnitudes) {
-    require(magnitudes.size() == layout_.shape().size(), "magnitudes of a view that was read",
-            static_cast<double>(magnitudes.size()), std::to_string(layout_.shape().size()));
-    ++result_.views_in_full;
-    result_.bytes_read += compared_bytes_;
-    nearest_.offer({view, mask_.empty()
-                              ? kernels_.l1(magnitudes.data(), magnitudes_.data(), compared_bytes_)
-                              : kernels_.masked_l1(magnitudes.data(), magnitudes_.data(),
-                                                   mask_.data(), compared_bytes_)});
-  }
-
-  /// Compares these in full; none is compared twice.
-  void read(std::span<const SketchedView> candidates) {
-    std::vector<ViewId> wanted;
-    for (const SketchedView& candidate : candidates) {
-      if (std::ranges::binary_search(compared_, candidate.view)) continue;
-      wanted.push_back(candidate.view);
-    }
-    if (wanted.empty()) return;
-    std::ranges::sort(wanted);
-    read_(wanted, [this](ViewId view, std::span<const std::uint8_t> magnitudes) {
-      compare(view, magnitudes);
-    });
-    const auto middle = static_cast<std::ptrdiff_t>(compared_.size());
-    compared_.insert(compared_.end(), wanted.begin(), wanted.end());
-    std::ranges::inplace_merge(compared_, compared_.begin() + middle);
-    query_.choose_unit(layout_, nearest_.limit());
-  }
-
-  static bool is_better(const SketchedView& a, const SketchedView& b) {
-    return a.bound != b.bound ? a.bound < b.bound : a.view < b.view;
-  }
-  static void keep_best(std::vector<SketchedView>& candidates, std::size_t count) {
-    if (candidates.size() <= count) return;
-    std::ranges::nth_element(candidates, candidates.begin() + static_cast<std::ptrdiff_t>(count),
-                             is_better);
-    candidates.resize(count);
-  }
-
-  std::span<const std::uint32_t> cells(const SketchSegment& segment, std::uint32_t limit,
-                                       std::size_t first, std::size_t count,
-                                       SegmentScratch& scratch) const {
-    scratch.bytes_read += count * kernels::cell_block * layout_.dimensions(0) / 2;
-    return segment.cell_bounds(layout_, kernels_, query_, scratch.tables, limit, first, count,
-                               scratch.bounds, scratch.indices);
-  }
-  /// Into scratch.level_bounds.
-  void bounds_at(const SketchSegment& segment, int level, std::span<const std::uint32_t> rows,
-                 SegmentScratch& scratch) const {
-    scratch.bytes_read += rows.size() * layout_.dimensions(level);
-    segment.bounds_at(layout_, kernels_, query_, level, rows, scratch.room,
-                      scratch.level_bounds.data());
-  }
-
-  /// Calls body(segment number, place in the order, scratch, chunk) for those of the order from
-  /// `begin` to `end`, on the threads of the executor; chunks are of so many segments.
-  template <class Body>
-  void for_segments(std::size_t begin, std::size_t end, std::size_t chunk, const Body& body) {
-    std::vector<std::uint64_t> bytes((end - begin + chunk - 1) / chunk);
-    executor_.for_chunks(end - begin, chunk,
-                         [&](std::size_t from, std::size_t to, std::size_t number) {
-                           SegmentScratch scratch(layout_);
-                           for (std::size_t i = from; i < to; ++i) {
-                             body(order_[begin + i].second, begin + i, scratch, number);
-                           }
-                           bytes[number] = scratch.bytes_read;
-                         });
-    for (const std::uint64_t of_chunk : bytes) result_.bytes_read += of_chunk;
-  }
-
-  /// Bounds of candidates, which are put in the order of their rows.
-  void refine(std::vector<SketchedView>& candidates, int level) {
-    std::ranges::sort(candidates, {}, [](const SketchedView& candidate) {
-      return std::pair(candidate.segment, candidate.row);
-    });
-    SegmentScratch scratch(layout_);
-    std::vector<std::uint32_t> rows;
-    for (std::size_t begin = 0; begin < candidates.size();) {
-      const std::uint32_t number = candidates[begin].segment;
-      std::size_t end = begin;
-      rows.clear();
-      for (; end < candidates.size() && candidates[end].segment == number; ++end) {
-        rows.push_back(candidates[end].row);
-      }
-      bounds_at(*segments_[number].sketches, level, rows, scratch);
-      for (std::size_t i = begin; i < end; ++i) {
-        candidates[i].bound = scratch.level_bounds[i - begin];
-      }
-      begin = end;
-    }
-    result_.bytes_read += scratch.bytes_read;
-  }
-
-  /// A first limit, within which `top` views lie: from the segments of which a sample of the views
-  /// looks best. Views that were taken near each other lie near each other there.
-  void find_limit() {
-    if (segments_.empty()) return;
-    for (std::size_t i = 0; i < segments_.size(); ++i) {
-      order_.emplace_back(0U, static_cast<std::uint32_t>(i));
-    }
-    query_.choose_unit(layout_, typical_bound(*segments_.front().sketches));
-    if (segments_.size() > first_segments) {
-      for_segments(0, order_.size(), 64,
-                   [this](std::uint32_t number, std::size_t place, SegmentScratch& scratch,
-                          std::size_t /*chunk*/) {
-                     order_[place].first =
-                         least_of_sample(*segments_[number].sketches, number, scratch);
-                   });
-      std::ranges::sort(order_);
-    }
-    std::vector<SketchedView> best;
-    std::size_t begin = 0;
-    while (begin < order_.size() && (begin == 0 || best.size() < 2 * top_)) {
-      const std::size_t end = std::min(order_.size(), begin + first_segments);
-      std::vector<std::vector<SketchedView>> found(end - begin);
-      for_segments(begin, end, 1,
-                   [&](std::uint32_t number, std::size_t /*place*/, SegmentScratch& scratch,
-                       std::size_t chunk) { take_best(number, scratch, found[chunk]); });
-      for (const auto& of_segment : found) {
-        best.insert(best.end(), of_segment.begin(), of_segment.end());
-      }
-      begin = end;
-    }
-    keep_best(best, kept_by_cells());
-    refine(best, 1);
-    keep_best(best, 128 + 4 * top_);
-    refine(best, 2);
-    keep_best(best, top_ + 6);
-    read(best);
-  }
-  [[nodiscard]] std::size_t kept_by_cells() const noexcept { return 1024 + 8 * top_; }
-
-  std::uint32_t least_of_sample(const SketchSegment& segment, std::size_t number,
-                                SegmentScratch& scratch) const {
-    segment.make_tables(layout_, kernels_, query_, scratch.tables);
-    std::uint32_t least = std::numeric_limits<std::uint32_t>::max();
-    for (std::size_t block = number % sampled_every; block < segment.blocks();
-         block += sampled_every) {
-      cells(segment, 0, block, 1, scratch);
-      const std::size_t rows =
-          std::min(kernels::cell_block, segment.rows() - block * kernels::cell_block);
-      least = std::min<std::uint32_t>(
-          least, *std::ranges::min_element(std::span(scratch.bounds).first(rows)));
-    }
-    return least;
-  }
-
-  /// Those views of a segment that look best by their cells.
-  void take_best(std::uint32_t number, SegmentScratch& scratch,
-                 std::vector<SketchedView>& best) const {
-    const LiveSegment& segment = segments_[number];
-    const SketchSegment& sketches = *segment.sketches;
-    sketches.make_tables(layout_, kernels_, query_, scratch.tables);
-    cells(sketches, 0, 0, sketches.blocks(), scratch);
-    // The bound that enough of them keep to.
-    std::array<std::size_t, 256> counts{};
-    for (std::size_t row = 0; row < sketches.rows(); ++row) ++counts[scratch.bounds[row]];
-    std::size_t limit = 0;
-    for (std::size_t within = counts[0]; within < kept_by_cells() && limit < 255;) {
-      within += counts[++limit];
-    }
-    for (std::uint32_t row = 0; row < sketches.rows(); ++row) {
-      if (scratch.bounds[row] > limit || !segment.has(row)) continue;
-      const ViewId view = sketches.views()[row];
-      if (!excluded(view)) best.push_back({scratch.bounds[row], number, row, view});
-    }
-  }
-
-  /// The median bound of some views.
-  std::uint32_t typical_bound(const SketchSegment& segment) {
-    std::vector<std::uint32_t> rows;
-    for (std::uint32_t row = 0; row < std::min<std::size_t>(64, segment.rows()); ++row) {
-      rows.push_back(row);
-    }
-    SegmentScratch scratch(layout_);
-    bounds_at(segment, 1, rows, scratch);
-    const auto bounds = std::span(scratch.level_bounds).first(rows.size());
-    const auto middle = bounds.begin() + static_cast<std::ptrdiff_t>(rows.size() / 2);
-    std::ranges::nth_element(bounds, middle);
-    return *middle;
-  }
-
-  /// All segments, in rounds that grow: after each the limit may sink.
-  void scan() {
-    constexpr std::size_t chunk = 16;
-    std::vector<SketchedView> waiting;
-    std::size_t begin = 0;
-    while (begin < order_.size()) {
-      const std::size_t end = std::min(order_.size(), begin + std::max(2 * chunk, 3 * begin));
-      std::vector<std::vector<SketchedView>> found((end - begin + chunk - 1) / chunk);
-      for_segments(begin, end, chunk,
-                   [&](std::uint32_t number, std::size_t /*place*/, SegmentScratch& scratch,
-                       std::size_t of_chunk) {
-                     take_within(number, nearest_.limit(), scratch, found[of_chunk]);
-                   });
-      for (const auto& of_chunk : found) {
-        waiting.insert(waiting.end(), of_chunk.begin(), of_chunk.end());
-      }
-      if (waiting.size() >= max_waiting) read_some(waiting);
-      begin = end;
-    }
-    while (!waiting.empty()) read_some(waiting);
-  }
-
-  /// Those views of a segment whose bounds are within the limit.
-  void take_within(std::uint32_t number, std::uint32_t limit, SegmentScratch& scratch,
-                   std::vector<SketchedView>& found) const {
-    const LiveSegment& segment = segments_[number];
-    const SketchSegment& sketches = *segment.sketches;
-    sketches.make_tables(layout_, kernels_, query_, scratch.tables);
-    const auto passed = cells(sketches, limit, 0, sketches.blocks(), scratch);
-    // In place: what is kept lies before what is looked at.
-    const std::span<std::uint32_t> rows(scratch.indices.data(), passed.size());
-    std::size_t kept = 0;
-    for (const std::uint32_t row : rows) {
-      rows[kept] = row;
-      kept += segment.has(row) ? 1 : 0;
-    }
-    for (int level = 1; level <= 2 && kept > 0; ++level) {
-      const auto compared = rows.first(kept);
-      bounds_at(sketches, level, compared, scratch);
-      kept = 0;
-      for (std::size_t i = 0; i < compared.size(); ++i) {
-        if (scratch.level_bounds[i] > limit) continue;
-        scratch.level_bounds[kept] = scratch.level_bounds[i];
-        rows[kept++] = rows[i];
-      }
-    }
-    for (std::size_t i = 0; i < kept; ++i) {
-      const ViewId view = sketches.views()[rows[i]];
-      if (!excluded(view)) found.push_back({scratch.level_bounds[i], number, rows[i], view});
-    }
-  }
-
-  /// The best of them, more each time; all where they are few. Of the others those stay that can be
-  /// among the nearest then.
-  void read_some(std::vector<SketchedView>& waiting) {
-    const auto drop = [&] {
-      std::erase_if(waiting, [this](const SketchedView& candidate) {
-        return nearest_.rules_out(candidate.bound, candidate.view) ||
-               std::ranges::binary_search(compared_, candidate.view);
-      });
-    };
-    drop();
-    std::vector<SketchedView> best(waiting);
-    keep_best(best, read_at_once_);
-    read_at_once_ = std::min<std::size_t>(2 * read_at_once_, 4096);
-    read(best);
-    drop();
-  }
-
-  static constexpr std::size_t first_segments = 16;
-  static constexpr std::size_t sampled_every = 16;  // blocks of a segment
-  static constexpr std::size_t max_waiting = 256;
-
-  const SegmentLayout& layout_;
-  std::span<const LiveSegment> segments_;
-  const kernels::DistanceKernels& kernels_;
-  const ViewSketches::ReadViews& read_;
-  Executor& executor_;
-  std::size_t top_;
-  Nearest nearest_;
-  SegmentQuery query_;
-  AlignedVector<std::uint8_t> magnitudes_, mask_;  // the mask is empty when all rows count
-  std::size_t compared_bytes_ = 0;
-  std::vector<ViewId> excluded_;                                // ascending
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> order_;  // least bound of a sample, number
-  std::vector<ViewId> compared_;                                // in full, ascending
-  std::size_t read_at_once_ = 128;
-  SearchResult result_;
-};
-
 }  // namespace
 
 struct ViewSketches::Implementation {
@@ -372,7 +28,7 @@ struct ViewSketches::Implementation {
 
   std::shared_ptr<const SegmentLayout> layout;
   std::vector<LiveSegment> segments;  // full ones, then the one that grows
-  /// Of the last segment while it is not full: it is sketched anew when views come.
+  /// Of the last segment while it is not full: it is sketched again when views come.
   std::shared_ptr<const std::vector<std::uint8_t>> growing;
   std::size_t size = 0;
 
@@ -522,9 +178,8 @@ SearchResult ViewSketches::search(const PackedSignature& query, const SearchOpti
                                 static_cast<std::uint64_t>(shape().rows);
   SearchResult result;
   if (top > 0) {
-    result = SketchSearch(*implementation_->layout, implementation_->segments, query, components,
-                          mask, top, read, executor)
-                 .run();
+    result = search_segments(*implementation_->layout, implementation_->segments, query, components,
+                             mask, top, read, executor);
   }
   result.bytes_in_full = in_full;
   return result;

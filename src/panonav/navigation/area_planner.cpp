@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/navigation/internal/search_tree.hpp"
 
 namespace panonav {
 

@@ -7,6 +7,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/navigation/internal/search_tree.hpp"
 
 namespace panonav {
 

@@ -14,7 +14,6 @@
 #include "panonav/memory/view_source.hpp"
 #include "panonav/navigation/area_planner.hpp"
 #include "panonav/navigation/known_route.hpp"
-#include "panonav/navigation/place_scale.hpp"
 
 namespace panonav {
 

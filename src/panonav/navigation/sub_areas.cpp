@@ -23,6 +23,7 @@ void visit_options(SubAreaOptions& options, OptionVisitor& visitor) {
 namespace {
 
 constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
+// Share of the views that the smaller side of a cut has at least.
 constexpr double min_side = 1.0 / 3.0;
 
 /// Some nodes of a graph with the edges among them, numbered anew.

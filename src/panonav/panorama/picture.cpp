@@ -68,6 +68,43 @@ void check(const PictureLayout& layout) {
   }
 }
 
+// Samples the rows between two heights, fractions of the picture's from its top, at `shape`. Rows
+// come first: it leaves fewer of them. Weights that fall outside the picture count for its edge.
+std::vector<float> sample_grey(ImageView picture, const PictureLayout& layout, double top,
+                               double row_step, PanoramaShape shape) {
+  const double column_step = static_cast<double>(picture.width) / shape.columns;
+  const double sign = layout.direction == ColumnDirection::clockwise ? -1.0 : 1.0;
+  std::vector<Sample> across;
+  for (int c = 0; c < shape.columns; ++c) {
+    Sample sample = make_sample(
+        layout.forward_column * picture.width + sign * c * column_step - 0.5, column_step);
+    sample.first = (sample.first % picture.width + picture.width) % picture.width;
+    across.push_back(std::move(sample));
+  }
+  std::vector<float> values(static_cast<std::size_t>(shape.rows) * shape.columns);
+  std::vector<float> line(static_cast<std::size_t>(picture.width));
+  for (int y = 0; y < shape.rows; ++y) {
+    const Sample down = make_sample(top * picture.height + (y + 0.5) * row_step - 0.5, row_step);
+    std::fill(line.begin(), line.end(), 0.0F);
+    for (std::size_t i = 0; i < down.weights.size(); ++i) {
+      const int v = std::clamp(down.first + static_cast<int>(i), 0, picture.height - 1);
+      const std::uint8_t* from = picture.data + v * picture.stride;
+      for (int u = 0; u < picture.width; ++u) line[u] += down.weights[i] * from[u];
+    }
+    for (int c = 0; c < shape.columns; ++c) {
+      float sum = 0.0F;
+      int u = across[c].first;
+      for (const float weight : across[c].weights) {
+        sum += weight * line[u];
+        if (++u == picture.width) u = 0;
+      }
+      values[static_cast<std::size_t>(y) * shape.columns + c] =
+          std::clamp(sum * (1.0F / 255.0F), 0.0F, 1.0F);
+    }
+  }
+  return values;
+}
+
 }  // namespace
 
 Panorama panorama_from_picture(ImageView picture, const PictureLayout& layout,
@@ -91,50 +128,15 @@ Panorama panorama_from_picture(ImageView picture, const PictureLayout& layout,
     band = layout.kept_elevations;
   }
   const double kept_rows = (bottom - top) * picture.height;
-  const int rows =
-      shape.rows > 0 ? shape.rows : std::max(1, static_cast<int>(std::lround(kept_rows)));
-  const int columns = shape.columns > 0 ? shape.columns : picture.width;
-
+  if (shape.rows == 0) shape.rows = std::max(1, static_cast<int>(std::lround(kept_rows)));
+  if (shape.columns == 0) shape.columns = picture.width;
   Image grey_copy(1, 1);
   if (picture.channels != 1) {
     grey_copy = to_grey(picture);
     picture = grey_copy.view();
   }
-
-  const double column_step = static_cast<double>(picture.width) / columns;
-  const double sign = layout.direction == ColumnDirection::clockwise ? -1.0 : 1.0;
-  std::vector<Sample> across;
-  for (int c = 0; c < columns; ++c) {
-    Sample sample = make_sample(
-        layout.forward_column * picture.width + sign * c * column_step - 0.5, column_step);
-    sample.first = (sample.first % picture.width + picture.width) % picture.width;
-    across.push_back(std::move(sample));
-  }
-  const double row_step = kept_rows / rows;
-
-  // Rows first: it leaves fewer of them. Weights that fall outside the picture count for its edge.
-  std::vector<float> values(static_cast<std::size_t>(rows) * columns);
-  std::vector<float> line(static_cast<std::size_t>(picture.width));
-  for (int y = 0; y < rows; ++y) {
-    const Sample down = make_sample(top * picture.height + (y + 0.5) * row_step - 0.5, row_step);
-    std::fill(line.begin(), line.end(), 0.0F);
-    for (std::size_t i = 0; i < down.weights.size(); ++i) {
-      const int v = std::clamp(down.first + static_cast<int>(i), 0, picture.height - 1);
-      const std::uint8_t* from = picture.data + v * picture.stride;
-      for (int u = 0; u < picture.width; ++u) line[u] += down.weights[i] * from[u];
-    }
-    for (int c = 0; c < columns; ++c) {
-      float sum = 0.0F;
-      int u = across[c].first;
-      for (const float weight : across[c].weights) {
-        sum += weight * line[u];
-        if (++u == picture.width) u = 0;
-      }
-      values[static_cast<std::size_t>(y) * columns + c] =
-          std::clamp(sum * (1.0F / 255.0F), 0.0F, 1.0F);
-    }
-  }
-  return {rows, columns, band, std::move(values)};
+  auto values = sample_grey(picture, layout, top, kept_rows / shape.rows, shape);
+  return {shape.rows, shape.columns, band, std::move(values)};
 }
 
 }  // namespace panonav

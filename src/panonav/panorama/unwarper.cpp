@@ -8,6 +8,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/kernels/remap.hpp"
+#include "panonav/panorama/internal/unwarp_table.hpp"
 #include "panonav/panorama/picture.hpp"
 
 namespace panonav {
@@ -60,8 +61,14 @@ Unwarper::Unwarper(const Camera& camera, const UnwarperOptions& options)
       columns_(options.columns),
       elevations_(checked_band(camera, options)) {
   if (!std::holds_alternative<EquirectangularModel>(camera_.model)) {
-    table_ = make_unwarp_table(camera_, rows_, columns_, elevations_);
+    table_ = std::make_shared<const UnwarpTable>(
+        make_unwarp_table(camera_, rows_, columns_, elevations_));
   }
+}
+
+bool Unwarper::is_seen(int row, int column) const noexcept {
+  return !table_ || table_->seen.empty() ||
+         table_->seen[static_cast<std::size_t>(row) * columns_ + column] != 0;
 }
 
 void Unwarper::check(ImageView image) const {
@@ -76,8 +83,8 @@ void Unwarper::check(ImageView image) const {
 
 void Unwarper::prepare(ImageView image, Workspace& workspace) const {
   const kernels::Instructions instructions = kernels::chosen_instructions();
-  workspace.halved.resize(table_.halved_size);
-  workspace.pairs.resize(table_.pairs_size);
+  workspace.halved.resize(table_->halved_size);
+  workspace.pairs.resize(table_->pairs_size);
   // The part of the level before that is there: its first pixel is (left, top).
   struct Part {
     const std::uint8_t* data;
@@ -88,8 +95,8 @@ void Unwarper::prepare(ImageView image, Workspace& workspace) const {
     }
   };
   Part part{image.data, image.stride, 0, 0};
-  for (std::size_t i = 0; i < table_.levels.size(); ++i) {
-    const UnwarpTable::Level& level = table_.levels[i];
+  for (std::size_t i = 0; i < table_->levels.size(); ++i) {
+    const UnwarpTable::Level& level = table_->levels[i];
     if (i > 0) {
       const int width = level.right - level.left;
       const int height = level.bottom - level.top;
@@ -109,13 +116,13 @@ void Unwarper::prepare(ImageView image, Workspace& workspace) const {
 
 void Unwarper::look_up(std::span<const std::uint16_t> pairs, int row,
                        std::span<float> values) const {
-  const UnwarpTable::Row& entry = table_.rows[static_cast<std::size_t>(row)];
+  const UnwarpTable::Row& entry = table_->rows[static_cast<std::size_t>(row)];
   const std::size_t count = static_cast<std::size_t>(entry.taps) * columns_;
   // The taps of two lenses share the weight of one.
   const int full_taps = entry.taps / lens_count(camera_);
   const float scale = 1.0F / static_cast<float>(255 * kernels::tap_weight_sum * full_taps);
-  kernels::remap(pairs, std::span(table_.positions).subspan(entry.first_entry, count),
-                 std::span(table_.weights).subspan(entry.first_entry, count), entry.taps, scale,
+  kernels::remap(pairs, std::span(table_->positions).subspan(entry.first_entry, count),
+                 std::span(table_->weights).subspan(entry.first_entry, count), entry.taps, scale,
                  values, kernels::chosen_instructions());
 }
 

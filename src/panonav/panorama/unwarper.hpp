@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -10,9 +11,10 @@
 #include "panonav/core/image.hpp"
 #include "panonav/core/options.hpp"
 #include "panonav/panorama/panorama.hpp"
-#include "panonav/panorama/unwarp_table.hpp"
 
 namespace panonav {
+
+struct UnwarpTable;
 
 /// The cylinder onto which images are unwarped.
 struct UnwarperOptions {
@@ -70,10 +72,7 @@ class Unwarper {
   [[nodiscard]] const ElevationBand& elevations() const noexcept { return elevations_; }
   /// False where the value is taken from a neighbour, because the camera does not see that
   /// direction.
-  [[nodiscard]] bool is_seen(int row, int column) const noexcept {
-    return table_.seen.empty() ||
-           table_.seen[static_cast<std::size_t>(row) * columns_ + column] != 0;
-  }
+  [[nodiscard]] bool is_seen(int row, int column) const noexcept;
 
   /// Throws ContractError unless the image has the camera's size; colour becomes grey.
   [[nodiscard]] Panorama unwrap(ImageView image) const;
@@ -95,7 +94,7 @@ class Unwarper {
   Camera camera_;
   int rows_, columns_;
   ElevationBand elevations_;
-  UnwarpTable table_;  ///< empty for equirectangular cameras
+  std::shared_ptr<const UnwarpTable> table_;  ///< empty for equirectangular cameras
 };
 
 }  // namespace panonav

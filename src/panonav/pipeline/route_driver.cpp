@@ -57,7 +57,7 @@ RouteDriveStep RouteDriver::step(const Observation& observation,
       if (++searches_ >= max_searches) step.state = RouteDriveState::lost;
       return step;
     }
-    start_at(step.fix->fix.pose.position());
+    start_at(step.fix->pose.position());
   }
   step.along_m = start_m_ + path_->along_m();
   step.state = RouteDriveState::lost;

@@ -33,10 +33,10 @@ enum class RouteDriveState {
 /// What a robot is to do after an observation, and where it is beside the route.
 struct RouteDriveStep {
   RouteDriveState state = RouteDriveState::searching;  ///< after this observation
-  Velocity velocity;                   ///< for the next period of the base; 0 unless driving
-  std::optional<TrackedRouteFix> fix;  ///< empty: odometry carries the robot on
-  double along_m = 0.0;                ///< way along the route
-  double length_m = 0.0;               ///< of the route
+  Velocity velocity;            ///< for the next period of the base; 0 unless driving
+  std::optional<RouteFix> fix;  ///< empty: odometry carries the robot on
+  double along_m = 0.0;         ///< way along the route
+  double length_m = 0.0;        ///< of the route
 };
 
 /// Repeats a recorded route [Y03]: a picture with its odometry in, a velocity out. It drives from

@@ -28,7 +28,7 @@ RouteStep RouteFollower::step(std::vector<float> line, const std::optional<Pose2
   }
   odometry_ = odometry;
   if (step.fix) {
-    step.changed = changes_.add(step.fix->fix);
+    step.changed = changes_.add(*step.fix);
   } else {
     changes_.reset();
   }

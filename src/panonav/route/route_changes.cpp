@@ -11,8 +11,8 @@ namespace panonav {
 
 namespace {
 
-constexpr int min_pictures = 5;
-constexpr double usual_deviations = 3.0;
+constexpr int min_pictures = 5;         // in which a change shows, one after the other
+constexpr double max_deviations = 3.0;  // of noise; more are unexplained
 
 }  // namespace
 
@@ -25,7 +25,7 @@ bool RouteChanges::counts(Point2 position) {
 }
 
 std::vector<AzimuthRange> RouteChanges::add(const RouteFix& fix) {
-  const auto limit = static_cast<float>(usual_deviations * fix.noise);
+  const auto limit = static_cast<float>(max_deviations * fix.noise);
   std::array<int, sectors> above{};
   std::array<int, sectors> all{};
   const std::size_t columns = fix.unexplained.size();

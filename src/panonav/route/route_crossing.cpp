@@ -9,8 +9,6 @@
 
 namespace panonav {
 
-namespace {}  // namespace
-
 std::vector<Direction2> equal_directions(std::size_t count) {
   std::vector<Direction2> directions(count);
   for (std::size_t c = 0; c < count; ++c) {

@@ -12,8 +12,8 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/geometry/least_squares.hpp"
 #include "panonav/motion/path.hpp"
+#include "panonav/route/horizon_scanline.hpp"
 #include "panonav/route/internal/line_sampling.hpp"
 
 namespace panonav {
@@ -28,7 +28,13 @@ using Vector = Eigen::Matrix<double, 5, 1>;
 constexpr double usual_distance_m = 2.0;
 
 // With fewer directions three numbers are not worth asking for.
-constexpr std::size_t fewest_directions = 16;
+constexpr std::size_t min_directions = 16;
+
+// A grey level: lines are bytes.
+constexpr double min_noise = 1.0 / 255.0;
+
+// Standard deviations of a Gaussian for the median of its absolute values.
+constexpr double deviations_per_median = 1.4826;
 
 }  // namespace
 
@@ -42,6 +48,8 @@ struct RouteLines::Term {
   std::uint32_t direction = 0;
 };
 
+// The normal equations of all directions: differences are what the route shows less gain times what
+// is seen less offset.
 struct RouteLines::Linearised {
   Matrix matrix = Matrix::Zero();
   Vector right = Vector::Zero();
@@ -51,6 +59,21 @@ struct RouteLines::Linearised {
   double variance = 0.0;   // of a difference, robust
   double deviation = 0.0;  // of what the route shows
   double correlation = 0.0;
+
+  // Returns the equations at these terms; empty where a line has no structure.
+  static std::optional<Linearised> at(const std::vector<Term>& terms, bool robust,
+                                      std::vector<float>& scratch);
+
+ private:
+  double mean_seen_ = 0.0;
+  double mean_shown_ = 0.0;
+
+  [[nodiscard]] bool set_light(const std::vector<Term>& terms);
+  void set_noise(const std::vector<Term>& terms, std::vector<float>& scratch);
+  void set_equations(const std::vector<Term>& terms, bool robust);
+  [[nodiscard]] double difference(const Term& term) const {
+    return static_cast<double>(term.shown) - gain * static_cast<double>(term.seen) - offset;
+  }
 };
 
 // What a fit writes over and over.
@@ -163,13 +186,10 @@ bool RouteLines::collect(const Level& level, std::span<const float> seen, const 
         {shown(level, crossing.along, c), along * crossing.along_by_x, along * crossing.along_by_y,
          at.value, at.slope * static_cast<float>(columns_per_rad), static_cast<std::uint32_t>(c)});
   }
-  return terms.size() >= fewest_directions;
+  return terms.size() >= min_directions;
 }
 
-// Differences are what the route shows less gain times what is seen less offset.
-std::optional<RouteLines::Linearised> RouteLines::linearise(const std::vector<Term>& terms,
-                                                            std::vector<float>& scratch) const {
-  Linearised result;
+bool RouteLines::Linearised::set_light(const std::vector<Term>& terms) {
   const auto n = static_cast<double>(terms.size());
   double seen = 0.0;
   double shown = 0.0;
@@ -188,24 +208,27 @@ std::optional<RouteLines::Linearised> RouteLines::linearise(const std::vector<Te
     product += x * y / n;
   }
   constexpr double min_variance = 1e-8;
-  if (seen_square < min_variance || shown_square < min_variance) return std::nullopt;
+  if (seen_square < min_variance || shown_square < min_variance) return false;
   // Another light is a factor of a few at most, and never turns black into white.
-  result.gain = std::clamp(product / seen_square, 0.2, 5.0);
-  result.offset = shown - result.gain * seen;
-  result.deviation = std::sqrt(shown_square);
-  const auto difference = [&](const Term& term) {
-    return static_cast<double>(term.shown) - result.gain * static_cast<double>(term.seen) -
-           result.offset;
-  };
+  gain = std::clamp(product / seen_square, 0.2, 5.0);
+  offset = shown - gain * seen;
+  deviation = std::sqrt(shown_square);
+  mean_seen_ = seen;
+  mean_shown_ = shown;
+  return true;
+}
+
+void RouteLines::Linearised::set_noise(const std::vector<Term>& terms,
+                                       std::vector<float>& scratch) {
   scratch.clear();
   for (const Term& term : terms) scratch.push_back(std::abs(static_cast<float>(difference(term))));
-  // A grey level at least: lines are bytes.
-  constexpr double min_noise = 1.0 / 255.0;
-  const double noise =
-      std::max(min_noise, 1.4826 * static_cast<double>(upper_median_in_place(std::span(scratch))));
-  result.noise = noise;
-  std::array<double, 25> matrix{};  // lower half, row by row
-  std::array<double, 5> right{};
+  noise = std::max(min_noise, deviations_per_median *
+                                  static_cast<double>(upper_median_in_place(std::span(scratch))));
+}
+
+void RouteLines::Linearised::set_equations(const std::vector<Term>& terms, bool robust) {
+  std::array<double, 25> lower{};  // half of the matrix, row by row
+  std::array<double, 5> sums{};
   double left = 0.0;
   double weights = 0.0;
   double x = 0.0;
@@ -217,19 +240,19 @@ std::optional<RouteLines::Linearised> RouteLines::linearise(const std::vector<Te
     const double off = difference(term);
     // Cauchy's weight; three deviations are usual, more are likely a change of the scene.
     const double ratio = off / (3.0 * noise);
-    const double weight = options_.robust ? cauchy_weight(ratio * ratio) : 1.0;
+    const double weight = robust ? 1.0 / (1.0 + ratio * ratio) : 1.0;
     const std::array<double, 5> slope{
         static_cast<double>(term.shown_x), static_cast<double>(term.shown_y),
-        result.gain * static_cast<double>(term.seen_turn), -static_cast<double>(term.seen), -1.0};
+        gain * static_cast<double>(term.seen_turn), -static_cast<double>(term.seen), -1.0};
     for (std::size_t i = 0; i < slope.size(); ++i) {
       const double weighted = weight * slope[i];
-      right[i] -= off * weighted;
-      for (std::size_t j = 0; j <= i; ++j) matrix[5 * i + j] += weighted * slope[j];
+      sums[i] -= off * weighted;
+      for (std::size_t j = 0; j <= i; ++j) lower[5 * i + j] += weighted * slope[j];
     }
     left += weight * off * off;
     weights += weight;
-    const double a = static_cast<double>(term.seen) - seen;
-    const double b = static_cast<double>(term.shown) - shown;
+    const double a = static_cast<double>(term.seen) - mean_seen_;
+    const double b = static_cast<double>(term.shown) - mean_shown_;
     x += weight * a;
     y += weight * b;
     xx += weight * a * a;
@@ -237,25 +260,33 @@ std::optional<RouteLines::Linearised> RouteLines::linearise(const std::vector<Te
     xy += weight * a * b;
   }
   const double within = (xx - x * x / weights) * (yy - y * y / weights);
-  result.correlation = within > 0.0 ? (xy - x * y / weights) / std::sqrt(within) : 0.0;
-  for (std::size_t i = 0; i < right.size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    result.right[row] = right[i];
-    for (std::size_t j = 0; j <= i; ++j) {
-      const auto column = static_cast<Eigen::Index>(j);
-      result.matrix(row, column) = result.matrix(column, row) = matrix[5 * i + j];
+  correlation = within > 0.0 ? (xy - x * y / weights) / std::sqrt(within) : 0.0;
+  for (Eigen::Index i = 0; i < 5; ++i) {
+    right[i] = sums[static_cast<std::size_t>(i)];
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      matrix(i, j) = matrix(j, i) = lower[static_cast<std::size_t>(5 * i + j)];
     }
   }
-  result.variance = std::max(left / weights, min_noise * min_noise / 12.0);
+  constexpr double rounding_variance = min_noise * min_noise / 12.0;  // of bytes
+  variance = std::max(left / weights, rounding_variance);
+}
+
+std::optional<RouteLines::Linearised> RouteLines::Linearised::at(const std::vector<Term>& terms,
+                                                                 bool robust,
+                                                                 std::vector<float>& scratch) {
+  Linearised result;
+  if (!result.set_light(terms)) return std::nullopt;
+  result.set_noise(terms, scratch);
+  result.set_equations(terms, robust);
   return result;
 }
 
 // By direction in the world: how far what is seen lies outside of all that is shown within `shift`
 // columns, or what is shown outside of all that is seen there, whichever is less; NaN where the
 // path is not crossed.
-std::vector<float> RouteLines::what_no_shift_explains(const std::vector<Term>& terms,
-                                                      std::size_t columns, double gain,
-                                                      double offset, int shift) {
+std::vector<float> RouteLines::shift_tolerant_residuals(const std::vector<Term>& terms,
+                                                        std::size_t columns, double gain,
+                                                        double offset, int shift) {
   const float nothing = std::numeric_limits<float>::quiet_NaN();
   std::vector<float> shown(columns, nothing);
   std::vector<float> seen(columns, nothing);
@@ -284,62 +315,32 @@ std::vector<float> RouteLines::what_no_shift_explains(const std::vector<Term>& t
   return left;
 }
 
-/// The pose at one level as `minimise` sees it.
-class RouteLines::LevelProblem {
- public:
-  LevelProblem(const RouteLines& lines, const Level& level, const Window& near, Workspace& work,
-               Pose2& pose)
-      : lines_(lines), level_(level), near_(near), work_(work), pose_(pose) {
-    // At the last level the noise of lines is a hundred times as much.
-    constexpr double settled_m = 3e-4;
-    constexpr double share_of_smoothing = 0.05;
-    const double smoothed_rad = level.sigma * 2.0 * std::numbers::pi / lines.columns_;
-    const bool last = &level == &lines.levels_.back();
-    settled_m_ = last ? settled_m : share_of_smoothing * usual_distance_m * smoothed_rad;
-  }
-
-  bool linearise(DenseEquations<5>& equations) {
-    if (!lines_.collect(level_, work_.seen, pose_, near_, work_.crossings, work_.terms)) {
-      return false;
-    }
-    const auto normal = lines_.linearise(work_.terms, work_.scratch);
-    if (!normal) return false;
-    equations.matrix = normal->matrix;
-    equations.right = normal->right;
-    return true;
-  }
-
-  bool move(const Vector& change) {
-    // No step is longer than what smoothing lets it see.
-    constexpr double max_step_m = 0.25;
-    constexpr double max_turn_rad = 0.2;
-    const double length_m = std::hypot(change[0], change[1]);
-    const double scale = std::min({1.0, max_step_m / std::max(1e-12, length_m),
-                                   max_turn_rad / std::max(1e-12, std::abs(change[2]))});
-    pose_.x_m += scale * change[0];
-    pose_.y_m += scale * change[1];
-    pose_.heading_rad = wrap_angle(pose_.heading_rad + scale * change[2]);
-    return length_m < settled_m_ && std::abs(change[2]) < settled_m_;
-  }
-
- private:
-  const RouteLines& lines_;
-  const Level& level_;
-  const Window& near_;
-  Workspace& work_;
-  Pose2& pose_;
-  double settled_m_;  // of a step, and in radians of a turn
-};
-
+// Gauss-Newton from level to level.
 bool RouteLines::descend(std::span<const Level> levels, std::span<const float> line,
                          const Window& near, Workspace& work, Pose2& pose) const {
-  // Directions in which nothing changes stay where they are.
-  const LeastSquaresOptions options{.max_steps = options_.max_steps, .damping = 1e-3};
   for (const Level& level : levels) {
     work.seen = smoothed_line(line, level.sigma);
-    LevelProblem problem(*this, level, near, work, pose);
-    DenseEquations<5> equations;
-    if (!minimise(problem, equations, options).solvable) return false;
+    const bool last = &level == &levels_.back();
+    const double near_enough_m =
+        last ? 3e-4 : 0.05 * usual_distance_m * level.sigma * 2.0 * std::numbers::pi / columns_;
+    for (int step = 0; step < options_.max_steps; ++step) {
+      if (!collect(level, work.seen, pose, near, work.crossings, work.terms)) return false;
+      const auto normal = Linearised::at(work.terms, options_.robust, work.scratch);
+      if (!normal) return false;
+      // A little damping: directions in which nothing changes stay where they are.
+      Matrix damped = normal->matrix;
+      damped.diagonal() *= 1.0 + 1e-3;
+      const Vector change = damped.ldlt().solve(normal->right);
+      if (!change.allFinite()) return false;
+      // No step is longer than what smoothing lets it see.
+      const double length_m = std::hypot(change[0], change[1]);
+      const double scale = std::min(
+          {1.0, 0.25 / std::max(1e-12, length_m), 0.2 / std::max(1e-12, std::abs(change[2]))});
+      pose.x_m += scale * change[0];
+      pose.y_m += scale * change[1];
+      pose.heading_rad = wrap_angle(pose.heading_rad + scale * change[2]);
+      if (length_m < near_enough_m && std::abs(change[2]) < near_enough_m) break;
+    }
   }
   return true;
 }
@@ -355,15 +356,15 @@ std::optional<RouteFix> RouteLines::fit(std::span<const float> line, const Pose2
   work.terms.reserve(line.size());
   work.scratch.reserve(line.size());
   std::optional<Linearised> normal;
-  RouteFix fix;
-  const auto try_from = [&](std::span<const Level> levels, Pose2 pose) {
-    if (!descend(levels, line, *near, work, pose)) return;
+  Pose2 pose;
+  const auto try_from = [&](std::span<const Level> levels, Pose2 start) {
+    if (!descend(levels, line, *near, work, start)) return;
     // `descend` leaves the line as its last level sees it.
-    if (!collect(levels_.back(), work.seen, pose, *near, work.crossings, work.terms)) return;
-    const auto there = linearise(work.terms, work.scratch);
+    if (!collect(levels_.back(), work.seen, start, *near, work.crossings, work.terms)) return;
+    const auto there = Linearised::at(work.terms, options_.robust, work.scratch);
     if (!there || (normal && there->correlation <= normal->correlation)) return;
     normal = there;
-    fix.pose = pose;
+    pose = start;
   };
   // Smoothed lines lead from afar, but may lead away: near things and far ones behind them blend.
   // From a good prediction the lines themselves find their way. What explains more is believed.
@@ -374,31 +375,37 @@ std::optional<RouteFix> RouteLines::fit(std::span<const float> line, const Pose2
     // So near to each other both end at the same place.
     constexpr double same_m = 0.01;
     constexpr double same_rad = 0.01;
-    const bool same =
-        normal && distance(coarse.position(), fix.pose.position()) < same_m &&
-        std::abs(angle_difference(coarse.heading_rad, fix.pose.heading_rad)) < same_rad;
+    const bool same = normal && distance(coarse.position(), pose.position()) < same_m &&
+                      std::abs(angle_difference(coarse.heading_rad, pose.heading_rad)) < same_rad;
     if (!same) try_from(levels.last(1), coarse);
   }
   if (!normal) return std::nullopt;
-  work.seen = smoothed_line(line, levels_.back().sigma);
-  static_cast<void>(
-      collect(levels_.back(), work.seen, fix.pose, *near, work.crossings, work.terms));
-  fix.columns = static_cast<int>(work.terms.size());
-  fix.correlation = normal->correlation;
-  fix.residual = std::sqrt(normal->variance) / normal->deviation;
-  const Matrix inverse = normal->matrix.ldlt().solve(Matrix::Identity());
+  return described(line, pose, *normal, *near, work);
+}
+
+std::optional<RouteFix> RouteLines::described(std::span<const float> line, const Pose2& pose,
+                                              const Linearised& normal, const Window& near,
+                                              Workspace& work) const {
+  const Matrix inverse = normal.matrix.ldlt().solve(Matrix::Identity());
   if (!inverse.allFinite()) return std::nullopt;
+  work.seen = smoothed_line(line, levels_.back().sigma);
+  static_cast<void>(collect(levels_.back(), work.seen, pose, near, work.crossings, work.terms));
+  RouteFix fix;
+  fix.pose = pose;
+  fix.columns = static_cast<int>(work.terms.size());
+  fix.correlation = normal.correlation;
+  fix.residual = std::sqrt(normal.variance) / normal.deviation;
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t j = 0; j < 3; ++j) {
       fix.covariance[3 * i + j] =
-          normal->variance * inverse(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+          normal.variance * inverse(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
     }
   }
-  fix.noise = normal->noise;
+  fix.noise = normal.noise;
   const int shift = std::max(1, columns_ / 360);
   const double turn = fix.pose.heading_rad * columns_ / (2.0 * std::numbers::pi);
   const auto left =
-      what_no_shift_explains(work.terms, line.size(), normal->gain, normal->offset, shift);
+      shift_tolerant_residuals(work.terms, line.size(), normal.gain, normal.offset, shift);
   fix.unexplained.resize(line.size());
   for (std::size_t c = 0; c < left.size(); ++c) {
     const auto size = static_cast<long long>(line.size());

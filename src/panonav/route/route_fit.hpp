@@ -23,8 +23,14 @@ struct RouteFitOptions {
 };
 void visit_options(RouteFitOptions& options, OptionVisitor& visitor);
 
-/// The pose from which a scanline was seen.
+/// Where a scanline was seen from, and how well it fits there.
 struct RouteFix {
+  /// How a tracker found it.
+  enum class Origin {
+    prediction,  ///< fitted from the odometry's prediction
+    recovery,    ///< the prediction did not hold; found around it
+    search,      ///< found on the whole route
+  };
   Pose2 pose;  ///< in the route's frame
   /// Of x, y and heading in metres and radians, row-major, as far as the noise of the lines goes.
   std::array<double, 9> covariance{};
@@ -39,6 +45,9 @@ struct RouteFix {
   /// By column of the line: what the fit leaves there and a shift by a degree does not explain, 0
   /// .. 1; NaN where nothing is crossed. Edges in depth are off by that much between lines.
   std::vector<float> unexplained;
+  Origin origin = Origin::prediction;  ///< set by `RouteTracker`, as the two below
+  double along_m = 0.0;    ///< path length from the start to the point nearest to the robot
+  double lateral_m = 0.0;  ///< from the path to the robot; positive to the left of the path
 };
 
 /// A route panorama made ready for fits: lines turned into the world's frame and smoothed.
@@ -99,7 +108,6 @@ class RouteLines {
   struct Term;
   struct Linearised;
   struct Workspace;
-  class LevelProblem;
   [[nodiscard]] bool descend(std::span<const Level> levels, std::span<const float> line,
                              const Window& near, Workspace& work, Pose2& pose) const;
   [[nodiscard]] std::optional<Window> window(Point2 position) const;
@@ -108,11 +116,13 @@ class RouteLines {
   [[nodiscard]] bool collect(const Level& level, std::span<const float> seen, const Pose2& pose,
                              const Window& window, std::vector<RouteCrossing>& crossings,
                              std::vector<Term>& terms) const;
-  [[nodiscard]] std::optional<Linearised> linearise(const std::vector<Term>& terms,
-                                                    std::vector<float>& scratch) const;
-  [[nodiscard]] static std::vector<float> what_no_shift_explains(const std::vector<Term>& terms,
-                                                                 std::size_t columns, double gain,
-                                                                 double offset, int shift);
+  [[nodiscard]] static std::vector<float> shift_tolerant_residuals(const std::vector<Term>& terms,
+                                                                   std::size_t columns, double gain,
+                                                                   double offset, int shift);
+  // The fix at a pose with its equations; empty where these determine no covariance.
+  [[nodiscard]] std::optional<RouteFix> described(std::span<const float> line, const Pose2& pose,
+                                                  const Linearised& normal, const Window& near,
+                                                  Workspace& work) const;
 
   int columns_;
   RouteFitOptions options_;

@@ -8,6 +8,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/route/horizon_scanline.hpp"
 #include "panonav/route/internal/line_sampling.hpp"
 #include "panonav/route/route_fit.hpp"
 

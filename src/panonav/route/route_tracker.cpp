@@ -13,8 +13,6 @@
 
 namespace panonav {
 
-namespace {}  // namespace
-
 void visit_options(RouteTrackerOptions& options, OptionVisitor& visitor) {
   using T = RouteTrackerOptions;
   constexpr OptionTable table{
@@ -70,9 +68,12 @@ double RouteTracker::learnt_correlation(const RoutePanorama& route,
   return low + std::max(0.0, high - low) / 3.0;
 }
 
-TrackedRouteFix RouteTracker::placed(RouteFix fix, RouteFixOrigin origin) const {
+RouteFix RouteTracker::placed(RouteFix fix, RouteFix::Origin origin) const {
   const RoutePlace place = place_on_route(lines_.poses(), fix.pose.position());
-  return {std::move(fix), origin, place.along_m, place.lateral_m};
+  fix.origin = origin;
+  fix.along_m = place.along_m;
+  fix.lateral_m = place.lateral_m;
+  return fix;
 }
 
 std::optional<RouteFix> RouteTracker::recover(std::span<const float> line,
@@ -132,17 +133,17 @@ std::optional<RouteFix> RouteTracker::best_anywhere(std::span<const float> line)
   return best;
 }
 
-std::optional<TrackedRouteFix> RouteTracker::search(std::span<const float> line) const {
+std::optional<RouteFix> RouteTracker::search(std::span<const float> line) const {
   auto best = best_anywhere(line);
   if (!best || best->correlation < min_correlation_) return std::nullopt;
-  return placed(*std::move(best), RouteFixOrigin::search);
+  return placed(*std::move(best), RouteFix::Origin::search);
 }
 
-std::optional<TrackedRouteFix> RouteTracker::track(std::span<const float> line, const Pose2& step) {
+std::optional<RouteFix> RouteTracker::track(std::span<const float> line, const Pose2& step) {
   const auto agrees = [&](const RouteFix& fix, double within_m) {
     return elsewhere_ && distance((*elsewhere_ * step).position(), fix.pose.position()) <= within_m;
   };
-  std::optional<TrackedRouteFix> found;
+  std::optional<RouteFix> found;
   if (pose_) {
     const Pose2 predicted = *pose_ * step;
     pose_ = predicted;
@@ -155,29 +156,29 @@ std::optional<TrackedRouteFix> RouteTracker::track(std::span<const float> line, 
     };
     auto fix = lines_.fit(line, predicted);
     if (believed(fix)) {
-      found = placed(*std::move(fix), RouteFixOrigin::prediction);
+      found = placed(*std::move(fix), RouteFix::Origin::prediction);
     } else {
       fix = recover(line, predicted);
-      if (believed(fix)) found = placed(*std::move(fix), RouteFixOrigin::recovery);
+      if (believed(fix)) found = placed(*std::move(fix), RouteFix::Origin::recovery);
     }
     // Odometry is right to centimetres from one line to the next.
-    if (found && followed_ && off_m(found->fix) > options_.surprise_m &&
-        !agrees(found->fix, options_.surprise_m)) {
-      elsewhere_ = found->fix.pose;
+    if (found && followed_ && off_m(*found) > options_.surprise_m &&
+        !agrees(*found, options_.surprise_m)) {
+      elsewhere_ = found->pose;
       return std::nullopt;
     }
   }
   if (!found) {
     auto anywhere = search(line);
     // A robot that was followed until now is seldom kidnapped; a line is sooner mistaken.
-    if (anywhere && (!pose_ || agrees(anywhere->fix, options_.recovery_m))) {
+    if (anywhere && (!pose_ || agrees(*anywhere, options_.recovery_m))) {
       found = std::move(anywhere);
     } else {
-      elsewhere_ = anywhere ? std::optional(anywhere->fix.pose) : std::nullopt;
+      elsewhere_ = anywhere ? std::optional(anywhere->pose) : std::nullopt;
     }
   }
   if (found) {
-    pose_ = found->fix.pose;
+    pose_ = found->pose;
     elsewhere_.reset();
     followed_ = true;
   }

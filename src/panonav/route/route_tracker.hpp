@@ -25,21 +25,6 @@ struct RouteTrackerOptions {
 };
 void visit_options(RouteTrackerOptions& options, OptionVisitor& visitor);
 
-/// How a fix was come by.
-enum class RouteFixOrigin {
-  prediction,  ///< fitted from the odometry's prediction
-  recovery,    ///< the prediction did not hold; found around it
-  search,      ///< found on the whole route
-};
-
-/// Where the robot is, and how that was found.
-struct TrackedRouteFix {
-  RouteFix fix;  ///< the pose with its covariance, and how well the line fits there
-  RouteFixOrigin origin = RouteFixOrigin::prediction;  ///< by which of the three ways
-  double along_m = 0.0;    ///< way along the path to its place nearest to the robot
-  double lateral_m = 0.0;  ///< from the path to the robot; positive to the left of the path
-};
-
 /// Follows a robot along a route panorama: odometry predicts, the line decides. Without a
 /// prediction, or where it does not hold, the whole route is searched. Deterministic; a copy goes
 /// on as the original.
@@ -57,10 +42,10 @@ class RouteTracker {
   /// Empty: not on this route, as far as the line tells, or at a surprising place of it, which is
   /// believed once two lines one after the other agree on it; the odometry is then carried on.
   /// Throws ContractError on a wrong length.
-  std::optional<TrackedRouteFix> track(std::span<const float> line, const Pose2& step);
+  std::optional<RouteFix> track(std::span<const float> line, const Pose2& step);
 
   /// From the line alone. Cost: some 10 microseconds for each place tried.
-  [[nodiscard]] std::optional<TrackedRouteFix> search(std::span<const float> line) const;
+  [[nodiscard]] std::optional<RouteFix> search(std::span<const float> line) const;
 
   /// Forgets where the robot is.
   void reset() noexcept {
@@ -87,7 +72,7 @@ class RouteTracker {
   [[nodiscard]] std::optional<RouteFix> best_anywhere(std::span<const float> line) const;
   [[nodiscard]] std::optional<RouteFix> recover(std::span<const float> line,
                                                 const Pose2& predicted) const;
-  [[nodiscard]] TrackedRouteFix placed(RouteFix fix, RouteFixOrigin origin) const;
+  [[nodiscard]] RouteFix placed(RouteFix fix, RouteFix::Origin origin) const;
 
   RouteTrackerOptions options_;
   RouteLines lines_;

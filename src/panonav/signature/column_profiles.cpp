@@ -17,7 +17,7 @@ namespace {
 constexpr int columns = ColumnProfiles::columns;
 constexpr int bands = ColumnProfiles::bands;
 static_assert(columns == kernels::matched_reference_columns && bands == kernels::matched_bands);
-constexpr std::uint8_t middle = 128;
+constexpr std::uint8_t middle = 128;  // byte of a value as high as the column's mean
 // A contrast of 1 in bytes: more than three times the contrast of a column is rare.
 constexpr float unit = 40.0F;
 // A column's own contrast counts together with this share of that of all columns, so that the noise

@@ -14,6 +14,7 @@
 namespace panonav {
 namespace {
 
+/// Directions in which the coarse search samples a circle; finer searches sample it every 3 px.
 constexpr int coarse_directions = 96;
 
 /// One sample for each `spacing` of circumference, 48 to 720.

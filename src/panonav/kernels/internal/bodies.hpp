@@ -106,15 +106,6 @@ struct SimilarityBody {
   static void exponentials(const float* logarithms, float scale, float* values, int count);
 };
 
-/// Products of a row come in multiples of this many turns.
-inline constexpr int turn_products_lanes = 16;
-
-template <Instructions set>
-struct TurnProductsBody {
-  static void turn_products(const float* rows, int count, int columns, const float* periodic,
-                            float* products, float* largest);
-};
-
 /// Calls `run` with the Body of an instruction set; of a set that this build lacks, with the scalar
 /// one.
 template <template <Instructions> class Body, class Run>

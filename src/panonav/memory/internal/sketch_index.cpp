@@ -9,8 +9,9 @@ namespace panonav {
 
 namespace {
 
-constexpr std::size_t group_bytes = 8;
-constexpr std::size_t enough_to_learn = 64;
+constexpr std::size_t group_bytes = 8;       // that an instruction sums at once
+constexpr std::size_t enough_to_learn = 64;  // views, from which scales are learnt
+// Of a row without a view: raises its bound above every limit.
 constexpr std::int32_t no_slack = -static_cast<std::int32_t>(SketchIndex::no_view);
 
 std::size_t groups_of(std::size_t dimensions) {

@@ -10,8 +10,8 @@ namespace panonav {
 
 namespace {
 
-constexpr std::size_t codes_of_a_cell = 16;
-constexpr std::size_t sums_of_a_step = 8;  // that share a step
+constexpr std::size_t codes_of_a_cell = 16;  // of four bits
+constexpr std::size_t sums_of_a_step = 8;    // that share a step
 
 std::size_t rounded_up(std::size_t count, std::size_t multiple) {
   return (count + multiple - 1) / multiple * multiple;

@@ -14,11 +14,11 @@
 #include "panonav/homing/homing_pursuit.hpp"
 #include "panonav/localisation/place_model.hpp"
 #include "panonav/navigation/area_planner.hpp"
-#include "panonav/navigation/area_views.hpp"
 #include "panonav/navigation/direction_field.hpp"
+#include "panonav/navigation/internal/area_views.hpp"
+#include "panonav/navigation/internal/place_scale.hpp"
 #include "panonav/navigation/internal/route_pilot.hpp"
 #include "panonav/navigation/navigator.hpp"
-#include "panonav/navigation/place_scale.hpp"
 
 namespace panonav {
 

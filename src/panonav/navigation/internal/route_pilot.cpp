@@ -32,7 +32,7 @@ bool RoutePilot::begin(std::span<const ViewId> way, std::span<const float> line,
   // Line and view must agree on the place, which the route may pass several times.
   const auto path = route.tracker.lines().poses();
   std::vector<double> starts_m;
-  for (const RoutePlace& place : places_on_route(path, fix->fix.pose.position(), route.beside_m)) {
+  for (const RoutePlace& place : places_on_route(path, fix->pose.position(), route.beside_m)) {
     const auto agrees = [&](double along_m) {
       return std::abs(along_m - place.along_m) <= shortest_m;
     };
@@ -47,7 +47,7 @@ bool RoutePilot::begin(std::span<const ViewId> way, std::span<const float> line,
                    way[stretch->last],
                    {},
                    0});
-  leg_->tracker.set_pose(fix->fix.pose);
+  leg_->tracker.set_pose(fix->pose);
   take_aim();
   return true;
 }

@@ -7,6 +7,7 @@
 
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/motion/steering.hpp"
+#include "panonav/navigation/internal/route_stretch.hpp"
 #include "panonav/navigation/known_route.hpp"
 
 namespace panonav {

@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <span>
-#include <vector>
 
 namespace panonav {
 
@@ -36,9 +35,5 @@ struct LineSample {
   const float c = 0.5F * (p2 - p0);
   return {((a * f + b) * f + c) * f + p1, (3.0F * a * f + 2.0F * b) * f + c};
 }
-
-/// The line under a Gaussian of this standard deviation in columns; below 0.3 as it is. Cost: 3
-/// sigma multiplications a column.
-[[nodiscard]] std::vector<float> smoothed_line(std::span<const float> line, double sigma);
 
 }  // namespace panonav

@@ -1,4 +1,4 @@
-#include "panonav/panorama/unwarp_table.hpp"
+#include "panonav/panorama/internal/unwarp_table.hpp"
 
 #include <algorithm>
 #include <array>

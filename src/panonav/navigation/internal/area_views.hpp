@@ -2,13 +2,13 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "panonav/memory/view_source.hpp"
 #include "panonav/navigation/navigation_graph.hpp"
+#include "panonav/navigation/search_everywhere.hpp"
 #include "panonav/navigation/sub_areas.hpp"
 #include "panonav/relative_pose/homing_view.hpp"
 #include "panonav/relative_pose/reference_views.hpp"
@@ -24,13 +24,6 @@ struct SeenView {
   PackedSignature packed;  ///< with the memory's full scale
   HomingView view;         ///< the first `components` only
   int components;          ///< that are compared
-};
-
-/// A reference that looks like the robot's view.
-struct FoundView {
-  std::size_t node = 0;             ///< of the navigation graph
-  std::uint32_t dissimilarity = 0;  ///< as the memory has it, over the components compared
-  double difference = 0.0;          ///< by `image_difference`: magnitudes and phases
 };
 
 /// The views of one area and those around it, loaded from a source: what a robot needs to have at
@@ -96,13 +89,5 @@ class AreaViews {
   Loading ahead_;
   std::uint64_t bytes_read_ = 0;
 };
-
-/// Relocalisation over the whole memory, one area after the other, so that no more than one is
-/// held: of the least dissimilar views of each area the one whose difference is least. `is_wanted`:
-/// asked for each node whether it counts; empty: all do. Empty when there is no view. Cost: loads
-/// all that count.
-[[nodiscard]] std::optional<FoundView> search_everywhere(
-    const ViewSource& source, const NavigationGraph& graph, const SubAreas& areas,
-    const FourierSignature& view, const std::function<bool(std::size_t node)>& is_wanted = {});
 
 }  // namespace panonav

@@ -1,12 +1,11 @@
 #pragma once
 
 #include <array>
-#include <vector>
+#include <cstddef>
 
 #include "panonav_simulation/place_recording.hpp"
-#include "panonav_viewer/plot.hpp"
 
-namespace panonav::viewer {
+namespace panonav::lab {
 
 /// Directions in which shapes are compared, counter-clockwise from x; each stands for a sector of
 /// 45 degrees around it.
@@ -38,12 +37,4 @@ struct Surroundings {
 /// The sector of a direction, 0 .. shape_directions - 1.
 [[nodiscard]] std::size_t sector_of(double azimuth_rad);
 
-/// A scene from above, behind everything else in a plot: what stands around as it is (its convex
-/// bodies, so that screens are slanted and the crowns of trees round), and walls, cut at the height
-/// of the camera so that doors are open.
-[[nodiscard]] std::vector<MapLayer> scene_layers(const simulation::Scene& scene);
-
-/// Returns the same as lines; outlines of closed things end where they begin.
-[[nodiscard]] std::vector<std::vector<Point2>> scene_outlines(const simulation::Scene& scene);
-
-}  // namespace panonav::viewer
+}  // namespace panonav::lab

@@ -1,5 +1,7 @@
-#include "panonav/route/route_contours.hpp"
+#include "lab/y03/route_contours.hpp"
 
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -9,10 +11,9 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/geometry/least_squares.hpp"
-#include "panonav/route/internal/line_sampling.hpp"
+#include "panonav/route/horizon_scanline.hpp"
 
-namespace panonav {
+namespace panonav::lab {
 
 namespace {
 
@@ -48,7 +49,10 @@ std::vector<int> edge_columns(std::span<const float> edges, int most) {
   return columns;
 }
 
-constexpr std::size_t min_points = 8;  // control points of a pose, which three would determine
+// With fewer control points a pose is not worth asking for.
+constexpr std::size_t min_points = 8;
+
+using Vector = Eigen::Vector3d;
 
 double wrap_columns(double columns, double size) {
   return columns - size * std::floor(columns / size + 0.5);
@@ -109,6 +113,22 @@ std::vector<RouteCrossing> RouteContours::curve(Point2 viewpoint) const {
   return crossings;
 }
 
+// Returns the energy that two neighbours share [Y03 eq. 7 and 11], `interval` columns apart in the
+// line. Contours are drawn over azimuth: per column, so that close points do not count more.
+// `next_slope`: to the point after them, NaN where it is not joined.
+double RouteContours::pair_energy(const ContourPoint& before, const ContourPoint& at,
+                                  double interval, bool joined, double next_slope) const {
+  const double slope = (at.along - before.along) / interval;
+  const double stretch = wrap_columns(at.azimuth - before.azimuth, columns_) - interval;
+  double energy = options_.constant * stretch * stretch;
+  if (joined) energy += 0.5 * options_.tension * slope * slope * interval;
+  if (std::isfinite(next_slope)) {
+    const double bend = next_slope - slope;
+    energy += 0.5 * options_.rigidity * bend * bend * interval;
+  }
+  return energy;
+}
+
 // Dynamic programming along the contour: each control point stays or goes to one of its eight
 // neighbours, and pairs of neighbours share eq. 7 and 11. The second derivative takes the point
 // after next from the last iteration.
@@ -117,7 +137,6 @@ void RouteContours::move(std::vector<ContourPoint>& contour, const std::vector<C
                          const std::vector<bool>& joined, double step) const {
   constexpr std::size_t choices = 9;
   const std::size_t n = contour.size();
-  const auto size = static_cast<double>(columns_);
   const auto choice = [&](std::size_t i, std::size_t k) {
     const double da = (static_cast<double>(k % 3) - 1.0) * step;
     const double dt = (static_cast<double>(k / 3) - 1.0) * step;
@@ -129,37 +148,27 @@ void RouteContours::move(std::vector<ContourPoint>& contour, const std::vector<C
     const auto target = edges[static_cast<std::size_t>(columns[i])];
     for (std::size_t k = 0; k < choices; ++k) {
       const ContourPoint at = choice(i, k);
-      const double off_azimuth = wrap_columns(other[i].azimuth - at.azimuth, size);
+      const double off_azimuth = wrap_columns(other[i].azimuth - at.azimuth, columns_);
       const double off_along = other[i].along - at.along;
-      double own =
+      cost[i][k] =
           options_.image * static_cast<double>(std::abs(edge(at.along, at.azimuth) - target));
-      own += 0.5 * options_.pull * (off_azimuth * off_azimuth + off_along * off_along);
-      if (i == 0) {
-        cost[i][k] = own;
-        continue;
-      }
+      cost[i][k] += 0.5 * options_.pull * (off_azimuth * off_azimuth + off_along * off_along);
+      if (i == 0) continue;
+      const double next_slope =
+          joined[i] && i + 1 < n && joined[i + 1]
+              ? (contour[i + 1].along - at.along) / static_cast<double>(columns[i + 1] - columns[i])
+              : std::numeric_limits<double>::quiet_NaN();
+      const auto interval = static_cast<double>(columns[i] - columns[i - 1]);
       double best = std::numeric_limits<double>::infinity();
-      const double wanted = static_cast<double>(columns[i] - columns[i - 1]);
       for (std::size_t j = 0; j < choices; ++j) {
-        const ContourPoint before = choice(i - 1, j);
-        // Contours are drawn over azimuth: per column, so that close points do not count more.
-        const double along = (at.along - before.along) / wanted;
-        const double interval = (wrap_columns(at.azimuth - before.azimuth, size) - wanted);
-        double pair = options_.constant * interval * interval;
-        if (joined[i]) pair += 0.5 * options_.tension * along * along * wanted;
-        if (joined[i] && i + 1 < n && joined[i + 1]) {
-          const double next =
-              (contour[i + 1].along - at.along) / static_cast<double>(columns[i + 1] - columns[i]);
-          const double bend = next - along;
-          pair += 0.5 * options_.rigidity * bend * bend * wanted;
-        }
-        const double total = cost[i - 1][j] + pair;
+        const double total =
+            cost[i - 1][j] + pair_energy(choice(i - 1, j), at, interval, joined[i], next_slope);
         if (total < best) {
           best = total;
           from[i][k] = j;
         }
       }
-      cost[i][k] = own + best;
+      cost[i][k] += best;
     }
   }
   std::size_t k =
@@ -175,124 +184,111 @@ void RouteContours::move(std::vector<ContourPoint>& contour, const std::vector<C
   contour = std::move(moved);
 }
 
-/// The pose that explains two contours by eq. 5, as `minimise` sees it: along the path, weighted by
-/// how well an azimuth determines the path length.
-class RouteContours::PoseProblem {
- public:
-  using Equations = DenseEquations<3>;
-
-  PoseProblem(const RouteContours& contours, RouteContourFix& fix) : of_(contours), fix_(fix) {}
-
-  bool linearise(Equations& equations) {
-    std::vector<Term> terms = terms_along();
-    if (terms.size() < min_points) return false;
-    const std::size_t along_terms = terms.size();
-    std::vector<double> sizes;
-    for (const Term& term : terms) {
-      sizes.push_back(std::abs(term.difference) * std::sqrt(term.weight));
-    }
-    noise_ = std::max(0.1, 1.4826 * upper_median_in_place(std::span(sizes)));
-    add_azimuths(terms);
-    equations.begin();
-    double left = 0.0;
-    double weights = 0.0;
-    for (std::size_t i = 0; i < terms.size(); ++i) {
-      const Term& term = terms[i];
-      const double ratio = term.difference * std::sqrt(term.weight) / (2.0 * noise_);
-      const double weight = term.weight * cauchy_weight(ratio * ratio);
-      equations.matrix += weight * term.slope * term.slope.transpose();
-      equations.right += weight * term.difference * term.slope;
-      if (i >= along_terms) continue;
-      left += weight * term.difference * term.difference;
-      weights += weight;
-    }
-    fix_.residual_m = std::sqrt(left / weights) * of_.spacing_m_;
-    // Directions in which nothing changes stay where they are.
-    equations.matrix.diagonal() *= 1.0 + 1e-6;
-    return true;
-  }
-
-  bool move(const Eigen::Vector3d& change) {
-    constexpr double max_step_m = 0.1;
-    const double length_m = std::hypot(change[0], change[1]);
-    if (length_m < 1e-5 && std::abs(change[2]) < 1e-6) return true;
-    const double scale = std::min(1.0, max_step_m / std::max(1e-12, length_m));
-    fix_.pose.x_m += scale * change[0];
-    fix_.pose.y_m += scale * change[1];
-    fix_.pose.heading_rad = wrap_angle(fix_.pose.heading_rad + scale * change[2]);
-    return false;
-  }
-
-  /// Robust standard deviation of a residual, in those that its term expects.
-  [[nodiscard]] double noise() const { return noise_; }
-
- private:
-  struct Term {
-    double difference, weight;
-    Eigen::Vector3d slope;
-  };
-
-  [[nodiscard]] double columns_per_rad() const { return of_.columns_ / (2.0 * std::numbers::pi); }
-
-  [[nodiscard]] std::vector<Term> terms_along() const {
-    std::vector<Term> terms;
-    const auto crossings = of_.curve(fix_.pose.position());
-    const auto size = static_cast<long long>(of_.columns_);
-    for (std::size_t i = 0; i < fix_.columns.size(); ++i) {
-      const double azimuth = fix_.columns[i] + fix_.pose.heading_rad * columns_per_rad();
-      const double whole = std::floor(azimuth);
-      const double f = azimuth - whole;
-      const auto c0 =
-          static_cast<std::size_t>(((static_cast<long long>(whole) % size) + size) % size);
-      const RouteCrossing& a = crossings[c0];
-      const RouteCrossing& b = crossings[(c0 + 1) % static_cast<std::size_t>(size)];
-      if (a.along < 0.0F || b.along < 0.0F) continue;
-      const auto turn = static_cast<double>(b.along - a.along);  // lines a column
-      // A jump from one part of the path to another, or next to a pole.
-      if (std::abs(turn) * of_.spacing_m_ > 1.0) continue;
-      const double along = static_cast<double>(a.along) + f * turn;
-      const double middle = 0.5 * (fix_.first[i].along + fix_.second[i].along);
-      // Half a line along the path, half a column of azimuth.
-      const double variance = 0.25 + 0.25 * turn * turn;
-      terms.push_back({middle - along,
-                       1.0 / variance,
-                       {static_cast<double>(a.along_by_x), static_cast<double>(a.along_by_y),
-                        turn * columns_per_rad()}});
-    }
-    return terms;
-  }
-
-  /// From the path itself all lines of sight start at one place, and eq. 5 says nothing of the
-  /// heading; but the contours' azimuths do, to a column each.
-  void add_azimuths(std::vector<Term>& terms) const {
-    for (std::size_t i = 0; i < fix_.columns.size(); ++i) {
-      const double azimuth = fix_.columns[i] + fix_.pose.heading_rad * columns_per_rad();
-      const double middle =
-          fix_.first[i].azimuth +
-          0.5 * wrap_columns(fix_.second[i].azimuth - fix_.first[i].azimuth, of_.columns_);
-      terms.push_back(
-          {wrap_columns(middle - azimuth, of_.columns_), 1.0, {0.0, 0.0, columns_per_rad()}});
-    }
-  }
-
-  const RouteContours& of_;
-  RouteContourFix& fix_;
-  double noise_ = 0.0;
+// One equation of the least squares of eq. 5.
+struct RouteContours::Term {
+  double difference, weight;
+  Vector slope;
+  double deviations = 0.0;  // size of the difference, in deviations
 };
 
-bool RouteContours::fit_pose(RouteContourFix& fix) const {
-  PoseProblem problem(*this, fix);
-  PoseProblem::Equations equations;
-  const LeastSquaresReport solved = minimise(problem, equations, {.max_steps = 20});
-  if (!solved.solvable || (!solved.settled && !problem.linearise(equations))) return false;
-  const Eigen::Matrix3d inverse = equations.matrix.ldlt().solve(Eigen::Matrix3d::Identity());
-  if (!inverse.allFinite()) return false;
+// What the contours say along the path [Y03 eq. 5], weighted by how well an azimuth tells the
+// place.
+std::vector<RouteContours::Term> RouteContours::path_terms(const RouteContourFix& fix) const {
+  const auto size = static_cast<long long>(columns_);
+  const double columns_per_rad = columns_ / (2.0 * std::numbers::pi);
+  const auto crossings = curve(fix.pose.position());
+  std::vector<Term> terms;
+  for (std::size_t i = 0; i < fix.columns.size(); ++i) {
+    const double azimuth = fix.columns[i] + fix.pose.heading_rad * columns_per_rad;
+    const double whole = std::floor(azimuth);
+    const double f = azimuth - whole;
+    const auto c0 =
+        static_cast<std::size_t>(((static_cast<long long>(whole) % size) + size) % size);
+    const RouteCrossing& a = crossings[c0];
+    const RouteCrossing& b = crossings[(c0 + 1) % static_cast<std::size_t>(size)];
+    if (a.along < 0.0F || b.along < 0.0F) continue;
+    const auto turn = static_cast<double>(b.along - a.along);  // lines a column
+    // A jump from one part of the path to another, or next to a pole.
+    if (std::abs(turn) * spacing_m_ > 1.0) continue;
+    const double along = static_cast<double>(a.along) + f * turn;
+    const double middle = 0.5 * (fix.first[i].along + fix.second[i].along);
+    // Half a line along the path, half a column of azimuth.
+    const double variance = 0.25 + 0.25 * turn * turn;
+    terms.push_back({middle - along, 1.0 / variance,
+                     Vector(static_cast<double>(a.along_by_x), static_cast<double>(a.along_by_y),
+                            turn * columns_per_rad),
+                     std::abs(middle - along) / std::sqrt(variance)});
+  }
+  return terms;
+}
+
+// What the contours' azimuths say of the heading, to a column each. From the path itself all lines
+// of sight start at one place, and eq. 5 says nothing of it.
+void RouteContours::add_heading_terms(const RouteContourFix& fix, std::vector<Term>& terms) const {
+  const double columns_per_rad = columns_ / (2.0 * std::numbers::pi);
+  for (std::size_t i = 0; i < fix.columns.size(); ++i) {
+    const double azimuth = fix.columns[i] + fix.pose.heading_rad * columns_per_rad;
+    const double middle =
+        fix.first[i].azimuth +
+        0.5 * wrap_columns(fix.second[i].azimuth - fix.first[i].azimuth, columns_);
+    terms.push_back(
+        {wrap_columns(middle - azimuth, columns_), 1.0, Vector(0.0, 0.0, columns_per_rad)});
+  }
+}
+
+// One Gauss-Newton step with Cauchy's weights: sets the residual and the covariance of the fix, and
+// returns the change of its pose; empty where the terms determine none.
+std::optional<Eigen::Vector3d> RouteContours::solve(const std::vector<Term>& terms,
+                                                    std::size_t along_terms,
+                                                    RouteContourFix& fix) const {
+  std::vector<double> sizes;
+  for (const Term& term : std::span(terms).first(along_terms)) {
+    sizes.push_back(term.deviations);
+  }
+  const double noise = std::max(0.1, 1.4826 * upper_median_in_place(std::span(sizes)));
+  Eigen::Matrix3d matrix = Eigen::Matrix3d::Zero();
+  Vector right = Vector::Zero();
+  double left = 0.0;
+  double weights = 0.0;
+  for (std::size_t i = 0; i < terms.size(); ++i) {
+    const Term& term = terms[i];
+    const double ratio = term.difference * std::sqrt(term.weight) / (2.0 * noise);
+    const double weight = term.weight / (1.0 + ratio * ratio);
+    matrix += weight * term.slope * term.slope.transpose();
+    right += weight * term.difference * term.slope;
+    if (i >= along_terms) continue;
+    left += weight * term.difference * term.difference;
+    weights += weight;
+  }
+  fix.residual_m = std::sqrt(left / weights) * spacing_m_;
+  matrix.diagonal() *= 1.0 + 1e-6;
+  const Vector change = matrix.ldlt().solve(right);
+  const Eigen::Matrix3d inverse = matrix.ldlt().solve(Eigen::Matrix3d::Identity());
+  if (!change.allFinite() || !inverse.allFinite()) return std::nullopt;
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t j = 0; j < 3; ++j) {
       fix.covariance[3 * i + j] =
-          problem.noise() * problem.noise() *
-          inverse(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+          noise * noise * inverse(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
     }
+  }
+  return change;
+}
+
+bool RouteContours::fit_pose(RouteContourFix& fix) const {
+  constexpr int steps = 20;
+  for (int step = 0; step <= steps; ++step) {
+    std::vector<Term> terms = path_terms(fix);
+    const std::size_t along_terms = terms.size();
+    if (along_terms < min_points) return false;
+    add_heading_terms(fix, terms);
+    const auto change = solve(terms, along_terms, fix);
+    if (!change) return false;
+    const double length_m = std::hypot((*change)[0], (*change)[1]);
+    const double scale = std::min(1.0, 0.1 / std::max(1e-12, length_m));
+    if (step == steps || (length_m < 1e-5 && std::abs((*change)[2]) < 1e-6)) break;
+    fix.pose.x_m += scale * (*change)[0];
+    fix.pose.y_m += scale * (*change)[1];
+    fix.pose.heading_rad = wrap_angle(fix.pose.heading_rad + scale * (*change)[2]);
   }
   return true;
 }
@@ -304,14 +300,29 @@ std::optional<RouteContourFix> RouteContours::fit(std::span<const float> line,
                         std::to_string(columns_));
   }
   const auto edges = slopes(smoothed_line(line, options_.smoothing_deg * columns_ / 360.0));
+  std::vector<bool> joined;
+  RouteContourFix fix = start(edges, predicted, joined);
+  if (fix.columns.size() < min_points) return std::nullopt;
+  converge(fix, edges, joined);
+  std::size_t met = 0;
+  for (std::size_t i = 0; i < fix.first.size(); ++i) {
+    met += std::abs(fix.first[i].along - fix.second[i].along) <= 1.0 ? 1 : 0;
+  }
+  fix.converged = 5 * met >= 4 * fix.first.size();
+  if (!fit_pose(fix)) return std::nullopt;
+  return fix;
+}
+
+// Places the control points of both contours, `margin_m` before and behind the predicted curve.
+// `joined`: whether a control point and the one before lie on the same side of the path.
+RouteContourFix RouteContours::start(std::span<const float> edges, const Pose2& predicted,
+                                     std::vector<bool>& joined) const {
   const auto crossings = curve(predicted.position());
   const double turn = predicted.heading_rad * columns_ / (2.0 * std::numbers::pi);
   const auto size = static_cast<long long>(columns_);
   RouteContourFix fix;
   fix.pose = predicted;
   const double margin = options_.margin_m / spacing_m_;
-  // Whether a control point and the one before lie on the same side of the path.
-  std::vector<bool> joined;
   bool left = false;
   for (const int column : edge_columns(edges, options_.max_points)) {
     const double azimuth = column + turn;
@@ -332,7 +343,11 @@ std::optional<RouteContourFix> RouteContours::fit(std::span<const float> line,
     fix.first.push_back({azimuth, along + margin});
     fix.second.push_back({azimuth, along - margin});
   }
-  if (fix.columns.size() < min_points) return std::nullopt;
+  return fix;
+}
+
+void RouteContours::converge(RouteContourFix& fix, std::span<const float> edges,
+                             const std::vector<bool>& joined) const {
   // Steps of a line and a column first, then of half, until nothing moves.
   double step = 1.0;
   for (; fix.iterations < options_.max_iterations; ++fix.iterations) {
@@ -350,13 +365,6 @@ std::optional<RouteContourFix> RouteContours::fit(std::span<const float> line,
     if (step < 0.3) break;
     step *= 0.5;
   }
-  std::size_t met = 0;
-  for (std::size_t i = 0; i < fix.first.size(); ++i) {
-    met += std::abs(fix.first[i].along - fix.second[i].along) <= 1.0 ? 1 : 0;
-  }
-  fix.converged = 5 * met >= 4 * fix.first.size();
-  if (!fit_pose(fix)) return std::nullopt;
-  return fix;
 }
 
-}  // namespace panonav
+}  // namespace panonav::lab

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <cstddef>
 #include <optional>
@@ -10,7 +11,7 @@
 #include "panonav/route/route_crossing.hpp"
 #include "panonav/route/route_panorama.hpp"
 
-namespace panonav {
+namespace panonav::lab {
 
 /// The energies of the dual active contour models [Y03 eq. 6-11]. The paper prints no weights;
 /// these were chosen on lab scenes of seeds 701 to 704 (docs/decisions.md). Lengths along the path
@@ -63,12 +64,23 @@ class RouteContours {
                                                    const Pose2& predicted) const;
 
  private:
+  struct Term;
   [[nodiscard]] float edge(double along, double azimuth) const noexcept;
   void move(std::vector<ContourPoint>& contour, const std::vector<ContourPoint>& other,
             const std::vector<int>& columns, std::span<const float> edges,
             const std::vector<bool>& joined, double step) const;
   [[nodiscard]] std::vector<RouteCrossing> curve(Point2 viewpoint) const;
-  class PoseProblem;
+  [[nodiscard]] double pair_energy(const ContourPoint& before, const ContourPoint& at,
+                                   double interval, bool joined, double next_slope) const;
+  [[nodiscard]] RouteContourFix start(std::span<const float> edges, const Pose2& predicted,
+                                      std::vector<bool>& joined) const;
+  void converge(RouteContourFix& fix, std::span<const float> edges,
+                const std::vector<bool>& joined) const;
+  [[nodiscard]] std::vector<Term> path_terms(const RouteContourFix& fix) const;
+  void add_heading_terms(const RouteContourFix& fix, std::vector<Term>& terms) const;
+  [[nodiscard]] std::optional<Eigen::Vector3d> solve(const std::vector<Term>& terms,
+                                                     std::size_t along_terms,
+                                                     RouteContourFix& fix) const;
   bool fit_pose(RouteContourFix& fix) const;
 
   int columns_;
@@ -79,4 +91,4 @@ class RouteContours {
   std::vector<float> edges_;  // slope of each line over azimuth, line by line
 };
 
-}  // namespace panonav
+}  // namespace panonav::lab

@@ -1,4 +1,4 @@
-#include "panonav_viewer/surroundings.hpp"
+#include "panonav_viewer/scene_drawing.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -15,8 +15,6 @@
 namespace panonav::viewer {
 
 namespace {
-
-constexpr double kSectorRad = 2.0 * std::numbers::pi / shape_directions;
 
 using Triangle = std::array<simulation::Vector3, 3>;
 
@@ -83,103 +81,6 @@ std::vector<Point2> cut(const Triangle& triangle, double height_m) {
 }
 
 }  // namespace
-
-std::size_t sector_of(double azimuth_rad) {
-  const auto steps = std::lround(azimuth_rad / kSectorRad);
-  constexpr long count = shape_directions;
-  return static_cast<std::size_t>(((steps % count) + count) % count);
-}
-
-Surroundings surroundings_of(const simulation::PlaceRecording& place, Point2 position) {
-  constexpr std::size_t kRays = 120;
-  constexpr std::array kHeightsM{0.3, 0.6, 0.9};
-  Surroundings result;
-  Directional nearness{};
-  Directional rays{};
-  Directional shift{};
-  for (std::size_t ray = 0; ray < kRays; ++ray) {
-    const double azimuth = 2.0 * std::numbers::pi * static_cast<double>(ray) / kRays;
-    for (const double height : kHeightsM) {
-      const double free_m = place.renderer->distance_along({position.x_m, position.y_m, height},
-                                                           Direction3::from_angles(azimuth, 0.0));
-      const double near = std::isfinite(free_m) ? 1.0 / std::max(free_m, 0.01) : 0.0;
-      const std::size_t sector = sector_of(azimuth);
-      nearness[sector] += near;
-      rays[sector] += 1.0;
-      for (std::size_t direction = 0; direction < shape_directions; ++direction) {
-        const double theta = kSectorRad * static_cast<double>(direction);
-        shift[direction] += std::abs(std::sin(azimuth - theta)) * near;
-      }
-    }
-  }
-  for (std::size_t i = 0; i < shape_directions; ++i) {
-    // Nothing all around, as outdoors: farther than any room.
-    constexpr double kFarM = 1000.0;
-    result.free_m[i] = nearness[i] > 0.0 ? rays[i] / nearness[i] : kFarM;
-    result.parallax_m[i] =
-        shift[i] > 0.0 ? static_cast<double>(kRays * kHeightsM.size()) / shift[i] : kFarM;
-  }
-  return result;
-}
-
-Directional predicted_extents(const simulation::PlaceRecording& place, const Pose2& pose,
-                              const Panorama& view, int components) {
-  require(view.elevations().has_value(), "elevations of the view", 0.0, "known");
-  using Complex = std::complex<double>;
-  const FourierSignature signature = compute_signature(view, components);
-  const double column_rad = 2.0 * std::numbers::pi / view.columns();
-  const double row_rad = (view.elevations()->top_rad - view.elevations()->bottom_rad) / view.rows();
-  const auto count = static_cast<std::size_t>(components);
-  Directional change{};
-  for (int y = 0; y < view.rows(); ++y) {
-    const double elevation = view.elevation_rad(y);
-    const int above = std::max(y - 1, 0);
-    const int below = std::min(y + 1, view.rows() - 1);
-    // How the components of this row change per metre along x and y of the robot.
-    std::vector<Complex> along_x(count);
-    std::vector<Complex> along_y(count);
-    for (int c = 0; c < view.columns(); ++c) {
-      const double azimuth = view.azimuth_rad(c);
-      const double range_m = place.renderer->distance_along(
-          {pose.x_m, pose.y_m, place.scene.camera_height_m},
-          Direction3::from_angles(azimuth + pose.heading_rad, elevation));
-      if (!std::isfinite(range_m) || range_m <= 0.0) continue;
-      const int left = (c + 1) % view.columns();
-      const int right = (c + view.columns() - 1) % view.columns();
-      const double around = (view.at(y, left) - view.at(y, right)) / (2.0 * column_rad);
-      const double upwards =
-          above == below ? 0.0
-                         : (view.at(above, c) - view.at(below, c)) / ((below - above) * row_rad);
-      // A step along theta turns what is seen by sin(azimuth - theta) / (range cos(elevation)), and
-      // lifts it by cos(azimuth - theta) sin(elevation) / range.
-      const double turn = around / (range_m * std::max(std::cos(elevation), 1e-3));
-      const double lift = upwards * std::sin(elevation) / range_m;
-      const double x = turn * std::sin(azimuth) + lift * std::cos(azimuth);
-      const double y_part = -turn * std::cos(azimuth) + lift * std::sin(azimuth);
-      for (std::size_t k = 0; k < count; ++k) {
-        const Complex wave = std::polar(1.0, -static_cast<double>(k) * azimuth);
-        along_x[k] += x * wave;
-        along_y[k] += y_part * wave;
-      }
-    }
-    for (std::size_t k = 0; k < count; ++k) {
-      // The part along the component itself changes its magnitude, the rest its phase.
-      const Complex unit =
-          std::polar(1.0, -static_cast<double>(signature.phase_rad(y, static_cast<int>(k))));
-      const double per_x = (along_x[k] * unit).real();
-      const double per_y = (along_y[k] * unit).real();
-      for (std::size_t i = 0; i < shape_directions; ++i) {
-        const double theta = kSectorRad * static_cast<double>(i) - pose.heading_rad;
-        change[i] += std::abs(per_x * std::cos(theta) + per_y * std::sin(theta));
-      }
-    }
-  }
-  Directional extents{};
-  for (std::size_t i = 0; i < shape_directions; ++i) {
-    extents[i] = change[i] > 0.0 ? 1.0 / change[i] : 0.0;
-  }
-  return extents;
-}
 
 std::vector<MapLayer> scene_layers(const simulation::Scene& scene) {
   constexpr double lowest_m = 0.1;    // carpets and sills do not count

@@ -1,4 +1,4 @@
-#include "panonav/route/route_contours.hpp"
+#include "lab/y03/route_contours.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,8 @@
 #include "panonav/geometry/angles.hpp"
 #include "support/toy_world.hpp"
 
-namespace panonav::testing {
+namespace panonav::lab {
+using namespace testing;
 namespace {
 
 RoutePanorama straight_route(const ToyWorld& room) {
@@ -67,4 +68,4 @@ TEST(RouteContours, NoAnswerWithoutEdgesOrOutOfReach) {
 }
 
 }  // namespace
-}  // namespace panonav::testing
+}  // namespace panonav::lab

@@ -1,4 +1,4 @@
-#include "panonav/navigation/place_scale.hpp"
+#include "panonav/navigation/internal/place_scale.hpp"
 
 #include <algorithm>
 #include <cstddef>

@@ -1,4 +1,4 @@
-#include "panonav/kernels/turn_products.hpp"
+#include "lab/baselines/turn_products.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,8 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 
-namespace panonav::kernels {
+namespace panonav::lab {
+using namespace testing;
 namespace {
 
 TEST(TurnProducts, EveryInstructionSetAgreesWithTheSumsInDoublePrecision) {
@@ -24,7 +25,7 @@ TEST(TurnProducts, EveryInstructionSetAgreesWithTheSumsInDoublePrecision) {
         periodic[i] = static_cast<float>(random.uniform(-0.5, 0.5));
       }
       for (std::size_t i = columns; i < periodic.size(); ++i) periodic[i] = periodic[i - columns];
-      for (const Instructions instructions : available_instructions()) {
+      for (const kernels::Instructions instructions : kernels::available_instructions()) {
         std::vector<float> products(count * stride, -100.0F);
         std::vector<float> largest(count, -100.0F);
         turn_products(rows, columns, periodic, products, largest, instructions);
@@ -35,7 +36,7 @@ TEST(TurnProducts, EveryInstructionSetAgreesWithTheSumsInDoublePrecision) {
               sum += static_cast<double>(rows[r * columns + i]) *
                      static_cast<double>(periodic[(t + i) % columns]);
             }
-            ASSERT_NEAR(products[r * stride + t], sum, 1e-5) << name(instructions);
+            ASSERT_NEAR(products[r * stride + t], sum, 1e-5) << kernels::name(instructions);
             ++compared;
           }
           const auto row = products.begin() + static_cast<std::ptrdiff_t>(r * stride);
@@ -56,7 +57,7 @@ TEST(TurnProducts, RefusesWrongSizes) {
   std::vector<float> products(16);
   std::vector<float> largest(1);
   const auto run = [&](std::size_t columns) {
-    turn_products(rows, columns, periodic, products, largest, Instructions::scalar);
+    turn_products(rows, columns, periodic, products, largest, kernels::Instructions::scalar);
   };
   EXPECT_NO_THROW(run(8));
   EXPECT_THROW(run(7), ContractError);
@@ -66,4 +67,4 @@ TEST(TurnProducts, RefusesWrongSizes) {
 }
 
 }  // namespace
-}  // namespace panonav::kernels
+}  // namespace panonav::lab

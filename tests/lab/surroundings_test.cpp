@@ -1,4 +1,5 @@
-#include "panonav_viewer/surroundings.hpp"
+#include "lab/m04/surroundings.hpp"
+#include "panonav_viewer/scene_drawing.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,13 +8,13 @@
 #include <memory>
 #include <numbers>
 
+#include "lab/statistics.hpp"
 #include "panonav/core/random.hpp"
-#include "panonav/core/statistics.hpp"
 #include "panonav/signature/dissimilarity.hpp"
 #include "panonav_simulation/scenes.hpp"
 #include "panonav_simulation/screen.hpp"
 
-namespace panonav::viewer {
+namespace panonav::lab {
 namespace {
 
 simulation::PlaceRecording small_office() {
@@ -104,7 +105,7 @@ TEST(PredictedExtents, AgreeWithStepsThatAreReallyTaken) {
 /// What stands around, and walls.
 struct Drawn {
   explicit Drawn(const simulation::Scene& scene) {
-    for (const MapLayer& layer : scene_layers(scene)) {
+    for (const viewer::MapLayer& layer : viewer::scene_layers(scene)) {
       things.insert(things.end(), layer.filled_polygons.begin(), layer.filled_polygons.end());
       walls.insert(walls.end(), layer.lines.begin(), layer.lines.end());
     }
@@ -174,4 +175,4 @@ TEST(SceneLayers, DoorsAreOpenUnderTheirLintels) {
 }
 
 }  // namespace
-}  // namespace panonav::viewer
+}  // namespace panonav::lab

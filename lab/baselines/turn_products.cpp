@@ -1,0 +1,139 @@
+#include "lab/baselines/turn_products.hpp"
+
+#include <limits>
+
+#include "panonav/core/error.hpp"
+
+namespace panonav::lab {
+
+namespace {
+
+/// Products of a row come in multiples of this many turns: the floats of the widest register.
+constexpr std::size_t turn_lanes = 16;
+
+template <int lanes>
+struct Lanes {
+  typedef float Floats __attribute__((vector_size(4 * lanes), aligned(4)));
+};
+
+/// Correlates `row_count` rows at `vectors * lanes` turns from turn `t` on: all sums stay in
+/// registers, and each value that is loaded serves all rows or all turns.
+template <int lanes, int row_count, int vectors>
+[[gnu::always_inline]] inline void products_of_block(const float* rows, std::size_t columns,
+                                                     const float* periodic, std::size_t t,
+                                                     std::size_t stride, float* products,
+                                                     typename Lanes<lanes>::Floats* largest) {
+  using Floats = typename Lanes<lanes>::Floats;
+  Floats sums[row_count][vectors] = {};
+  for (std::size_t i = 0; i < columns; ++i) {
+    Floats turned[vectors];
+    for (int v = 0; v < vectors; ++v) {
+      turned[v] = *reinterpret_cast<const Floats*>(periodic + t + i + v * lanes);
+    }
+    for (int r = 0; r < row_count; ++r) {
+      const float value = rows[static_cast<std::size_t>(r) * columns + i];
+      for (int v = 0; v < vectors; ++v) sums[r][v] += value * turned[v];
+    }
+  }
+  for (int r = 0; r < row_count; ++r) {
+    for (int v = 0; v < vectors; ++v) {
+      float* const to = products + static_cast<std::size_t>(r) * stride + t + v * lanes;
+      *reinterpret_cast<Floats*>(to) = sums[r][v];
+      largest[r] = sums[r][v] > largest[r] ? sums[r][v] : largest[r];
+    }
+  }
+}
+
+template <int lanes, int row_count, int vectors>
+[[gnu::always_inline]] inline void products_of_rows(const float* rows, std::size_t columns,
+                                                    const float* periodic, std::size_t stride,
+                                                    float* products, float* largest) {
+  using Floats = typename Lanes<lanes>::Floats;
+  Floats greatest[row_count];
+  for (Floats& row : greatest) row = Floats{} - std::numeric_limits<float>::max();
+  std::size_t t = 0;
+  for (; t + vectors * lanes <= stride; t += vectors * lanes) {
+    products_of_block<lanes, row_count, vectors>(rows, columns, periodic, t, stride, products,
+                                                 greatest);
+  }
+  for (; t < stride; t += lanes) {
+    products_of_block<lanes, row_count, 1>(rows, columns, periodic, t, stride, products, greatest);
+  }
+  for (int r = 0; r < row_count; ++r) {
+    largest[r] = greatest[r][0];
+    for (int i = 1; i < lanes; ++i) {
+      largest[r] = greatest[r][i] > largest[r] ? greatest[r][i] : largest[r];
+    }
+  }
+}
+
+/// `vectors`: as many as leave registers for the rows.
+template <int lanes, int vectors>
+[[gnu::always_inline]] inline void all_products(const float* rows, std::size_t count,
+                                                std::size_t columns, const float* periodic,
+                                                float* products, float* largest) {
+  const std::size_t stride = turn_products_stride(columns);
+  constexpr int row_count = 4;
+  std::size_t r = 0;
+  for (; r + row_count <= count; r += row_count) {
+    products_of_rows<lanes, row_count, vectors>(rows + r * columns, columns, periodic, stride,
+                                                products + r * stride, largest + r);
+  }
+  for (; r < count; ++r) {
+    products_of_rows<lanes, 1, vectors>(rows + r * columns, columns, periodic, stride,
+                                        products + r * stride, largest + r);
+  }
+}
+
+#if defined(__x86_64__)
+[[gnu::target("avx512f,avx512bw,avx512dq,avx512vl,fma,prefer-vector-width=512")]] void
+products_by_avx512(const float* rows, std::size_t count, std::size_t columns, const float* periodic,
+                   float* products, float* largest) {
+  all_products<16, 5>(rows, count, columns, periodic, products, largest);
+}
+[[gnu::target("avx2,fma")]] void products_by_avx2(const float* rows, std::size_t count,
+                                                  std::size_t columns, const float* periodic,
+                                                  float* products, float* largest) {
+  all_products<8, 2>(rows, count, columns, periodic, products, largest);
+}
+#endif
+
+/// Correlates with registers of four floats, which every processor has: ARM has 32 of them.
+#if defined(__aarch64__)
+constexpr int vectors_of_four = 4;
+#else
+constexpr int vectors_of_four = 2;
+#endif
+void products_by_four(const float* rows, std::size_t count, std::size_t columns,
+                      const float* periodic, float* products, float* largest) {
+  all_products<4, vectors_of_four>(rows, count, columns, periodic, products, largest);
+}
+
+}  // namespace
+
+std::size_t turn_products_stride(std::size_t columns) noexcept {
+  return (columns + turn_lanes - 1) / turn_lanes * turn_lanes;
+}
+
+void turn_products(std::span<const float> rows, std::size_t columns,
+                   std::span<const float> periodic, std::span<float> products,
+                   std::span<float> largest, kernels::Instructions instructions) {
+  const auto check = [](std::size_t size, std::size_t expected, const char* what) {
+    require(size == expected, what, static_cast<double>(size),
+            to_text(static_cast<double>(expected)));
+  };
+  const std::size_t count = largest.size();
+  const std::size_t stride = turn_products_stride(columns);
+  require(columns >= 1 && columns <= 65536, "columns", static_cast<double>(columns), "1 .. 65536");
+  check(rows.size(), count * columns, "values of the rows");
+  check(periodic.size(), columns + stride, "values of the periodic row");
+  check(products.size(), count * stride, "products");
+  auto* correlate = products_by_four;
+#if defined(__x86_64__)
+  if (instructions == kernels::Instructions::avx512) correlate = products_by_avx512;
+  if (instructions == kernels::Instructions::avx2) correlate = products_by_avx2;
+#endif
+  correlate(rows.data(), count, columns, periodic.data(), products.data(), largest.data());
+}
+
+}  // namespace panonav::lab

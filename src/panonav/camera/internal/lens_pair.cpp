@@ -1,0 +1,103 @@
+#include "panonav/camera/internal/lens_pair.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace panonav::dual_fisheye {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+namespace {
+
+Matrix3d world_from_rig(const Stand& stand) {
+  return (Eigen::AngleAxisd(stand.yaw_rad, Vector3d::UnitZ()) *
+          Eigen::AngleAxisd(stand.pitch_rad, Vector3d::UnitY()) *
+          Eigen::AngleAxisd(stand.roll_rad, Vector3d::UnitX()))
+      .toRotationMatrix();
+}
+Matrix3d rig_from_lens(const FisheyeLens& lens) {
+  const LensRotation rotation(lens);
+  Matrix3d matrix;
+  for (int i = 0; i < 3; ++i) {
+    const auto axis =
+        rotation.robot_from_lens({i == 0 ? 1.0 : 0.0, i == 1 ? 1.0 : 0.0, i == 2 ? 1.0 : 0.0});
+    matrix.col(i) = Vector3d(axis.x, axis.y, axis.z);
+  }
+  return matrix;
+}
+
+}  // namespace
+
+void add_to(FisheyeLens& lens, int parameter, double change) {
+  switch (parameter) {
+    case 0:
+      lens.centre_u_px += change;
+      break;
+    case 1:
+      lens.centre_v_px += change;
+      break;
+    case 2:
+      lens.focal_length_px *= std::exp(change);
+      break;
+    case 3:
+      lens.k3 += change;
+      break;
+    case 4:
+      lens.k5 += change;
+      break;
+    case 5:
+      lens.azimuth_rad += change;
+      break;
+    case 6:
+      lens.elevation_rad += change;
+      break;
+    default:
+      lens.roll_rad += change;
+  }
+}
+
+void add_to(Stand& stand, int parameter, double change) {
+  (parameter == 0 ? stand.yaw_rad : parameter == 1 ? stand.roll_rad : stand.pitch_rad) += change;
+}
+
+State moved(State state, const Eigen::VectorXd& change) {
+  for (int lens = 0; lens < 2; ++lens) {
+    for (int i = 0; i < lens_size; ++i) add_to(state.lenses[lens], i, change[lens_at(lens) + i]);
+  }
+  for (int p = 0; p < static_cast<int>(state.stands.size()); ++p) {
+    for (int i = 0; i < stand_size; ++i) add_to(state.stands[p], i, change[stand_at(p) + i]);
+  }
+  return state;
+}
+
+Matrix3d world_from_lens(const Stand& stand, const FisheyeLens& lens) {
+  return world_from_rig(stand) * rig_from_lens(lens);
+}
+
+Stance::Stance(const FisheyeLens& lens, const Stand& stand, double side)
+    : lens_(lens), world_from_lens_(world_from_lens(stand, lens)), side_(side) {
+  // What other parameters see beyond the circle still has a slope.
+  lens_.max_angle_rad = std::min(std::numbers::pi, 1.1 * lens_.max_angle_rad);
+}
+
+Vector3d Stance::ray(const Eigen::Vector2d& pixel) const {
+  const double right = side_ * (pixel.x() - lens_.centre_u_px);
+  const double up = lens_.centre_v_px - pixel.y();
+  const double radius = std::hypot(right, up);
+  const double angle = angle_at(lens_, radius);
+  const double scale = radius > 0 ? std::sin(angle) / radius : 0.0;
+  return world_from_lens_ * Vector3d(std::cos(angle), -right * scale, up * scale);
+}
+
+std::vector<Stance> stances(const State& state, double side) {
+  std::vector<Stance> result;
+  for (const Stand& stand : state.stands) {
+    for (const FisheyeLens& lens : state.lenses) result.emplace_back(lens, stand, side);
+  }
+  return result;
+}
+
+}  // namespace panonav::dual_fisheye

@@ -1,0 +1,350 @@
+#include "panonav/camera/internal/patch_matching.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <numbers>
+#include <optional>
+
+#include "panonav/geometry/angles.hpp"
+
+namespace panonav::dual_fisheye {
+
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+namespace {
+
+/// The light of one picture, smoothed to a distance of values.
+struct Plane {
+  int reduction = 1, width = 0, height = 0;
+  const std::vector<float>* values = nullptr;
+};
+
+Plane plane_of(const SmoothPlanes& smooth, int reduction) {
+  return {reduction, smooth.width, smooth.height, &smooth.channels[0]};
+}
+
+/// Patches are 15 x 15 values; at the finest level about 5 degrees in pictures of 1280 x 640.
+constexpr int reach = 7;
+constexpr int side_length = 2 * reach + 1;
+/// Weaker patches are noise: 8-bit rounding, and what is left of a sensor's noise after smoothing.
+constexpr double min_contrast = 3.0;
+/// Correlation from which on two patches show the same thing.
+constexpr double min_correlation = 0.7;
+
+struct Patch {
+  int half = 0;
+  std::vector<float> values;  ///< negative: not seen
+  [[nodiscard]] float at(int x, int y) const {
+    return values[static_cast<std::size_t>(y + half) * static_cast<std::size_t>(2 * half + 1) +
+                  static_cast<std::size_t>(x + half)];
+  }
+};
+template <class View>
+Patch cut(const View& view, const Vector3d& middle, const Vector3d& east, const Vector3d& north,
+          double step_rad, int half) {
+  Patch patch{half, {}};
+  for (int y = -half; y <= half; ++y) {
+    for (int x = -half; x <= half; ++x) {
+      patch.values.push_back(view.value(middle + step_rad * (x * east + y * north)));
+    }
+  }
+  return patch;
+}
+
+struct Correlation {
+  double value = -1.0;
+  double log_gain = 0.0;
+};
+Correlation correlate(const Patch& a, const Patch& b, int dx, int dy) {
+  double n = 0, sa = 0, sb = 0, saa = 0, sbb = 0, sab = 0;
+  for (int y = -reach; y <= reach; ++y) {
+    for (int x = -reach; x <= reach; ++x) {
+      const double p = a.at(x, y);
+      const double q = b.at(x + dx, y + dy);
+      if (p < 0 || q < 0) continue;
+      n += 1;
+      sa += p;
+      sb += q;
+      saa += p * p;
+      sbb += q * q;
+      sab += p * q;
+    }
+  }
+  if (n < 0.5 * side_length * side_length) return {};
+  const double va = saa - sa * sa / n;
+  const double vb = sbb - sb * sb / n;
+  if (!(va > 0 && vb > 0.25 * min_contrast * min_contrast * n)) return {};
+  return {(sab - sa * sb / n) / std::sqrt(va * vb),
+          std::log(std::max(sb, 1.0) / std::max(sa, 1.0))};
+}
+
+/// Contrast across edges and along them; empty where there is too little of it.
+std::optional<Eigen::Matrix2d> whitener_of(const Patch& patch) {
+  double n = 0, sum = 0, squares = 0;
+  Eigen::Matrix2d tensor = Eigen::Matrix2d::Zero();
+  for (int y = -reach; y <= reach; ++y) {
+    for (int x = -reach; x <= reach; ++x) {
+      const double here = patch.at(x, y);
+      if (here < 0) continue;
+      n += 1;
+      sum += here;
+      squares += here * here;
+      if (x == reach || y == reach || patch.at(x + 1, y) < 0 || patch.at(x, y + 1) < 0) continue;
+      const Vector2d slope(patch.at(x + 1, y) - here, patch.at(x, y + 1) - here);
+      tensor += slope * slope.transpose();
+    }
+  }
+  if (n < 0.5 * side_length * side_length) return std::nullopt;
+  if (squares - sum * sum / n < min_contrast * min_contrast * n) return std::nullopt;
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver;
+  solver.computeDirect(tensor);
+  const double most = solver.eigenvalues()[1];
+  if (!(most > 0)) return std::nullopt;
+  const Vector2d roots(std::sqrt(std::max(0.0, solver.eigenvalues()[0] / most)), 1.0);
+  const Eigen::Matrix2d axes = solver.eigenvectors();
+  return Eigen::Matrix2d(axes * roots.asDiagonal() * axes.transpose());
+}
+
+/// A direction of the world, and what lies across it.
+struct Direction {
+  Vector3d middle, east, north;
+  int region = 0;
+};
+/// Returns direction i of `count`: evenly over the sphere (Fibonacci), but for the poles: floor or
+/// stand, and the hand above.
+Direction direction_at(std::size_t i, int count) {
+  const double z = 0.94 * (1 - (2.0 * static_cast<double>(i) + 1) / count);
+  const double azimuth = std::numbers::pi * (3 - std::sqrt(5.0)) * static_cast<double>(i);
+  const double flat = std::sqrt(1 - z * z);
+  const Vector3d middle(flat * std::cos(azimuth), flat * std::sin(azimuth), z);
+  const Vector3d east(-std::sin(azimuth), std::cos(azimuth), 0);
+  const double turns = azimuth / (2 * std::numbers::pi);
+  const int region = static_cast<int>((turns - std::floor(turns)) * sectors) % sectors +
+                     sectors * static_cast<int>(2 * (z + 1));
+  return {middle, east, middle.cross(east), region};
+}
+
+/// Returns the pairs of views to match: the lenses of each picture, and all of one with all of the
+/// next; the last picture's next is the first.
+std::vector<std::array<int, 2>> view_pairs(int pictures) {
+  std::vector<std::array<int, 2>> pairs;
+  for (int p = 0; p < pictures; ++p) {
+    pairs.push_back({2 * p, 2 * p + 1});
+    if (pictures == 1 || (pictures == 2 && p == 1)) continue;
+    const int next = (p + 1) % pictures;
+    for (const int a : {0, 1}) {
+      for (const int b : {0, 1}) pairs.push_back({2 * p + a, 2 * next + b});
+    }
+  }
+  return pairs;
+}
+
+}  // namespace
+
+/// One lens in one picture as it is believed to stand.
+class PatchMatcher::View {
+ public:
+  View(const State& state, int picture, int lens, const Plane& plane, double side)
+      : lens_(state.lenses[lens]),
+        lens_from_world_(world_from_lens(state.stands[picture], lens_).transpose()),
+        plane_(plane),
+        side_(side) {}
+
+  /// Where the lens sees a direction of the world (image pixels); empty beyond its field of view.
+  [[nodiscard]] std::optional<Vector2d> pixel(const Vector3d& in_world) const {
+    const Vector3d d = lens_from_world_ * in_world;
+    const auto point = project(lens_, {d.x(), d.y(), d.z()});
+    if (!point) return std::nullopt;
+    return Vector2d(lens_.centre_u_px + side_ * point->right_px, lens_.centre_v_px - point->up_px);
+  }
+  /// Its grey level there; negative: not seen.
+  [[nodiscard]] float value(const Vector3d& in_world) const {
+    const auto at = pixel(in_world);
+    if (!at) return -1.0F;
+    const double u = at->x() / plane_.reduction - 0.5;
+    const double v = at->y() / plane_.reduction - 0.5;
+    if (!(u >= 0 && v >= 0 && u < plane_.width - 1 && v < plane_.height - 1)) return -1.0F;
+    const auto u0 = static_cast<std::size_t>(u);
+    const auto v0 = static_cast<std::size_t>(v);
+    const auto a = static_cast<float>(u - static_cast<double>(u0));
+    const auto b = static_cast<float>(v - static_cast<double>(v0));
+    const float* here = plane_.values->data() + v0 * static_cast<std::size_t>(plane_.width) + u0;
+    const float* below = here + plane_.width;
+    return (1 - b) * ((1 - a) * here[0] + a * here[1]) + b * ((1 - a) * below[0] + a * below[1]);
+  }
+
+ private:
+  FisheyeLens lens_;
+  Matrix3d lens_from_world_;
+  Plane plane_;
+  double side_;
+};
+
+int Matching::near() const {
+  return static_cast<int>(
+      std::ranges::count_if(matches, [](const Match& match) { return match.off_steps <= 1.0; }));
+}
+
+void PatchMatcher::find_turns(State& state, double step_rad, double left_azimuth_rad) {
+  static_cast<void>(planes(state, step_rad));
+  // The first reduction serves all fields of view that are tried: they differ little.
+  const auto& [reduction, smooth_pictures] = planes_.front();
+  constexpr int columns = 360;  // a value a degree
+  constexpr int rows = 30;      // every second degree about the horizon
+  const auto panorama = [&](int picture) {
+    std::vector<float> values;
+    const Plane plane = plane_of(smooth_pictures[picture], reduction);
+    State level = state;
+    level.stands[picture] = {};
+    const View left(level, picture, 0, plane, side_);
+    const View right(level, picture, 1, plane, side_);
+    for (int y = 0; y < rows; ++y) {
+      double sum = 0;
+      for (int c = 0; c < columns; ++c) {
+        const double azimuth = left_azimuth_rad + 2 * std::numbers::pi * c / columns;
+        const auto d = Direction3::from_angles(azimuth, radians(2.0 * y - rows));
+        const View& view = std::cos(azimuth - left_azimuth_rad) > 0 ? left : right;
+        values.push_back(std::max(0.0F, view.value({d.x, d.y, d.z})));
+        sum += values.back();
+      }
+      for (int c = 0; c < columns; ++c) {
+        values[static_cast<std::size_t>(y) * columns + c] -= static_cast<float>(sum / columns);
+      }
+    }
+    return values;
+  };
+  const auto first = panorama(0);
+  for (int p = 1; p < static_cast<int>(state.stands.size()); ++p) {
+    const auto other = panorama(p);
+    double best = -1;
+    for (int turn = 0; turn < columns; ++turn) {
+      double product = 0;
+      for (std::size_t i = 0; i < other.size(); ++i) {
+        const std::size_t column = (i % columns + static_cast<std::size_t>(turn)) % columns;
+        product += static_cast<double>(other[i]) * first[i / columns * columns + column];
+      }
+      if (product > best) {
+        best = product;
+        state.stands[p].yaw_rad = 2 * std::numbers::pi * turn / columns;
+      }
+    }
+  }
+}
+
+/// Looks in one direction of the world for what pairs of views both see.
+class PatchMatcher::Search {
+ public:
+  Search(const std::vector<View>& views, const Direction& direction, double step_rad, int search)
+      : views_(views),
+        direction_(direction),
+        step_rad_(step_rad),
+        search_(search),
+        areas_(views.size()) {}
+
+  /// Adds the match of views a and b to `found`, where both see a patch with contrast that agrees.
+  void add_match(int a, int b, Matching& found) {
+    const auto pixel = views_[a].pixel(direction_.middle);
+    if (!pixel || !views_[b].pixel(direction_.middle)) return;
+    const auto whitener = whitener_of(area(a));
+    if (!whitener) return;
+    const std::vector<Correlation> at = correlations(a, b);
+    const auto best =
+        static_cast<int>(std::ranges::max_element(at, {}, &Correlation::value) - at.begin());
+    if (at[best].value < -0.5) return;  // the other view lacks the patch, or contrast there
+    ++found.textured;
+    const int width = 2 * search_ + 1;
+    const int x = best % width;
+    const int y = best / width;
+    if (at[best].value < min_correlation || x == 0 || y == 0 || x == width - 1 || y == width - 1) {
+      return;
+    }
+    const auto vertex = [&](int stride) {  // of the parabola through three values
+      const double low = at[best - stride].value;
+      const double high = at[best + stride].value;
+      const double bend = low + high - 2 * at[best].value;
+      return bend < 0 ? std::clamp(0.5 * (low - high) / bend, -0.5, 0.5) : 0.0;
+    };
+    const auto& [middle, east, north, region] = direction_;
+    const double dx = x - search_ + vertex(1);
+    const double dy = y - search_ + vertex(width);
+    const auto other = views_[b].pixel(middle + step_rad_ * (dx * east + dy * north));
+    if (!other) return;
+    found.matches.push_back({{Seen{a / 2, a % 2, *pixel}, Seen{b / 2, b % 2, *other}},
+                             east,
+                             north,
+                             *whitener,
+                             std::hypot(dx, dy),
+                             at[best].log_gain,
+                             region});
+  }
+
+ private:
+  /// Returns the patch of a view with all that is searched around it.
+  [[nodiscard]] const Patch& area(int view) {
+    if (!areas_[view]) {
+      areas_[view] = cut(views_[view], direction_.middle, direction_.east, direction_.north,
+                         step_rad_, reach + search_);
+    }
+    return *areas_[view];
+  }
+  /// Correlates the patch of view a with view b at all steps that are searched, row by row.
+  [[nodiscard]] std::vector<Correlation> correlations(int a, int b) {
+    std::vector<Correlation> at;
+    const int width = 2 * search_ + 1;
+    for (int i = 0; i < width * width; ++i) {
+      at.push_back(correlate(area(a), area(b), i % width - search_, i / width - search_));
+    }
+    return at;
+  }
+
+  const std::vector<View>& views_;
+  Direction direction_;
+  double step_rad_;
+  int search_;
+  std::vector<std::optional<Patch>> areas_;
+};
+
+Matching PatchMatcher::match(const State& state, double step_rad, int search, int directions) {
+  const auto& [reduction, smooth] = planes(state, step_rad);
+  const int count = static_cast<int>(grey_.size());
+  std::vector<View> views;
+  for (int p = 0; p < count; ++p) {
+    const Plane plane = plane_of(smooth[p], reduction);
+    for (int lens = 0; lens < 2; ++lens) views.emplace_back(state, p, lens, plane, side_);
+  }
+  const auto pairs = view_pairs(count);
+  const auto directions_size = static_cast<std::size_t>(directions);
+  std::vector<Matching> found(directions_size);
+  executor_.for_chunks(directions_size, 1, [&](std::size_t begin, std::size_t, std::size_t) {
+    Search here(views, direction_at(begin, directions), step_rad, search);
+    for (const auto& [a, b] : pairs) here.add_match(a, b, found[begin]);
+  });
+  Matching all;
+  for (Matching& part : found) {
+    all.textured += part.textured;
+    std::ranges::move(part.matches, std::back_inserter(all.matches));
+  }
+  return all;
+}
+
+const std::pair<int, std::vector<SmoothPlanes>>& PatchMatcher::planes(const State& state,
+                                                                      double step_rad) {
+  const int reduction =
+      std::max(1, static_cast<int>(std::lround(state.lenses[0].focal_length_px * step_rad)));
+  for (const auto& known : planes_) {
+    if (known.first == reduction) return known;
+  }
+  constexpr double sigma_px = 0.7;  // against aliasing of the reduced pictures
+  std::vector<SmoothPlanes> smooth;
+  for (const Image& picture : grey_) {
+    smooth.push_back(smooth_planes(picture.view(), reduction, sigma_px));
+  }
+  return planes_.emplace_back(reduction, std::move(smooth));
+}
+
+}  // namespace panonav::dual_fisheye

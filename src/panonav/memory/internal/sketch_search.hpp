@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "panonav/core/executor.hpp"
+#include "panonav/memory/internal/sketch_segment.hpp"
+#include "panonav/memory/view_sketches.hpp"
+
+namespace panonav {
+
+/// A segment and which of its views are there.
+struct LiveSegment {
+  std::shared_ptr<const SketchSegment> sketches;
+  std::vector<std::uint64_t> live;  // a bit for each row of its blocks
+  std::size_t count = 0;
+  [[nodiscard]] bool has(std::size_t row) const { return (live[row / 64] >> (row % 64) & 1U) != 0; }
+};
+
+/// Searches segments for the `top` views nearest to a query, of which `components` are compared:
+/// what `ViewSketches::search` promises. The caller has checked query, mask and components.
+[[nodiscard]] SearchResult search_segments(const SegmentLayout& layout,
+                                           std::span<const LiveSegment> segments,
+                                           const PackedSignature& query, int components,
+                                           const SearchMask& mask, std::size_t top,
+                                           const ViewSketches::ReadViews& read, Executor& executor);
+
+}  // namespace panonav

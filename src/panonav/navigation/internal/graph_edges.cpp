@@ -1,0 +1,75 @@
+#include "panonav/navigation/internal/graph_edges.hpp"
+
+#include <algorithm>
+#include <numbers>
+#include <set>
+
+#include "panonav/core/statistics.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/relative_pose/homing_view.hpp"
+
+namespace panonav {
+
+namespace {
+
+/// Least length of an edge, over the median length: that between pictures of one place.
+constexpr double min_length_share = 0.1;
+
+// Reads some edges from the phases of their views, which are all held at once.
+void read_some_edges(const ViewSource& source, std::span<const Link> links,
+                     std::span<NavigationEdge> edges, Executor& executor) {
+  std::set<ViewId> wanted;
+  for (const Link& link : links) wanted.insert({link.a, link.b});
+  const VisualMemory memory = source.load(std::vector<ViewId>(wanted.begin(), wanted.end()));
+  constexpr std::size_t links_per_chunk = 64;
+  executor.for_chunks(
+      links.size(), links_per_chunk, [&](std::size_t begin, std::size_t end, std::size_t) {
+        for (std::size_t i = begin; i < end; ++i) {
+          edges[i] = {links[i].a, links[i].b, 0.0, std::nullopt};
+          const auto reading = read_phases(homing_view(memory.signature(links[i].a)),
+                                           homing_view(memory.signature(links[i].b)));
+          if (!reading) continue;
+          edges[i].a_from_b = motion_of(*reading);
+          if (edges[i].a_from_b) edges[i].length = reading->length;
+        }
+      });
+}
+
+}  // namespace
+
+std::optional<Pose2> motion_of(const PhaseReading& reading) {
+  if (!reading.points) return Pose2{0.0, 0.0, reading.turn_rad};
+  if (reading.disagreement_rad > max_disagreement_rad) return std::nullopt;
+  const double from_b = reading.direction_b_rad + reading.turn_rad - std::numbers::pi;
+  const double direction =
+      reading.direction_a_rad + 0.5 * angle_difference(from_b, reading.direction_a_rad);
+  return Pose2{reading.length * std::cos(direction), reading.length * std::sin(direction),
+               wrap_angle(reading.turn_rad)};
+}
+
+void complete_lengths(std::vector<NavigationEdge>& edges) {
+  std::vector<double> lengths;
+  for (const NavigationEdge& edge : edges) {
+    if (edge.length > 0.0) lengths.push_back(edge.length);
+  }
+  const double typical = lengths.empty() ? 1.0 : upper_median(lengths);
+  for (NavigationEdge& edge : edges) {
+    const bool known = edge.a_from_b || edge.length > 0.0;
+    edge.length =
+        known ? std::max(edge.length, min_length_share * typical) : unknown_length_share * typical;
+  }
+}
+
+std::vector<NavigationEdge> read_edges(const ViewSource& source, std::span<const Link> links,
+                                       Executor& executor) {
+  std::vector<NavigationEdge> edges(links.size());
+  constexpr std::size_t links_at_once = 2048;
+  for (std::size_t first = 0; first < links.size(); first += links_at_once) {
+    const std::size_t count = std::min(links_at_once, links.size() - first);
+    read_some_edges(source, links.subspan(first, count), std::span(edges).subspan(first, count),
+                    executor);
+  }
+  return edges;
+}
+
+}  // namespace panonav

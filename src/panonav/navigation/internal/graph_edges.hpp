@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "panonav/core/executor.hpp"
+#include "panonav/memory/view_source.hpp"
+#include "panonav/navigation/navigation_graph.hpp"
+#include "panonav/relative_pose/view_pair.hpp"
+
+namespace panonav {
+
+/// Length of an edge of which nothing is known, over the median length.
+inline constexpr double unknown_length_share = 3.0;
+
+/// Two nodes of a graph or a map.
+struct NodePair {
+  std::size_t a = 0;
+  std::size_t b = 0;
+};
+
+/// Multiplies the displacement of a motion.
+inline void scale_displacement(Pose2& motion, double factor) {
+  motion.x_m *= factor;
+  motion.y_m *= factor;
+}
+
+/// Returns the length of a motion's displacement.
+[[nodiscard]] inline double length_of(const Pose2& motion) {
+  return std::hypot(motion.x_m, motion.y_m);
+}
+
+/// Returns the motion that two readings indicate: they are averaged, as each has its own error.
+/// Empty where they disagree.
+[[nodiscard]] std::optional<Pose2> motion_of(const PhaseReading& reading);
+
+/// Sets the length of edges of which neither length nor motion is known from that of the others,
+/// and raises those between pictures of one place to a least one.
+void complete_lengths(std::vector<NavigationEdge>& edges);
+
+/// Reads edges from the phases of their views; length 0 and no motion where nothing is read.
+[[nodiscard]] std::vector<NavigationEdge> read_edges(const ViewSource& source,
+                                                     std::span<const Link> links,
+                                                     Executor& executor);
+
+}  // namespace panonav
