@@ -185,17 +185,18 @@ MHD_Result put(Connection& one, HttpAnswer answer, std::string_view headers) {
 
 }  // namespace
 
-bool is_own_host(std::string_view host) {
-  const std::string name(host.substr(0, host.rfind(':')));
+bool is_own_page(const HttpRequest& request) {
+  const std::string name = request.host.substr(0, request.host.rfind(':'));
   in_addr ignored{};
-  return name == "localhost" || inet_pton(AF_INET, name.c_str(), &ignored) == 1;
+  return (name == "localhost" || inet_pton(AF_INET, name.c_str(), &ignored) == 1) &&
+         (request.origin.empty() || request.origin == "http://" + request.host);
 }
 
-bool same_secret(std::string_view given, std::string_view secret) {
-  if (given.size() != secret.size()) return false;
+bool is_same_secret(std::string_view sent, std::string_view secret) {
+  if (sent.size() != secret.size()) return false;
   unsigned differing = 0;
   for (std::size_t i = 0; i < secret.size(); ++i) {
-    differing |= static_cast<unsigned char>(given[i]) ^ static_cast<unsigned char>(secret[i]);
+    differing |= static_cast<unsigned char>(sent[i]) ^ static_cast<unsigned char>(secret[i]);
   }
   return differing == 0;
 }
