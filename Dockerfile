@@ -14,7 +14,7 @@ RUN SOURCE_DATE_EPOCH=$SOURCE_DATE_EPOCH tools/make_packages /packages
 FROM debian:bookworm-slim
 COPY --from=build /packages/panonav_*.deb /packages/libpanonav0_*.deb /packages/python3-panonav_*.deb /packages/
 RUN apt-get update && \
-    apt-get install -y --no-install-recommends /packages/*.deb gnuplot-nox ffmpeg && \
+    apt-get install -y --no-install-recommends /packages/*.deb ffmpeg && \
     rm -rf /var/lib/apt/lists/* /packages && \
     useradd --create-home --groups video robot
 USER robot

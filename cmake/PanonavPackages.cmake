@@ -81,7 +81,7 @@ panonav_package(documents doc "" "image-based memory for robot navigation (docum
 .
 This package holds the documents and programs to begin with.")
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_CONTROL_EXTRA "${PROJECT_SOURCE_DIR}/cmake/debian/triggers")
-set(CPACK_DEBIAN_COMMAND_PACKAGE_RECOMMENDS "gnuplot-nox | gnuplot, ffmpeg")  # plots; videos and streams
+set(CPACK_DEBIAN_COMMAND_PACKAGE_RECOMMENDS "ffmpeg")  # videos and streams, pictures as PNG
 set(CPACK_DEBIAN_DOCUMENTS_PACKAGE_ARCHITECTURE all)
 set(CPACK_DEBIAN_DOCUMENTS_PACKAGE_SHLIBDEPS OFF)
 if(TARGET panonav_python)

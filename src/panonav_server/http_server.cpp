@@ -1,9 +1,8 @@
 #include "panonav_server/http_server.hpp"
 
 #include <arpa/inet.h>
-#include <fcntl.h>
+#include <microhttpd.h>
 #include <netinet/in.h>
-#include <netinet/tcp.h>
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
@@ -12,18 +11,15 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <cerrno>
+#include <cctype>
 #include <charconv>
-#include <chrono>
 #include <csignal>
 #include <cstdint>
 #include <cstring>
 #include <exception>
 #include <list>
-#include <string_view>
 #include <thread>
 #include <utility>
-#include <vector>
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
@@ -33,191 +29,191 @@ namespace panonav::server {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
 
-constexpr std::size_t max_head = 8192;
+constexpr std::size_t max_head_bytes = 8192;
 constexpr std::size_t max_connections = 64;
-constexpr int send_buffer = 256 * 1024;
-constexpr auto patience = std::chrono::seconds(5);
-constexpr auto idle_patience = std::chrono::seconds(30);  // between two requests
+/// Of one connection, for the head and pieces of its answer: libmicrohttpd takes no more.
+constexpr std::size_t connection_bytes = 4 * max_head_bytes;
+/// Of the system, for a slow reader: what waits longer is old when it arrives.
+constexpr int send_buffer_bytes = 256 * 1024;
+constexpr unsigned request_timeout_s = 5;
+constexpr unsigned idle_timeout_s = 30;  ///< between two requests of a trusted client
+constexpr std::size_t min_body_bytes_per_s = 100'000;
+constexpr milliseconds tick_interval(400);
 
-/// A file descriptor that is closed with its owner.
-class Handle {
- public:
-  explicit Handle(int number = -1) : number_(number) {}
-  ~Handle() {
-    if (number_ >= 0) close(number_);
-  }
-  Handle(Handle&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
-  Handle& operator=(Handle&&) = delete;
-  [[nodiscard]] int number() const noexcept { return number_; }
-
- private:
-  int number_;
+enum class Stage {
+  idle,  ///< nothing has come of the next request
+  reading,
+  answering,
 };
-
-std::string_view trimmed(std::string_view text) {
-  const std::size_t from = text.find_first_not_of(" \t");
-  if (from == std::string_view::npos) return {};
-  return text.substr(from, text.find_last_not_of(" \t") - from + 1);
-}
-
-std::string_view reason_of(int status) {
-  switch (status) {
-    case 200:
-      return "OK";
-    case 204:
-      return "No Content";
-    case 400:
-      return "Bad Request";
-    case 401:
-      return "Unauthorized";
-    case 403:
-      return "Forbidden";
-    case 404:
-      return "Not Found";
-    case 405:
-      return "Method Not Allowed";
-    case 413:
-      return "Content Too Large";
-    case 422:
-      return "Unprocessable Content";
-    case 431:
-      return "Request Header Fields Too Large";
-    case 501:
-      return "Not Implemented";
-    case 503:
-      return "Service Unavailable";
-    default:
-      return "Internal Server Error";
-  }
-}
-
-/// The head of a request, up to the empty line that ends it.
-struct Head {
-  HttpRequest request;
-  std::size_t body_size = 0;
-  bool keep = true;       ///< the connection
-  bool expected = false;  ///< the client waits to be told that it may send the body
-};
-
-/// `status` says what is wrong where there is nothing to give.
-std::optional<Head> read_head(std::string_view text, std::size_t max_body, int& status) {
-  status = 400;
-  const auto next_line = [&text] {
-    const std::size_t end = text.find("\r\n");
-    const std::string_view line = text.substr(0, end);
-    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 2);
-    return line;
-  };
-  const std::string_view line = next_line();
-  const std::size_t first = line.find(' ');
-  const std::size_t last = line.rfind(' ');
-  if (first == std::string_view::npos || last <= first + 1) return std::nullopt;
-  const std::string_view version = line.substr(last + 1);
-  if (version != "HTTP/1.1" && version != "HTTP/1.0") return std::nullopt;
-  Head head;
-  head.request.method = line.substr(0, first);
-  const std::string_view target = line.substr(first + 1, last - first - 1);
-  head.request.path = target.substr(0, target.find('?'));
-  head.keep = version == "HTTP/1.1";
-  bool sized = false;
-  while (!text.empty()) {
-    const std::string_view field = next_line();
-    const std::size_t colon = field.find(':');
-    if (colon == 0 || colon == std::string_view::npos) return std::nullopt;
-    const std::string name = lower_case(field.substr(0, colon));
-    const std::string_view value = trimmed(field.substr(colon + 1));
-    if (name == "host" || name == "origin" || name == "authorization") {
-      std::string& kept = name == "host"     ? head.request.host
-                          : name == "origin" ? head.request.origin
-                                             : head.request.authorization;
-      if (!kept.empty() || value.empty()) return std::nullopt;
-      kept = value;
-    } else if (name == "content-length") {
-      const auto [end, error] =
-          std::from_chars(value.data(), value.data() + value.size(), head.body_size);
-      if (std::exchange(sized, true)) return std::nullopt;
-      if (error == std::errc::result_out_of_range || head.body_size > max_body) status = 413;
-      if (error != std::errc() || end != value.data() + value.size() || status == 413) {
-        return std::nullopt;
-      }
-    } else if (name == "transfer-encoding") {
-      status = 501;
-      return std::nullopt;
-    } else if (name == "connection" && lower_case(value) == "close") {
-      head.keep = false;
-    } else if (name == "expect" && lower_case(value) == "100-continue") {
-      head.expected = true;
-    }
-  }
-  if (head.request.host.empty()) return std::nullopt;
-  return head;
-}
 
 struct Connection {
-  explicit Connection(Handle handle) : socket(std::move(handle)) {}
-
-  Handle socket;
-  std::string in;            ///< not answered yet
-  std::optional<Head> head;  ///< of the request whose body is on its way
-  std::string out;
-  std::size_t sent = 0;  ///< of `out`
+  MHD_Connection* handle = nullptr;
+  int socket = -1;
+  Stage stage = Stage::idle;
+  Clock::time_point since = Clock::now();  ///< of the stage
+  bool trusted = false;                    ///< got an answer below 400
+  bool evicted = false;
+  bool suspended = false;  ///< waits for `more` or `later`
+  bool has_head = false;
+  HttpRequest request;
+  std::size_t body_bytes = 0;  ///< that were announced
   std::function<std::optional<std::string>()> more;
   std::function<std::optional<HttpAnswer>()> later;
-  bool trusted = false;  ///< got an answer below 400
-  bool closing = false;  ///< once all is sent
-  bool gone = false;
-  Clock::time_point since = Clock::now();  ///< the last byte that went out, or request that began
+  std::optional<HttpAnswer> answer;
+  std::string piece;     ///< of `more`
+  std::size_t sent = 0;  ///< of `piece`
 
-  [[nodiscard]] bool pending() const { return sent < out.size(); }
-  /// What is behind is read when this is answered.
-  [[nodiscard]] std::size_t wanted_bytes() const { return max_head + (head ? head->body_size : 0); }
-  [[nodiscard]] Clock::duration allowed() const {
-    if (!pending() && in.empty() && !head && trusted) return idle_patience;
-    return patience + std::chrono::seconds(head ? head->body_size / 100'000 : 0);
+  void enter(Stage next) {
+    stage = next;
+    since = Clock::now();
+  }
+  [[nodiscard]] bool is_late() const {
+    if (stage == Stage::answering) return false;  // libmicrohttpd sees who takes nothing
+    const bool is_pause = stage == Stage::idle && trusted;
+    return Clock::now() - since >
+           std::chrono::seconds(is_pause ? idle_timeout_s
+                                         : request_timeout_s + body_bytes / min_body_bytes_per_s);
+  }
+  /// libmicrohttpd closes the connection when it reads the end of it.
+  void evict() {
+    evicted = true;
+    resume();
+    shutdown(socket, SHUT_RDWR);
+  }
+  void suspend() {
+    suspended = true;
+    MHD_suspend_connection(handle);
+  }
+  void resume() {
+    if (std::exchange(suspended, false)) MHD_resume_connection(handle);
   }
 };
+
+/// Reads the fields of a head into a request. `status`: 0, or why it is refused.
+struct HeadReader {
+  Connection& to;
+  std::size_t max_body;
+  int status = 0;
+  bool has_length = false;
+
+  void read_field(const std::string& name, std::string_view value) {
+    if (name == "host") read_once(to.request.host, value);
+    if (name == "origin") read_once(to.request.origin, value);
+    if (name == "authorization") read_once(to.request.authorization, value);
+    if (name == "transfer-encoding") status = 501;
+    if (name == "content-length") read_length(value);
+  }
+
+ private:
+  void read_once(std::string& field, std::string_view value) {
+    if (!field.empty() || value.empty()) status = 400;
+    field = value;
+  }
+  void read_length(std::string_view value) {
+    const char* const end = value.data() + value.size();
+    const auto [read, error] = std::from_chars(value.data(), end, to.body_bytes);
+    if (std::exchange(has_length, true) || error == std::errc::invalid_argument || read != end) {
+      status = 400;
+    } else if (error != std::errc() || to.body_bytes > max_body) {
+      status = 413;
+    }
+  }
+};
+
+MHD_Result read_field(void* reader, MHD_ValueKind /*kind*/, const char* name, const char* value) {
+  static_cast<HeadReader*>(reader)->read_field(lower_case(name), value == nullptr ? "" : value);
+  return MHD_YES;
+}
+
+Connection& connection_of(MHD_Connection* handle) {
+  return *static_cast<Connection*>(
+      MHD_get_connection_info(handle, MHD_CONNECTION_INFO_SOCKET_CONTEXT)->socket_context);
+}
+
+/// Copies what comes next of an answer without an end into the buffer of libmicrohttpd.
+ssize_t read_more(void* connection, std::uint64_t /*position*/, char* buffer, std::size_t size) {
+  Connection& one = *static_cast<Connection*>(connection);
+  if (one.evicted) return MHD_CONTENT_READER_END_WITH_ERROR;
+  if (one.sent == one.piece.size()) {
+    auto text = one.more();
+    if (!text) return MHD_CONTENT_READER_END_OF_STREAM;
+    one.piece = std::move(*text);
+    one.sent = 0;
+    if (one.piece.empty()) {
+      one.suspend();
+      return 0;
+    }
+  }
+  const std::size_t count = one.piece.copy(buffer, size, one.sent);
+  one.sent += count;
+  return static_cast<ssize_t>(count);
+}
+
+/// Queues `answer` with `headers` (each ended by "\r\n") and takes its `more`.
+MHD_Result put(Connection& one, HttpAnswer answer, std::string_view headers) {
+  one.enter(Stage::answering);
+  const auto status = static_cast<unsigned>(answer.status);
+  if (status < 400) one.trusted = true;
+  if (answer.content.empty() && status >= 400) {
+    answer.content = std::string(MHD_get_reason_phrase_for(status)) + ".\n";
+  }
+  MHD_Response* response = nullptr;
+  if (answer.more) {
+    one.more = std::move(answer.more);
+    response = MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, send_buffer_bytes, &read_more,
+                                                 &one, nullptr);
+    MHD_set_response_options(response, MHD_RF_HTTP_1_0_COMPATIBLE_STRICT, MHD_RO_END);
+  } else {
+    response = MHD_create_response_from_buffer(answer.content.size(), answer.content.data(),
+                                               MHD_RESPMEM_MUST_COPY);
+  }
+  while (!headers.empty()) {
+    const std::size_t colon = headers.find(": ");
+    const std::size_t end = headers.find("\r\n");
+    MHD_add_response_header(response, std::string(headers.substr(0, colon)).c_str(),
+                            std::string(headers.substr(colon + 2, end - colon - 2)).c_str());
+    headers.remove_prefix(end + 2);
+  }
+  if (status != 204) MHD_add_response_header(response, "Content-Type", answer.type.c_str());
+  if (status >= 400) MHD_add_response_header(response, "Connection", "close");
+  const MHD_Result queued = MHD_queue_response(one.handle, status, response);
+  MHD_destroy_response(response);
+  return queued;
+}
 
 }  // namespace
 
-bool is_own_host(std::string_view host) {
-  const std::string name(host.substr(0, host.rfind(':')));
+bool is_own_page(const HttpRequest& request) {
+  const std::string name = request.host.substr(0, request.host.rfind(':'));
   in_addr ignored{};
-  return name == "localhost" || inet_pton(AF_INET, name.c_str(), &ignored) == 1;
+  return (name == "localhost" || inet_pton(AF_INET, name.c_str(), &ignored) == 1) &&
+         (request.origin.empty() || request.origin == "http://" + request.host);
 }
 
-bool same_secret(std::string_view given, std::string_view secret) {
-  if (given.size() != secret.size()) return false;
+bool is_same_secret(std::string_view sent, std::string_view secret) {
+  if (sent.size() != secret.size()) return false;
   unsigned differing = 0;
   for (std::size_t i = 0; i < secret.size(); ++i) {
-    differing |= static_cast<unsigned char>(given[i]) ^ static_cast<unsigned char>(secret[i]);
+    differing |= static_cast<unsigned char>(sent[i]) ^ static_cast<unsigned char>(secret[i]);
   }
   return differing == 0;
 }
 
+/// libmicrohttpd parses requests and sends answers on a thread of ours. It knows time-outs between
+/// two bytes alone, and lets nobody make room: late requests and the oldest strangers are evicted
+/// here.
 struct HttpServer::Implementation {
-  Implementation(const HttpServerOptions& wanted, Handler answer_to)
-      : options(wanted),
-        handler(std::move(answer_to)),
-        listener(socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0)),
-        wake(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
+  Implementation(const HttpServerOptions& server_options, Handler request_handler)
+      : options(server_options), handler(std::move(request_handler)) {
     require(options.port >= 0 && options.port <= 65535, "port", options.port, "0 .. 65535");
-    sockaddr_in place{};
-    place.sin_family = AF_INET;
-    place.sin_port = htons(static_cast<std::uint16_t>(options.port));
-    const int yes = 1;
-    // A port whose last connections are not forgotten yet may be taken again.
-    setsockopt(listener.number(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
-    socklen_t size = sizeof(place);
-    auto* const address = reinterpret_cast<sockaddr*>(&place);
-    if (wake.number() < 0 || inet_pton(AF_INET, options.address.c_str(), &place.sin_addr) != 1 ||
-        bind(listener.number(), address, size) != 0 || listen(listener.number(), SOMAXCONN) != 0 ||
-        getsockname(listener.number(), address, &size) != 0) {
+    start_daemon();
+    if (daemon == nullptr || wake < 0) {
       throw Error("cannot listen at " + options.address + ", port " + std::to_string(options.port) +
                   "; allowed: an IPv4 address of this machine, and a port that is free (0 finds " +
                   "one)");
     }
-    port = ntohs(place.sin_port);
     // Signals are for the threads that expect them.
     sigset_t all;
     sigset_t before;
@@ -231,228 +227,187 @@ struct HttpServer::Implementation {
     ended = true;
     poke();
     thread.join();
+    MHD_stop_daemon(daemon);
+    close(wake);
+  }
+
+  void start_daemon() {
+    sockaddr_in place{};
+    place.sin_family = AF_INET;
+    place.sin_port = htons(static_cast<std::uint16_t>(options.port));
+    if (inet_pton(AF_INET, options.address.c_str(), &place.sin_addr) != 1) return;
+    const auto keep_escaped = [](void*, MHD_Connection*, char* text) { return std::strlen(text); };
+    daemon = MHD_start_daemon(
+        MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_SUPPRESS_DATE_NO_CLOCK, 0, nullptr,
+        nullptr, &take, this, MHD_OPTION_SOCK_ADDR, reinterpret_cast<sockaddr*>(&place),
+        // Those that were evicted are there a moment longer.
+        MHD_OPTION_CONNECTION_LIMIT, static_cast<unsigned>(2 * max_connections),
+        MHD_OPTION_CONNECTION_TIMEOUT, request_timeout_s, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
+        connection_bytes, MHD_OPTION_NOTIFY_CONNECTION, &connect_or_close, this,
+        MHD_OPTION_NOTIFY_COMPLETED, &complete, nullptr, MHD_OPTION_UNESCAPE_CALLBACK,
+        static_cast<std::size_t (*)(void*, MHD_Connection*, char*)>(keep_escaped), nullptr,
+        MHD_OPTION_END);
   }
 
   void poke() const {
     const std::uint64_t one = 1;
-    [[maybe_unused]] const auto written = write(wake.number(), &one, sizeof(one));
+    [[maybe_unused]] const auto written = write(wake, &one, sizeof(one));
   }
 
   void serve() {
-    std::vector<pollfd> waiting;
-    Clock::time_point accept_from{};
-    while (!ended || has_last_answers()) {
-      const bool accepting = !ended && Clock::now() >= accept_from;
-      waiting.clear();
-      waiting.push_back({wake.number(), POLLIN, 0});
-      waiting.push_back({accepting ? listener.number() : -1, POLLIN, 0});
-      for (const Connection& connection : connections) {
-        const bool reading = connection.in.size() <= connection.wanted_bytes();
-        const int events = (reading ? POLLIN : 0) | (connection.pending() ? POLLOUT : 0);
-        waiting.push_back({connection.socket.number(), static_cast<short>(events), 0});
-      }
-      poll(waiting.data(), waiting.size(), accepting ? 500 : 50);
+    const int events = MHD_get_daemon_info(daemon, MHD_DAEMON_INFO_EPOLL_FD)->epoll_fd;
+    std::optional<Clock::time_point> last;  // when the last answers are to be sent
+    Clock::time_point ticked{};
+    while (!last || (Clock::now() < *last && has_last_answers())) {
+      std::array<pollfd, 2> waiting{pollfd{wake, POLLIN, 0}, pollfd{events, POLLIN, 0}};
+      MHD_UNSIGNED_LONG_LONG due_ms = 0;
+      const bool is_due = MHD_get_timeout(daemon, &due_ms) == MHD_YES && due_ms == 0;
+      poll(waiting.data(), waiting.size(), is_due ? 0 : last ? 50 : 500);
       std::uint64_t pokes = 0;
-      [[maybe_unused]] const auto read_some = read(wake.number(), &pokes, sizeof(pokes));
-      std::size_t i = 2;
-      for (Connection& connection : connections) {
-        const short events = waiting[i++].revents;
-        if ((events & POLLIN) != 0) receive(connection);
-        if ((events & (POLLERR | POLLNVAL | POLLHUP)) != 0) connection.gone = true;
-        answer_requests(connection);
-        send_pending(connection);
-        const bool waits = (connection.more || connection.later) && !connection.pending();
-        if (!waits && Clock::now() - connection.since > connection.allowed()) {
-          connection.gone = true;
-        }
+      const bool poked = read(wake, &pokes, sizeof(pokes)) > 0;
+      if (poked || Clock::now() - ticked > tick_interval) {
+        std::ranges::for_each(connections, &Implementation::tick);
+        ticked = Clock::now();
       }
-      std::erase_if(connections, [](const Connection& one) { return one.gone; });
-      if (waiting[1].revents != 0 && !accept_waiting()) {
-        accept_from = Clock::now() + std::chrono::milliseconds(50);
+      std::ranges::for_each(connections, &Implementation::look_at_first_byte);
+      MHD_run(daemon);
+      if (ended && !last) {
+        last = Clock::now() + options.last_answers;
+        close(MHD_quiesce_daemon(daemon));
       }
     }
-    connections.clear();
+    std::ranges::for_each(connections, &Connection::evict);
+    MHD_run(daemon);
   }
 
-  /// False where the system has no more descriptors.
-  bool accept_waiting() {
-    for (std::size_t i = 0; i < max_connections; ++i) {
-      Handle socket(accept4(listener.number(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
-      if (socket.number() < 0) return errno != EMFILE && errno != ENFILE && errno != ENOMEM;
-      if (connections.size() >= max_connections) {
-        const auto stranger = std::ranges::find(connections, false, &Connection::trusted);
-        if (stranger == connections.end()) continue;
-        connections.erase(stranger);
-      }
-      const int yes = 1;
-      setsockopt(socket.number(), IPPROTO_TCP, TCP_NODELAY, &yes, sizeof(yes));
-      // What waits in the system for a slow reader is old when it arrives.
-      setsockopt(socket.number(), SOL_SOCKET, SO_SNDBUF, &send_buffer, sizeof(send_buffer));
-      connections.emplace_back(std::move(socket));
+  /// Asks for what a connection waits for; evicts it where it is late, or its client has gone.
+  static void tick(Connection& one) {
+    if (one.evicted) return;
+    if (!one.suspended) {
+      if (one.is_late()) one.evict();
+      return;
     }
-    return true;
+    pollfd client{one.socket, POLLRDHUP, 0};
+    if (poll(&client, 1, 0) > 0) return one.evict();
+    if (one.later && !(one.answer = one.later())) return;
+    one.resume();
   }
 
-  static void receive(Connection& connection) {
-    std::array<char, 4096> bytes;
-    while (!connection.gone) {
-      const ssize_t count = recv(connection.socket.number(), bytes.data(), bytes.size(), 0);
-      if (count < 0) {
-        connection.gone = errno != EAGAIN && errno != EINTR;
-        return;
-      }
-      if (count == 0) {
-        connection.gone = true;
-        return;
-      }
-      if (connection.more || connection.closing) continue;  // nothing is to be said any more
-      if (connection.in.empty() && !connection.head) connection.since = Clock::now();
-      connection.in.append(bytes.data(), static_cast<std::size_t>(count));
-      if (connection.in.size() > connection.wanted_bytes()) return;
+  /// Starts the time of a request with its first byte. libmicrohttpd skips bytes that begin none;
+  /// here they are refused, such as a TLS handshake.
+  static void look_at_first_byte(Connection& one) {
+    char first = 0;
+    if (one.stage != Stage::idle || one.evicted ||
+        recv(one.socket, &first, 1, MSG_PEEK | MSG_DONTWAIT) != 1) {
+      return;
     }
+    one.enter(Stage::reading);
+    if (std::isalpha(static_cast<unsigned char>(first)) != 0 || first == '*') return;
+    constexpr std::string_view refusal = "HTTP/1.1 400 Bad Request\r\nConnection: close\r\n\r\n";
+    send(one.socket, refusal.data(), refusal.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+    one.evict();
   }
 
-  void answer_requests(Connection& connection) {
-    if (connection.later && !connection.gone) {
-      if (auto answer = connection.later()) {
-        connection.later = nullptr;
-        put(connection, std::move(*answer));
-        send_pending(connection);
-      }
-    }
-    while (!connection.gone && !connection.closing && !connection.more && !connection.later &&
-           !connection.pending()) {
-      if (!connection.head && !take_head(connection)) return;
-      Head& head = *connection.head;
-      if (connection.in.size() < head.body_size) {
-        if (std::exchange(head.expected, false)) {
-          connection.out = "HTTP/1.1 100 Continue\r\n\r\n";
-          connection.sent = 0;
-          send_pending(connection);
-        }
-        return;
-      }
-      // What came so far of the next request is short, this one's body may be a picture.
-      std::string behind = connection.in.substr(head.body_size);
-      connection.in.resize(head.body_size);
-      head.request.body = std::exchange(connection.in, std::move(behind));
-      connection.closing = !head.keep;
-      HttpAnswer answer;
-      try {
-        answer = handler(std::move(head.request));
-      } catch (const std::exception&) {
-        answer = {.status = 500};
-      }
-      connection.head.reset();
-      if (answer.later) {
-        connection.later = std::move(answer.later);
-        return answer_requests(connection);  // it may be there already
-      }
-      put(connection, std::move(answer));
-      send_pending(connection);
-    }
+  /// True while answers with an end are on their way.
+  bool has_last_answers() const {
+    return std::ranges::any_of(connections, [](const Connection& one) {
+      return !one.evicted && one.stage == Stage::answering && !one.more;
+    });
   }
 
-  /// False where it has not come yet, and where the request is refused.
-  bool take_head(Connection& connection) {
-    const std::size_t end = connection.in.find("\r\n\r\n");
-    if (std::min(end, connection.in.size()) > max_head) {
-      refuse(connection, 431);
-      return false;
+  static void connect_or_close(void* self, MHD_Connection* handle, void** context,
+                               MHD_ConnectionNotificationCode code) {
+    auto& connections = static_cast<Implementation*>(self)->connections;
+    if (code == MHD_CONNECTION_NOTIFY_CLOSED) {
+      connections.remove_if([&](const Connection& one) { return &one == *context; });
+      return;
     }
-    if (end == std::string::npos) return false;
-    int status = 0;
-    auto head = read_head(std::string_view(connection.in).substr(0, end), options.max_body, status);
-    if (!head) {
-      refuse(connection, status);
-      return false;
-    }
-    std::size_t bodies = head->body_size;
-    for (const Connection& other : connections) bodies += other.head ? other.head->body_size : 0;
-    if (bodies > std::max(options.max_bodies, options.max_body)) {
-      refuse(connection, 503);
-      return false;
-    }
-    connection.in.erase(0, end + 4);
-    connection.head = std::move(head);
-    return true;
+    const auto staying = std::ranges::count(connections, false, &Connection::evicted);
+    Connection& one = connections.emplace_back();
+    *context = &one;
+    one.handle = handle;
+    one.socket = MHD_get_connection_info(handle, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd;
+    setsockopt(one.socket, SOL_SOCKET, SO_SNDBUF, &send_buffer_bytes, sizeof(send_buffer_bytes));
+    if (static_cast<std::size_t>(staying) < max_connections) return;
+    std::ranges::find_if(connections, [](const Connection& other) {
+      return !other.trusted && !other.evicted;
+    })->evict();  // the new one where there is no other
   }
 
-  /// Whether answers are on their way for whom the end may wait.
-  bool has_last_answers() {
-    if (!last) last = Clock::now() + options.last_answers;
-    return Clock::now() < *last && std::ranges::any_of(connections, [](const Connection& one) {
-             return one.later || (one.pending() && !one.more);
-           });
+  static void complete(void* /*self*/, MHD_Connection* handle, void** /*request*/,
+                       MHD_RequestTerminationCode /*why*/) {
+    Connection& one = connection_of(handle);
+    one.more = nullptr;
+    one.later = nullptr;
+    one.answer.reset();
+    one.has_head = false;
+    one.body_bytes = 0;
+    one.enter(Stage::idle);
+    MHD_set_connection_option(handle, MHD_CONNECTION_OPTION_TIMEOUT, idle_timeout_s);
   }
 
-  void refuse(Connection& connection, int status) const {
-    connection.closing = true;
-    put(connection, {.status = status});
+  /// Is called with the head, with each piece of the body, at its end, and again when a connection
+  /// that was suspended goes on.
+  static MHD_Result take(void* self, MHD_Connection* handle, const char* path, const char* method,
+                         const char* /*version*/, const char* data, std::size_t* size,
+                         void** /*request*/) {
+    auto& server = *static_cast<Implementation*>(self);
+    Connection& one = connection_of(handle);
+    if (one.evicted) return MHD_NO;
+    if (!one.has_head) return server.take_head(one, path, method);
+    if (*size > 0) {
+      one.request.body.append(data, std::exchange(*size, 0));
+      return MHD_YES;
+    }
+    if (!one.answer) server.answer_request(one);
+    if (one.later && !one.answer) one.answer = one.later();
+    if (one.answer)
+      return put(one, *std::exchange(one.answer, std::nullopt), server.options.headers);
+    one.suspend();
+    return MHD_YES;
   }
 
-  void put(Connection& connection, HttpAnswer answer) const {
-    connection.since = Clock::now();
-    if (answer.status < 400) {
-      connection.trusted = true;
-    } else {
-      connection.closing = true;
+  MHD_Result take_head(Connection& one, const char* path, const char* method) {
+    one.has_head = true;
+    one.request = {.method = method, .path = path};
+    if (one.stage == Stage::idle) one.enter(Stage::reading);
+    MHD_set_connection_option(one.handle, MHD_CONNECTION_OPTION_TIMEOUT, request_timeout_s);
+    HeadReader head{.to = one, .max_body = options.max_body};
+    MHD_get_connection_values(one.handle, MHD_HEADER_KIND, &read_field, &head);
+    if (head.status == 0 && one.request.host.empty()) head.status = 400;
+    const auto* const size =
+        MHD_get_connection_info(one.handle, MHD_CONNECTION_INFO_REQUEST_HEADER_SIZE);
+    if (size->header_size > max_head_bytes) head.status = 431;
+    std::size_t bodies = 0;
+    for (const Connection& other : connections) bodies += other.body_bytes;
+    if (head.status == 0 && bodies > std::max(options.max_bodies, options.max_body)) {
+      head.status = 503;
     }
-    if (answer.content.empty() && answer.status >= 400) {
-      answer.content = std::string(reason_of(answer.status)) + ".\n";
-    }
-    connection.more = std::move(answer.more);
-    connection.out = "HTTP/1.1 " + std::to_string(answer.status) + " " +
-                     std::string(reason_of(answer.status)) + "\r\n" + options.headers;
-    if (answer.status != 204) connection.out += "Content-Type: " + answer.type + "\r\n";
-    if (!connection.more && answer.status != 204) {
-      connection.out += "Content-Length: " + std::to_string(answer.content.size()) + "\r\n";
-    }
-    if (connection.more || connection.closing) connection.out += "Connection: close\r\n";
-    connection.out += "\r\n" + answer.content;
-    connection.sent = 0;
+    if (head.status == 0) return MHD_YES;
+    one.body_bytes = 0;
+    return put(one, {.status = head.status}, options.headers);
   }
 
-  static void send_pending(Connection& connection) {
-    while (!connection.gone) {
-      if (!connection.pending()) {
-        connection.out.clear();
-        connection.sent = 0;
-        if (connection.more) {
-          auto text = connection.more();
-          if (text) {
-            connection.out = std::move(*text);
-            connection.since = Clock::now();
-          } else {
-            connection.more = nullptr;
-            connection.closing = true;
-          }
-        }
-        if (!connection.pending()) {
-          if (connection.closing && !connection.later) connection.gone = true;
-          return;
-        }
-      }
-      const ssize_t count =
-          send(connection.socket.number(), connection.out.data() + connection.sent,
-               connection.out.size() - connection.sent, MSG_NOSIGNAL);
-      if (count < 0) {
-        connection.gone = errno != EAGAIN && errno != EINTR;
-        return;
-      }
-      connection.sent += static_cast<std::size_t>(count);
-      connection.since = Clock::now();
+  /// Sets `answer` or `later`.
+  void answer_request(Connection& one) {
+    if (one.later) return;
+    one.enter(Stage::answering);
+    one.body_bytes = 0;
+    try {
+      one.answer = handler(std::move(one.request));
+    } catch (const std::exception&) {
+      one.answer = HttpAnswer{.status = 500};
     }
+    one.later = std::move(one.answer->later);
+    if (one.later) one.answer.reset();
   }
 
   const HttpServerOptions options;
   const Handler handler;
-  const Handle listener;
-  const Handle wake;
-  int port = 0;
+  const int wake = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
+  MHD_Daemon* daemon = nullptr;
   std::list<Connection> connections;  // of the thread; the oldest first
   std::atomic<bool> ended = false;
-  std::optional<Clock::time_point> last;  // of the thread
   std::thread thread;
 };
 
@@ -462,7 +417,7 @@ HttpServer::HttpServer(const HttpServerOptions& options, Handler handler)
 HttpServer::~HttpServer() = default;
 
 int HttpServer::port() const {
-  return implementation_->port;
+  return MHD_get_daemon_info(implementation_->daemon, MHD_DAEMON_INFO_BIND_PORT)->port;
 }
 
 void HttpServer::poke() {

@@ -45,18 +45,19 @@ struct HttpServerOptions {
   std::chrono::milliseconds last_answers{0};
 };
 
-/// Whether a request went to a number or to "localhost": then no name server of somebody else's can
-/// have led a browser here. `host`: with or without a port.
-[[nodiscard]] bool is_own_host(std::string_view host);
+/// True if a request went to a number or to "localhost", and no page of another origin made it:
+/// then no name server of somebody else's can have led a browser here.
+[[nodiscard]] bool is_own_page(const HttpRequest& request);
 
-/// Whether the two are equal; takes the same time wherever they differ.
-[[nodiscard]] bool same_secret(std::string_view given, std::string_view secret);
+/// True if the two are equal; takes the same time wherever they differ.
+[[nodiscard]] bool is_same_secret(std::string_view sent, std::string_view secret);
 
-/// A small HTTP/1.1 server for a handful of viewers and any number of strangers: one thread, and
-/// whatever is sent to it, bounded memory. A request has at most 8 kB of head; 5 s after its first
-/// byte, and a further second for each 100 kB of its body, it is whole, or its connection is
-/// closed, and so is one that takes nothing for 5 s. There are at most 64 connections: a further
-/// one replaces the oldest that never got an answer below 400, or is closed where there is none.
+/// A small HTTP/1.1 server (libmicrohttpd) for a handful of viewers and any number of strangers:
+/// one thread, and whatever is sent to it, bounded memory. A request has at most 8 kB of head; 5 s
+/// after its first byte, and a further second for each 100 kB of its body, it is whole, or its
+/// connection is closed, and so is one that takes nothing for 5 s. There are at most 64
+/// connections: a further one replaces the oldest that never got an answer below 400, or is closed
+/// where there is none.
 class HttpServer {
  public:
   /// Called on the server's thread, and may keep the request; what it throws becomes status 500.

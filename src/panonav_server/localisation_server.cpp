@@ -1,20 +1,17 @@
 #include "panonav_server/localisation_server.hpp"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <charconv>
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
-#include <fstream>
 #include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 #include <string_view>
-#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -22,12 +19,9 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/io/image_file.hpp"
-#include "panonav/pipeline/place_recogniser.hpp"
-#include "panonav/storage/memory_address.hpp"
-#include "panonav/storage/memory_file.hpp"
-#include "panonav_fleet/memory_changes.hpp"
-#include "panonav_fleet/searched_recogniser.hpp"
 #include "panonav_server/http_server.hpp"
+#include "panonav_server/loaded_memory.hpp"
+#include "panonav_server/metrics.hpp"
 #include "panonav_server/place_json.hpp"
 
 namespace panonav::server {
@@ -38,7 +32,7 @@ using Clock = std::chrono::steady_clock;
 using nlohmann::ordered_json;
 
 constexpr std::size_t max_picture_bytes = std::size_t{16} << 20U;
-constexpr std::size_t max_bytes_on_the_way = std::size_t{64} << 20U;
+constexpr std::size_t max_in_flight_bytes = std::size_t{64} << 20U;
 constexpr std::size_t max_waiting_bytes = std::size_t{128} << 20U;
 constexpr ImageLimits picture_limits{
     .side_px = 16384, .area_px = 33'554'432, .scanned_px = std::int64_t{16} * 33'554'432};
@@ -77,128 +71,6 @@ HttpAnswer json_answer(const ordered_json& document, int status = 200) {
 
 HttpAnswer refusal(int status, std::string_view why) {
   return json_answer({{"error", readable_line(std::string(why))}}, status);
-}
-
-/// A file as it was last written; of an SQLite file also what its log holds.
-using FileState = std::array<std::pair<std::filesystem::file_time_type, std::uintmax_t>, 2>;
-
-FileState state_of(const std::filesystem::path& path) {
-  FileState state;
-  const std::array files{path, std::filesystem::path(path.native() + "-wal")};
-  for (std::size_t i = 0; i < files.size(); ++i) {
-    std::error_code missing;
-    const auto size = std::filesystem::file_size(files[i], missing);
-    if (missing || size == 0) continue;  // who opens a file makes it an empty log
-    const auto written = std::filesystem::last_write_time(files[i], missing);
-    if (!missing) state[i] = {written, size};
-  }
-  return state;
-}
-
-/// Tells when a memory is another one than it was.
-class MemoryWatch {
- public:
-  /// From now on.
-  explicit MemoryWatch(std::filesystem::path memory)
-      : memory_(std::move(memory)), state_(state_of(memory_)) {
-    if (is_server_address(memory_)) changes_.emplace(memory_);
-  }
-  /// Since this was asked last. A server that cannot be asked may have changed it once it is back.
-  [[nodiscard]] bool changed() {
-    if (!is_server_address(memory_)) {
-      const FileState before = std::exchange(state_, state_of(memory_));
-      return state_ != before;
-    }
-    try {
-      bool changed = !changes_;
-      if (!changes_) changes_.emplace(memory_);
-      while (changes_->wait(std::chrono::milliseconds(0))) changed = true;
-      return changed;
-    } catch (const FileError&) {
-      changes_.reset();
-      return false;
-    }
-  }
-
- private:
-  std::filesystem::path memory_;
-  FileState state_;
-  std::optional<fleet::MemoryChanges> changes_;
-};
-
-/// A memory as it was read: held, or searched where it lies.
-struct LoadedMemory {
-  LoadedMemory(const std::filesystem::path& path_, const LocalisationServerOptions& options)
-      : path(path_), file(MemoryFile::open(path, Access::read_only)) {
-    if (is_server_address(path) && file.views().size() > options.max_held_views) {
-      searched.emplace(path, PlaceRecogniserOptions{.localiser = options.localiser});
-    } else {
-      held.emplace(file, PlaceRecogniserOptions{.localiser = options.localiser});
-    }
-  }
-  [[nodiscard]] std::size_t size() const { return held ? held->memory().size() : searched->size(); }
-  [[nodiscard]] Place localise(const Observation& seen) const {
-    return held ? held->localise(seen) : searched->localise(seen);
-  }
-  /// A file that is open, also after its server was away.
-  [[nodiscard]] std::optional<std::vector<std::uint8_t>> thumbnail(const std::string& view) {
-    const auto read = [&]() -> std::optional<std::vector<std::uint8_t>> {
-      const auto id = view.empty() ? std::nullopt : file.find(view);
-      return id ? file.thumbnail(*id) : std::nullopt;
-    };
-    try {
-      return read();
-    } catch (const FileError&) {
-      if (!searched) throw;
-    }
-    file = MemoryFile::open(path, Access::read_only);
-    return read();
-  }
-  std::filesystem::path path;
-  MemoryFile file;  // of the thread that speaks HTTP, once it is there
-  std::optional<PlaceRecogniser> held;
-  std::optional<fleet::SearchedRecogniser> searched;
-};
-
-/// Counts how long something took, as Prometheus wants it.
-class Histogram {
- public:
-  void add(Clock::duration taken) {
-    const double taken_s = std::chrono::duration<double>(taken).count();
-    ++counts_[static_cast<std::size_t>(std::ranges::lower_bound(bounds_s, taken_s) -
-                                       bounds_s.begin())];
-    sum_s_ += taken_s;
-  }
-  [[nodiscard]] std::string text(const std::string& name) const {
-    std::string lines;
-    std::uint64_t below = 0;
-    for (std::size_t i = 0; i < counts_.size(); ++i) {
-      below += counts_[i];
-      lines += name + "_bucket{le=\"" + (i < bounds_s.size() ? to_text(bounds_s[i]) : "+Inf") +
-               "\"} " + std::to_string(below) + "\n";
-    }
-    return lines + name + "_sum " + to_text(sum_s_) + "\n" + name + "_count " +
-           std::to_string(below) + "\n";
-  }
-
- private:
-  static constexpr std::array bounds_s{0.001, 0.002, 0.005, 0.01, 0.02, 0.05,
-                                       0.1,   0.2,   0.5,   1.0,  2.0,  5.0};
-  std::array<std::uint64_t, bounds_s.size() + 1> counts_{};
-  double sum_s_ = 0.0;
-};
-
-std::string described(const std::string& name, const std::string& type, const std::string& help) {
-  return "# HELP " + name + " " + help + "\n# TYPE " + name + " " + type + "\n";
-}
-
-/// Bytes of memory that the process holds; 0 where the system does not tell.
-std::uint64_t resident_bytes() {
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);) {
-    if (line.starts_with("VmRSS:")) return std::stoull(line.substr(6)) * 1024;
-  }
-  return 0;
 }
 
 }  // namespace
@@ -248,7 +120,7 @@ struct LocalisationServer::Implementation {
                                      .headers = "X-Content-Type-Options: nosniff\r\n"
                                                 "Cache-Control: no-store\r\n",
                                      .max_body = max_picture_bytes,
-                                     .max_bodies = max_bytes_on_the_way,
+                                     .max_bodies = max_in_flight_bytes,
                                      .last_answers = std::chrono::seconds(5)},
                    [this](HttpRequest request) { return answer(std::move(request)); });
     for (int i = 0; i < (options.threads == 0 ? cores : options.threads); ++i) {
@@ -272,12 +144,12 @@ struct LocalisationServer::Implementation {
   // ---- on the thread that speaks HTTP
 
   HttpAnswer answer(HttpRequest request) {
-    HttpAnswer given = answer_to(std::move(request));
-    if (given.status >= 400) {
+    HttpAnswer result = answer_to(std::move(request));
+    if (result.status >= 400) {
       const std::lock_guard lock(mutex);
-      ++refused[given.status];
+      ++refused[result.status];
     }
-    return given;
+    return result;
   }
 
   HttpAnswer answer_to(HttpRequest request) {
@@ -291,11 +163,10 @@ struct LocalisationServer::Implementation {
     if (!options.token.empty()) {
       constexpr std::string_view bearer = "Bearer ";
       const std::string_view sent = request.authorization;
-      if (!sent.starts_with(bearer) || !same_secret(sent.substr(bearer.size()), options.token)) {
+      if (!sent.starts_with(bearer) || !is_same_secret(sent.substr(bearer.size()), options.token)) {
         return refusal(401, "the token of this server is missing: Authorization: Bearer TOKEN");
       }
-    } else if (!is_own_host(request.host) ||
-               !(request.origin.empty() || request.origin == "http://" + request.host)) {
+    } else if (!is_own_page(request)) {
       return refusal(403,
                      "without a token this server answers programs that call it by its number or "
                      "as localhost");
@@ -397,40 +268,42 @@ struct LocalisationServer::Implementation {
 
   HttpAnswer metrics() const {
     const std::lock_guard lock(mutex);
-    std::string text = described("panonav_localisations_total", "counter",
-                                 "Pictures that were answered, by memory and answer.");
+    std::string text = describe_metric("panonav_localisations_total", "counter",
+                                       "Pictures that were answered, by memory and answer.");
     for (const auto& [name, one] : served) {
       const std::string memory = "panonav_localisations_total{memory=\"" + name + "\",answer=\"";
       text += memory + "known\"} " + std::to_string(one.known) + "\n";
       text += memory + "unknown\"} " + std::to_string(one.unknown) + "\n";
     }
-    text += described("panonav_refused_total", "counter", "Requests that got an error, by status.");
+    text += describe_metric("panonav_refused_total", "counter",
+                            "Requests that got an error, by status.");
     for (const auto& [status, times] : refused) {
       text += "panonav_refused_total{status=\"" + std::to_string(status) + "\"} " +
               std::to_string(times) + "\n";
     }
-    text += described("panonav_localisation_seconds", "histogram",
-                      "Time in which a picture was decoded and answered.") +
+    text += describe_metric("panonav_localisation_seconds", "histogram",
+                            "Time in which a picture was decoded and answered.") +
             answering.text("panonav_localisation_seconds");
-    text += described("panonav_waiting_seconds", "histogram",
-                      "Time for which a picture waited for a thread.") +
+    text += describe_metric("panonav_waiting_seconds", "histogram",
+                            "Time for which a picture waited for a thread.") +
             queueing.text("panonav_waiting_seconds");
-    text += described("panonav_waiting", "gauge", "Pictures that wait for a thread.") +
+    text += describe_metric("panonav_waiting", "gauge", "Pictures that wait for a thread.") +
             "panonav_waiting " + std::to_string(waiting.size()) + "\n";
-    text += described("panonav_memory_views", "gauge", "Views of a memory.");
+    text += describe_metric("panonav_memory_views", "gauge", "Views of a memory.");
     for (const auto& [name, one] : served) {
       text += "panonav_memory_views{memory=\"" + name + "\"} " +
               std::to_string(one.loaded->size()) + "\n";
     }
     text += search_metrics();
-    text += described("panonav_memory_reloads_total", "counter",
-                      "Times that a changed memory file was read again, by result.");
+    text += describe_metric("panonav_memory_reloads_total", "counter",
+                            "Times that a changed memory file was read again, by result.");
     for (const auto& [name, one] : served) {
       const std::string memory = "panonav_memory_reloads_total{memory=\"" + name + "\",result=\"";
       text += memory + "done\"} " + std::to_string(one.reloads) + "\n";
       text += memory + "failed\"} " + std::to_string(one.failed_reloads) + "\n";
     }
-    text += described("process_resident_memory_bytes", "gauge", "Memory that the process holds.") +
+    text += describe_metric("process_resident_memory_bytes", "gauge",
+                            "Memory that the process holds.") +
             "process_resident_memory_bytes " + std::to_string(resident_bytes()) + "\n";
     return {.type = "text/plain; version=0.0.4; charset=utf-8", .content = std::move(text)};
   }
@@ -444,7 +317,7 @@ struct LocalisationServer::Implementation {
         if (!one.loaded->searched) continue;
         lines += name + "{memory=\"" + memory + "\"} " + value(*one.loaded->searched) + "\n";
       }
-      return lines.empty() ? lines : described(name, type, help) + lines;
+      return lines.empty() ? lines : describe_metric(name, type, help) + lines;
     };
     return of_each("panonav_sketch_bytes", "gauge", "Bytes of sketches of a memory.",
                    [](const fleet::SearchedRecogniser& of) { return std::to_string(of.bytes()); }) +
@@ -535,7 +408,7 @@ struct LocalisationServer::Implementation {
           lock.lock();
           continue;
         }
-        const bool same = !one.watch->changed();
+        const bool same = !one.watch->has_changed();
         if (!same) {
           try {
             again = std::make_shared<LoadedMemory>(one.memory.path, options);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "panonav_recordings/run_recorder.hpp"
+#include "panonav_viewer/data_url.hpp"
 #include "panonav_viewer/moment_json.hpp"
 #include "panonav_viewer/picture_plot.hpp"
 
@@ -71,7 +72,5 @@ class RunPage {
 [[nodiscard]] std::string html_escaped(std::string_view text);
 /// JSON within a script element.
 [[nodiscard]] std::string data_element(std::string_view json);
-/// "data:image/png;base64,...": a picture within a page. `type`: "image/png".
-[[nodiscard]] std::string data_url(std::string_view type, std::span<const std::uint8_t> bytes);
 
 }  // namespace panonav::viewer

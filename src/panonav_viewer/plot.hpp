@@ -98,10 +98,10 @@ struct MapPlot {
   std::optional<std::pair<Point2, Point2>> shown = {};
 };
 
-/// Writes a PNG (or, for a path ending in .svg, an SVG) through the external program gnuplot; the
-/// file appears whole or not at all. Throws Error when gnuplot is not installed, FileError when the
-/// file cannot be written, ContractError on series whose x and y differ in size. What holds no
-/// point does not appear in the legend.
+/// Writes an SVG or, for a path that does not end in .svg, a PNG, which the program ffmpeg makes of
+/// the SVG; the file appears whole or not at all. Throws FileError when it cannot be written, Error
+/// when it is a PNG and ffmpeg is not installed, ContractError on series whose x and y differ in
+/// size. What holds no point does not appear in the legend.
 void write_plot(const std::filesystem::path& path, const LinePlot& plot);
 void write_plot(const std::filesystem::path& path, const HeatMap& plot);
 void write_plot(const std::filesystem::path& path, const MapPlot& plot);

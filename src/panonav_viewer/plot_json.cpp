@@ -8,9 +8,8 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
-#include "panonav/core/image.hpp"
 #include "panonav/io/image_file.hpp"
-#include "panonav_viewer/page.hpp"
+#include "panonav_viewer/data_url.hpp"
 
 namespace panonav::viewer {
 
@@ -143,23 +142,7 @@ std::string plot_json(std::string_view title, const std::vector<MapPlot>& frames
 }
 
 std::string plot_json(const PicturePlot& plot) {
-  const auto columns = static_cast<std::size_t>(plot.columns);
-  require(plot.values.size() == columns * static_cast<std::size_t>(plot.rows),
-          "values of a picture plot", static_cast<double>(plot.values.size()), "columns * rows");
-  Image image(plot.columns, plot.rows, 3);
-  for (int row = 0; row < plot.rows; ++row) {
-    for (int column = 0; column < plot.columns; ++column) {
-      const float value =
-          plot.values[static_cast<std::size_t>(row) * columns + static_cast<std::size_t>(column)];
-      const bool known = !std::isnan(value);
-      const auto grey = static_cast<std::uint8_t>(
-          known ? std::lround(255.0F * std::clamp(value, 0.0F, 1.0F)) : 0);
-      const int at = plot.rows - 1 - row;  // the lowest row comes first
-      image.at(column, at, 0) = known ? grey : 170;
-      image.at(column, at, 1) = known ? grey : 214;
-      image.at(column, at, 2) = known ? grey : 240;
-    }
-  }
+  const Image image = paint_pixels(plot);
   Json json{
       {"title", plot.title},           {"x_label", plot.x_label},
       {"y_label", plot.y_label},       {"x_range", pair(plot.x_range)},

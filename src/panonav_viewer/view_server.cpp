@@ -145,9 +145,8 @@ struct ViewServer::Implementation {
   [[nodiscard]] server::HttpAnswer answer(const server::HttpRequest& request) {
     const auto only = [](int status) { return server::HttpAnswer{.status = status}; };
     if (!request.path.starts_with('/') ||
-        !server::same_secret(std::string_view(request.path).substr(1, token.size()), token) ||
-        !server::is_own_host(request.host) ||
-        !(request.origin.empty() || request.origin == "http://" + request.host)) {
+        !server::is_same_secret(std::string_view(request.path).substr(1, token.size()), token) ||
+        !server::is_own_page(request)) {
       return only(404);
     }
     const std::string_view asked = std::string_view(request.path).substr(1 + token.size());

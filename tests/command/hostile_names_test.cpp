@@ -1,5 +1,5 @@
 // Names of pictures and folders come from strangers: they are shown as they are and mean nothing
-// to gnuplot, to HTML or to a script.
+// to SVG, to HTML or to a script.
 #include <gtest/gtest.h>
 
 #include <filesystem>

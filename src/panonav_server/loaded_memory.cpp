@@ -1,0 +1,69 @@
+#include "panonav_server/loaded_memory.hpp"
+
+#include <chrono>
+#include <system_error>
+
+#include "panonav/core/error.hpp"
+#include "panonav/storage/memory_address.hpp"
+
+namespace panonav::server {
+
+MemoryWatch::MemoryWatch(std::filesystem::path memory)
+    : memory_(std::move(memory)), state_(read_state(memory_)) {
+  if (is_server_address(memory_)) changes_.emplace(memory_);
+}
+
+MemoryWatch::FileState MemoryWatch::read_state(const std::filesystem::path& path) {
+  FileState state;
+  const std::array files{path, std::filesystem::path(path.native() + "-wal")};
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    std::error_code missing;
+    const auto size = std::filesystem::file_size(files[i], missing);
+    if (missing || size == 0) continue;  // who opens a file makes it an empty log
+    const auto written = std::filesystem::last_write_time(files[i], missing);
+    if (!missing) state[i] = {written, size};
+  }
+  return state;
+}
+
+bool MemoryWatch::has_changed() {
+  if (!is_server_address(memory_)) {
+    const FileState before = std::exchange(state_, read_state(memory_));
+    return state_ != before;
+  }
+  try {
+    bool changed = !changes_;
+    if (!changes_) changes_.emplace(memory_);
+    while (changes_->wait(std::chrono::milliseconds(0))) changed = true;
+    return changed;
+  } catch (const FileError&) {
+    changes_.reset();
+    return false;
+  }
+}
+
+LoadedMemory::LoadedMemory(const std::filesystem::path& memory,
+                           const LocalisationServerOptions& options)
+    : path(memory), file(MemoryFile::open(path, Access::read_only)) {
+  if (is_server_address(path) && file.views().size() > options.max_held_views) {
+    searched.emplace(path, PlaceRecogniserOptions{.localiser = options.localiser});
+  } else {
+    held.emplace(file, PlaceRecogniserOptions{.localiser = options.localiser});
+  }
+}
+
+std::optional<std::vector<std::uint8_t>> LoadedMemory::thumbnail(const std::string& view) {
+  const auto read = [&]() -> std::optional<std::vector<std::uint8_t>> {
+    const auto id = view.empty() ? std::nullopt : file.find(view);
+    return id ? file.thumbnail(*id) : std::nullopt;
+  };
+  try {
+    return read();
+  } catch (const FileError&) {
+    if (!searched) throw;
+  }
+  file = MemoryFile::open(path, Access::read_only);
+  return read();
+}
+
+}  // namespace panonav::server
