@@ -235,10 +235,10 @@ std::vector<WholeServerView> ServerExchange::whole(std::span<const ViewId> ids) 
   RecordBytes scratch;
   connection().stream(
       std::string(server_view_fields) +
-          ", v.signature, t.bytes, t.checksum, f.bytes, f.checksum FROM panonav.views v LEFT JOIN "
-          "panonav.thumbnails t ON t.memory = v.memory AND t.view = v.id LEFT JOIN panonav.features "
-          "f ON f.memory = v.memory AND f.view = v.id WHERE v.memory = $1 AND v.id = ANY($2) ORDER "
-          "BY v.id",
+          ", v.signature, t.bytes, t.checksum, f.bytes, f.checksum FROM panonav.views v "
+          "LEFT JOIN panonav.thumbnails t ON t.memory = v.memory AND t.view = v.id "
+          "LEFT JOIN panonav.features f ON f.memory = v.memory AND f.view = v.id "
+          "WHERE v.memory = $1 AND v.id = ANY($2) ORDER BY v.id",
       values().add(Numbers(numbers)), [&](const PostgresqlRows& rows) {
         ServerView found = view_in(rows, 0);
         const auto signature = rows.bytes(0, 7);
