@@ -70,8 +70,8 @@ void visit_options(RouteContourOptions& options, OptionVisitor& visitor) {
       option<&T::pull>("w_pull", 0, 1000),
       option<&T::constant>("w_const", 0, 1000),
       option<&T::smoothing_deg>("of the lines before they are differentiated", 0, 45),
-      option<&T::max_points>("control points", 8, 10000).formerly("most_points"),
-      option<&T::max_iterations>("until the contours stop", 1, 100000).formerly("most_iterations"),
+      option<&T::max_points>("control points", 8, 10000),
+      option<&T::max_iterations>("until the contours stop", 1, 100000),
   };
   table.visit(options, visitor);
 }

@@ -423,8 +423,8 @@ void bind_basics(py::module_& m) {
                           .release()
                           .ptr();
   file_error_type = make_error(m, "FileError", py::make_tuple(error, builtin(PyExc_OSError)),
-                               "A file is missing, unreadable, damaged, of another kind, of a "
-                               "newer version, or cannot be written.")
+                               "A file is missing, unreadable, damaged, of another kind, of "
+                               "another version, or cannot be written.")
                         .release()
                         .ptr();
   py::register_exception_translator([](std::exception_ptr thrown) {

@@ -1,11 +1,9 @@
 #include "panonav_fleet/place_search.hpp"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <chrono>
 #include <exception>
-#include <map>
 #include <mutex>
 #include <optional>
 #include <set>
@@ -16,6 +14,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/executor.hpp"
+#include "panonav_fleet/internal/areas_of_views.hpp"
 #include "panonav/storage/internal/memory_file_access.hpp"
 #include "panonav/storage/internal/memory_tables.hpp"
 #include "panonav/storage/memory_address.hpp"
@@ -24,56 +23,6 @@
 namespace panonav::fleet {
 
 namespace {
-
-/// In which area each view lies, by its id: what a change of an area is compared with. Four bytes a
-/// view.
-class AreasOfViews {
- public:
-  void set(ViewId view, const std::optional<MemoryArea>& area) {
-    if (view.value >= numbers_.size()) {
-      numbers_.resize(std::max<std::size_t>(view.value + std::size_t{1}, numbers_.size() * 5 / 4));
-    }
-    numbers_[view.value] = area ? number_of(*area) : no_area;
-  }
-  void erase(ViewId view) {
-    if (view.value < numbers_.size()) numbers_[view.value] = no_view;
-  }
-  [[nodiscard]] bool has(ViewId view) const {
-    return view.value < numbers_.size() && numbers_[view.value] != no_view;
-  }
-  /// Ascending. Cost: a pass over all ids.
-  [[nodiscard]] std::vector<ViewId> within(const std::set<MemoryArea>& areas) const {
-    std::vector<std::uint32_t> wanted;
-    for (const MemoryArea& area : areas) {
-      const auto found = areas_.find(area);
-      if (found != areas_.end()) wanted.push_back(found->second);
-    }
-    std::ranges::sort(wanted);
-    return with([&](std::uint32_t number) { return std::ranges::binary_search(wanted, number); });
-  }
-  [[nodiscard]] std::vector<ViewId> all() const {
-    return with([](std::uint32_t number) { return number != no_view; });
-  }
-  [[nodiscard]] std::uint64_t bytes() const { return numbers_.size() * sizeof(std::uint32_t); }
-
- private:
-  static constexpr std::uint32_t no_view = 0;
-  static constexpr std::uint32_t no_area = 1;
-  std::uint32_t number_of(const MemoryArea& area) {
-    return areas_.try_emplace(area, static_cast<std::uint32_t>(areas_.size()) + no_area + 1)
-        .first->second;
-  }
-  template <class Wanted>
-  [[nodiscard]] std::vector<ViewId> with(const Wanted& wanted) const {
-    std::vector<ViewId> views;
-    for (std::size_t id = 0; id < numbers_.size(); ++id) {
-      if (wanted(numbers_[id])) views.push_back({static_cast<std::uint32_t>(id)});
-    }
-    return views;
-  }
-  std::vector<std::uint32_t> numbers_;  // by id
-  std::map<MemoryArea, std::uint32_t> areas_;
-};
 
 std::optional<MemoryArea> area_at(const std::optional<Point2>& position) {
   if (!position) return std::nullopt;

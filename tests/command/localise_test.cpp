@@ -144,19 +144,6 @@ TEST_F(Localise, JsonLinesHaveExactlyTheDocumentedFields) {
   }
 }
 
-TEST_F(Localise, FormerKeysAreThoseOfTheLastVersion) {
-  auto expected = run_panonav({"localise", memory(), asked(), "--json"});
-  const auto former = run_panonav({"localise", memory(), asked(), "--json", "--former-keys"});
-  const std::string key = "\"column_difference\"";
-  ASSERT_NE(expected.out.find(key), std::string::npos);
-  for (auto at = expected.out.find(key); at != std::string::npos; at = expected.out.find(key)) {
-    expected.out.replace(at, key.size(), "\"difference\"");
-  }
-  EXPECT_EQ(former.out, expected.out);
-  EXPECT_NE(former.err.find("--former-keys: "), std::string::npos);
-  EXPECT_EQ(expected.err.find("--former-keys"), std::string::npos);
-}
-
 TEST_F(Localise, FindsPlaceAndHeadingOfPosesBetweenTheReferences) {
   const auto all = answers({memory(), asked()});
   ASSERT_EQ(all.size(), asked_->size());

@@ -406,17 +406,6 @@ TEST_F(BadInput, KilledMemoriseResumes) {
   EXPECT_EQ(a.out, b.out);
 }
 
-TEST_F(Memorise, InfoCountsTheChainsOfAnOlderVersion) {
-  run_well({"memorise", data(), memory()});
-  EXPECT_EQ(info_of(memory())["unused_chains"], 0);
-  EXPECT_EQ(run_panonav({"info", memory()}).out.find("chains"), std::string::npos);
-  add_old_chain(memory());
-  EXPECT_EQ(info_of(memory())["unused_chains"], 1);
-  EXPECT_EQ(views_in(memory()), 16);
-  EXPECT_NE(run_panonav({"info", memory()}).out.find("does not use them"), std::string::npos);
-  run_well({"verify", memory()});
-}
-
 TEST_F(Memorise, WhatWasForgottenComesBackWithUndo) {
   run_well({"memorise", data(), memory()});
   EXPECT_TRUE(contains(refusal({"undo", memory()}), "has nothing to undo"));

@@ -341,28 +341,6 @@ TEST(Usage, ManualPagesNameEveryOptionAndFormatWithoutWarnings) {
   }
 }
 
-TEST(Usage, FormerNamesOfFlagsAreTakenWithAWarningAndNotShown) {
-  const std::string warning = "--most-difference is now --max-difference\n";
-  for (const auto& flag : {"--most-difference=0.2", "--most-difference=2"}) {
-    const auto former = run_panonav({"prune", "no.panonav", flag});
-    EXPECT_EQ(former.exit_code, 2);
-    EXPECT_EQ(former.err.find(warning), 0U) << former.err;
-    EXPECT_EQ(run_panonav({"prune", "no.panonav", flag, "--quiet"}).err.find("is now"),
-              std::string::npos);
-  }
-  const auto apart = run_panonav({"prune", "no.panonav", "--most-difference", "2"});
-  EXPECT_EQ(apart.err.find(warning), 0U) << apart.err;
-  EXPECT_NE(apart.err.find("max_difference is 2; allowed: >= 0 and <= 1"), std::string::npos);
-  EXPECT_EQ(run_panonav({"prune", "no.panonav", "--max-difference", "0.2"}).err.find("is now"),
-            std::string::npos);
-  EXPECT_NE(refusal({"prune", "a", "--most-difference", "0.1", "--max-difference", "0.2"})
-                .find("--most-difference is the former name of --max-difference"),
-            std::string::npos);
-  const auto help = help_of("prune", "--help-all");
-  EXPECT_NE(help.find("--max-difference"), std::string::npos);
-  EXPECT_EQ(help.find("--most-difference"), std::string::npos);
-}
-
 std::vector<std::string> simulate_one(const std::string& out) {
   return {"simulate", "office",    out,  "--random",        "1", "--kind", "panorama", "--rows",
           "8",        "--columns", "32", "--rays-per-axis", "1"};
@@ -442,7 +420,6 @@ TEST(Usage, AnOptionThatDoesNothingIsRefused) {
   const std::string on_navigate = "navigate m --goal 1 --scene office ";
   const std::vector<Unused> all{
       {"localise m x --area-tolerance 1", "--area-tolerance", "--areas"},
-      {"localise m x --former-keys", "--former-keys", "--json"},
       {"track m x --injection-share 0.1", "--injection-share", "--injection topological"},
       {"track m x --injection-number 9", "--injection-number", "--injection uniform"},
       {"home a b --rising true", "--rising", "--iterations 2"},

@@ -55,7 +55,7 @@ void visit_options(NestedOptions& options, OptionVisitor& visitor) {
   constexpr OptionTable table{
       options_of<&T::sample>(),
       no_option<&T::bounds>("a pair that no text gives"),
-      choice<&T::side>("which", "left", "right").formerly("hand").formerly("port", "left"),
+      choice<&T::side>("which", "left", "right"),
   };
   table.visit(options, visitor);
 }
@@ -77,7 +77,6 @@ class Listing final : public OptionVisitor {
     std::string all;
     for (std::size_t i = 0; i < choices.size(); ++i) {
       all.append(i == 0 ? "" : "|").append(choices[i]);
-      if (!info.former_choices[i].empty()) all.append("<").append(info.former_choices[i]);
     }
     add(info, all);
     value = static_cast<int>(choices.size()) - 1;
@@ -86,17 +85,16 @@ class Listing final : public OptionVisitor {
 
  private:
   void add(const OptionInfo& info, std::string_view kind) {
-    text.append(info.name).append(" ").append(kind).append(" ").append(info.former).append(";");
+    text.append(info.name).append(" ").append(kind).append(";");
   }
 };
 
-TEST(Options, TablesShowMembersInOrderWithNestedStructsChoicesAndFormerNames) {
+TEST(Options, TablesShowMembersInOrderWithNestedStructsAndChoices) {
   NestedOptions options;
   Listing listing;
   visit_options(options, listing);
   EXPECT_EQ(listing.text,
-            "views int ;radius_m double ;tolerance double ;packed bool ;norm l1|l2 ;"
-            "side left<port|right hand;");
+            "views int;radius_m double;tolerance double;packed bool;norm l1|l2;side left|right;");
   EXPECT_EQ(options.side, Side::right);
   EXPECT_EQ(options.sample, (SampleOptions{.norm = 1}));
 }

@@ -25,8 +25,8 @@ void visit_options(SampleOptions& options, OptionVisitor& visitor) {
   constexpr OptionTable table{
       option<&T::count>("", 1, 10),
       option<&T::radius_m>("", above(0)),
-      option<&T::fast>("").formerly("quick"),
-      choice<&T::kind>("", "plain", "fancy").formerly("fashion").formerly("ornate", "fancy"),
+      option<&T::fast>(""),
+      choice<&T::kind>("", "plain", "fancy"),
   };
   table.visit(options, visitor);
 }
@@ -52,30 +52,6 @@ TEST_F(OptionFiles, FieldsReplaceDefaults) {
   EXPECT_FALSE(file.has("half", "count"));
   EXPECT_FALSE(file.has("absent", "count"));
   file.require_sections(std::array<std::string_view, 3>{"half", "sample", "more"});
-}
-
-TEST_F(OptionFiles, FormerNamesAreTakenWithAWarning) {
-  const auto path =
-      folder.write("a.toml", "[sample]\ncount = 7\nquick = true\nfashion = \"ornate\"\n");
-  OptionFile file(path);
-  SampleOptions options;
-  file.apply("sample", options);
-  EXPECT_EQ(options, (SampleOptions{7, 0.5, true, 1}));
-  EXPECT_TRUE(file.has("sample", "fast"));
-  const std::string where = path.string() + ": [sample]: ";
-  EXPECT_EQ(file.warnings(),
-            (std::vector<std::string>{where + "quick is now fast", where + "fashion is now kind",
-                                      where + "\"ornate\" of kind is now \"fancy\""}));
-
-  OptionFile plain(folder.write("b.toml", "[sample]\nfast = true\nkind = \"fancy\"\n"));
-  plain.apply("sample", options);
-  EXPECT_TRUE(plain.warnings().empty());
-
-  OptionFile both(folder.write("c.toml", "[sample]\nquick = true\nfast = true\n"));
-  EXPECT_NE(message_of<FileError>([&] {
-              both.apply("sample", options);
-            }).find("[sample]: quick is the former name of fast; allowed: one of the two"),
-            std::string::npos);
 }
 
 TEST_F(OptionFiles, FaultsNameFileSectionFieldAndRange) {

@@ -1,4 +1,4 @@
-// Files that are not as they were written: damaged, cut, foreign, newer.
+// Files that are not as they were written: damaged, cut, foreign, of another format.
 #include <gtest/gtest.h>
 
 #include "panonav/core/error.hpp"
@@ -162,10 +162,12 @@ TEST_F(MemoryFileDamage, ForeignFilesAreRefused) {
   EXPECT_FALSE(std::filesystem::exists(folder / "none.panonav"));
 }
 
-TEST_F(MemoryFileDamage, NewerFilesAreRefused) {
+TEST_F(MemoryFileDamage, FilesOfAnotherFormatAreRefused) {
   { (void)MemoryFile::create(path, small_header()); }
-  run_sql(path, "PRAGMA journal_mode=DELETE; PRAGMA user_version=9");
-  expect_refused_unchanged(path, "newer version: format version is 9; allowed: 1 .. 8");
+  for (const char* version : {"0", "2", "8"}) {
+    run_sql(path, "PRAGMA journal_mode=DELETE; PRAGMA user_version=" + std::string(version));
+    expect_refused_unchanged(path, "has format version " + std::string(version) + "; allowed: 1");
+  }
 }
 
 TEST_F(MemoryFileDamage, OtherTablesAreRefused) {

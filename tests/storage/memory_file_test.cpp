@@ -101,7 +101,7 @@ TEST_F(MemoryFileContent, ContentComesBack) {
   EXPECT_EQ(info.links, 1U);
   EXPECT_EQ(info.thumbnails, 13U);
   EXPECT_GT(info.file_bytes, 50 * 2 * header.shape.size());
-  EXPECT_EQ(info.format_version, 8);
+  EXPECT_EQ(info.format_version, 1);
   std::uint64_t positions = 0;
   std::uint64_t headings = 0;
   for (const ViewId view : expected.views()) {
@@ -310,100 +310,18 @@ TEST_F(MemoryFileContent, ALargeMemoryComesBackWhole) {
   EXPECT_TRUE(file.verify().empty());
 }
 
-// All values of the two tables of chains, as older programs would read them.
-std::string chains_in(const std::filesystem::path& path) {
-  sqlite3* database = nullptr;
-  EXPECT_EQ(sqlite3_open(path.c_str(), &database), SQLITE_OK);
-  std::string values;
-  const auto append = [](void* to, int columns, char** row, char**) {
-    for (int i = 0; i < columns; ++i) {
-      *static_cast<std::string*>(to) += std::string(row[i] ? row[i] : "null") + " ";
-    }
-    return 0;
-  };
-  EXPECT_EQ(sqlite3_exec(database,
-                         "SELECT * FROM chains; SELECT chain, number, travelled_m, x_m, y_m, "
-                         "heading_rad, hex(coefficients), checksum FROM chain_snapshots",
-                         append, &values, nullptr),
-            SQLITE_OK)
-      << sqlite3_errmsg(database);
-  sqlite3_close(database);
-  return values;
-}
-
-TEST_F(MemoryFileContent, ChainsOfAnOlderVersionAreCountedAndStayAsTheyAre) {
-  Random random(8);
-  const SignatureShape shape = small_header().shape;
-  (void)MemoryFile::create(path, small_header()).append(random_view(random, shape, 1));
-  EXPECT_EQ(MemoryFile::open(path, Access::read_only).info().unused_chains, 0U);
-  add_old_chain(path);
-  const std::string before = chains_in(path);
-  ASSERT_NE(before.find("0B0A0908"), std::string::npos);
-  {
-    MemoryFile file = MemoryFile::open(path, Access::read_write);
-    EXPECT_EQ(file.info().unused_chains, 1U);
-    EXPECT_TRUE(file.verify().empty());
-    const ViewId view = file.append(random_view(random, shape, 2));
-    TopologicalMap map;
-    map.nodes.push_back({view, {}, 0});
-    file.save_map("map", map);
-    file.remove(file.views());
-  }
-  const MemoryFile file = MemoryFile::open(path, Access::read_only);
-  EXPECT_EQ(file.info().format_version, 8);
-  EXPECT_EQ(file.info().unused_chains, 1U);
-  EXPECT_TRUE(file.verify().empty());
-  EXPECT_EQ(chains_in(path), before);
-}
-
-TEST_F(MemoryFileContent, AnOlderFileIsReadAsItIsAndGrowsWithItsFirstChange) {
-  Random random(9);
-  const SignatureShape shape = small_header().shape;
-  (void)MemoryFile::create(path, small_header()).append(random_view(random, shape, 1));
-  make_version_1(path);
-  const std::string before = bytes_of(path);
-  {
-    const MemoryFile file = MemoryFile::open(path, Access::read_only);
-    EXPECT_EQ(file.info().format_version, 1);
-    EXPECT_EQ(file.load().size(), 1U);
-    EXPECT_FALSE(file.map("map"));
-    EXPECT_FALSE(file.route("route"));
-    EXPECT_FALSE(file.undoable());
-    EXPECT_TRUE(file.verify().empty());
-  }
-  EXPECT_EQ(bytes_of(path), before);
-  MemoryFile file = MemoryFile::open(path, Access::read_write);
-  file.append(random_view(random, shape, 2));
-  file.save_map("map", {});
-  EXPECT_EQ(file.info().format_version, 8);
-  EXPECT_EQ(file.load().size(), 2U);
-  EXPECT_TRUE(file.verify().empty());
-}
-
-// Version 5 had no local features.
 TEST_F(MemoryFileContent, LocalFeaturesAreKeptCheckedAndGoWithTheirView) {
   Random random(10);
   const SignatureShape shape = small_header().shape;
   (void)MemoryFile::create(path, small_header()).append(random_view(random, shape, 1));
-  run_sql(path,
-          "PRAGMA journal_mode=DELETE; DROP TABLE features; DROP TABLE history; DROP TABLE "
-          "synchronised; DROP TABLE synchronised_links; PRAGMA user_version=5; PRAGMA "
-          "journal_mode=WAL");
-  const ViewId old{1};
-  {
-    const MemoryFile file = MemoryFile::open(path, Access::read_only);
-    EXPECT_EQ(file.info().format_version, 5);
-    EXPECT_FALSE(file.features(old));
-    EXPECT_TRUE(file.verify().empty());
-  }
+  const ViewId without{1};
   NewView added = random_view(random, shape, 2);
   added.features.assign(72, 7);
   {
     MemoryFile file = MemoryFile::open(path, Access::read_write);
     const ViewId view = file.append(added);
-    EXPECT_FALSE(file.features(old));
+    EXPECT_FALSE(file.features(without));
     EXPECT_EQ(file.features(view), added.features);
-    EXPECT_EQ(file.info().format_version, 8);
     EXPECT_EQ(file.info().views_with_features, 1U);
     EXPECT_EQ(file.info().feature_bytes, 72U);
     EXPECT_TRUE(file.verify().empty());
@@ -417,15 +335,6 @@ TEST_F(MemoryFileContent, LocalFeaturesAreKeptCheckedAndGoWithTheirView) {
   const MemoryFile file = MemoryFile::open(path, Access::read_only);
   EXPECT_THROW((void)file.features(ViewId{2}), FileError);
   EXPECT_EQ(file.verify().size(), 1U);
-}
-
-TEST_F(MemoryFileContent, AFileThatClaimsChainsWithoutTheirTablesIsRefused) {
-  { (void)MemoryFile::create(path, small_header()); }
-  make_version_1(path);
-  run_sql(path, "PRAGMA user_version=2");
-  EXPECT_TRUE(
-      contains(message_of<FileError>([&] { (void)MemoryFile::open(path, Access::read_only); }),
-               "table chain_snapshots is missing"));
 }
 
 }  // namespace

@@ -88,37 +88,6 @@ inline void run_sql(const std::filesystem::path& path, const std::string& sql) {
   sqlite3_close(database);
 }
 
-/// Takes from a new file what versions after the first added. It held no map and no route.
-inline void make_version_1(const std::filesystem::path& path) {
-  run_sql(path,
-          "PRAGMA journal_mode=DELETE; DROP TABLE log; DROP TABLE undo; DROP TABLE history; DROP "
-          "TABLE maps; DROP TABLE "
-          "routes; DROP TABLE route_blocks; DROP TABLE features; DROP TABLE "
-          "synchronised; DROP TABLE synchronised_links; PRAGMA user_version=1; PRAGMA "
-          "journal_mode=WAL");
-}
-
-/// Makes a file of version 1 one of version 2, as programs did that saved chains of snapshots: with
-/// one chain of two snapshots of one row and two components.
-inline void add_old_chain(const std::filesystem::path& path) {
-  make_version_1(path);
-  run_sql(
-      path,
-      "BEGIN;"
-      "CREATE TABLE chain_snapshots(chain TEXT NOT NULL, number INTEGER NOT NULL, travelled_m "
-      "REAL NOT NULL, x_m REAL NOT NULL, y_m REAL NOT NULL, heading_rad REAL NOT NULL, "
-      "coefficients BLOB NOT NULL, checksum INTEGER NOT NULL, PRIMARY KEY(chain, number)) "
-      "STRICT, WITHOUT ROWID;"
-      "CREATE TABLE chains(name TEXT NOT NULL PRIMARY KEY, rows INTEGER NOT NULL, components "
-      "INTEGER NOT NULL, elevation_bottom_rad REAL, elevation_top_rad REAL, snapshots INTEGER "
-      "NOT NULL, checksum INTEGER NOT NULL) STRICT, WITHOUT ROWID;"
-      "INSERT INTO chains VALUES('way', 1, 2, NULL, NULL, 2, 11);"
-      "INSERT INTO chain_snapshots VALUES('way', 0, 0.0, 0.0, 0.0, 0.0, x'000102030405060708090A"
-      "0B', 12), ('way', 1, 0.5, 0.5, 0.0, 0.1, x'0B0A09080706050403020100', 13);"
-      "PRAGMA user_version=2;"
-      "COMMIT");
-}
-
 /// The bytes of a file after an accident: by `trial` one bit, four bytes, or a stretch of zeros.
 inline std::string damaged_bytes(std::string bytes, Random& random, int trial) {
   const std::size_t at = random.index(bytes.size());

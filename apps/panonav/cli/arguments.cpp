@@ -34,16 +34,9 @@ struct Arguments::Implementation {
     std::function<bool()> used;
     std::string why;
   };
-  struct Former {
-    std::string flag;
-    std::string name;  ///< of the value; of the flag where `value` is false
-    std::string now;
-    bool value = false;
-  };
   std::vector<ArgumentInfo> infos = {};
   std::vector<Take> takes = {};       ///< one for each of the infos
   std::deque<Section> sections = {};  ///< a deque: takes keep references into it
-  std::vector<Former> former = {};
   std::vector<UsedOnly> used_only = {};
   std::set<std::string, std::less<>> typed = {};  ///< flags
   /// Flags outside options structs that stand in option files, and what a file or the command line
@@ -254,13 +247,6 @@ void Arguments::add_section(const std::string& section, const std::string& prefi
     info.choices.assign(option.choices.begin(), option.choices.end());
     info.section = section;
     info.common = false;
-    if (!option.info.former.empty()) {
-      formerly(flag_of(before + std::string(option.info.former)), flag);
-    }
-    for (std::size_t i = 0; i < option.info.former_choices.size(); ++i) {
-      if (option.info.former_choices[i].empty()) continue;
-      formerly(flag, std::string(option.info.former_choices[i]), std::string(option.choices[i]));
-    }
   });
   added.visit(lister);
 }
@@ -283,52 +269,6 @@ void Arguments::set_common(std::initializer_list<std::string_view> flags, bool c
   }
 }
 
-void Arguments::formerly(const std::string& former, const std::string& now) {
-  implementation_->former.push_back({now, former, now});
-}
-
-void Arguments::formerly(const std::string& flag, const std::string& former,
-                         const std::string& now) {
-  implementation_->former.push_back({flag, former, now, true});
-}
-
-std::vector<std::string> Arguments::rename(std::vector<std::string>& typed) const {
-  std::vector<std::string> warnings;
-  /// Whether the word is this flag, alone or with its value behind "=".
-  const auto is = [](const std::string& word, const std::string& flag) {
-    return word.starts_with(flag) && (word.size() == flag.size() || word[flag.size()] == '=');
-  };
-  for (const auto& former : implementation_->former) {
-    bool now_typed = false;
-    bool former_typed = false;
-    for (std::size_t i = 0; i < typed.size() && typed[i] != "--"; ++i) {
-      std::string& word = typed[i];
-      if (former.value) {
-        if (word == former.flag + "=" + former.name) {
-          word = former.flag + "=" + former.now;
-        } else if (i > 0 && typed[i - 1] == former.flag && word == former.name) {
-          word = former.now;
-        } else {
-          continue;
-        }
-      } else {
-        now_typed = now_typed || is(word, former.now);
-        if (!is(word, former.name)) continue;
-        word.replace(0, former.name.size(), former.now);
-      }
-      former_typed = true;
-    }
-    if (!former_typed) continue;
-    if (now_typed) {
-      throw UsageError(former.name + " is the former name of " + former.now +
-                       "; allowed: one of the two");
-    }
-    warnings.push_back((former.value ? former.flag + " " : "") + former.name + " is now " +
-                       former.now);
-  }
-  return warnings;
-}
-
 std::string Arguments::unknown_flag(const std::string& typed) const {
   std::vector<std::string_view> names;
   for (const auto& info : infos()) {
@@ -337,9 +277,7 @@ std::string Arguments::unknown_flag(const std::string& typed) const {
   return "no such option: " + typed + did_you_mean(typed, names);
 }
 
-std::vector<std::string> Arguments::read(std::vector<std::string> words, std::string_view verb,
-                                         bool may_miss) {
-  auto warnings = rename(words);
+void Arguments::read(std::span<const std::string> words, std::string_view verb, bool may_miss) {
   const auto& infos = implementation_->infos;
   const auto find = [&infos](std::string_view name) {
     return std::ranges::find_if(infos, [&](const ArgumentInfo& info) {
@@ -388,7 +326,6 @@ std::vector<std::string> Arguments::read(std::vector<std::string> words, std::st
       throw UsageError(infos[i].name + " is required");
     }
   }
-  return warnings;
 }
 
 void Arguments::take_positionals(std::span<const std::string> words, std::string_view verb,
@@ -430,9 +367,8 @@ void Arguments::take_positionals(std::span<const std::string> words, std::string
   }
 }
 
-std::vector<std::string> Arguments::resolve(
-    const std::optional<std::string>& config,
-    const std::function<std::vector<std::string>()>& sections_of_all_verbs) {
+void Arguments::resolve(const std::optional<std::string>& config,
+                        const std::function<std::vector<std::string>()>& sections_of_all_verbs) {
   std::optional<OptionFile> file;
   if (config) {
     file.emplace(*config);
@@ -464,7 +400,6 @@ std::vector<std::string> Arguments::resolve(
   for (const auto& [options, used, why] : implementation_->used_only) {
     if (!used()) refuse_unused(options, why);
   }
-  return file ? file->warnings() : std::vector<std::string>{};
 }
 
 void Arguments::used_only(std::vector<std::string> options, std::function<bool()> used,
@@ -623,14 +558,9 @@ std::shared_ptr<Declared> declare(const Verb& verb) {
                    "Read options from this TOML file; options typed here win over it");
   arguments.flag("--config-template", common.config_template,
                  "Print such a file with all options, their defaults and ranges, and stop");
-  arguments.flag("--former-keys", common.session.former_keys,
-                 "With --json: keys that have a new name have their former one, for programs that "
-                 "were written for the last version");
   arguments.flag("-h,--help", declared->ignored, "Print a short help and stop");
   arguments.flag("--help-all", declared->ignored, "Print the help with all options and stop");
-  arguments.used_only(
-      {"--former-keys"}, [&common] { return common.session.json; }, "without --json");
-  arguments.uncommon({"--threads", "--config", "--config-template", "--former-keys"});
+  arguments.uncommon({"--threads", "--config", "--config-template"});
   return declared;
 }
 
@@ -670,16 +600,11 @@ ParsedCommand parse(std::span<const Verb> verbs, std::span<const std::string> wo
   }
   const bool wants_template = std::ranges::find(rest, "--config-template") != rest.end();
   const auto& common = declared->common;
-  const auto warn = [&](const std::vector<std::string>& warnings) {
-    for (const auto& warning : warnings) {
-      if (!common.session.quiet) std::cerr << readable_line(warning) << '\n';
-    }
-  };
-  warn(declared->arguments.read(rest, verb.name, wants_template));
+  declared->arguments.read(rest, verb.name, wants_template);
   if (common.session.quiet && common.session.verbose) {
     throw UsageError("--quiet and --verbose exclude each other");
   }
-  warn(declared->arguments.resolve(common.config, [&] {
+  declared->arguments.resolve(common.config, [&] {
     // One file may serve several verbs, so the sections of all of them are allowed in it.
     std::vector<std::string> sections;
     for (const auto& other : verbs) {
@@ -687,7 +612,7 @@ ParsedCommand parse(std::span<const Verb> verbs, std::span<const std::string> wo
       sections.insert(sections.end(), more.begin(), more.end());
     }
     return sections;
-  }));
+  });
   if (wants_template) {
     return printing(verb.name, declared->arguments.config_template(verb.name));
   }

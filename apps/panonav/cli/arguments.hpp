@@ -95,8 +95,7 @@ class Arguments {
 
   /// One flag for each member that visit_options shows: `cell_size_m` becomes `--cell-size-m`, with
   /// a prefix "area" `--area-cell-size-m`. The same members are read from the table [`section`] of
-  /// a --config file; flags win over the file, the file over defaults. Former names of members and
-  /// of their choices are taken, too.
+  /// a --config file; flags win over the file, the file over defaults.
   template <class Options>
   void options(const std::string& section, Options& values, const std::string& prefix = "") {
     add_section(
@@ -112,12 +111,6 @@ class Arguments {
   /// there is no such flag.
   void common(std::initializer_list<std::string_view> flags) { set_common(flags, true); }
   void uncommon(std::initializer_list<std::string_view> flags) { set_common(flags, false); }
-
-  /// `former` is what the flag `now` was called in the last version: `--help` does not show it, but
-  /// it is taken, with a warning.
-  void formerly(const std::string& former, const std::string& now);
-  /// The same of one value of a flag.
-  void formerly(const std::string& flag, const std::string& former, const std::string& now);
 
   /// Whether the user gave this member by flag or file; an empty name: any member of the section.
   /// Meaningful once the verb runs.
@@ -145,14 +138,12 @@ class Arguments {
   }
 
   /// Reads the words behind the verb into the values; with `may_miss` also where required ones are
-  /// missing. Gives warnings of former names. Throws UsageError.
-  std::vector<std::string> read(std::vector<std::string> words, std::string_view verb,
-                                bool may_miss);
-  /// Fills the option structs once all words are read: file first, then flags, then checks. Gives
-  /// warnings of former names in the file, whose sections may also be those of `other_verbs`.
-  std::vector<std::string> resolve(
-      const std::optional<std::string>& config,
-      const std::function<std::vector<std::string>()>& sections_of_all_verbs);
+  /// missing. Throws UsageError.
+  void read(std::span<const std::string> words, std::string_view verb, bool may_miss);
+  /// Fills the option structs once all words are read: file first, then flags, then checks. The
+  /// file may also have sections that only other verbs know.
+  void resolve(const std::optional<std::string>& config,
+               const std::function<std::vector<std::string>()>& sections_of_all_verbs);
   [[nodiscard]] std::vector<std::string> sections() const;
 
   [[nodiscard]] const std::vector<ArgumentInfo>& infos() const;
@@ -169,7 +160,6 @@ class Arguments {
   void compare(const std::string& section, const Visit& wanted, const Visit& kept,
                const std::string& as) const;
   void set_common(std::initializer_list<std::string_view> flags, bool common);
-  [[nodiscard]] std::vector<std::string> rename(std::vector<std::string>& words) const;
   [[nodiscard]] std::string unknown_flag(const std::string& typed) const;
   void take_positionals(std::span<const std::string> words, std::string_view verb, bool may_miss);
 

@@ -32,7 +32,4 @@ template <class Value>
   return document.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
 }
 
-/// A line of JSON with the names of keys that the last version gave them (`--former-keys`).
-[[nodiscard]] std::string with_former_keys(std::string_view line);
-
 }  // namespace panonav::command

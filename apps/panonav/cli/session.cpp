@@ -60,10 +60,7 @@ std::string time_left(double elapsed_s, std::size_t done, std::size_t total) {
 Session::Session(const SessionOptions& options)
     : options_(options),
       colours_(!options.json && wants_colours(STDOUT_FILENO)),
-      executor_(options.threads) {
-  options_.former_keys = options.former_keys && options.json;
-  if (options_.former_keys) note("--former-keys: the next version will no longer know these keys");
-}
+      executor_(options.threads) {}
 
 void Session::say(std::string_view line) {
   clear_bar();
@@ -73,13 +70,7 @@ void Session::say(std::string_view line) {
 void Session::print(std::string_view text) {
   clear_bar();
   const std::string line = without_passwords(text);
-  if (options_.former_keys) {
-    std::cout << with_former_keys(std::string_view(line)) << '\n';
-  } else if (options_.json) {
-    std::cout << line << '\n';
-  } else {
-    std::cout << readable(line) << '\n';
-  }
+  std::cout << (options_.json ? line : readable(line)) << '\n';
 }
 
 void Session::note(std::string_view line) {

@@ -14,11 +14,10 @@ namespace panonav::command {
 
 /// How a verb speaks, and on how many threads it works.
 struct SessionOptions {
-  bool json = false;         ///< results as JSON
-  bool former_keys = false;  ///< keys of JSON have their names of the last version
-  bool quiet = false;        ///< results and errors only
-  bool verbose = false;      ///< what is done, and when
-  int threads = 0;           ///< 0: one per core
+  bool json = false;     ///< results as JSON
+  bool quiet = false;    ///< results and errors only
+  bool verbose = false;  ///< what is done, and when
+  int threads = 0;       ///< 0: one per core
 };
 
 /// What a verb needs of its surroundings: threads, and how to speak to people and to machines.

@@ -73,7 +73,6 @@ ordered_json as_json(const MemoryFile& memory, const MemoryFileInfo& info) {
                       {"edge_channel", steps.edge_channel},
                       {"remove_mean", steps.remove_mean},
                       {"normalise_gain", steps.normalise_gain}}}};
-  json["unused_chains"] = info.unused_chains;
   auto routes = ordered_json::array();
   for (const auto& [name, lines, length_m, bytes] : routes_of(memory)) {
     routes.push_back({{"name", name}, {"lines", lines}, {"length_m", length_m}, {"bytes", bytes}});
@@ -114,10 +113,6 @@ ExitCode show(const std::string& path, Session& session) {
   session.print("  file        " + std::to_string(info.file_bytes) + " bytes, format " +
                 std::to_string(info.format_version) + ", " + std::to_string(info.thumbnails) +
                 " thumbnails");
-  if (info.unused_chains > 0) {
-    session.print("  chains      " + std::to_string(info.unused_chains) +
-                  " of snapshots, saved by an earlier version; this version does not use them");
-  }
   for (const auto& [name, lines, length_m, bytes] : routes_of(memory)) {
     session.print("  route       " + name + ": " + std::to_string(lines) + " lines over " +
                   fixed(length_m, 1) + " m, " +

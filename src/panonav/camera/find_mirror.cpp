@@ -285,18 +285,14 @@ void visit_options(MirrorSearchOptions& options, OptionVisitor& visitor) {
   using T = MirrorSearchOptions;
   constexpr OptionTable table{
       option<&T::min_rim>("smallest radius of the mirror's rim, in shorter sides of the image",
-                          above(0), 2)
-          .formerly("smallest_rim"),
+                          above(0), 2),
       option<&T::max_rim>("largest radius of the mirror's rim, in longer sides of the image",
-                          above(0), 2)
-          .formerly("largest_rim"),
+                          above(0), 2),
       option<&T::visible_fraction>("smallest part of the rim that must lie inside the frame", 0.25,
-                                   1)
-          .formerly("visible_part"),
+                                   1),
       option<&T::min_quality>(
           "lowest quality of a rim, from 0 (any circle) to 1 (a sharp edge all around)", above(0),
-          1)
-          .formerly("least_quality"),
+          1),
   };
   table.visit(options, visitor);
 }

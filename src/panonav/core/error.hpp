@@ -30,7 +30,7 @@ class OptionError : public Error {
   using Error::Error;
 };
 
-/// A file is missing, unreadable, damaged, of a foreign kind, of a newer version, or cannot be
+/// A file is missing, unreadable, damaged, of a foreign kind, of another version, or cannot be
 /// written.
 class FileError : public Error {
  public:

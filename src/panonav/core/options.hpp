@@ -21,9 +21,6 @@ struct OptionInfo {
   double low = -std::numeric_limits<double>::infinity();  ///< smallest allowed value
   double high = std::numeric_limits<double>::infinity();  ///< largest allowed value
   bool low_open = false;                                  ///< `low` itself is not allowed
-  std::string_view former = {};  ///< name in the last version, still taken; empty: the same
-  /// The same of each choice, where there are choices.
-  std::span<const std::string_view> former_choices = {};
 };
 
 /// Visits the members of an options struct. Each options struct `T` has a function
@@ -99,30 +96,12 @@ struct OptionEntry {
 
   OptionInfo info = {.name = name, .help = {}};
   std::array<std::string_view, choice_count> choices = {};
-  std::array<std::string_view, choice_count> former_choices = {};
-
-  /// The option's name in the last version: still taken, with a warning.
-  consteval OptionEntry formerly(std::string_view former) const {
-    OptionEntry entry = *this;
-    entry.info.former = former;
-    return entry;
-  }
-  /// The same of one of its choices.
-  consteval OptionEntry formerly(std::string_view former, std::string_view choice) const {
-    OptionEntry entry = *this;
-    std::size_t i = 0;
-    while (choices.at(i) != choice) ++i;  // an unknown choice does not compile
-    entry.former_choices.at(i) = former;
-    return entry;
-  }
 
   void visit(Options& options, OptionVisitor& visitor) const {
     using Value = std::remove_cvref_t<decltype(options.*member)>;
     if constexpr (choice_count > 0) {
-      OptionInfo with_choices = info;
-      with_choices.former_choices = former_choices;
       int value = static_cast<int>(options.*member);
-      visitor.visit(with_choices, choices, value);
+      visitor.visit(info, choices, value);
       options.*member = static_cast<Value>(value);
     } else if constexpr (std::is_arithmetic_v<Value>) {
       visitor.visit(info, options.*member);
@@ -193,7 +172,7 @@ constexpr auto no_option(std::string_view /*reason*/) {
 ///
 ///     constexpr OptionTable table{
 ///         option<&SearchOptions::radius_m>("how far", above(0), 100),
-///         choice<&SearchOptions::norm>("which sum", "l1", "l2").formerly("metric"),
+///         choice<&SearchOptions::norm>("which sum", "l1", "l2"),
 ///     };
 template <class... Entries>
 class OptionTable {

@@ -29,14 +29,12 @@ void visit_options(HomingPursuitOptions& options, OptionVisitor& visitor) {
       option<&T::middle>("highest frequency of the second stage", 1, 62),
       option<&T::fine>("highest frequency of the third stage", 1, 62),
       option<&T::typical_distance_m>("typical distance of the things around", above(0), 1000),
-      option<&T::max_step_m>("longest way between two views", above(0), 100)
-          .formerly("longest_step_m"),
+      option<&T::max_step_m>("longest way between two views", above(0), 100),
       option<&T::stop_length>("homing stops when the vector is shorter, in units of R", 0, 1),
-      option<&T::min_step_m>("homing stops when the step is shorter", above(0), 100)
-          .formerly("shortest_step_m"),
+      option<&T::min_step_m>("homing stops when the step is shorter", above(0), 100),
       option<&T::patience>(
           "homing stops when the views became no more similar for this number of steps", 1, 1e6),
-      option<&T::max_steps>("steps after which a run ends", 1, 1e6).formerly("most_steps"),
+      option<&T::max_steps>("steps after which a run ends", 1, 1e6),
       option<&T::arrived_difference>("largest difference of the views at home", 0, 2),
   };
   table.visit(options, visitor);

@@ -18,47 +18,6 @@ auto section_in(Table& table, std::string_view section) {
   return found == table.end() ? nullptr : std::get_if<TomlTable>(&found->value.content);
 }
 
-/// Puts new names in the place of former ones, of fields and of choices.
-class Renamer final : public OptionVisitor {
- public:
-  Renamer(std::string where, TomlTable& table, std::vector<std::string>& warnings)
-      : where_(std::move(where)), table_(table), warnings_(warnings) {}
-  void visit(const OptionInfo& info, int& /*value*/) override { rename(info); }
-  void visit(const OptionInfo& info, double& /*value*/) override { rename(info); }
-  void visit(const OptionInfo& info, bool& /*value*/) override { rename(info); }
-  void visit(const OptionInfo& info, std::span<const std::string_view> choices,
-             int& /*value*/) override {
-    rename(info);
-    const auto field = std::ranges::find(table_, info.name, &TomlField::name);
-    if (field == table_.end()) return;
-    auto* text = std::get_if<std::string>(&field->value.content);
-    for (std::size_t i = 0; text != nullptr && i < info.former_choices.size(); ++i) {
-      if (text->empty() || *text != info.former_choices[i]) continue;
-      warn(toml_text(*text) + " of " + field->name, toml_text(choices[i]));
-      *text = choices[i];
-    }
-  }
-
- private:
-  void rename(const OptionInfo& info) {
-    if (info.former.empty()) return;
-    const auto field = std::ranges::find(table_, info.former, &TomlField::name);
-    if (field == table_.end()) return;
-    if (std::ranges::find(table_, info.name, &TomlField::name) != table_.end()) {
-      throw FileError(where_, field->name + " is the former name of " + std::string(info.name) +
-                                  "; allowed: one of the two");
-    }
-    warn(field->name, info.name);
-    field->name = info.name;
-  }
-  void warn(const std::string& former, std::string_view now) {
-    warnings_.push_back(where_ + ": " + former + " is now " + std::string(now));
-  }
-  std::string where_;
-  TomlTable& table_;
-  std::vector<std::string>& warnings_;
-};
-
 class OptionReader final : public OptionVisitor {
  public:
   OptionReader(const std::filesystem::path& path, std::string_view section, const TomlTable& table)
@@ -115,10 +74,8 @@ OptionFile::OptionFile(std::filesystem::path path)
 }
 
 void OptionFile::apply(std::string_view section, const std::function<void(OptionVisitor&)>& visit) {
-  TomlTable* table = section_in(table_, section);
+  const TomlTable* table = section_in(table_, section);
   if (table == nullptr) return;
-  Renamer renamer(path_.string() + ": [" + std::string(section) + "]", *table, warnings_);
-  visit(renamer);
   OptionReader reader(path_, section, *table);
   visit(reader);
   reader.finish();

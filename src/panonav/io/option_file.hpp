@@ -14,7 +14,7 @@
 namespace panonav {
 
 /// A TOML file of options (docs/formats.md): one section for each options struct, in it one field
-/// for each member that the struct's `visit_options` shows, or for its former name.
+/// for each member that the struct's `visit_options` shows.
 class OptionFile {
  public:
   /// Throws FileError: missing, not TOML, a field outside all sections.
@@ -23,8 +23,7 @@ class OptionFile {
   /// Writes the fields of [section] into the members that `visit` shows; members without a field
   /// stay as they are, and so does everything when the file has no such section. Throws FileError
   /// with one line that names file, section, field, value and what is allowed: an unknown field, a
-  /// wrong type, a value out of range, an option under its name and its former name. Where the file
-  /// says a former name, the file is as if it said the new one, and `warnings` says so.
+  /// wrong type, a value out of range.
   void apply(std::string_view section, const std::function<void(OptionVisitor&)>& visit);
   /// The same for a struct of options: the members that its table shows.
   template <class Options>
@@ -43,13 +42,10 @@ class OptionFile {
   /// misspelt one would otherwise do nothing. The message names `own` only.
   void require_sections(std::span<const std::string_view> own,
                         std::span<const std::string_view> others = {}) const;
-  /// One line for each former name that was met in the sections applied.
-  [[nodiscard]] const std::vector<std::string>& warnings() const noexcept { return warnings_; }
 
  private:
   std::filesystem::path path_;
   TomlTable table_;
-  std::vector<std::string> warnings_;
 };
 
 }  // namespace panonav

@@ -96,8 +96,7 @@ void visit_options(LocaliserOptions& options, OptionVisitor& visitor) {
       option<&T::components>("Fourier components compared, 0 for all", 0),
       option<&T::reranked_views>("views compared column by column when the nearest ones do not "
                                  "explain the picture; 0 keeps the order of dissimilarity",
-                                 0, 1e6)
-          .formerly("compared_views"),
+                                 0, 1e6),
   };
   table.visit(options, visitor);
 }

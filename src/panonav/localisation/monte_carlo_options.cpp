@@ -7,23 +7,19 @@ namespace panonav {
 void visit_options(MonteCarloOptions& options, OptionVisitor& visitor) {
   using T = MonteCarloOptions;
   constexpr OptionTable table{
-      option<&T::min_particles>("fewest particles", 1, 1e7).formerly("least_particles"),
-      option<&T::max_particles>("most particles", 1, 1e7).formerly("most_particles"),
+      option<&T::min_particles>("fewest particles", 1, 1e7),
+      option<&T::max_particles>("most particles", 1, 1e7),
       option<&T::kld_error>(
           "allowed error of the particles' distribution; smaller needs more particles", 1e-4, 1),
       option<&T::resample_below>(
           "effective sample size below which particles are resampled, as a share of them", 0, 1),
       option<&T::compass>("weigh headings by the visual compass"),
       choice<&T::injection>("where new particles are drawn", "none", "uniform", "topological",
-                            "explained")
-          .formerly("redraw"),
-      option<&T::injection_share>("share of particles injected by 'topological'", 0, 1)
-          .formerly("redraw_share"),
-      option<&T::injection_number>("particles injected by 'uniform'", 0, 1e7)
-          .formerly("redraw_number"),
+                            "explained"),
+      option<&T::injection_share>("share of particles injected by 'topological'", 0, 1),
+      option<&T::injection_number>("particles injected by 'uniform'", 0, 1e7),
       option<&T::reranked_views>(
-          "views compared column by column when no near one explains the picture", 0, 1e6)
-          .formerly("compared_views"),
+          "views compared column by column when no near one explains the picture", 0, 1e6),
       option<&T::seed>("seed of all random choices", 0),
   };
   table.visit(options, visitor);

@@ -31,13 +31,11 @@ void visit_options(LoopClosureOptions& options, OptionVisitor& visitor) {
   constexpr OptionTable table{
       option<&T::candidates>("places looked at for each view", 1, 1000),
       option<&T::min_loop_m>("shortest loop; views nearer along the way are no candidates",
-                             above(0), 1e6)
-          .formerly("shortest_loop_m"),
+                             above(0), 1e6),
       option<&T::max_residual>("share of the views' energy that a closure may leave unexplained", 0,
-                               1)
-          .formerly("most_residual"),
-      option<&T::max_length>("distance between the views of a closure in units of R, at most", 0, 2)
-          .formerly("most_length"),
+                               1),
+      option<&T::max_length>("distance between the views of a closure in units of R, at most", 0,
+                             2),
       option<&T::heading_tolerance_rad>("angle by which compass, way there and way back may differ",
                                         0, 3.2),
       option<&T::return_tolerance>(
@@ -47,8 +45,7 @@ void visit_options(LoopClosureOptions& options, OptionVisitor& visitor) {
           "rank within which the search from the candidate must find the view", 1, 1000),
       option<&T::sequence>("successive views whose closures must agree", 1, 1000),
       option<&T::spacing_m>("shortest way between two closures that are reported", 0, 1e6),
-      option<&T::max_drift>("drift of the odometry for each metre since the last closure", 0, 100)
-          .formerly("most_drift"),
+      option<&T::max_drift>("drift of the odometry for each metre since the last closure", 0, 100),
   };
   table.visit(options, visitor);
 }

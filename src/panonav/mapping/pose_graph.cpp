@@ -217,8 +217,7 @@ class Graph {
 void visit_options(PoseGraphOptions& options, OptionVisitor& visitor) {
   using T = PoseGraphOptions;
   constexpr OptionTable table{
-      option<&T::max_iterations>("largest number of steps of the solver", 1, 1000)
-          .formerly("most_iterations"),
+      option<&T::max_iterations>("largest number of steps of the solver", 1, 1000),
       option<&T::settled_m>("the solver has converged when no position changes by more", above(0),
                             1e6),
       option<&T::doubt_deviations>(

@@ -100,8 +100,7 @@ void visit_options(SparseMemoryOptions& options, OptionVisitor& visitor) {
   using T = SparseMemoryOptions;
   constexpr OptionTable table{
       option<&T::max_difference>("largest difference from a kept view at which a view is redundant",
-                                 0, 1)
-          .formerly("most_difference"),
+                                 0, 1),
       option<&T::reach_m>(
           "distance within which a view stands for another, where positions are known", above(0),
           1e6),

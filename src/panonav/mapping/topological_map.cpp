@@ -107,8 +107,7 @@ void visit_options(MappingOptions& options, OptionVisitor& visitor) {
       option<&T::close_loops>("look for places passed before"),
       option<&T::bridge_m>(
           "length of steps that neither views nor wheels show; 0: a new component begins", 0, 1e6),
-      option<&T::wheels>("take steps from the wheels, and the turn from the views, too")
-          .formerly("wheel_lengths"),
+      option<&T::wheels>("take steps from the wheels, and the turn from the views, too"),
       option<&T::step_deviation>("deviation of positions read from views, for each metre", above(0),
                                  10),
       option<&T::turn_deviation>("deviation of headings read from views (rad), for each metre",

@@ -84,8 +84,8 @@ void visit_options(VisualOdometryOptions& options, OptionVisitor& visitor) {
       option<&T::iterations>("times that the home vector is refined", 0, 20),
       option<&T::nearer_side>(
           "take out of turns what things nearer on one side of the way do to them"),
-      option<&T::max_residual>("share of the views' energy that a step may leave unexplained", 0, 1)
-          .formerly("most_residual"),
+      option<&T::max_residual>("share of the views' energy that a step may leave unexplained", 0,
+                               1),
   };
   table.visit(options, visitor);
 }

@@ -13,7 +13,7 @@ void visit_options(SteeringOptions& options, OptionVisitor& visitor) {
   using T = SteeringOptions;
   constexpr OptionTable table{
       option<&T::turn_gain>("share of the error of direction turned in one step", 0.01, 1),
-      option<&T::max_turn_rad>("turned in one step at most", 0.01, 3.2).formerly("most_turn_rad"),
+      option<&T::max_turn_rad>("turned in one step at most", 0.01, 3.2),
       option<&T::travel_gain>("share of the way that is left driven in one step", 0.01, 1),
       option<&T::step_m>("driven in one step at most", 1e-3, 10),
       option<&T::on_spot_rad>("the robot turns on the spot for larger errors of direction", 0.05,
@@ -26,8 +26,7 @@ void visit_options(PathFollowerOptions& options, OptionVisitor& visitor) {
   using T = PathFollowerOptions;
   constexpr OptionTable table{
       option<&T::look_ahead_m>("the robot steers to the place of the path so far ahead", 0.01, 100),
-      option<&T::max_cut_m>("by which the straight way to that place may leave the path", 1e-3, 10)
-          .formerly("most_cut_m"),
+      option<&T::max_cut_m>("by which the straight way to that place may leave the path", 1e-3, 10),
       option<&T::arrived_m>("so near to the end of the path the robot has arrived", 1e-3, 10),
       options_of<&T::steering>(),
   };

@@ -58,8 +58,7 @@ void relative_errors(const std::vector<Pair>& pairs, double distance_m, Trajecto
 void visit_options(TrajectoryErrorOptions& options, OptionVisitor& visitor) {
   using T = TrajectoryErrorOptions;
   constexpr OptionTable table{
-      option<&T::max_gap_s>("longest gap of the truth over which it is interpolated", above(0))
-          .formerly("longest_gap_s"),
+      option<&T::max_gap_s>("longest gap of the truth over which it is interpolated", above(0)),
       option<&T::relative_distance_m>(
           "distance along the true path over which the relative error is taken", above(0)),
       option<&T::align>("align the estimate with the truth first"),

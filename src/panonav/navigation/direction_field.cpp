@@ -16,8 +16,7 @@ void visit_options(FieldOptions& options, OptionVisitor& visitor) {
   constexpr OptionTable table{
       option<&T::links_ahead>("edges ahead that count for a direction", 1, 100),
       option<&T::max_bend_rad>("bend of the way beyond which edges no longer count for a direction",
-                               0, std::numbers::pi)
-          .formerly("most_bend_rad"),
+                               0, std::numbers::pi),
   };
   table.visit(options, visitor);
 }

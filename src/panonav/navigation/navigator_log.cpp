@@ -57,18 +57,15 @@ void visit_options(NavigatorOptions& options, OptionVisitor& visitor) {
       option<&T::views_ahead>("views of the next area that a step loads", 0, 1e6),
       options_of<&T::homing>(),
       option<&T::min_agreeing_steps>(
-          "steps that must agree before another place or a block is believed", 1, 1000)
-          .formerly("agreeing_looks"),
+          "steps that must agree before another place or a block is believed", 1, 1000),
       option<&T::lost_patience>("steps without a known place after which the robot is lost", 1,
                                 1e6),
       option<&T::edge_patience>("steps without coming nearer after which an edge counts as blocked",
-                                1, 1e6)
-          .formerly("passage_patience"),
+                                1, 1e6),
       option<&T::min_leg_m>("shortest way along a recorded route that is worth a leg", above(0),
-                            1000)
-          .formerly("shortest_leg_m"),
+                            1000),
       option<&T::attempts>("times that closed edges, or the last stretch, are tried", 1, 1000),
-      option<&T::max_run_steps>("steps after which a run ends", 1, 1e9).formerly("most_looks"),
+      option<&T::max_run_steps>("steps after which a run ends", 1, 1e9),
   };
   table.visit(options, visitor);
 }

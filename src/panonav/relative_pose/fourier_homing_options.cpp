@@ -16,7 +16,7 @@ void visit_options(FourierHomingOptions& options, OptionVisitor& visitor) {
                                      static_cast<double>(max_starting_estimates)),
       option<&T::displacement_search>("try displacements up to two thirds of R before solving"),
       option<&T::vertical_motion>("rows off the horizon move up and down, too"),
-      option<&T::tilt>("the robot may tilt a little, as on uneven ground").formerly("lean"),
+      option<&T::tilt>("the robot may tilt a little, as on uneven ground"),
   };
   table.visit(options, visitor);
 }

@@ -89,7 +89,7 @@ void visit_options(RouteFitOptions& options, OptionVisitor& visitor) {
   constexpr OptionTable table{
       option<&T::coarse_deg>("smoothing of the lines where a fit starts", 0, 45),
       option<&T::levels>("number of levels from coarse to fine", 1, 8),
-      option<&T::max_steps>("steps at each level", 1, 100).formerly("most_steps"),
+      option<&T::max_steps>("steps at each level", 1, 100),
       option<&T::reach_m>("distance from the prediction beyond which lines are not compared", 0.1,
                           1000),
       option<&T::robust>("give changed parts of the scene less weight"),

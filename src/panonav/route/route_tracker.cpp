@@ -21,14 +21,13 @@ void visit_options(RouteTrackerOptions& options, OptionVisitor& visitor) {
       option<&T::search_lateral_m>(
           "distance between the places beside the path that a search tries", 0.01, 100),
       option<&T::search_sides>("places that a search tries to either side of the path", 0, 100),
-      option<&T::max_candidates>("places that a search fits", 1, 1000).formerly("most_candidates"),
+      option<&T::max_candidates>("places that a search fits", 1, 1000),
       option<&T::recovery_m>("distance by which a prediction may be off", 0, 100),
       option<&T::surprise_m>(
           "distance from the odometry's prediction above which the next line must confirm a place",
           0, 100),
       option<&T::min_correlation>(
-          "correlation from which on a fit is accepted; 0: learnt from the route", 0, 1)
-          .formerly("least_correlation"),
+          "correlation from which on a fit is accepted; 0: learnt from the route", 0, 1),
   };
   table.visit(options, visitor);
 }

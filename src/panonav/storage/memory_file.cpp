@@ -11,7 +11,7 @@
 #include "panonav/storage/internal/memory_file_access.hpp"
 #include "panonav/storage/internal/memory_file_implementation.hpp"
 #include "panonav/storage/internal/memory_rows.hpp"
-#include "panonav/storage/internal/route_tables.hpp"
+#include "panonav/storage/internal/memory_verification.hpp"
 #include "panonav/storage/memory_header.hpp"
 
 namespace panonav {
@@ -51,41 +51,6 @@ void require_view(const NewView& view, SignatureShape shape) {
 
 }  // namespace
 
-ViewId MemoryTables::view_id(std::int64_t number) const {
-  if (number < 1 || number > std::int64_t{UINT32_MAX}) fail_damaged("a view id is out of range");
-  return {static_cast<std::uint32_t>(number)};
-}
-
-Link MemoryTables::checked(const LinkRow& row) const {
-  Link link{row.a, row.b, LinkKind::sequence};
-  if (row.kind < 0 || row.kind > static_cast<int>(LinkKind::closure)) {
-    fail_damaged("a link of unknown kind");
-  }
-  if (link.b <= link.a) {
-    fail_damaged("a link of views " + std::to_string(link.a.value) + " and " +
-                 std::to_string(link.b.value) + "; allowed: the smaller id first");
-  }
-  link.kind = static_cast<LinkKind>(row.kind);
-  if (row.checksum != link_checksum(link)) {
-    fail_damaged("the link of views " + std::to_string(link.a.value) + " and " +
-                 std::to_string(link.b.value) + " does not match its checksum");
-  }
-  return link;
-}
-
-const ViewRow& MemoryTables::checked(const ViewRow& row, SignatureShape shape,
-                                     RecordBytes& scratch) const {
-  if (row.signature.size() != 2 * shape.size() ||
-      row.checksum != view_checksum(scratch, row.id, row.info, row.signature)) {
-    fail_damaged("view " + std::to_string(row.id.value) + " does not match its checksum");
-  }
-  return row;
-}
-
-void MemoryTables::fail_damaged(std::string_view what) const {
-  throw FileError(place().string(), "is damaged: " + std::string(what));
-}
-
 MemoryFile::Implementation::Implementation(std::filesystem::path address_,
                                            std::unique_ptr<MemoryTables> tables_,
                                            MemoryHeader header_)
@@ -114,21 +79,6 @@ void MemoryFile::Implementation::change_info(ViewId view,
     new_checksum = view_checksum(scratch, view, *info, row.signature);
   });
   tables->write_info(view, info.value(), new_checksum);
-}
-
-std::optional<std::vector<std::uint8_t>> MemoryFile::Implementation::bytes(BesideViews table,
-                                                                           ViewId view) {
-  tables->require_views(std::span(&view, 1));
-  auto stored = tables->bytes(table, view);
-  if (!stored) return std::nullopt;
-  if (stored->checksum != bytes_checksum(view, stored->bytes)) {
-    tables->fail_damaged(table == BesideViews::thumbnails
-                             ? "the thumbnail of view " + std::to_string(view.value) +
-                                   " does not match its checksum"
-                             : "the local features of view " + std::to_string(view.value) +
-                                   " do not match their checksum");
-  }
-  return std::move(stored->bytes);
 }
 
 MemoryFile::MemoryFile(std::unique_ptr<Implementation> implementation)
@@ -274,7 +224,7 @@ std::vector<ViewId> MemoryFile::views_with_thumbnail() const {
 }
 
 std::optional<std::vector<std::uint8_t>> MemoryFile::thumbnail(ViewId view) const {
-  return implementation_->bytes(BesideViews::thumbnails, view);
+  return implementation_->tables->checked_bytes(BesideViews::thumbnails, view);
 }
 
 bool MemoryFile::has_features() const {
@@ -282,7 +232,7 @@ bool MemoryFile::has_features() const {
 }
 
 std::optional<std::vector<std::uint8_t>> MemoryFile::features(ViewId view) const {
-  return implementation_->bytes(BesideViews::features, view);
+  return implementation_->tables->checked_bytes(BesideViews::features, view);
 }
 
 void MemoryFile::set_parameter(std::string_view name, std::string_view value) {
@@ -353,67 +303,7 @@ std::vector<Link> MemoryFile::links() const {
 }
 
 std::vector<MemoryFault> MemoryFile::verify() const {
-  MemoryTables& tables = *implementation_->tables;
-  std::vector<MemoryFault> faults;
-  // Whatever goes wrong in one part must not hide the faults of the others.
-  const auto check = [&](std::optional<ViewId> view, const auto& part) {
-    try {
-      part();
-    } catch (const Error& error) {
-      std::string what = error.what();
-      for (const std::string& prefix :
-           {tables.place().string() + ": ", std::string("is damaged: ")}) {
-        if (what.starts_with(prefix)) what.erase(0, prefix.size());
-      }
-      faults.push_back({view, std::move(what)});
-    }
-  };
-  const auto check_part = [&](const std::function<void()>& part) { check(std::nullopt, part); };
-  const auto reading = tables.transaction(MemoryTables::Kind::reading);
-  const std::set<ViewId> views = tables.verify_structure(check_part);
-  check_part([&] { static_cast<void>(header_from(tables.settings())); });
-  for (const ViewId view : views) {
-    check(view, [&] {
-      tables.read_views(std::span(&view, 1), [&](const ViewRow& row) {
-        static_cast<void>(implementation_->checked(row));
-      });
-    });
-  }
-  for (const BesideViews table : {BesideViews::thumbnails, BesideViews::features}) {
-    check_part([&] {
-      for (const ViewId view : tables.views_with(table)) {
-        check(view, [&] {
-          if (!views.contains(view)) {
-            tables.fail_damaged(std::string("an entry of ") +
-                                (table == BesideViews::thumbnails ? "thumbnails" : "features") +
-                                " without a view");
-          }
-          static_cast<void>(implementation_->bytes(table, view));
-        });
-      }
-    });
-  }
-  check_part([&] {
-    std::pair<ViewId, ViewId> before{};
-    tables.read_links([&](const LinkRow& row) {
-      const std::pair ends(row.a, row.b);
-      if (ends <= std::exchange(before, ends)) tables.fail_damaged("links are out of order");
-      check_part([&] {
-        const Link link = tables.checked(row);
-        if (!views.contains(link.a) || !views.contains(link.b)) {
-          tables.fail_damaged("a link of views " + std::to_string(link.a.value) + " and " +
-                              std::to_string(link.b.value) + ", of which one is missing");
-        }
-      });
-    });
-  });
-  check_part([&] {
-    verify_maps(
-        tables, [&](ViewId view) { return views.contains(view); }, check_part);
-  });
-  check_part([&] { verify_routes(tables, check_part); });
-  check_part([&] { static_cast<void>(history()); });
-  return faults;
+  return verify_memory(*implementation_->tables, implementation_->header);
 }
 
 MemoryFileInfo MemoryFile::info() const {

@@ -67,10 +67,11 @@ struct MemoryFault {
 
 /// A change of a memory that was kept so that it can be taken back.
 struct KeptChange {
-  std::string what;               ///< for people
-  std::optional<double> stamp_s;  ///< seconds since 1970-01-01 UTC; empty: an older version made it
-  std::uint64_t bytes = 0;        ///< that are kept for taking it back
-  bool undoable = false;          ///< false: too old, only its description is left
+  std::string what;  ///< for people
+  std::optional<double>
+      stamp_s;              ///< seconds since 1970-01-01 UTC; empty: on a server, which keeps none
+  std::uint64_t bytes = 0;  ///< that are kept for taking it back
+  bool undoable = false;    ///< false: too old, only its description is left
   friend bool operator==(const KeptChange&, const KeptChange&) = default;
 };
 
@@ -83,13 +84,10 @@ struct MemoryFileInfo {
   std::uint64_t thumbnails = 0;           ///< views stored with a picture file
   std::uint64_t views_with_features = 0;  ///< views stored with local features
   std::uint64_t feature_bytes = 0;        ///< packed local features of all views
-  /// Chains of snapshots that an earlier version saved. They are kept, and nothing reads them.
-  /// Counted up to a million.
-  std::uint64_t unused_chains = 0;
-  std::uint64_t maps = 0;        ///< kept by name
-  std::uint64_t routes = 0;      ///< kept by name
-  std::uint64_t file_bytes = 0;  ///< with what is still in the write-ahead log
-  int format_version = 0;        ///< of docs/formats.md, >= 1
+  std::uint64_t maps = 0;                 ///< kept by name
+  std::uint64_t routes = 0;               ///< kept by name
+  std::uint64_t file_bytes = 0;           ///< with what is still in the write-ahead log
+  int format_version = 0;                 ///< of docs/formats.md
   friend bool operator==(const MemoryFileInfo&, const MemoryFileInfo&) = default;
 };
 
@@ -98,16 +96,16 @@ struct MemoryFileInfo {
 /// a password and a lost connection is a FileError. What a changing member function returned for is
 /// still there after the process is killed or the machine loses its power. One process writes at a
 /// time, any number read beside it, each seeing a state between two changes. A damaged or foreign
-/// file or one of a newer version is refused and never changed; the first change of one of an older
-/// version gives it the newest. One object belongs to one thread at a time. All member functions
-/// throw FileError; those that change something leave the file as it was when they throw.
+/// file or one of another format version is refused and never changed. One object belongs to one
+/// thread at a time. All member functions throw FileError; those that change something leave the
+/// file as it was when they throw.
 class MemoryFile {
  public:
   /// Makes an empty memory file, whole or not at all. Throws FileError when something is at `path`
   /// already, ContractError on a header out of range.
   static MemoryFile create(const std::filesystem::path& path, const MemoryHeader& header);
-  /// Throws FileError: missing, no memory file, damaged, newer; no write permission with
-  /// read_write.
+  /// Throws FileError: missing, no memory file, of another format version, damaged; no write
+  /// permission with read_write.
   static MemoryFile open(const std::filesystem::path& path, Access access);
   ~MemoryFile();
   /// What is left of the other may only be destroyed or assigned to.

@@ -1,9 +1,9 @@
 #include "panonav/storage/memory_header.hpp"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <numbers>
 #include <set>
@@ -19,14 +19,6 @@ namespace {
 
 constexpr std::array<std::string_view, 3> kind_names{"panorama", "equirectangular", "mirror"};
 constexpr std::array<std::string_view, 2> direction_names{"clockwise", "counter-clockwise"};
-constexpr std::string_view preprocessing_prefix = "preprocessing.";
-constexpr std::string_view camera_prefix = "source.camera.";
-
-std::string joined(std::string_view a, std::string_view b) {
-  std::string text(a);
-  text += b;
-  return text;
-}
 
 void require_band(const std::optional<ElevationBand>& band, std::string_view field) {
   if (!band) return;
@@ -96,28 +88,124 @@ Image mask_of(const std::vector<std::uint8_t>& bits, ImageSize size) {
   return mask;
 }
 
-class OptionWriter final : public OptionVisitor {
+// Passes options to the members `field` and `choice` of `Fields`.
+template <class Fields>
+class OptionFields : public OptionVisitor {
  public:
-  explicit OptionWriter(Settings& settings) : settings_(settings) {}
-  void visit(const OptionInfo& info, int& value) override { put(info, std::int64_t{value}); }
-  void visit(const OptionInfo& info, double& value) override { put(info, value); }
-  void visit(const OptionInfo& info, bool& value) override { put(info, std::int64_t{value}); }
+  void visit(const OptionInfo& info, int& value) override { fields().field(key(info), value); }
+  void visit(const OptionInfo& info, double& value) override { fields().field(key(info), value); }
+  void visit(const OptionInfo& info, bool& value) override { fields().field(key(info), value); }
   void visit(const OptionInfo& info, std::span<const std::string_view> choices,
              int& value) override {
-    put(info, std::string(choices[static_cast<std::size_t>(value)]));
+    fields().choice(key(info), choices, value);
   }
 
  private:
-  void put(const OptionInfo& info, SettingValue value) {
-    settings_.emplace(joined(preprocessing_prefix, info.name), std::move(value));
+  Fields& fields() { return static_cast<Fields&>(*this); }
+  static std::string key(const OptionInfo& info) {
+    return "preprocessing." + std::string(info.name);
   }
-  Settings& settings_;
 };
 
-// Hands out settings by key and type, and knows which were never asked for.
-class SettingsReader {
+// Writes the fields of a header as settings.
+class SettingsWriter final : public OptionFields<SettingsWriter> {
+ public:
+  void field(const std::string& key, bool value) { put(key, std::int64_t{value}); }
+  void field(const std::string& key, int value) { put(key, std::int64_t{value}); }
+  void field(const std::string& key, double value) { put(key, value); }
+  void field(const std::string& key, float value) { put(key, static_cast<double>(value)); }
+  void field(const std::string& key, const std::vector<double>& value) {
+    put(key, bytes_of(value));
+  }
+  void field(const std::string& key, const std::optional<double>& value) {
+    if (value) put(key, *value);
+  }
+  template <class Enum>
+  void choice(const std::string& key, std::span<const std::string_view> names, Enum value) {
+    put(key, std::string(names[static_cast<std::size_t>(value)]));
+  }
+  template <class Enum>
+  void choice_or(const std::string& key, std::span<const std::string_view> names, Enum value,
+                 Enum usual) {
+    if (value != usual) choice(key, names, value);
+  }
+  void band(const std::string& prefix, const std::optional<ElevationBand>& band) {
+    if (!band) return;
+    put(prefix + "bottom_rad", band->bottom_rad);
+    put(prefix + "top_rad", band->top_rad);
+  }
+  void shape(const std::string& prefix, const std::optional<PanoramaShape>& shape) {
+    if (!shape) return;
+    field(prefix + "rows", shape->rows);
+    field(prefix + "columns", shape->columns);
+  }
+  void model(const std::string& key, const CameraModel& model) {
+    put(key, std::string(model_name(model)));
+  }
+  void options(PreprocessingOptions options) { visit_options(options, *this); }
+
+  void put(const std::string& key, SettingValue value) { settings.emplace(key, std::move(value)); }
+  Settings settings;
+};
+
+// Reads what SettingsWriter wrote, and knows which settings were never read. Every option must be
+// there: a default that changes must not change what a file means.
+class SettingsReader final : public OptionFields<SettingsReader> {
  public:
   explicit SettingsReader(const Settings& settings) : settings_(settings) {}
+
+  void field(const std::string& key, int& value) {
+    const auto number = get<std::int64_t>(key);
+    require(number >= 0 && number <= std::numeric_limits<int>::max(), key,
+            static_cast<double>(number), "0 .. 2^31 - 1");
+    value = static_cast<int>(number);
+  }
+  void field(const std::string& key, bool& value) {
+    int number = 0;
+    field(key, number);
+    value = number != 0;
+  }
+  void field(const std::string& key, double& value) { value = get<double>(key); }
+  void field(const std::string& key, float& value) { value = static_cast<float>(get<double>(key)); }
+  void field(const std::string& key, std::vector<double>& value) {
+    value = doubles_of(get<std::vector<std::uint8_t>>(key));
+  }
+  void field(const std::string& key, std::optional<double>& value) {
+    if (const auto* found = find<double>(key)) value = *found;
+  }
+  template <class Enum>
+  void choice(const std::string& key, std::span<const std::string_view> names, Enum& value) {
+    const auto& name = get<std::string>(key);
+    const auto found = std::ranges::find(names, name);
+    if (found == names.end()) throw ContractError(key, name, "a name in docs/formats.md");
+    value = static_cast<Enum>(found - names.begin());
+  }
+  template <class Enum>
+  void choice_or(const std::string& key, std::span<const std::string_view> names, Enum& value,
+                 Enum usual) {
+    value = usual;
+    if (settings_.contains(key)) choice(key, names, value);
+  }
+  void band(const std::string& prefix, std::optional<ElevationBand>& band) {
+    const auto* bottom = find<double>(prefix + "bottom_rad");
+    const auto* top = find<double>(prefix + "top_rad");
+    if (bottom == nullptr && top == nullptr) return;
+    if (bottom == nullptr || top == nullptr) throw ContractError(prefix, "half", "both or neither");
+    band = ElevationBand{*bottom, *top};
+  }
+  void shape(const std::string& prefix, std::optional<PanoramaShape>& shape) {
+    if (!settings_.contains(prefix + "rows") && !settings_.contains(prefix + "columns")) return;
+    shape.emplace();
+    field(prefix + "rows", shape->rows);
+    field(prefix + "columns", shape->columns);
+  }
+  void model(const std::string& key, CameraModel& model) {
+    const auto& name = get<std::string>(key);
+    const auto found = model_of_name(name);
+    if (!found) throw ContractError(key, name, "a model in docs/formats.md");
+    model = *found;
+  }
+  void options(PreprocessingOptions& options) { visit_options(options, *this); }
 
   template <class Value>
   const Value* find(const std::string& key) {
@@ -125,37 +213,11 @@ class SettingsReader {
     const auto found = settings_.find(key);
     if (found == settings_.end()) return nullptr;
     const Value* value = std::get_if<Value>(&found->second);
-    if (value == nullptr)
+    if (value == nullptr) {
       throw ContractError(key, "of a wrong type", "the type in docs/formats.md");
+    }
     return value;
   }
-  template <class Value>
-  const Value& get(const std::string& key) {
-    const Value* value = find<Value>(key);
-    if (value == nullptr) throw ContractError(key, "missing", "one value");
-    return *value;
-  }
-  int integer(const std::string& key) {
-    const auto value = get<std::int64_t>(key);
-    require(value >= 0 && value <= std::numeric_limits<int>::max(), key, static_cast<double>(value),
-            "0 .. 2^31 - 1");
-    return static_cast<int>(value);
-  }
-  std::size_t choice(const std::string& key, std::span<const std::string_view> names) {
-    const auto& name = get<std::string>(key);
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      if (names[i] == name) return i;
-    }
-    throw ContractError(key, name, "a name in docs/formats.md");
-  }
-  std::optional<ElevationBand> band(const std::string& prefix) {
-    const auto* bottom = find<double>(prefix + "bottom_rad");
-    const auto* top = find<double>(prefix + "top_rad");
-    if (bottom == nullptr && top == nullptr) return std::nullopt;
-    if (bottom == nullptr || top == nullptr) throw ContractError(prefix, "half", "both or neither");
-    return ElevationBand{*bottom, *top};
-  }
-  bool has(const std::string& key) const { return settings_.contains(key); }
   void require_all_used() const {
     for (const auto& [key, value] : settings_) {
       if (!key.starts_with("parameter.") && !key.starts_with("synchronised.") &&
@@ -166,95 +228,61 @@ class SettingsReader {
   }
 
  private:
+  template <class Value>
+  const Value& get(const std::string& key) {
+    const Value* value = find<Value>(key);
+    if (value == nullptr) throw ContractError(key, "missing", "one value");
+    return *value;
+  }
   const Settings& settings_;
   std::set<std::string> used_;
 };
 
-// Every option must be there: a default that changes must not change what a file means.
-class OptionReader final : public OptionVisitor {
- public:
-  explicit OptionReader(SettingsReader& reader) : reader_(reader) {}
-  void visit(const OptionInfo& info, int& value) override { value = reader_.integer(key(info)); }
-  void visit(const OptionInfo& info, double& value) override {
-    value = reader_.get<double>(key(info));
+// The one list from which settings are written and read: `Fields` is a SettingsWriter with a const
+// camera, or a SettingsReader.
+template <class Fields, class AnyCamera>
+void visit_camera(Fields& fields, AnyCamera& camera) {
+  const std::string prefix = "source.camera.";
+  fields.model(prefix + "model", camera.model);
+  visit_parameters(camera.model, [&](const std::string& name, auto& value) {
+    fields.field(prefix + name, value);
+  });
+  if (auto* unified = std::get_if<UnifiedModel>(&camera.model)) {
+    fields.choice_or(prefix + "axis", view_axis_names, unified->axis, ViewAxis::down);
   }
-  void visit(const OptionInfo& info, bool& value) override {
-    value = reader_.integer(key(info)) != 0;
-  }
-  void visit(const OptionInfo& info, std::span<const std::string_view> choices,
-             int& value) override {
-    value = static_cast<int>(reader_.choice(key(info), choices));
-  }
-
- private:
-  std::string key(const OptionInfo& info) const {
-    const std::string former = joined(preprocessing_prefix, info.former);
-    return reader_.has(former) ? former : joined(preprocessing_prefix, info.name);
-  }
-  SettingsReader& reader_;
-};
-
-void put_band(Settings& settings, const std::string& prefix,
-              const std::optional<ElevationBand>& band) {
-  if (!band) return;
-  settings.emplace(prefix + "bottom_rad", band->bottom_rad);
-  settings.emplace(prefix + "top_rad", band->top_rad);
+  fields.field(prefix + "width_px", camera.image_size.width);
+  fields.field(prefix + "height_px", camera.image_size.height);
+  fields.field(prefix + "centre_u_px", camera.centre.u_px);
+  fields.field(prefix + "centre_v_px", camera.centre.v_px);
+  fields.field(prefix + "rim_radius_px", camera.rim_radius_px);
+  fields.field(prefix + "inner_radius_px", camera.inner_radius_px);
+  fields.choice(prefix + "direction", direction_names, camera.direction);
+  fields.field(prefix + "forward_angle_rad", camera.forward_angle_rad);
+  fields.field(prefix + "forward_column", camera.forward_column);
 }
 
-void put_camera(Settings& settings, const Camera& camera) {
-  const auto put = [&](std::string_view key, SettingValue value) {
-    settings.emplace(joined(camera_prefix, key), std::move(value));
-  };
-  put("model", std::string(model_name(camera.model)));
-  visit_parameters(camera.model, [&](std::string_view name, const auto& value) {
-    if constexpr (std::is_same_v<std::remove_cvref_t<decltype(value)>, double>) {
-      put(name, value);
-    } else {
-      put(name, bytes_of(value));
-    }
-  });
-  // A key that programs before it do not know: only where they would misread the camera.
-  if (const auto* unified = std::get_if<UnifiedModel>(&camera.model);
-      unified != nullptr && unified->axis != ViewAxis::down) {
-    put("axis", std::string(view_axis_names[static_cast<std::size_t>(unified->axis)]));
-  }
-  put("width_px", std::int64_t{camera.image_size.width});
-  put("height_px", std::int64_t{camera.image_size.height});
-  put("centre_u_px", camera.centre.u_px);
-  put("centre_v_px", camera.centre.v_px);
-  put("rim_radius_px", camera.rim_radius_px);
-  put("inner_radius_px", camera.inner_radius_px);
-  put("direction", std::string(direction_names[static_cast<std::size_t>(camera.direction)]));
-  put("forward_angle_rad", camera.forward_angle_rad);
-  put("forward_column", camera.forward_column);
+// The same of all of the header but the camera and its mask.
+template <class Fields, class Header>
+void visit_header(Fields& fields, Header& header) {
+  fields.field("rows", header.shape.rows);
+  fields.field("components", header.shape.components);
+  fields.field("full_scale", header.full_scale);
+  fields.field("panorama_columns", header.panorama_columns);
+  fields.band("elevation_", header.elevations);
+  fields.field("created_s", header.created_s);
+  fields.options(header.preprocessing);
+  auto& source = header.source;
+  fields.choice("source.kind", kind_names, source.kind);
+  fields.choice("source.direction", direction_names, source.layout.direction);
+  fields.field("source.forward_column", source.layout.forward_column);
+  fields.band("source.elevation_", source.layout.elevations);
+  fields.band("source.kept_elevation_", source.layout.kept_elevations);
+  fields.shape("source.picture_", header.picture_shape);
 }
 
-Camera camera_from(SettingsReader& reader) {
-  const auto key = [](std::string_view name) { return joined(camera_prefix, name); };
-  Camera camera;
-  const auto& name = reader.get<std::string>(key("model"));
-  const auto model = model_of_name(name);
-  if (!model) throw ContractError(key("model"), name, "a model in docs/formats.md");
-  camera.model = *model;
-  visit_parameters(camera.model, [&](std::string_view parameter, auto& value) {
-    if constexpr (std::is_same_v<std::remove_cvref_t<decltype(value)>, double>) {
-      value = reader.get<double>(key(parameter));
-    } else {
-      value = doubles_of(reader.get<std::vector<std::uint8_t>>(key(parameter)));
-    }
-  });
-  if (auto* unified = std::get_if<UnifiedModel>(&camera.model);
-      unified != nullptr && reader.has(key("axis"))) {
-    unified->axis = static_cast<ViewAxis>(reader.choice(key("axis"), view_axis_names));
-  }
-  camera.image_size = {reader.integer(key("width_px")), reader.integer(key("height_px"))};
-  camera.centre = {reader.get<double>(key("centre_u_px")), reader.get<double>(key("centre_v_px"))};
-  camera.rim_radius_px = reader.get<double>(key("rim_radius_px"));
-  camera.inner_radius_px = reader.get<double>(key("inner_radius_px"));
-  camera.direction = static_cast<ColumnDirection>(reader.choice(key("direction"), direction_names));
-  camera.forward_angle_rad = reader.get<double>(key("forward_angle_rad"));
-  camera.forward_column = reader.get<double>(key("forward_column"));
-  return camera;
+void require_camera(const Camera& camera) {
+  require_picture(camera.image_size.height, camera.image_size.width, "height_px", "width_px");
+  validate(camera);
 }
 
 }  // namespace
@@ -285,11 +313,7 @@ void validate(const MemoryHeader& header) {
     require(header.picture_shape->columns >= 4, "picture columns", header.picture_shape->columns,
             ">= 4");
   }
-  if (source.camera) {
-    require_picture(source.camera->image_size.height, source.camera->image_size.width, "height_px",
-                    "width_px");
-    validate(*source.camera);
-  }
+  if (source.camera) require_camera(*source.camera);
   if (source.mask && (!source.camera || source.mask->channels() != 1 ||
                       source.mask->size() != source.camera->image_size)) {
     throw ContractError(
@@ -303,61 +327,22 @@ void validate(const MemoryHeader& header) {
 }
 
 Settings settings_of(const MemoryHeader& header) {
-  Settings settings;
-  settings.emplace("rows", std::int64_t{header.shape.rows});
-  settings.emplace("components", std::int64_t{header.shape.components});
-  settings.emplace("full_scale", static_cast<double>(header.full_scale));
-  settings.emplace("panorama_columns", std::int64_t{header.panorama_columns});
-  put_band(settings, "elevation_", header.elevations);
-  if (header.created_s) settings.emplace("created_s", *header.created_s);
-  OptionWriter writer(settings);
-  PreprocessingOptions preprocessing = header.preprocessing;
-  visit_options(preprocessing, writer);
-
+  SettingsWriter writer;
+  visit_header(writer, header);
   const PictureSource& source = header.source;
-  settings.emplace("source.kind", std::string(kind_names[static_cast<std::size_t>(source.kind)]));
-  settings.emplace("source.direction",
-                   std::string(direction_names[static_cast<std::size_t>(source.layout.direction)]));
-  settings.emplace("source.forward_column", source.layout.forward_column);
-  put_band(settings, "source.elevation_", source.layout.elevations);
-  put_band(settings, "source.kept_elevation_", source.layout.kept_elevations);
-  if (header.picture_shape) {
-    settings.emplace("source.picture_rows", std::int64_t{header.picture_shape->rows});
-    settings.emplace("source.picture_columns", std::int64_t{header.picture_shape->columns});
-  }
-  if (source.camera) put_camera(settings, *source.camera);
-  if (source.mask) settings.emplace("source.mask", bits_of(*source.mask));
-  return settings;
+  if (source.camera) visit_camera(writer, *source.camera);
+  if (source.mask) writer.put("source.mask", bits_of(*source.mask));
+  return std::move(writer.settings);
 }
 
 MemoryHeader header_from(const Settings& settings) {
   SettingsReader reader(settings);
   MemoryHeader header;
-  header.shape = {reader.integer("rows"), reader.integer("components")};
-  header.full_scale = static_cast<float>(reader.get<double>("full_scale"));
-  header.panorama_columns = reader.integer("panorama_columns");
-  header.elevations = reader.band("elevation_");
-  if (const auto* created = reader.find<double>("created_s")) header.created_s = *created;
-  OptionReader options(reader);
-  visit_options(header.preprocessing, options);
-
+  visit_header(reader, header);
   PictureSource& source = header.source;
-  source.kind = static_cast<PictureKind>(reader.choice("source.kind", kind_names));
-  source.layout.direction =
-      static_cast<ColumnDirection>(reader.choice("source.direction", direction_names));
-  source.layout.forward_column = reader.get<double>("source.forward_column");
-  source.layout.elevations = reader.band("source.elevation_");
-  source.layout.kept_elevations = reader.band("source.kept_elevation_");
-  if (reader.find<std::int64_t>("source.picture_rows") != nullptr ||
-      reader.find<std::int64_t>("source.picture_columns") != nullptr) {
-    header.picture_shape = PanoramaShape{reader.integer("source.picture_rows"),
-                                         reader.integer("source.picture_columns")};
-  }
   if (source.kind == PictureKind::mirror) {
-    source.camera = camera_from(reader);
-    require_picture(source.camera->image_size.height, source.camera->image_size.width, "height_px",
-                    "width_px");
-    validate(*source.camera);
+    visit_camera(reader, source.camera.emplace());
+    require_camera(*source.camera);
     if (const auto* mask = reader.find<std::vector<std::uint8_t>>("source.mask")) {
       source.mask = mask_of(*mask, source.camera->image_size);
     }

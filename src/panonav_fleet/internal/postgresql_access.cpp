@@ -14,21 +14,20 @@ namespace panonav::fleet {
 MemoriesConnection connect_to_memories(const ServerAddress& address, bool make_schema) {
   PostgresqlConnection connection(address);
   int version = schema_version(connection);
-  if (version < postgresql_schema_version && make_schema &&
-      (version == 0 || may_migrate_schema(connection))) {
-    migrate_schema(connection);
-    version = postgresql_schema_version;
+  if (version == 0 && make_schema) {
+    create_schema_if_missing(connection);
+    version = schema_version(connection);
   }
-  if (version > postgresql_schema_version) {
-    throw FileError(address.shown.native(), "was made by a newer version: schema version is " +
-                                                std::to_string(version) + "; allowed: 1 .. " +
-                                                std::to_string(postgresql_schema_version));
+  if (version != 0 && version != postgresql_schema_version) {
+    throw FileError(address.shown.native(),
+                    "has schema version " + std::to_string(version) +
+                        "; allowed: " + std::to_string(postgresql_schema_version));
   }
-  return {std::move(connection), version};
+  return {std::move(connection), version != 0};
 }
 
 std::optional<FoundMemory> find_memory(MemoriesConnection& memories, const ServerAddress& address) {
-  if (memories.schema_version == 0) return std::nullopt;
+  if (!memories.has_schema) return std::nullopt;
   PostgresqlValues values;
   values.add(std::string_view(address.memory));
   if (address.fleet) values.add(std::string_view(*address.fleet));

@@ -23,6 +23,17 @@ void add_info(Fields& fields, const ReferenceInfo& info) {
       .add(info.stamp_s);
 }
 
+/// The same fields of a row, from column `first` on.
+[[nodiscard]] inline ReferenceInfo info_in(const PostgresqlRows& rows, int row, int first) {
+  ReferenceInfo info;
+  info.name = rows.text(row, first);
+  const auto x_m = rows.real(row, first + 1);
+  const auto y_m = rows.real(row, first + 2);
+  if (x_m && y_m) info.pose = ReferencePose{*x_m, *y_m, rows.real(row, first + 3)};
+  info.stamp_s = rows.real(row, first + 4);
+  return info;
+}
+
 [[nodiscard]] inline std::vector<std::int64_t> numbers_of(std::span<const ViewId> views) {
   std::vector<std::int64_t> numbers;
   for (const ViewId view : views) numbers.push_back(view.value);
@@ -134,6 +145,7 @@ class PostgresqlTables final : public MemoryTables {
   }
   [[nodiscard]] ViewRow view_in(const Rows& rows) const;
   [[nodiscard]] std::vector<std::string> texts(const std::string& sql);
+  void make_incoming_table_if_needed();
   void changed_rows(const Rows& rows);
   void notify();
 
@@ -152,12 +164,11 @@ struct FoundMemory {
   std::string channel;
 };
 
-/// A connection to a database with the schema. With `make_schema` it is made where there is none,
-/// and an older one is brought to this version where the login may; otherwise it may be older.
-/// Throws FileError on a newer one.
+/// A connection to a database of memories. With `make_schema` the schema is made where there is
+/// none. Throws FileError on a schema of another version.
 struct MemoriesConnection {
   PostgresqlConnection connection;
-  int schema_version = 0;  ///< 0: there is none
+  bool has_schema = false;
 };
 [[nodiscard]] MemoriesConnection connect_to_memories(const ServerAddress& address,
                                                      bool make_schema);

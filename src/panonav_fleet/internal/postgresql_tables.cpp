@@ -106,16 +106,7 @@ void PostgresqlTables::notify() {
 }
 
 ViewRow PostgresqlTables::view_in(const Rows& rows) const {
-  ViewRow view;
-  view.id = id_in(rows, 0, 0);
-  view.info.name = rows.text(0, 1);
-  const auto x_m = rows.real(0, 2);
-  const auto y_m = rows.real(0, 3);
-  if (x_m && y_m) view.info.pose = ReferencePose{*x_m, *y_m, rows.real(0, 4)};
-  view.info.stamp_s = rows.real(0, 5);
-  view.signature = rows.bytes(0, 6);
-  view.checksum = rows.integer(0, 7);
-  return view;
+  return {id_in(rows, 0, 0), info_in(rows, 0, 1), rows.bytes(0, 6), rows.integer(0, 7)};
 }
 
 std::vector<std::string> PostgresqlTables::texts(const std::string& sql) {
@@ -225,21 +216,24 @@ std::int64_t PostgresqlTables::session() {
   return *session_;
 }
 
+// COPY does not look at rows' owners (row-level security), so new views are first brought to a
+// table of the connection's own.
+void PostgresqlTables::make_incoming_table_if_needed() {
+  if (has_incoming_) return;
+  connection_.execute(
+      "CREATE TEMPORARY TABLE IF NOT EXISTS panonav_incoming(id bigint, name text COLLATE \"C\", "
+      "x_m double precision, y_m double precision, heading_rad double precision, stamp_s double "
+      "precision, signature bytea, checksum bigint, thumbnail bytea, thumbnail_checksum bigint, "
+      "features bytea, features_checksum bigint) ON COMMIT DELETE ROWS;"
+      "ALTER TABLE pg_temp.panonav_incoming ALTER signature SET STORAGE PLAIN, ALTER thumbnail "
+      "SET STORAGE EXTERNAL, ALTER features SET STORAGE EXTERNAL");
+  has_incoming_ = true;
+}
+
 void PostgresqlTables::insert(std::span<const ViewId> ids, std::span<const NewView> views) {
   if (views.empty()) return;
   session();
-  // COPY does not look at rows' owners (row-level security), so they are first brought to a table
-  // of the connection's own.
-  if (!has_incoming_) {
-    connection_.execute(
-        "CREATE TEMPORARY TABLE IF NOT EXISTS panonav_incoming(id bigint, name text COLLATE \"C\", "
-        "x_m double precision, y_m double precision, heading_rad double precision, stamp_s double "
-        "precision, signature bytea, checksum bigint, thumbnail bytea, thumbnail_checksum bigint, "
-        "features bytea, features_checksum bigint) ON COMMIT DELETE ROWS;"
-        "ALTER TABLE pg_temp.panonav_incoming ALTER signature SET STORAGE PLAIN, ALTER thumbnail "
-        "SET STORAGE EXTERNAL, ALTER features SET STORAGE EXTERNAL");
-    has_incoming_ = true;
-  }
+  make_incoming_table_if_needed();
   const std::string memory = std::to_string(memory_);
   std::vector<std::uint8_t> signature;
   RecordBytes scratch;

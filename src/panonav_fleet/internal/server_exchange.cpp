@@ -56,14 +56,6 @@ const std::string block_of_l = "l.a >> " + std::to_string(block_bits);
 
 std::unique_ptr<ServerExchange> ServerExchange::connect(const ServerAddress& address) {
   MemoriesConnection memories = connect_to_memories(address, true);
-  if (memories.schema_version < postgresql_schema_version) {
-    throw FileError(
-        address.shown.native(),
-        "cannot be synchronised: the schema's version is " +
-            std::to_string(memories.schema_version) +
-            "; allowed: " + std::to_string(postgresql_schema_version) +
-            ", to which the owner of the schema brings it by opening a memory to write");
-  }
   const auto found = find_memory(memories, address);
   if (!found) return nullptr;
   return std::unique_ptr<ServerExchange>(
@@ -90,17 +82,21 @@ PostgresqlValues ServerExchange::values() const {
   return values;
 }
 
-// id, name, x_m, y_m, heading_rad, stamp_s, checksum
+// The columns are those of `server_view_fields`.
 ServerView ServerExchange::view_in(const PostgresqlRows& rows, int row) const {
-  ServerView view;
-  view.id = id_in(rows, row, 0);
-  view.info.name = rows.text(row, 1);
-  const auto x_m = rows.real(row, 2);
-  const auto y_m = rows.real(row, 3);
-  if (x_m && y_m) view.info.pose = ReferencePose{*x_m, *y_m, rows.real(row, 4)};
-  view.info.stamp_s = rows.real(row, 5);
-  view.checksum = rows.integer(row, 6);
-  return view;
+  return {id_in(rows, row, 0), info_in(rows, row, 1), rows.integer(row, 6)};
+}
+
+std::vector<ServerView> ServerExchange::views_in(const PostgresqlRows& rows) const {
+  std::vector<ServerView> views;
+  for (int i = 0; i < rows.size(); ++i) views.push_back(view_in(rows, i));
+  return views;
+}
+
+std::map<ViewId, std::int64_t> ServerExchange::checksums_in(const PostgresqlRows& rows) const {
+  std::map<ViewId, std::int64_t> checksums;
+  for (int i = 0; i < rows.size(); ++i) checksums.emplace(id_in(rows, i, 0), rows.integer(i, 1));
+  return checksums;
 }
 
 void ServerExchange::refuse_removed() const {
@@ -145,38 +141,32 @@ std::vector<Upload> ServerExchange::settled_uploads(const std::string& file,
                        values().add(std::string_view(file)).add(Numbers(numbers))));
 }
 
+constexpr const char* server_view_fields =
+    "SELECT v.id, v.name, v.x_m, v.y_m, v.heading_rad, v.stamp_s, v.checksum";
+
 std::vector<ServerView> ServerExchange::named(std::span<const std::string> names) {
-  std::vector<ServerView> views;
-  if (names.empty()) return views;
-  const PostgresqlRows rows = connection().run(
-      "SELECT id, name, x_m, y_m, heading_rad, stamp_s, checksum FROM panonav.views WHERE memory = "
-      "$1 AND name = ANY($2)",
-      values().add(names));
-  for (int i = 0; i < rows.size(); ++i) views.push_back(view_in(rows, i));
-  return views;
+  if (names.empty()) return {};
+  return views_in(
+      connection().run(std::string(server_view_fields) +
+                           " FROM panonav.views v WHERE v.memory = $1 AND v.name = ANY($2)",
+                       values().add(names)));
 }
 
 std::vector<ServerView> ServerExchange::infos(std::span<const ViewId> ids) {
-  std::vector<ServerView> views;
-  if (ids.empty()) return views;
+  if (ids.empty()) return {};
   const auto numbers = numbers_of(ids);
-  const PostgresqlRows rows = connection().run(
-      "SELECT id, name, x_m, y_m, heading_rad, stamp_s, checksum FROM panonav.views WHERE memory = "
-      "$1 AND id = ANY($2) ORDER BY id",
-      values().add(Numbers(numbers)));
-  for (int i = 0; i < rows.size(); ++i) views.push_back(view_in(rows, i));
-  return views;
+  return views_in(connection().run(
+      std::string(server_view_fields) +
+          " FROM panonav.views v WHERE v.memory = $1 AND v.id = ANY($2) ORDER BY v.id",
+      values().add(Numbers(numbers))));
 }
 
 std::map<ViewId, std::int64_t> ServerExchange::checksums(std::span<const ViewId> views) {
-  std::map<ViewId, std::int64_t> checksums;
-  if (views.empty()) return checksums;
+  if (views.empty()) return {};
   const auto numbers = numbers_of(views);
-  const PostgresqlRows rows =
+  return checksums_in(
       connection().run("SELECT id, checksum FROM panonav.views WHERE memory = $1 AND id = ANY($2)",
-                       values().add(Numbers(numbers)));
-  for (int i = 0; i < rows.size(); ++i) checksums.emplace(id_in(rows, i, 0), rows.integer(i, 1));
-  return checksums;
+                       values().add(Numbers(numbers))));
 }
 
 Blocks ServerExchange::view_blocks(const KeptAreas& areas) {
@@ -190,16 +180,13 @@ Blocks ServerExchange::view_blocks(const KeptAreas& areas) {
 
 std::map<ViewId, std::int64_t> ServerExchange::checksums_in(const KeptAreas& areas,
                                                             std::span<const std::int64_t> blocks) {
-  std::map<ViewId, std::int64_t> checksums;
-  if (blocks.empty()) return checksums;
+  if (blocks.empty()) return {};
   PostgresqlValues given = values();
   add_areas(given, areas);
-  const PostgresqlRows rows =
-      connection().run("SELECT v.id, v.checksum FROM " + kept_views(areas) + " AND " + block_of_v +
-                           " = ANY(" + (areas ? "$4)" : "$2)"),
-                       given.add(blocks));
-  for (int i = 0; i < rows.size(); ++i) checksums.emplace(id_in(rows, i, 0), rows.integer(i, 1));
-  return checksums;
+  return checksums_in(connection().run("SELECT v.id, v.checksum FROM " + kept_views(areas) +
+                                           " AND " + block_of_v + " = ANY(" +
+                                           (areas ? "$4)" : "$2)"),
+                                       given.add(blocks)));
 }
 
 Blocks ServerExchange::link_blocks(const KeptAreas& areas) {
@@ -247,10 +234,11 @@ std::vector<WholeServerView> ServerExchange::whole(std::span<const ViewId> ids) 
   const auto numbers = numbers_of(ids);
   RecordBytes scratch;
   connection().stream(
-      "SELECT v.id, v.name, v.x_m, v.y_m, v.heading_rad, v.stamp_s, v.checksum, v.signature, "
-      "t.bytes, t.checksum, f.bytes, f.checksum FROM panonav.views v LEFT JOIN panonav.thumbnails "
-      "t ON t.memory = v.memory AND t.view = v.id LEFT JOIN panonav.features f ON f.memory = "
-      "v.memory AND f.view = v.id WHERE v.memory = $1 AND v.id = ANY($2) ORDER BY v.id",
+      std::string(server_view_fields) +
+          ", v.signature, t.bytes, t.checksum, f.bytes, f.checksum FROM panonav.views v "
+          "LEFT JOIN panonav.thumbnails t ON t.memory = v.memory AND t.view = v.id "
+          "LEFT JOIN panonav.features f ON f.memory = v.memory AND f.view = v.id "
+          "WHERE v.memory = $1 AND v.id = ANY($2) ORDER BY v.id",
       values().add(Numbers(numbers)), [&](const PostgresqlRows& rows) {
         ServerView found = view_in(rows, 0);
         const auto signature = rows.bytes(0, 7);

@@ -61,8 +61,7 @@ using KeptAreas = std::optional<std::vector<MemoryArea>>;
 /// interface does. Within transactions of `tables()`.
 class ServerExchange {
  public:
-  /// Empty when there is no such memory. Throws FileError when the schema is older and this login
-  /// may not bring it to this version.
+  /// Empty when there is no such memory. Throws FileError as `connect_to_memories`.
   [[nodiscard]] static std::unique_ptr<ServerExchange> connect(const ServerAddress& address);
 
   [[nodiscard]] PostgresqlTables& tables() noexcept { return tables_; }
@@ -140,6 +139,8 @@ class ServerExchange {
   [[noreturn]] void refuse_removed() const;
   [[nodiscard]] std::vector<Upload> uploads_in(const PostgresqlRows& rows) const;
   [[nodiscard]] ServerView view_in(const PostgresqlRows& rows, int row) const;
+  [[nodiscard]] std::vector<ServerView> views_in(const PostgresqlRows& rows) const;
+  [[nodiscard]] std::map<ViewId, std::int64_t> checksums_in(const PostgresqlRows& rows) const;
   [[nodiscard]] ViewId id_in(const PostgresqlRows& rows, int row, int column) const {
     return tables_.view_id(rows.integer(row, column));
   }

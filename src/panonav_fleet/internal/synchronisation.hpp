@@ -73,6 +73,13 @@ class Synchronisation {
   /// What there is to upload, under names that are free on the server; noted in the file before it
   /// is sent.
   void prepare();
+  /// Finds what has changed in the file and this login may upload: the views with their names. Sets
+  /// `removed_`.
+  std::map<ViewId, std::string> find_local_changes();
+  /// Views of the server that have one of these names, by name.
+  std::map<std::string, ServerView> views_with_names(const std::map<ViewId, std::string>& names);
+  /// Notes in the file that the view is being sent, or that the server already has it as `same`.
+  void note_as_sent(ViewId view, const LocalRow& row, const ServerView* same);
   [[nodiscard]] bool is_at(ViewId view, ViewId server_view) const;
   /// Whether the view of that name on the server is this one, which nothing is known of yet: their
   /// signatures are the same.
@@ -106,6 +113,13 @@ class Synchronisation {
   std::set<ViewId> lost_by_server(const std::vector<ViewId>& gone);
   void take_changes(const std::vector<ViewId>& gone, const std::set<ViewId>& lost,
                     const std::vector<ServerView>& changes, const std::vector<ViewId>& reused);
+  /// Removes views that are gone on the server, and forgets ids that it gave again or lost. Returns
+  /// whether the file lost any.
+  bool remove_from_file(const std::vector<ViewId>& gone, const std::set<ViewId>& lost,
+                        const std::vector<ViewId>& reused);
+  /// Gives views of the file the names, poses and stamps of the server. Returns whether there were
+  /// any.
+  bool update_in_file(const std::vector<ServerView>& changes);
   /// A view of the file that has a name of the server's gets another one, which is none of those
   /// that are to come; the next synchronisation uploads it.
   void make_way(const std::string& name, std::optional<ViewId> but,

@@ -118,6 +118,15 @@ void Synchronisation::take_changes(const std::vector<ViewId>& gone, const std::s
                                    const std::vector<ViewId>& reused) {
   if (gone.empty() && changes.empty() && reused.empty()) return;
   const auto writing = change_file();
+  const bool removed = remove_from_file(gone, lost, reused);
+  const bool updated = update_in_file(changes);
+  if (removed || updated) clear_recordings();
+  commit(*writing);
+}
+
+bool Synchronisation::remove_from_file(const std::vector<ViewId>& gone,
+                                       const std::set<ViewId>& lost,
+                                       const std::vector<ViewId>& reused) {
   std::vector<ViewId> removed;
   for (const ViewId id : gone) {
     const ViewId view = by_server_.at(id);
@@ -140,14 +149,16 @@ void Synchronisation::take_changes(const std::vector<ViewId>& gone, const std::s
   forget_in_maps(file_, removed);
   for (const ViewId view : removed) local_.erase(view);
   report_.removed_in_file += removed.size();
+  return !removed.empty();
+}
 
+bool Synchronisation::update_in_file(const std::vector<ServerView>& changes) {
   struct Change {
     ViewId view;
     const ServerView* there;
     LocalRow row;
   };
   std::vector<Change> taken;
-  std::set<ViewId> moving;
   for (const ServerView& there : changes) {
     const ViewId view = by_server_.at(there.id);
     auto row = read_row(view);
@@ -157,7 +168,6 @@ void Synchronisation::take_changes(const std::vector<ViewId>& gone, const std::s
       ++report_.updated_in_file;
     }
     taken.push_back({view, &there, std::move(*row)});
-    moving.insert(view);
   }
   // Names that views give each other are free in between.
   for (const Change& change : taken) {
@@ -177,8 +187,7 @@ void Synchronisation::take_changes(const std::vector<ViewId>& gone, const std::s
     next.sent.reset();
     put(change.view, next);
   }
-  if (!removed.empty() || !taken.empty()) clear_recordings();
-  commit(*writing);
+  return !taken.empty();
 }
 
 void Synchronisation::make_way(const std::string& name, std::optional<ViewId> but,

@@ -43,35 +43,61 @@ void Synchronisation::take_answer(SynchronisedView& row, const Upload& upload,
   row.sent.reset();
 }
 
-void Synchronisation::prepare() {
-  std::vector<ViewId> wanted;
+std::map<ViewId, std::string> Synchronisation::find_local_changes() {
+  std::vector<ViewId> changed;
   removed_.clear();
   for (const auto& [view, checksum] : local_) {
     const auto row = views_.find(view);
     const bool is_new = row == views_.end();
     if (!is_new && row->second.local_checksum == checksum) continue;
-    if (is_new ? server_.may_add() : server_.may_change()) wanted.push_back(view);
+    if (is_new ? server_.may_add() : server_.may_change()) changed.push_back(view);
   }
   for (const auto& [view, row] : views_) {
     if (!local_.contains(view) && server_.may_change()) removed_.push_back(view);
   }
   std::map<ViewId, std::string> names;
-  {
-    const auto reading = file_.transaction(Kind::reading);
-    local_ = read_view_checksums(file_);
-    for (const ViewId view : wanted) {
-      if (const auto row = read_row(view)) names[view] = row->info.name;
-    }
+  const auto reading = file_.transaction(Kind::reading);
+  local_ = read_view_checksums(file_);
+  for (const ViewId view : changed) {
+    if (const auto row = read_row(view)) names[view] = row->info.name;
   }
+  return names;
+}
+
+std::map<std::string, ServerView> Synchronisation::views_with_names(
+    const std::map<ViewId, std::string>& names) {
+  std::vector<std::string> asked;
+  for (const auto& [view, name] : names) asked.push_back(name);
+  std::map<std::string, ServerView> views;
+  in_parts(asked, rows_at_once, [&](std::span<const std::string> part) {
+    for (ServerView& view : server_.named(part)) views[view.info.name] = std::move(view);
+  });
+  return views;
+}
+
+void Synchronisation::note_as_sent(ViewId view, const LocalRow& row, const ServerView* same) {
+  const auto known = views_.find(view);
+  SynchronisedView next;
+  if (known != views_.end()) {
+    next = known->second;
+    next.sent = sent_;
+  } else if (same != nullptr && adopts(view, *same)) {
+    next = adopted(view, row, same->id, same->info, same->checksum);
+  } else {
+    next.local_checksum = local_.at(view);
+    next.signature = signature_checksum(row.signature);
+    next.sent = sent_;
+  }
+  put(view, next);
+}
+
+void Synchronisation::prepare() {
+  const std::map<ViewId, std::string> names = find_local_changes();
   std::map<std::string, ServerView> taken;
   std::map<ViewId, std::string> new_names;
   {
     const auto reading = server_.tables().transaction(Kind::reading);
-    std::vector<std::string> asked;
-    for (const auto& [view, name] : names) asked.push_back(name);
-    in_parts(asked, rows_at_once, [&](std::span<const std::string> part) {
-      for (ServerView& view : server_.named(part)) taken[view.info.name] = std::move(view);
-    });
+    taken = views_with_names(names);
     std::vector<std::pair<ViewId, std::string>> nameless;
     for (const auto& [view, name] : names) {
       const auto other = taken.find(name);
@@ -94,20 +120,8 @@ void Synchronisation::prepare() {
       write_info(view, row->info, row->signature);
       ++report_.renamed;
     }
-    const auto known = views_.find(view);
-    SynchronisedView next;
-    if (known != views_.end()) {
-      next = known->second;
-      next.sent = sent_;
-    } else if (const auto same = taken.find(name);
-               same != taken.end() && adopts(view, same->second)) {
-      next = adopted(view, *row, same->second.id, same->second.info, same->second.checksum);
-    } else {
-      next.local_checksum = local_.at(view);
-      next.signature = signature_checksum(row->signature);
-      next.sent = sent_;
-    }
-    put(view, next);
+    const auto same = taken.find(name);
+    note_as_sent(view, *row, same == taken.end() ? nullptr : &same->second);
   }
   if (report_.renamed > 0) clear_recordings();
   commit(*writing);

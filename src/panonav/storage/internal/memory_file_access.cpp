@@ -103,42 +103,25 @@ Database open_memory_database(const fs::path& path, Access access) {
   }
 }
 
-// Gives a checked file of an older version or in another journal mode what changes need.
+// Gives a checked file in another journal mode what changes need.
 void prepare_for_changes(Database& database) {
-  const auto require_alone = [&](bool alone) {
-    if (!alone) {
-      throw FileError(database.path().string(),
-                      "is being used by another program; its first change by this version needs "
-                      "it alone");
-    }
-  };
-  const bool older = format_version(database) < memory_format_version;
-  if (older) {
-    Transaction transaction(database, Transaction::Kind::writing);
-    upgrade_schema(database);
-    transaction.commit();
+  Statement mode(database, "PRAGMA journal_mode=WAL");
+  if (!mode.step() || mode.text(0) != "wal") {
+    throw FileError(database.path().string(),
+                    "is being used by another program; its first change needs it alone");
   }
-  {
-    Statement mode(database, "PRAGMA journal_mode=WAL");
-    require_alone(mode.step() && mode.text(0) == "wal");
-  }
-  // The marks must be in the file itself before its log holds anything else.
-  if (older) require_alone(database.integer("PRAGMA wal_checkpoint(TRUNCATE)") == 0);
+  mode.reset();
   database.watch_name();
 }
 
-}  // namespace
+[[noreturn]] void refuse_existing(const fs::path& path) {
+  throw FileError(path.string(), "is there already; allowed: a name that is free");
+}
 
-void make_memory_tables(const fs::path& path, const MemoryHeader& header,
-                        const std::function<void(MemoryTables&)>& fill) {
-  validate(header);
-  if (const auto scheme = find_memory_scheme(path)) return scheme->create(path, header, fill);
+void require_free_name(const fs::path& path) {
   std::error_code ignored;
   const std::string name = path.string();
-  const auto refuse_existing = [&] {
-    throw FileError(name, "is there already; allowed: a name that is free");
-  };
-  if (fs::exists(fs::symlink_status(path, ignored))) refuse_existing();
+  if (fs::exists(fs::symlink_status(path, ignored))) refuse_existing(path);
   const fs::path folder = folder_of(path);
   if (!fs::is_directory(folder, ignored)) {
     throw FileError(name, "cannot be made: there is no folder " + folder.string());
@@ -154,7 +137,27 @@ void make_memory_tables(const fs::path& path, const MemoryHeader& header,
                                 " of an earlier file of that name is in the way");
     }
   }
+}
 
+// A link refuses a name that was taken meanwhile; a rename would replace that file.
+void give_name(const fs::path& unfinished, const fs::path& path) {
+  if (::link(unfinished.c_str(), path.c_str()) != 0) {
+    if (errno == EEXIST) refuse_existing(path);
+    if ((errno != EPERM && errno != EOPNOTSUPP && errno != ENOSYS) ||
+        ::rename(unfinished.c_str(), path.c_str()) != 0) {
+      throw FileError(path.string(), "cannot be made: " + cause());
+    }
+  }
+  sync_folder(folder_of(path));
+}
+
+}  // namespace
+
+void make_memory_tables(const fs::path& path, const MemoryHeader& header,
+                        const std::function<void(MemoryTables&)>& fill) {
+  validate(header);
+  if (const auto scheme = find_memory_scheme(path)) return scheme->create(path, header, fill);
+  require_free_name(path);
   const TemporaryFile unfinished(path);
   remove_beside(unfinished.path());
   try {
@@ -177,15 +180,7 @@ void make_memory_tables(const fs::path& path, const MemoryHeader& header,
     remove_beside(unfinished.path());
     throw;
   }
-  // A link refuses a name that was taken meanwhile; a rename would replace that file.
-  if (::link(unfinished.path().c_str(), path.c_str()) != 0) {
-    if (errno == EEXIST) refuse_existing();
-    if ((errno != EPERM && errno != EOPNOTSUPP && errno != ENOSYS) ||
-        ::rename(unfinished.path().c_str(), path.c_str()) != 0) {
-      throw FileError(name, "cannot be made: " + cause());
-    }
-  }
-  sync_folder(folder);
+  give_name(unfinished.path(), path);
 }
 
 OpenedMemory open_memory_tables(const fs::path& path, Access access) {

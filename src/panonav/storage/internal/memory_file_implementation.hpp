@@ -22,8 +22,6 @@ struct MemoryFile::Implementation {
   void append_row(const ViewRow& row, VisualMemory& memory);
   /// Within a transaction. Throws as `refuse_view`.
   void change_info(ViewId view, const std::function<void(ReferenceInfo&)>& change);
-  /// Checked. Throws as `refuse_view`.
-  [[nodiscard]] std::optional<std::vector<std::uint8_t>> bytes(BesideViews table, ViewId view);
 
   std::filesystem::path address;  ///< as it was opened; it may hold a password
   std::unique_ptr<MemoryTables> tables;

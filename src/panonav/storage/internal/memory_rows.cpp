@@ -74,11 +74,11 @@ std::int64_t setting_checksum(std::string_view key, const SettingValue& value) {
   return static_cast<std::int64_t>(checksum(record.bytes()));
 }
 
-std::int64_t undo_checksum(std::string_view what, std::optional<double> stamp_s,
+std::int64_t undo_checksum(std::string_view what, double stamp_s,
                            std::span<const std::uint8_t> changes) {
   RecordBytes record;
   record.add(what);
-  if (stamp_s) record.add(*stamp_s);
+  record.add(stamp_s);
   return static_cast<std::int64_t>(checksum(changes, checksum(record.bytes())));
 }
 

@@ -35,9 +35,8 @@ void pack_signature(const PackedSignature& signature, std::vector<std::uint8_t>&
 [[nodiscard]] std::int64_t bytes_checksum(ViewId view, std::span<const std::uint8_t> bytes);
 [[nodiscard]] std::int64_t link_checksum(const Link& link);
 [[nodiscard]] std::int64_t setting_checksum(std::string_view key, const SettingValue& value);
-/// Of the change that can be undone.
-/// `stamp_s`: when it was made; versions 5 and 6 do not say.
-[[nodiscard]] std::int64_t undo_checksum(std::string_view what, std::optional<double> stamp_s,
+/// Of a change that can be undone; `stamp_s` says when it was made.
+[[nodiscard]] std::int64_t undo_checksum(std::string_view what, double stamp_s,
                                          std::span<const std::uint8_t> changes);
 
 /// Throws the ContractError for a view that is not in the file.

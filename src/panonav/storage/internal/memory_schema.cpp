@@ -25,78 +25,48 @@ namespace {
 struct Table {
   std::string_view name;
   const char* sql;  // as SQLite keeps it
-  int since;        // version of the format
 };
 
 // Links have a < b. Every checksum is XXH64 over the other fields of its row (docs/formats.md). The
-// table `log` comes first, so that new files have it on their second page.
-constexpr std::array<Table, 13> tables{{
+// table `log` comes first, so that it lies on the second page of every file.
+constexpr std::array<Table, 12> tables{{
     {"log",
-     "CREATE TABLE log(id INTEGER PRIMARY KEY, before BLOB NOT NULL, now BLOB NOT NULL) STRICT", 5},
-    {"undo",
-     "CREATE TABLE undo(id INTEGER PRIMARY KEY, what TEXT NOT NULL, changes BLOB NOT NULL, "
-     "checksum INTEGER NOT NULL) STRICT",
-     5},
+     "CREATE TABLE log(id INTEGER PRIMARY KEY, before BLOB NOT NULL, now BLOB NOT NULL) STRICT"},
     {"features",
      "CREATE TABLE features(view INTEGER PRIMARY KEY, features BLOB NOT NULL, checksum INTEGER NOT "
-     "NULL) STRICT",
-     6},
+     "NULL) STRICT"},
     {"history",
-     "CREATE TABLE history(id INTEGER PRIMARY KEY, what TEXT NOT NULL, stamp_s REAL, changes BLOB, "
-     "checksum INTEGER NOT NULL) STRICT",
-     7},
+     "CREATE TABLE history(id INTEGER PRIMARY KEY, what TEXT NOT NULL, stamp_s REAL NOT NULL, "
+     "changes BLOB, checksum INTEGER NOT NULL) STRICT"},
     {"links",
      "CREATE TABLE links(a INTEGER NOT NULL, b INTEGER NOT NULL, kind INTEGER NOT NULL, checksum "
-     "INTEGER NOT NULL, PRIMARY KEY(a, b)) STRICT, WITHOUT ROWID",
-     1},
+     "INTEGER NOT NULL, PRIMARY KEY(a, b)) STRICT, WITHOUT ROWID"},
     {"settings",
      "CREATE TABLE settings(key TEXT NOT NULL PRIMARY KEY, value ANY NOT NULL, checksum INTEGER "
-     "NOT NULL) STRICT, WITHOUT ROWID",
-     1},
+     "NOT NULL) STRICT, WITHOUT ROWID"},
     {"synchronised",
      "CREATE TABLE synchronised(view INTEGER PRIMARY KEY, server_view INTEGER, local_checksum "
      "INTEGER NOT NULL, server_checksum INTEGER NOT NULL, signature INTEGER NOT NULL, uploaded "
-     "INTEGER NOT NULL, sent INTEGER, checksum INTEGER NOT NULL) STRICT",
-     8},
+     "INTEGER NOT NULL, sent INTEGER, checksum INTEGER NOT NULL) STRICT"},
     {"synchronised_links",
      "CREATE TABLE synchronised_links(a INTEGER NOT NULL, b INTEGER NOT NULL, kind INTEGER NOT "
-     "NULL, checksum INTEGER NOT NULL, PRIMARY KEY(a, b)) STRICT, WITHOUT ROWID",
-     8},
+     "NULL, checksum INTEGER NOT NULL, PRIMARY KEY(a, b)) STRICT, WITHOUT ROWID"},
     {"thumbnails",
      "CREATE TABLE thumbnails(view INTEGER PRIMARY KEY, picture BLOB NOT NULL, checksum INTEGER "
-     "NOT NULL) STRICT",
-     1},
+     "NOT NULL) STRICT"},
     {"views",
      "CREATE TABLE views(id INTEGER PRIMARY KEY AUTOINCREMENT, name TEXT NOT NULL UNIQUE, x_m "
      "REAL, y_m REAL, heading_rad REAL, stamp_s REAL, signature BLOB NOT NULL, checksum INTEGER "
-     "NOT NULL) STRICT",
-     1},
+     "NOT NULL) STRICT"},
     {"maps",
      "CREATE TABLE maps(name TEXT NOT NULL PRIMARY KEY, nodes BLOB NOT NULL, edges BLOB NOT NULL, "
-     "checksum INTEGER NOT NULL) STRICT, WITHOUT ROWID",
-     3},
+     "checksum INTEGER NOT NULL) STRICT, WITHOUT ROWID"},
     {"route_blocks",
      "CREATE TABLE route_blocks(route TEXT NOT NULL, number INTEGER NOT NULL, lines BLOB NOT NULL, "
-     "checksum INTEGER NOT NULL, PRIMARY KEY(route, number)) STRICT, WITHOUT ROWID",
-     4},
+     "checksum INTEGER NOT NULL, PRIMARY KEY(route, number)) STRICT, WITHOUT ROWID"},
     {"routes",
      "CREATE TABLE routes(name TEXT NOT NULL PRIMARY KEY, columns INTEGER NOT NULL, lines INTEGER "
-     "NOT NULL, checksum INTEGER NOT NULL) STRICT, WITHOUT ROWID",
-     4},
-}};
-// Of versions 2 to 4; files that were one of these keep them. Nothing writes or reads them any
-// more.
-constexpr std::array<Table, 2> chain_tables{{
-    {"chain_snapshots",
-     "CREATE TABLE chain_snapshots(chain TEXT NOT NULL, number INTEGER NOT NULL, travelled_m REAL "
-     "NOT NULL, x_m REAL NOT NULL, y_m REAL NOT NULL, heading_rad REAL NOT NULL, coefficients BLOB "
-     "NOT NULL, checksum INTEGER NOT NULL, PRIMARY KEY(chain, number)) STRICT, WITHOUT ROWID",
-     2},
-    {"chains",
-     "CREATE TABLE chains(name TEXT NOT NULL PRIMARY KEY, rows INTEGER NOT NULL, components "
-     "INTEGER NOT NULL, elevation_bottom_rad REAL, elevation_top_rad REAL, snapshots INTEGER NOT "
-     "NULL, checksum INTEGER NOT NULL) STRICT, WITHOUT ROWID",
-     2},
+     "NOT NULL, checksum INTEGER NOT NULL) STRICT, WITHOUT ROWID"},
 }};
 
 // What SQLite adds by itself: the last id of the views, and the index of their names.
@@ -160,81 +130,49 @@ void require_memory_file(const std::filesystem::path& path) {
                               "; allowed: " + hexadecimal(memory_application_id));
   }
   const std::uint32_t version = big_endian(head.data() + 60);
-  if (version > static_cast<std::uint32_t>(memory_format_version)) {
-    throw FileError(name, "was made by a newer version: format version is " +
-                              std::to_string(version) + "; allowed: 1 .. " +
-                              std::to_string(memory_format_version));
+  if (version != static_cast<std::uint32_t>(memory_format_version)) {
+    throw FileError(name, "has format version " + std::to_string(version) +
+                              "; allowed: " + std::to_string(memory_format_version));
   }
-  if (version == 0)
-    throw FileError(name, "is damaged: format version is 0; allowed: 1 .. " +
-                              std::to_string(memory_format_version));
-}
-
-int format_version(Database& database) {
-  return static_cast<int>(database.integer("PRAGMA user_version"));
 }
 
 void create_schema(Database& database) {
   database.execute(("PRAGMA application_id=" + std::to_string(memory_application_id)).c_str());
-  upgrade_schema(database);
+  for (const Table& table : tables) database.execute(table.sql);
+  database.execute("INSERT INTO log VALUES(1, zeroblob(16), randomblob(16))");
+  database.execute(("PRAGMA user_version=" + std::to_string(memory_format_version)).c_str());
   database.execute(links_index);
 }
 
-void upgrade_schema(Database& database) {
-  const int version = format_version(database);
-  for (const Table& table : tables) {
-    if (version < table.since) database.execute(table.sql);
-  }
-  if (version < 5) database.execute("INSERT INTO log VALUES(1, zeroblob(16), randomblob(16))");
-  // A row without a stamp has the same checksum in both.
-  if (version == 5 || version == 6) {
-    database.execute(
-        "INSERT INTO history(what, changes, checksum) SELECT what, changes, checksum FROM undo");
-    database.execute("DELETE FROM undo");
-  }
-  database.execute(("PRAGMA user_version=" + std::to_string(memory_format_version)).c_str());
-}
-
-bool has_chain_tables(Database& database) {
-  return database.integer("SELECT count(*) FROM sqlite_schema WHERE name = 'chains'") > 0;
-}
-
 void require_schema(Database& database) {
-  const int version = format_version(database);
   struct Entry {
     std::string_view type, table, sql;
   };
-  std::map<std::string_view, Entry> wanted{
+  std::map<std::string_view, Entry> missing{
       {"sqlite_sequence", {"table", "sqlite_sequence", sequence}},
       {names_index, {"index", "views", ""}},
       {"links_b", {"index", "links", links_index}}};
-  const auto want = [&](const Table& table) {
-    if (table.since <= version) wanted[table.name] = {"table", table.name, table.sql};
-  };
-  for (const Table& table : tables) want(table);
-  for (const Table& table : chain_tables) want(table);
+  for (const Table& table : tables) missing[table.name] = {"table", table.name, table.sql};
   const auto fail = [&](std::string_view type, std::string_view name, const char* what) {
     database.fail_damaged(std::string(type) + " " + std::string(name.substr(0, 60)) + " " + what);
   };
-  // An entry is taken out when it is found, so that a second one of its name is not wanted.
+  // An entry is erased when it is found, so that a second one of its name is refused.
   Statement rows(database,
                  "SELECT type, name, tbl_name, coalesce(sql, ''), rootpage FROM sqlite_schema");
   std::set<std::int64_t> pages{1};
   while (rows.step()) {
-    const auto found = wanted.find(rows.text(1));
-    if (found == wanted.end()) fail(rows.text(0), rows.text(1), "is no part of a memory");
+    const auto found = missing.find(rows.text(1));
+    if (found == missing.end()) fail(rows.text(0), rows.text(1), "is no part of a memory");
     const Entry& entry = found->second;
     if (rows.text(0) != entry.type || rows.text(2) != entry.table || rows.text(3) != entry.sql ||
         !pages.insert(rows.integer(4)).second) {
       fail(entry.type, found->first, "is not as it was made");
     }
-    wanted.erase(found);
+    missing.erase(found);
   }
-  if (version >= 5 && wanted.contains("chains") && wanted.contains("chain_snapshots")) {
-    for (const Table& table : chain_tables) wanted.erase(table.name);
-  }
-  for (const auto& [name, entry] : wanted)
+  for (const auto& [name, entry] : missing) {
     fail(entry.type, name, "is missing or not as it was made");
+  }
 }
 
 Settings read_settings(Database& database) {

@@ -68,7 +68,6 @@ enum class BesideViews { thumbnails, features };
 /// Where the rows of one memory are kept: an SQLite file or a PostgreSQL server. What the rows mean
 /// and what is refused is decided above (`MemoryFile`, map_tables.hpp, route_tables.hpp), once.
 /// Everything that the database refuses is thrown as a FileError of one line that names the memory.
-/// What an older file has no table for is empty.
 class MemoryTables {
  public:
   enum class Kind { reading, writing };
@@ -143,6 +142,10 @@ class MemoryTables {
   [[nodiscard]] virtual std::vector<ViewId> views_with(BesideViews table) = 0;
   [[nodiscard]] virtual bool has_any(BesideViews table) = 0;
   [[nodiscard]] virtual std::optional<StoredBytes> bytes(BesideViews table, ViewId view) = 0;
+  /// The same bytes, checked. Throws as `refuse_view`, and FileError when they do not match their
+  /// checksum.
+  [[nodiscard]] std::optional<std::vector<std::uint8_t>> checked_bytes(BesideViews table,
+                                                                       ViewId view);
 
   /// With a < b; a pair that is there gets the new kind.
   virtual void write_links(std::span<const Link> links) = 0;

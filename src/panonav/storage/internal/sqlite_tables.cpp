@@ -94,10 +94,6 @@ ViewRow SqliteTables::view_in(const Statement& row) const {
   return view;
 }
 
-bool SqliteTables::has(BesideViews table) {
-  return table == BesideViews::thumbnails || has_feature_table(database_);
-}
-
 std::vector<std::string> SqliteTables::texts(const char* sql) {
   std::vector<std::string> texts;
   Statement rows(database_, sql);
@@ -180,11 +176,8 @@ void SqliteTables::remove(std::span<const ViewId> views) {
   std::vector<Statement> statements;
   for (const char* sql :
        {"DELETE FROM links WHERE a = ?1 OR b = ?1", "DELETE FROM thumbnails WHERE view = ?",
-        "DELETE FROM views WHERE id = ?"}) {
+        "DELETE FROM features WHERE view = ?", "DELETE FROM views WHERE id = ?"}) {
     statements.emplace_back(database_, sql);
-  }
-  if (has(BesideViews::features)) {
-    statements.emplace_back(database_, "DELETE FROM features WHERE view = ?");
   }
   for (const ViewId view : views) {
     for (Statement& statement : statements) {
@@ -298,14 +291,12 @@ std::vector<PositionRow> SqliteTables::views_within(const PositionBounds& bounds
 }
 
 bool SqliteTables::has_any(BesideViews table) {
-  if (!has(table)) return false;
   const std::string sql = "SELECT EXISTS (SELECT 1 FROM " + std::string(name_of(table)) + ")";
   return database_.integer(sql.c_str()) != 0;
 }
 
 std::vector<ViewId> SqliteTables::views_with(BesideViews table) {
   std::vector<ViewId> views;
-  if (!has(table)) return views;
   const std::string sql = "SELECT view FROM " + std::string(name_of(table)) + " ORDER BY view";
   Statement rows(database_, sql.c_str());
   while (rows.step()) {
@@ -319,7 +310,6 @@ std::vector<ViewId> SqliteTables::views_with(BesideViews table) {
 }
 
 std::optional<StoredBytes> SqliteTables::bytes(BesideViews table, ViewId view) {
-  if (!has(table)) return std::nullopt;
   Statement row(database_, table == BesideViews::thumbnails
                                ? "SELECT picture, checksum FROM thumbnails WHERE view = ?"
                                : "SELECT features, checksum FROM features WHERE view = ?");
@@ -366,7 +356,6 @@ void SqliteTables::write_map(std::string_view name, const MapRow& row) {
 }
 
 std::optional<MapRow> SqliteTables::map(std::string_view name) {
-  if (!has_map_table(database_)) return std::nullopt;
   Statement row(database_, "SELECT nodes, edges, checksum FROM maps WHERE name = ?");
   if (!row.bind(1, name).step()) return std::nullopt;
   return MapRow{copy_of(row.blob(0)), copy_of(row.blob(1)), row.integer(2)};
@@ -378,7 +367,6 @@ void SqliteTables::erase_map(std::string_view name) {
 }
 
 std::vector<std::string> SqliteTables::map_names() {
-  if (!has_map_table(database_)) return {};
   return texts("SELECT name FROM maps ORDER BY name");
 }
 
@@ -392,7 +380,6 @@ void SqliteTables::write_route(std::string_view name, const RouteRow& row) {
 }
 
 std::optional<RouteRow> SqliteTables::route(std::string_view name) {
-  if (!has_route_tables(database_)) return std::nullopt;
   Statement row(database_, "SELECT columns, lines, checksum FROM routes WHERE name = ?");
   if (!row.bind(1, name).step()) return std::nullopt;
   return RouteRow{row.integer(0), row.integer(1), row.integer(2)};
@@ -407,7 +394,6 @@ void SqliteTables::erase_route(std::string_view name) {
 }
 
 std::vector<std::string> SqliteTables::route_names() {
-  if (!has_route_tables(database_)) return {};
   return texts("SELECT name FROM routes ORDER BY name");
 }
 
@@ -431,20 +417,17 @@ std::optional<StoredBytes> SqliteTables::block(std::string_view route, std::int6
 }
 
 std::int64_t SqliteTables::blocks(std::string_view route) {
-  if (!has_route_tables(database_)) return 0;
   Statement count(database_, "SELECT count(*) FROM route_blocks WHERE route = ?");
   return count.bind(1, route).step() ? count.integer(0) : 0;
 }
 
 std::int64_t SqliteTables::route_bytes(std::string_view route) {
-  if (!has_route_tables(database_)) return 0;
   Statement sum(database_,
                 "SELECT coalesce(sum(length(lines)), 0) FROM route_blocks WHERE route = ?");
   return sum.bind(1, route).step() ? sum.integer(0) : 0;
 }
 
 std::vector<std::string> SqliteTables::routes_with_blocks() {
-  if (!has_route_tables(database_)) return {};
   return texts("SELECT DISTINCT route FROM route_blocks");
 }
 
@@ -465,10 +448,8 @@ std::set<ViewId> SqliteTables::verify_structure(const Check& check) {
     });
   }
   check([&] { static_cast<void>(last_id()); });
-  if (has_synchronised_tables(database_)) {
-    check([&] { static_cast<void>(read_synchronised_views(*this)); });
-    check([&] { static_cast<void>(read_synchronised_links(*this)); });
-  }
+  check([&] { static_cast<void>(read_synchronised_views(*this)); });
+  check([&] { static_cast<void>(read_synchronised_links(*this)); });
   // From the table and from the index of the names: a view that either has lost is found in the
   // other.
   std::set<ViewId> views;
@@ -494,18 +475,12 @@ MemoryFileInfo SqliteTables::info() {
   info.views_with_heading = count("SELECT count(heading_rad) FROM views WHERE id > 0");
   info.links = count("SELECT count(*) FROM links WHERE a > 0");
   info.thumbnails = count("SELECT count(*) FROM thumbnails WHERE view > 0");
-  if (has_feature_table(database_)) {
-    info.views_with_features = count("SELECT count(*) FROM features WHERE view > 0");
-    info.feature_bytes =
-        count("SELECT coalesce(sum(length(features)), 0) FROM features WHERE view > 0");
-  }
-  if (has_chain_tables(database_)) {
-    info.unused_chains = count("SELECT count(*) FROM (SELECT 1 FROM chains LIMIT 1000000)");
-  }
-  if (has_map_table(database_)) info.maps = count("SELECT count(*) FROM maps WHERE name > ''");
-  if (has_route_tables(database_))
-    info.routes = count("SELECT count(*) FROM routes WHERE name > ''");
-  info.format_version = static_cast<int>(database_.integer("PRAGMA user_version"));
+  info.views_with_features = count("SELECT count(*) FROM features WHERE view > 0");
+  info.feature_bytes =
+      count("SELECT coalesce(sum(length(features)), 0) FROM features WHERE view > 0");
+  info.maps = count("SELECT count(*) FROM maps WHERE name > ''");
+  info.routes = count("SELECT count(*) FROM routes WHERE name > ''");
+  info.format_version = memory_format_version;
   for (const char* suffix : {"", "-wal"}) {
     std::filesystem::path file = database_.path();
     file += suffix;

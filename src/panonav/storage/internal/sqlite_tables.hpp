@@ -77,8 +77,6 @@ class SqliteTables final : public MemoryTables {
   [[nodiscard]] ViewId id_in(const Statement& row, int column) const;
   [[nodiscard]] ViewRow view_in(const Statement& row) const;
   void insert_beside(BesideViews table, ViewId view, std::span<const std::uint8_t> bytes);
-  /// Whether a file of this version has the table.
-  [[nodiscard]] bool has(BesideViews table);
   [[nodiscard]] std::vector<std::string> texts(const char* sql);
   /// What the bounds of `MemoryFile::change` drop.
   void shorten_history();

@@ -15,7 +15,6 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/storage/internal/memory_rows.hpp"
-#include "panonav/storage/internal/memory_schema.hpp"
 #include "panonav/storage/internal/sqlite_tables.hpp"
 
 namespace panonav {
@@ -42,19 +41,9 @@ struct SqliteBytes {
   }
 };
 
-// Columns: id, what, stamp_s, changes, checksum. Versions 5 and 6 keep one change, without a stamp.
-std::string select_history(Database& database, const char* order) {
-  if (!has_undo_table(database)) return "";
-  return (has_history_table(database)
-              ? "SELECT id, what, stamp_s, changes, checksum FROM history ORDER BY id "
-              : "SELECT id, what, NULL, changes, checksum FROM undo ORDER BY id ") +
-         std::string(order);
-}
-
-std::optional<double> stamp_in(const Statement& row) {
-  if (row.is_null(2)) return std::nullopt;
-  return row.real(2);
-}
+// The newest change first.
+constexpr const char* select_history =
+    "SELECT id, what, stamp_s, changes, checksum FROM history ORDER BY id DESC";
 
 // Empty also where they are kept no more.
 std::span<const std::uint8_t> changes_in(const Statement& row) {
@@ -65,7 +54,7 @@ std::span<const std::uint8_t> changes_in(const Statement& row) {
 // The next change, checked.
 bool step_checked(Database& database, Statement& row) {
   if (!row.step()) return false;
-  if (row.integer(4) != undo_checksum(row.text(1), stamp_in(row), changes_in(row))) {
+  if (row.integer(4) != undo_checksum(row.text(1), row.real(2), changes_in(row))) {
     database.fail_damaged("a change that can be undone does not match its checksum");
   }
   return true;
@@ -126,7 +115,7 @@ void SqliteTables::shorten_history() {
   struct Old {
     std::int64_t id;
     std::string what;
-    std::optional<double> stamp_s;
+    double stamp_s;
   };
   std::vector<Old> old;
   std::vector<std::int64_t> gone;
@@ -142,7 +131,7 @@ void SqliteTables::shorten_history() {
       if (level >= MemoryFile::max_history) {
         gone.push_back(row.integer(0));
       } else if (is_kept && !fits) {
-        old.push_back({row.integer(0), std::string(row.text(1)), stamp_in(row)});
+        old.push_back({row.integer(0), std::string(row.text(1)), row.real(2)});
       }
     }
   }
@@ -156,13 +145,11 @@ void SqliteTables::shorten_history() {
 }
 
 std::vector<KeptChange> SqliteTables::history() {
-  const std::string sql = select_history(database_, "DESC");
   std::vector<KeptChange> changes;
-  if (sql.empty()) return changes;
-  Statement row(database_, sql.c_str());
+  Statement row(database_, select_history);
   while (step_checked(database_, row)) {
     changes.push_back(
-        {std::string(row.text(1)), stamp_in(row), changes_in(row).size(), !row.is_null(3)});
+        {std::string(row.text(1)), row.real(2), changes_in(row).size(), !row.is_null(3)});
   }
   return changes;
 }
@@ -170,7 +157,7 @@ std::vector<KeptChange> SqliteTables::history() {
 void SqliteTables::undo() {
   std::int64_t id = 0;
   {
-    Statement row(database_, select_history(database_, "DESC LIMIT 1").c_str());
+    Statement row(database_, select_history);
     if (!step_checked(database_, row) || row.is_null(3)) fail_damaged("table history");
     id = row.integer(0);
     const auto changes = row.blob(3);

@@ -56,8 +56,7 @@ std::optional<Marks> marks_in(std::span<const std::uint8_t> page) {
   return marks;
 }
 
-// Empty: a file of a version without marks.
-std::optional<FileMark> mark_of(const fs::path& file) {
+FileMark mark_of(const fs::path& file) {
   Database database(file, DatabaseMode::immutable);
   // A writer that was killed while the log went into the file may have left it shorter than its
   // first page says; with this, SQLite reads it nevertheless.
@@ -65,7 +64,7 @@ std::optional<FileMark> mark_of(const fs::path& file) {
   database.execute("PRAGMA writable_schema=ON");
   Statement root(database,
                  "SELECT rootpage FROM sqlite_schema WHERE type = 'table' AND name = 'log'");
-  if (!root.step()) return std::nullopt;
+  if (!root.step()) database.fail_damaged("table log is missing");
   const std::int64_t page = root.integer(0);
   root.reset();
   Statement row(database, "SELECT now FROM log WHERE id = 1");
@@ -151,11 +150,11 @@ class LogReader {
 
 bool is_own(const fs::path& file, const fs::path& log) {
   const auto mark = mark_of(file);
-  const auto content = LogReader(log).read_all(mark ? mark->page : 0);
+  const auto content = LogReader(log).read_all(mark.page);
   if (content.changes == 0) return true;  // SQLite finds nothing in it either
-  if (!mark || !content.starts_with_mark) return false;
-  return mark->now == content.marks.front().before ||
-         std::ranges::any_of(content.marks, [&](const Marks& m) { return m.now == mark->now; });
+  if (!content.starts_with_mark) return false;
+  return mark.now == content.marks.front().before ||
+         std::ranges::any_of(content.marks, [&](const Marks& m) { return m.now == mark.now; });
 }
 
 }  // namespace

@@ -1,0 +1,61 @@
+#include "panonav/storage/internal/memory_tables.hpp"
+
+#include <string>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/storage/internal/memory_rows.hpp"
+
+namespace panonav {
+
+ViewId MemoryTables::view_id(std::int64_t number) const {
+  if (number < 1 || number > std::int64_t{UINT32_MAX}) fail_damaged("a view id is out of range");
+  return {static_cast<std::uint32_t>(number)};
+}
+
+Link MemoryTables::checked(const LinkRow& row) const {
+  Link link{row.a, row.b, LinkKind::sequence};
+  if (row.kind < 0 || row.kind > static_cast<int>(LinkKind::closure)) {
+    fail_damaged("a link of unknown kind");
+  }
+  if (link.b <= link.a) {
+    fail_damaged("a link of views " + std::to_string(link.a.value) + " and " +
+                 std::to_string(link.b.value) + "; allowed: the smaller id first");
+  }
+  link.kind = static_cast<LinkKind>(row.kind);
+  if (row.checksum != link_checksum(link)) {
+    fail_damaged("the link of views " + std::to_string(link.a.value) + " and " +
+                 std::to_string(link.b.value) + " does not match its checksum");
+  }
+  return link;
+}
+
+const ViewRow& MemoryTables::checked(const ViewRow& row, SignatureShape shape,
+                                     RecordBytes& scratch) const {
+  if (row.signature.size() != 2 * shape.size() ||
+      row.checksum != view_checksum(scratch, row.id, row.info, row.signature)) {
+    fail_damaged("view " + std::to_string(row.id.value) + " does not match its checksum");
+  }
+  return row;
+}
+
+void MemoryTables::fail_damaged(std::string_view what) const {
+  throw FileError(place().string(), "is damaged: " + std::string(what));
+}
+
+std::optional<std::vector<std::uint8_t>> MemoryTables::checked_bytes(BesideViews table,
+                                                                     ViewId view) {
+  require_views(std::span(&view, 1));
+  auto stored = bytes(table, view);
+  if (!stored) return std::nullopt;
+  if (stored->checksum != bytes_checksum(view, stored->bytes)) {
+    fail_damaged(table == BesideViews::thumbnails
+                     ? "the thumbnail of view " + std::to_string(view.value) +
+                           " does not match its checksum"
+                     : "the local features of view " + std::to_string(view.value) +
+                           " do not match their checksum");
+  }
+  return std::move(stored->bytes);
+}
+
+}  // namespace panonav

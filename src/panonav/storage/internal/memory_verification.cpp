@@ -1,0 +1,103 @@
+#include "panonav/storage/internal/memory_verification.hpp"
+
+#include <functional>
+#include <set>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/storage/internal/map_tables.hpp"
+#include "panonav/storage/internal/route_tables.hpp"
+
+namespace panonav {
+
+namespace {
+
+// Runs parts of a check and collects what they throw, so that no fault hides another.
+class MemoryVerification {
+ public:
+  MemoryVerification(MemoryTables& tables, const MemoryHeader& header)
+      : tables_(tables), header_(header) {}
+
+  std::vector<MemoryFault> run() {
+    const auto reading = tables_.transaction(MemoryTables::Kind::reading);
+    const MemoryTables::Check check_part = [this](const auto& part) { check(part); };
+    views_ = tables_.verify_structure(check_part);
+    check([&] { static_cast<void>(header_from(tables_.settings())); });
+    verify_views();
+    for (const BesideViews table : {BesideViews::thumbnails, BesideViews::features}) {
+      check([&] { verify_bytes(table); });
+    }
+    check([&] { verify_links(); });
+    const auto is_known = [&](ViewId view) { return views_.contains(view); };
+    check([&] { verify_maps(tables_, is_known, check_part); });
+    check([&] { verify_routes(tables_, check_part); });
+    check([&] { static_cast<void>(tables_.history()); });
+    return std::move(faults_);
+  }
+
+ private:
+  void check(const std::function<void()>& part, std::optional<ViewId> view = std::nullopt) {
+    try {
+      part();
+    } catch (const Error& error) {
+      std::string what = error.what();
+      for (const std::string& prefix :
+           {tables_.place().string() + ": ", std::string("is damaged: ")}) {
+        if (what.starts_with(prefix)) what.erase(0, prefix.size());
+      }
+      faults_.push_back({view, std::move(what)});
+    }
+  }
+
+  void verify_views() {
+    RecordBytes scratch;
+    const auto verify_row = [&](const ViewRow& row) {
+      tables_.checked(row, header_.shape, scratch);
+    };
+    for (const ViewId view : views_) {
+      check([&] { tables_.read_views(std::span(&view, 1), verify_row); }, view);
+    }
+  }
+
+  void verify_bytes(BesideViews table) {
+    const auto verify_entry = [&](ViewId view) {
+      if (!views_.contains(view)) {
+        tables_.fail_damaged(std::string("an entry of ") +
+                             (table == BesideViews::thumbnails ? "thumbnails" : "features") +
+                             " without a view");
+      }
+      static_cast<void>(tables_.checked_bytes(table, view));
+    };
+    for (const ViewId view : tables_.views_with(table)) {
+      check([&] { verify_entry(view); }, view);
+    }
+  }
+
+  void verify_links() {
+    std::pair<ViewId, ViewId> before{};
+    tables_.read_links([&](const LinkRow& row) {
+      const std::pair ends(row.a, row.b);
+      if (ends <= std::exchange(before, ends)) tables_.fail_damaged("links are out of order");
+      check([&] {
+        const Link link = tables_.checked(row);
+        if (!views_.contains(link.a) || !views_.contains(link.b)) {
+          tables_.fail_damaged("a link of views " + std::to_string(link.a.value) + " and " +
+                               std::to_string(link.b.value) + ", of which one is missing");
+        }
+      });
+    });
+  }
+
+  MemoryTables& tables_;
+  const MemoryHeader& header_;
+  std::set<ViewId> views_;
+  std::vector<MemoryFault> faults_;
+};
+
+}  // namespace
+
+std::vector<MemoryFault> verify_memory(MemoryTables& tables, const MemoryHeader& header) {
+  return MemoryVerification(tables, header).run();
+}
+
+}  // namespace panonav

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <vector>
+
+#include "panonav/storage/internal/memory_tables.hpp"
+
+namespace panonav {
+
+/// Everything that is wrong with a memory: structure, then view by view, then what belongs to the
+/// views. Empty: intact.
+[[nodiscard]] std::vector<MemoryFault> verify_memory(MemoryTables& tables,
+                                                     const MemoryHeader& header);
+
+}  // namespace panonav

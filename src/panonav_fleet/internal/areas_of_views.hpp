@@ -1,0 +1,65 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <set>
+#include <vector>
+
+#include "panonav/memory/visual_memory.hpp"
+#include "panonav_fleet/memory_changes.hpp"
+
+namespace panonav::fleet {
+
+/// In which area each view lies, by its id: what a change of an area is compared with. Four bytes a
+/// view.
+class AreasOfViews {
+ public:
+  void set(ViewId view, const std::optional<MemoryArea>& area) {
+    if (view.value >= numbers_.size()) {
+      numbers_.resize(std::max<std::size_t>(view.value + std::size_t{1}, numbers_.size() * 5 / 4));
+    }
+    numbers_[view.value] = area ? number_of(*area) : no_area;
+  }
+  void erase(ViewId view) {
+    if (view.value < numbers_.size()) numbers_[view.value] = no_view;
+  }
+  [[nodiscard]] bool has(ViewId view) const {
+    return view.value < numbers_.size() && numbers_[view.value] != no_view;
+  }
+  /// Ascending. Cost: a pass over all ids.
+  [[nodiscard]] std::vector<ViewId> within(const std::set<MemoryArea>& areas) const {
+    std::vector<std::uint32_t> known;
+    for (const MemoryArea& area : areas) {
+      const auto found = areas_.find(area);
+      if (found != areas_.end()) known.push_back(found->second);
+    }
+    std::ranges::sort(known);
+    return with([&](std::uint32_t number) { return std::ranges::binary_search(known, number); });
+  }
+  [[nodiscard]] std::vector<ViewId> all() const {
+    return with([](std::uint32_t number) { return number != no_view; });
+  }
+  [[nodiscard]] std::uint64_t bytes() const { return numbers_.size() * sizeof(std::uint32_t); }
+
+ private:
+  static constexpr std::uint32_t no_view = 0;
+  static constexpr std::uint32_t no_area = 1;
+  std::uint32_t number_of(const MemoryArea& area) {
+    return areas_.try_emplace(area, static_cast<std::uint32_t>(areas_.size()) + no_area + 1)
+        .first->second;
+  }
+  template <class Condition>
+  [[nodiscard]] std::vector<ViewId> with(const Condition& holds) const {
+    std::vector<ViewId> views;
+    for (std::size_t id = 0; id < numbers_.size(); ++id) {
+      if (holds(numbers_[id])) views.push_back({static_cast<std::uint32_t>(id)});
+    }
+    return views;
+  }
+  std::vector<std::uint32_t> numbers_;  // by id
+  std::map<MemoryArea, std::uint32_t> areas_;
+};
+
+}  // namespace panonav::fleet
