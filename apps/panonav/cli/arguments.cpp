@@ -4,7 +4,6 @@
 #include <charconv>
 #include <deque>
 #include <filesystem>
-#include <iostream>
 #include <map>
 #include <set>
 #include <system_error>

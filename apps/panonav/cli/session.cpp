@@ -10,7 +10,6 @@
 #include <sstream>
 #include <utility>
 
-#include "cli/json.hpp"
 #include "cli/option_values.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/storage/memory_address.hpp"
