@@ -10,7 +10,7 @@
 #include "experiments/runs/place_recording.hpp"
 #include "panonav/core/executor.hpp"
 #include "panonav/geometry/pose2.hpp"
-#include "panonav/mapping/topological_map.hpp"
+#include "panonav/mapping/topological_mapper.hpp"
 #include "panonav/motion/odometry.hpp"
 #include "panonav/signature/fourier_signature.hpp"
 
