@@ -9,7 +9,7 @@
 
 #include "panonav/core/executor.hpp"
 #include "panonav/geometry/pose2.hpp"
-#include "panonav/mapping/topological_map.hpp"
+#include "panonav/mapping/topological_mapper.hpp"
 #include "panonav/motion/odometry.hpp"
 #include "panonav/signature/fourier_signature.hpp"
 #include "panonav_simulation/place_recording.hpp"

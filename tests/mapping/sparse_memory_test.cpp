@@ -8,6 +8,7 @@
 #include <string>
 
 #include "panonav/core/error.hpp"
+#include "panonav/mapping/pose_graph.hpp"
 #include "panonav/relative_pose/fourier_homing.hpp"
 #include "support/remembered_worlds.hpp"
 

@@ -361,6 +361,22 @@ TEST(FourierHoming, ATurnKnownCoarselyTellsAlikeTurnsApart) {
   EXPECT_THROW((void)home_vector_near(one, one, 0.0, 1.0, published_homing(3)), ContractError);
 }
 
+// Bounds may hold no turn at which the views correlate: the best one there is taken all the same.
+TEST(FourierHoming, ATurnWithinBoundsMayCorrelateNegatively) {
+  int negative = 0;
+  for (int trial = 0; trial < 20; ++trial) {
+    const HomingView home = view_of(seen_from(random_surroundings(trial), 0, 0, 0, 1));
+    const HomingView current = view_of(seen_from(random_surroundings(trial + 100), 0, 0, 0, 1));
+    for (const double middle : {-2.0, 0.0, 2.0}) {
+      const HomeVector near = home_vector_near(home, current, middle, 0.5);
+      if (!(near.correlation < 0.0)) continue;
+      EXPECT_GT(near.frequencies, 0.0);
+      ++negative;
+    }
+  }
+  EXPECT_GE(negative, 3);
+}
+
 TEST(FourierHoming, RefusesViewsThatDoNotFit) {
   const HomingView one = view_of(seen_from(random_surroundings(1), 0, 0, 0, 1));
   const HomingView four = view_of(seen_from(random_surroundings(1), 0, 0, 0, 4));

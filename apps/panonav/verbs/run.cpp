@@ -9,6 +9,7 @@
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
+#include "panonav/mapping/visual_odometry.hpp"
 #include "panonav/pipeline/live_memory.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/pipeline/route_follower.hpp"

@@ -1,14 +1,9 @@
 #pragma once
 
 #include <cstddef>
-#include <deque>
-#include <span>
-#include <vector>
 
 #include "panonav/core/options.hpp"
 #include "panonav/geometry/pose2.hpp"
-#include "panonav/mapping/visual_odometry.hpp"
-#include "panonav/memory/visual_memory.hpp"
 
 namespace panonav {
 
@@ -43,13 +38,6 @@ struct LoopClosureOptions {
 };
 void visit_options(LoopClosureOptions& options, OptionVisitor& visitor);
 
-/// A node of the map for the search for closures.
-struct PassedNode {
-  ViewId view;                ///< an id of the memory
-  double way_m = 0.0;         ///< along the way of the robot from its first view to here
-  std::size_t component = 0;  ///< its connected component, in whose frame its pose is
-};
-
 /// Two nodes that see the same place.
 struct LoopClosure {
   std::size_t earlier = 0;   ///< place among the nodes given
@@ -57,64 +45,6 @@ struct LoopClosure {
   Pose2 earlier_from_later;  ///< pose of the later node in the frame of the earlier one, metres
   double residual = 0.0;     ///< share of the energy of both views left unexplained
   friend bool operator==(const LoopClosure&, const LoopClosure&) = default;
-};
-
-/// Where the finder looks for the other node of a closure.
-/// Among which nodes the finder looks.
-enum class ClosureScope {
-  everywhere,        ///< all nodes of the map
-  other_components,  ///< not in the connected component of the latest node
-};
-
-/// Finds loop closures while the robot drives. Candidates come from the memory's search. Home
-/// vectors in both directions must agree with the compass and be each other's inverse; the search
-/// from the candidate must lead back to here; no other place may explain the view as well; the
-/// drift of the odometry must allow it; and a sequence of views must agree.
-class LoopClosureFinder {
- public:
-  /// `memory` must outlive the finder. Throws OptionError.
-  LoopClosureFinder(const VisualMemory& memory, const LoopClosureOptions& options,
-                    const VisualOdometryOptions& odometry,
-                    ClosureScope scope = ClosureScope::everywhere);
-
-  /// The last of `nodes` is new and its view is in the memory; `poses` is the map so far, by which
-  /// places are told from each other and the sequence is judged. `scale_m` as of the odometry.
-  /// Returns the closures that have become certain with this view: none, or those of the whole
-  /// sequence. Throws ContractError on different numbers of nodes and poses. Cost: two searches of
-  /// the memory and, where there are candidates, 0.3 ms for each.
-  [[nodiscard]] std::vector<LoopClosure> find(std::span<const PassedNode> nodes,
-                                              std::span<const Pose2> poses,
-                                              const OdometryView& view, double scale_m);
-
- private:
-  [[nodiscard]] std::optional<LoopClosure> best_closure(std::span<const PassedNode> nodes,
-                                                        std::span<const Pose2> poses,
-                                                        const OdometryView& view) const;
-  [[nodiscard]] std::optional<LoopClosure> compare(std::size_t earlier, std::size_t later,
-                                                   const OdometryView& earlier_view,
-                                                   const OdometryView& later_view) const;
-  [[nodiscard]] bool is_reciprocal(std::span<const PassedNode> nodes, std::span<const Pose2> poses,
-                                   const LoopClosure& closure) const;
-  [[nodiscard]] bool is_in_reach(std::span<const PassedNode> nodes, std::span<const Pose2> poses,
-                                 const LoopClosure& closure) const;
-  [[nodiscard]] bool agree(const LoopClosure& a, const LoopClosure& b,
-                           std::span<const Pose2> poses) const;
-  /// Views that are no candidates for a closure with the node.
-  [[nodiscard]] std::vector<ViewId> excluded_for(std::span<const PassedNode> nodes,
-                                                 std::size_t node) const;
-  [[nodiscard]] std::optional<std::size_t> node_of(std::span<const PassedNode> nodes,
-                                                   ViewId view) const;
-
-  const VisualMemory* memory_;
-  LoopClosureOptions options_;
-  VisualOdometryOptions odometry_;
-  ClosureScope scope_;
-  double closed_way_m_ = 0.0;  // where the last closure was
-  struct Pending {
-    LoopClosure closure;
-    bool told = false;
-  };
-  std::deque<Pending> pending_;  // of the last views, oldest first
 };
 
 }  // namespace panonav

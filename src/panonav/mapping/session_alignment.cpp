@@ -8,6 +8,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/mapping/internal/loop_closure_finder.hpp"
 
 namespace panonav {
 

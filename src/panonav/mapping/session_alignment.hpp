@@ -8,6 +8,7 @@
 #include "panonav/core/options.hpp"
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/mapping/loop_closure.hpp"
+#include "panonav/mapping/pose_graph.hpp"
 #include "panonav/mapping/topological_map.hpp"
 
 namespace panonav {
@@ -43,13 +44,13 @@ struct SessionAlignment {
 };
 
 /// Finds the places that two sessions have in common, by appearance alone: for each view of the
-/// second in turn, `LoopClosureFinder` looks for closures among those of the first. Each closure
+/// second in turn, closures are searched among those of the first. Each closure
 /// tells how the second map lies in the frame of the first; the largest set of closures that agree
 /// counts. Empty where they are too few, or others nearly as many. All nodes of a map are in one
 /// frame. `memory` holds the views of both, as far as they have different ids; a view that is in
 /// both is a place in common by itself. Throws OptionError, ContractError on a map that `validate`
-/// refuses or whose views are not in the memory. Cost: that of `LoopClosureFinder::find` for each
-/// node of the second.
+/// refuses or whose views are not in the memory. Cost: two searches of
+/// the memory and some home vectors of 0.3 ms for each node of the second.
 [[nodiscard]] std::optional<SessionAlignment> align_sessions(
     const VisualMemory& memory, const TopologicalMap& first, const TopologicalMap& second,
     const SessionAlignmentOptions& options = {});

@@ -9,7 +9,7 @@
 
 #include "panonav/core/executor.hpp"
 #include "panonav/io/dataset.hpp"
-#include "panonav/mapping/topological_map.hpp"
+#include "panonav/mapping/topological_mapper.hpp"
 #include "panonav/pipeline/observation.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
 #include "panonav/storage/memory_file.hpp"

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "panonav/core/text.hpp"
-#include "panonav/mapping/topological_map.hpp"
+#include "panonav/mapping/topological_mapper.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 
 namespace panonav {

@@ -185,10 +185,11 @@ void PairOfViews::solve_at_best_turn(std::span<const float> turns) {
   vector_.heading_rad = 0.0;
   vector_.residual = 1.0;
   double best_residual = 2.0;  // above all
-  for (const float turn : turns) {
+  for (std::size_t i = 0; i < turns.size(); ++i) {
+    const float turn = turns[i];
     // A heading at which the views do not even correlate half as well explains nothing better.
     constexpr double min_share = 0.5;
-    if (&turn != turns.data() && correlation_at(turn) < min_share * correlation_at(turns[0])) break;
+    if (i > 0 && correlation_at(turn) < min_share * correlation_at(turns[0])) break;
     const PairSolution solution = solve_at(static_cast<double>(turn));
     const double left = std::max(0.0, normal_.energy - solution.explained);
     const double residual = normal_.energy_of_views > 0.0 ? left / normal_.energy_of_views : 1.0;

@@ -1,4 +1,4 @@
-#include "panonav/mapping/loop_closure.hpp"
+#include "panonav/mapping/internal/loop_closure_finder.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -210,7 +210,7 @@ std::vector<LoopClosure> LoopClosureFinder::find(std::span<const PassedNode> nod
   if (!closure || !is_in_reach(nodes, poses, *closure) || !is_reciprocal(nodes, poses, *closure)) {
     return {};
   }
-  const bool goes_on = std::ranges::any_of(pending_, &Pending::told);
+  const bool continues = std::ranges::any_of(pending_, &Pending::reported);
   pending_.push_back({*closure, false});
   std::vector<Pending*> agreeing;
   for (Pending& pending : pending_) {
@@ -219,12 +219,12 @@ std::vector<LoopClosure> LoopClosureFinder::find(std::span<const PassedNode> nod
   std::vector<LoopClosure> certain;
   if (static_cast<int>(agreeing.size()) < options_.sequence) return certain;
   const double here_m = nodes[here].way_m;
-  if (goes_on && here_m - closed_way_m_ < options_.spacing_m) return certain;
+  if (continues && here_m - closed_way_m_ < options_.spacing_m) return certain;
   // Where a passage begins, every view of the sequence counts; later the latest does.
   for (Pending* pending : agreeing) {
-    if (goes_on && pending != agreeing.back()) continue;
+    if (continues && pending != agreeing.back()) continue;
     certain.push_back(pending->closure);
-    pending->told = true;
+    pending->reported = true;
   }
   closed_way_m_ = here_m;
   return certain;

@@ -1,4 +1,4 @@
-#include "panonav/mapping/topological_map.hpp"
+#include "panonav/mapping/topological_mapper.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,6 +10,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/alignment.hpp"
+#include "panonav/mapping/internal/loop_closure_finder.hpp"
 #include "panonav/motion/odometry.hpp"
 #include "support/remembered_worlds.hpp"
 
