@@ -1,4 +1,5 @@
 #include "bindings.hpp"
+#include "panonav/io/register_recordings.hpp"
 
 namespace {
 namespace py = pybind11;
@@ -8,6 +9,7 @@ PYBIND11_MODULE(_core, m) {
   using namespace panonav::python;
   m.doc() = "The panonav library (see the package panonav).";
   m.attr("__version__") = PANONAV_VERSION;
+  panonav::register_recordings();
   bind_basics(m);
   bind_panoramas(m);
   bind_signatures(m);

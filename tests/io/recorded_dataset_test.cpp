@@ -60,8 +60,8 @@ class RecordedTopics : public ::testing::TestWithParam<MessageEncoding> {
     message.orientation = ros::pose_of({0.0, 0.0, 1.2}, tilt).orientation;
     recorded_->add(topic, start_ns + after_ns, message);
   }
-  [[nodiscard]] RecordedDataset read(const RecordingTopics& topics = {},
-                                     const PictureSource& source = sphere) const {
+  [[nodiscard]] OpenedDataset read(const RecordingTopics& topics = {},
+                                   const PictureSource& source = sphere) const {
     return read_recording(recorded_, "drive.bag", source, topics);
   }
   [[nodiscard]] std::string error(const RecordingTopics& topics = {}) const {
@@ -181,17 +181,17 @@ TEST_P(RecordedTopics, TopicsAreChosenByTypeOrNamed) {
   add_imu(0, {}, "/imu1");
   EXPECT_EQ(error(),
             "drive.bag: has pictures of several topics: /left, /right; name one with "
-            "--image-topic");
+            "'image_topic'");
   const auto right = read({.image = "/right"});
   EXPECT_EQ(read_picture(right.dataset.entries.at(0)), images_[1]);
   EXPECT_FALSE(right.dataset.entries[0].odometry);
   ASSERT_EQ(right.warnings.size(), 2U);
   EXPECT_EQ(right.warnings[0],
             "odometry of several topics, of which none is used: /filtered, /wheels; name one with "
-            "--odometry-topic");
+            "'odometry_topic'");
   EXPECT_EQ(right.warnings[1],
             "inertial sensors of several topics, of which none is used: /imu0, /imu1; name one "
-            "with --imu-topic");
+            "with 'imu_topic'");
   const auto named = read({.image = "/right", .odometry = "/wheels", .imu = "/imu1"});
   EXPECT_TRUE(named.warnings.empty());
   EXPECT_TRUE(named.dataset.entries[0].odometry && named.dataset.entries[0].tilt);

@@ -12,6 +12,7 @@
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
+#include "panonav/io/register_recordings.hpp"
 #include "panonav/storage/memory_address.hpp"
 
 namespace {
@@ -42,6 +43,7 @@ ExitCode run(std::string_view& verb, std::span<const std::string> words) {
 int main(int argc, char** argv) {
   // A file that hits its size limit is then a failed write with a message, not a killed process.
   std::signal(SIGXFSZ, SIG_IGN);
+  panonav::register_recordings();
   std::string_view verb;
   try {
     const std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);

@@ -11,6 +11,7 @@
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/atomic_file.hpp"
+#include "panonav/io/recording.hpp"
 #include "panonav/pipeline/memory_learner.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/pipeline/visual_motion.hpp"

@@ -9,7 +9,7 @@
 #include "cli/session.hpp"
 #include "panonav/core/executor.hpp"
 #include "panonav/io/dataset.hpp"
-#include "panonav/io/recorded_dataset.hpp"
+#include "panonav/io/dataset_readers.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/storage/memory_file.hpp"
 
@@ -55,12 +55,10 @@ void declare_pictures(Arguments& arguments, PictureArguments& pictures);
 /// The part that is wanted. Throws UsageError on values out of range.
 [[nodiscard]] PictureSelection selection_of(const PartArguments& part);
 
-/// A data set, a folder of pictures, one picture, a video or a recording of topics. `remembered` is
-/// how pictures lay that the memory was made from: it reads what comes without a description of its
-/// own. A data set describes itself, so flags beside it throw UsageError, as topics do of what has
-/// none, and live sources but standard input, which is read to its end. Throws FileError. Notes
-/// what of a folder or recording is left out and pictures that look as if they were of another
-/// kind.
+/// Opens what `open_input` does, as the flags say, and notes its warnings. `remembered` is how the
+/// pictures lie that a memory was made from: so lie those that come without a description of their
+/// own. Throws UsageError on flags that do not fit the input and on live sources but standard
+/// input, which is read to its end; FileError.
 [[nodiscard]] Dataset open_recording(const std::string& input, const PictureArguments& pictures,
                                      const std::optional<PictureSource>& remembered,
                                      Session& session);

@@ -7,6 +7,7 @@
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/io/recording.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/pipeline/route_recorder.hpp"
 #include "panonav/pipeline/view_encoder.hpp"

@@ -1,4 +1,4 @@
-#include "panonav/io/toml_fields.hpp"
+#include "panonav/io/internal/toml_fields.hpp"
 
 #include <cstdint>
 
@@ -107,25 +107,6 @@ TomlTable read_toml(const std::filesystem::path& path) {
     throw FileError(path.string(), "line " + std::to_string(error.source().begin.line) +
                                        " is not TOML: " + readable_line(error.description()));
   }
-}
-
-std::string toml_text(std::string_view text) {
-  constexpr std::string_view digits = "0123456789ABCDEF";
-  std::string result = "\"";
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (c == '"' || c == '\\') {
-      result += '\\';
-      result += c;
-    } else if (byte < ' ' || byte == 0x7F) {
-      result += "\\u00";
-      result += digits[byte >> 4U];
-      result += digits[byte & 15U];
-    } else {
-      result += c;
-    }
-  }
-  return result + "\"";
 }
 
 TomlFields::TomlFields(std::filesystem::path path, std::string section, const TomlTable& table)
