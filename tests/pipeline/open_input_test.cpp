@@ -22,10 +22,11 @@ namespace fs = std::filesystem;
 class OpenInput : public ::testing::Test {
  protected:
   void SetUp() override {
+    const Image picture = smooth_image(16, 8, 1);
     for (const std::string name : {"data/a.png", "data/b.png", "photos/view_9.png",
                                    "photos/view_10.png", "photos/evening/view_1.png"}) {
       fs::create_directories((folder_ / name).parent_path());
-      write_png(folder_ / name, smooth_image(16, 8, 1).view());
+      write_png(folder_ / name, picture.view());
     }
     folder_.write("data/dataset.toml",
                   "[images]\nkind = \"equirectangular\"\n[list]\nfile = \"images.csv\"\n");
