@@ -219,7 +219,7 @@ void bind_catchment(py::module_& m) {
         }
         const Dataset homes = dataset_from(recording, source);
         std::optional<Dataset> second;
-        if (!current.is_none()) second = dataset_from(current, source);
+        if (!current.is_none()) second = dataset_from(current, source, homes.source);
         const py::gil_scoped_release free;
         return survey(homes, second, views, settings, turn_seed, threads);
       },

@@ -143,8 +143,8 @@ void bind_recogniser(py::module_& m) {
              bool exclude_same_file, int threads) {
             const auto source = recogniser.read(
                 [](const PlaceRecogniser& r) { return r.encoder().header().source; });
-            return localise_all(recogniser, dataset_from(recording, source), exclude_same_file,
-                                threads);
+            return localise_all(recogniser, dataset_from(recording, std::nullopt, source),
+                                exclude_same_file, threads);
           },
           py::arg("recording"), py::kw_only(), py::arg("exclude_same_file") = false,
           py::arg("threads") = 0,
@@ -322,7 +322,7 @@ void bind_tracker(py::module_& m) {
             require(every >= 1, "every", every, ">= 1");
             const auto source =
                 tracker.read([](const Tracker& t) { return t.encoder().header().source; });
-            Dataset run = dataset_from(recording, source);
+            Dataset run = dataset_from(recording, std::nullopt, source);
             return tracker.change([&](Tracker& t) {
               return track_recording(t, std::move(run), static_cast<std::size_t>(every), threads);
             });

@@ -113,7 +113,7 @@ void bind_maps(py::module_& m) {
         SignatureOptions signature;
         MapperOptions wanted = mapper_options(keywords, &signature);
         wanted.thumbnails = thumbnails;
-        const Dataset dataset = dataset_from(recording, source);
+        const Dataset dataset = dataset_from(recording, source, remembered_source(memory));
         const py::gil_scoped_release free;
         return make_map(dataset, memory, signature, wanted, threads);
       },

@@ -2,6 +2,7 @@
 #ifdef PANONAV_PYTHON_FLEET
 #include "panonav_fleet/postgresql_memories.hpp"
 #endif
+#include "panonav_recordings/register_recordings.hpp"
 
 namespace {
 namespace py = pybind11;
@@ -14,6 +15,7 @@ PYBIND11_MODULE(_core, m) {
 #ifdef PANONAV_PYTHON_FLEET
   panonav::fleet::register_postgresql_memories();
 #endif
+  panonav::recordings::register_recordings();
   bind_basics(m);
   bind_panoramas(m);
   bind_signatures(m);

@@ -2,38 +2,45 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/io/image_file.hpp"
-#include "panonav/io/trajectory_file.hpp"
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/observation_source.hpp"
-#include "panonav_recordings/recorded_dataset.hpp"
-#include "panonav_recordings/recording.hpp"
-#include "panonav_recordings/video_file.hpp"
+#include "panonav/pipeline/open_input.hpp"
+#include "panonav/storage/memory_address.hpp"
+#include "panonav/storage/memory_file.hpp"
 
 namespace panonav::python {
 
-Dataset open_dataset(const std::filesystem::path& path,
-                     const std::optional<PictureSource>& source) {
-  std::error_code ignored;
-  if (!std::filesystem::exists(path, ignored)) {
-    throw FileError(path.string(), "there is no such file or folder");
+namespace {
+
+Dataset open_with_warnings(const std::filesystem::path& path, const InputOptions& options) {
+  OpenedDataset opened = [&] {
+    const py::gil_scoped_release free;
+    return open_input(path, options);
+  }();
+  for (const std::string& warning : opened.warnings) {
+    if (PyErr_WarnEx(PyExc_UserWarning, warning.c_str(), 1) != 0) throw py::error_already_set();
   }
-  const bool folder = std::filesystem::is_directory(path, ignored);
-  if (folder && std::filesystem::exists(path / "dataset.toml", ignored)) return read_dataset(path);
-  if (!source) {
-    throw FileError(path.string(),
-                    "does not say how its pictures lie; say it with a PictureSource");
-  }
-  if (recordings::is_recording(path)) return recordings::read_recording(path, *source).dataset;
-  if (folder) return read_picture_folder(path, *source);
-  return recordings::is_video(path) ? recordings::read_video(path, *source)
-                                    : single_picture(path, *source);
+  return std::move(opened.dataset);
 }
 
-Dataset dataset_from(const py::handle& recording, const std::optional<PictureSource>& source) {
-  if (py::isinstance<Dataset>(recording)) return recording.cast<const Dataset&>();
-  const auto path = recording.cast<std::filesystem::path>();
+}  // namespace
+
+Dataset dataset_from(const py::handle& recording, const std::optional<PictureSource>& source,
+                     const std::optional<PictureSource>& default_source) {
+  if (!py::isinstance<Dataset>(recording)) {
+    InputOptions options;
+    options.source = source;
+    options.default_source = default_source;
+    return open_with_warnings(recording.cast<std::filesystem::path>(), options);
+  }
+  if (source) throw OptionError("a Dataset says how its pictures lie; leave out 'source'");
+  return recording.cast<const Dataset&>();
+}
+
+std::optional<PictureSource> remembered_source(const std::filesystem::path& memory) {
   const py::gil_scoped_release free;
-  return open_dataset(path, source);
+  if (!memory_exists(memory)) return std::nullopt;
+  return MemoryFile::open(memory, Access::read_only).header().source;
 }
 
 namespace {
@@ -95,11 +102,28 @@ void bind_datasets(py::module_& m) {
   py::class_<Dataset>(m, "Dataset",
                       "A recording: pictures in order, which are read when they are needed. "
                       "Iterating gives its observations.")
-      .def(py::init(&open_dataset), py::arg("path"), py::arg("source") = py::none(),
-           py::call_guard<py::gil_scoped_release>(),
-           "A data set (a folder with dataset.toml) describes itself. `source` says how the "
-           "pictures of a folder, a video, a recording of topics (MCAP, rosbag2, ROS 1 bag) or a "
-           "single picture lie.")
+      .def(
+          py::init([](const std::filesystem::path& path, const std::optional<PictureSource>& source,
+                      bool recursive, const std::optional<std::string>& image_topic,
+                      const std::optional<std::string>& odometry_topic,
+                      const std::optional<std::pair<std::string, std::string>>& odometry_frames,
+                      const std::optional<std::string>& imu_topic) {
+            InputOptions options;
+            options.source = source;
+            options.recursive = recursive;
+            options.topics = {image_topic, odometry_topic, imu_topic, odometry_frames};
+            return open_with_warnings(path, options);
+          }),
+          py::arg("path"), py::arg("source") = py::none(), py::kw_only(),
+          py::arg("recursive") = false, py::arg("image_topic") = py::none(),
+          py::arg("odometry_topic") = py::none(), py::arg("odometry_frames") = py::none(),
+          py::arg("imu_topic") = py::none(),
+          "A data set (a folder with dataset.toml) describes itself and refuses `source`, which "
+          "says how the pictures of a folder, a video, a recording of topics (MCAP, rosbag2, "
+          "ROS 1 bag) or a single picture lie. `recursive`: pictures of the folders within a "
+          "folder, too. Topics of a recording are found by their types where they are not named; "
+          "`odometry_frames`: odometry from the transforms between these two frames. What is left "
+          "out or looks wrong is a UserWarning.")
       .def_readonly("source", &Dataset::source, "How all pictures lie.")
       .def_readonly("entries", &Dataset::entries, "In the order in which they were taken.")
       .def_readonly("left_out", &Dataset::left_out, "What lies in a folder and is no picture.")
@@ -130,6 +154,9 @@ void bind_datasets(py::module_& m) {
         return "Dataset('" + d.folder.string() + "', " + std::to_string(d.entries.size()) +
                " pictures)";
       });
+}
+
+void bind_images(py::module_& m) {
   m.def(
       "read_image",
       [](const std::filesystem::path& path) {
@@ -201,7 +228,7 @@ void bind_memorising(py::module_& m) {
       [=](const py::object& recording, const std::filesystem::path& memory,
           const std::optional<PictureSource>& source, bool thumbnails, bool features, int threads,
           const py::kwargs& keywords) {
-        const Dataset dataset = dataset_from(recording, source);
+        const Dataset dataset = dataset_from(recording, source, remembered_source(memory));
         const auto wanted = options_from(dataset.source, thumbnails, features, keywords);
         const py::gil_scoped_release free;
         InterruptibleExecutor executor(threads);
@@ -234,6 +261,7 @@ void bind_memorising(py::module_& m) {
 void bind_recordings(py::module_& m) {
   bind_observations(m);
   bind_datasets(m);
+  bind_images(m);
   bind_memorising(m);
 }
 

@@ -1,18 +1,19 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 
 #include "bindings.hpp"
 #include "panonav/io/dataset.hpp"
 
 namespace panonav::python {
 
-/// A data set, or a folder of pictures, a picture, a video or a recording of topics that lies as
-/// `source` says. Throws FileError.
-[[nodiscard]] Dataset open_dataset(const std::filesystem::path& path,
-                                   const std::optional<PictureSource>& source);
-/// A `Dataset`, or the path of what `open_dataset` reads.
+/// Returns a `Dataset` of Python as it is, or opens a path (`open_input`) and passes its warnings
+/// on to Python. Throws OptionError on a source of what says itself how its pictures lie.
 [[nodiscard]] Dataset dataset_from(const py::handle& recording,
-                                   const std::optional<PictureSource>& source);
+                                   const std::optional<PictureSource>& source,
+                                   const std::optional<PictureSource>& default_source = {});
+/// Returns how the pictures lay that the memory was made from; `nullopt` where there is no memory.
+[[nodiscard]] std::optional<PictureSource> remembered_source(const std::filesystem::path& memory);
 
 }  // namespace panonav::python

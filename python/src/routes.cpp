@@ -105,7 +105,7 @@ void bind_following(py::module_& m) {
          const std::optional<std::string>& name, const std::optional<PictureSource>& source,
          bool use_odometry, int threads, const py::kwargs& keywords) {
         auto wanted = follower_options(name, use_odometry, keywords);
-        const Dataset dataset = dataset_from(recording, source);
+        const Dataset dataset = dataset_from(recording, source, remembered_source(memory));
         const py::gil_scoped_release free;
         InterruptibleExecutor executor(threads);
         wanted.use_odometry = use_odometry && !odometry_poses(dataset).empty();
@@ -187,7 +187,7 @@ void bind_recording(py::module_& m) {
         HorizonScanlineOptions line;
         Keywords(keywords).options(line).finish();
         if (py::len(keywords) > 0) options.line = line;
-        const Dataset dataset = dataset_from(recording, source);
+        const Dataset dataset = dataset_from(recording, source, remembered_source(memory));
         const py::gil_scoped_release free;
         return record_route(dataset, memory, options, threads);
       },

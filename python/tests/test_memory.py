@@ -4,6 +4,7 @@ import gc
 import pathlib
 import shutil
 import subprocess
+import warnings
 
 import numpy
 import pytest
@@ -174,3 +175,33 @@ def test_synchronise_memory(office, tmp_path):
         subprocess.run([server, tmp_path / "s", "stop"], check=True)
     with pytest.raises(panonav.FileError, match="cannot be opened"):
         panonav.synchronise_memory(file, address)
+
+
+def test_inputs_are_opened_as_by_the_command(office, tmp_path):
+    run, source = office / "query_run", panonav.Dataset(office / "query_run").source
+    with pytest.raises(panonav.OptionError, match="dataset.toml.*leave out 'source'"):
+        panonav.Dataset(run, source)
+    with pytest.raises(panonav.OptionError, match="leave out 'source'"):
+        panonav.memorise(panonav.Dataset(run), tmp_path / "new.panonav", source)
+    with pytest.raises(panonav.OptionError, match="has no topics; leave out the option imu_topic"):
+        panonav.Dataset(run, imu_topic="/imu")
+    photos = tmp_path / "photos"
+    (photos / "within").mkdir(parents=True)
+    for place in (photos, photos / "within"):
+        shutil.copy(run / panonav.Dataset(run).entries[0].file, place / "view.png")
+    (photos / "notes.txt").write_text("mine", encoding="utf-8")
+    with pytest.warns(UserWarning) as warned:
+        assert len(panonav.Dataset(photos, source)) == 1
+    assert [str(each.message) for each in warned] == ["left out, no PNG or JPEG by name: notes.txt",
+                                                      "left out, folders within: within/"]
+    with pytest.warns(UserWarning, match="notes.txt"):
+        assert len(panonav.Dataset(photos, source, recursive=True)) == 2
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(UserWarning, match="notes.txt"):
+            panonav.Dataset(photos, source)
+    # A memory knows how pictures lie that say nothing.
+    memory = tmp_path / "office.panonav"
+    shutil.copy(office / "office.panonav", memory)
+    with pytest.warns(UserWarning):
+        assert panonav.memorise(photos, memory).appended == 1

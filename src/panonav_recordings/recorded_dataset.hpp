@@ -6,30 +6,12 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
-#include "panonav/io/dataset.hpp"
+#include "panonav/io/dataset_readers.hpp"
 #include "panonav_recordings/recording.hpp"
 
 namespace panonav::recordings {
-
-/// Which topics of a recording become the data set. What is not named is found by its type.
-struct RecordingTopics {
-  std::optional<std::string> image;     ///< sensor_msgs/Image or CompressedImage
-  std::optional<std::string> odometry;  ///< nav_msgs/Odometry
-  std::optional<std::string> imu;       ///< sensor_msgs/Imu
-  /// Odometry from TF instead of a topic: the frame of the odometry, then that of the robot.
-  std::optional<std::pair<std::string, std::string>> odometry_frames;
-};
-
-/// A recording of topics as a data set.
-struct RecordedDataset {
-  /// Ready to be used; its pictures are read from the recording when they are needed.
-  Dataset dataset;
-  /// What was left out, guessed or missing, a line each.
-  std::vector<std::string> warnings;
-};
 
 /// What a recording of topics (`Recording::open`) tells as a data set: the pictures of one topic in
 /// order of their recording, named by their stamps ("1700000000_250000000"), which are read when
@@ -53,14 +35,12 @@ struct RecordedDataset {
 /// `Recording::open` throws. Cost: one pass over the messages of these topics. Memory: 400 bytes a
 /// picture and 80 a message of the other topics, of which there may be 10 million; a million
 /// pictures.
-[[nodiscard]] RecordedDataset read_recording(const std::filesystem::path& path,
-                                             PictureSource source,
-                                             const RecordingTopics& topics = {});
+[[nodiscard]] OpenedDataset read_recording(const std::filesystem::path& path, PictureSource source,
+                                           const RecordingTopics& topics = {});
 /// The same of a recording that is open; `path` stands in errors and entries.
-[[nodiscard]] RecordedDataset read_recording(std::shared_ptr<const Recording> recording,
-                                             const std::filesystem::path& path,
-                                             PictureSource source,
-                                             const RecordingTopics& topics = {});
+[[nodiscard]] OpenedDataset read_recording(std::shared_ptr<const Recording> recording,
+                                           const std::filesystem::path& path, PictureSource source,
+                                           const RecordingTopics& topics = {});
 
 /// One topic as `describe_recording` knows it.
 struct TopicSummary {

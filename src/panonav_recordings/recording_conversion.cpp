@@ -19,24 +19,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What all pictures have.
-RecordingConversion common_to_all(const Dataset& dataset) {
-  const auto all = [&](const auto& has) { return std::ranges::all_of(dataset.entries, has); };
-  RecordingConversion done{.pictures = dataset.entries.size()};
-  done.stamps = all([](const auto& e) { return e.stamp_s.has_value(); });
-  done.odometry = all([](const auto& e) { return e.odometry.has_value(); });
-  done.positions = all([](const auto& e) { return e.pose.has_value(); });
-  done.headings =
-      done.positions && all([](const auto& e) { return e.pose->heading_rad.has_value(); });
-  done.tilts = all([](const auto& e) { return e.tilt.has_value(); });
-  return done;
-}
-
 }  // namespace
 
-RecordingConversion convert_to_recording(const Dataset& dataset, const fs::path& file,
-                                         const std::function<void()>& advance) {
-  RecordingConversion done = common_to_all(dataset);
+DatasetFields convert_to_recording(const Dataset& dataset, const fs::path& file,
+                                   const std::function<void()>& advance) {
+  const DatasetFields shared = shared_fields(dataset);
   TemporaryFile unfinished(file);
   // JPEG and PNG are packed already.
   McapWriter writer(unfinished.path(), {.compression = McapCompression::none});
@@ -45,10 +32,10 @@ RecordingConversion convert_to_recording(const Dataset& dataset, const fs::path&
   std::int64_t log_ns = 0;
   for (std::size_t i = 0; i < dataset.entries.size(); ++i) {
     const DatasetEntry& entry = dataset.entries[i];
-    const std::int64_t ns = nanoseconds(done.stamps ? *entry.stamp_s : static_cast<double>(i));
+    const std::int64_t ns = nanoseconds(shared.stamps ? *entry.stamp_s : static_cast<double>(i));
     log_ns = std::max(log_ns, ns);  // readers go by it, and the order of pictures stays
     std::optional<ReferencePose> truth = entry.pose;
-    if (truth && !done.headings) truth->heading_rad.reset();
+    if (truth && !shared.headings) truth->heading_rad.reset();
     robot.write(log_ns, ns, entry.odometry, entry.tilt, truth);
     const auto bytes = read_encoded_picture(entry);
     pictures.write(log_ns, ns,
@@ -62,29 +49,24 @@ RecordingConversion convert_to_recording(const Dataset& dataset, const fs::path&
   fs::rename(unfinished.path(), file, error);
   if (error) throw FileError(file.string(), "cannot be written: " + error.message());
   unfinished.keep();
-  return done;
+  return shared;
 }
 
-RecordingConversion convert_to_dataset(const Dataset& recording, const fs::path& folder,
-                                       const std::function<void()>& advance) {
-  const RecordingConversion done = common_to_all(recording);
+DatasetFields convert_to_dataset(const Dataset& recording, const fs::path& folder,
+                                 const std::function<void()>& advance) {
   UnfinishedFolder unfinished(folder);
   Dataset dataset = recording;
+  const DatasetFields shared = drop_partial_fields(dataset);
   dataset.folder = unfinished.path();
   for (DatasetEntry& entry : dataset.entries) {
     const auto bytes = read_encoded_picture(entry);
     entry.file += image_format(bytes, entry.file) == ImageFormat::png ? ".png" : ".jpg";
     write_file(dataset.folder / entry.file, bytes);
-    if (!done.stamps) entry.stamp_s.reset();
-    if (!done.odometry) entry.odometry.reset();
-    if (!done.positions) entry.pose.reset();
-    if (entry.pose && !done.headings) entry.pose->heading_rad.reset();
-    if (!done.tilts) entry.tilt.reset();
     if (advance) advance();
   }
   write_dataset(dataset);
   unfinished.finish();
-  return done;
+  return shared;
 }
 
 }  // namespace panonav::recordings

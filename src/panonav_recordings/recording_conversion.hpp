@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstddef>
 #include <filesystem>
 #include <functional>
 
@@ -8,29 +7,19 @@
 
 namespace panonav::recordings {
 
-/// What a conversion took along of its pictures.
-struct RecordingConversion {
-  std::size_t pictures = 0;  ///< that were written
-  bool stamps = false;       ///< false: a recording got one second from picture to picture
-  bool odometry = false;     ///< every picture has it, as for those below
-  bool positions = false;    ///< of the ground truth
-  bool headings = false;     ///< of the ground truth; true only with `positions`
-  bool tilts = false;        ///< of an inertial sensor
-};
-
 /// Writes the data set, or what another recording or a video became, as an MCAP file of ROS 2
 /// messages (docs/formats.md, section "Recordings"), which appears whole or not at all. Pictures
 /// keep the bytes of their files; how they lie is not in it. Headings are left out where not every
-/// position has one. `advance` is called after each picture. Throws FileError, and ContractError on
-/// stamps below 0 or beyond 2038.
-RecordingConversion convert_to_recording(const Dataset& dataset, const std::filesystem::path& file,
-                                         const std::function<void()>& advance = {});
+/// position has one; where not every picture has a stamp they are one second apart. Returns what
+/// every picture has. `advance` is called after each picture. Throws FileError, and ContractError
+/// on stamps below 0 or beyond 2038.
+DatasetFields convert_to_recording(const Dataset& dataset, const std::filesystem::path& file,
+                                   const std::function<void()>& advance = {});
 
 /// Writes what a recording or a video became as a new folder with a data set, which appears whole
 /// or not at all. JPEG and PNG keep their bytes, other pictures become PNG. What only some pictures
-/// have is left out. Throws FileError.
-RecordingConversion convert_to_dataset(const Dataset& recording,
-                                       const std::filesystem::path& folder,
-                                       const std::function<void()>& advance = {});
+/// have is left out. Returns what every picture has. Throws FileError.
+DatasetFields convert_to_dataset(const Dataset& recording, const std::filesystem::path& folder,
+                                 const std::function<void()>& advance = {});
 
 }  // namespace panonav::recordings

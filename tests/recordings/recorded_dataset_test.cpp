@@ -61,8 +61,8 @@ class RecordedTopics : public ::testing::TestWithParam<MessageEncoding> {
     message.orientation = ros::pose_of({0.0, 0.0, 1.2}, tilt).orientation;
     recorded_->add(topic, start_ns + after_ns, message);
   }
-  [[nodiscard]] RecordedDataset read(const RecordingTopics& topics = {},
-                                     const PictureSource& source = sphere) const {
+  [[nodiscard]] OpenedDataset read(const RecordingTopics& topics = {},
+                                   const PictureSource& source = sphere) const {
     return read_recording(recorded_, "drive.bag", source, topics);
   }
   [[nodiscard]] std::string error(const RecordingTopics& topics = {}) const {

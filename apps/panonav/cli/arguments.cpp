@@ -15,7 +15,6 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/io/option_file.hpp"
-#include "panonav/io/toml_fields.hpp"
 #include "panonav/storage/memory_address.hpp"
 
 namespace panonav::command {

@@ -4,6 +4,7 @@
 #include "cli/json.hpp"
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
+#include "panonav_recordings/recording.hpp"
 #include "panonav_recordings/recording_conversion.hpp"
 #include "verbs/recording.hpp"
 
@@ -20,7 +21,7 @@ struct ConvertArguments {
 };
 
 /// What some pictures lack, and so none has in a data set.
-std::string parts(const recordings::RecordingConversion& done) {
+std::string parts(const DatasetFields& done) {
   std::string text;
   for (const auto& [has, what] : {std::pair{done.odometry, "odometry"},
                                   {done.positions, "positions"},
@@ -48,14 +49,14 @@ ExitCode convert(const ConvertArguments& wanted, Session& session) {
                                          records ? std::optional(any) : std::nullopt, session);
   Progress progress(session, "converting", dataset.entries.size());
   const auto advance = [&] { progress.advance(); };
-  const recordings::RecordingConversion done =
-      records ? recordings::convert_to_recording(dataset, wanted.output, advance)
-              : recordings::convert_to_dataset(dataset, wanted.output, advance);
+  const DatasetFields done = records
+                                 ? recordings::convert_to_recording(dataset, wanted.output, advance)
+                                 : recordings::convert_to_dataset(dataset, wanted.output, advance);
   progress.clear();
   if (session.json()) {
     session.print(json_line(ordered_json{{"input", wanted.input},
                                          {"output", wanted.output},
-                                         {"pictures", done.pictures},
+                                         {"pictures", dataset.entries.size()},
                                          {"stamps", done.stamps},
                                          {"odometry", done.odometry},
                                          {"positions", done.positions},
@@ -63,8 +64,8 @@ ExitCode convert(const ConvertArguments& wanted, Session& session) {
                                          {"tilts", done.tilts}}));
     return ExitCode::done;
   }
-  session.print(session.strong(std::to_string(done.pictures)) + " pictures of " + wanted.input +
-                " in " + wanted.output + parts(done));
+  session.print(session.strong(std::to_string(dataset.entries.size())) + " pictures of " +
+                wanted.input + " in " + wanted.output + parts(done));
   if (records && !done.stamps) {
     session.print("Not all pictures have a stamp; they are one second apart.");
   }

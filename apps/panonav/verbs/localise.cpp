@@ -14,6 +14,7 @@
 #include "panonav/pipeline/memory_learner.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/pipeline/visual_motion.hpp"
+#include "panonav_recordings/recording.hpp"
 #include "reports/localise_report.hpp"
 #include "reports/report_page.hpp"
 #include "verbs/live_run.hpp"

@@ -1,19 +1,18 @@
 #include "verbs/recording.hpp"
 
-#include <unistd.h>
-
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
+#include <string_view>
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/camera_file.hpp"
-#include "panonav/io/image_file.hpp"
-#include "panonav_recordings/jpeg_stream.hpp"
+#include "panonav/pipeline/open_input.hpp"
 #include "panonav_recordings/live_pictures.hpp"
-#include "panonav_recordings/video_file.hpp"
+#include "panonav_recordings/recording.hpp"
 
 namespace panonav::command {
 
@@ -21,61 +20,51 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The first ones, and how many more there are.
-std::string listed(const std::vector<std::string>& names) {
-  constexpr std::size_t shown = 8;
-  std::string text;
-  for (std::size_t i = 0; i < std::min(shown, names.size()); ++i) {
-    text += (i > 0 ? ", " : "") + readable_line(names[i]);
+/// Replaces the names of options that have flags of other names; `name_flags` knows the rest.
+std::string name_picture_flags(std::string text) {
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 4> flags{{
+      {"'source' (a PictureSource)", "--kind"},
+      {"'source'", "--kind and its companions"},
+      {"'from_s'", "--from"},
+      {"'to_s'", "--to"},
+  }};
+  for (const auto& [name, flag] : flags) {
+    for (auto at = text.find(name); at != text.npos; at = text.find(name, at + flag.size())) {
+      text.replace(at, name.size(), flag);
+    }
   }
-  if (names.size() > shown) text += " and " + std::to_string(names.size() - shown) + " more";
   return text;
 }
 
-void note_left_out(const Dataset& recording, Session& session) {
-  std::vector<std::string> files;
-  std::vector<std::string> folders;
-  for (const std::string& name : recording.left_out) {
-    (name.ends_with('/') ? folders : files).push_back(name);
+std::optional<ElevationBand> elevation_band(const PictureArguments& pictures) {
+  constexpr double min_band_deg = 5.0;  // pictures are higher; radians are mostly less
+  if (!pictures.elevation_deg) return std::nullopt;
+  const auto [low, high] = *pictures.elevation_deg;
+  if (low < -90.0 || high > 90.0 || high - low < min_band_deg) {
+    throw UsageError("--elevation-deg is " + to_text(low) + " " + to_text(high) +
+                     "; allowed: LOW HIGH in degrees, -90 <= LOW < HIGH <= 90, 5 degrees apart "
+                     "or more");
   }
-  if (!files.empty()) session.note("left out, no PNG or JPEG by name: " + listed(files));
-  if (!folders.empty()) session.note("left out, folders within: " + listed(folders));
+  return ElevationBand{radians(low), radians(high)};
 }
 
-/// Pictures are higher than this, but radians that stand for degrees look like it. A data set may
-/// be of single lines, as a route's is.
-constexpr double min_band_deg = 5.0;
-
-void note_low_band(const Dataset& recording, Session& session) {
-  const PictureLayout& layout = recording.source.layout;
-  const auto& band = layout.kept_elevations ? layout.kept_elevations : layout.elevations;
-  if (!band) return;
-  const double low = degrees(band->bottom_rad);
-  const double high = degrees(band->top_rad);
-  if (high - low >= min_band_deg) return;
-  session.note("hint: the elevation band of " + readable_line(recording.folder.string()) + " is " +
-               short_number(low) + " to " + short_number(high) +
-               " degrees; are these radians? elevation_deg is in degrees");
-}
-
-/// A picture twice as wide as high that is said to be a panorama shows the whole sphere in all
-/// likelihood; a panorama of square pixels that high would reach from pole to pole.
-void note_other_kind(const Dataset& recording, Session& session) {
-  if (recording.source.kind != PictureKind::panorama) return;
-  const auto& band = recording.source.layout.elevations;
-  if (band && band->top_rad - band->bottom_rad < radians(170.0)) return;
-  const DatasetEntry& first = recording.entries.front();
-  ImageSize size;
-  try {
-    size = first.store ? read_picture(first).size() : read_image_size(first.path);
-  } catch (const Error&) {
-    return;  // who reads its pixels says what is wrong
+PictureSource mirror_source(const PictureArguments& pictures,
+                            const std::optional<ElevationBand>& band) {
+  if (!pictures.camera) {
+    throw UsageError(
+        "--camera is missing: pictures of a mirror need the file that panonav calibrate writes");
   }
-  if (size.width != 2 * size.height) return;
-  session.note("hint: " + readable_line(first.path.string()) + " is " + std::to_string(size.width) +
-               " x " + std::to_string(size.height) +
-               " px; a picture of the whole sphere is of the kind equirectangular, a panorama has "
-               "an elevation band");
+  if (pictures.columns || pictures.forward_column) {
+    throw UsageError(
+        "--columns-run and --forward-column do not go with a mirror; the camera file says where "
+        "forward is");
+  }
+  PictureSource source{.kind = PictureKind::mirror};
+  auto camera = read_camera(*pictures.camera);
+  source.camera = std::move(camera.camera);
+  source.mask = std::move(camera.mask);
+  source.layout.kept_elevations = band;
+  return source;
 }
 
 }  // namespace
@@ -94,7 +83,7 @@ void declare_layout(Arguments& arguments, PictureArguments& pictures) {
   arguments.uncommon({"--columns-run", "--forward-column"});
 }
 
-void declare_topics(Arguments& arguments, recordings::RecordingTopics& topics) {
+void declare_topics(Arguments& arguments, RecordingTopics& topics) {
   arguments.option(
       "--image-topic NAME", topics.image,
       "Pictures of a recording (MCAP, rosbag2, ROS 1 bag) with several topics of them");
@@ -132,8 +121,8 @@ std::vector<std::string> recording_options() {
 
 bool is_one_picture(const std::string& input) {
   std::error_code ignored;
-  return !fs::is_directory(input, ignored) && !recordings::is_recording(input) &&
-         !recordings::is_video(input) && !recordings::is_live(input);
+  return !fs::is_directory(input, ignored) && !find_dataset_reader(input) &&
+         !recordings::is_live(input);
 }
 
 PictureSelection selection_of(const PartArguments& part) {
@@ -176,36 +165,10 @@ std::optional<PictureSource> picture_source(const PictureArguments& pictures) {
   const std::string kind = pictures.kind.value_or(pictures.camera ? "mirror" : "");
   if (kind.empty()) throw UsageError("--kind is missing: panorama, equirectangular or mirror");
 
-  PictureSource source;
-  std::optional<ElevationBand> band;
-  if (pictures.elevation_deg) {
-    const auto [low, high] = *pictures.elevation_deg;
-    if (low < -90.0 || high > 90.0 || high - low < min_band_deg) {
-      throw UsageError("--elevation-deg is " + to_text(low) + " " + to_text(high) +
-                       "; allowed: LOW HIGH in degrees, -90 <= LOW < HIGH <= 90, 5 degrees apart "
-                       "or more");
-    }
-    band = ElevationBand{radians(low), radians(high)};
-  }
-  if (kind == "mirror") {
-    if (!pictures.camera) {
-      throw UsageError(
-          "--camera is missing: pictures of a mirror need the file that panonav "
-          "calibrate writes");
-    }
-    if (pictures.columns || pictures.forward_column) {
-      throw UsageError(
-          "--columns-run and --forward-column do not go with a mirror; the camera "
-          "file says where forward is");
-    }
-    source.kind = PictureKind::mirror;
-    auto camera = read_camera(*pictures.camera);
-    source.camera = std::move(camera.camera);
-    source.mask = std::move(camera.mask);
-    source.layout.kept_elevations = band;
-    return source;
-  }
+  const std::optional<ElevationBand> band = elevation_band(pictures);
+  if (kind == "mirror") return mirror_source(pictures, band);
   if (pictures.camera) throw UsageError("--camera goes only with --kind mirror");
+  PictureSource source;
   if (pictures.columns == "counter-clockwise") {
     source.layout.direction = ColumnDirection::counter_clockwise;
   }
@@ -226,119 +189,27 @@ std::optional<PictureSource> picture_source(const PictureArguments& pictures) {
   return source;
 }
 
-namespace {
-
-void refuse_topics(const std::string& input, const recordings::RecordingTopics& topics) {
-  for (const auto& [typed, flag] : {std::pair{topics.image.has_value(), "--image-topic"},
-                                    {topics.odometry.has_value(), "--odometry-topic"},
-                                    {topics.odometry_frames.has_value(), "--odometry-frames"},
-                                    {topics.imu.has_value(), "--imu-topic"}}) {
-    if (typed) throw UsageError(input + " has no topics; leave out " + flag);
-  }
-}
-
-Dataset open_topics(const std::string& input, const recordings::RecordingTopics& topics,
-                    const PictureSource& source, Session& session) {
-  if (topics.odometry && topics.odometry_frames) {
-    throw UsageError("--odometry-topic and --odometry-frames do not go together");
-  }
-  recordings::RecordedDataset recorded = recordings::read_recording(input, source, topics);
-  for (const std::string& warning : recorded.warnings) session.note(input + ": " + warning);
-  return std::move(recorded.dataset);
-}
-
-}  // namespace
-
-namespace {
-
-/// All pictures; of a video those that are selected, as the others need not be decoded then.
-Dataset open_whole(const std::string& input, const PictureArguments& pictures,
-                   const PictureSelection& selection,
-                   const std::optional<PictureSource>& remembered, Session& session) {
-  const auto stated = picture_source(pictures);
-  std::error_code ignored;
-  if (input == "-") {
-    const auto& source = stated ? stated : remembered;
-    if (!source) throw UsageError("say what the pictures on standard input show with --kind");
-    if (pictures.recursive) throw UsageError("--recursive goes with a folder");
-    refuse_topics("standard input", pictures.topics);
-    return recordings::read_jpeg_stream(STDIN_FILENO, "standard input", *source);
-  }
-  if (recordings::is_live(input)) {
-    throw UsageError(input + " is a live source; allowed with run, localise, memorise and track");
-  }
-  if (!fs::exists(input, ignored)) throw FileError(input, "there is no such file or folder");
-  if (recordings::is_recording(input)) {
-    const auto& source = stated ? stated : remembered;
-    if (!source) {
-      throw UsageError(input +
-                       " does not say how its pictures lie; say what they show with --kind");
-    }
-    if (pictures.recursive) throw UsageError(input + " is a recording; leave out --recursive");
-    Dataset recording = open_topics(input, pictures.topics, *source, session);
-    if (stated) note_other_kind(recording, session);
-    return recording;
-  }
-  refuse_topics(input, pictures.topics);
-  if (recordings::is_video(input) && fs::is_regular_file(input, ignored)) {
-    const auto& source = stated ? stated : remembered;
-    if (!source) {
-      throw UsageError(input + " is a video; say what its pictures show with --kind");
-    }
-    if (pictures.recursive) throw UsageError(input + " is a video; leave out --recursive");
-    Dataset recording = recordings::read_video(input, *source, selection);
-    if (stated) note_other_kind(recording, session);
-    return recording;
-  }
-  if (fs::is_directory(input, ignored) && fs::exists(fs::path(input) / "dataset.toml", ignored)) {
-    if (stated) {
-      throw UsageError(input +
-                       " has a dataset.toml, which says how its pictures lie; leave out "
-                       "--kind and its companions");
-    }
-    if (pictures.recursive) {
-      throw UsageError(input +
-                       " has a dataset.toml, which names its pictures; leave out "
-                       "--recursive");
-    }
-    Dataset recording = read_dataset(input);
-    note_low_band(recording, session);
-    note_other_kind(recording, session);
-    return recording;
-  }
-  const auto& source = stated ? stated : remembered;
-  if (!source) {
-    throw UsageError(input + " has no dataset.toml; say what the pictures show with --kind");
-  }
-  const bool is_folder = fs::is_directory(input, ignored);
-  if (pictures.recursive && !is_folder) {
-    throw UsageError(input + " is one picture; --recursive goes with a folder");
-  }
-  if (!is_folder && (pictures.part.from_s || pictures.part.to_s || pictures.part.every)) {
-    throw UsageError(input + " is one picture; --from, --to and --every go with a recording");
-  }
-  Dataset recording = is_folder
-                          ? read_picture_folder(input, *source, {.recursive = pictures.recursive})
-                          : single_picture(input, *source);
-  note_left_out(recording, session);
-  if (stated) note_other_kind(recording, session);
-  return recording;
-}
-
-void select_part(Dataset& recording, const PictureSelection& selection, const std::string& input) {
-  if (selection.by_time() || selection.every > 1) {
-    if (!recordings::is_video(input)) select_pictures(recording, selection);
-  }
-}
-
-}  // namespace
-
 Dataset open_recording(const std::string& input, const PictureArguments& pictures,
                        const std::optional<PictureSource>& remembered, Session& session) {
-  const PictureSelection selection = selection_of(pictures.part);
-  Dataset recording = open_whole(input, pictures, selection, remembered, session);
-  select_part(recording, selection, input);
-  return recording;
+  const InputOptions options{.source = picture_source(pictures),
+                             .default_source = remembered,
+                             .topics = pictures.topics,
+                             .selection = selection_of(pictures.part),
+                             .recursive = pictures.recursive};
+  if (recordings::is_live(input) && input != "-") {
+    throw UsageError(input + " is a live source; allowed with run, localise, memorise and track");
+  }
+  try {
+    OpenedDataset opened = open_input(input, options);
+    for (const std::string& warning : opened.warnings) session.note(name_picture_flags(warning));
+    return std::move(opened.dataset);
+  } catch (const OptionError& error) {
+    throw UsageError(name_picture_flags(error.what()));
+  } catch (const FileError& error) {
+    const std::string_view text = error.what();
+    if (text.find("'source'") != text.npos) throw UsageError(name_picture_flags(error.what()));
+    throw Error(name_picture_flags(error.what()));
+  }
 }
 
 const PictureArguments& checked_beside(const PictureArguments& pictures, const MemoryFile& memory) {
@@ -370,15 +241,8 @@ Dataset open_recording(const std::string& input, const PictureArguments& picture
   return recording;
 }
 
-Dataset read_run(const std::string& input, const recordings::RecordingTopics& topics,
-                 const PartArguments& part, const MemoryFile& memory, Session& session) {
-  std::error_code ignored;
-  if (fs::exists(fs::path(input) / "dataset.toml", ignored)) {
-    refuse_topics(input, topics);
-    Dataset run = read_dataset(input);
-    select_part(run, selection_of(part), input);
-    return run;
-  }
+Dataset read_run(const std::string& input, const RecordingTopics& topics, const PartArguments& part,
+                 const MemoryFile& memory, Session& session) {
   PictureArguments pictures;
   pictures.topics = topics;
   pictures.part = part;
@@ -390,8 +254,7 @@ std::string how_to_add(const std::string& folder, const std::string& columns,
   if (recordings::is_recording(folder)) {
     return "; of a recording odometry is nav_msgs/Odometry or TF, poses are those of /ground_truth";
   }
-  std::error_code ignored;
-  const bool described = fs::exists(fs::path(folder) / "dataset.toml", ignored);
+  const bool described = has_dataset_file(folder);
   const Dataset recording = described ? read_dataset(folder) : read_picture_folder(folder, {});
   const std::string table = "the columns file," + columns +
                             " and a line for each picture, such as " +
@@ -406,20 +269,13 @@ std::string how_to_add(const std::string& folder, const std::string& columns,
 Dataset read_described(const std::string& folder, const PictureArguments& pictures,
                        const std::optional<PictureSource>& remembered, const std::string& columns,
                        const std::string& values, Session& session) {
-  if (recordings::is_recording(folder) || recordings::is_video(folder) ||
-      picture_source(pictures)) {
-    return open_recording(folder, pictures, remembered, session);
-  }
-  refuse_topics(folder, pictures.topics);
   std::error_code ignored;
-  if (fs::is_directory(folder, ignored) &&
-      !fs::exists(fs::path(folder) / "dataset.toml", ignored)) {
+  if (fs::is_directory(folder, ignored) && !has_dataset_file(folder) &&
+      !recordings::is_recording(folder) && !picture_source(pictures)) {
     throw FileError(folder, "has no dataset.toml, so nothing tells where its pictures were taken" +
                                 how_to_add(folder, columns, values));
   }
-  Dataset recording = read_dataset(folder);
-  select_part(recording, selection_of(pictures.part), folder);
-  return recording;
+  return open_recording(folder, pictures, remembered, session);
 }
 
 }  // namespace panonav::command

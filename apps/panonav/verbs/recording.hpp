@@ -9,9 +9,9 @@
 #include "cli/session.hpp"
 #include "panonav/core/executor.hpp"
 #include "panonav/io/dataset.hpp"
+#include "panonav/io/dataset_readers.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/storage/memory_file.hpp"
-#include "panonav_recordings/recorded_dataset.hpp"
 
 namespace panonav::command {
 
@@ -29,15 +29,15 @@ struct PictureArguments {
   std::optional<std::string> columns;
   std::optional<double> forward_column;
   std::optional<std::pair<double, double>> elevation_deg;
-  bool recursive = false;              ///< a folder of pictures: those of the folders within, too
-  recordings::RecordingTopics topics;  ///< of a recording of topics
+  bool recursive = false;  ///< a folder of pictures: those of the folders within, too
+  RecordingTopics topics;  ///< of a recording of topics
   PartArguments part;
 };
 
 /// Adds --kind, --camera, --columns-run, --forward-column and --elevation-deg.
 void declare_layout(Arguments& arguments, PictureArguments& pictures);
 /// Adds --image-topic, --odometry-topic, --odometry-frames and --imu-topic.
-void declare_topics(Arguments& arguments, recordings::RecordingTopics& topics);
+void declare_topics(Arguments& arguments, RecordingTopics& topics);
 /// Adds --from and --to, and unless the verb has one of its own, --every.
 void declare_part(Arguments& arguments, PartArguments& part, bool every);
 /// All three.
@@ -55,12 +55,10 @@ void declare_pictures(Arguments& arguments, PictureArguments& pictures);
 /// The part that is wanted. Throws UsageError on values out of range.
 [[nodiscard]] PictureSelection selection_of(const PartArguments& part);
 
-/// A data set, a folder of pictures, one picture, a video or a recording of topics. `remembered` is
-/// how pictures lay that the memory was made from: it reads what comes without a description of its
-/// own. A data set describes itself, so flags beside it throw UsageError, as topics do of what has
-/// none, and live sources but standard input, which is read to its end. Throws FileError. Notes
-/// what of a folder or recording is left out and pictures that look as if they were of another
-/// kind.
+/// Opens what `open_input` does, as the flags say, and notes its warnings. `remembered` is how the
+/// pictures lie that a memory was made from: so lie those that come without a description of their
+/// own. Throws UsageError on flags that do not fit the input and on live sources but standard
+/// input, which is read to its end; FileError.
 [[nodiscard]] Dataset open_recording(const std::string& input, const PictureArguments& pictures,
                                      const std::optional<PictureSource>& remembered,
                                      Session& session);
@@ -74,7 +72,7 @@ void declare_pictures(Arguments& arguments, PictureArguments& pictures);
 
 /// The recording of a run: a data set, or a folder or recording of pictures that lie as those of
 /// the memory.
-[[nodiscard]] Dataset read_run(const std::string& input, const recordings::RecordingTopics& topics,
+[[nodiscard]] Dataset read_run(const std::string& input, const RecordingTopics& topics,
                                const PartArguments& part, const MemoryFile& memory,
                                Session& session);
 

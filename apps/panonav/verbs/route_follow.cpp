@@ -24,7 +24,7 @@ namespace {
 struct FollowArguments {
   std::string memory;
   std::string dataset;
-  recordings::RecordingTopics topics;
+  RecordingTopics topics;
   PartArguments part;
   std::optional<std::string> name;
   int every = 1;

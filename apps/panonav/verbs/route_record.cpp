@@ -12,6 +12,7 @@
 #include "panonav/pipeline/view_encoder.hpp"
 #include "panonav/storage/memory_address.hpp"
 #include "panonav/storage/memory_file.hpp"
+#include "panonav_recordings/recording.hpp"
 #include "reports/report_page.hpp"
 #include "reports/route_report.hpp"
 #include "verbs/memorising.hpp"

@@ -47,7 +47,7 @@ constexpr double farthest_m = 1e9;
 struct TrackArguments {
   std::string memory;
   std::string dataset;
-  recordings::RecordingTopics topics;
+  RecordingTopics topics;
   PartArguments part;
   int every = 1;
   std::optional<double> start_x_m;
@@ -286,8 +286,8 @@ ExitCode track_live(const Arguments& arguments, const TrackArguments& wanted,
           if (number == 0) shown->put(*moment);
           clock.put(*moment);
         }
-        TrackedImage image = track_image(tracker, pack(view, encoder.header().full_scale), settings,
-                                         std::move(moment));
+        TrackedImage image = track_image(tracker, pack(view, encoder.header().full_scale),
+                                              settings, std::move(moment));
         moment = std::move(image.moment);
         if (moment && moved_by_hand) tell_wish(*moment);
         image.index = number;
@@ -417,7 +417,9 @@ Run declare_track(Arguments& arguments) {
                       "without --injection topological");
   arguments.used_only({"--injection-number"}, injects(ParticleInjection::uniform),
                       "without --injection uniform");
-  return [wanted, &arguments](Session& session) { return track_run(arguments, *wanted, session); };
+  return [wanted, &arguments](Session& session) {
+    return track_run(arguments, *wanted, session);
+  };
 }
 
 }  // namespace

@@ -10,7 +10,8 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/atomic_file.hpp"
 #include "panonav/io/image_file.hpp"
-#include "panonav/io/toml_fields.hpp"
+#include "panonav/io/internal/toml_fields.hpp"
+#include "panonav/io/option_file.hpp"
 
 namespace panonav {
 

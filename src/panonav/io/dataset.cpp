@@ -15,7 +15,7 @@
 #include "panonav/io/camera_file.hpp"
 #include "panonav/io/csv_table.hpp"
 #include "panonav/io/image_file.hpp"
-#include "panonav/io/toml_fields.hpp"
+#include "panonav/io/internal/toml_fields.hpp"
 
 namespace panonav {
 
@@ -196,6 +196,123 @@ bool natural_less(const std::string& a, const std::string& b) {
   return i == a.size();
 }
 
+Dataset find_pictures(const fs::path& folder, PictureSource source, bool is_recursive) {
+  Dataset dataset{folder, std::move(source), {}, {}};
+  std::error_code error;
+  std::vector<std::string> names;
+  fs::recursive_directory_iterator file(folder, error);
+  for (; !error && file != fs::recursive_directory_iterator(); file.increment(error)) {
+    std::error_code unknown;
+    const std::string name = file->path().lexically_relative(folder).string();
+    const bool is_folder = file->is_directory(unknown) && !file->is_symlink(unknown);
+    if (is_picture(file->path()) && file->is_regular_file(unknown)) {
+      names.push_back(name);
+    } else if (!is_folder) {
+      dataset.left_out.push_back(name);
+    } else if (!is_recursive) {
+      dataset.left_out.push_back(name + "/");
+      file.disable_recursion_pending();
+    }
+  }
+  if (error) throw FileError(folder.string(), "cannot be read: " + error.message());
+  std::ranges::sort(dataset.left_out, natural_less);
+  if (names.empty())
+    throw FileError(folder.string(), "holds no PNG or JPEG picture; allowed: one or more");
+  std::sort(names.begin(), names.end(), natural_less);
+  for (auto& name : names) {
+    DatasetEntry entry;
+    entry.path = folder / name;
+    entry.file = std::move(name);
+    dataset.entries.push_back(std::move(entry));
+  }
+  return dataset;
+}
+
+/// A value that entries may have, and its first column in the table.
+struct EntryField {
+  std::string_view column;
+  bool DatasetFields::*shared;
+  bool (*has)(const DatasetEntry& entry);
+};
+constexpr std::array<EntryField, 5> entry_fields{{
+    {"stamp_s", &DatasetFields::stamps, [](const auto& e) { return e.stamp_s.has_value(); }},
+    {"x_m", &DatasetFields::positions, [](const auto& e) { return e.pose.has_value(); }},
+    {"heading_deg", &DatasetFields::headings,
+     [](const auto& e) { return e.pose && e.pose->heading_rad.has_value(); }},
+    {"odom_x_m", &DatasetFields::odometry, [](const auto& e) { return e.odometry.has_value(); }},
+    {"roll_deg", &DatasetFields::tilts, [](const auto& e) { return e.tilt.has_value(); }},
+}};
+
+/// Throws ContractError where some entries have a value and others have not.
+void require_whole_fields(const std::vector<DatasetEntry>& entries) {
+  require(!entries.empty(), "number of pictures", 0.0, ">= 1");
+  const auto all = static_cast<std::ptrdiff_t>(entries.size());
+  for (const EntryField& field : entry_fields) {
+    const auto count = std::ranges::count_if(entries, field.has);
+    require(count == 0 || count == all, "number of pictures with " + std::string(field.column),
+            static_cast<double>(count), "0 or all " + std::to_string(all));
+  }
+}
+
+std::string table_text(const std::vector<DatasetEntry>& entries, const DatasetFields& columns) {
+  std::string table = "file";
+  if (columns.stamps) table += ",stamp_s";
+  if (columns.positions) table += ",x_m,y_m";
+  if (columns.headings) table += ",heading_deg";
+  if (columns.odometry) table += ",odom_x_m,odom_y_m,odom_heading_deg";
+  if (columns.tilts) table += ",roll_deg,pitch_deg";
+  table += "\n";
+  for (const auto& entry : entries) {
+    if (entry.file.empty() || entry.file.find_first_of("\r\n") != std::string::npos) {
+      throw ContractError("file", "a name that is empty or has a line break", "other names");
+    }
+    table += csv_field(entry.file);
+    const auto add = [&table](double value) { table += "," + to_text(value); };
+    if (columns.stamps) add(*entry.stamp_s);
+    if (columns.positions) {
+      add(entry.pose->x_m);
+      add(entry.pose->y_m);
+    }
+    if (columns.headings) add(written_degrees(*entry.pose->heading_rad));
+    if (columns.odometry) {
+      add(entry.odometry->x_m);
+      add(entry.odometry->y_m);
+      add(written_degrees(entry.odometry->heading_rad));
+    }
+    if (columns.tilts) {
+      add(written_degrees(entry.tilt->roll_rad));
+      add(written_degrees(entry.tilt->pitch_rad));
+    }
+    table += "\n";
+  }
+  return table;
+}
+
+/// Returns the section [images]; the camera of a mirror is written into a file of its own.
+std::string images_text(const Dataset& dataset) {
+  const PictureSource& source = dataset.source;
+  std::string text = "[images]\nkind = \"" +
+                     std::string(kind_names[static_cast<std::size_t>(source.kind)]) + "\"\n";
+  std::optional<ElevationBand> band = source.layout.kept_elevations;
+  if (source.kind == PictureKind::panorama) band = source.layout.elevations;
+  if (source.kind != PictureKind::mirror) {
+    text += "columns = \"" +
+            std::string(
+                column_directions[source.layout.direction == ColumnDirection::clockwise ? 0 : 1]) +
+            "\"\nforward_column = " + to_text(source.layout.forward_column) + "\n";
+  }
+  if (band) {
+    text += "elevation_deg = [" + to_text(written_degrees(band->bottom_rad)) + ", " +
+            to_text(written_degrees(band->top_rad)) + "]\n";
+  }
+  if (source.kind == PictureKind::mirror) {
+    require(source.camera.has_value(), "camera of mirror pictures", 0.0, "one camera");
+    write_camera(dataset.folder / "camera.toml", {*source.camera, source.mask});
+    text += "camera = \"camera.toml\"\n";
+  }
+  return text;
+}
+
 }  // namespace
 
 Dataset read_dataset(const fs::path& folder) {
@@ -222,37 +339,12 @@ Dataset read_dataset(const fs::path& folder) {
   return dataset;
 }
 
-Dataset read_picture_folder(const fs::path& folder, PictureSource source,
-                            const PictureFolderOptions& options) {
-  Dataset dataset{folder, std::move(source), {}, {}};
-  std::error_code error;
-  std::vector<std::string> names;
-  fs::recursive_directory_iterator file(folder, error);
-  for (; !error && file != fs::recursive_directory_iterator(); file.increment(error)) {
-    std::error_code unknown;
-    const std::string name = file->path().lexically_relative(folder).string();
-    const bool is_folder = file->is_directory(unknown) && !file->is_symlink(unknown);
-    if (is_picture(file->path()) && file->is_regular_file(unknown)) {
-      names.push_back(name);
-    } else if (!is_folder) {
-      dataset.left_out.push_back(name);
-    } else if (!options.recursive) {
-      dataset.left_out.push_back(name + "/");
-      file.disable_recursion_pending();
-    }
-  }
-  if (error) throw FileError(folder.string(), "cannot be read: " + error.message());
-  std::ranges::sort(dataset.left_out, natural_less);
-  if (names.empty())
-    throw FileError(folder.string(), "holds no PNG or JPEG picture; allowed: one or more");
-  std::sort(names.begin(), names.end(), natural_less);
-  for (auto& name : names) {
-    DatasetEntry entry;
-    entry.path = folder / name;
-    entry.file = std::move(name);
-    dataset.entries.push_back(std::move(entry));
-  }
-  return dataset;
+Dataset read_picture_folder(const fs::path& folder, PictureSource source) {
+  return find_pictures(folder, std::move(source), false);
+}
+
+Dataset read_picture_tree(const fs::path& folder, PictureSource source) {
+  return find_pictures(folder, std::move(source), true);
 }
 
 std::vector<std::size_t> selected_pictures(const std::vector<double>& stamps_s,
@@ -325,79 +417,34 @@ Dataset single_picture(const fs::path& file, PictureSource source) {
   return dataset;
 }
 
+DatasetFields shared_fields(const Dataset& dataset) {
+  DatasetFields fields;
+  for (const EntryField& field : entry_fields) {
+    fields.*field.shared = std::ranges::all_of(dataset.entries, field.has);
+  }
+  return fields;
+}
+
+DatasetFields drop_partial_fields(Dataset& dataset) {
+  const DatasetFields fields = shared_fields(dataset);
+  for (DatasetEntry& entry : dataset.entries) {
+    if (!fields.stamps) entry.stamp_s.reset();
+    if (!fields.positions) entry.pose.reset();
+    if (entry.pose && !fields.headings) entry.pose->heading_rad.reset();
+    if (!fields.odometry) entry.odometry.reset();
+    if (!fields.tilts) entry.tilt.reset();
+  }
+  return fields;
+}
+
 void write_dataset(const Dataset& dataset) {
-  const auto& entries = dataset.entries;
-  require(!entries.empty(), "number of pictures", 0.0, ">= 1");
-  const auto all_or_none = [&](std::string_view field, const auto& has) {
-    const auto count = std::count_if(entries.begin(), entries.end(), has);
-    require(count == 0 || count == static_cast<std::ptrdiff_t>(entries.size()),
-            "number of pictures with " + std::string(field), static_cast<double>(count),
-            "0 or all " + std::to_string(entries.size()));
-    return count > 0;
-  };
-  const bool stamps = all_or_none("stamp_s", [](const auto& e) { return e.stamp_s.has_value(); });
-  const bool poses = all_or_none("x_m", [](const auto& e) { return e.pose.has_value(); });
-  const bool headings = all_or_none(
-      "heading_deg", [](const auto& e) { return e.pose && e.pose->heading_rad.has_value(); });
-  const bool odometry =
-      all_or_none("odom_x_m", [](const auto& e) { return e.odometry.has_value(); });
-  const bool tilts = all_or_none("roll_deg", [](const auto& e) { return e.tilt.has_value(); });
-
-  std::string table = "file";
-  if (stamps) table += ",stamp_s";
-  if (poses) table += ",x_m,y_m";
-  if (headings) table += ",heading_deg";
-  if (odometry) table += ",odom_x_m,odom_y_m,odom_heading_deg";
-  if (tilts) table += ",roll_deg,pitch_deg";
-  table += "\n";
-  for (const auto& entry : entries) {
-    if (entry.file.empty() || entry.file.find_first_of("\r\n") != std::string::npos) {
-      throw ContractError("file", "a name that is empty or has a line break", "other names");
-    }
-    table += csv_field(entry.file);
-    const auto add = [&table](double value) { table += "," + to_text(value); };
-    if (stamps) add(*entry.stamp_s);
-    if (poses) {
-      add(entry.pose->x_m);
-      add(entry.pose->y_m);
-    }
-    if (headings) add(written_degrees(*entry.pose->heading_rad));
-    if (odometry) {
-      add(entry.odometry->x_m);
-      add(entry.odometry->y_m);
-      add(written_degrees(entry.odometry->heading_rad));
-    }
-    if (tilts) {
-      add(written_degrees(entry.tilt->roll_rad));
-      add(written_degrees(entry.tilt->pitch_rad));
-    }
-    table += "\n";
-  }
-
-  const PictureSource& source = dataset.source;
-  std::string text = "[images]\nkind = \"" +
-                     std::string(kind_names[static_cast<std::size_t>(source.kind)]) + "\"\n";
-  std::optional<ElevationBand> band = source.layout.kept_elevations;
-  if (source.kind == PictureKind::panorama) band = source.layout.elevations;
-  if (source.kind != PictureKind::mirror) {
-    text += "columns = \"" +
-            std::string(
-                column_directions[source.layout.direction == ColumnDirection::clockwise ? 0 : 1]) +
-            "\"\nforward_column = " + to_text(source.layout.forward_column) + "\n";
-  }
-  if (band) {
-    text += "elevation_deg = [" + to_text(written_degrees(band->bottom_rad)) + ", " +
-            to_text(written_degrees(band->top_rad)) + "]\n";
-  }
-  if (source.kind == PictureKind::mirror) {
-    require(source.camera.has_value(), "camera of mirror pictures", 0.0, "one camera");
-    write_camera(dataset.folder / "camera.toml", {*source.camera, source.mask});
-    text += "camera = \"camera.toml\"\n";
-  }
-  const bool with_poses = poses || odometry;
+  require_whole_fields(dataset.entries);
+  const DatasetFields columns = shared_fields(dataset);
+  std::string text = images_text(dataset);
+  const bool with_poses = columns.positions || columns.odometry;
   const std::string name = with_poses ? "poses.csv" : "images.csv";
   text += std::string("\n[") + (with_poses ? "poses" : "list") + "]\nfile = \"" + name + "\"\n";
-  write_file(dataset.folder / name, table);
+  write_file(dataset.folder / name, table_text(dataset.entries, columns));
   write_file(dataset.folder / "dataset.toml", text);
 }
 

@@ -86,19 +86,28 @@ struct PictureSelection {
 /// one before that of its predecessor, and when nothing is left.
 void select_pictures(Dataset& dataset, const PictureSelection& selection);
 
-/// How a folder is searched for pictures.
-struct PictureFolderOptions {
-  bool recursive = false;  ///< pictures of the folders within count, too; links are not followed
-};
-
 /// A folder of PNG and JPEG pictures without dataset.toml, in natural order of their names
-/// ("view_9" before "view_10", "morning/view_1" with their folders). Throws FileError when there is
-/// none.
-[[nodiscard]] Dataset read_picture_folder(const std::filesystem::path& folder, PictureSource source,
-                                          const PictureFolderOptions& options = {});
+/// ("view_9" before "view_10"). Throws FileError when there is none.
+[[nodiscard]] Dataset read_picture_folder(const std::filesystem::path& folder,
+                                          PictureSource source);
+/// The same with the pictures of all folders within ("morning/view_1"); links are not followed.
+[[nodiscard]] Dataset read_picture_tree(const std::filesystem::path& folder, PictureSource source);
 
 /// One picture as a data set.
 [[nodiscard]] Dataset single_picture(const std::filesystem::path& file, PictureSource source);
+
+/// What all pictures of a data set have.
+struct DatasetFields {
+  bool stamps = false;     ///< `stamp_s`
+  bool positions = false;  ///< `pose`
+  bool headings = false;   ///< of `pose`; true only with `positions`
+  bool odometry = false;   ///< `odometry`
+  bool tilts = false;      ///< `tilt`
+};
+/// Returns what all entries have, of which there must be one or more.
+[[nodiscard]] DatasetFields shared_fields(const Dataset& dataset);
+/// Drops what only some of the entries have, so that `write_dataset` takes them. Returns the rest.
+DatasetFields drop_partial_fields(Dataset& dataset);
 
 /// Writes dataset.toml, the table (poses.csv, or images.csv when no position is known) and, for
 /// mirror pictures, camera.toml into `dataset.folder`; the pictures are the caller's. The table

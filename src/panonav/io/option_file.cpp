@@ -7,6 +7,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
+#include "panonav/io/internal/toml_fields.hpp"
 
 namespace panonav {
 
@@ -62,6 +63,25 @@ class OptionReader final : public OptionVisitor {
 
 }  // namespace
 
+std::string toml_text(std::string_view text) {
+  constexpr std::string_view digits = "0123456789ABCDEF";
+  std::string result = "\"";
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (c == '"' || c == '\\') {
+      result += '\\';
+      result += c;
+    } else if (byte < ' ' || byte == 0x7F) {
+      result += "\\u00";
+      result += digits[byte >> 4U];
+      result += digits[byte & 15U];
+    } else {
+      result += c;
+    }
+  }
+  return result + "\"";
+}
+
 OptionFile::OptionFile(std::filesystem::path path)
     : path_(std::move(path)), table_(read_toml(path_)) {
   for (const TomlField& field : table_) {
@@ -72,6 +92,10 @@ OptionFile::OptionFile(std::filesystem::path path)
     }
   }
 }
+
+OptionFile::~OptionFile() = default;
+OptionFile::OptionFile(OptionFile&&) noexcept = default;
+OptionFile& OptionFile::operator=(OptionFile&&) noexcept = default;
 
 void OptionFile::apply(std::string_view section, const std::function<void(OptionVisitor&)>& visit) {
   const TomlTable* table = section_in(table_, section);

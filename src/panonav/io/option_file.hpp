@@ -9,9 +9,13 @@
 #include <vector>
 
 #include "panonav/core/options.hpp"
-#include "panonav/io/toml_fields.hpp"
 
 namespace panonav {
+
+struct TomlField;
+
+/// Returns the text in quotation marks as TOML writes it.
+[[nodiscard]] std::string toml_text(std::string_view text);
 
 /// A TOML file of options (docs/formats.md): one section for each options struct, in it one field
 /// for each member that the struct's `visit_options` shows.
@@ -19,6 +23,9 @@ class OptionFile {
  public:
   /// Throws FileError: missing, not TOML, a field outside all sections.
   explicit OptionFile(std::filesystem::path path);
+  ~OptionFile();
+  OptionFile(OptionFile&&) noexcept;
+  OptionFile& operator=(OptionFile&&) noexcept;
 
   /// Writes the fields of [section] into the members that `visit` shows; members without a field
   /// stay as they are, and so does everything when the file has no such section. Throws FileError
@@ -45,7 +52,7 @@ class OptionFile {
 
  private:
   std::filesystem::path path_;
-  TomlTable table_;
+  std::vector<TomlField> table_;
 };
 
 }  // namespace panonav

@@ -116,21 +116,6 @@ std::vector<std::uint8_t> signature_array(const VisualMemory& memory) {
   return bytes;
 }
 
-/// Leaves only what all pictures have, as a data set does.
-void write_dataset_of(Dataset dataset, MemoryExport& done) {
-  const auto all = [&](const auto& has) { return std::ranges::all_of(dataset.entries, has); };
-  done.positions = all([](const auto& e) { return e.pose.has_value(); });
-  done.headings =
-      done.positions && all([](const auto& e) { return e.pose->heading_rad.has_value(); });
-  done.stamps = all([](const auto& e) { return e.stamp_s.has_value(); });
-  for (DatasetEntry& entry : dataset.entries) {
-    if (!done.positions) entry.pose.reset();
-    if (entry.pose && !done.headings) entry.pose->heading_rad.reset();
-    if (!done.stamps) entry.stamp_s.reset();
-  }
-  write_dataset(dataset);
-}
-
 }  // namespace
 
 MemoryExport export_memory(const MemoryFile& memory, const fs::path& folder,
@@ -179,7 +164,13 @@ MemoryExport export_memory(const MemoryFile& memory, const fs::path& folder,
   if (header.source.camera) {
     write_camera(out / "camera.toml", {*header.source.camera, header.source.mask});
   }
-  if (done.pictures > 0) write_dataset_of(std::move(dataset), done);
+  if (done.pictures > 0) {
+    const DatasetFields shared = drop_partial_fields(dataset);
+    done.positions = shared.positions;
+    done.headings = shared.headings;
+    done.stamps = shared.stamps;
+    write_dataset(dataset);
+  }
   unfinished.finish();
   return done;
 }

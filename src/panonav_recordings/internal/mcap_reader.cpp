@@ -158,94 +158,136 @@ class McapFile : public ChunkedFile {
     }
   }
 
+  /// What the footer says of the summary.
+  struct Footer {
+    std::uint64_t at = 0;  ///< of the footer itself
+    std::uint64_t summary_at = 0;
+    std::uint32_t sum = 0;  ///< checksum of the summary; 0: none
+  };
+  /// What the records of the summary say of the messages.
+  struct Summary {
+    std::uint64_t indexed = 0;              ///< messages of all indexed chunks
+    std::optional<std::uint64_t> messages;  ///< of the whole file
+    std::vector<std::pair<std::uint16_t, std::uint64_t>> counts;  ///< messages by channel
+    bool is_complete = true;
+  };
+
   // Whether the summary stands for the whole file. What is wrong with it is warned of; a file may
   // also have none, or one without all that is needed.
   bool read_summary() {
-    if (size() < mcap_magic.size() + footer_bytes) return false;
-    const std::uint64_t footer_at = size() - footer_bytes;
-    const Buffer end = bytes_at(footer_at, footer_bytes);
-    Fields footer(end.bytes());
-    const auto kind = footer.number<McapRecord>();
-    const auto length = footer.number<std::uint64_t>();
-    const auto start = footer.number<std::uint64_t>();
-    footer.number<std::uint64_t>();  // of the offsets of groups
-    const auto sum = footer.number<std::uint32_t>();
-    if (kind != McapRecord::footer || length != 20 || !begins_with(footer.bytes(8), mcap_magic)) {
-      return false;  // the pass over the file says what it lacks
-    }
-    if (start == 0) return false;
-    const auto is_damaged = [&] {
-      warn("its summary is damaged; the whole file is read");
+    const auto footer = read_footer();
+    if (!footer) return false;  // the pass over the file says what it lacks
+    Summary summary;
+    const bool is_read = read_records(*footer, summary);
+    if (is_read && !add_counts(summary)) return false;
+    std::ranges::sort(blocks_, {}, &Block::at);
+    if (is_read && !has_overlapping_blocks()) return true;
+    warn("its summary is damaged; the whole file is read");
+    return false;
+  }
+
+  // Empty where there is no footer, or no summary.
+  std::optional<Footer> read_footer() {
+    if (size() < mcap_magic.size() + footer_bytes) return std::nullopt;
+    Footer footer{.at = size() - footer_bytes};
+    const Buffer end = bytes_at(footer.at, footer_bytes);
+    Fields fields(end.bytes());
+    const auto kind = fields.number<McapRecord>();
+    const auto length = fields.number<std::uint64_t>();
+    footer.summary_at = fields.number<std::uint64_t>();
+    fields.number<std::uint64_t>();  // of the offsets of groups
+    footer.sum = fields.number<std::uint32_t>();
+    const bool is_footer =
+        kind == McapRecord::footer && length == 20 && begins_with(fields.bytes(8), mcap_magic);
+    return is_footer && footer.summary_at != 0 ? std::optional(footer) : std::nullopt;
+  }
+
+  // False where the summary is damaged.
+  bool read_records(const Footer& footer, Summary& summary) {
+    const std::uint64_t start = footer.summary_at;
+    if (start < mcap_magic.size() || start > footer.at || footer.at - start > limits_.chunk_bytes) {
       return false;
-    };
-    if (start < mcap_magic.size() || start > footer_at || footer_at - start > limits_.chunk_bytes) {
-      return is_damaged();
     }
-    const Buffer bytes = bytes_at(start, footer_at - start + head_bytes + 16);
-    if (sum != 0 && ::crc32(0, bytes.data.get(), static_cast<uInt>(bytes.size)) != sum) {
-      return is_damaged();
+    const Buffer bytes = bytes_at(start, footer.at - start + head_bytes + 16);
+    if (footer.sum != 0 &&
+        ::crc32(0, bytes.data.get(), static_cast<uInt>(bytes.size)) != footer.sum) {
+      return false;
     }
-    Fields fields(bytes.bytes().first(static_cast<std::size_t>(footer_at - start)));
-    std::uint64_t indexed = 0;
-    std::optional<std::uint64_t> messages;
-    std::vector<std::pair<std::uint16_t, std::uint64_t>> counts;
-    bool is_complete = true;
+    Fields fields(bytes.bytes().first(static_cast<std::size_t>(footer.at - start)));
     while (fields.left() > 0) {
       const auto record = fields.number<McapRecord>();
       const auto body = fields.bytes(fields.number<std::uint64_t>());
-      if (!fields.good()) return is_damaged();
+      if (!fields.good()) return false;
       declare(record, body);
-      Fields content(body);
-      if (record == McapRecord::chunk_index) {
-        Block block;
-        const TimeSpan time{mcap_time(content.number<std::uint64_t>()),
-                            mcap_time(content.number<std::uint64_t>())};
-        block.at = content.number<std::uint64_t>();
-        const auto chunk_bytes = content.number<std::uint64_t>();
-        const auto lists = content.prefixed();
-        block.index_at = block.at + chunk_bytes;
-        block.index_bytes = content.number<std::uint64_t>();
-        if (!content.good() || block.at < mcap_magic.size() || block.at > start ||
-            chunk_bytes > start - block.at || block.index_bytes > start - block.index_at) {
-          return is_damaged();
-        }
-        // Each list of times and offsets has 15 bytes beside its pairs of 16.
-        const std::uint64_t beside = lists.size() / 10 * 15;
-        if (block.index_bytes < beside || (block.index_bytes - beside) % 16 != 0) {
-          is_complete = false;
-          continue;
-        }
-        block.messages = (block.index_bytes - beside) / 16;
-        indexed += block.messages;
-        if (block.messages > 0) block.time = time;
-        blocks_.push_back(std::move(block));
-      } else if (record == McapRecord::statistics) {
-        messages = content.number<std::uint64_t>();
-        content.bytes(2 + 4 + 4 + 4 + 4 + 8 + 8);
-        Fields list(content.prefixed());
-        while (list.left() > 0) {
-          const auto channel = list.number<std::uint16_t>();
-          counts.emplace_back(channel, list.number<std::uint64_t>());
-        }
-        if (!content.good() || !list.good()) return is_damaged();
+      if (record == McapRecord::chunk_index && !read_chunk_index(body, start, summary)) {
+        return false;
       }
+      if (record == McapRecord::statistics && !read_statistics(body, summary)) return false;
     }
-    if (!messages || indexed != *messages || !is_complete || lacks_schemas_) return false;
-    for (const auto& [channel, count] : counts) {
+    return true;
+  }
+
+  bool read_chunk_index(std::span<const std::uint8_t> body, std::uint64_t summary_at,
+                        Summary& summary) {
+    Fields content(body);
+    Block block;
+    const TimeSpan time{mcap_time(content.number<std::uint64_t>()),
+                        mcap_time(content.number<std::uint64_t>())};
+    block.at = content.number<std::uint64_t>();
+    const auto chunk_bytes = content.number<std::uint64_t>();
+    const auto lists = content.prefixed();
+    block.index_at = block.at + chunk_bytes;
+    block.index_bytes = content.number<std::uint64_t>();
+    if (!content.good() || block.at < mcap_magic.size() || block.at > summary_at ||
+        chunk_bytes > summary_at - block.at || block.index_bytes > summary_at - block.index_at) {
+      return false;
+    }
+    // Each list of times and offsets has 15 bytes beside its pairs of 16.
+    const std::uint64_t beside = lists.size() / 10 * 15;
+    if (block.index_bytes < beside || (block.index_bytes - beside) % 16 != 0) {
+      summary.is_complete = false;
+      return true;
+    }
+    block.messages = (block.index_bytes - beside) / 16;
+    summary.indexed += block.messages;
+    if (block.messages > 0) block.time = time;
+    blocks_.push_back(std::move(block));
+    return true;
+  }
+
+  static bool read_statistics(std::span<const std::uint8_t> body, Summary& summary) {
+    Fields content(body);
+    summary.messages = content.number<std::uint64_t>();
+    content.bytes(2 + 4 + 4 + 4 + 4 + 8 + 8);
+    Fields list(content.prefixed());
+    while (list.left() > 0) {
+      const auto channel = list.number<std::uint16_t>();
+      summary.counts.emplace_back(channel, list.number<std::uint64_t>());
+    }
+    return content.good() && list.good();
+  }
+  /// Adds up the messages of each topic. False where the summary lacks some.
+  bool add_counts(const Summary& summary) {
+    if (!summary.messages || summary.indexed != *summary.messages || !summary.is_complete ||
+        lacks_schemas_) {
+      return false;
+    }
+    for (const auto& [channel, count] : summary.counts) {
       const auto topic = channels_.find(channel);
       if (topic == channels_.end()) return false;
       topics_[topic->second].messages += count;
     }
     std::uint64_t counted = 0;
     for (const RecordedTopic& topic : topics_) counted += topic.messages;
-    if (counted != *messages) return false;
-    std::ranges::sort(blocks_, {}, &Block::at);
+    return counted == *summary.messages;
+  }
+
+  /// Of blocks in order.
+  [[nodiscard]] bool has_overlapping_blocks() const {
     for (std::size_t i = 1; i < blocks_.size(); ++i) {
-      if (blocks_[i].at < blocks_[i - 1].index_at + blocks_[i - 1].index_bytes) {
-        return is_damaged();
-      }
+      if (blocks_[i].at < blocks_[i - 1].index_at + blocks_[i - 1].index_bytes) return true;
     }
-    return true;
+    return false;
   }
 
   void scan() {

@@ -32,11 +32,8 @@ struct TomlField {
 };
 
 /// Parses the file. Throws FileError with the line: missing, larger than 1 MB, not TOML, or TOML
-/// that no file of ours needs: texts of several lines, names of 64 parts and more.
+/// that no file of ours needs: values nested more than 16 deep, a line with more than 100 dots.
 [[nodiscard]] TomlTable read_toml(const std::filesystem::path& path);
-
-/// The text in quotation marks as TOML writes it.
-[[nodiscard]] std::string toml_text(std::string_view text);
 
 /// Reads one table of a file, with one clear line for everything that is wrong. Remembers which
 /// fields were asked for, so that `finish` can refuse the others: a misspelt field would otherwise

@@ -1,0 +1,215 @@
+#include "panonav/pipeline/open_input.hpp"
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/io/image_file.hpp"
+
+namespace panonav {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Returns the first names, and how many more there are.
+std::string list_names(const std::vector<std::string>& names) {
+  constexpr std::size_t max_listed = 8;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(max_listed, names.size()); ++i) {
+    text += (i > 0 ? ", " : "") + readable_line(names[i]);
+  }
+  if (names.size() > max_listed) {
+    text += " and " + std::to_string(names.size() - max_listed) + " more";
+  }
+  return text;
+}
+
+void warn_of_left_out(OpenedDataset& opened) {
+  std::vector<std::string> files;
+  std::vector<std::string> folders;
+  for (const std::string& name : opened.dataset.left_out) {
+    (name.ends_with('/') ? folders : files).push_back(name);
+  }
+  if (!files.empty()) {
+    opened.warnings.push_back("left out, no PNG or JPEG by name: " + list_names(files));
+  }
+  if (!folders.empty()) {
+    opened.warnings.push_back("left out, folders within: " + list_names(folders));
+  }
+}
+
+/// Size of the first picture; nullopt where it cannot be read: who reads its pixels says what is
+/// wrong.
+std::optional<ImageSize> first_picture_size(const Dataset& dataset) {
+  const DatasetEntry& first = dataset.entries.front();
+  try {
+    return first.store ? read_picture(first).size() : read_image_size(first.path);
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
+/// Radians in the place of degrees make a band that is far lower than the rows of its pictures; a
+/// data set of a few rows, as a route's may be, has a low band by right.
+void warn_of_low_band(OpenedDataset& opened) {
+  constexpr double min_band_deg = 5.0;  // pi radians, taken for degrees, are less
+  constexpr double max_stretch = 8.0;   // of pixels; radians stretch them 57 times
+  const PictureLayout& layout = opened.dataset.source.layout;
+  const auto& band = layout.kept_elevations ? layout.kept_elevations : layout.elevations;
+  if (!band) return;
+  const double low_deg = degrees(band->bottom_rad);
+  const double high_deg = degrees(band->top_rad);
+  if (high_deg - low_deg >= min_band_deg) return;
+  const auto size = first_picture_size(opened.dataset);
+  if (!size || 360.0 * size->height < max_stretch * (high_deg - low_deg) * size->width) return;
+  opened.warnings.push_back("hint: the elevation band of " +
+                            readable_line(opened.dataset.folder.string()) + " is " +
+                            short_number(low_deg) + " to " + short_number(high_deg) +
+                            " degrees; are these radians? elevation_deg is in degrees");
+}
+
+/// A picture twice as wide as high that is said to be a panorama shows the whole sphere in all
+/// likelihood: as a panorama of square pixels it would reach from pole to pole.
+void warn_of_other_kind(OpenedDataset& opened) {
+  constexpr double max_band_deg = 170.0;  // from here on the band is nearly the sphere's
+  const Dataset& dataset = opened.dataset;
+  if (dataset.source.kind != PictureKind::panorama) return;
+  const auto& band = dataset.source.layout.elevations;
+  if (band && band->top_rad - band->bottom_rad < radians(max_band_deg)) return;
+  const auto size = first_picture_size(dataset);
+  if (!size || size->width != 2 * size->height) return;
+  opened.warnings.push_back(
+      "hint: " + readable_line(dataset.entries.front().path.string()) + " is " +
+      std::to_string(size->width) + " x " + std::to_string(size->height) +
+      " px; a picture of the whole sphere is of the kind equirectangular, a panorama has an "
+      "elevation band");
+}
+
+void refuse_topics(const fs::path& path, const RecordingTopics& topics) {
+  for (const auto& [is_set, option] :
+       {std::pair{topics.image.has_value(), "the option image_topic"},
+        {topics.odometry.has_value(), "the option odometry_topic"},
+        {topics.odometry_frames.has_value(), "the option odometry_frames"},
+        {topics.imu.has_value(), "the option imu_topic"}}) {
+    if (is_set) throw OptionError(path.string() + " has no topics; leave out " + option);
+  }
+}
+
+/// Throws FileError on a kind of file that is known but not read by this program.
+void refuse_unregistered(const fs::path& path) {
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kinds{{
+      {".mcap", "recording"},
+      {".bag", "recording"},
+      {".db3", "recording"},
+      {".mp4", "video"},
+      {".m4v", "video"},
+      {".mov", "video"},
+      {".mkv", "video"},
+      {".webm", "video"},
+      {".avi", "video"},
+  }};
+  std::error_code ignored;
+  const bool is_rosbag2 = fs::exists(path / "metadata.yaml", ignored);
+  const std::string extension = lower_case(path.extension().string());
+  for (const auto& [ending, name] : kinds) {
+    if (extension != ending && !(is_rosbag2 && name == "recording")) continue;
+    if (has_dataset_reader(std::string(name))) continue;
+    throw FileError(path.string(), "is a " + std::string(name) + ", and this program reads no " +
+                                       std::string(name) +
+                                       "s: no reader of that kind is registered");
+  }
+}
+
+const PictureSource& stated_source(const fs::path& path, const InputOptions& options,
+                                   std::string_view why) {
+  if (options.source) return *options.source;
+  if (options.default_source) return *options.default_source;
+  throw FileError(path.string(), std::string(why) + " with 'source' (a PictureSource)");
+}
+
+OpenedDataset open_registered(const fs::path& path, const DatasetReader& reader,
+                              const InputOptions& options) {
+  if (!reader.has_topics) refuse_topics(path, options.topics);
+  if (options.topics.odometry && options.topics.odometry_frames) {
+    throw OptionError(
+        "the option odometry_topic and the option odometry_frames do not go together");
+  }
+  const PictureSource& source =
+      stated_source(path, options, "does not say how its pictures lie; say what they show");
+  if (options.recursive) {
+    throw OptionError(path.string() + " is a " + reader.name + "; leave out the option recursive");
+  }
+  OpenedDataset opened = reader.read(path, source, options);
+  for (std::string& warning : opened.warnings) warning = path.string() + ": " + warning;
+  if (options.source) warn_of_other_kind(opened);
+  return opened;
+}
+
+OpenedDataset open_described(const fs::path& folder, const InputOptions& options) {
+  if (options.source) {
+    throw OptionError(folder.string() +
+                      " has a dataset.toml, which says how its pictures lie; leave out 'source'");
+  }
+  if (options.recursive) {
+    throw OptionError(
+        folder.string() +
+        " has a dataset.toml, which names its pictures; leave out the option recursive");
+  }
+  OpenedDataset opened{read_dataset(folder), {}};
+  warn_of_low_band(opened);
+  warn_of_other_kind(opened);
+  return opened;
+}
+
+OpenedDataset open_pictures(const fs::path& path, const InputOptions& options) {
+  refuse_unregistered(path);
+  const PictureSource& source =
+      stated_source(path, options, "has no dataset.toml; say what the pictures show");
+  std::error_code ignored;
+  OpenedDataset opened;
+  if (fs::is_directory(path, ignored)) {
+    opened.dataset =
+        options.recursive ? read_picture_tree(path, source) : read_picture_folder(path, source);
+  } else if (options.recursive) {
+    throw OptionError(path.string() + " is one picture; the option recursive goes with a folder");
+  } else if (options.selection.by_time() || options.selection.every > 1) {
+    throw OptionError(path.string() +
+                      " is one picture; 'from_s', 'to_s' and the option every go with a recording");
+  } else {
+    opened.dataset = single_picture(path, source);
+  }
+  warn_of_left_out(opened);
+  if (options.source) warn_of_other_kind(opened);
+  return opened;
+}
+
+}  // namespace
+
+bool has_dataset_file(const fs::path& folder) {
+  std::error_code ignored;
+  return fs::exists(folder / "dataset.toml", ignored);
+}
+
+OpenedDataset open_input(const fs::path& path, const InputOptions& options) {
+  if (const auto reader = find_dataset_reader(path)) return open_registered(path, *reader, options);
+  std::error_code ignored;
+  if (!fs::exists(path, ignored)) {
+    throw FileError(path.string(), "there is no such file or folder");
+  }
+  refuse_topics(path, options.topics);
+  OpenedDataset opened =
+      has_dataset_file(path) ? open_described(path, options) : open_pictures(path, options);
+  if (options.selection.by_time() || options.selection.every > 1) {
+    select_pictures(opened.dataset, options.selection);
+  }
+  return opened;
+}
+
+}  // namespace panonav

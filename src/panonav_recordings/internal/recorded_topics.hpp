@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "panonav/io/dataset_readers.hpp"
+#include "panonav/panorama/picture_source.hpp"
+#include "panonav_recordings/recording.hpp"
+
+namespace panonav::recordings {
+
+/// What the messages of a topic give a data set.
+enum class TopicRole { none, picture, odometry, transforms, tilt, truth };
+
+/// Which topics of a recording become the data set.
+struct TopicChoice {
+  std::vector<TopicRole> roles;       ///< of each topic of the recording
+  std::vector<std::uint32_t> topics;  ///< those with a role
+  /// The frames between which transforms give odometry; `nullopt` where a topic does, or nothing.
+  std::optional<std::pair<std::string, std::string>> frames;
+  bool frames_are_named = false;      ///< by the caller, so that they must be there
+  std::vector<std::string> warnings;  ///< what is there and not used, a line each
+};
+
+/// True if messages of this topic are pictures that can be read.
+[[nodiscard]] bool has_pictures(const RecordedTopic& topic);
+
+/// Chooses topics by name, or else by type (`read_recording`); the pictures lie as `source` says.
+/// Throws FileError, naming `path`, and ContractError on a topic of odometry beside frames.
+[[nodiscard]] TopicChoice choose_topics(const Recording& recording,
+                                        const std::filesystem::path& path,
+                                        const RecordingTopics& names, const PictureSource& source);
+
+}  // namespace panonav::recordings
