@@ -33,7 +33,7 @@ namespace panonav {
 
 namespace {
 
-constexpr double route_m = 60.0;
+constexpr double long_route_m = 60.0;
 // The way between lines that the paper counts its bytes for [Y03 section 2.2].
 constexpr double spacing_m = 0.1;
 constexpr int runs_each = 10;  // of a route, half of them back
@@ -48,7 +48,7 @@ struct RepeatedRoute {
 RepeatedRoute repeat_one(const RouteScene& place, int runs, std::uint64_t seed,
                          Executor& executor) {
   RepeatedRoute repeated;
-  repeated.way = curved_route(place, route_m, spacing_m, seed);
+  repeated.way = curved_route(place, long_route_m, spacing_m, seed);
   repeated.panorama = record_route(place, repeated.way, Random(seed, 7).next(), executor);
   const RouteTracker tracker(repeated.panorama);
   repeated.runs.resize(static_cast<std::size_t>(runs));
