@@ -15,6 +15,7 @@
 #include <fstream>
 #include <functional>
 #include <iterator>
+#include <memory>
 #include <queue>
 #include <sstream>
 #include <string>
@@ -302,6 +303,136 @@ double beside_m(const std::vector<StampedPose>& truths, Point2 place) {
   return nearest;
 }
 
+// A node that learns a drive, the judge of it, and what they do one after the other.
+class Loop {
+ public:
+  Loop(std::vector<std::string> simulate, std::vector<std::string> node_words)
+      : node_words_(std::move(node_words)), robot_(std::move(simulate)) {}
+
+  // The robot is driven along the path while the node learns; the node makes its map of that.
+  void teach_drive(const std::vector<Point2>& path) {
+    auto learning = node_words_;
+    learning.insert(learning.end(), {"--learn", "--route", "drive", "--kind", "panorama",
+                                     "--elevation-deg", "-30", "40"});
+    // The robot first stands where the drive begins.
+    wait(2.0);
+    const Point2 ahead = path[1];
+    judge_.carry(
+        {path[0].x_m, path[0].y_m, std::atan2(ahead.y_m - path[0].y_m, ahead.x_m - path[0].x_m)});
+    Process node(learning);
+    judge_.until(60.0, [&] { return judge_.pictures > 2; });
+    std::vector<StampedPose> by_odometry;
+    truths_ = teach(judge_, path, by_odometry);
+    wait(1.0);
+    printf("taught:%s; its odometry is off by %.2f m rms\n", judge_.values.c_str(),
+           rms_m(by_odometry, truths_));
+    const double before_s = wall_s();
+    judge_.command.publish({"finish"});
+    judge_.until(600.0, [&] { return !judge_.answer.empty(); });
+    printf("%s after %.1f s\n", judge_.answer.c_str(), wall_s() - before_s);
+  }
+
+  // Starts the node that drives, on what was learnt; false where nothing was.
+  bool start_node(const std::string& memory) {
+    const auto views = taught_views(memory);
+    printf("the map is off by %.2f m rms\n", rms_m(views, truths_));
+    for (const auto& [stamp_s, pose] : views) {
+      const auto at = std::ranges::lower_bound(truths_, stamp_s, {}, &StampedPose::stamp_s);
+      if (at != truths_.end()) taught_.push_back({at->pose, pose});
+    }
+    if (taught_.empty()) return false;
+    node_ = std::make_unique<Process>(node_words_);
+    judge_.last_transform_s = 0.0;
+    judge_.gaps_ms.clear();
+    judge_.pictures = 0;
+    judge_.until(60.0, [&] { return judge_.pictures > 2; });
+    wait(2.0);
+    return true;
+  }
+
+  // Whether the node finds itself again after the robot was carried away.
+  bool kidnap(int number, Random& random) {
+    const Taught& place = taught_[random.index(taught_.size())];
+    judge_.carry(place.truth * Pose2{0.0, 0.0, random.uniform(-3.0, 3.0)});
+    wait(1.0);
+    const double start_s = judge_.now_s;
+    const auto off_m = [&] { return distance(judge_.told().position(), place.map.position()); };
+    const bool right =
+        judge_.until(40.0, [&] { return judge_.state == "localised" && off_m() < 0.5; });
+    printf("kidnapped %d: %s after %.1f s, %.2f m off, %s\n", number, right ? "found" : "not found",
+           judge_.now_s - start_s, off_m(), judge_.state.c_str());
+    return right;
+  }
+
+  bool repeat(bool is_killed, double limit_s, Random& random) {
+    judge_.carry(truths_.front().pose * Pose2{0.0, random.uniform(-0.1, 0.1), 0.0});
+    return drive(
+        "repeated", [&] { judge_.command.publish({"repeat drive"}); },
+        truths_.back().pose.position(), is_killed, limit_s);
+  }
+
+  bool go_to_goal(bool is_killed, Random& random) {
+    const Taught& place = taught_[random.index(taught_.size())];
+    return drive(
+        "mission", [&] { judge_.goal.publish(in_map(place.map)); }, place.truth.position(),
+        is_killed, 600.0);
+  }
+
+  void report_gaps() const {
+    if (judge_.gaps_ms.empty()) return;
+    printf("map -> odom each %.1f ms, at 99.9 %% within %.1f ms, at most %.1f ms, %zu times\n",
+           quantile(judge_.gaps_ms, 0.5), quantile(judge_.gaps_ms, 0.999),
+           std::ranges::max(judge_.gaps_ms), judge_.gaps_ms.size());
+  }
+
+ private:
+  void wait(double seconds) {
+    judge_.until(seconds, [] { return false; });
+  }
+
+  // Kills the node and starts it again; returns after how many seconds the robot drives on.
+  double kill_and_restart() {
+    judge_.until(10.0, [&] { return !judge_.result.empty(); });
+    node_->end(SIGKILL);
+    judge_.last_transform_s = 0.0;
+    wait(3.0);
+    const double before_s = wall_s();
+    node_ = std::make_unique<Process>(node_words_);
+    judge_.until(100.0, [&] { return judge_.last_command_s > before_s; });
+    return judge_.last_command_s - before_s;
+  }
+
+  bool drive(const char* what, const std::function<void()>& send, Point2 end, bool is_killed,
+             double limit_s) {
+    judge_.result.clear();
+    judge_.feedback = 0;
+    for (int i = 0; i < 5 && judge_.feedback == 0 && judge_.result.empty(); ++i) {
+      send();
+      judge_.until(30.0, [&] { return judge_.feedback > 0 || !judge_.result.empty(); });
+    }
+    const double resumed_s = is_killed ? kill_and_restart() : -1.0;
+    const double start_s = judge_.now_s;
+    double farthest_m = 0.0;
+    judge_.until(limit_s, [&] {
+      farthest_m = std::max(farthest_m, beside_m(truths_, judge_.truth.position()));
+      return !judge_.result.empty();
+    });
+    const double off_m = distance(judge_.truth.position(), end);
+    printf("%s: %s after %.0f s, %.2f m from its end, at most %.2f m beside the taught drive", what,
+           judge_.result.c_str(), judge_.now_s - start_s, off_m, farthest_m);
+    if (is_killed) printf("; killed, drove again %.2f s after its new start", resumed_s);
+    puts(judge_.result == "arrived" ? "" : ("; at last" + judge_.way).c_str());
+    return judge_.result == "arrived" && off_m < 0.5;
+  }
+
+  std::vector<std::string> node_words_;
+  Process robot_;
+  Judge judge_;
+  std::vector<StampedPose> truths_;  // of the taught drive
+  std::vector<Taught> taught_;
+  std::unique_ptr<Process> node_;
+};
+
 }  // namespace
 
 int main(int count, char** words) {
@@ -319,117 +450,19 @@ int main(int count, char** words) {
   std::vector<std::string> simulate{panonav,  "simulate", world,           "--ros2",
                                     "--kind", "panorama", "--time-factor", words[9]};
   simulate.insert(simulate.end(), words + 10, words + count);
-  const std::vector<std::string> node_words{panonav, "ros2", memory, "--use-sim-time", "true"};
-  Process robot(simulate);
-  Judge judge;
-  std::vector<StampedPose> truths;
-  {
-    auto learning = node_words;
-    learning.insert(learning.end(), {"--learn", "--route", "drive", "--kind", "panorama",
-                                     "--elevation-deg", "-30", "40"});
-    // The robot first stands where the drive begins.
-    judge.until(2.0, [] { return false; });
-    const Point2 ahead = path[1];
-    judge.carry(
-        {path[0].x_m, path[0].y_m, std::atan2(ahead.y_m - path[0].y_m, ahead.x_m - path[0].x_m)});
-    Process node(learning);
-    judge.until(60.0, [&] { return judge.pictures > 2; });
-    std::vector<StampedPose> by_odometry;
-    truths = teach(judge, path, by_odometry);
-    judge.until(1.0, [] { return false; });
-    printf("taught:%s; its odometry is off by %.2f m rms\n", judge.values.c_str(),
-           rms_m(by_odometry, truths));
-    const double before_s = wall_s();
-    judge.command.publish({"finish"});
-    judge.until(600.0, [&] { return !judge.answer.empty(); });
-    printf("%s after %.1f s\n", judge.answer.c_str(), wall_s() - before_s);
-  }
-  const auto views = taught_views(memory);
-  printf("the map is off by %.2f m rms\n", rms_m(views, truths));
-  std::vector<Taught> taught;
-  for (const auto& [stamp_s, pose] : views) {
-    const auto at = std::ranges::lower_bound(truths, stamp_s, {}, &StampedPose::stamp_s);
-    if (at != truths.end()) taught.push_back({at->pose, pose});
-  }
-  if (taught.empty()) return 1;
-  auto node = std::make_unique<Process>(node_words);
-  judge.last_transform_s = 0.0;
-  judge.gaps_ms.clear();
-  judge.pictures = 0;
-  judge.until(60.0, [&] { return judge.pictures > 2; });
-  judge.until(2.0, [] { return false; });
-
-  const auto drives = [&](const char* what, const std::function<void()>& send, Point2 end,
-                          bool kill, double limit_s) {
-    judge.result.clear();
-    judge.feedback = 0;
-    for (int i = 0; i < 5 && judge.feedback == 0 && judge.result.empty(); ++i) {
-      send();
-      judge.until(30.0, [&] { return judge.feedback > 0 || !judge.result.empty(); });
-    }
-    double resumed_s = -1.0;
-    if (kill) {
-      judge.until(10.0, [&] { return !judge.result.empty(); });
-      node->end(SIGKILL);
-      judge.last_transform_s = 0.0;
-      judge.until(3.0, [] { return false; });
-      const double before_s = wall_s();
-      node = std::make_unique<Process>(node_words);
-      judge.until(100.0, [&] { return judge.last_command_s > before_s; });
-      resumed_s = judge.last_command_s - before_s;
-    }
-    const double start_s = judge.now_s;
-    double farthest_m = 0.0;
-    judge.until(limit_s, [&] {
-      farthest_m = std::max(farthest_m, beside_m(truths, judge.truth.position()));
-      return !judge.result.empty();
-    });
-    const double off_m = distance(judge.truth.position(), end);
-    printf("%s: %s after %.0f s, %.2f m from its end, at most %.2f m beside the taught drive", what,
-           judge.result.c_str(), judge.now_s - start_s, off_m, farthest_m);
-    if (kill) printf("; killed, drove again %.2f s after its new start", resumed_s);
-    puts(judge.result == "arrived" ? "" : ("; at last" + judge.way).c_str());
-    return judge.result == "arrived" && off_m < 0.5;
-  };
-
+  Loop loop(std::move(simulate), {panonav, "ros2", memory, "--use-sim-time", "true"});
+  loop.teach_drive(path);
+  if (!loop.start_node(memory)) return 1;
   int found = 0;
-  for (int i = 0; i < kidnappings; ++i) {
-    const Taught& place = taught[random.index(taught.size())];
-    const double turn = random.uniform(-3.0, 3.0);
-    judge.carry(place.truth * Pose2{0.0, 0.0, turn});
-    judge.until(1.0, [] { return false; });
-    const double start_s = judge.now_s;
-    const auto off_m = [&] { return distance(judge.told().position(), place.map.position()); };
-    const bool right =
-        judge.until(40.0, [&] { return judge.state == "localised" && off_m() < 0.5; });
-    found += right ? 1 : 0;
-    printf("kidnapped %d: %s after %.1f s, %.2f m off, %s\n", i, right ? "found" : "not found",
-           judge.now_s - start_s, off_m(), judge.state.c_str());
-  }
+  for (int i = 0; i < kidnappings; ++i) found += loop.kidnap(i, random) ? 1 : 0;
   int repeated = 0;
   for (int i = 0; i < repeats; ++i) {
-    judge.carry(truths.front().pose * Pose2{0.0, random.uniform(-0.1, 0.1), 0.0});
-    repeated += drives(
-                    "repeated", [&] { judge.command.publish({"repeat drive"}); },
-                    truths.back().pose.position(), i == 1, 2.0 * metres / 0.3 + 100.0)
-                    ? 1
-                    : 0;
+    repeated += loop.repeat(i == 1, 2.0 * metres / 0.3 + 100.0, random) ? 1 : 0;
   }
   int reached = 0;
-  for (int i = 0; i < missions; ++i) {
-    const Taught& place = taught[random.index(taught.size())];
-    reached += drives(
-                   "mission", [&] { judge.goal.publish(in_map(place.map)); },
-                   place.truth.position(), i == 1, 600.0)
-                   ? 1
-                   : 0;
-  }
+  for (int i = 0; i < missions; ++i) reached += loop.go_to_goal(i == 1, random) ? 1 : 0;
   printf("repeated %d of %d, reached %d of %d, found %d of %d\n", repeated, repeats, reached,
          missions, found, kidnappings);
-  if (!judge.gaps_ms.empty()) {
-    printf("map -> odom each %.1f ms, at 99.9 %% within %.1f ms, at most %.1f ms, %zu times\n",
-           quantile(judge.gaps_ms, 0.5), quantile(judge.gaps_ms, 0.999),
-           std::ranges::max(judge.gaps_ms), judge.gaps_ms.size());
-  }
+  loop.report_gaps();
   return 0;
 }

@@ -70,30 +70,4 @@ void load(benchmark::State& state) {
 }
 BENCHMARK(load)->Arg(1000)->Arg(10000)->Arg(100000)->Unit(benchmark::kMillisecond)->UseRealTime();
 
-// One view in a transaction of its own, on the disk when it returns.
-void append_one(benchmark::State& state) {
-  const BenchFile file(1000);
-  MemoryFile memory = MemoryFile::open(file.path(), Access::read_write);
-  Random random(2);
-  int number = 1000;
-  for (auto _ : state) memory.append(random_view(random, number++));
-}
-BENCHMARK(append_one)->Unit(benchmark::kMillisecond)->UseRealTime();
-
-// A thousand views in one transaction.
-void append_thousand(benchmark::State& state) {
-  const BenchFile file(1000);
-  MemoryFile memory = MemoryFile::open(file.path(), Access::read_write);
-  Random random(3);
-  int number = 1000;
-  for (auto _ : state) {
-    state.PauseTiming();
-    std::vector<NewView> views;
-    for (int i = 0; i < 1000; ++i) views.push_back(random_view(random, number++));
-    state.ResumeTiming();
-    memory.append(views);
-  }
-}
-BENCHMARK(append_thousand)->Unit(benchmark::kMillisecond)->UseRealTime()->Iterations(20);
-
 }  // namespace

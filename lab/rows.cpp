@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lab/statistics.hpp"
 #include "panonav/core/statistics.hpp"
 
 namespace panonav::lab {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -53,6 +54,12 @@ void add_mean(Reproduction& result, const std::string& id, const std::string& wh
 [[nodiscard]] std::string centimetres(double distance_m);
 /// "2_5cm", for the names of rows.
 [[nodiscard]] std::string centimetres_id(double distance_m);
+
+/// How many elements of a range fulfil a predicate.
+template <typename Range, typename Predicate>
+[[nodiscard]] std::size_t count_where(const Range& range, Predicate predicate) {
+  return static_cast<std::size_t>(std::ranges::count_if(range, predicate));
+}
 
 /// One more point of a curve, with its interval as error bar.
 void add_point(viewer::Series& series, double x, const Figure& y);

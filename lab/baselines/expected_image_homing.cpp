@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <string>
 
@@ -85,91 +86,108 @@ ExpectedImageHoming::ExpectedImageHoming(int columns, const ExpectedImageOptions
   }
 }
 
-HomeVector ExpectedImageHoming::home_vector(std::span<const float> home,
-                                            std::span<const float> current) const {
-  const auto columns = static_cast<std::size_t>(columns_);
-  for (const auto& row : {home, current}) {
-    require(row.size() == columns, "pixels of a row", static_cast<double>(row.size()),
-            to_text(columns_));
+namespace {
+
+// A row around its mean, and its energy.
+struct FlatRow {
+  std::vector<float> values;
+  double energy = 0.0;
+
+  explicit FlatRow(std::span<const float> row) {
+    const double mean = mean_of(row);
     for (const float value : row) {
-      require(std::isfinite(value), "pixel", static_cast<double>(value), "a finite number");
+      values.push_back(static_cast<float>(static_cast<double>(value) - mean));
+      energy += static_cast<double>(values.back()) * static_cast<double>(values.back());
     }
   }
+};
+
+// Puts the pixels that are seen from a position into `row`; returns their energy around their mean.
+float expect_row(std::span<const float> flat, const std::uint16_t* seen, float* row) {
+  const std::size_t columns = flat.size();
+  // Several sums side by side, so that one does not wait for the other.
+  std::array<float, 4> sums{};
+  std::array<float, 4> squares{};
+  std::size_t i = 0;
+  for (; i + 4 <= columns; i += 4) {
+    for (std::size_t j = 0; j < 4; ++j) {
+      const float value = flat[seen[i + j]];
+      row[i + j] = value;
+      sums[j] += value;
+      squares[j] += value * value;
+    }
+  }
+  for (; i < columns; ++i) {
+    row[i] = flat[seen[i]];
+    sums[0] += row[i];
+    squares[0] += row[i] * row[i];
+  }
+  const float sum = (sums[0] + sums[1]) + (sums[2] + sums[3]);
+  return (squares[0] + squares[1]) + (squares[2] + squares[3]) -
+         sum * sum / static_cast<float>(columns);
+}
+
+// The position and turn at which the expected view is most like home.
+struct BestExpected {
+  double difference = 0.0;  // less the energy of the home view, which is the same for all
+  std::size_t position = std::numeric_limits<std::size_t>::max();
+  std::size_t turn = 0;
+};
+
+}  // namespace
+
+void ExpectedImageHoming::require_row(std::span<const float> row) const {
+  require(row.size() == static_cast<std::size_t>(columns_), "pixels of a row",
+          static_cast<double>(row.size()), to_text(columns_));
+  for (const float value : row) {
+    require(std::isfinite(value), "pixel", static_cast<double>(value), "a finite number");
+  }
+}
+
+HomeVector ExpectedImageHoming::home_vector(std::span<const float> home,
+                                            std::span<const float> current) const {
+  require_row(home);
+  require_row(current);
+  const auto columns = static_cast<std::size_t>(columns_);
   const std::size_t stride = turn_products_stride(columns);
-  std::vector<float> periodic(columns + stride);
-  std::vector<float> flat(columns);
+  FlatRow periodic(home);
+  for (std::size_t i = 0; i < stride; ++i) periodic.values.push_back(periodic.values[i]);
+  const FlatRow flat(current);
+  // Pixels are of the order of 1, so this is rounding.
+  if (!(periodic.energy * flat.energy > 1e-20)) return {};
   std::vector<float> expected(block * columns);
   std::vector<float> products(block * stride);
-
-  const double home_mean = mean_of(home);
-  const double current_mean = mean_of(current);
-  double home_energy = 0.0;
-  double current_energy = 0.0;
-  for (std::size_t i = 0; i < columns; ++i) {
-    periodic[i] = static_cast<float>(static_cast<double>(home[i]) - home_mean);
-    flat[i] = static_cast<float>(static_cast<double>(current[i]) - current_mean);
-    home_energy += static_cast<double>(periodic[i]) * static_cast<double>(periodic[i]);
-    current_energy += static_cast<double>(flat[i]) * static_cast<double>(flat[i]);
-  }
-  for (std::size_t i = 0; i < stride; ++i) periodic[columns + i] = periodic[i];
-  // Pixels are of the order of 1, so this is rounding.
-  if (!(home_energy * current_energy > 1e-20)) return {};
-
   HomeVector vector;
-  double least = 0.0;
-  std::size_t best = positions_.size();
-  std::size_t best_turn = 0;
+  BestExpected best;
   for (std::size_t first = 0; first < positions_.size(); first += block) {
     const std::size_t count = std::min(block, positions_.size() - first);
     std::array<float, block> energies{};
     std::array<float, block> largest{};
     for (std::size_t p = 0; p < count; ++p) {
-      const std::uint16_t* const seen = pixels(first + p).data();
-      float* const row = expected.data() + p * columns;
-      // Several sums side by side, so that one does not wait for the other.
-      std::array<float, 4> sums{};
-      std::array<float, 4> squares{};
-      std::size_t i = 0;
-      for (; i + 4 <= columns; i += 4) {
-        for (std::size_t j = 0; j < 4; ++j) {
-          const float value = flat[seen[i + j]];
-          row[i + j] = value;
-          sums[j] += value;
-          squares[j] += value * value;
-        }
-      }
-      for (; i < columns; ++i) {
-        row[i] = flat[seen[i]];
-        sums[0] += row[i];
-        squares[0] += row[i] * row[i];
-      }
-      const float sum = (sums[0] + sums[1]) + (sums[2] + sums[3]);
-      energies[p] = (squares[0] + squares[1]) + (squares[2] + squares[3]) -
-                    sum * sum / static_cast<float>(columns);
+      energies[p] =
+          expect_row(flat.values, pixels(first + p).data(), expected.data() + p * columns);
     }
-    turn_products(std::span(expected).first(count * columns), columns, periodic,
+    turn_products(std::span(expected).first(count * columns), columns, periodic.values,
                   std::span(products).first(count * stride), std::span(largest).first(count));
+    if (first == 0) {
+      vector.correlation = std::clamp(
+          static_cast<double>(largest[0]) / std::sqrt(periodic.energy * flat.energy), -1.0, 1.0);
+    }
     for (std::size_t p = 0; p < count; ++p) {
-      // Less the energy of the home view, which is the same for all.
       const auto difference =
           static_cast<double>(energies[p]) - 2.0 * static_cast<double>(largest[p]);
-      if (first + p == 0) {
-        vector.correlation = std::clamp(
-            static_cast<double>(largest[p]) / std::sqrt(home_energy * current_energy), -1.0, 1.0);
-      }
-      if (best < positions_.size() && difference >= least) continue;
-      least = difference;
-      best = first + p;
+      if (best.position < positions_.size() && difference >= best.difference) continue;
       const float* const row = products.data() + p * stride;
-      best_turn = static_cast<std::size_t>(std::find(row, row + columns, largest[p]) - row);
-      const double energy = home_energy + static_cast<double>(energies[p]);
-      vector.residual = std::clamp((home_energy + difference) / energy, 0.0, 1.0);
+      best = {difference, first + p,
+              static_cast<std::size_t>(std::find(row, row + columns, largest[p]) - row)};
+      const double energy = periodic.energy + static_cast<double>(energies[p]);
+      vector.residual = std::clamp((periodic.energy + difference) / energy, 0.0, 1.0);
     }
   }
-  // Value i of the turned home view is value i + best_turn of the home view [S06 eq. 8: i - s].
-  const std::size_t shift = (columns - best_turn) % columns;
-  vector.xi = static_cast<double>(positions_[best].xi);
-  vector.eta = static_cast<double>(positions_[best].eta);
+  // Value i of the turned home view is value i + turn of the home view [S06 eq. 8: i - s].
+  const std::size_t shift = (columns - best.turn) % columns;
+  vector.xi = static_cast<double>(positions_[best.position].xi);
+  vector.eta = static_cast<double>(positions_[best.position].eta);
   vector.heading_rad = wrap_angle(2.0 * std::numbers::pi * static_cast<double>(shift) / columns_);
   const double square = vector.xi * vector.xi + vector.eta * vector.eta;
   // Of a position that may be anywhere in its square of the lattice.

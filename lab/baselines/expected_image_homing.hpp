@@ -55,6 +55,8 @@ class ExpectedImageHoming {
                                        std::span<const float> current) const;
 
  private:
+  void require_row(std::span<const float> row) const;
+
   int columns_;
   double spacing_;
   std::vector<Position> positions_;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <tuple>
 #include <utility>
 
 #include "lab/elsewhere/experiments.hpp"
@@ -237,135 +238,171 @@ class LearningRobot {
   std::size_t dropped_ = 0;
 };
 
-}  // namespace
+/// A robot that learns on its daily drives.
+struct DailyRobot {
+  std::string id;
+  std::string what;
+  DrivingRobot driving;
+  LearningRobot learning;
+  std::size_t max_views;
+  DayAnswers answers{};
+  viewer::Series series{};
+};
 
-void reproduce_days(const ElsewhereReproductionOptions& options, const std::string& name,
-                    Executor& executor, Reproduction& result) {
-  simulation::Scene first = simulation::scene_named(options.data, name, options.seed);
-  first.name = name;
-  simulation::ChangingScene changing(first, options.seed);
-  const simulation::PlaceRecording place = simulation::record_place(std::move(first),
-                                                                    {.seed = options.seed,
-                                                                     .spacing_m = spacing_m,
-                                                                     .queries = 1,
-                                                                     .rows = rows,
-                                                                     .columns = columns},
-                                                                    executor);
-  const VisualMemory memory = memory_of_references(place, executor);
-  const Features features = features_of(place, memory);
-  const RememberedPlace still(memory, features);
-  struct Robot {
-    std::string id;
-    std::string what;
-    DrivingRobot driving;
-    LearningRobot learning;
-    std::size_t max_views;
-    DayAnswers answers;
-    viewer::Series series;
-  };
-  std::vector<Robot> robots;
-  robots.push_back({".with",
-                    "learning on errands",
-                    DrivingRobot(DailyDrive::errands),
-                    LearningRobot(memory, features),
-                    memory.size(),
-                    {},
-                    {}});
-  robots.push_back({".rounds",
-                    "learning on rounds",
-                    DrivingRobot(DailyDrive::rounds),
-                    LearningRobot(memory, features),
-                    memory.size(),
-                    {},
-                    {}});
-  for (Robot& robot : robots) robot.series.label = robot.what;
-  Random light(options.seed, 91);
-  viewer::Series without_learning{.label = "without learning"};
-  DayAnswers without;
-  DayAnswers rerecorded;
-  const auto asked = static_cast<std::size_t>(3 * options.queries);
-  const int asked_every = std::max(1, options.days / 6);
-  for (int day = 1; day <= options.days; ++day) {
-    changing.pass_day(moved_share);
-    simulation::PlaceRecording today = place;
-    today.scene = changing.scene(light.uniform(0.6, 1.2));
+/// A place over the days: a memory that stays as it was, robots that learn, and one more memory
+/// that is recorded on the last day.
+class Days {
+ public:
+  Days(ElsewhereExperiments& elsewhere, const std::string& name)
+      : elsewhere_(elsewhere),
+        options_(elsewhere.options),
+        name_(name),
+        place_(simulation::record_place(first_scene(),
+                                        {.seed = options_.seed,
+                                         .spacing_m = spacing_m,
+                                         .queries = 1,
+                                         .rows = rows,
+                                         .columns = columns},
+                                        elsewhere.executor)),
+        changing_(place_.scene, options_.seed),
+        memory_(memory_of_references(place_, elsewhere.executor)),
+        features_(features_of(place_, memory_)),
+        still_(memory_, features_) {
+    for (const auto& [id, what, drive] :
+         {std::tuple{".with", "learning on errands", DailyDrive::errands},
+          {".rounds", "learning on rounds", DailyDrive::rounds}}) {
+      robots_.push_back(
+          {id, what, DrivingRobot(drive), LearningRobot(memory_, features_), memory_.size()});
+      robots_.back().series.label = what;
+    }
+  }
+
+  void pass_all() {
+    Random light(options_.seed, 91);
+    const int asked_every = std::max(1, options_.days / 6);
+    for (int day = 1; day <= options_.days; ++day) {
+      changing_.pass_day(moved_share);
+      const simulation::PlaceRecording today = place_today(light.uniform(0.6, 1.2));
+      const std::uint64_t seed = options_.seed * 1000003U + static_cast<std::uint64_t>(day) * 1000U;
+      if (day == 1 || day % asked_every == 0 || day == options_.days) ask_all(today, day, seed);
+      if (day == options_.days) break;
+      for (DailyRobot& robot : robots_) {
+        Random driving(seed, 5);
+        const auto path = robot.driving.pass_day(*today.free_space, options_.day_pictures, driving);
+        robot.learning.learn(
+            simulation::take_views(today, place_.rendering, path, seed, {}, executor()), seed,
+            executor());
+        robot.max_views = std::max(robot.max_views, robot.learning.views());
+      }
+    }
+  }
+
+  void report() const {
+    const std::string id = "elsewhere.days." + name_;
+    const std::string what = name_ + ", day " + std::to_string(options_.days) + ", " +
+                             std::to_string(changing_.moved()) + " of " +
+                             std::to_string(changing_.movable()) + " objects moved: ";
+    Reproduction& result = elsewhere_.result;
+    add_rate(result, id + ".without",
+             what + "single pictures localised within one spacing, without learning",
+             without_.right, asked());
+    add_rate(result, id + ".rerecorded", what + "the same with a memory recorded again that day",
+             rerecorded_.right, asked());
+    add_rate(result, id + ".wrong_without",
+             what + "answers farther off than one spacing, without learning", without_.wrong,
+             asked());
+    if (!without_.errors_m.empty()) {
+      add_median(result, id + ".error_without", what + "error of positions, without learning", "m",
+                 without_.errors_m);
+    }
+    for (const DailyRobot& robot : robots_) report(robot, id + robot.id, what + robot.what + ", ");
+    add_plot(result, options_.out, "days_" + name_ + ".svg",
+             "Single pictures of " + name_ +
+                 " that are localised within one spacing, while objects move and light changes.",
+             viewer::LinePlot{.x_label = "day",
+                              .y_label = "localised",
+                              .series = {robots_[0].series, robots_[1].series, without_learning_}});
+  }
+
+ private:
+  [[nodiscard]] simulation::Scene first_scene() const {
+    simulation::Scene scene = simulation::scene_named(options_.data, name_, options_.seed);
+    scene.name = name_;
+    return scene;
+  }
+  [[nodiscard]] Executor& executor() const { return elsewhere_.executor; }
+  [[nodiscard]] std::size_t asked() const { return static_cast<std::size_t>(3 * options_.queries); }
+
+  [[nodiscard]] simulation::PlaceRecording place_today(double light) const {
+    simulation::PlaceRecording today = place_;
+    today.scene = changing_.scene(light);
     today.renderer = std::make_shared<const simulation::Renderer>(
-        today.scene, simulation::RendererOptions{}, executor);
+        today.scene, simulation::RendererOptions{}, executor());
     today.free_space = std::make_shared<const simulation::FreeSpace>(
         today.scene, simulation::free_space_options(today.scene));
-    const std::uint64_t seed = options.seed * 1000003U + static_cast<std::uint64_t>(day) * 1000U;
-    if (day == 1 || day % asked_every == 0 || day == options.days) {
-      Random random(seed, 6);
-      std::vector<Pose2> poses;
-      for (std::size_t q = 0; q < asked; ++q) {
-        poses.push_back(today.free_space->random_pose(random));
-      }
-      const auto queries =
-          simulation::take_views(today, place.rendering, poses, seed + 500, {}, executor);
-      without = ask(still, queries, executor);
-      add_point(without_learning, day, success_rate(without.right, asked));
-      for (Robot& robot : robots) {
-        robot.answers = ask(robot.learning.remembered(), queries, executor);
-        add_point(robot.series, day, success_rate(robot.answers.right, asked));
-      }
-      if (day == options.days) {
-        rerecorded = ask(recorded_again(today, seed + 50'000, executor), queries, executor);
-      }
+    return today;
+  }
+
+  void ask_all(const simulation::PlaceRecording& today, int day, std::uint64_t seed) {
+    Random random(seed, 6);
+    std::vector<Pose2> poses;
+    for (std::size_t q = 0; q < asked(); ++q)
+      poses.push_back(today.free_space->random_pose(random));
+    const auto queries =
+        simulation::take_views(today, place_.rendering, poses, seed + 500, {}, executor());
+    without_ = ask(still_, queries, executor());
+    add_point(without_learning_, day, success_rate(without_.right, asked()));
+    for (DailyRobot& robot : robots_) {
+      robot.answers = ask(robot.learning.remembered(), queries, executor());
+      add_point(robot.series, day, success_rate(robot.answers.right, asked()));
     }
-    if (day == options.days) break;
-    for (Robot& robot : robots) {
-      Random driving(seed, 5);
-      const auto path = robot.driving.pass_day(*today.free_space, options.day_pictures, driving);
-      robot.learning.learn(simulation::take_views(today, place.rendering, path, seed, {}, executor),
-                           seed, executor);
-      robot.max_views = std::max(robot.max_views, robot.learning.views());
+    if (day == options_.days) {
+      rerecorded_ = ask(recorded_again(today, seed + 50'000, executor()), queries, executor());
     }
   }
-  const std::string id = "elsewhere.days." + name;
-  const std::string what = name + ", day " + std::to_string(options.days) + ", " +
-                           std::to_string(changing.moved()) + " of " +
-                           std::to_string(changing.movable()) + " objects moved: ";
-  add_rate(result, id + ".without",
-           what + "single pictures localised within one spacing, without learning", without.right,
-           asked);
-  add_rate(result, id + ".rerecorded", what + "the same with a memory recorded again that day",
-           rerecorded.right, asked);
-  add_rate(result, id + ".wrong_without",
-           what + "answers farther off than one spacing, without learning", without.wrong, asked);
-  if (!without.errors_m.empty()) {
-    add_median(result, id + ".error_without", what + "error of positions, without learning", "m",
-               without.errors_m);
-  }
-  for (const Robot& robot : robots) {
-    const std::string row = id + robot.id;
-    const std::string which = what + robot.what + ", ";
-    add_rate(result, row, which + "localised within one spacing", robot.answers.right, asked,
+
+  void report(const DailyRobot& robot, const std::string& row, const std::string& which) const {
+    Reproduction& result = elsewhere_.result;
+    const LearningRobot& learning = robot.learning;
+    add_rate(result, row, which + "localised within one spacing", robot.answers.right, asked(),
              at_least(0.98));
     add_rate(result, row + ".wrong", which + "answers farther off than that", robot.answers.wrong,
-             asked);
+             asked());
     if (!robot.answers.errors_m.empty()) {
       add_median(result, row + ".error", which + "error of positions", "m", robot.answers.errors_m);
     }
     add_row(result, row + ".views",
             which + "views of the memory, most on any day, over those at first",
-            static_cast<double>(robot.max_views) / static_cast<double>(memory.size()), "",
-            at_most(static_cast<double>(MemoryUpdateOptions{}.appearances)));
-    result.rows.back().over = std::to_string(memory.size()) + " at first, " +
-                              std::to_string(robot.learning.added()) + " learnt, " +
-                              std::to_string(robot.learning.dropped()) + " dropped";
-    if (robot.learning.added() > 0) {
-      const auto astray = static_cast<std::size_t>(std::ranges::count_if(
-          robot.learning.errors_m(), [](double error_m) { return error_m > spacing_m; }));
-      add_rate(result, row + ".astray", which + "views learnt farther off than one spacing", astray,
-               robot.learning.added(), at_most(0.0));
-    }
+            static_cast<double>(robot.max_views) / static_cast<double>(memory_.size()), "",
+            at_most(static_cast<double>(MemoryUpdateOptions{}.appearances)))
+        .over = std::to_string(memory_.size()) + " at first, " + std::to_string(learning.added()) +
+                " learnt, " + std::to_string(learning.dropped()) + " dropped";
+    if (learning.added() == 0) return;
+    add_rate(result, row + ".astray", which + "views learnt farther off than one spacing",
+             count_where(learning.errors_m(), [](double error_m) { return error_m > spacing_m; }),
+             learning.added(), at_most(0.0));
   }
-  add_plot(result, options.out, "days_" + name + ".svg",
-           "Single pictures of " + name +
-               " that are localised within one spacing, while objects move and light changes.",
-           viewer::LinePlot{.x_label = "day",
-                            .y_label = "localised",
-                            .series = {robots[0].series, robots[1].series, without_learning}});
+
+  ElsewhereExperiments& elsewhere_;
+  const ElsewhereReproductionOptions& options_;
+  std::string name_;
+  simulation::PlaceRecording place_;
+  simulation::ChangingScene changing_;
+  VisualMemory memory_;
+  Features features_;
+  RememberedPlace still_;
+  std::vector<DailyRobot> robots_;
+  viewer::Series without_learning_{.label = "without learning"};
+  DayAnswers without_;
+  DayAnswers rerecorded_;
+};
+
+}  // namespace
+
+void ElsewhereExperiments::reproduce_days(const std::string& place) {
+  Days days(*this, place);
+  days.pass_all();
+  days.report();
 }
 
 }  // namespace panonav::lab

@@ -11,6 +11,7 @@
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/mapping/map_measures.hpp"
+#include "panonav_simulation/mapping_run.hpp"
 #include "panonav_simulation/mission.hpp"
 #include "panonav_simulation/worlds.hpp"
 #include "panonav_viewer/plot.hpp"
@@ -18,30 +19,69 @@
 
 namespace panonav::lab {
 
-void reproduce_floor(const ElsewhereReproductionOptions& options, const std::string& world,
-                     double spacing_m, Executor& executor, Reproduction& result) {
+namespace {
+
+/// Missions over an arranged floor.
+struct FloorMissions {
+  std::size_t arrived = 0;
+  std::size_t wrongly = 0;         // say that they arrived, but are elsewhere
+  std::size_t within = 0;          // from the largest component to a view in it
+  std::size_t arrived_within = 0;  // of these
+  std::map<NavigationState, std::size_t> ends;
+};
+
+// Whether a way can lead from a place, as the nearest view has it.
+bool is_in_largest_component(const simulation::RememberedPlace& remembered,
+                             const Point2& position) {
+  const auto nearest = std::ranges::min_element(
+      remembered.truth, {}, [&](const Pose2& view) { return distance(view.position(), position); });
+  return remembered.arranged[static_cast<std::size_t>(nearest - remembered.truth.begin())]
+      .has_value();
+}
+
+FloorMissions count_missions(const simulation::RememberedPlace& remembered,
+                             const std::vector<simulation::Mission>& missions,
+                             const std::vector<simulation::MissionRun>& runs, double spacing_m) {
+  FloorMissions count;
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    const bool arrives = runs[i].arrives(0.5 * spacing_m);
+    count.arrived += arrives ? 1 : 0;
+    count.wrongly += !arrives && runs[i].end == NavigationState::arrived ? 1 : 0;
+    ++count.ends[runs[i].end];
+    const Pose2& goal = remembered.truth[remembered.graph.node_of(missions[i].goal).value()];
+    if (!is_in_largest_component(remembered, goal.position()) ||
+        !is_in_largest_component(remembered, missions[i].start.position())) {
+      continue;
+    }
+    ++count.within;
+    count.arrived_within += arrives ? 1 : 0;
+  }
+  return count;
+}
+
+}  // namespace
+
+void ElsewhereExperiments::reproduce_floor(const std::string& world, double spacing_m) {
   const simulation::MissionPlace place =
       simulation::make_mission_place(simulation::read_world(options.data, world), executor);
   const simulation::RememberedPlace remembered =
       simulation::remember_grid(place, spacing_m, Random(options.seed, 1).next(), executor);
-  std::vector<Point2> truth;
-  for (const Pose2& pose : remembered.truth) truth.push_back(pose.position());
+  const std::size_t views = remembered.truth.size();
   const std::string id = "elsewhere.arrange." + world + "." + centimetres_id(spacing_m);
-  const std::string what = world + ", " + std::to_string(truth.size()) + " views every " +
+  const std::string what = world + ", " + std::to_string(views) + " views every " +
                            centimetres(spacing_m) + " arranged by their similarity alone";
   std::vector<Point2> estimate;
-  std::vector<Point2> placed_truth;
-  for (std::size_t i = 0; i < truth.size(); ++i) {
+  std::vector<Point2> truth;
+  for (std::size_t i = 0; i < views; ++i) {
     if (!remembered.arranged[i]) continue;
     estimate.push_back(*remembered.arranged[i]);
-    placed_truth.push_back(truth[i]);
+    truth.push_back(remembered.truth[i].position());
   }
   add_rate(result, id + ".placed", what + ": views in the largest connected component",
-           estimate.size(), truth.size());
-  const auto difference = shape_difference(estimate, placed_truth);
-  const double trustworthiness = neighbour_preservation(estimate, placed_truth, 8).trustworthiness;
+           estimate.size(), views);
+  const double trustworthiness = neighbour_preservation(estimate, truth, 8).trustworthiness;
   add_row(result, id + ".shape", what + ": shape difference of the largest component",
-          difference.value, "", at_most(0.05))
+          shape_difference(estimate, truth).value, "", at_most(0.05))
       .reason = "the trustworthiness of its neighbourhoods is " + fixed(trustworthiness, 3);
   add_row(result, id + ".trustworthiness", what + ": trustworthiness of its neighbourhoods",
           trustworthiness, "");
@@ -49,43 +89,18 @@ void reproduce_floor(const ElsewhereReproductionOptions& options, const std::str
                                                     Random(options.seed, 2).next());
   const auto runs = simulation::run_missions(place, remembered, missions, {},
                                              Random(options.seed, 3).next(), executor);
-  // Whether a way can lead from the start, as the nearest view has it, to the goal.
-  const auto in_largest = [&](const Point2& position) {
-    const auto nearest = std::ranges::min_element(
-        truth, {}, [&](const Point2& view) { return distance(view, position); });
-    return remembered.arranged[static_cast<std::size_t>(nearest - truth.begin())].has_value();
-  };
-  std::size_t arrived = 0;
-  std::size_t wrongly = 0;
-  std::size_t within = 0;
-  std::size_t arrived_within = 0;
-  std::map<NavigationState, std::size_t> ends;
-  for (std::size_t i = 0; i < runs.size(); ++i) {
-    const bool arrives = runs[i].arrives(0.5 * spacing_m);
-    arrived += arrives ? 1 : 0;
-    wrongly += !arrives && runs[i].end == NavigationState::arrived ? 1 : 0;
-    ++ends[runs[i].end];
-    const Pose2& goal = remembered.truth[remembered.graph.node_of(missions[i].goal).value()];
-    if (!in_largest(goal.position()) || !in_largest(missions[i].start.position())) continue;
-    ++within;
-    arrived_within += arrives ? 1 : 0;
-  }
+  const FloorMissions count = count_missions(remembered, missions, runs, spacing_m);
   add_rate(result, id + ".missions", what + ": missions that arrive within half the spacing",
-           arrived, runs.size(), at_least(0.95));
-  result.rows.back().reason = simulation::other_ends(ends, wrongly) + "; of the " +
-                              std::to_string(within) +
+           count.arrived, runs.size(), at_least(0.95));
+  result.rows.back().reason = simulation::other_ends(count.ends, count.wrongly) + "; of the " +
+                              std::to_string(count.within) +
                               " missions from the largest component to a view in it, " +
-                              std::to_string(arrived_within) + " arrive";
-  const Alignment onto =
-      align(estimate, placed_truth, {.allow_scale = true, .allow_reflection = false});
-  viewer::MapLayer arranged{.label = "arranged, after the best rotation and scale",
-                            .colour = viewer::PlotColour::orange};
-  for (const Point2& point : estimate) arranged.dots.push_back(onto.apply(point));
-  viewer::MapLayer taken{.label = "where the views were taken"};
-  taken.dots = placed_truth;
+                              std::to_string(count.arrived_within) + " arrive";
   std::vector<viewer::MapLayer> layers = viewer::scene_layers(place.scene);
-  layers.push_back(std::move(taken));
-  layers.push_back(std::move(arranged));
+  layers.push_back({.label = "where the views were taken", .dots = truth});
+  layers.push_back({.label = "arranged, after the best rotation and scale",
+                    .colour = viewer::PlotColour::orange,
+                    .dots = simulation::laid_over(estimate, truth)});
   add_plot(result, options.out,
            "elsewhere_arrange_" + world + "_" + centimetres_id(spacing_m) + ".svg", what,
            viewer::MapPlot{.title = world, .layers = std::move(layers)});

@@ -100,37 +100,124 @@ std::string ends_elsewhere(const std::vector<HomingRun>& runs, std::size_t level
 void add_answers(Reproduction& result, const std::string& id, const std::string& what,
                  std::span<const HomeAnswered> answers, std::optional<Target> target) {
   add_rate(result, id, what,
-           static_cast<std::size_t>(std::ranges::count_if(answers, &HomeAnswered::answered)),
+           count_where(answers, [](const HomeAnswered& answer) { return answer.answered; }),
            answers.size(), target);
 }
 
-}  // namespace
+/// Distances between two views.
+struct Range {
+  std::string id;
+  double low_m;
+  double high_m;
+};
 
-void reproduce_home_vectors(const ElsewhereReproductionOptions& options,
-                            const std::vector<RecordedGround>& grounds, Executor& executor,
-                            Reproduction& result) {
-  Random random(options.seed, 11);
-  const auto any = [&random](const std::vector<const simulation::PlacedView*>& views) {
-    return views[random.index(views.size())];
-  };
-  const auto pairs = static_cast<std::size_t>(options.queries);
-  struct Range {
-    std::string id;
-    double low_m;
-    double high_m;
-  };
-  const std::array<Range, 3> ranges{
-      Range{"0_1m", 0.1, 1.0}, {"1_3m", 1.0, 3.0}, {"3_6m", 3.0, 6.0}};
-  std::size_t sure = 0;  // of all ranges
-  std::size_t surely_right = 0;
-  for (const Range& range : ranges) {
-    std::vector<std::pair<const simulation::PlacedView*, const simulation::PlacedView*>> asked;
-    std::vector<const RecordedGround*> ground_of;
-    for (const RecordedGround& ground : grounds) {
+/// Two views of which one is to lead to the other's place, and where both were taken.
+struct AskedPair {
+  const simulation::PlacedView* goal;
+  const simulation::PlacedView* current;
+  const RecordedGround* ground;
+};
+
+/// Asks for home vectors between random views.
+class HomeVectors {
+ public:
+  explicit HomeVectors(ElsewhereExperiments& elsewhere)
+      : elsewhere_(elsewhere),
+        random_(elsewhere.options.seed, 11),
+        pairs_(static_cast<std::size_t>(elsewhere.options.queries)) {}
+
+  void ask_within(const Range& range) {
+    const auto asked = draw_pairs(range);
+    const auto answers = simulation::make_each(
+        elsewhere_.executor, asked.size(),
+        [&](std::size_t i) { return ask_home(*asked[i].goal, *asked[i].current); });
+    std::size_t off = 0;
+    std::map<std::string, std::size_t> off_in;
+    for (std::size_t i = 0; i < answers.size(); ++i) {
+      const bool is_right = answers[i].off_rad <= radians(45.0);
+      if (answers[i].answered && answers[i].probability >= 0.9) {
+        ++sure_;
+        surely_right_ += is_right ? 1 : 0;
+      }
+      if (!answers[i].answered || is_right) continue;
+      ++off;
+      ++off_in[asked[i].ground->name];
+    }
+    const std::string id = "elsewhere.home." + range.id;
+    const std::string what = "views " + centimetres(range.low_m) + " to " +
+                             centimetres(range.high_m) + " apart, the straight way free: ";
+    Reproduction& result = elsewhere_.result;
+    add_answers(result, id + ".answered", what + "home vectors with a direction", answers,
+                std::nullopt);
+    const std::size_t answered =
+        count_where(answers, [](const HomeAnswered& answer) { return answer.answered; });
+    if (answered == 0) return;
+    add_rate(result, id + ".off", what + "of these, off by more than 45 degrees", off, answered,
+             at_most(0.05));
+    std::string& reason = result.rows.back().reason;
+    for (const auto& [name, count] : off_in) {
+      reason +=
+          (reason.empty() ? "by scene or world: " : ", ") + name + " " + std::to_string(count);
+    }
+  }
+
+  void report_probability() const {
+    if (sure_ == 0) return;
+    add_rate(elsewhere_.result, "elsewhere.home.probability",
+             "views 10 cm to 600 cm apart: of home vectors with a probability of 0.9 and more, "
+             "within 45 degrees",
+             surely_right_, sure_, at_least(0.9));
+  }
+
+  void ask_between_grounds() {
+    std::vector<std::pair<const simulation::PlacedView*, const simulation::PlacedView*>> foreign;
+    for (const RecordedGround& a : elsewhere_.grounds) {
+      for (const RecordedGround& b : elsewhere_.grounds) {
+        if (&a == &b) continue;
+        const auto goals = views_of(a.variants.front());
+        const auto currents = views_of(b.variants.front());
+        for (std::size_t i = 0; i < pairs_; i += 4) foreign.emplace_back(any(goals), any(currents));
+      }
+    }
+    if (foreign.empty()) return;
+    add_answers(elsewhere_.result, "elsewhere.home.foreign",
+                "views of two scenes or worlds: home vectors with a direction",
+                simulation::make_each(elsewhere_.executor, foreign.size(),
+                                      [&](std::size_t i) {
+                                        return ask_home(foreign[i].first->panorama,
+                                                        foreign[i].second->panorama);
+                                      }),
+                at_most(0.02));
+  }
+
+  void ask_between_noise(int smoothed) const {
+    const Panorama& like = elsewhere_.grounds.front().variants.front().references.front().panorama;
+    const auto noise_of = [&](std::size_t seed) {
+      return noise(like.rows(), like.columns(), smoothed, seed);
+    };
+    add_answers(elsewhere_.result, "elsewhere.home.noise_" + std::to_string(smoothed),
+                "noise" +
+                    (smoothed > 1 ? " smoothed over " + std::to_string(smoothed) + " columns"
+                                  : std::string()) +
+                    ": home vectors with a direction",
+                simulation::make_each(
+                    elsewhere_.executor, pairs_,
+                    [&](std::size_t i) { return ask_home(noise_of(2 * i), noise_of(2 * i + 1)); }),
+                at_most(0.02));
+  }
+
+ private:
+  const simulation::PlacedView* any(const std::vector<const simulation::PlacedView*>& views) {
+    return views[random_.index(views.size())];
+  }
+
+  std::vector<AskedPair> draw_pairs(const Range& range) {
+    std::vector<AskedPair> asked;
+    for (const RecordedGround& ground : elsewhere_.grounds) {
       const auto& place = ground.variants.front();
       const auto views = views_of(place);
       std::size_t tries = 0;
-      for (std::size_t found = 0; found < pairs && tries < 200 * pairs; ++tries) {
+      for (std::size_t found = 0; found < pairs_ && tries < 200 * pairs_; ++tries) {
         const simulation::PlacedView* goal = any(views);
         const simulation::PlacedView* current = any(views);
         const double far_m = distance(goal->pose.position(), current->pose.position());
@@ -139,91 +226,35 @@ void reproduce_home_vectors(const ElsewhereReproductionOptions& options,
         if (!place.free_space->is_free_between(goal->pose.position(), current->pose.position())) {
           continue;
         }
-        asked.emplace_back(goal, current);
-        ground_of.push_back(&ground);
+        asked.push_back({goal, current, &ground});
         ++found;
       }
     }
-    const auto answers = simulation::make_each(executor, asked.size(), [&](std::size_t i) {
-      return ask_home(*asked[i].first, *asked[i].second);
-    });
-    const auto answered =
-        static_cast<std::size_t>(std::ranges::count_if(answers, &HomeAnswered::answered));
-    std::size_t off = 0;
-    std::map<std::string, std::size_t> off_in;
-    for (std::size_t i = 0; i < answers.size(); ++i) {
-      if (answers[i].answered && answers[i].probability >= 0.9) {
-        ++sure;
-        surely_right += answers[i].off_rad <= radians(45.0) ? 1 : 0;
-      }
-      if (!answers[i].answered || answers[i].off_rad <= radians(45.0)) continue;
-      ++off;
-      ++off_in[ground_of[i]->name];
-    }
-    const std::string id = "elsewhere.home." + range.id;
-    const std::string what = "views " + centimetres(range.low_m) + " to " +
-                             centimetres(range.high_m) + " apart, the straight way free: ";
-    add_answers(result, id + ".answered", what + "home vectors with a direction", answers,
-                std::nullopt);
-    if (answered > 0) {
-      add_rate(result, id + ".off", what + "of these, off by more than 45 degrees", off, answered,
-               at_most(0.05));
-      std::string& reason = result.rows.back().reason;
-      for (const auto& [name, count] : off_in) {
-        reason +=
-            (reason.empty() ? "by scene or world: " : ", ") + name + " " + std::to_string(count);
-      }
-    }
+    return asked;
   }
 
-  if (sure > 0) {
-    add_rate(
-        result, "elsewhere.home.probability",
-        "views 10 cm to 600 cm apart: of home vectors with a probability of 0.9 and more, within "
-        "45 degrees",
-        surely_right, sure, at_least(0.9));
-  }
+  ElsewhereExperiments& elsewhere_;
+  Random random_;
+  std::size_t pairs_;
+  std::size_t sure_ = 0;  // answers of all ranges
+  std::size_t surely_right_ = 0;
+};
 
-  std::vector<std::pair<const simulation::PlacedView*, const simulation::PlacedView*>> foreign;
-  for (const RecordedGround& a : grounds) {
-    for (const RecordedGround& b : grounds) {
-      if (&a == &b) continue;
-      const auto goals = views_of(a.variants.front());
-      const auto currents = views_of(b.variants.front());
-      for (std::size_t i = 0; i < pairs; i += 4) foreign.emplace_back(any(goals), any(currents));
-    }
+}  // namespace
+
+void ElsewhereExperiments::reproduce_home_vectors() {
+  HomeVectors vectors(*this);
+  for (const Range& range :
+       {Range{"0_1m", 0.1, 1.0}, Range{"1_3m", 1.0, 3.0}, Range{"3_6m", 3.0, 6.0}}) {
+    vectors.ask_within(range);
   }
-  if (!foreign.empty()) {
-    add_answers(result, "elsewhere.home.foreign",
-                "views of two scenes or worlds: home vectors with a direction",
-                simulation::make_each(executor, foreign.size(),
-                                      [&](std::size_t i) {
-                                        return ask_home(foreign[i].first->panorama,
-                                                        foreign[i].second->panorama);
-                                      }),
-                at_most(0.02));
-  }
-  const simulation::PlacedView& some = grounds.front().variants.front().references.front();
-  const int rows = some.panorama.rows();
-  const int columns = some.panorama.columns();
-  for (const int smoothed : {1, 16}) {
-    add_answers(result, "elsewhere.home.noise_" + std::to_string(smoothed),
-                "noise" +
-                    (smoothed > 1 ? " smoothed over " + std::to_string(smoothed) + " columns"
-                                  : std::string()) +
-                    ": home vectors with a direction",
-                simulation::make_each(executor, pairs,
-                                      [&](std::size_t i) {
-                                        return ask_home(noise(rows, columns, smoothed, 2 * i),
-                                                        noise(rows, columns, smoothed, 2 * i + 1));
-                                      }),
-                at_most(0.02));
-  }
+  vectors.report_probability();
+  vectors.ask_between_grounds();
+  for (const int smoothed : {1, 16}) vectors.ask_between_noise(smoothed);
 }
 
-void reproduce_tilted_homing(const ElsewhereReproductionOptions& options, Executor& executor,
-                             Reproduction& result) {
-  for (const std::string& name : elsewhere_grounds(options)) {
+void ElsewhereExperiments::reproduce_tilted_homing() {
+  for (const std::string& name : ground_names()) {
     HomingPlace place =
         make_homing_place(simulation::scene_named(options.data, name, options.seed), {}, executor);
     const auto tasks = random_homing_tasks(place, options.runs, homing_radius_m, options.seed);
@@ -241,8 +272,8 @@ void reproduce_tilted_homing(const ElsewhereReproductionOptions& options, Execut
       place.camera.frame.tilt_rad = radians(tilt_deg);
       place.camera.levelled = measured;
       const auto runs = run_home(place, tasks, {}, options.seed, executor);
-      const auto home = static_cast<std::size_t>(std::ranges::count_if(
-          runs, [](const HomingRun& run) { return run.succeeds(arrived_m); }));
+      const auto home =
+          count_where(runs, [](const HomingRun& run) { return run.succeeds(arrived_m); });
       if (tilt_deg == 0) level_home = home;
       std::string how = "level robot";
       if (tilt_deg > 0) {

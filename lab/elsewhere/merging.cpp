@@ -110,10 +110,53 @@ std::optional<Joined> join(const Session& first, const Session& second,
   return joined;
 }
 
+/// Pairs of walks, and how many of them were joined.
+struct Pairs {
+  std::size_t all = 0;
+  std::size_t joined = 0;
+};
+
+/// Each walk through one place joined with the next one.
+void report_place(const std::string& name, const std::vector<Session>& walks,
+                  const std::filesystem::path& folder, Reproduction& result) {
+  Pairs sharing;
+  Pairs between;
+  Pairs apart;
+  std::size_t wrong = 0;
+  double worst_shape = 0.0;
+  for (std::size_t i = 0; i < walks.size(); ++i) {
+    const Session& first = walks[i];
+    const Session& second = walks[(i + 1) % walks.size()];
+    const double share = std::max(first.share_beside(second), second.share_beside(first));
+    const auto found = join(first, second, folder);
+    Pairs& alike = share >= shared_much ? sharing : share < shared_hardly ? apart : between;
+    ++alike.all;
+    if (!found) continue;
+    ++alike.joined;
+    wrong += found->rms_m > wrong_rms_m ? 1 : 0;
+    worst_shape = std::max(worst_shape, found->shape_difference);
+  }
+  const std::string id = "elsewhere.merge." + name;
+  const std::string what = "memories of two walks through " + name + " that ";
+  const auto add_pairs = [&](const std::string& key, const std::string& how, const Pairs& pairs,
+                             std::optional<Target> target) {
+    if (pairs.all == 0) return;
+    add_rate(result, id + key, what + how + ": joined", pairs.joined, pairs.all, target);
+  };
+  add_pairs(".joined", "share 13 % of the way or more", sharing, at_least(0.95));
+  if (const auto joined = sharing.joined + between.joined + apart.joined; joined > 0) {
+    add_rate(result, id + ".wrong", what + "were joined: off by more than 2 m rms", wrong, joined,
+             at_most(0.0));
+    add_row(result, id + ".shape", what + "were joined: shape difference of the worst map",
+            worst_shape, "", at_most(0.02));
+  }
+  add_pairs(".between", "share 2 to 13 % of the way", between, std::nullopt);
+  add_pairs(".apart", "share less than 2 % of the way", apart, std::nullopt);
+}
+
 }  // namespace
 
-void reproduce_merging(const ElsewhereReproductionOptions& options, Executor& executor,
-                       Reproduction& result) {
+void ElsewhereExperiments::reproduce_merging() {
   const std::filesystem::path folder = options.out / "merged";
   std::filesystem::create_directories(folder);
   std::map<std::string, std::vector<Session>> sessions;
@@ -127,62 +170,19 @@ void reproduce_merging(const ElsewhereReproductionOptions& options, Executor& ex
                        folder, options.seed + 100U + static_cast<std::uint64_t>(i), executor));
     }
   }
-  for (const auto& [name, walks] : sessions) {
-    struct Pairs {
-      std::size_t all = 0;
-      std::size_t joined = 0;
-    };
-    Pairs sharing;
-    Pairs between;
-    Pairs apart;
-    std::size_t wrong = 0;
-    double worst_shape = 0.0;
-    for (std::size_t i = 0; i < walks.size(); ++i) {
-      const Session& first = walks[i];
-      const Session& second = walks[(i + 1) % walks.size()];
-      const double share = std::max(first.share_beside(second), second.share_beside(first));
-      const auto found = join(first, second, folder);
-      Pairs& alike = share >= shared_much ? sharing : share < shared_hardly ? apart : between;
-      ++alike.all;
-      if (!found) continue;
-      ++alike.joined;
-      if (found->rms_m > wrong_rms_m) ++wrong;
-      worst_shape = std::max(worst_shape, found->shape_difference);
-    }
-    const std::string id = "elsewhere.merge." + name;
-    const std::string what = "memories of two walks through " + name + " ";
-    if (sharing.all > 0) {
-      add_rate(result, id + ".joined", what + "that share 13 % of the way or more: joined",
-               sharing.joined, sharing.all, at_least(0.95));
-    }
-    if (const auto joined = sharing.joined + between.joined + apart.joined; joined > 0) {
-      add_rate(result, id + ".wrong", what + "that were joined: off by more than 2 m rms", wrong,
-               joined, at_most(0.0));
-      add_row(result, id + ".shape", what + "that were joined: shape difference of the worst map",
-              worst_shape, "", at_most(0.02));
-    }
-    if (between.all > 0) {
-      add_rate(result, id + ".between", what + "that share 2 to 13 % of the way: joined",
-               between.joined, between.all);
-    }
-    if (apart.all > 0) {
-      add_rate(result, id + ".apart", what + "that share less than 2 % of the way: joined",
-               apart.joined, apart.all);
-    }
-  }
-  std::size_t pairs = 0;
-  std::size_t joined = 0;
+  for (const auto& [name, walks] : sessions) report_place(name, walks, folder, result);
+  Pairs disjoint;
   for (auto one = sessions.begin(); one != sessions.end(); ++one) {
     for (auto other = std::next(one); other != sessions.end(); ++other) {
       for (std::size_t i = 0; i < one->second.size(); ++i) {
-        ++pairs;
-        if (join(one->second[i], other->second[i], folder)) ++joined;
+        ++disjoint.all;
+        disjoint.joined += join(one->second[i], other->second[i], folder) ? 1 : 0;
       }
     }
   }
-  if (pairs > 0) {
+  if (disjoint.all > 0) {
     add_rate(result, "elsewhere.merge.disjoint", "memories of walks through two places: joined",
-             joined, pairs, at_most(0.0));
+             disjoint.joined, disjoint.all, at_most(0.0));
   }
   std::filesystem::remove_all(folder);
 }

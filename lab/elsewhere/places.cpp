@@ -60,20 +60,55 @@ void add_rates(Reproduction& result, const std::string& id, const std::string& w
              std::to_string(rates.trials) + " places in all; " + rates.extreme(false);
 }
 
+/// Own places of one ground, in both conditions.
+void add_own_places(const ElsewhereExperiments& elsewhere, const RecordedGround& ground) {
+  const auto all_conditions = place_conditions();
+  const std::vector<PlaceCondition> conditions(all_conditions.begin(), all_conditions.begin() + 2);
+  const std::array<std::string, 2> ids{"clean", "hard"};
+  const std::array<double, 2> targets{0.97, 0.93};
+  const auto asked = static_cast<std::size_t>(elsewhere.options.queries);
+  std::array<Rates, 2> known;
+  std::array<Rates, 2> near;
+  Rates inside;
+  for (const simulation::PlaceRecording& place : ground.variants) {
+    const std::string name = ground.name + " " + std::to_string(place.seed);
+    const auto measured = run_place_experiment(place, conditions, elsewhere.executor);
+    for (std::size_t c = 0; c < conditions.size(); ++c) {
+      known[c].add(name, measured[c].known, asked);
+      near[c].add(name, measured[c].nearest_or_next, asked);
+    }
+    inside.add(name, measured[0].inside, asked);
+  }
+  Reproduction& result = elsewhere.result;
+  for (std::size_t c = 0; c < conditions.size(); ++c) {
+    const std::string id = "elsewhere.places." + ground.name + "." + ids[c];
+    const std::string where =
+        ground.name + ", references every " + centimetres(spacing_m) + ", " + conditions[c].name;
+    add_rates(result, id + ".known", where + ": own places known", known[c], at_least(targets[c]));
+    add_rates(result, id + ".near",
+              where + ": the best match is the nearest reference or beside it", near[c],
+              at_least(0.9));
+  }
+  const std::string id = "elsewhere.places." + ground.name + ".radius";
+  const std::string what = ground.name + ": positions within the stated 95 % radius";
+  add_rates(result, id, what, inside, at_least(0.9));
+  add_rates(result, id + "_not_too_wide", what + " (more: wider than need be)", inside,
+            at_most(0.98));
+}
+
 }  // namespace
 
-std::vector<std::string> elsewhere_grounds(const ElsewhereReproductionOptions& options) {
-  std::vector<std::string> names(options.built_in.begin(), options.built_in.end());
+std::vector<std::string> ElsewhereExperiments::ground_names() const {
+  std::vector<std::string> names = options.built_in;
   for (const std::string& world : simulation::all_worlds_in(options.data)) names.push_back(world);
   return names;
 }
 
-RecordedGround record_ground(const ElsewhereReproductionOptions& options, const std::string& name,
-                             Executor& executor) {
+void ElsewhereExperiments::record_ground(const std::string& name) {
   RecordedGround ground{.name = name};
-  ground.built_in =
+  const bool is_built_in =
       std::ranges::find(simulation::scene_names(), name) != simulation::scene_names().end();
-  for (int i = 0; i < (ground.built_in ? options.scenes : 1); ++i) {
+  for (int i = 0; i < (is_built_in ? options.scenes : 1); ++i) {
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
     simulation::Scene scene = simulation::scene_named(options.data, name, seed);
     scene.name = name;
@@ -85,56 +120,22 @@ RecordedGround record_ground(const ElsewhereReproductionOptions& options, const 
                                                         .columns = columns},
                                                        executor));
   }
-  return ground;
+  grounds.push_back(std::move(ground));
 }
 
-void reproduce_known_places(const ElsewhereReproductionOptions& options,
-                            const std::vector<RecordedGround>& grounds, Executor& executor,
-                            Reproduction& result) {
-  const auto asked = static_cast<std::size_t>(options.queries);
-  const auto all_conditions = place_conditions();
-  const std::vector<PlaceCondition> conditions(all_conditions.begin(), all_conditions.begin() + 2);
-  const std::array<std::string, 2> ids{"clean", "hard"};
-  const std::array<double, 2> targets{0.97, 0.93};
+void ElsewhereExperiments::reproduce_known_places() {
   std::vector<const simulation::PlaceRecording*> places;
   for (const RecordedGround& ground : grounds) {
-    std::array<Rates, 2> known;
-    std::array<Rates, 2> near;
-    Rates inside;
-    for (const simulation::PlaceRecording& place : ground.variants) {
-      places.push_back(&place);
-      const std::string name = ground.name + " " + std::to_string(place.seed);
-      const auto measured = run_place_experiment(place, conditions, executor);
-      for (std::size_t c = 0; c < conditions.size(); ++c) {
-        known[c].add(name, measured[c].known, asked);
-        near[c].add(name, measured[c].nearest_or_next, asked);
-      }
-      inside.add(name, measured[0].inside, asked);
-    }
-    for (std::size_t c = 0; c < conditions.size(); ++c) {
-      const std::string id = "elsewhere.places." + ground.name + "." + ids[c];
-      const std::string where =
-          ground.name + ", references every " + centimetres(spacing_m) + ", " + conditions[c].name;
-      add_rates(result, id + ".known", where + ": own places known", known[c],
-                at_least(targets[c]));
-      add_rates(result, id + ".near",
-                where + ": the best match is the nearest reference or beside it", near[c],
-                at_least(0.9));
-    }
-    const std::string id = "elsewhere.places." + ground.name + ".radius";
-    const std::string what = ground.name + ": positions within the stated 95 % radius";
-    add_rates(result, id, what, inside, at_least(0.9));
-    add_rates(result, id + "_not_too_wide", what + " (more: wider than need be)", inside,
-              at_most(0.98));
+    for (const simulation::PlaceRecording& place : ground.variants) places.push_back(&place);
+    add_own_places(*this, ground);
   }
-
   Rates other;
   Rates variant;
   for (const RecognitionRate& rate : recognition_rates(places, executor)) {
     if (rate.memory == rate.queries) continue;
     const std::string name = rate.queries + " in " + rate.memory;
     (ground_of(rate.memory) == ground_of(rate.queries) ? variant : other)
-        .add(name, rate.known, asked);
+        .add(name, rate.known, static_cast<std::size_t>(options.queries));
   }
   const auto add_foreign = [&](const std::string& id, const std::string& what, const Rates& rates,
                                double most) {
@@ -147,9 +148,7 @@ void reproduce_known_places(const ElsewhereReproductionOptions& options,
               0.05);
 }
 
-void reproduce_tracked_poses(const ElsewhereReproductionOptions& options,
-                             const std::vector<RecordedGround>& grounds, Executor& executor,
-                             Reproduction& result) {
+void ElsewhereExperiments::reproduce_tracked_poses() {
   // Of chi squared with two degrees of freedom.
   constexpr double quantile_95 = 5.991;
   constexpr double quantile_50 = 1.386;
@@ -179,8 +178,7 @@ void reproduce_tracked_poses(const ElsewhereReproductionOptions& options,
     std::vector<double> all;
     for (const auto& some : squares) all.insert(all.end(), some.begin(), some.end());
     if (all.empty()) continue;
-    const auto inside = static_cast<std::size_t>(
-        std::ranges::count_if(all, [](double square) { return square <= quantile_95; }));
+    const auto inside = count_where(all, [](double square) { return square <= quantile_95; });
     const std::string id = "elsewhere.tracks." + ground.name;
     add_rate(result, id + ".ellipse",
              ground.name + ", walks: tracked poses within the 95 % ellipse of their covariance",

@@ -87,127 +87,164 @@ struct Found {
   double milliseconds = 0.0;
 };
 
-/// All answers of one way of asking.
-struct Asked {
-  std::size_t near_count = 0;
-  std::vector<double> milliseconds;
-
-  Asked(const std::vector<Recorded>& views, std::span<const Found> found) {
-    for (std::size_t n = 0; n < found.size(); ++n) {
-      near_count += is_near(views, n / turns, found[n].view) ? 1 : 0;
-      milliseconds.push_back(found[n].milliseconds);
+/// Each picture of a recording, turned at random, and its rows.
+class LeaveOneOut {
+ public:
+  LeaveOneOut(const ElsewhereExperiments& elsewhere, const Dataset& dataset,
+              const PlaceRecogniser& recogniser, const std::string& name)
+      : elsewhere_(elsewhere), id_("elsewhere." + name) {
+    for (const DatasetEntry& entry : dataset.entries) {
+      Panorama panorama = recogniser.encoder().panorama(read_observation(entry));
+      Panorama sharp = sharp_view(entry, dataset.source, panorama);
+      views_.push_back({entry.file,
+                        entry.pose ? std::optional(entry.pose->position()) : std::nullopt,
+                        std::move(panorama), std::move(sharp)});
     }
+    columns_ = static_cast<std::uint64_t>(views_.front().panorama.columns());
+    what_ = name + ", each of " + std::to_string(views_.size()) + " pictures, turned at random " +
+            std::to_string(turns) + " times, asked of the memory of the others: ";
+    near_ = views_.front().position ? "best match within 1.5 times the distance of the nearest"
+                                    : "best match is the picture before or after";
   }
+
+  [[nodiscard]] std::size_t size() const { return views_.size(); }
+
+  /// Asks a memory of all pictures; its answers are kept in `places`.
+  std::vector<Found> ask(const PlaceRecogniser& ours, std::vector<Place>& places) const {
+    places.resize(asked());
+    return simulation::make_each(elsewhere_.executor, asked(), [&](std::size_t n) {
+      const Observation seen(turned(n));
+      const double start = simulation::thread_seconds();
+      places[n] = ours.localise(seen, {&views_[n / turns].file, 1});
+      const double spent = 1000.0 * (simulation::thread_seconds() - start);
+      const auto match = std::ranges::find(views_, places[n].matches.at(0).name, &Recorded::file);
+      return Found{static_cast<std::size_t>(match - views_.begin()), spent};
+    });
+  }
+
+  std::vector<Found> ask(RivalRecogniser& rival) const {
+    std::vector<RivalView> references;
+    for (const Recorded& view : views_) {
+      references.push_back({view.panorama, to_picture(view.sharp)});
+    }
+    rival.memorise(references);
+    return simulation::make_each(elsewhere_.executor, asked(), [&](std::size_t n) {
+      const Panorama& sharp = views_[n / turns].sharp;
+      const auto turn = static_cast<int>(
+          std::lround(turn_of(n) * sharp.columns() / static_cast<double>(columns_)));
+      const RivalView query{turned(n), to_picture(turn_columns(sharp, turn))};
+      const double start = simulation::thread_seconds();
+      const std::size_t view = rival.nearest(query, n / turns);
+      return Found{view, 1000.0 * (simulation::thread_seconds() - start)};
+    });
+  }
+
+  void add_near(const std::vector<Found>& found, std::optional<Target> target) const {
+    add_rate(result(), id_ + ".near", what_ + near_, count_near(found), asked(), target);
+  }
+
+  void add_known(const std::vector<Place>& places) const {
+    std::size_t known = 0;
+    std::size_t placed = 0;
+    std::size_t inside = 0;
+    for (std::size_t n = 0; n < asked(); ++n) {
+      const Place& place = places[n];
+      const auto& truth = views_[n / turns].position;
+      known += place.known ? 1 : 0;
+      if (!place.position || !place.position->radius_m || !truth) continue;
+      ++placed;
+      const double off_m = distance({place.position->x_m, place.position->y_m}, *truth);
+      inside += off_m <= *place.position->radius_m ? 1 : 0;
+    }
+    add_rate(result(), id_ + ".known", what_ + "places known", known, asked());
+    if (placed == 0) return;
+    add_rate(result(), id_ + ".radius", what_ + "positions within the stated 95 % radius", inside,
+             placed, at_least(0.9));
+  }
+
+  void add_cost(const std::vector<Found>& found, double file_bytes) const {
+    add_median(result(), id_ + ".time", what_ + "processor time from the panorama to the answer",
+               "ms", milliseconds(found), at_most(5.0));
+    add_row(result(), id_ + ".bytes", what_ + "size of the memory file, for each view",
+            file_bytes / static_cast<double>(size()), "B", at_most(20'000.0));
+  }
+
+  /// Adds the rows of another way of asking; returns its name and how often it was right.
+  std::string add_other(const std::string& other, const std::vector<Found>& found,
+                        double bytes) const {
+    std::string key = other;
+    std::ranges::replace(key, ' ', '_');
+    std::erase(key, ',');
+    const std::string id = id_ + "." + key;
+    const std::size_t near_count = count_near(found);
+    add_rate(result(), id + ".near", what_ + other + ": " + near_, near_count, asked());
+    add_median(result(), id + ".time", what_ + other + ": processor time", "ms",
+               milliseconds(found));
+    add_row(result(), id + ".bytes", what_ + other + ": bytes a view", bytes, "B");
+    return other + " " + std::to_string(near_count);
+  }
+
+ private:
+  [[nodiscard]] Reproduction& result() const { return elsewhere_.result; }
+  [[nodiscard]] std::size_t asked() const { return views_.size() * turns; }
+  [[nodiscard]] int turn_of(std::size_t n) const {
+    Random random(elsewhere_.options.seed + n % turns, n / turns);
+    return static_cast<int>(random.index(columns_));
+  }
+  [[nodiscard]] Panorama turned(std::size_t n) const {
+    return turn_columns(views_[n / turns].panorama, turn_of(n));
+  }
+  [[nodiscard]] std::size_t count_near(const std::vector<Found>& found) const {
+    std::size_t count = 0;
+    for (std::size_t n = 0; n < found.size(); ++n) {
+      count += is_near(views_, n / turns, found[n].view) ? 1 : 0;
+    }
+    return count;
+  }
+  static std::vector<double> milliseconds(const std::vector<Found>& found) {
+    std::vector<double> times;
+    for (const Found& one : found) times.push_back(one.milliseconds);
+    return times;
+  }
+
+  const ElsewhereExperiments& elsewhere_;
+  std::string id_;
+  std::string what_;
+  std::string near_;
+  std::vector<Recorded> views_;
+  std::uint64_t columns_ = 0;
 };
 
 }  // namespace
 
-void reproduce_leave_one_out(const ElsewhereReproductionOptions& options,
-                             const std::filesystem::path& recording,
-                             std::vector<std::unique_ptr<RivalRecogniser>> rivals,
-                             Executor& executor, Reproduction& result) {
+void ElsewhereExperiments::reproduce_leave_one_out(
+    const std::filesystem::path& recording, std::vector<std::unique_ptr<RivalRecogniser>> rivals) {
   const Dataset dataset = read_dataset(recording);
   const std::string name = recording.filename().string();
   const RemovedInTheEnd memory{options.out / (name + ".panonav")};
   const PlaceRecogniser by_columns = memorise(memory.file, dataset, false, executor);
   const PlaceRecogniser recogniser = memorise(memory.file, dataset, true, executor);
-  const double file_bytes = static_cast<double>(std::filesystem::file_size(memory.file));
-  std::vector<Recorded> views;
-  for (const DatasetEntry& entry : dataset.entries) {
-    Panorama panorama = recogniser.encoder().panorama(read_observation(entry));
-    Panorama sharp = sharp_view(entry, dataset.source, panorama);
-    views.push_back({entry.file, entry.pose ? std::optional(entry.pose->position()) : std::nullopt,
-                     std::move(panorama), std::move(sharp)});
-  }
-  const auto columns = static_cast<std::uint64_t>(views.front().panorama.columns());
-  const auto turn_of = [&](std::size_t n) {
-    Random random(options.seed + n % turns, n / turns);
-    return static_cast<int>(random.index(columns));
-  };
-  const auto turned = [&](std::size_t n) {
-    return turn_columns(views[n / turns].panorama, turn_of(n));
-  };
-
-  const std::size_t asked = views.size() * turns;
-  const std::string id = "elsewhere." + name;
-  const std::string what = name + ", each of " + std::to_string(views.size()) +
-                           " pictures, turned at random " + std::to_string(turns) +
-                           " times, asked of the memory of the others: ";
-  const std::string near = views.front().position
-                               ? "best match within 1.5 times the distance of the nearest"
-                               : "best match is the picture before or after";
-
-  std::vector<Place> places(asked);
-  const auto ask = [&](const PlaceRecogniser& ours) {
-    return Asked(views, simulation::make_each(executor, asked, [&](std::size_t n) {
-                   const Observation seen(turned(n));
-                   const double start = simulation::thread_seconds();
-                   places[n] = ours.localise(seen, {&views[n / turns].file, 1});
-                   const double spent = 1000.0 * (simulation::thread_seconds() - start);
-                   const auto match =
-                       std::ranges::find(views, places[n].matches.at(0).name, &Recorded::file);
-                   return Found{static_cast<std::size_t>(match - views.begin()), spent};
-                 }));
-  };
-  const Asked without_features = ask(by_columns);
-  const Asked ours = ask(recogniser);
-  add_rate(result, id + ".near", what + near, ours.near_count, asked,
-           name == "ciirc_b670" ? std::optional(at_least(29.0 / 31.0)) : std::nullopt);
+  const LeaveOneOut pictures(*this, dataset, recogniser, name);
+  std::vector<Place> places;
+  const auto without_features = pictures.ask(by_columns, places);
+  const auto ours = pictures.ask(recogniser, places);
+  pictures.add_near(ours,
+                    name == "ciirc_b670" ? std::optional(at_least(29.0 / 31.0)) : std::nullopt);
   const std::size_t judged = result.rows.size() - 1;
-  std::size_t known = 0;
-  std::size_t placed = 0;
-  std::size_t inside = 0;
-  for (std::size_t n = 0; n < asked; ++n) {
-    const Place& place = places[n];
-    const Recorded& truth = views[n / turns];
-    known += place.known ? 1 : 0;
-    if (!place.position || !place.position->radius_m || !truth.position) continue;
-    ++placed;
-    const double off_m = distance({place.position->x_m, place.position->y_m}, *truth.position);
-    inside += off_m <= *place.position->radius_m ? 1 : 0;
-  }
-  add_rate(result, id + ".known", what + "places known", known, asked);
-  if (placed > 0) {
-    add_rate(result, id + ".radius", what + "positions within the stated 95 % radius", inside,
-             placed, at_least(0.9));
-  }
-  add_median(result, id + ".time", what + "processor time from the panorama to the answer", "ms",
-             ours.milliseconds, at_most(5.0));
-  add_row(result, id + ".bytes", what + "size of the memory file, for each view",
-          file_bytes / static_cast<double>(views.size()), "B", at_most(20'000.0));
+  pictures.add_known(places);
+  pictures.add_cost(ours, static_cast<double>(std::filesystem::file_size(memory.file)));
 
-  std::string beside = "the others on the same queries: ";
-  const auto add_other = [&](const std::string& other, const Asked& found, double bytes) {
-    std::string key = other;
-    std::ranges::replace(key, ' ', '_');
-    std::erase(key, ',');
-    add_rate(result, id + "." + key + ".near", what + other + ": " + near, found.near_count, asked);
-    add_median(result, id + "." + key + ".time", what + other + ": processor time", "ms",
-               found.milliseconds);
-    add_row(result, id + "." + key + ".bytes", what + other + ": bytes a view", bytes, "B");
-    beside += (beside.back() == ' ' ? "" : ", ") + other + " " + std::to_string(found.near_count);
-  };
-  add_other("ours without local features", without_features,
-            2.0 * static_cast<double>(recogniser.encoder().header().shape.size()));
+  std::string others =
+      pictures.add_other("ours without local features", without_features,
+                         2.0 * static_cast<double>(recogniser.encoder().header().shape.size()));
   rivals.insert(rivals.begin(), patch_normalised_recogniser());
   rivals.insert(rivals.begin(), pixels_over_all_turns_recogniser());
   rivals.insert(rivals.begin(), fourier_signature_recogniser());
-  std::vector<RivalView> references;
-  for (const Recorded& view : views) references.push_back({view.panorama, to_picture(view.sharp)});
   for (const auto& rival : rivals) {
-    rival->memorise(references);
-    const auto found = simulation::make_each(executor, asked, [&](std::size_t n) {
-      const Panorama& sharp = views[n / turns].sharp;
-      const auto turn = static_cast<int>(
-          std::lround(turn_of(n) * sharp.columns() / static_cast<double>(columns)));
-      const RivalView query{turned(n), to_picture(turn_columns(sharp, turn))};
-      const double start = simulation::thread_seconds();
-      const std::size_t view = rival->nearest(query, n / turns);
-      return Found{view, 1000.0 * (simulation::thread_seconds() - start)};
-    });
-    add_other(rival->name(), Asked(views, found), rival->bytes_per_view());
+    const auto found = pictures.ask(*rival);
+    others += ", " + pictures.add_other(rival->name(), found, rival->bytes_per_view());
   }
-  result.rows[judged].over += "; " + beside;
+  result.rows[judged].over += "; the others on the same queries: " + others;
 }
 
 }  // namespace panonav::lab

@@ -34,43 +34,38 @@ Reproduction reproduce_elsewhere(const ElsewhereReproductionOptions& options, Ex
   require(!options.built_in.empty(), "built-in scenes", 0.0, ">= 1");
   make_folder(options.out);
   Reproduction result;
-  std::vector<RecordedGround> grounds;
+  ElsewhereExperiments elsewhere{options, executor, result};
   std::vector<ReproductionStage> stages;
-  for (const std::string& name : elsewhere_grounds(options)) {
-    stages.push_back({"views of " + name, 10.0,
-                      [&, name] { grounds.push_back(record_ground(options, name, executor)); }});
+  for (const std::string& name : elsewhere.ground_names()) {
+    stages.push_back(
+        {"views of " + name, 10.0, [&elsewhere, name] { elsewhere.record_ground(name); }});
   }
-  stages.push_back({"places known and unknown", 100.0,
-                    [&] { reproduce_known_places(options, grounds, executor, result); }});
-  stages.push_back({"tracked poses", 40.0,
-                    [&] { reproduce_tracked_poses(options, grounds, executor, result); }});
   stages.push_back(
-      {"home vectors", 60.0, [&] { reproduce_home_vectors(options, grounds, executor, result); }});
+      {"places known and unknown", 100.0, [&] { elsewhere.reproduce_known_places(); }});
+  stages.push_back({"tracked poses", 40.0, [&] { elsewhere.reproduce_tracked_poses(); }});
+  stages.push_back({"home vectors", 60.0, [&] { elsewhere.reproduce_home_vectors(); }});
   stages.push_back({"tilted robots", 60.0, [&] {
-                      grounds.clear();
-                      reproduce_tilted_homing(options, executor, result);
+                      elsewhere.grounds.clear();
+                      elsewhere.reproduce_tilted_homing();
                     }});
   for (const char* const recording : {"ciirc_b670", "gantry_plants", "indoor_walk_360"}) {
     if (!simulation::has_data(options.data, recording)) continue;
     stages.push_back({recording, 20.0, [&, recording] {
-                        reproduce_leave_one_out(options, options.data / recording, {}, executor,
-                                                result);
+                        elsewhere.reproduce_leave_one_out(options.data / recording);
                       }});
   }
   for (const char* const name : {"office", "small_warehouse"}) {
     if (!simulation::has_scene(options.data, name)) continue;
     stages.push_back({std::string("days in ") + name, 60.0,
-                      [&, name] { reproduce_days(options, name, executor, result); }});
+                      [&elsewhere, name] { elsewhere.reproduce_days(name); }});
   }
-  stages.push_back(
-      {"merged memories", 200.0, [&] { reproduce_merging(options, executor, result); }});
-  if (options.floors) {
-    for (const std::string& world : simulation::all_worlds_in(options.data)) {
-      for (const double spacing_m : {0.5, 0.3}) {
-        stages.push_back({"arrangement of " + world, 60.0, [&, world, spacing_m] {
-                            reproduce_floor(options, world, spacing_m, executor, result);
-                          }});
-      }
+  stages.push_back({"merged memories", 200.0, [&] { elsewhere.reproduce_merging(); }});
+  for (const std::string& world : simulation::all_worlds_in(options.data)) {
+    for (const double spacing_m : {0.5, 0.3}) {
+      if (!options.floors) break;
+      stages.push_back({"arrangement of " + world, 60.0, [&elsewhere, world, spacing_m] {
+                          elsewhere.reproduce_floor(world, spacing_m);
+                        }});
     }
   }
   run_stages(stages, progress);

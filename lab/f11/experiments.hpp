@@ -9,29 +9,30 @@
 
 namespace panonav::lab {
 
-// The experiments of [F11] and what its authors left to later work. Each appends rows and writes
-// pictures into `options.out`.
+/// The experiments of [F11] and what its authors left to later work. Each appends rows and writes
+/// pictures into `options.out`.
+struct MappingExperiments {
+  const MappingReproductionOptions& options;
+  Executor& executor;
+  Reproduction& result;
 
-/// Figures 4 and 6 (a): 200 views 10 cm apart along the round trip of `loop`.
-void reproduce_first_set(const MappingReproductionOptions& options, Executor& executor,
-                         Reproduction& result);
-/// Figures 5 and 6 (b): 150 views captured by threshold in `lab`.
-void reproduce_second_set(const MappingReproductionOptions& options, Executor& executor,
-                          Reproduction& result);
-/// Time from a mirror image to a pose.
-void measure_step_time(const MappingReproductionOptions& options, Executor& executor,
-                       Reproduction& result);
-/// Places that look alike: closures in a corridor of identical doors.
-void reproduce_identical_doors(const MappingReproductionOptions& options, Executor& executor,
-                               Reproduction& result);
-/// 60 m with two loops in a Gazebo world of `options.data`.
-void reproduce_mapping_in_world(const MappingReproductionOptions& options, const std::string& name,
-                                Executor& executor, Reproduction& result);
-/// The recordings of `options.data`: a route outdoors, a walk through a building.
-void reproduce_mapped_recordings(const MappingReproductionOptions& options, Executor& executor,
-                                 Reproduction& result);
-/// Time and memory at 100 views and at more, ten times each, up to `options.max_views`.
-void measure_large_maps(const MappingReproductionOptions& options, Executor& executor,
-                        Reproduction& result);
+  /// Figures 4 and 6 (a): 200 views 10 cm apart along the round trip of `loop`.
+  void reproduce_first_set();
+  /// Figures 5 and 6 (b): 150 views captured by threshold in `lab`.
+  void reproduce_second_set();
+  /// Time from a mirror image to a pose.
+  void measure_step_time();
+  /// Places that look alike: closures in a corridor of identical doors.
+  void reproduce_identical_doors();
+  /// 60 m with two loops in a Gazebo world of `options.data`.
+  void reproduce_world(const std::string& name);
+  /// The recordings of `options.data`: a route outdoors, a walk through a building.
+  void reproduce_recordings();
+  /// Time and memory at 100 views and at more, ten times each, up to `options.max_views`.
+  void measure_large_maps();
+
+  /// Variant `number` of a built-in scene.
+  [[nodiscard]] simulation::PlaceRecording make_variant(const std::string& scene, int number) const;
+};
 
 }  // namespace panonav::lab

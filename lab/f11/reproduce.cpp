@@ -26,21 +26,17 @@ Reproduction reproduce_f11(const MappingReproductionOptions& options, Executor& 
   make_folder(options.out);
 
   Reproduction result;
+  MappingExperiments f11{options, executor, result};
   std::vector<ReproductionStage> stages{
-      {"first set", 6.0 * options.scenes, [&] { reproduce_first_set(options, executor, result); }},
-      {"second set", 10.0 * options.scenes,
-       [&] { reproduce_second_set(options, executor, result); }},
-      {"time", 1.0, [&] { measure_step_time(options, executor, result); }},
-      {"identical doors", 15.0, [&] { reproduce_identical_doors(options, executor, result); }}};
+      {"first set", 6.0 * options.scenes, [&] { f11.reproduce_first_set(); }},
+      {"second set", 10.0 * options.scenes, [&] { f11.reproduce_second_set(); }},
+      {"time", 1.0, [&] { f11.measure_step_time(); }},
+      {"identical doors", 15.0, [&] { f11.reproduce_identical_doors(); }}};
   for (const std::string& name : simulation::worlds_in(options.data)) {
-    stages.push_back({name, 10.0 * options.runs,
-                      [&, name] { reproduce_mapping_in_world(options, name, executor, result); }});
+    stages.push_back({name, 10.0 * options.runs, [&f11, name] { f11.reproduce_world(name); }});
   }
-  stages.push_back(
-      {"recordings", 5.0, [&] { reproduce_mapped_recordings(options, executor, result); }});
-  stages.push_back({"large maps", 0.02 * options.max_views,
-                    [&] { measure_large_maps(options, executor, result); }});
-
+  stages.push_back({"recordings", 5.0, [&] { f11.reproduce_recordings(); }});
+  stages.push_back({"large maps", 0.02 * options.max_views, [&] { f11.measure_large_maps(); }});
   run_stages(stages, progress);
   return result;
 }

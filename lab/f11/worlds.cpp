@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <string>
 #include <utility>
@@ -21,6 +22,7 @@
 #include "panonav/panorama/preprocessing.hpp"
 #include "panonav/panorama/unwarper.hpp"
 #include "panonav/signature/signature_extractor.hpp"
+#include "panonav_simulation/make_each.hpp"
 #include "panonav_simulation/recording.hpp"
 #include "panonav_simulation/scenes.hpp"
 #include "panonav_simulation/worlds.hpp"
@@ -71,32 +73,20 @@ std::vector<Pose2> two_loops(const simulation::PlaceRecording& place, double len
   return drive(place, way, spacing_m, views);
 }
 
-/// A data set's views with what is known of their places.
-struct ReadRecording {
-  simulation::MappingRecording recording;
-  bool posed = false;
-};
-ReadRecording read_recording(const std::filesystem::path& folder, PanoramaShape shape,
-                             Executor& executor) {
+/// A data set's views with their places where these are known.
+simulation::MappingRecording read_recording(const std::filesystem::path& folder,
+                                            PanoramaShape shape, Executor& executor) {
   const Dataset dataset = read_dataset(folder);
   const PanoramaReader reader(dataset.source, shape);
-  ReadRecording result;
-  std::vector<std::optional<FourierSignature>> views(dataset.entries.size());
-  executor.for_chunks(views.size(), 1, [&](std::size_t begin, std::size_t end, std::size_t) {
-    for (std::size_t i = begin; i < end; ++i) {
-      views[i] =
-          compute_signature(preprocess(reader.read(dataset.entries[i].path), {}), components);
-    }
+  simulation::MappingRecording recording;
+  recording.views = simulation::make_each(executor, dataset.entries.size(), [&](std::size_t i) {
+    return compute_signature(preprocess(reader.read(dataset.entries[i].path), {}), components);
   });
-  result.posed = true;
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    result.recording.views.push_back(std::move(*views[i]));
-    const auto& pose = dataset.entries[i].pose;
-    result.posed = result.posed && pose.has_value();
-    result.recording.truth.push_back(pose ? Pose2{pose->x_m, pose->y_m, 0.0} : Pose2{});
-    result.recording.wheels.push_back({});
+  for (const DatasetEntry& entry : dataset.entries) {
+    recording.truth.push_back(entry.pose ? Pose2{entry.pose->x_m, entry.pose->y_m, 0.0} : Pose2{});
+    recording.wheels.push_back({});
   }
-  return result;
+  return recording;
 }
 
 /// Pairs of views, one over the other, three pairs in a row.
@@ -135,77 +125,78 @@ viewer::PicturePlot pairs_picture(const std::string& title,
   return plot;
 }
 
-void map_indoor_walk(const MappingReproductionOptions& options, Executor& executor,
-                     Reproduction& result) {
-  const std::filesystem::path folder = options.data / "indoor_walk_360";
-  constexpr PanoramaShape shape{80, 512};
-  const auto walk = read_recording(folder, shape, executor);
-  // The pictures stand metres apart.
-  const auto parts = simulation::map_recording(walk.recording, {});
-  const auto bridged = simulation::map_recording(walk.recording, {.mapping = {.bridge_m = 1.5}});
-  const auto closures_of = [](const simulation::MappedRecording& mapped) {
-    std::vector<MapEdge> closures;
-    for (const MapEdge& edge : mapped.map.edges) {
-      if (edge.kind == LinkKind::closure) closures.push_back(edge);
-    }
-    return closures;
-  };
-  const auto linked =
-      static_cast<double>(std::ranges::count(parts.map.edges, LinkKind::sequence, &MapEdge::kind));
-  add_row(result, "f11.indoor_walk.linked",
-          "indoor_walk_360: consecutive pictures linked by a step read from them",
-          linked / static_cast<double>(walk.recording.views.size() - 1), "");
-  add_row(result, "f11.indoor_walk.closures", "indoor_walk_360: loops closed",
-          static_cast<double>(closures_of(bridged).size()), "closures");
-  // What single views would close: for the eye.
-  const auto single = simulation::map_recording(
-      walk.recording,
-      {.mapping = {.bridge_m = 1.5}, .closure = {.sequence = 1, .max_drift = 100.0}});
-  const auto refused = closures_of(single);
-  add_row(result, "f11.indoor_walk.without_sequence",
-          "indoor_walk_360: loops that single views would close, were no sequence asked for",
-          static_cast<double>(refused.size()), "closures");
+std::vector<MapEdge> closures_of(const simulation::MappedRecording& mapped) {
+  std::vector<MapEdge> closures;
+  std::ranges::copy_if(mapped.map.edges, std::back_inserter(closures),
+                       [](const MapEdge& edge) { return edge.kind == LinkKind::closure; });
+  return closures;
+}
+
+viewer::MapPlot plot_indoor_walk(const simulation::MappedRecording& bridged) {
   viewer::MapLayer lines{.label = "closures", .colour = viewer::PlotColour::vermilion};
-  const auto place_of = [&](ViewId view) {
+  const auto position_of = [&](ViewId view) {
     return bridged.estimate[view.value - bridged.map.nodes[0].view.value];
   };
   for (const MapEdge& edge : closures_of(bridged)) {
-    lines.lines.push_back({place_of(edge.a), place_of(edge.b)});
+    lines.lines.push_back({position_of(edge.a), position_of(edge.b)});
   }
-  add_plot(result, options.out, "f11_indoor_walk.svg",
+  return {.title = "indoor_walk_360, no positions known",
+          .layers = {{.label = "consecutive pictures",
+                      .colour = viewer::PlotColour::blue,
+                      .lines = {bridged.estimate},
+                      .dots = bridged.estimate},
+                     lines}};
+}
+
+void map_indoor_walk(const MappingExperiments& f11) {
+  const std::filesystem::path folder = f11.options.data / "indoor_walk_360";
+  constexpr PanoramaShape shape{80, 512};
+  const simulation::MappingRecording walk = read_recording(folder, shape, f11.executor);
+  // The pictures stand metres apart.
+  const auto parts = simulation::map_recording(walk, {});
+  const auto bridged = simulation::map_recording(walk, {.mapping = {.bridge_m = 1.5}});
+  const auto linked =
+      static_cast<double>(std::ranges::count(parts.map.edges, LinkKind::sequence, &MapEdge::kind));
+  add_row(f11.result, "f11.indoor_walk.linked",
+          "indoor_walk_360: consecutive pictures linked by a step read from them",
+          linked / static_cast<double>(walk.views.size() - 1), "");
+  add_row(f11.result, "f11.indoor_walk.closures", "indoor_walk_360: loops closed",
+          static_cast<double>(closures_of(bridged).size()), "closures");
+  // What single views would close: for the eye.
+  const auto single = simulation::map_recording(
+      walk, {.mapping = {.bridge_m = 1.5}, .closure = {.sequence = 1, .max_drift = 100.0}});
+  auto refused = closures_of(single);
+  add_row(f11.result, "f11.indoor_walk.without_sequence",
+          "indoor_walk_360: loops that single views would close, were no sequence asked for",
+          static_cast<double>(refused.size()), "closures");
+  add_plot(f11.result, f11.options.out, "f11_indoor_walk.svg",
            "A walk through a building, pictures metres apart: steps that the views do not show "
            "count as 1.5 m straight ahead; closures in orange",
-           viewer::MapPlot{.title = "indoor_walk_360, no positions known",
-                           .layers = {{.label = "consecutive pictures",
-                                       .colour = viewer::PlotColour::blue,
-                                       .lines = {bridged.estimate},
-                                       .dots = bridged.estimate},
-                                      lines}});
+           plot_indoor_walk(bridged));
   if (refused.empty()) return;
   const Dataset dataset = read_dataset(folder);
   const PanoramaReader reader(dataset.source, shape);
-  std::vector<std::pair<Panorama, Panorama>> pairs;
+  const auto view_of = [&](ViewId view) {
+    return reader.read(dataset.entries[view.value - single.map.nodes[0].view.value].path);
+  };
   constexpr std::size_t max_pairs = 12;
-  for (const MapEdge& edge : refused) {
-    if (pairs.size() == max_pairs) break;
-    const std::uint64_t first = single.map.nodes[0].view.value;
-    pairs.emplace_back(reader.read(dataset.entries[edge.a.value - first].path),
-                       reader.read(dataset.entries[edge.b.value - first].path));
-  }
-  add_plot(result, options.out, "f11_indoor_walk_pairs.svg",
+  if (refused.size() > max_pairs) refused.resize(max_pairs);
+  std::vector<std::pair<Panorama, Panorama>> pairs;
+  for (const MapEdge& edge : refused) pairs.emplace_back(view_of(edge.a), view_of(edge.b));
+  add_plot(f11.result, f11.options.out, "f11_indoor_walk_pairs.svg",
            "Pairs of pictures (one over the other) that pass every check of a loop closure but the "
            "sequence: corridors of one kind on several floors. None of them becomes a closure",
            pairs_picture("indoor_walk_360: pairs that no sequence of views confirms", pairs));
 }
 
-}  // namespace
+/// Mirror images along the round trip of the loop, and how they are unwrapped.
+struct MirrorImages {
+  std::vector<Image> images;
+  Unwarper unwarper;
+};
 
-void measure_step_time(const MappingReproductionOptions& options, Executor& executor,
-                       Reproduction& result) {
-  const simulation::PlaceRecording place = simulation::empty_place(
-      simulation::make_scene("loop", {.seed = options.seed}), options.seed, 512, executor);
-  const auto views = static_cast<std::size_t>(std::min(60, options.views));
-  const auto poses = drive(place, {}, 0.1, views);
+MirrorImages take_mirror_images(const MappingExperiments& f11) {
+  const simulation::PlaceRecording place = f11.make_variant("loop", 0);
   Camera camera;
   camera.model = HyperboloidalModel{};
   camera.image_size = {640, 480};
@@ -213,42 +204,106 @@ void measure_step_time(const MappingReproductionOptions& options, Executor& exec
   camera.rim_radius_px = 230.0;
   camera.inner_radius_px = 40.0;
   std::vector<Image> images;
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    images.push_back(
-        simulation::take_picture(*place.renderer, poses[i], camera, {}, {}, i, executor));
+  for (const Pose2& pose :
+       drive(place, {}, 0.1, static_cast<std::size_t>(std::min(60, f11.options.views)))) {
+    images.push_back(simulation::take_picture(*place.renderer, pose, camera, {}, {}, images.size(),
+                                              f11.executor));
   }
-  const Unwarper unwarper(camera, {80, 512});
-  const SignatureExtractor extractor({80, 512}, components);
+  return {std::move(images), Unwarper(camera, {80, 512})};
+}
+
+/// Median times of a step of visual odometry.
+struct StepTimes {
+  double all_ms = 0.0;       ///< from the mirror image
+  double odometry_ms = 0.0;  ///< from the signature
+};
+
+StepTimes time_steps(const MirrorImages& seen, int count) {
+  const SignatureExtractor extractor({80, 512}, count);
   SignatureExtractor::Workspace workspace;
   VisualOdometry odometry;
   std::vector<double> all_us;
   std::vector<double> step_us;
-  for (const Image& image : images) {
+  for (const Image& image : seen.images) {
     const auto start = Clock::now();
-    FourierSignature signature = extractor.signature(unwarper, image.view(), workspace);
+    FourierSignature signature = extractor.signature(seen.unwarper, image.view(), workspace);
     const auto middle = Clock::now();
     static_cast<void>(odometry.add(OdometryView(std::move(signature))));
     step_us.push_back(microseconds_since(middle));
     all_us.push_back(microseconds_since(start));
   }
-  add_row(result, "f11.time.step",
-          "time of a step from a mirror image of 640 x 480 to a pose, median",
-          1e-3 * median(all_us), "ms", at_most(0.3), std::pair(54.0, 153.0));
-  add_row(result, "f11.time.odometry", "of these, from signature to pose", 1e-3 * median(step_us),
-          "ms");
-  // Figure 6 shows the influence of the components on the time, too.
-  viewer::Series times{.label = "signature to pose", .x = {}, .y = {}};
-  for (const int count : {6, 10, 15, 20, 32, 64}) {
-    const SignatureExtractor extract({80, 512}, count);
-    VisualOdometry steps;
-    std::vector<double> taken_us;
-    for (const Image& image : images) {
-      FourierSignature signature = extract.signature(unwarper, image.view(), workspace);
-      const auto start = Clock::now();
-      static_cast<void>(steps.add(OdometryView(std::move(signature))));
-      taken_us.push_back(microseconds_since(start));
+  return {1e-3 * median(all_us), 1e-3 * median(step_us)};
+}
+
+/// Two loops in a world, mapped in several ways: errors of each path.
+struct WorldErrors {
+  std::vector<double> wheels, open, closed, ground_open, ground, with_wheels;  // [m]
+  std::size_t right = 0;
+  std::size_t wrong = 0;
+  std::vector<viewer::MapPlot> maps;  // of the first four
+
+  void add(const simulation::PlaceRecording& place, const simulation::MappingRecording& recording,
+           const std::string& name) {
+    const VisualOdometryOptions known{.camera_height_m = place.scene.camera_height_m};
+    const auto open_map = simulation::map_recording(recording, {.mapping = {.close_loops = false}});
+    const auto closed_map = simulation::map_recording(recording, {});
+    const auto ground_open_map = simulation::map_recording(
+        recording, {.mapping = {.close_loops = false}, .odometry = known});
+    const auto ground_map = simulation::map_recording(recording, {.odometry = known});
+    const auto wheels_map = simulation::map_recording(recording, {.wheels = true});
+    const auto error_of = [](const simulation::MappedRecording& mapped, bool scale) {
+      return rms_m(mapped.estimate, mapped.truth, scale);
+    };
+    wheels.push_back(rms_m(positions_of(recording.wheels), open_map.truth, false));
+    open.push_back(error_of(open_map, true));
+    closed.push_back(error_of(closed_map, true));
+    ground_open.push_back(error_of(ground_open_map, false));
+    ground.push_back(error_of(ground_map, false));
+    with_wheels.push_back(error_of(wheels_map, false));
+    for (const auto* mapped : {&closed_map, &ground_map, &wheels_map}) {
+      right += mapped->right_closures;
+      wrong += mapped->wrong_closures;
     }
-    times.add(count, 1e-3 * median(taken_us));
+    if (maps.size() == 4) return;
+    maps.push_back({.title = name + ", path " + std::to_string(maps.size() + 1),
+                    .layers = viewer::scene_layers(place.scene)});
+    const auto draw = [&](const std::string& label, viewer::PlotColour colour,
+                          std::vector<Point2> line) {
+      maps.back().layers.push_back({.label = label, .colour = colour, .lines = {std::move(line)}});
+    };
+    const auto truth = open_map.truth;
+    std::vector<Point2> wheel_line = positions_of(recording.wheels);
+    const Alignment alignment = align(wheel_line, truth);
+    for (Point2& p : wheel_line) p = alignment.apply(p);
+    draw("ground truth", viewer::PlotColour::black, truth);
+    draw("wheels", viewer::PlotColour::vermilion, std::move(wheel_line));
+    draw("views alone", viewer::PlotColour::blue,
+         simulation::laid_over(ground_map.estimate, ground_map.truth));
+    draw("views, steps from wheels", viewer::PlotColour::green,
+         simulation::laid_over(wheels_map.estimate, wheels_map.truth));
+  }
+
+  /// On how many paths these errors are smaller than those of the wheels.
+  [[nodiscard]] std::size_t better(const std::vector<double>& errors) const {
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < errors.size(); ++i) count += errors[i] < wheels[i] ? 1 : 0;
+    return count;
+  }
+};
+
+}  // namespace
+
+void MappingExperiments::measure_step_time() {
+  const MirrorImages seen = take_mirror_images(*this);
+  const StepTimes usual = time_steps(seen, components);
+  add_row(result, "f11.time.step",
+          "time of a step from a mirror image of 640 x 480 to a pose, median", usual.all_ms, "ms",
+          at_most(0.3), std::pair(54.0, 153.0));
+  add_row(result, "f11.time.odometry", "of these, from signature to pose", usual.odometry_ms, "ms");
+  // Figure 6 shows the influence of the components on the time, too.
+  viewer::Series times{.label = "signature to pose"};
+  for (const int count : {6, 10, 15, 20, 32, 64}) {
+    times.add(count, time_steps(seen, count).odometry_ms);
     add_row(result, "f11.time.components_" + std::to_string(count),
             "from signature to pose with " + std::to_string(count) + " components", times.y.back(),
             "ms");
@@ -261,8 +316,7 @@ void measure_step_time(const MappingReproductionOptions& options, Executor& exec
                             .series = {times}});
 }
 
-void reproduce_identical_doors(const MappingReproductionOptions& options, Executor& executor,
-                               Reproduction& result) {
+void MappingExperiments::reproduce_identical_doors() {
   const int scenes = std::max(1, options.scenes / 5);
   constexpr double spacing_m = 0.2;
   const auto views = static_cast<std::size_t>(2 * options.views);
@@ -273,16 +327,14 @@ void reproduce_identical_doors(const MappingReproductionOptions& options, Execut
   std::size_t wrong = 0;
   std::vector<double> errors;
   for (int s = 0; s < scenes; ++s) {
-    const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(s);
-    const simulation::PlaceRecording place = simulation::empty_place(
-        simulation::make_scene("corridor", {.seed = seed}), seed, options.columns, executor);
+    const simulation::PlaceRecording place = make_variant("corridor", s);
     std::vector<Point2> way;
     for (int round = 0; round < 3; ++round) {
       way.insert(way.end(), place.scene.tour.begin(), place.scene.tour.end());
     }
     const auto recording =
         simulation::record_for_mapping(place, drive(place, way, spacing_m, views), components + 2,
-                                       simulation::cheap_wheels(), 1000 * seed, executor);
+                                       simulation::cheap_wheels(), 1000 * place.seed, executor);
     for (const bool wheels : {false, true}) {
       const auto mapped = simulation::map_recording(recording, {.wheels = wheels});
       right += mapped.right_closures;
@@ -297,105 +349,49 @@ void reproduce_identical_doors(const MappingReproductionOptions& options, Execut
              what + ": shape difference with closure and steps from wheels", "", errors);
 }
 
-void reproduce_mapping_in_world(const MappingReproductionOptions& options, const std::string& name,
-                                Executor& executor, Reproduction& result) {
+void MappingExperiments::reproduce_world(const std::string& name) {
   constexpr double length_m = 60.0;
   constexpr double spacing_m = 0.15;
   const simulation::PlaceRecording place = simulation::empty_place(
       simulation::read_world(options.data, name), options.seed, options.columns, executor);
-  std::vector<double> wheels_m;
-  std::vector<double> open_m;
-  std::vector<double> closed_m;
-  std::vector<double> ground_open_m;
-  std::vector<double> ground_m;
-  std::vector<double> with_wheels_m;
-  std::size_t better = 0;
-  std::size_t better_without = 0;
-  std::size_t right = 0;
-  std::size_t wrong = 0;
-  std::vector<viewer::MapPlot> maps;
+  WorldErrors errors;
   for (int run = 0; run < options.runs; ++run) {
     Random random(options.seed, 300 + static_cast<std::uint64_t>(run));
     const auto recording = simulation::record_for_mapping(
         place, two_loops(place, length_m, spacing_m, random), components + 2,
         simulation::cheap_wheels(),
         1000 * options.seed + 10'000 * static_cast<std::uint64_t>(run + 1), executor);
-    const auto open = simulation::map_recording(recording, {.mapping = {.close_loops = false}});
-    const auto closed = simulation::map_recording(recording, {});
-    const VisualOdometryOptions ground{.camera_height_m = place.scene.camera_height_m};
-    const auto ground_open = simulation::map_recording(
-        recording, {.mapping = {.close_loops = false}, .odometry = ground});
-    const auto with_ground = simulation::map_recording(recording, {.odometry = ground});
-    const auto with_wheels = simulation::map_recording(recording, {.wheels = true});
-    const std::vector<Point2> wheels = positions_of(recording.wheels);
-    wheels_m.push_back(rms_m(wheels, open.truth, false));
-    open_m.push_back(rms_m(open.estimate, open.truth, true));
-    closed_m.push_back(rms_m(closed.estimate, closed.truth, true));
-    ground_open_m.push_back(rms_m(ground_open.estimate, ground_open.truth, false));
-    ground_m.push_back(rms_m(with_ground.estimate, with_ground.truth, false));
-    with_wheels_m.push_back(rms_m(with_wheels.estimate, with_wheels.truth, false));
-    better += with_wheels_m.back() < wheels_m.back() ? 1 : 0;
-    better_without += ground_m.back() < wheels_m.back() ? 1 : 0;
-    for (const auto* mapped : {&closed, &with_ground, &with_wheels}) {
-      right += mapped->right_closures;
-      wrong += mapped->wrong_closures;
-    }
-    if (run < 4) {
-      viewer::MapPlot map{.title = name + ", path " + std::to_string(run + 1),
-                          .layers = viewer::scene_layers(place.scene)};
-      map.layers.push_back(
-          {.label = "ground truth", .colour = viewer::PlotColour::black, .lines = {open.truth}});
-      std::vector<Point2> wheel_line;
-      const Alignment wheel_alignment = align(wheels, open.truth);
-      for (const Point2& p : wheels) wheel_line.push_back(wheel_alignment.apply(p));
-      map.layers.push_back(
-          {.label = "wheels", .colour = viewer::PlotColour::vermilion, .lines = {wheel_line}});
-      map.layers.push_back(
-          {.label = "views alone",
-           .colour = viewer::PlotColour::blue,
-           .lines = {simulation::laid_over(with_ground.estimate, with_ground.truth)}});
-      map.layers.push_back(
-          {.label = "views, steps from wheels",
-           .colour = viewer::PlotColour::green,
-           .lines = {simulation::laid_over(with_wheels.estimate, with_wheels.truth)}});
-      maps.push_back(std::move(map));
-    }
+    errors.add(place, recording, name);
   }
   const auto runs = static_cast<std::size_t>(options.runs);
   const std::string id = "f11." + name;
-  const std::string what = name + ", 60 m with two loops";
-  add_median(result, id + ".wheels", what + ": position error (rms) of the wheels of a cheap robot",
-             "m", wheels_m);
-  add_median(result, id + ".open", what + ": of the views alone, one scale, no closure", "m",
-             open_m);
-  add_median(result, id + ".closed", what + ": of the views alone, one scale, loops closed", "m",
-             closed_m);
-  add_median(result, id + ".ground_open",
-             what + ": of the views alone, height of the camera known, no closure", "m",
-             ground_open_m);
-  add_median(result, id + ".ground",
-             what + ": of the views alone, height of the camera known, loops closed", "m",
-             ground_m);
-  add_median(result, id + ".closed_wheels", what + ": with steps from these wheels, loops closed",
-             "m", with_wheels_m);
-  add_rate(result, id + ".better", what + ": paths on which ours, steps from wheels, is better",
-           better, runs, at_least(0.5));
+  const std::string what = name + ", 60 m with two loops: ";
+  const auto add = [&](const std::string& key, const std::string& how,
+                       const std::vector<double>& errors_m) {
+    add_median(result, id + key, what + how, "m", errors_m);
+  };
+  add(".wheels", "position error (rms) of the wheels of a cheap robot", errors.wheels);
+  add(".open", "of the views alone, one scale, no closure", errors.open);
+  add(".closed", "of the views alone, one scale, loops closed", errors.closed);
+  add(".ground_open", "of the views alone, height of the camera known, no closure",
+      errors.ground_open);
+  add(".ground", "of the views alone, height of the camera known, loops closed", errors.ground);
+  add(".closed_wheels", "with steps from these wheels, loops closed", errors.with_wheels);
+  add_rate(result, id + ".better", what + "paths on which ours, steps from wheels, is better",
+           errors.better(errors.with_wheels), runs, at_least(0.5));
   add_rate(result, id + ".better_without",
-           what + ": paths on which ours, views and height of the camera alone, is better",
-           better_without, runs);
-  add_rate(result, id + ".right_closures", what + ": closures between views at most 1 m apart",
-           right, std::max<std::size_t>(1, right + wrong));
-  const std::string file = "f11_" + name + ".svg";
-  add_plot(result, options.out, file,
-           "Paths of 60 m with two loops in " + name + ", laid over the truth", maps, 2);
+           what + "paths on which ours, views and height of the camera alone, is better",
+           errors.better(errors.ground), runs);
+  add_rate(result, id + ".right_closures", what + "closures between views at most 1 m apart",
+           errors.right, std::max<std::size_t>(1, errors.right + errors.wrong));
+  add_plot(result, options.out, "f11_" + name + ".svg",
+           "Paths of 60 m with two loops in " + name + ", laid over the truth", errors.maps, 2);
 }
 
-void reproduce_mapped_recordings(const MappingReproductionOptions& options, Executor& executor,
-                                 Reproduction& result) {
+void MappingExperiments::reproduce_recordings() {
   if (simulation::has_data(options.data, "sussex_route")) {
     const auto route = read_recording(options.data / "sussex_route", {}, executor);
-    const auto mapped =
-        simulation::map_recording(route.recording, {.mapping = {.close_loops = false}});
+    const auto mapped = simulation::map_recording(route, {.mapping = {.close_loops = false}});
     add_row(result, "f11.sussex.rms",
             "sussex_route, 7 m outdoors: position error (rms), views alone, one scale",
             rms_m(mapped.estimate, mapped.truth, true), "m");
@@ -411,12 +407,10 @@ void reproduce_mapped_recordings(const MappingReproductionOptions& options, Exec
                  .colour = viewer::PlotColour::blue,
                  .lines = {simulation::laid_over(mapped.estimate, mapped.truth)}}}});
   }
-  if (simulation::has_data(options.data, "indoor_walk_360"))
-    map_indoor_walk(options, executor, result);
+  if (simulation::has_data(options.data, "indoor_walk_360")) map_indoor_walk(*this);
 }
 
-void measure_large_maps(const MappingReproductionOptions& options, Executor& executor,
-                        Reproduction& result) {
+void MappingExperiments::measure_large_maps() {
   // Round after round, each a little beside the others.
   constexpr int columns = 256;
   const simulation::PlaceRecording place = simulation::empty_place(

@@ -117,20 +117,16 @@ struct CorridorRuns {
   std::vector<viewer::MapLayer> things;                    ///< of the first scene
 };
 
-CorridorRuns record_corridors(const TrackingReproductionOptions& options, Executor& executor) {
+CorridorRuns record_corridors(const TrackingExperiments& m03) {
+  const TrackingReproductionOptions& options = m03.options;
+  Executor& executor = m03.executor;
   CorridorRuns corridors;
   const int scenes = std::max(1, (options.scenes + 1) / 2);
   const int runs_each = 2 * options.variants * options.runs;
   for (int s = 0; s < scenes; ++s) {
-    const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(s);
     const simulation::PlaceRecording place =
-        simulation::record_place({.scene = "corridor",
-                                  .seed = seed,
-                                  .spacing_m = m03_spacing_m,
-                                  .queries = 1,
-                                  .rows = options.rows,
-                                  .columns = options.columns / 2},
-                                 executor);
+        m03.record_variant("corridor", s, m03_spacing_m, options.columns / 2);
+    const std::uint64_t seed = place.seed;
     const auto remembered = remember_for_tracking(place, executor);
     const auto things = distinct_things(place.scene);
     std::vector<std::vector<Pose2>> ways(static_cast<std::size_t>(runs_each));
@@ -163,26 +159,21 @@ CorridorRuns record_corridors(const TrackingReproductionOptions& options, Execut
   return corridors;
 }
 
-}  // namespace
-
-void reproduce_corridor(const TrackingReproductionOptions& options, Executor& executor,
-                        Reproduction& result) {
-  const CorridorRuns corridors = record_corridors(options, executor);
-  FilterSetting setting;
-  const auto runs = track_sets(corridors.sets, setting, seed_of_corridor, executor);
-  std::size_t before = 0;
-  std::size_t kept = 0;
+// What became of the hypotheses before and after the first distinct place.
+struct CorridorMeasures {
+  std::size_t before = 0;  // images before it
+  std::size_t kept = 0;    // of these, with a mode near the truth
   std::size_t sure_before = 0;
-  std::size_t reached = 0;
+  std::size_t reached = 0;  // runs that come to a distinct place
   std::size_t right = 0;
   std::size_t right_for_good = 0;
-  std::vector<double> ways;
-  std::vector<double> hypotheses;
-  for (std::size_t r = 0; r < runs.size(); ++r) {
-    const auto first = corridors.first_distinct[r];
+  std::vector<double> ways;        // images before it, of each such run
+  std::vector<double> hypotheses;  // modes, of each image before it
+
+  void add(const TrackedRun& run, std::optional<std::size_t> first) {
     std::optional<std::size_t> found;
     bool lost_again = false;
-    for (const TrackedImage& image : runs[r]) {
+    for (const TrackedImage& image : run) {
       const bool is_right = image.error_m < right_m;
       if (!first || image.step < *first) {
         ++before;
@@ -194,38 +185,49 @@ void reproduce_corridor(const TrackingReproductionOptions& options, Executor& ex
       if (is_right && !found) found = image.step - *first;
       if (!is_right && image.step >= *first + 3) lost_again = true;
     }
-    if (!first) continue;  // it never came to a distinct place
+    if (!first) return;  // it never came to a distinct place
     ++reached;
     ways.push_back(static_cast<double>(*first));
     right += found && *found < 3 ? 1 : 0;
     right_for_good += found && *found < 3 && !lost_again ? 1 : 0;
   }
-  const std::string what =
-      "corridor of identical doors, from anywhere along the ring; the first distinct place is "
-      "where the window, the notice board or the plant first covers " +
-      std::to_string(distinct_degrees) + " degrees of the view";
-  if (before > 0) {
+};
+
+}  // namespace
+
+void TrackingExperiments::reproduce_corridor() {
+  const CorridorRuns corridors = record_corridors(*this);
+  const FilterSetting setting;
+  const auto runs = track(corridors.sets, setting, seed_of_corridor);
+  CorridorMeasures of;
+  for (std::size_t r = 0; r < runs.size(); ++r) of.add(runs[r], corridors.first_distinct[r]);
+  const RunRows rows{result, "m03.corridor", "corridor", corridors.sets, runs};
+  if (of.before > 0) {
     add_rate(result, "m03.corridor.kept_before",
-             what + "; before it, images after which a mode is within 0.5 m of the truth", kept,
-             before, at_least(0.99));
-    tell_single_images(result.rows.back(), corridors.sets);
+             "corridor of identical doors, from anywhere along the ring; the first distinct place "
+             "is where the window, the notice board or the plant first covers " +
+                 std::to_string(distinct_degrees) +
+                 " degrees of the view; before it, images after which a mode is within 0.5 m of "
+                 "the truth",
+             of.kept, of.before, at_least(0.99));
+    rows.tell_single_images();
     add_rate(result, "m03.corridor.sure_before",
              "corridor: before the first distinct place, images at which it says localised",
-             sure_before, before);
+             of.sure_before, of.before);
     add_mean(result, "m03.corridor.modes_before",
-             "corridor: modes kept before the first distinct place", "modes", hypotheses);
+             "corridor: modes kept before the first distinct place", "modes", of.hypotheses);
   }
-  add_confidently_wrong(result, "m03.corridor.wrong", "corridor", runs, at_most(0.0));
-  if (reached > 0) {
+  rows.add_wrong(at_most(0.0));
+  if (of.reached > 0) {
     add_rate(result, "m03.corridor.right_after",
              "corridor: runs whose heaviest mode is within 0.5 m of the truth at the first "
              "distinct place or one of the two images after it",
-             right, reached, at_least(0.99));
+             of.right, of.reached, at_least(0.99));
     add_rate(result, "m03.corridor.right_for_good",
-             "corridor: the same, and at all images from the fourth to the tenth", right_for_good,
-             reached);
+             "corridor: the same, and at all images from the fourth to the tenth",
+             of.right_for_good, of.reached);
     add_median(result, "m03.corridor.images_before",
-               "corridor: images before the first distinct place", "images", ways);
+               "corridor: images before the first distinct place", "images", of.ways);
   }
   const RunSet& shown = corridors.sets.front();
   const std::size_t last = shown.runs.front().steps.size() - 1;

@@ -1,50 +1,130 @@
 #pragma once
 
+#include <cstdint>
+#include <memory>
+#include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
-#include "lab/m03/support.hpp"
-#include "lab/reproduction.hpp"
+#include "lab/rows.hpp"
+#include "lab/runs/tracking_filter.hpp"
+#include "lab/runs/tracking_run.hpp"
 #include "panonav/core/executor.hpp"
 
 namespace panonav::lab {
 
-// Each appends rows and writes pictures into `options.out`. Over offices: at least one of them.
+/// Side of the references' grid in the office, and the way between two images.
+inline constexpr double m03_spacing_m = 0.25;
+/// Runs that are not localised within so many images, or not at all, count as this many.
+inline constexpr int m03_most_images = 15;
+/// A pose that is off by more is plainly wrong.
+inline constexpr double m03_wrong_m = 1.0;
+inline constexpr std::size_t m03_images_before_kidnapping = 10;
 
-/// [M03] section 4.1, Global Localisation and figure 7 (1-3).
-void reproduce_global_localisation(const TrackingReproductionOptions& options,
-                                   std::span<const OfficeRuns> offices, Executor& executor,
-                                   Reproduction& result);
-/// [M03] section 4.1, Position Tracking and figure 7 (4-6).
-void reproduce_position_tracking(const TrackingReproductionOptions& options,
-                                 std::span<const OfficeRuns> offices, Executor& executor,
-                                 Reproduction& result);
-/// [M03] section 4.1, Kidnapped Robot and figures 8 and 9.
-void reproduce_kidnapping(const TrackingReproductionOptions& options,
-                          std::span<const OfficeRuns> offices, Executor& executor,
-                          Reproduction& result);
-/// Numbers of particles and kinds of odometry.
-void reproduce_tracking_sweeps(const TrackingReproductionOptions& options,
-                               std::span<const OfficeRuns> offices, Executor& executor,
-                               Reproduction& result);
+/// Runs in one place.
+struct RunSet {
+  std::shared_ptr<const TrackingPlace> place;
+  std::vector<TrackingRun> runs;
+  SingleImages single_images;  ///< of these runs
+};
+[[nodiscard]] RunSet make_run_set(std::shared_ptr<const TrackingPlace> place,
+                                  std::vector<TrackingRun> runs, Executor& executor);
+/// How single images of all sets are localised.
+[[nodiscard]] SingleImages sum_single_images(std::span<const RunSet> sets);
 
-/// "A long indoor corridor with a loop where we face many false hypothesis": never surely wrong.
-void reproduce_corridor(const TrackingReproductionOptions& options, Executor& executor,
-                        Reproduction& result);
-/// "A large outdoor environment where we are investigating the different nature of brightness
-/// variations".
-void reproduce_garden(const TrackingReproductionOptions& options, Executor& executor,
-                      Reproduction& result);
-/// A robot that leaves the memorised half of the scene `name` and returns.
-void reproduce_leaving(const TrackingReproductionOptions& options, const std::string& name,
-                       Executor& executor, Reproduction& result);
-/// Global localisation in the world `name` of `options.data`. Throws FileError.
-void reproduce_gazebo_world(const TrackingReproductionOptions& options, const std::string& name,
-                            Executor& executor, Reproduction& result);
-/// The recordings of `options.data`: sussex_route, gantry_plants. Throw FileError.
-void reproduce_recorded_route(const TrackingReproductionOptions& options, Executor& executor,
-                              Reproduction& result);
-void reproduce_gantry(const TrackingReproductionOptions& options, Executor& executor,
-                      Reproduction& result);
+/// An office with everything that happens in it.
+struct OfficeRuns {
+  std::vector<viewer::MapLayer> furniture;
+  RunSet constant_heading;  ///< clean
+  RunSet hard;
+  RunSet kidnapped;  ///< hard; 10 images, then kidnapped by at least 1 m
+};
+
+/// Images until localised, each at most `m03_most_images`.
+[[nodiscard]] std::vector<double> capped_images(std::span<const TrackedRun> runs, double radius_m,
+                                                std::size_t first_step = 0);
+/// How many runs are localised within so many images.
+[[nodiscard]] std::size_t localised_within(std::span<const TrackedRun> runs, double radius_m,
+                                           int images, std::size_t first_step = 0);
+/// Error after so many images, counted from `first_step`; runs that ended before are left out.
+[[nodiscard]] std::vector<double> errors_after(std::span<const TrackedRun> runs, std::size_t images,
+                                               std::size_t first_step = 0);
+/// Median error over the images with the 5 % and 95 % quantiles as bars, `shift` to the right.
+[[nodiscard]] viewer::Series error_over_images(const std::string& label,
+                                               std::span<const TrackedRun> runs, std::size_t images,
+                                               std::size_t first_step, double shift);
+
+/// A filter's particles over a run, as in [M03] figures 7 to 9: panels at the chosen steps.
+[[nodiscard]] std::vector<viewer::MapPlot> particle_maps(
+    const TrackingPlace& place, std::span<const viewer::MapLayer> furniture, const TrackingRun& run,
+    const FilterSetting& setting, std::uint64_t seed, std::span<const std::size_t> steps,
+    const std::string& title);
+
+/// Adds rows of the runs of some sets through a filter; ids begin with `id`, texts with `what`.
+struct RunRows {
+  Reproduction& result;
+  std::string id;
+  std::string what;
+  std::span<const RunSet> sets;
+  std::span<const TrackedRun> runs;
+  double radius_m = m03_spacing_m;  ///< within which a run is localised
+  std::size_t first_step = 0;       ///< from which images are counted
+  bool judged = true;               ///< otherwise targets are left out
+
+  /// Images until localised, with what one image alone gives.
+  void add_images(std::optional<Target> target = std::nullopt,
+                  std::optional<std::pair<double, double>> published = std::nullopt) const;
+  void add_images_mean() const;
+  void add_within(int images, std::optional<Target> target = std::nullopt) const;
+  void add_error_after(std::size_t images, std::optional<Target> target = std::nullopt) const;
+  /// How often the filter says "localised" and is wrong by more than `m03_wrong_m`.
+  void add_wrong(std::optional<Target> target = std::nullopt) const;
+  /// Adds what one image alone gives to what the last row was taken over: "one image alone: right
+  /// 74 % (by dissimilarity only 54 %), within 25 cm 96 %".
+  void tell_single_images() const;
+};
+
+/// The experiments of [M03] and what its authors only announced. Each appends rows and writes
+/// pictures into `options.out`.
+struct TrackingExperiments {
+  const TrackingReproductionOptions& options;
+  Executor& executor;
+  Reproduction& result;
+  std::vector<OfficeRuns> offices{};  ///< the first four experiments need one at least
+
+  void record_office(int number);
+  /// [M03] section 4.1, Global Localisation and figure 7 (1-3).
+  void reproduce_global_localisation();
+  /// [M03] section 4.1, Position Tracking and figure 7 (4-6).
+  void reproduce_position_tracking();
+  /// [M03] section 4.1, Kidnapped Robot and figures 8 and 9.
+  void reproduce_kidnapping();
+  /// Numbers of particles and kinds of odometry.
+  void reproduce_sweeps();
+  /// "A long indoor corridor with a loop where we face many false hypothesis": never surely wrong.
+  void reproduce_corridor();
+  /// "A large outdoor environment where we are investigating the different nature of brightness
+  /// variations".
+  void reproduce_garden();
+  /// A robot that leaves the memorised half of the scene `name` and returns.
+  void reproduce_leaving(const std::string& name);
+  /// Global localisation in the world `name` of `options.data`. Throws FileError.
+  void reproduce_gazebo_world(const std::string& name);
+  /// The recordings of `options.data`: sussex_route, gantry_plants. Throw FileError.
+  void reproduce_recorded_route();
+  void reproduce_gantry();
+
+  /// Variant `number` of a built-in scene with its references.
+  [[nodiscard]] simulation::PlaceRecording record_variant(const std::string& scene, int number,
+                                                          double spacing_m, int columns) const;
+  /// All runs of all sets through a filter, in their order. Runs of different sets have different
+  /// seeds.
+  [[nodiscard]] std::vector<TrackedRun> track(std::span<const RunSet> sets,
+                                              const FilterSetting& setting,
+                                              std::uint64_t seed) const;
+  /// One set of runs of each office.
+  [[nodiscard]] std::vector<RunSet> sets_of(RunSet OfficeRuns::*set) const;
+};
 
 }  // namespace panonav::lab

@@ -8,6 +8,7 @@
 #include "lab/m03/experiments.hpp"
 #include "lab/statistics.hpp"
 #include "panonav/core/random.hpp"
+#include "panonav/core/statistics.hpp"
 #include "panonav/motion/path.hpp"
 
 namespace panonav::lab {
@@ -32,20 +33,16 @@ struct GardenRuns {
   std::vector<RunSet> changing;
 };
 
-GardenRuns record_gardens(const TrackingReproductionOptions& options, Executor& executor) {
+GardenRuns record_gardens(const TrackingExperiments& m03) {
+  const TrackingReproductionOptions& options = m03.options;
+  Executor& executor = m03.executor;
   GardenRuns gardens;
   const int scenes = std::max(1, (options.scenes + 1) / 2);
   const int runs_each = options.variants * options.runs;
   for (int s = 0; s < scenes; ++s) {
-    const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(s);
     const simulation::PlaceRecording place =
-        simulation::record_place({.scene = "garden",
-                                  .seed = seed,
-                                  .spacing_m = garden_spacing_m,
-                                  .queries = 1,
-                                  .rows = options.rows,
-                                  .columns = options.columns / 2},
-                                 executor);
+        m03.record_variant("garden", s, garden_spacing_m, options.columns / 2);
+    const std::uint64_t seed = place.seed;
     const auto remembered = remember_for_tracking(place, executor);
     std::vector<std::vector<Pose2>> ways;
     for (int r = 0; r < runs_each; ++r) {
@@ -77,31 +74,19 @@ GardenRuns record_gardens(const TrackingReproductionOptions& options, Executor& 
   return gardens;
 }
 
-SingleImages sum_of(std::span<const RunSet> sets) {
-  SingleImages sum;
-  for (const RunSet& set : sets) sum.add(set.single_images);
-  return sum;
-}
-
 }  // namespace
 
-void reproduce_garden(const TrackingReproductionOptions& options, Executor& executor,
-                      Reproduction& result) {
-  const GardenRuns gardens = record_gardens(options, executor);
-  const FilterSetting setting;
-  const auto rows = [&](const std::string& id, const std::string& light,
-                        std::span<const RunSet> sets) {
-    const auto runs = track_sets(sets, setting, seed_of_garden, executor);
-    const std::string what = "garden, 50 cm grid, " + light;
-    const auto needed = capped_images(runs, garden_spacing_m);
-    add_median(result, "m03.garden." + id + ".images",
-               what + ": images until the error is below 50 cm from then on", "images", needed);
-    tell_single_images(result.rows.back(), sets);
-    add_rate(result, "m03.garden." + id + ".within_10", what + ": runs localised within 10 images",
-             localised_within(runs, garden_spacing_m, 10), runs.size());
-    add_median(result, "m03.garden." + id + ".error_10", what + ": error after 10 images", "m",
-               errors_after(runs, 10));
-    add_confidently_wrong(result, "m03.garden." + id + ".wrong", what, runs);
+void TrackingExperiments::reproduce_garden() {
+  const GardenRuns gardens = record_gardens(*this);
+  const auto add_rows = [&](const std::string& id, const std::string& light,
+                            std::span<const RunSet> sets) {
+    auto runs = track(sets, FilterSetting{}, seed_of_garden);
+    const RunRows rows{result, "m03.garden." + id, "garden, 50 cm grid, " + light, sets,
+                       runs,   garden_spacing_m};
+    rows.add_images();
+    rows.add_within(10);
+    rows.add_error_after(10);
+    rows.add_wrong();
     return runs;
   };
   viewer::Series right{.label = "one image alone: nearest place"};
@@ -111,9 +96,9 @@ void reproduce_garden(const TrackingReproductionOptions& options, Executor& exec
   viewer::Series needed{.label = "constant light"};
   for (std::size_t l = 0; l < lights.size(); ++l) {
     const auto runs =
-        rows("light_" + shown(lights[l]), "light " + shown(lights[l]) + " times that of the memory",
-             gardens.constant[l]);
-    const SingleImages single = sum_of(gardens.constant[l]);
+        add_rows("light_" + shown(lights[l]),
+                 "light " + shown(lights[l]) + " times that of the memory", gardens.constant[l]);
+    const SingleImages single = sum_single_images(gardens.constant[l]);
     add_point(right, lights[l], success_rate(single.right, single.asked));
     add_point(near, lights[l], success_rate(single.near, single.asked));
     const auto share_within = [&](int images) {
@@ -123,8 +108,8 @@ void reproduce_garden(const TrackingReproductionOptions& options, Executor& exec
     add_point(first, lights[l], share_within(1));
     add_point(needed, lights[l], mean_figure(capped_images(runs, garden_spacing_m)));
   }
-  (void)rows("light_changing", "light that changes at each image between 0.50 and 2.00",
-             gardens.changing);
+  (void)add_rows("light_changing", "light that changes at each image between 0.50 and 2.00",
+                 gardens.changing);
   add_plot(result, options.out, "garden_success.svg",
            "Outdoors in other light than memorised: single images, and the filter.",
            viewer::LinePlot{.title = "Garden: localisation against brightness",

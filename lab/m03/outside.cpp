@@ -9,6 +9,7 @@
 #include "lab/m03/experiments.hpp"
 #include "lab/statistics.hpp"
 #include "panonav/core/random.hpp"
+#include "panonav/core/statistics.hpp"
 #include "panonav/motion/path.hpp"
 
 namespace panonav::lab {
@@ -56,21 +57,16 @@ std::vector<Pose2> excursion(const simulation::FreeSpace& space, double border_m
   return poses;
 }
 
-OutsideRuns record_excursions(const TrackingReproductionOptions& options, const std::string& name,
-                              Executor& executor) {
+OutsideRuns record_excursions(const TrackingExperiments& m03, const std::string& name) {
+  const TrackingReproductionOptions& options = m03.options;
+  Executor& executor = m03.executor;
   OutsideRuns outside;
   const int scenes = std::max(1, options.scenes / 3);
   const int runs_each = 2 * options.variants * options.runs;
   for (int s = 0; s < scenes; ++s) {
-    const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(s);
     const simulation::PlaceRecording place =
-        simulation::record_place({.scene = name,
-                                  .seed = seed,
-                                  .spacing_m = m03_spacing_m,
-                                  .queries = 1,
-                                  .rows = options.rows,
-                                  .columns = options.columns / 2},
-                                 executor);
+        m03.record_variant(name, s, m03_spacing_m, options.columns / 2);
+    const std::uint64_t seed = place.seed;
     const double border = 0.5 * (place.scene.floor_low.x_m + place.scene.floor_high.x_m);
     const auto remembered =
         remember_for_tracking(place, executor, [&](Point2 p) { return p.x_m < border; });
@@ -165,13 +161,13 @@ void add_run(Reports& reports, const TrackedRun& run, std::span<const double> wa
   if (back) reports.until_found.push_back(capped(said_found, images_back));
 }
 
-void add_rows(Reproduction& result, const std::string& id, const std::string& what,
-              const Reports& reports, std::span<const RunSet> sets) {
+void add_rows(const RunRows& rows, const Reports& reports) {
+  const auto& [result, id, what] = std::tie(rows.result, rows.id, rows.what);
   if (reports.inside > 0) {
     add_rate(result, id + ".lost_inside",
              what + ": images before it leaves, from the sixth on, that are called lost",
              reports.lost_inside, reports.inside);
-    tell_single_images(result.rows.back(), sets);
+    rows.tell_single_images();
   }
   if (reports.outside > 0) {
     add_rate(result, id + ".lost_outside",
@@ -190,26 +186,24 @@ void add_rows(Reproduction& result, const std::string& id, const std::string& wh
                reports.until_found);
     add_rate(result, id + ".found_within_5",
              what + ": runs called localised, within 25 cm, within 5 images back inside",
-             static_cast<std::size_t>(std::ranges::count_if(
-                 reports.until_found, [](double images) { return images <= 5.0; })),
+             count_where(reports.until_found, [](double images) { return images <= 5.0; }),
              reports.until_found.size());
   }
 }
 
 }  // namespace
 
-void reproduce_leaving(const TrackingReproductionOptions& options, const std::string& name,
-                       Executor& executor, Reproduction& result) {
-  const OutsideRuns outside = record_excursions(options, name, executor);
-  const FilterSetting setting;
-  const auto runs = track_sets(outside.sets, setting, seed_of_outside, executor);
+void TrackingExperiments::reproduce_leaving(const std::string& name) {
+  const OutsideRuns outside = record_excursions(*this, name);
+  const auto runs = track(outside.sets, FilterSetting{}, seed_of_outside);
   Reports reports;
   for (std::size_t r = 0; r < runs.size(); ++r) add_run(reports, runs[r], outside.ways_m[r]);
-  add_rows(result, "m03.leaving." + name,
-           name + ", one half memorised, the robot drives out of it and back", reports,
-           outside.sets);
-  add_confidently_wrong(result, "m03.leaving." + name + ".wrong", name + ", leaving and returning",
-                        runs);
+  RunRows rows{result, "m03.leaving." + name,
+               name + ", one half memorised, the robot drives out of it and back", outside.sets,
+               runs};
+  add_rows(rows, reports);
+  rows.what = name + ", leaving and returning";
+  rows.add_wrong();
   viewer::Series lost_series{.label = "called lost"};
   viewer::Series sure_series{.label = "called localised"};
   for (std::size_t b = 0; b < bins; ++b) {

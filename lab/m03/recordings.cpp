@@ -1,4 +1,4 @@
-// Monte-Carlo localisation on real views: a route outdoors, a gantry over plants.
+// Global localisation in Gazebo worlds and on real views: a route outdoors, a gantry over plants.
 
 #include <algorithm>
 #include <cmath>
@@ -12,23 +12,25 @@
 #include "panonav/core/statistics.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/panorama_reader.hpp"
+#include "panonav_simulation/worlds.hpp"
 
 namespace panonav::lab {
 
 namespace {
 
+constexpr std::uint64_t seed_of_worlds = 90'000;
 constexpr std::uint64_t seed_of_route = 100'000;
 constexpr std::uint64_t seed_of_gantry = 110'000;
 
-struct PosedView {
+struct RecordedView {
   ReferencePose pose;
   Panorama panorama;
 };
 
-std::vector<PosedView> read_views(const std::filesystem::path& folder) {
+std::vector<RecordedView> read_views(const std::filesystem::path& folder) {
   const Dataset dataset = read_dataset(folder);
   const PanoramaReader reader(dataset.source, {});
-  std::vector<PosedView> views;
+  std::vector<RecordedView> views;
   for (const DatasetEntry& entry : dataset.entries) {
     if (entry.pose) views.push_back({*entry.pose, reader.read(entry.path)});
   }
@@ -37,7 +39,7 @@ std::vector<PosedView> read_views(const std::filesystem::path& folder) {
 
 /// Headings along the path, whose positions jitter by more than lies between two of them: those of
 /// a straight line fitted to the positions within `half` before and after.
-std::vector<double> tangents(const std::vector<PosedView>& views, std::size_t half) {
+std::vector<double> tangents(const std::vector<RecordedView>& views, std::size_t half) {
   std::vector<double> headings;
   for (std::size_t i = 0; i < views.size(); ++i) {
     const std::size_t begin = i > half ? i - half : 0;
@@ -54,26 +56,83 @@ std::vector<double> tangents(const std::vector<PosedView>& views, std::size_t ha
   return headings;
 }
 
-void add_rows(Reproduction& result, const std::string& id, const std::string& what, double radius_m,
-              std::span<const RunSet> sets, std::span<const TrackedRun> runs) {
-  const std::string centimetres = std::to_string(std::lround(100.0 * radius_m)) + " cm";
-  const auto needed = capped_images(runs, radius_m);
-  add_median(result, id + ".images",
-             what + ": images until the error is below " + centimetres + " from then on", "images",
-             needed);
-  tell_single_images(result.rows.back(), sets);
-  add_mean(result, id + ".images_mean", what + ": images", "images", needed);
-  add_rate(result, id + ".within_10", what + ": runs localised within 10 images",
-           localised_within(runs, radius_m, 10), runs.size());
-  add_median(result, id + ".error_10", what + ": error after 10 images", "m",
-             errors_after(runs, 10));
-  add_confidently_wrong(result, id + ".wrong", what, runs);
+void add_rows(const RunRows& rows) {
+  rows.add_images();
+  rows.add_images_mean();
+  rows.add_within(10);
+  rows.add_error_after(10);
+  rows.add_wrong();
+}
+
+/// A walk from place to neighbouring place that comes to none twice; as long as it can be, up to
+/// `images`.
+std::vector<std::size_t> walk_over(const std::vector<RecordedView>& views, double spacing_m,
+                                   std::size_t images, Random& random) {
+  std::vector<std::size_t> walk{static_cast<std::size_t>(random.index(views.size()))};
+  std::vector<bool> visited(views.size());
+  visited[walk.front()] = true;
+  while (walk.size() < images) {
+    std::vector<std::size_t> next;
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      const double way = distance(views[i].pose.position(), views[walk.back()].pose.position());
+      if (!visited[i] && way < 1.5 * spacing_m) next.push_back(i);
+    }
+    if (next.empty()) break;
+    walk.push_back(next[random.index(next.size())]);
+    visited[walk.back()] = true;
+  }
+  return walk;
 }
 
 }  // namespace
 
-void reproduce_recorded_route(const TrackingReproductionOptions& options, Executor& executor,
-                              Reproduction& result) {
+void TrackingExperiments::reproduce_gazebo_world(const std::string& name) {
+  constexpr double spacing_m = 0.5;
+  const simulation::PlaceRecording place =
+      simulation::record_place(simulation::read_world(options.data, name),
+                               {.seed = options.seed,
+                                .spacing_m = spacing_m,
+                                .queries = 1,
+                                .rows = options.rows,
+                                .columns = options.columns / 2},
+                               executor);
+  const auto remembered = remember_for_tracking(place, executor);
+  RunCondition noisy = clean_condition();
+  noisy.id = "noisy";
+  noisy.name = "the sensor noise of hard";
+  noisy.sensor = hard_condition().sensor;
+  const WalkOptions walks{.variants = 1,
+                          .runs_each = 5 * options.variants * options.runs,
+                          .images = 20,
+                          .step_m = spacing_m,
+                          .seed = 3};
+  for (const RunCondition& condition : {clean_condition(), noisy}) {
+    const std::vector<RunSet> sets{make_run_set(
+        remembered, record_walks(place, *remembered, condition, walks, executor), executor)};
+    const auto runs = track(sets, FilterSetting{}, seed_of_worlds);
+    const RunRows rows{.result = result,
+                       .id = "m03." + name + "." + condition.id,
+                       .what = name + ", " + std::to_string(remembered->memory().size()) +
+                               " references on a 50 cm grid, " + condition.name,
+                       .sets = sets,
+                       .runs = runs,
+                       .radius_m = 1.0};
+    add_rate(result, rows.id + ".within_15",
+             rows.what + ": runs with an error below 1 m within 15 images and from then on",
+             localised_within(runs, 1.0, 15), runs.size(),
+             name == "small_warehouse" && condition.id == "clean" ? std::optional(at_least(0.95))
+                                                                  : std::nullopt);
+    rows.tell_single_images();
+    const auto needed = capped_images(runs, 1.0);
+    const std::string images = rows.what + ": images until the error is below 1 m from then on";
+    add_median(result, rows.id + ".images", images, "images", needed);
+    add_mean(result, rows.id + ".images_mean", images, "images", needed);
+    rows.add_error_after(15);
+    rows.add_wrong();
+  }
+}
+
+void TrackingExperiments::reproduce_recorded_route() {
   const auto views = read_views(options.data / "sussex_route");
   constexpr std::size_t around = 8;  // 12 cm of the route
   constexpr std::size_t stride = 8;  // images of a run are 12 cm apart
@@ -108,42 +167,17 @@ void reproduce_recorded_route(const TrackingReproductionOptions& options, Execut
   for (const bool compass : {false, true}) {
     const std::vector<RunSet> sets{make_run_set(compass ? with_headings : plain, runs, executor)};
     setting.options.compass = compass;
-    const auto tracked = track_sets(sets, setting, seed_of_route, executor);
-    add_rows(result, std::string("m03.sussex_route.") + (compass ? "compass" : "no_compass"),
-             std::string("route outdoors (sussex_route), even images memorised, stretches of 20 "
-                         "odd images 12 cm apart, which overlap, ") +
-                 (compass ? "memory with headings along the path, compass on"
-                          : "memory without headings"),
-             0.25, sets, tracked);
+    const auto tracked = track(sets, setting, seed_of_route);
+    add_rows({result, std::string("m03.sussex_route.") + (compass ? "compass" : "no_compass"),
+              std::string("route outdoors (sussex_route), even images memorised, stretches of 20 "
+                          "odd images 12 cm apart, which overlap, ") +
+                  (compass ? "memory with headings along the path, compass on"
+                           : "memory without headings"),
+              sets, tracked});
   }
 }
 
-namespace {
-
-/// A walk from place to neighbouring place that comes to none twice; as long as it can be, up to
-/// `images`.
-std::vector<std::size_t> walk_over(const std::vector<PosedView>& views, double spacing_m,
-                                   std::size_t images, Random& random) {
-  std::vector<std::size_t> walk{static_cast<std::size_t>(random.index(views.size()))};
-  std::vector<bool> visited(views.size());
-  visited[walk.front()] = true;
-  while (walk.size() < images) {
-    std::vector<std::size_t> next;
-    for (std::size_t i = 0; i < views.size(); ++i) {
-      const double way = distance(views[i].pose.position(), views[walk.back()].pose.position());
-      if (!visited[i] && way < 1.5 * spacing_m) next.push_back(i);
-    }
-    if (next.empty()) break;
-    walk.push_back(next[random.index(next.size())]);
-    visited[walk.back()] = true;
-  }
-  return walk;
-}
-
-}  // namespace
-
-void reproduce_gantry(const TrackingReproductionOptions& options, Executor& executor,
-                      Reproduction& result) {
+void TrackingExperiments::reproduce_gantry() {
   const auto views = read_views(options.data / "gantry_plants");
   constexpr double spacing_m = 0.1;
   constexpr std::size_t images = 15;
@@ -173,11 +207,11 @@ void reproduce_gantry(const TrackingReproductionOptions& options, Executor& exec
     }
     sets.push_back(make_run_set(remembered, {run_through(truth, std::move(seen))}, executor));
   }
-  const auto tracked = track_sets(sets, setting, seed_of_gantry, executor);
-  add_rows(result, "m03.gantry_plants",
-           "gantry over plants (gantry_plants), random walks over its 10 cm grid, whose views are "
-           "left out of the memory",
-           2.0 * spacing_m, sets, tracked);
+  const auto tracked = track(sets, setting, seed_of_gantry);
+  add_rows({result, "m03.gantry_plants",
+            "gantry over plants (gantry_plants), random walks over its 10 cm grid, whose views are "
+            "left out of the memory",
+            sets, tracked, 2.0 * spacing_m});
 }
 
 }  // namespace panonav::lab

@@ -7,10 +7,8 @@
 
 #include "lab/m04/experiment.hpp"
 #include "lab/m04/support.hpp"
-#include "lab/statistics.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
-#include "panonav/core/statistics.hpp"
 #include "panonav/signature/dissimilarity.hpp"
 #include "panonav_viewer/plot.hpp"
 
@@ -88,58 +86,36 @@ std::pair<Point2, Point2> draw_line(const simulation::FreeSpace& space, Random& 
   return *best;
 }
 
+// The mean of the values at each distance.
+struct CurveSums {
+  Curve sums;
+  Curve counts;
+
+  void add(std::size_t bin, double value) {
+    if (bin >= sums.size()) {
+      sums.resize(bin + 1);
+      counts.resize(bin + 1);
+    }
+    sums[bin] += value;
+    counts[bin] += 1.0;
+  }
+  [[nodiscard]] Curve mean() const {
+    Curve curve;
+    for (std::size_t bin = 0; bin < sums.size(); ++bin) curve.push_back(sums[bin] / counts[bin]);
+    return curve;
+  }
+};
+
 class DistanceCurve final : public Experiment {
  public:
   void add(const simulation::PlaceRecording& place, Executor& executor) override {
     Random random(place.seed, 79);
-    Curve sums;
-    Curve counts;
-    const auto count_pair = [&](std::size_t bin, double value) {
-      if (bin >= sums.size()) {
-        sums.resize(bin + 1);
-        counts.resize(bin + 1);
-      }
-      sums[bin] += value;
-      counts[bin] += 1.0;
-    };
+    CurveSums sums;
     for (std::size_t line = 0; line < kLines; ++line) {
       const auto [from, to] = draw_line(*place.free_space, random);
-      const auto steps = static_cast<std::size_t>(std::lround(distance(from, to) / kStepM));
-      std::vector<Pose2> poses;
-      for (std::size_t i = 0; i <= steps; ++i) {
-        const double share = steps > 0 ? static_cast<double>(i) / static_cast<double>(steps) : 0.0;
-        // Any heading: magnitudes do not depend on it.
-        poses.push_back(
-            {from.x_m + share * (to.x_m - from.x_m), from.y_m + share * (to.y_m - from.y_m), 0.0});
-      }
-      const std::uint64_t noise = place.seed * 100003U + 70000U + 5000U * line;
-      const auto views =
-          signatures_of(simulation::take_views(place, place.rendering, poses, noise, {}, executor),
-                        m04_components, executor);
-      std::vector<Pose2> some;
-      for (std::size_t i = 0; i < poses.size(); i += kAgain) some.push_back(poses[i]);
-      const auto again = signatures_of(
-          simulation::take_views(place, place.rendering, some, noise + 2500U, {}, executor),
-          m04_components, executor);
-      for (std::size_t i = 0; i < views.size(); ++i) {
-        // At distance 0 two pictures differ by noise alone.
-        if (i % kAgain == 0) count_pair(0, dissimilarity_l1(views[i], again[i / kAgain]));
-        for (std::size_t j = i + 1; j < views.size(); ++j) {
-          count_pair(j - i, dissimilarity_l1(views[i], views[j]));
-        }
-      }
-      // The paper shows single pairs: one reference, one robot that drives away from it.
-      if (line == 0 && single_.size() < kShown) {
-        viewer::Series one{.label = "pair " + std::to_string(single_.size() + 1),
-                           .style = viewer::SeriesStyle::lines};
-        for (std::size_t j = 0; j < views.size(); ++j) {
-          one.add(distance_of(j), dissimilarity_l1(views[0], j == 0 ? again[0] : views[j]));
-        }
-        single_.push_back(std::move(one));
-      }
+      add_line(place, from, to, line, sums, executor);
     }
-    Curve curve;
-    for (std::size_t bin = 0; bin < sums.size(); ++bin) curve.push_back(sums[bin] / counts[bin]);
+    Curve curve = sums.mean();
     require(curve.size() >= 50, "length of the straight ways [m]", distance_of(curve.size() - 1),
             ">= 1 m");
     // The absolute value depends on the place and carries no meaning [M04 section 2.2]: 1 is the
@@ -207,6 +183,44 @@ class DistanceCurve final : public Experiment {
   }
 
  private:
+  // All pairs of views along one straight way.
+  void add_line(const simulation::PlaceRecording& place, Point2 from, Point2 to, std::size_t line,
+                CurveSums& sums, Executor& executor) {
+    const auto steps = static_cast<std::size_t>(std::lround(distance(from, to) / kStepM));
+    std::vector<Pose2> poses;
+    std::vector<Pose2> some;
+    for (std::size_t i = 0; i <= steps; ++i) {
+      const double share = steps > 0 ? static_cast<double>(i) / static_cast<double>(steps) : 0.0;
+      // Any heading: magnitudes do not depend on it.
+      poses.push_back(
+          {from.x_m + share * (to.x_m - from.x_m), from.y_m + share * (to.y_m - from.y_m), 0.0});
+      if (i % kAgain == 0) some.push_back(poses.back());
+    }
+    const std::uint64_t noise = place.seed * 100003U + 70000U + 5000U * line;
+    const auto see = [&](const std::vector<Pose2>& from_here, std::uint64_t seed) {
+      return signatures_of(
+          simulation::take_views(place, place.rendering, from_here, seed, {}, executor),
+          m04_components, executor);
+    };
+    const auto views = see(poses, noise);
+    const auto again = see(some, noise + 2500U);
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      // At distance 0 two pictures differ by noise alone.
+      if (i % kAgain == 0) sums.add(0, dissimilarity_l1(views[i], again[i / kAgain]));
+      for (std::size_t j = i + 1; j < views.size(); ++j) {
+        sums.add(j - i, dissimilarity_l1(views[i], views[j]));
+      }
+    }
+    // The paper shows single pairs: one reference, one robot that drives away from it.
+    if (line > 0 || single_.size() >= kShown) return;
+    viewer::Series one{.label = "pair " + std::to_string(single_.size() + 1),
+                       .style = viewer::SeriesStyle::lines};
+    for (std::size_t j = 0; j < views.size(); ++j) {
+      one.add(distance_of(j), dissimilarity_l1(views[0], j == 0 ? again[0] : views[j]));
+    }
+    single_.push_back(std::move(one));
+  }
+
   static constexpr std::size_t kLines = 2;
   static constexpr std::size_t kAgain = 10;  // one view in so many is taken twice
   static constexpr std::size_t kShown = 5;

@@ -81,11 +81,12 @@ Reproduction reproduce_m04(const ReproductionOptions& options, Executor& executo
   reproduce_lattice(options, executor, step, result);
   for (const MissionGrid& grid : options.mission_grids) {
     step("missions in " + grid.scene, cost_of(grid));
-    reproduce_grid_missions({.out = options.out,
-                             .scenes = options.mission_scenes,
-                             .runs = options.missions,
-                             .seed = options.seed + mission_seeds_above},
-                            grid.scene, grid.spacing_m, executor, result);
+    const NavigationReproductionOptions missions{.out = options.out,
+                                                 .scenes = options.mission_scenes,
+                                                 .runs = options.missions,
+                                                 .seed = options.seed + mission_seeds_above};
+    NavigationExperiments{missions, executor, result}.reproduce_grid_missions(grid.scene,
+                                                                              grid.spacing_m);
   }
   if (progress) progress("done", 1.0);
   return result;

@@ -31,7 +31,7 @@ namespace {
 
 // Of every second variant; the others have as much more light.
 constexpr double light_change = 0.3;
-constexpr double moved_share = 0.1;
+constexpr double moved_objects_share = 0.1;
 // References along a drive, and how long that is.
 constexpr double drive_spacing_m = 0.25;
 constexpr double drive_m = 60.0;
@@ -165,8 +165,7 @@ std::optional<double> shutting_width_m(const simulation::Scene& scene,
 
 }  // namespace
 
-void reproduce_grid_missions(const NavigationReproductionOptions& options, const std::string& scene,
-                             double spacing_m, Executor& executor, Reproduction& result) {
+void NavigationExperiments::reproduce_grid_missions(const std::string& scene, double spacing_m) {
   Measures measured;
   for (int i = 0; i < options.scenes; ++i) {
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
@@ -189,8 +188,7 @@ void reproduce_grid_missions(const NavigationReproductionOptions& options, const
          measured, at_least(0.98), at_most(1.3), result);
 }
 
-void reproduce_drive_missions(const NavigationReproductionOptions& options,
-                              const std::string& scene, Executor& executor, Reproduction& result) {
+void NavigationExperiments::reproduce_drive_missions(const std::string& scene) {
   Measures same;
   Measures changed;
   Measures kidnapped;
@@ -204,7 +202,7 @@ void reproduce_drive_missions(const NavigationReproductionOptions& options,
         simulation::remember_drive(place, exploring_drive(place, seed), simulation::cheap_wheels(),
                                    Random(seed, 1).next(), executor);
     variation.light = i % 2 == 0 ? 1.0 - light_change : 1.0 + light_change;
-    variation.moved_objects = moved_share;
+    variation.moved_objects = moved_objects_share;
     variation.moved_seed = Random(seed, 4).next();
     const simulation::MissionPlace other =
         simulation::make_mission_place(scene_of(options, scene, variation), executor);
@@ -250,8 +248,7 @@ void reproduce_drive_missions(const NavigationReproductionOptions& options,
   }
 }
 
-void reproduce_tours(const NavigationReproductionOptions& options, Executor& executor,
-                     Reproduction& result) {
+void NavigationExperiments::reproduce_tours() {
   constexpr int goals_a_tour = 5;
   constexpr int people = 3;
   struct Kind {
@@ -304,8 +301,7 @@ void reproduce_tours(const NavigationReproductionOptions& options, Executor& exe
   }
 }
 
-void reproduce_route_missions(const NavigationReproductionOptions& options, Executor& executor,
-                              Reproduction& result) {
+void NavigationExperiments::reproduce_route_missions() {
   struct Kind {
     std::string id;
     std::string what;
@@ -359,8 +355,7 @@ void reproduce_route_missions(const NavigationReproductionOptions& options, Exec
              what + ": distance from the way that was driven, on a leg", "m", on_route_m);
 }
 
-void reproduce_blocked_missions(const NavigationReproductionOptions& options, Executor& executor,
-                                Reproduction& result) {
+void NavigationExperiments::reproduce_blocked_missions() {
   Measures around;
   Measures shut;
   for (int i = 0; i < options.scenes; ++i) {

@@ -23,17 +23,17 @@ Reproduction reproduce_navigation(const NavigationReproductionOptions& options, 
   require(options.runs >= options.scenes, "runs", options.runs, ">= scenes");
   make_folder(options.out);
   Reproduction result;
+  NavigationExperiments navigation{options, executor, result};
   std::vector<ReproductionStage> stages;
   std::vector<std::string> drives{"loop", "corridor"};
   std::ranges::copy(simulation::worlds_in(options.data), std::back_inserter(drives));
   for (const std::string& scene : drives) {
     stages.push_back({"missions in " + scene, 6.0,
-                      [&, scene] { reproduce_drive_missions(options, scene, executor, result); }});
+                      [&navigation, scene] { navigation.reproduce_drive_missions(scene); }});
   }
-  stages.push_back({"tours", 4.0, [&] { reproduce_tours(options, executor, result); }});
-  stages.push_back({"routes", 3.0, [&] { reproduce_route_missions(options, executor, result); }});
-  stages.push_back(
-      {"blocked edges", 2.0, [&] { reproduce_blocked_missions(options, executor, result); }});
+  stages.push_back({"tours", 4.0, [&] { navigation.reproduce_tours(); }});
+  stages.push_back({"routes", 3.0, [&] { navigation.reproduce_route_missions(); }});
+  stages.push_back({"blocked edges", 2.0, [&] { navigation.reproduce_blocked_missions(); }});
   run_stages(stages, progress);
   return result;
 }

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "lab/runs/tracking_run.hpp"
+#include "lab/statistics.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav_simulation/recording.hpp"

@@ -16,11 +16,11 @@ namespace panonav::lab {
 
 namespace {
 
-constexpr int components = 15;           // [M04]
+constexpr int memory_components = 15;    // [M04]
 constexpr std::size_t first_views = 32;  // of which a memory learns its full scale
 
 FourierSignature signature_of(const Panorama& view) {
-  return compute_signature(preprocess(view, {}), components);
+  return compute_signature(preprocess(view, {}), memory_components);
 }
 
 // A number for each of its parts: different parts give different numbers, far apart.

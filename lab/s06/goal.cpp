@@ -12,6 +12,10 @@ namespace panonav::lab {
 
 namespace {
 
+const std::vector<double> difference_limits{0.05, 0.1, 0.2, 0.4, 0.8};
+const std::vector<double> distance_limits{0.0126, 0.0501, 0.1001, 0.2001, 0.4001};
+constexpr double reached_m = 0.1 + 1e-6;
+
 // A goal and all that the pictures need of it.
 class GoalPictures {
  public:
@@ -42,7 +46,7 @@ class GoalPictures {
   [[nodiscard]] std::vector<viewer::MapLayer> shaded(const std::vector<double>& values,
                                                      const std::vector<double>& limits) const;
   [[nodiscard]] viewer::MapLayer vectors(const FourierHomingOptions& homing) const;
-  [[nodiscard]] viewer::MapLayer border(const std::vector<bool>& inside) const;
+  [[nodiscard]] viewer::MapLayer border(const std::vector<double>& ends_m) const;
   [[nodiscard]] viewer::MapLayer goal_mark() const;
   [[nodiscard]] viewer::MapLayer most_similar(const std::vector<double>& differences) const;
 
@@ -91,21 +95,21 @@ viewer::MapLayer GoalPictures::vectors(const FourierHomingOptions& homing) const
   return layer;
 }
 
-// The edges between cells inside and all others.
-viewer::MapLayer GoalPictures::border(const std::vector<bool>& inside) const {
+// The edges between cells from which runs end within 10 cm of the goal and all others.
+viewer::MapLayer GoalPictures::border(const std::vector<double>& ends_m) const {
   viewer::MapLayer layer{.colour = viewer::PlotColour::vermilion};
   const double spacing_m = arena_.options.spacing_m;
   const auto is_inside = [&](double x_m, double y_m) {
-    for (std::size_t p = 0; p < inside.size(); ++p) {
+    for (std::size_t p = 0; p < ends_m.size(); ++p) {
       const Point2 at = arena_.currents.views[p].pose.position();
       if (std::abs(at.x_m - x_m) < 0.5 * spacing_m && std::abs(at.y_m - y_m) < 0.5 * spacing_m) {
-        return static_cast<bool>(inside[p]);
+        return ends_m[p] <= reached_m;
       }
     }
     return false;
   };
-  for (std::size_t p = 0; p < inside.size(); ++p) {
-    if (!inside[p]) continue;
+  for (std::size_t p = 0; p < ends_m.size(); ++p) {
+    if (!(ends_m[p] <= reached_m)) continue;
     const Point2 at = arena_.currents.views[p].pose.position();
     constexpr std::array<std::array<int, 2>, 4> sides{{{1, 0}, {0, 1}, {-1, 0}, {0, -1}}};
     for (const auto& [dx, dy] : sides) {
@@ -128,16 +132,6 @@ viewer::MapLayer GoalPictures::most_similar(const std::vector<double>& differenc
   return {.label = "most similar",
           .colour = viewer::PlotColour::green,
           .circles = {arena_.currents.views[static_cast<std::size_t>(best)].pose.position()}};
-}
-
-const std::vector<double> difference_limits{0.05, 0.1, 0.2, 0.4, 0.8};
-const std::vector<double> distance_limits{0.0126, 0.0501, 0.1001, 0.2001, 0.4001};
-constexpr double reached_m = 0.1 + 1e-6;
-
-std::vector<bool> within(const std::vector<double>& distances, double limit_m) {
-  std::vector<bool> inside;
-  for (const double away_m : distances) inside.push_back(away_m <= limit_m);
-  return inside;
 }
 
 template <typename... Layers>
@@ -165,40 +159,33 @@ viewer::Series transect(const Arena& arena, Point2 goal, const std::vector<doubl
   return series;
 }
 
-}  // namespace
+// The goal nearest to the crossing of the streets left of the middle.
+std::size_t choose_goal(const HomingSurvey& survey) {
+  const Point2 crossing{0.5, 0.6};
+  return static_cast<std::size_t>(
+      std::ranges::min_element(
+          survey.goals, {},
+          [&](const Pose2& goal) { return distance(goal.position(), crossing); }) -
+      survey.goals.begin());
+}
 
-void reproduce_goal_figures(ArenaSurveys& surveys, const std::filesystem::path& folder,
-                            Reproduction& result) {
-  const Arena& arena = surveys.arena();
-  // The goal nearest to the crossing of the streets left of the middle.
-  const HomingSurvey& survey = surveys.published(2);
-  const Point2 wanted{0.5, 0.6};
-  std::size_t goal = 0;
-  for (std::size_t g = 1; g < survey.goals.size(); ++g) {
-    if (distance(survey.goals[g].position(), wanted) <
-        distance(survey.goals[goal].position(), wanted)) {
-      goal = g;
-    }
-  }
-  GoalPictures of(surveys, goal);
+// Figure 9.
+void draw_vectors(GoalPictures& of, const std::filesystem::path& folder, Reproduction& result) {
+  const auto differences = of.differences(5);
+  const auto ends = of.final_distances_of(published_strategy({5}));
+  add_plot(result, folder, "figure_09_vectors.svg",
+           "[S06] figure 9: home vectors to one goal (strokes from the dots), the darker the less "
+           "similar "
+           "the views. Other valleys lead astray.",
+           map_of("Home vectors, K = 5; orange: catchment area at 10 cm",
+                  of.shaded(differences, difference_limits),
+                  of.vectors(published_homing(5, s06_iterations)), of.border(ends), of.goal_mark(),
+                  of.most_similar(differences)));
+}
 
-  const auto at_five = of.differences(5);
-  const auto ends_five = of.final_distances_of(published_strategy({5}));
-  add_plot(
-      result, folder, "figure_09_vectors.svg",
-      "[S06] figure 9: home vectors to one goal (strokes from the dots), the darker the less "
-      "similar "
-      "the views. Other valleys lead astray.",
-      map_of("Home vectors, K = 5; orange: catchment area at 10 cm",
-             of.shaded(at_five, difference_limits), of.vectors(published_homing(5, s06_iterations)),
-             of.border(within(ends_five, reached_m)), of.goal_mark(), of.most_similar(at_five)));
-
+// Figure 14.
+void draw_stages(GoalPictures& of, const std::filesystem::path& folder, Reproduction& result) {
   std::vector<viewer::MapPlot> panels;
-  viewer::LinePlot along_x{.title = "Image difference along x through the goal",
-                           .x_label = "distance from the goal [m]",
-                           .y_label = "share of the energy of both views"};
-  viewer::LinePlot along_y = along_x;
-  along_y.title = "Image difference along y through the goal";
   for (const int highest : {2, 4, 10}) {
     const std::string k = "K = " + std::to_string(highest);
     const auto differences = of.differences(highest);
@@ -208,36 +195,54 @@ void reproduce_goal_figures(ArenaSurveys& surveys, const std::filesystem::path& 
                             of.vectors(published_homing(highest, s06_iterations)), of.goal_mark(),
                             of.most_similar(differences)));
     panels.push_back(map_of(k + ": where runs end; yellow: at the goal, dark: beyond 40 cm",
-                            of.shaded(ends, distance_limits), of.border(within(ends, reached_m)),
-                            of.goal_mark()));
-    along_x.series.push_back(transect(arena, of.position(), differences, true, k));
-    along_y.series.push_back(transect(arena, of.position(), differences, false, k));
+                            of.shaded(ends, distance_limits), of.border(ends), of.goal_mark()));
   }
   add_plot(result, folder, "figure_14_stages.svg",
            "[S06] figure 14: the same goal with K = 2, 4 and 10. Left: image difference and home "
            "vectors; right: how far from the goal runs end that start there.",
            panels, 2);
+}
 
-  const auto staged = of.final_distances_of(published_strategy({2, 4, 10}));
-  const auto own = of.final_distances_of(own_strategy());
-  const auto images = of.final_distances_of(expected_image_strategy());
+// Figure 15.
+void draw_areas_of_rules(GoalPictures& of, const std::filesystem::path& folder,
+                         Reproduction& result) {
+  std::vector<viewer::MapPlot> panels;
+  for (const HomingStrategy& strategy :
+       {published_strategy({2, 4, 10}), own_strategy(), expected_image_strategy()}) {
+    const auto ends = of.final_distances_of(strategy);
+    panels.push_back(
+        map_of(strategy.label, of.shaded(ends, distance_limits), of.border(ends), of.goal_mark()));
+  }
   add_plot(
       result, folder, "figure_15_areas.svg",
       "[S06] figure 15: where runs to this goal end, coarse to fine, by our rule and by expected "
       "images. Yellow: at the goal; dark: beyond 40 cm; orange: the area within 10 cm.",
-      std::vector<viewer::MapPlot>{map_of("K = 2, 4, 10", of.shaded(staged, distance_limits),
-                                          of.border(within(staged, reached_m)), of.goal_mark()),
-                                   map_of("our rule", of.shaded(own, distance_limits),
-                                          of.border(within(own, reached_m)), of.goal_mark()),
-                                   map_of("expected images", of.shaded(images, distance_limits),
-                                          of.border(within(images, reached_m)), of.goal_mark())},
-      3);
+      panels, 3);
+}
 
+// Figure 16, left.
+void draw_transects(const Arena& arena, const GoalPictures& of, const std::filesystem::path& folder,
+                    Reproduction& result) {
+  const auto plot = [&](const std::string& axis, bool along_x) {
+    viewer::LinePlot lines{.title = "Image difference along " + axis + " through the goal",
+                           .x_label = "distance from the goal [m]",
+                           .y_label = "share of the energy of both views"};
+    for (const int highest : {2, 4, 10}) {
+      lines.series.push_back(transect(arena, of.position(), of.differences(highest), along_x,
+                                      "K = " + std::to_string(highest)));
+    }
+    return lines;
+  };
   add_plot(result, folder, "figure_16_transect_x.svg",
            "[S06] figure 16, left: the image difference along a line through the goal. More "
            "frequencies, a narrower valley.",
-           along_x);
-  add_plot(result, folder, "figure_16_transect_y.svg", "The same across.", along_y);
+           plot("x", true));
+  add_plot(result, folder, "figure_16_transect_y.svg", "The same across.", plot("y", false));
+}
+
+// Figure 16, right.
+void draw_surface(const Arena& arena, const GoalPictures& of, const std::filesystem::path& folder,
+                  Reproduction& result) {
   const auto surface = of.differences(10);
   viewer::HeatMap map{.title = "Image difference to the goal (cross), K = 10",
                       .value_label = "share of the energy of both views",
@@ -256,6 +261,18 @@ void reproduce_goal_figures(ArenaSurveys& surveys, const std::filesystem::path& 
   }
   add_plot(result, folder, "figure_16_surface.svg",
            "[S06] figure 16, right: the image difference over the arena.", map);
+}
+
+}  // namespace
+
+void reproduce_goal_figures(ArenaSurveys& surveys, const std::filesystem::path& folder,
+                            Reproduction& result) {
+  GoalPictures of(surveys, choose_goal(surveys.published(2)));
+  draw_vectors(of, folder, result);
+  draw_stages(of, folder, result);
+  draw_areas_of_rules(of, folder, result);
+  draw_transects(surveys.arena(), of, folder, result);
+  draw_surface(surveys.arena(), of, folder, result);
 }
 
 }  // namespace panonav::lab

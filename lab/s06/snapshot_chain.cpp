@@ -171,71 +171,81 @@ ChainDecision ChainFollower::approach_last(const HomingView& current) {
   return decision;
 }
 
+void ChainFollower::start_at_most_similar(const HomingView& current) {
+  double min_difference = 3.0;
+  target_ = 0;
+  for (std::size_t i = 0; i < chain_.size(); ++i) {
+    const double difference = image_difference(chain_[i].view, current);
+    if (difference >= min_difference) continue;
+    min_difference = difference;
+    target_ = i;
+  }
+  max_steps_to_target_ = pursuit_options_.max_steps;
+}
+
+// What the views say counts where odometry does not exclude it.
+bool ChainFollower::aim_at_next_if_reached(const HomingView& current, const HomeVector& vector) {
+  const double r_m = pursuit_options_.typical_distance_m;
+  const bool contradicts = contradicts_odometry(vector);
+  const bool plausible =
+      !target_from_robot_ ||
+      (!contradicts && length(*target_from_robot_) <= std::max(near_m, 0.5 * way_m_));
+  const bool is_near = plausible && vector.length() < switch_length;
+  const bool passed = plausible && !is_near &&
+                      image_difference(chain_[next(*target_)].view, current) <
+                          image_difference(chain_[*target_].view, current);
+  const bool is_there_by_odometry =
+      contradicts && length(*target_from_robot_) < r_m * switch_length;
+  const bool skipped =
+      !is_near && !passed && (is_there_by_odometry || steps_to_target_ >= max_steps_to_target_);
+  if (is_near || passed) unseen_m_ = 0.0;
+  if (!is_near && !passed && !skipped) return false;
+  // Heading by the compass. Position by the vector where it is short, else by odometry.
+  Pose2 target_from_robot = target_from_robot_.value_or(Pose2{});
+  if (is_near || !target_from_robot_) {
+    target_from_robot =
+        inverse(Pose2{r_m * vector.xi, r_m * vector.eta, wrap_angle(vector.heading_rad)});
+  }
+  aim_at_next(target_from_robot);
+  return true;
+}
+
+std::optional<ChainDecision> ChainFollower::follow_odometry_if_needed(const HomeVector& vector) {
+  if (!target_from_robot_) return std::nullopt;
+  const bool contradicts = contradicts_odometry(vector);
+  const bool near = length(*target_from_robot_) <= near_m;
+  const Pose2 expected = inverse(*target_from_robot_);
+  const double expected_rad = std::atan2(expected.y_m, expected.x_m);
+  const double off_rad = std::abs(wrap_angle(vector.direction_rad() - expected_rad));
+  const bool at_last = near && is_last(*target_);
+  if (!at_last && (contradicts || vector.length() == 0.0 || (!near && off_rad > mistrust_rad))) {
+    return ChainDecision{ChainState::following, *target_, expected_rad,
+                         std::min(pursuit_options_.max_step_m, length(expected))};
+  }
+  // The compass does not drift.
+  if (!contradicts) target_from_robot_->heading_rad = wrap_angle(-vector.heading_rad);
+  return std::nullopt;
+}
+
 ChainDecision ChainFollower::decide(const HomingView& current, const Pose2& moved) {
   if (!target_) {
-    double min_difference = 3.0;
-    for (std::size_t i = 0; i < chain_.size(); ++i) {
-      const double difference = image_difference(chain_[i].view, current);
-      if (difference >= min_difference) continue;
-      min_difference = difference;
-      target_ = i;
-    }
-    if (!target_) target_ = 0;
-    max_steps_to_target_ = pursuit_options_.max_steps;
+    start_at_most_similar(current);
   } else if (target_from_robot_) {
     target_from_robot_ = *target_from_robot_ * moved;
     unseen_m_ += length(moved);
   }
   if (pursuit_) return approach_last(current);
-
-  const double r_m = pursuit_options_.typical_distance_m;
   HomeVector vector = home_vector(chain_[*target_].view, current);
-  if (!is_last(*target_)) {
-    // What the views say counts where odometry does not exclude it.
-    const bool contradicts = contradicts_odometry(vector);
-    const bool plausible =
-        !target_from_robot_ ||
-        (!contradicts && length(*target_from_robot_) <= std::max(near_m, 0.5 * way_m_));
-    const bool is_near = plausible && vector.length() < switch_length;
-    const bool passed = plausible && !is_near &&
-                        image_difference(chain_[next(*target_)].view, current) <
-                            image_difference(chain_[*target_].view, current);
-    const bool is_there_by_odometry =
-        contradicts && length(*target_from_robot_) < r_m * switch_length;
-    const bool skipped =
-        !is_near && !passed && (is_there_by_odometry || steps_to_target_ >= max_steps_to_target_);
-    if (is_near || passed) unseen_m_ = 0.0;
-    if (is_near || passed || skipped) {
-      // Heading by the compass. Position by the vector where it is short, else by odometry.
-      Pose2 target_from_robot = target_from_robot_.value_or(Pose2{});
-      if (is_near || !target_from_robot_) {
-        target_from_robot =
-            inverse(Pose2{r_m * vector.xi, r_m * vector.eta, wrap_angle(vector.heading_rad)});
-      }
-      aim_at_next(target_from_robot);
-      vector = home_vector(chain_[*target_].view, current);
-    }
+  if (!is_last(*target_) && aim_at_next_if_reached(current, vector)) {
+    vector = home_vector(chain_[*target_].view, current);
   }
   ++steps_to_target_;
   if (unseen_m_ > max_unseen_m) return {ChainState::lost, *target_, 0.0, 0.0};
-
-  if (target_from_robot_) {
-    const bool contradicts = contradicts_odometry(vector);
-    const bool near = length(*target_from_robot_) <= near_m;
-    const Pose2 expected = inverse(*target_from_robot_);
-    const double expected_rad = std::atan2(expected.y_m, expected.x_m);
-    const double off_rad = std::abs(wrap_angle(vector.direction_rad() - expected_rad));
-    const bool at_last = near && is_last(*target_);
-    if (!at_last && (contradicts || vector.length() == 0.0 || (!near && off_rad > mistrust_rad))) {
-      return {ChainState::following, *target_, expected_rad,
-              std::min(pursuit_options_.max_step_m, length(expected))};
-    }
-    // The compass does not drift.
-    if (!contradicts) target_from_robot_->heading_rad = wrap_angle(-vector.heading_rad);
-  }
+  if (const auto decision = follow_odometry_if_needed(vector)) return *decision;
   if (is_last(*target_)) return approach_last(current);
-  return {ChainState::following, *target_, vector.direction_rad(),
-          std::min(pursuit_options_.max_step_m, r_m * vector.length())};
+  return {
+      ChainState::following, *target_, vector.direction_rad(),
+      std::min(pursuit_options_.max_step_m, pursuit_options_.typical_distance_m * vector.length())};
 }
 
 }  // namespace panonav::lab

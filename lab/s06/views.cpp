@@ -157,74 +157,88 @@ void draw_spectrum(const Arena& arena, const std::filesystem::path& folder, Repr
                             .log_y = true});
 }
 
-struct Sums {
-  explicit Sums(std::size_t bins) : first(bins), second(bins) {}
-  std::vector<double> first, second;
-  void add(const Sums& other) {
-    for (std::size_t i = 0; i < first.size(); ++i) {
-      first[i] += other.first[i];
-      second[i] += other.second[i];
+// Two numbers for each of several curves.
+using Values = std::vector<std::pair<double, double>>;
+
+// Sums of values over all pairs of places, by their distance.
+struct PairSums {
+  std::vector<Values> sums;   // of each bin
+  std::vector<double> pairs;  // in each bin
+
+  explicit PairSums(std::size_t curves) : sums(bins, Values(curves)), pairs(bins) {}
+  void add(const PairSums& other) {
+    for (std::size_t i = 0; i < bins; ++i) {
+      pairs[i] += other.pairs[i];
+      for (std::size_t s = 0; s < sums[i].size(); ++s) {
+        sums[i][s].first += other.sums[i][s].first;
+        sums[i][s].second += other.sums[i][s].second;
+      }
     }
   }
+  static constexpr std::size_t bins = 62;
 };
 
-// For each of `series` values, sums over all pairs of places by their distance; `values` fills two
-// numbers per series. The same on any number of threads.
-template <typename Values>
-std::pair<std::vector<Sums>, std::vector<double>> sum_pairs(const Arena& arena, std::size_t series,
-                                                            Executor& executor, Values values) {
+// `fill` sets the values of a pair of places. The same on any number of threads.
+template <typename Fill>
+PairSums sum_pairs(const Arena& arena, std::size_t curves, Executor& executor, Fill fill) {
   const auto& homes = arena.homes.views;
   const auto& currents = arena.currents.views;
-  constexpr std::size_t bins = 62;
   constexpr std::size_t chunk = 64;
-  struct Part {
-    std::vector<Sums> sums;
-    std::vector<double> pairs;
-  };
-  std::vector<Part> parts((homes.size() + chunk - 1) / chunk);
+  std::vector<PairSums> parts((homes.size() + chunk - 1) / chunk, PairSums(curves));
   executor.for_chunks(
       homes.size(), chunk, [&](std::size_t begin, std::size_t end, std::size_t number) {
-        Part part{std::vector<Sums>(series, Sums(bins)), std::vector<double>(bins)};
-        std::vector<std::pair<double, double>> of_pair(series);
+        PairSums& part = parts[number];
+        Values of_pair(curves);
         for (std::size_t g = begin; g < end; ++g) {
           for (std::size_t p = 0; p < currents.size(); ++p) {
             const double away_m = distance(homes[g].pose.position(), currents[p].pose.position());
             const auto bin = static_cast<std::size_t>(away_m / arena.options.spacing_m + 0.5);
-            if (bin >= bins) continue;
-            values(g, p, of_pair);
+            if (bin >= PairSums::bins) continue;
+            fill(g, p, of_pair);
             part.pairs[bin] += 1.0;
-            for (std::size_t s = 0; s < series; ++s) {
-              part.sums[s].first[bin] += of_pair[s].first;
-              part.sums[s].second[bin] += of_pair[s].second;
+            for (std::size_t s = 0; s < curves; ++s) {
+              part.sums[bin][s].first += of_pair[s].first;
+              part.sums[bin][s].second += of_pair[s].second;
             }
           }
         }
-        parts[number] = std::move(part);
       });
-  Part all{std::vector<Sums>(series, Sums(bins)), std::vector<double>(bins)};
-  for (const Part& part : parts) {
-    for (std::size_t s = 0; s < series; ++s) all.sums[s].add(part.sums[s]);
-    for (std::size_t i = 0; i < bins; ++i) all.pairs[i] += part.pairs[i];
+  PairSums all(curves);
+  for (const PairSums& part : parts) all.add(part);
+  return all;
+}
+
+// A curve over the distance, where there are pairs enough for a mean.
+template <typename Value>
+viewer::Series curve_by_distance(const Arena& arena, const PairSums& sums, double farthest_m,
+                                 const Value& value) {
+  viewer::Series series;
+  for (std::size_t i = 0; i < PairSums::bins; ++i) {
+    if (sums.pairs[i] < 100.0) continue;
+    const double x = static_cast<double>(i) * arena.options.spacing_m;
+    if (x > farthest_m) break;
+    series.add(x, value(i));
   }
-  return {std::move(all.sums), std::move(all.pairs)};
+  return series;
+}
+
+// All at one heading, as in the paper.
+std::vector<HomingView> turned_north(const ArenaRecording& recording) {
+  std::vector<HomingView> views;
+  for (const auto& placed : recording.views) {
+    views.push_back(turn(placed.view, -placed.pose.heading_rad));
+  }
+  return views;
 }
 
 // Figure 7.
 void draw_changes(const Arena& arena, const std::filesystem::path& folder, Executor& executor,
                   Reproduction& result) {
   constexpr std::array<int, 6> shown{1, 2, 3, 5, 10, 20};
-  // All at one heading, as in the paper.
-  std::vector<HomingView> homes;
-  std::vector<HomingView> currents;
-  for (const auto& placed : arena.homes.views) {
-    homes.push_back(turn(placed.view, -placed.pose.heading_rad));
-  }
-  for (const auto& placed : arena.currents.views) {
-    currents.push_back(turn(placed.view, -placed.pose.heading_rad));
-  }
-  const auto [sums, pairs] = sum_pairs(
-      arena, shown.size() + 1, executor,
-      [&](std::size_t g, std::size_t p, std::vector<std::pair<double, double>>& values) {
+  const auto homes = turned_north(arena.homes);
+  const auto currents = turned_north(arena.currents);
+  const auto sums = sum_pairs(
+      arena, shown.size() + 1, executor, [&](std::size_t g, std::size_t p, Values& values) {
         double all = 0.0;
         for (int k = 1; k <= top; ++k) {
           const double da = static_cast<double>(homes[g].a(0, k) - currents[p].a(0, k));
@@ -232,11 +246,10 @@ void draw_changes(const Arena& arena, const std::filesystem::path& folder, Execu
           all += da * da + db * db;
         }
         for (std::size_t s = 0; s < shown.size(); ++s) {
-          const int k = shown[s];
-          const auto ha = static_cast<double>(homes[g].a(0, k));
-          const auto hb = static_cast<double>(homes[g].b(0, k));
-          const auto ca = static_cast<double>(currents[p].a(0, k));
-          const auto cb = static_cast<double>(currents[p].b(0, k));
+          const auto ha = static_cast<double>(homes[g].a(0, shown[s]));
+          const auto hb = static_cast<double>(homes[g].b(0, shown[s]));
+          const auto ca = static_cast<double>(currents[p].a(0, shown[s]));
+          const auto cb = static_cast<double>(currents[p].b(0, shown[s]));
           const double lengths = std::sqrt((ha * ha + hb * hb) * (ca * ca + cb * cb));
           const double cosine = lengths > 0.0 ? (ha * ca + hb * cb) / lengths : 0.0;
           values[s] = {(ha - ca) * (ha - ca) + (hb - cb) * (hb - cb), 2.0 * (1.0 - cosine)};
@@ -250,19 +263,16 @@ void draw_changes(const Arena& arena, const std::filesystem::path& folder, Execu
                           .x_label = "distance [m]",
                           .y_label = "mean of 2 (1 - cos(change))"};
   for (std::size_t s = 0; s <= shown.size(); ++s) {
-    viewer::Series change{.style = viewer::SeriesStyle::lines};
-    viewer::Series phase{.style = viewer::SeriesStyle::lines};
-    change.label = phase.label =
-        s < shown.size() ? "k = " + std::to_string(shown[s]) : "all frequencies / 5";
-    for (std::size_t i = 0; i < pairs.size(); ++i) {
-      if (pairs[i] < 100.0) continue;
-      const double x = static_cast<double>(i) * arena.options.spacing_m;
-      if (x > 1.0) break;
-      change.add(x, sums[s].first[i] / pairs[i]);
-      phase.add(x, sums[s].second[i] / pairs[i]);
-    }
-    changes.series.push_back(std::move(change));
-    if (s < shown.size()) phases.series.push_back(std::move(phase));
+    const auto add = [&](viewer::LinePlot& plot, double std::pair<double, double>::*value) {
+      plot.series.push_back(curve_by_distance(arena, sums, 1.0, [&](std::size_t bin) {
+        return sums.sums[bin][s].*value / sums.pairs[bin];
+      }));
+      plot.series.back().style = viewer::SeriesStyle::lines;
+      plot.series.back().label =
+          s < shown.size() ? "k = " + std::to_string(shown[s]) : "all frequencies / 5";
+    };
+    add(changes, &std::pair<double, double>::first);
+    if (s < shown.size()) add(phases, &std::pair<double, double>::second);
   }
   add_plot(result, folder, "figure_07_coefficients.svg",
            "[S06] figure 7a: change of coefficients with the distance, all pairs of places. It "
@@ -274,24 +284,9 @@ void draw_changes(const Arena& arena, const std::filesystem::path& folder, Execu
            phases);
 }
 
-// Figure 8.
-void draw_headings(const Arena& arena, const std::filesystem::path& folder, Executor& executor,
-                   Reproduction& result) {
-  constexpr std::array<int, 5> shown{1, 2, 3, 5, 15};
-  const auto [sums, pairs] =
-      sum_pairs(arena, shown.size() + 1, executor,
-                [&](std::size_t g, std::size_t p, std::vector<std::pair<double, double>>& values) {
-                  const double truth = true_turn(arena, g, p);
-                  TurnCorrelation correlation = correlation_of(
-                      arena.homes.views[g].view, arena.currents.views[p].view, shown.back());
-                  for (std::size_t s = 0; s < shown.size(); ++s) {
-                    correlation.highest = shown[s];
-                    const double error = static_cast<double>(sequential_turn(correlation)) - truth;
-                    values[s] = {std::cos(error), std::sin(error)};
-                  }
-                  values[shown.size()] = {0.0, 0.0};
-                });
-  // All shifts by whole pixels: one home view against all current ones at once.
+// Of each home and current view, the shift by whole pixels at which they correlate most: one home
+// view against all current ones at once.
+std::vector<std::vector<std::uint8_t>> best_shifts(const Arena& arena, Executor& executor) {
   const auto& currents = arena.currents.rows;
   std::vector<float> rows;
   for (const auto& row : currents) {
@@ -309,7 +304,7 @@ void draw_headings(const Arena& arena, const std::filesystem::path& folder, Exec
       for (std::size_t i = 0; i < periodic.size(); ++i) {
         periodic[i] = arena.homes.rows[g][i % s06_columns];
       }
-      turn_products(rows, s06_columns, periodic, products, largest);
+      turn_products(rows, s06_columns, periodic, products, largest, kernels::chosen_instructions());
       for (std::size_t p = 0; p < currents.size(); ++p) {
         const float* const row = products.data() + p * stride;
         shifts[g].push_back(
@@ -317,41 +312,54 @@ void draw_headings(const Arena& arena, const std::filesystem::path& folder, Exec
       }
     }
   });
-  const auto [whole, whole_pairs] =
-      sum_pairs(arena, 1, executor,
-                [&](std::size_t g, std::size_t p, std::vector<std::pair<double, double>>& values) {
-                  const double error =
-                      -2.0 * std::numbers::pi * shifts[g][p] / s06_columns - true_turn(arena, g, p);
-                  values[0] = {std::cos(error), std::sin(error)};
-                });
+  return shifts;
+}
 
-  const auto deviation = [&counts = pairs](const Sums& of, std::size_t bin) {
-    const double length = std::hypot(of.first[bin], of.second[bin]) / counts[bin];
-    return degrees(std::sqrt(std::max(0.0, -2.0 * std::log(length))));
+// Circular standard deviation of `count` errors whose cosines and sines have these sums.
+double deviation_deg(const std::pair<double, double>& sums, double count) {
+  const double length = std::hypot(sums.first, sums.second) / count;
+  return degrees(std::sqrt(std::max(0.0, -2.0 * std::log(length))));
+}
+
+// Figure 8.
+void draw_headings(const Arena& arena, const std::filesystem::path& folder, Executor& executor,
+                   Reproduction& result) {
+  constexpr std::array<int, 5> shown{1, 2, 3, 5, 15};
+  const auto shifts = best_shifts(arena, executor);
+  const auto sums = sum_pairs(
+      arena, shown.size() + 1, executor, [&](std::size_t g, std::size_t p, Values& values) {
+        const double truth = true_turn(arena, g, p);
+        TurnCorrelation correlation =
+            correlation_of(arena.homes.views[g].view, arena.currents.views[p].view, shown.back());
+        for (std::size_t s = 0; s < shown.size(); ++s) {
+          correlation.highest = shown[s];
+          const double error = static_cast<double>(sequential_turn(correlation)) - truth;
+          values[s] = {std::cos(error), std::sin(error)};
+        }
+        const double error = -2.0 * std::numbers::pi * shifts[g][p] / s06_columns - truth;
+        values[shown.size()] = {std::cos(error), std::sin(error)};
+      });
+  const auto deviation = [&](std::size_t curve, std::size_t bin) {
+    return deviation_deg(sums.sums[bin][curve], sums.pairs[bin]);
   };
   viewer::LinePlot plot{.title = "Error of the heading",
                         .x_label = "distance [m]",
                         .y_label = "circular standard deviation [degrees]"};
   for (std::size_t s = 0; s <= shown.size(); ++s) {
-    viewer::Series series{.label = s < shown.size() ? "K = " + std::to_string(shown[s])
-                                                    : "all shifts by whole pixels"};
-    if (s == shown.size()) series.style = viewer::SeriesStyle::lines;
-    for (std::size_t i = 0; i < pairs.size(); ++i) {
-      if (pairs[i] < 100.0) continue;
-      const double x = static_cast<double>(i) * arena.options.spacing_m;
-      if (x > 0.6) break;
-      series.add(x, deviation(s < shown.size() ? sums[s] : whole[0], i));
-    }
-    plot.series.push_back(std::move(series));
+    plot.series.push_back(
+        curve_by_distance(arena, sums, 0.6, [&](std::size_t bin) { return deviation(s, bin); }));
+    plot.series.back().label =
+        s < shown.size() ? "K = " + std::to_string(shown[s]) : "all shifts by whole pixels";
+    if (s == shown.size()) plot.series.back().style = viewer::SeriesStyle::lines;
   }
   add_plot(result, folder, "figure_08_headings.svg",
            "[S06] figure 8: error of the heading that the phases tell, by the distance of the two "
            "views; all pairs, random headings.",
            plot);
   add_row(result, "s06.heading.at_goal", "error of the heading at no distance, K = 15, 72 pixels",
-          deviation(sums[4], 0), "deg", at_most(0.2), std::pair(1.5, 1.5));
+          deviation(4, 0), "deg", at_most(0.2), std::pair(1.5, 1.5));
   add_row(result, "s06.heading.at_goal_whole_pixels", "the same by all shifts of whole pixels",
-          deviation(whole[0], 0), "deg");
+          deviation(shown.size(), 0), "deg");
 }
 
 }  // namespace
@@ -375,11 +383,10 @@ void reproduce_heading_with_pose_noise(const Arena& arena, Reproduction& result)
     cosines += std::cos(error);
     sines += std::sin(error);
   }
-  const double length = std::hypot(cosines, sines) / static_cast<double>(places);
   add_row(result, "s06.heading.at_goal_pose_noise",
           "error of the heading at no distance with the tracker's noise (3 mm, 2 degrees in each "
           "recording)",
-          degrees(std::sqrt(std::max(0.0, -2.0 * std::log(length)))), "deg", std::nullopt,
+          deviation_deg({cosines, sines}, static_cast<double>(places)), "deg", std::nullopt,
           std::pair(1.5, 1.5));
 }
 

@@ -21,9 +21,7 @@ namespace panonav::lab {
 namespace {
 
 std::size_t successes(const std::vector<HomingRun>& runs) {
-  return static_cast<std::size_t>(std::count_if(runs.begin(), runs.end(), [](const HomingRun& run) {
-    return run.succeeds(homing_success_m);
-  }));
+  return count_where(runs, [](const HomingRun& run) { return run.succeeds(homing_success_m); });
 }
 
 viewer::MapPlot map_of_failure(const HomingPlace& place, const HomingRun& run, std::size_t number) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <map>
 #include <numeric>
 #include <optional>
 #include <string>
@@ -51,6 +52,12 @@ struct Errors {
     missed += drive.missed;
     changed += drive.changed;
   }
+
+  [[nodiscard]] std::size_t images() const {
+    std::size_t count = 0;
+    for (const auto& one : images_cm) count += one.size();
+    return count;
+  }
 };
 
 // Of the images of these variants.
@@ -83,33 +90,10 @@ std::pair<double, double> deviation_interval(const std::vector<std::vector<doubl
   return {quantile(values, 0.025), quantile(values, 0.975)};
 }
 
-void report(Reproduction& result, std::uint64_t seed, const std::string& id,
-            const std::string& what, const Errors& errors, std::optional<Target> target,
-            std::optional<double> published, std::optional<Target> sigma_target = std::nullopt,
-            std::optional<double> published_sigma = std::nullopt) {
-  const auto pair = [](std::optional<double> value) {
-    return value ? std::optional(std::pair(*value, *value)) : std::nullopt;
-  };
-  std::vector<std::size_t> all(errors.images_cm.size());
-  std::iota(all.begin(), all.end(), std::size_t{0});
-  add_row(result, "y03." + id + ".error", what + ": mean error of the position",
-          mean_figure(errors.mean_cm, seed), "cm", target, pair(published))
-      .over = "mean of " + std::to_string(errors.mean_cm.size()) + " variants";
-  add_row(result, "y03." + id + ".sigma", what + ": standard deviation of the error, all images",
-          Figure(deviation(errors.images_cm, all), deviation_interval(errors.images_cm, seed)),
-          "cm", sigma_target, pair(published_sigma));
-  std::size_t images = 0;
-  for (const auto& one : errors.images_cm) images += one.size();
-  add_rate(result, "y03." + id + ".missed", what + ": images without an answer", errors.missed,
-           images);
-}
-
-// What each variant gives to the rows.
+// What each variant gives to the rows: drives as localised, by the ids of their rows, and sweeps.
 struct Variant {
-  DriveErrors fit, contours;
-  DriveErrors changed, changed_plain, changed_contours;
-  DriveErrors sparse, wrong_scale;
-  std::vector<DriveErrors> by_spacing, by_offset, by_margin;
+  std::map<std::string, DriveErrors> drives;
+  std::map<std::string, std::vector<DriveErrors>> sweeps;
   GoalRun goal;
 };
 
@@ -134,181 +118,196 @@ Variant examine(const LabRoute& lab, bool sweeps) {
   Variant variant;
   const RouteLines lines(lab.route);
   const RouteContours contours(lab.route);
-  variant.fit = drive_by_fit(lines, lab.across);
-  variant.contours = drive_by_contours(contours, lab.across);
-  variant.changed = drive_by_fit(lines, lab.across_changed);
-  variant.changed_plain =
-      drive_by_fit(RouteLines(lab.route, {.robust = false}), lab.across_changed);
-  variant.changed_contours = drive_by_contours(contours, lab.across_changed);
-  variant.sparse = drive_by_fit(RouteLines(thinned(lab.route, 5)), lab.across);
-  variant.wrong_scale = drive_by_fit(RouteLines(scaled(lab.route, 1.01)), lab.across);
+  variant.drives = {
+      {"straight.fit", drive_by_fit(lines, lab.across)},
+      {"straight.contours", drive_by_contours(contours, lab.across)},
+      {"changed.fit", drive_by_fit(lines, lab.across_changed)},
+      {"changed.plain", drive_by_fit(RouteLines(lab.route, {.robust = false}), lab.across_changed)},
+      {"changed.contours", drive_by_contours(contours, lab.across_changed)},
+      {"sparse.fit", drive_by_fit(RouteLines(thinned(lab.route, 5)), lab.across)},
+      {"scale.fit", drive_by_fit(RouteLines(scaled(lab.route, 1.01)), lab.across)}};
   variant.goal = run_to_goals(lab, lines, lab.seed * 31 + 5);
   if (!sweeps) return variant;
   for (const std::size_t every : thinnings) {
-    variant.by_spacing.push_back(drive_by_fit(RouteLines(thinned(lab.route, every)), lab.across));
+    variant.sweeps["spacing"].push_back(
+        drive_by_fit(RouteLines(thinned(lab.route, every)), lab.across));
   }
   for (const LineDrive& drive : lab.beside) {
-    variant.by_offset.push_back(drive_by_fit(lines, drive));
+    variant.sweeps["offset"].push_back(drive_by_fit(lines, drive));
   }
   for (const double margin_m : margins_m) {
-    variant.by_margin.push_back(
+    variant.sweeps["margin"].push_back(
         drive_by_contours(RouteContours(lab.route, {.margin_m = margin_m}), lab.across));
   }
   return variant;
 }
 
-// Curve of mean errors with intervals.
-viewer::Series error_series(const std::string& label, const std::vector<double>& x,
-                            const std::vector<std::vector<double>>& means_cm, std::uint64_t seed) {
-  viewer::Series series{.label = label};
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    add_point(series, x[i], mean_figure(means_cm[i], seed));
+// What is measured over all variants.
+class LabMeasures {
+ public:
+  LabMeasures(const RouteReproductionOptions& options, Reproduction& result)
+      : options_(options), result_(result) {}
+
+  void add(const LabRoute& lab, const Variant& variant) {
+    for (const auto& [id, drive] : variant.drives) errors_[id].add(drive);
+    for (const auto& [id, drives] : variant.sweeps) {
+      sweeps_[id].resize(drives.size());
+      for (std::size_t k = 0; k < drives.size(); ++k) sweeps_[id][k].add(drives[k]);
+    }
+    goal_cm_.push_back(100.0 * variant.goal.error_m);
+    arrived_ += variant.goal.arrived ? 1 : 0;
+    changed_percent_.push_back(100.0 * lab.changed_share);
+    const auto time_ms = [&](const auto& route) {
+      return time_of_fit_ms(lab.across,
+                            [&](const std::vector<float>& line, const Pose2& predicted) {
+                              return route.fit(line, predicted);
+                            });
+    };
+    fit_ms_.push_back(time_ms(RouteLines(lab.route)));
+    contours_ms_.push_back(time_ms(RouteContours(lab.route)));
   }
-  return series;
-}
+
+  void report() const {
+    const std::string drive = "5 m route, a line every 2 cm, driven at 30 degrees to it";
+    const std::string moved = "the same with things moved, a tenth of what is seen";
+    report_way("straight.fit", drive + ", direct fit", at_most(0.5), straight_, at_most(0.3));
+    add_row(result_, "y03.straight.fit.heading", drive + ", direct fit: mean error of the heading",
+            mean_figure(errors_.at("straight.fit").heading_deg, options_.seed), "deg",
+            at_most(0.1));
+    report_way("straight.contours", drive + ", dual contours as published", std::nullopt,
+               straight_);
+    add_mean(result_, "y03.changed.share", "directions that show something else after things moved",
+             "%", changed_percent_);
+    report_way("changed.fit", moved + ", direct fit with masking", at_most(0.8), moved_);
+    report_named("before", "scene as memorised", errors_.at("straight.fit"));
+    report_named("after", "things moved; the first four of a drive cannot be",
+                 errors_.at("changed.fit"));
+    report_way("changed.plain", moved + ", direct fit without masking", std::nullopt, moved_);
+    report_way("changed.contours", moved + ", dual contours as published", std::nullopt, moved_);
+    report_way("sparse.fit", "the same with a line every 10 cm, direct fit", at_most(0.8));
+    report_way("scale.fit", "recorded with 1 % error of the odometry's scale, direct fit",
+               at_most(3.0));
+    add_median(result_, "y03.goal.error",
+               "closed loop (100, 0) to (200, -50) to (300, 0) cm: error at the goal", "cm",
+               goal_cm_, at_most(2.0), std::pair(4.0, 4.0));
+    add_rate(result_, "y03.goal.arrived", "closed loop: the robot says that it arrived", arrived_,
+             goal_cm_.size());
+    add_median(result_, "y03.time", "from horizon scanline to pose, one core, direct fit", "ms",
+               fit_ms_, at_most(0.5), std::pair(200.0, 200.0));
+    add_median(result_, "y03.time.contours",
+               "from horizon scanline to pose, one core, dual contours", "ms", contours_ms_,
+               std::nullopt, std::pair(200.0, 200.0));
+  }
+
+  void draw_sweeps() const {
+    std::vector<double> spacings_m;
+    for (const std::size_t every : thinnings) {
+      spacings_m.push_back(lab_spacing_m * static_cast<double>(every));
+    }
+    draw_sweep("spacing", spacings_m, "Way between the lines, direct fit", "way between lines [cm]",
+               "direct fit", "Error against the way between memorised lines.");
+    draw_sweep("offset", lateral_offsets_m, "Distance from the path, direct fit",
+               "distance from the path [cm]", "direct fit",
+               "Error of drives parallel to the path.");
+    draw_sweep("margin", margins_m, "Margin of the contours", "margin on either side [cm]",
+               "dual contours",
+               "Error of the published contours against the margin from which they start.");
+  }
+
+ private:
+  // Published mean and standard deviation of the error.
+  using Published = std::pair<double, double>;
+  static constexpr Published straight_{1.98, 1.0};
+  static constexpr Published moved_{3.46, 0.56};
+
+  void report_way(const std::string& id, const std::string& what, std::optional<Target> target,
+                  std::optional<Published> published = std::nullopt,
+                  std::optional<Target> sigma_target = std::nullopt) const {
+    const Errors& errors = errors_.at(id);
+    const auto range = [&](double Published::*value) {
+      return published ? std::optional(std::pair((*published).*value, (*published).*value))
+                       : std::nullopt;
+    };
+    std::vector<std::size_t> all(errors.images_cm.size());
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    add_row(result_, "y03." + id + ".error", what + ": mean error of the position",
+            mean_figure(errors.mean_cm, options_.seed), "cm", target, range(&Published::first))
+        .over = "mean of " + std::to_string(errors.mean_cm.size()) + " variants";
+    add_row(result_, "y03." + id + ".sigma", what + ": standard deviation of the error, all images",
+            Figure(deviation(errors.images_cm, all),
+                   deviation_interval(errors.images_cm, options_.seed)),
+            "cm", sigma_target, range(&Published::second));
+    add_rate(result_, "y03." + id + ".missed", what + ": images without an answer", errors.missed,
+             errors.images());
+  }
+
+  void report_named(const std::string& id, const std::string& scene, const Errors& errors) const {
+    add_rate(result_, "y03.changed.named." + id,
+             "images in which something is named as changed, " + scene, errors.changed,
+             errors.images());
+  }
+
+  void draw_sweep(const std::string& id, const std::vector<double>& x_m, const std::string& title,
+                  const std::string& x_label, const std::string& label,
+                  const std::string& caption) const {
+    const std::vector<Errors>& errors = sweeps_.at(id);
+    viewer::Series series{.label = label};
+    for (std::size_t i = 0; i < x_m.size(); ++i) {
+      add_point(series, 100.0 * x_m[i], mean_figure(errors[i].mean_cm, options_.seed));
+    }
+    add_plot(
+        result_, options_.out, id + ".svg", caption,
+        viewer::LinePlot{
+            .title = title, .x_label = x_label, .y_label = "mean error [cm]", .series = {series}});
+    for (std::size_t i = 0; i < x_m.size(); ++i) {
+      const std::string x_cm = std::to_string(std::lround(100.0 * x_m[i]));
+      add_row(result_, "y03.sweep." + id + "." + x_cm + "cm", title + ": " + x_cm + " cm",
+              mean(errors[i].mean_cm), "cm");
+    }
+  }
+
+  const RouteReproductionOptions& options_;
+  Reproduction& result_;
+  std::map<std::string, Errors> errors_;
+  std::map<std::string, std::vector<Errors>> sweeps_;
+  std::vector<double> goal_cm_;
+  std::vector<double> fit_ms_;
+  std::vector<double> contours_ms_;
+  std::vector<double> changed_percent_;
+  std::size_t arrived_ = 0;
+};
 
 }  // namespace
 
-void reproduce_lab_drives(const RouteReproductionOptions& options, Executor& executor,
-                          const ReproductionProgress& progress, Reproduction& result) {
-  Errors fit, contours, changed, changed_plain, changed_contours, sparse, wrong_scale;
-  std::vector<Errors> spacing(thinnings.size());
-  std::vector<Errors> offset(lateral_offsets_m.size());
-  std::vector<Errors> margin(margins_m.size());
-  std::vector<double> goal_cm;
-  std::vector<double> fit_ms;
-  std::vector<double> contours_ms;
-  std::vector<double> changed_percent;
-  std::size_t arrived = 0;
+void RouteExperiments::reproduce_lab_drives(const ReproductionProgress& progress) {
+  LabMeasures measures(options, result);
   // A few variants at a time: each renders on all threads, then all are examined side by side.
   constexpr int batch = 4;
   for (int begin = 0; begin < options.scenes; begin += batch) {
-    const int end = std::min(begin + batch, options.scenes);
     std::vector<LabRoute> labs;
-    for (int i = begin; i < end; ++i) {
-      if (progress) {
-        progress("lab", static_cast<double>(i) / static_cast<double>(options.scenes));
-      }
+    for (int i = begin; i < std::min(begin + batch, options.scenes); ++i) {
+      if (progress) progress("lab", static_cast<double>(i) / options.scenes);
       labs.push_back(record_lab_route(options.seed + static_cast<std::uint64_t>(i),
                                       i < options.swept ? lateral_offsets_m : std::vector<double>{},
                                       executor));
     }
-    auto variants = simulation::make_each(executor, labs.size(), [&](std::size_t i) {
+    const auto variants = simulation::make_each(executor, labs.size(), [&](std::size_t i) {
       return examine(labs[i], begin + static_cast<int>(i) < options.swept);
     });
-    for (std::size_t i = 0; i < labs.size(); ++i) {
-      const Variant& variant = variants[i];
-      fit.add(variant.fit);
-      contours.add(variant.contours);
-      changed.add(variant.changed);
-      changed_plain.add(variant.changed_plain);
-      changed_contours.add(variant.changed_contours);
-      sparse.add(variant.sparse);
-      wrong_scale.add(variant.wrong_scale);
-      for (std::size_t k = 0; k < variant.by_spacing.size(); ++k)
-        spacing[k].add(variant.by_spacing[k]);
-      for (std::size_t k = 0; k < variant.by_offset.size(); ++k)
-        offset[k].add(variant.by_offset[k]);
-      for (std::size_t k = 0; k < variant.by_margin.size(); ++k)
-        margin[k].add(variant.by_margin[k]);
-      goal_cm.push_back(100.0 * variant.goal.error_m);
-      arrived += variant.goal.arrived ? 1 : 0;
-      changed_percent.push_back(100.0 * labs[i].changed_share);
-      // One after the other: nothing else works meanwhile.
-      const RouteLines lines(labs[i].route);
-      fit_ms.push_back(time_of_fit_ms(labs[i].across,
-                                      [&](const std::vector<float>& line, const Pose2& predicted) {
-                                        return lines.fit(line, predicted);
-                                      }));
-      const RouteContours dual(labs[i].route);
-      contours_ms.push_back(time_of_fit_ms(
-          labs[i].across, [&](const std::vector<float>& line, const Pose2& predicted) {
-            return dual.fit(line, predicted);
-          }));
-      if (begin > 0 || i > 0) continue;
-      draw_route_panorama(labs[i], options.out, result);
-      draw_virtual_view(labs[i], labs[i].beside[shown_offset], options.out, result);
-      draw_drives(labs[i],
-                  {variant.fit, variant.contours, variant.changed, variant.changed_contours},
-                  options.out, result);
-      draw_goal_run(labs[i], variant.goal, options.out, result);
-    }
+    // One after the other, so that nothing else works while fits are timed.
+    for (std::size_t i = 0; i < labs.size(); ++i) measures.add(labs[i], variants[i]);
+    if (begin > 0) continue;
+    const auto& drives = variants[0].drives;
+    draw_route_panorama(labs[0], options.out, result);
+    draw_virtual_view(labs[0], labs[0].beside[shown_offset], options.out, result);
+    draw_drives(labs[0],
+                {drives.at("straight.fit"), drives.at("straight.contours"),
+                 drives.at("changed.fit"), drives.at("changed.contours")},
+                options.out, result);
+    draw_goal_run(labs[0], variants[0].goal, options.out, result);
   }
-  const std::uint64_t seed = options.seed;
-  const std::string drive = "5 m route, a line every 2 cm, driven at 30 degrees to it";
-  report(result, seed, "straight.fit", drive + ", direct fit", fit, at_most(0.5), 1.98,
-         at_most(0.3), 1.0);
-  add_row(result, "y03.straight.fit.heading", drive + ", direct fit: mean error of the heading",
-          mean_figure(fit.heading_deg, seed), "deg", at_most(0.1));
-  report(result, seed, "straight.contours", drive + ", dual contours as published", contours,
-         std::nullopt, 1.98, std::nullopt, 1.0);
-  add_mean(result, "y03.changed.share", "directions that show something else after things moved",
-           "%", changed_percent);
-  const std::string moved = "the same with things moved, a tenth of what is seen";
-  report(result, seed, "changed.fit", moved + ", direct fit with masking", changed, at_most(0.8),
-         3.46, std::nullopt, 0.56);
-  const auto report_named = [&](const std::string& id, const std::string& scene,
-                                const Errors& errors) {
-    std::size_t images = 0;
-    for (const auto& one : errors.images_cm) images += one.size();
-    add_rate(result, "y03.changed.named." + id,
-             "images in which something is named as changed, " + scene, errors.changed, images);
-  };
-  report_named("before", "scene as memorised", fit);
-  report_named("after", "things moved; the first four of a drive cannot be", changed);
-  report(result, seed, "changed.plain", moved + ", direct fit without masking", changed_plain,
-         std::nullopt, 3.46, std::nullopt, 0.56);
-  report(result, seed, "changed.contours", moved + ", dual contours as published", changed_contours,
-         std::nullopt, 3.46, std::nullopt, 0.56);
-  report(result, seed, "sparse.fit", "the same with a line every 10 cm, direct fit", sparse,
-         at_most(0.8), std::nullopt);
-  report(result, seed, "scale.fit", "recorded with 1 % error of the odometry's scale, direct fit",
-         wrong_scale, at_most(3.0), std::nullopt);
-  add_median(result, "y03.goal.error",
-             "closed loop (100, 0) to (200, -50) to (300, 0) cm: error at the goal", "cm", goal_cm,
-             at_most(2.0), std::pair(4.0, 4.0));
-  add_rate(result, "y03.goal.arrived", "closed loop: the robot says that it arrived", arrived,
-           goal_cm.size());
-  add_median(result, "y03.time", "from horizon scanline to pose, one core, direct fit", "ms",
-             fit_ms, at_most(0.5), std::pair(200.0, 200.0));
-  add_median(result, "y03.time.contours", "from horizon scanline to pose, one core, dual contours",
-             "ms", contours_ms, std::nullopt, std::pair(200.0, 200.0));
-
-  const auto means = [](const std::vector<Errors>& errors) {
-    std::vector<std::vector<double>> values;
-    for (const Errors& one : errors) values.push_back(one.mean_cm);
-    return values;
-  };
-  std::vector<double> spacings_cm;
-  for (const std::size_t every : thinnings) {
-    spacings_cm.push_back(100.0 * lab_spacing_m * static_cast<double>(every));
-  }
-  std::vector<double> offsets_cm;
-  for (const double off : lateral_offsets_m) offsets_cm.push_back(100.0 * off);
-  std::vector<double> margins_cm;
-  for (const double off : margins_m) margins_cm.push_back(100.0 * off);
-  const auto draw = [&](const std::string& file, const std::string& title,
-                        const std::string& x_label, const std::vector<double>& x,
-                        const std::vector<Errors>& errors, const std::string& label,
-                        const std::string& caption) {
-    viewer::LinePlot plot{.title = title, .x_label = x_label, .y_label = "mean error [cm]"};
-    plot.series.push_back(error_series(label, x, means(errors), seed));
-    add_plot(result, options.out, file, caption, plot);
-    for (std::size_t i = 0; i < x.size(); ++i) {
-      add_row(result,
-              "y03.sweep." + file.substr(0, file.find('.')) + "." +
-                  std::to_string(std::lround(x[i])) + "cm",
-              title + ": " + std::to_string(std::lround(x[i])) + " cm", mean(errors[i].mean_cm),
-              "cm");
-    }
-  };
-  draw("spacing.svg", "Way between the lines, direct fit", "way between lines [cm]", spacings_cm,
-       spacing, "direct fit", "Error against the way between memorised lines.");
-  draw("offset.svg", "Distance from the path, direct fit", "distance from the path [cm]",
-       offsets_cm, offset, "direct fit", "Error of drives parallel to the path.");
-  draw("margin.svg", "Margin of the contours", "margin on either side [cm]", margins_cm, margin,
-       "dual contours",
-       "Error of the published contours against the margin from which they start.");
+  measures.report();
+  measures.draw_sweeps();
 }
 
 }  // namespace panonav::lab

@@ -33,7 +33,7 @@ namespace panonav::lab {
 
 namespace {
 
-constexpr double route_m = 60.0;
+constexpr double long_route_m = 60.0;
 // The way between lines that the paper counts its bytes for [Y03 section 2.2].
 constexpr double spacing_m = 0.1;
 constexpr int runs_each = 10;  // of a route, half of them back
@@ -48,78 +48,75 @@ struct RepeatedRoute {
 RepeatedRoute repeat_one(const RouteScene& place, int runs, std::uint64_t seed,
                          Executor& executor) {
   RepeatedRoute repeated;
-  repeated.way = curved_route(place, route_m, spacing_m, seed);
+  repeated.way = curved_route(place, long_route_m, spacing_m, seed);
   repeated.panorama = record_route(place, repeated.way, Random(seed, 7).next(), executor);
   const RouteTracker tracker(repeated.panorama);
-  repeated.runs.resize(static_cast<std::size_t>(runs));
-  executor.for_chunks(
-      repeated.runs.size(), 1, [&](std::size_t begin, std::size_t end, std::size_t) {
-        for (std::size_t i = begin; i < end; ++i) {
-          repeated.runs[i] =
-              repeat_route(place, tracker, {.back = i % 2 == 1}, Random(seed, 100 + i).next());
-        }
+  repeated.runs =
+      simulation::make_each(executor, static_cast<std::size_t>(runs), [&](std::size_t i) {
+        return repeat_route(place, tracker, {.back = i % 2 == 1}, Random(seed, 100 + i).next());
       });
   return repeated;
 }
 
-viewer::MapPlot map_of(const RouteScene& place, const RepeatedRoute& repeated) {
-  viewer::MapPlot map{.title = place.name, .layers = viewer::scene_layers(place.scene)};
-  std::ranges::move(route_layers(repeated.way, repeated.runs), std::back_inserter(map.layers));
-  return map;
-}
-
-void report_routes(const RouteReproductionOptions& options, const std::string& name,
-                   const RouteScene& first_place, const std::vector<RepeatedRoute>& routes,
-                   Reproduction& result) {
+// What is measured of the runs along some routes.
+struct RouteMeasures {
   std::vector<double> lateral_cm;
   std::vector<double> lateral_back_cm;
   std::vector<double> worst_cm;
   std::vector<double> fix_cm;
   std::size_t completed = 0;
-  std::size_t runs = 0;
   std::size_t lines = 0;
   std::size_t off_route = 0;
   std::size_t turned_aside = 0;
-  for (const RepeatedRoute& route : routes) {
-    for (std::size_t i = 0; i < route.runs.size(); ++i) {
-      const RouteRun& run = route.runs[i];
-      const double mean_cm = 100.0 * mean(run.lateral_m);
-      lateral_cm.push_back(mean_cm);
-      if (i % 2 == 1) lateral_back_cm.push_back(mean_cm);
-      worst_cm.push_back(100.0 * quantile(run.lateral_m, 0.95));
-      if (!run.position_m.empty()) fix_cm.push_back(100.0 * median(run.position_m));
-      completed += run.completes() ? 1 : 0;
-      lines += run.truth.size();
-      off_route += run.off_route;
-      turned_aside += run.turned_aside;
-      ++runs;
-    }
+
+  void add(const RouteRun& run, bool is_back) {
+    const double mean_cm = 100.0 * mean(run.lateral_m);
+    lateral_cm.push_back(mean_cm);
+    if (is_back) lateral_back_cm.push_back(mean_cm);
+    worst_cm.push_back(100.0 * quantile(run.lateral_m, 0.95));
+    if (!run.position_m.empty()) fix_cm.push_back(100.0 * median(run.position_m));
+    completed += run.completes() ? 1 : 0;
+    lines += run.truth.size();
+    off_route += run.off_route;
+    turned_aside += run.turned_aside;
   }
+};
+
+void report_routes(const RouteReproductionOptions& options, const std::string& name,
+                   const RouteScene& first_place, const std::vector<RepeatedRoute>& routes,
+                   Reproduction& result) {
+  RouteMeasures of;
+  for (const RepeatedRoute& route : routes) {
+    for (std::size_t i = 0; i < route.runs.size(); ++i) of.add(route.runs[i], i % 2 == 1);
+  }
+  const std::size_t runs = of.lateral_cm.size();
   const std::string id = "y03.route." + name;
   const std::string what = name + ", 60 m route repeated with wheels 5 % wrong, start 0.3 m off";
   add_row(result, id + ".lateral", what + ": distance from the route",
-          mean_figure(lateral_cm, options.seed), "cm", at_most(5.0))
+          mean_figure(of.lateral_cm, options.seed), "cm", at_most(5.0))
       .over = "mean of " + std::to_string(runs) + " runs";
-  add_rate(result, id + ".completed", what + ": runs that reach the end, none lost", completed,
+  add_rate(result, id + ".completed", what + ": runs that reach the end, none lost", of.completed,
            runs, at_least(1.0));
-  if (!lateral_back_cm.empty()) {
+  if (!of.lateral_back_cm.empty()) {
     add_mean(result, id + ".lateral_back", what + ": distance from the route, runs back alone",
-             "cm", lateral_back_cm);
+             "cm", of.lateral_back_cm);
   }
   add_mean(result, id + ".lateral_95", what + ": distance that 95 % of a run keep within", "cm",
-           worst_cm);
-  if (!fix_cm.empty()) {
-    add_median(result, id + ".fix", what + ": error of a fix, median of a run", "cm", fix_cm);
+           of.worst_cm);
+  if (!of.fix_cm.empty()) {
+    add_median(result, id + ".fix", what + ": error of a fix, median of a run", "cm", of.fix_cm);
   }
-  add_rate(result, id + ".off_route", what + ": lines taken for not on this route", off_route,
-           lines);
+  add_rate(result, id + ".off_route", what + ": lines taken for not on this route", of.off_route,
+           of.lines);
   add_rate(result, id + ".turned_aside", what + ": steps at which something was in the way",
-           turned_aside, lines);
-  const std::string file = "route_" + name + ".svg";
-  add_plot(result, options.out, file,
+           of.turned_aside, of.lines);
+  viewer::MapPlot map{.title = first_place.name, .layers = viewer::scene_layers(first_place.scene)};
+  std::ranges::move(route_layers(routes.front().way, routes.front().runs),
+                    std::back_inserter(map.layers));
+  add_plot(result, options.out, "route_" + name + ".svg",
            "A route of 60 m through " + name +
                ", recorded once and repeated forward and back; the driven ways lie on it.",
-           map_of(first_place, routes.front()));
+           map);
 }
 
 // Sizes on the disk, with nothing left in the write-ahead log.
@@ -174,8 +171,7 @@ int routes_of(const RouteReproductionOptions& options) {
 
 }  // namespace
 
-void reproduce_loop_routes(const RouteReproductionOptions& options, Executor& executor,
-                           Reproduction& result) {
+void RouteExperiments::reproduce_loop_routes() {
   std::vector<RepeatedRoute> routes;
   std::optional<RouteScene> first;
   for (int i = 0; i < routes_of(options); ++i) {
@@ -189,8 +185,7 @@ void reproduce_loop_routes(const RouteReproductionOptions& options, Executor& ex
   measure_file(options, routes, result);
 }
 
-void reproduce_world_routes(const RouteReproductionOptions& options, const std::string& name,
-                            Executor& executor, Reproduction& result) {
+void RouteExperiments::reproduce_world_routes(const std::string& name) {
   const RouteScene place =
       make_route_scene(simulation::read_world(options.data, name), name, executor);
   std::vector<RepeatedRoute> routes;
@@ -201,8 +196,7 @@ void reproduce_world_routes(const RouteReproductionOptions& options, const std::
   report_routes(options, name, place, routes, result);
 }
 
-void reproduce_real_route(const RouteReproductionOptions& options, Executor& executor,
-                          Reproduction& result) {
+void RouteExperiments::reproduce_real_route() {
   const Dataset dataset = read_dataset(options.data / "sussex_route");
   const PanoramaReader reader(dataset.source, {});
   auto lines = simulation::make_each(executor, dataset.entries.size(), [&](std::size_t i) {
@@ -220,11 +214,8 @@ void reproduce_real_route(const RouteReproductionOptions& options, Executor& exe
     static_cast<void>(route.append(way[i], std::span<const float>(lines[i])));
   }
   const RouteTracker tracker(route);
-  std::vector<std::optional<RouteFix>> found(way.size());
-  executor.for_chunks(way.size(), 8, [&](std::size_t begin, std::size_t end, std::size_t) {
-    for (std::size_t i = begin; i < end; ++i) {
-      if (i % every != 0) found[i] = tracker.search(lines[i]);
-    }
+  const auto found = simulation::make_each(executor, way.size(), [&](std::size_t i) {
+    return i % every != 0 ? tracker.search(lines[i]) : std::nullopt;
   });
   std::vector<double> along_cm;
   std::vector<double> beside_cm;

@@ -28,24 +28,20 @@ Reproduction reproduce_y03(const RouteReproductionOptions& options, Executor& ex
   const double drives = 3.0 * options.scenes;
   const double routes = 3.0 * options.runs;
   double share = 1.0;
+  RouteExperiments y03{options, executor, result};
   std::vector<ReproductionStage> stages;
   stages.push_back({"drives across a path", drives, [&] {
-                      reproduce_lab_drives(
-                          options, executor,
-                          [&](std::string_view name, double at) {
-                            if (progress) progress(name, share * at);
-                          },
-                          result);
+                      y03.reproduce_lab_drives([&](std::string_view name, double at) {
+                        if (progress) progress(name, share * at);
+                      });
                     }});
-  stages.push_back(
-      {"routes through loop", routes, [&] { reproduce_loop_routes(options, executor, result); }});
+  stages.push_back({"routes through loop", routes, [&] { y03.reproduce_loop_routes(); }});
   for (const std::string& world : simulation::worlds_in(options.data)) {
-    stages.push_back({"routes through " + world, routes,
-                      [&, world] { reproduce_world_routes(options, world, executor, result); }});
+    stages.push_back(
+        {"routes through " + world, routes, [&y03, world] { y03.reproduce_world_routes(world); }});
   }
   if (simulation::has_data(options.data, "sussex_route")) {
-    stages.push_back(
-        {"a real route", 1.0, [&] { reproduce_real_route(options, executor, result); }});
+    stages.push_back({"a real route", 1.0, [&] { y03.reproduce_real_route(); }});
   }
   double all = 0.0;
   for (const ReproductionStage& stage : stages) all += stage.cost;

@@ -20,12 +20,12 @@ namespace panonav::lab {
 
 namespace {
 
-constexpr double room_m = 0.1;
+constexpr double side_room_m = 0.1;
 
 // Where the robot has room; where the place has no such part, all that is free.
 simulation::FreeSpace roomy_space(const RouteScene& place) {
   simulation::FreeSpaceOptions options = simulation::free_space_options(place.scene);
-  options.robot_radius_m += room_m;
+  options.robot_radius_m += side_room_m;
   try {
     return simulation::FreeSpace(place.scene, options);
   } catch (const ContractError&) {
@@ -173,7 +173,7 @@ std::vector<Pose2> curved_route(const RouteScene& place, double length_m, double
   // As round as leaves the room that the corners leave, but for a cell of the map.
   constexpr double cell_m = 0.025;
   const double room_kept_m = std::min(min_clearance_m(place, sharp) - cell_m,
-                                      place.scene.robot_radius_m + room_m - cell_m);
+                                      place.scene.robot_radius_m + side_room_m - cell_m);
   std::vector<Pose2> way = sharp;
   for (const std::size_t reach : {10U, 7U, 5U, 3U, 2U}) {
     std::vector<Pose2> round = rounded(rounded(sharp, reach), reach);

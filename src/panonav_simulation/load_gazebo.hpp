@@ -32,7 +32,7 @@ struct GazeboOptions {
 /// maps. Each such thing is left out with a line in Scene::warnings that names the world, the
 /// models and the thing, once however often it occurs. Names whose letters only differ in case are
 /// found, with a warning. `model://sun` and `model://ground_plane` need no folder. Throws FileError
-/// on a world that is missing, no XML or shows nothing, and when panonav was built without assimp.
+/// on a world that is missing, no XML or shows nothing.
 [[nodiscard]] Scene load_gazebo(const std::filesystem::path& world,
                                 const GazeboOptions& options = {});
 

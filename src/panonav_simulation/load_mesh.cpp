@@ -11,6 +11,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <sstream>
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
@@ -146,65 +147,80 @@ class RegularFiles final : public Assimp::DefaultIOSystem {
 // nearest to each other.
 class ColladaHoles {
  public:
-  explicit ColladaHoles(XmlElement& root) {
+  explicit ColladaHoles(pugi::xml_node root) {
     collect(root);
-    for (XmlElement* polygons : polygons_) join_holes(*polygons);
+    for (const pugi::xml_node& polygons : polygons_) join_holes(polygons);
   }
 
  private:
   using Corner = std::vector<double>;  // the indices of one vertex, one for each input
   using Outline = std::vector<Corner>;
 
-  void collect(XmlElement& element) {
-    if (!element.attribute("id").empty())
-      by_id_.emplace("#" + std::string(element.attribute("id")), &element);
-    if (element.name == "polygons") polygons_.push_back(&element);
-    for (XmlElement& child : element.children) collect(child);
-  }
-
-  [[nodiscard]] const XmlElement* source_of(const XmlElement& element,
-                                            std::string_view semantic) const {
-    for (const XmlElement& input : element.children) {
-      if (input.name != "input" || input.attribute("semantic") != semantic) continue;
-      const auto found = by_id_.find(std::string(input.attribute("source")));
-      return found == by_id_.end() ? nullptr : found->second;
+  void collect(pugi::xml_node element) {
+    if (const pugi::xml_attribute id = element.attribute("id"))
+      by_id_.emplace("#" + std::string(id.value()), element);
+    if (has_name(element, "polygons")) polygons_.push_back(element);
+    const bool has_children =
+        element.find_child([](pugi::xml_node child) { return child.type() == pugi::node_element; });
+    if (!has_children) return set_text(element, text_of(element));
+    for (const pugi::xml_node& child : element) {
+      if (child.type() == pugi::node_element) collect(child);
     }
-    return nullptr;
   }
 
-  void join_holes(XmlElement& polygons) {
-    const XmlElement* vertices = source_of(polygons, "VERTEX");
-    const XmlElement* source = vertices == nullptr ? nullptr : source_of(*vertices, "POSITION");
-    const XmlElement* array = source == nullptr ? nullptr : source->child("float_array");
-    positions_ = array == nullptr ? std::nullopt : numbers_of(array->text);
+  static bool has_name(pugi::xml_node element, std::string_view name) {
+    return element.name() == name;
+  }
+
+  static void set_text(pugi::xml_node element, const std::string& text) {
+    element.remove_children();
+    if (!text.empty()) element.text().set(text.c_str());
+  }
+
+  [[nodiscard]] pugi::xml_node source_of(pugi::xml_node element, std::string_view semantic) const {
+    for (const pugi::xml_node& input : element.children("input")) {
+      if (input.attribute("semantic").value() != semantic) continue;
+      const auto found = by_id_.find(input.attribute("source").value());
+      return found == by_id_.end() ? pugi::xml_node() : found->second;
+    }
+    return {};
+  }
+
+  void join_holes(pugi::xml_node polygons) {
+    const pugi::xml_node array =
+        source_of(source_of(polygons, "VERTEX"), "POSITION").child("float_array");
+    positions_ = array ? numbers_of(text_of(array)) : std::nullopt;
     inputs_ = 1;
     vertex_input_ = 0;
-    for (const XmlElement& input : polygons.children) {
-      const auto offset = numbers_of(input.attribute("offset"));
-      if (input.name != "input" || !offset || offset->size() != 1) continue;
+    for (const pugi::xml_node& input : polygons.children("input")) {
+      const auto offset = numbers_of(input.attribute("offset").value());
+      if (!offset || offset->size() != 1) continue;
       if (!(offset->front() >= 0.0 && offset->front() < 32.0)) return;
       const auto number = static_cast<std::size_t>(offset->front());
       inputs_ = std::max(inputs_, number + 1);
-      if (input.attribute("semantic") == "VERTEX") vertex_input_ = number;
+      if (std::string_view(input.attribute("semantic").value()) == "VERTEX") vertex_input_ = number;
     }
-    for (XmlElement& polygon : polygons.children) {
-      if (polygon.name != "ph") continue;
-      Outline outline;
-      for (const XmlElement& ring : polygon.children) {
-        if (ring.name == "p") outline = corners(ring);
-      }
-      for (const XmlElement& ring : polygon.children) {
-        if (ring.name == "h") join(outline, corners(ring));
-      }
-      polygon = {"p", {}, {}, {}};
-      for (const Corner& corner : outline) {
-        for (const double index : corner) polygon.text += std::to_string(std::lround(index)) + " ";
-      }
+    for (pugi::xml_node polygon : polygons.children()) {
+      if (has_name(polygon, "ph")) join_holes_of_one(polygon);
     }
   }
 
-  [[nodiscard]] Outline corners(const XmlElement& ring) const {
-    const auto indices = numbers_of(ring.text).value_or(std::vector<double>{});
+  // A polygon with holes becomes one without.
+  void join_holes_of_one(pugi::xml_node polygon) const {
+    Outline outline;
+    for (const pugi::xml_node& ring : polygon.children("p")) outline = corners(ring);
+    for (const pugi::xml_node& ring : polygon.children("h")) join(outline, corners(ring));
+    std::string text;
+    for (const Corner& corner : outline) {
+      for (const double index : corner) text += std::to_string(std::lround(index)) + " ";
+    }
+    polygon.set_name("p");
+    polygon.remove_attributes();
+    set_text(polygon, text);
+  }
+
+  [[nodiscard]] Outline corners(pugi::xml_node ring) const {
+    const auto indices = numbers_of(text_of(ring)).value_or(std::vector<double>{});
     Outline outline;
     for (std::size_t i = 0; i + inputs_ <= indices.size(); i += inputs_)
       outline.emplace_back(&indices[i], &indices[i] + inputs_);
@@ -260,8 +276,8 @@ class ColladaHoles {
                    hole.end());
   }
 
-  std::map<std::string, const XmlElement*> by_id_;
-  std::vector<XmlElement*> polygons_;
+  std::map<std::string, pugi::xml_node> by_id_;
+  std::vector<pugi::xml_node> polygons_;
   std::optional<std::vector<double>> positions_;
   std::size_t inputs_ = 1;
   std::size_t vertex_input_ = 0;
@@ -269,9 +285,11 @@ class ColladaHoles {
 
 std::optional<std::string> readable_collada(const fs::path& path) {
   try {
-    XmlElement root = parse_xml(text_of_scene_file(path));
-    const ColladaHoles joined(root);
-    return to_xml(root);
+    const pugi::xml_document document = parse_xml(text_of_scene_file(path));
+    const ColladaHoles joined(document.document_element());
+    std::ostringstream text;
+    document.save(text, "", pugi::format_raw | pugi::format_no_declaration);
+    return std::move(text).str();
   } catch (const Error&) {
     return std::nullopt;
   }

@@ -26,8 +26,7 @@ struct MeshOptions {
 /// its meshes with colours and textures, one object per node. Files carry no useful lights, so one
 /// lamp hangs below the top of the scene and `ambient` does the rest. `floor_low .. floor_high` is
 /// the extent of the meshes. Missing textures are warnings in the scene. Throws FileError on a file
-/// that is missing, damaged or without triangles, and when panonav was built without assimp;
-/// ContractError on options out of range.
+/// that is missing, damaged or without triangles; ContractError on options out of range.
 [[nodiscard]] Scene load_mesh(const std::filesystem::path& path, const MeshOptions& options = {});
 
 }  // namespace panonav::simulation

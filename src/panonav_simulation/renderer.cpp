@@ -281,35 +281,80 @@ Panorama Renderer::render_panorama(const Viewpoint& viewpoint, const PanoramaRen
   return panorama;
 }
 
+namespace {
+
+// Through the lenses, or by way of the mirror: what a point of a picture shows.
+class CameraRays {
+ public:
+  // What is seen there: along a ray, or the camera's own body; neither where nothing is.
+  struct Sight {
+    std::optional<Ray> ray;
+    std::optional<float> body;
+  };
+
+  CameraRays(const Viewpoint& viewpoint, const Camera& camera)
+      : camera_(camera), dual_(std::get_if<DualFisheyeModel>(&camera.model)), make_ray_(viewpoint) {
+    if (std::holds_alternative<HyperboloidalModel>(camera.model)) mirror_.emplace(camera);
+    for (std::size_t i = 0; dual_ && i < 2; ++i) {
+      const double half_m = 0.5 * dual_->baseline_m;
+      const Direction3 axis = LensRotation(dual_->lenses[i]).robot_from_lens({1.0, 0.0, 0.0});
+      viewpoints_[i] = {half_m * axis.x, half_m * axis.y, half_m * axis.z};
+    }
+  }
+
+  [[nodiscard]] Sight look_at(const PixelPoint& point) const {
+    if (mirror_) {
+      const MirrorRay ray = mirror_->trace(point);
+      if (ray.target == MirrorTarget::world) return {make_ray_(ray.origin, ray.direction), {}};
+      const bool housing = ray.target == MirrorTarget::housing;
+      return {{}, housing ? kHousing : ray.body_radius < 0.3 ? kLens : kCameraBody};
+    }
+    const auto direction = unproject(camera_, point);
+    if (!direction) return {};
+    if (!dual_) return {make_ray_(*direction), {}};
+    return {make_ray_(viewpoints_[lens_at(camera_, point)], *direction), {}};
+  }
+
+  // How bright a column is drawn.
+  [[nodiscard]] float gain(std::size_t column) const {
+    if (!dual_) return 1.0F;
+    return static_cast<float>(
+        dual_->lenses[lens_at(camera_, {static_cast<double>(column), 0.0})].gain);
+  }
+
+  // The angle between pixels varies little over a picture; the one at two thirds of the rim, about
+  // the horizon, stands for all.
+  [[nodiscard]] double pixel_rad() const {
+    const bool flat = std::holds_alternative<EquirectangularModel>(camera_.model);
+    const double around_px = flat    ? camera_.image_size.width
+                             : dual_ ? 2.0 * std::numbers::pi * dual_->lenses[0].focal_length_px
+                                     : 2.0 * std::numbers::pi * camera_.rim_radius_px * 2.0 / 3.0;
+    return 2.0 * std::numbers::pi / around_px;
+  }
+
+ private:
+  const Camera& camera_;
+  const DualFisheyeModel* dual_;
+  RayMaker make_ray_;
+  std::optional<HyperboloidalMirror> mirror_;
+  std::array<Vector3, 2> viewpoints_{};  // of the lenses, in the robot's frame
+};
+
+}  // namespace
+
 Radiance Renderer::render_image(const Viewpoint& viewpoint, const Camera& camera, int rays_per_axis,
                                 Executor& executor) const {
   validate(viewpoint);
   panonav::validate(camera);
   require_rays(rays_per_axis);
-  std::optional<HyperboloidalMirror> mirror;
-  if (std::holds_alternative<HyperboloidalModel>(camera.model)) mirror.emplace(camera);
+  const CameraRays camera_rays(viewpoint, camera);
   const int n = rays_per_axis;
   const auto channels = static_cast<std::size_t>(implementation_->channels);
   const auto width = static_cast<std::size_t>(camera.image_size.width);
   Radiance image{camera.image_size.width, camera.image_size.height, implementation_->channels, {}};
   image.values.resize(width * static_cast<std::size_t>(image.height) * channels);
   const float weight = 1.0F / static_cast<float>(n * n);
-  // The angle between pixels varies little over a picture; the one at two thirds of the rim, about
-  // the horizon, stands for all.
-  const bool flat = std::holds_alternative<EquirectangularModel>(camera.model);
-  const auto* const dual = std::get_if<DualFisheyeModel>(&camera.model);
-  const double around_px = flat   ? camera.image_size.width
-                           : dual ? 2.0 * std::numbers::pi * dual->lenses[0].focal_length_px
-                                  : 2.0 * std::numbers::pi * camera.rim_radius_px * 2.0 / 3.0;
-  const auto spread_rad = static_cast<float>(2.0 * std::numbers::pi / around_px / n);
-  const RayMaker make_ray(viewpoint);
-
-  std::array<Vector3, 2> viewpoints{};
-  for (std::size_t i = 0; dual && i < 2; ++i) {
-    const double half_m = 0.5 * dual->baseline_m;
-    const Direction3 axis = LensRotation(dual->lenses[i]).robot_from_lens({1.0, 0.0, 0.0});
-    viewpoints[i] = {half_m * axis.x, half_m * axis.y, half_m * axis.z};
-  }
+  const auto spread_rad = static_cast<float>(camera_rays.pixel_rad() / n);
 
   const auto draw_rows = [&](std::size_t begin, std::size_t end, std::size_t) {
     std::vector<Ray> rays;
@@ -317,9 +362,7 @@ Radiance Renderer::render_image(const Viewpoint& viewpoint, const Camera& camera
     std::vector<RayHit> hits;
     std::array<float, 3> colour{};
     const auto add = [&](std::size_t pixel, const float* values) {
-      const PixelPoint at{static_cast<double>(pixel % width), 0.0};
-      const float share =
-          dual ? weight * static_cast<float>(dual->lenses[lens_at(camera, at)].gain) : weight;
+      const float share = weight * camera_rays.gain(pixel % width);
       for (std::size_t c = 0; c < channels; ++c) {
         image.values[pixel * channels + c] += share * values[c];
       }
@@ -329,24 +372,14 @@ Radiance Renderer::render_image(const Viewpoint& viewpoint, const Camera& camera
       pixel_of.clear();
       for (std::size_t i = 0; i < width * n; ++i) {
         const SubPixel at = sub_pixel(static_cast<int>(i % n), static_cast<int>(line % n), n);
-        const PixelPoint point{static_cast<double>(i / n) + at.u,
-                               static_cast<double>(line / n) + at.v};
         const std::size_t pixel = line / n * width + i / n;
-        if (!mirror) {
-          if (const auto direction = unproject(camera, point)) {
-            rays.push_back(dual ? make_ray(viewpoints[lens_at(camera, point)], *direction)
-                                : make_ray(*direction));
-            pixel_of.push_back(pixel);
-          }
-          continue;
-        }
-        const MirrorRay ray = mirror->trace(point);
-        if (ray.target == MirrorTarget::world) {
-          rays.push_back(make_ray(ray.origin, ray.direction));
+        const auto seen = camera_rays.look_at(
+            {static_cast<double>(i / n) + at.u, static_cast<double>(line / n) + at.v});
+        if (seen.ray) {
+          rays.push_back(*seen.ray);
           pixel_of.push_back(pixel);
-        } else {
-          const bool housing = ray.target == MirrorTarget::housing;
-          colour.fill(housing ? kHousing : ray.body_radius < 0.3 ? kLens : kCameraBody);
+        } else if (seen.body) {
+          colour.fill(*seen.body);
           add(pixel, colour.data());
         }
       }

@@ -160,7 +160,8 @@ TEST(LeaveOneOut, RivalsOfTheCallerAnswerTheSameQueriesInTheSameRun) {
   rivals.push_back(std::make_unique<NextOne>(3));
   Executor executor(2);
   Reproduction result;
-  reproduce_leave_one_out(options, folder / "line", std::move(rivals), executor, result);
+  ElsewhereExperiments{options, executor, result}.reproduce_leave_one_out(folder / "line",
+                                                                          std::move(rivals));
   const auto row = [&](const std::string& id) {
     const auto found = std::ranges::find(result.rows, "elsewhere.line." + id, &ResultRow::id);
     EXPECT_NE(found, result.rows.end()) << id;

@@ -73,8 +73,9 @@ TEST(RouteReproduction, TheFitIsBetterThanTheContoursAndMaskingHelps) {
   const TemporaryFolder folder;
   Executor executor(2);
   Reproduction result;
-  reproduce_lab_drives({.out = folder.path(), .scenes = 1, .swept = 1, .runs = 2, .seed = 711},
-                       executor, {}, result);
+  const RouteReproductionOptions options{
+      .out = folder.path(), .scenes = 1, .swept = 1, .runs = 2, .seed = 711};
+  RouteExperiments{options, executor, result}.reproduce_lab_drives({});
   std::map<std::string, double> ours;
   for (const ResultRow& row : result.rows) {
     EXPECT_TRUE(std::isfinite(row.ours)) << row.id;

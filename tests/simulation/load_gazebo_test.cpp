@@ -57,14 +57,6 @@ const Material& material_of(const Scene& scene, const std::string& object, std::
 
 class GazeboWorld : public ::testing::Test {
  protected:
-  void SetUp() override {
-    try {
-      (void)load_gazebo(data / "worlds/tiny.world");
-    } catch (const FileError& error) {
-      if (std::string(error.what()).find("built without assimp") == std::string::npos) throw;
-      GTEST_SKIP() << "built without assimp";
-    }
-  }
   const TemporaryFolder folder_;
 };
 

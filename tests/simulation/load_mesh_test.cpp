@@ -36,14 +36,6 @@ void expect_extent(const Scene& scene, const Vector3& low, const Vector3& high) 
 
 class MeshFile : public ::testing::Test {
  protected:
-  void SetUp() override {
-    try {
-      (void)load_mesh(meshes / "crate_z_up_cm.dae");
-    } catch (const FileError& error) {
-      if (std::string(error.what()).find("built without assimp") == std::string::npos) throw;
-      GTEST_SKIP() << "built without assimp";
-    }
-  }
   const TemporaryFolder folder_;
 };
 

@@ -58,26 +58,16 @@ void add_lintel(SceneBuilder& builder, const CorridorStyle& look, Point2 from, P
   builder.wall("lintel", look.plaster, from, to, look.height_m, 2.0, 2.3);
 }
 
-}  // namespace
+// The round trip of `loop` runs around a block: two rooms, below and above, joined by two
+// corridors.
+constexpr FloorArea loop_outside{{-1.5, -1.5}, {7.5, 5.5}};
+constexpr FloorArea loop_block{{1.0, 1.0}, {5.0, 3.0}};
+constexpr double loop_height_m = 2.5;
 
-Scene make_loop(const SceneVariation& variation) {
-  SceneBuilder builder("loop", variation);
-  Scene& scene = builder.scene();
+// The block's walls, each with pictures of its own.
+void add_block(SceneBuilder& builder) {
   Random& random = builder.random();
-  // The round trip runs around a block: two rooms, below and above, joined by two corridors.
-  const FloorArea outside{{-1.5, -1.5}, {7.5, 5.5}};
-  const FloorArea block{{1.0, 1.0}, {5.0, 3.0}};
-  constexpr double kHeight = 2.5;
-  scene.floor_low = {-0.5, -0.5};
-  scene.floor_high = {6.5, 4.5};
-  scene.drivable = {{{-0.5, -0.5}, {6.5, 0.5}},
-                    {{-0.5, 3.5}, {6.5, 4.5}},
-                    {{-0.5, -0.5}, {0.5, 4.5}},
-                    {{5.5, -0.5}, {6.5, 4.5}}};
-  scene.ambient = 0.4F;
-  scene.tour = {{0.0, 0.0}, {6.0, 0.0}, {6.0, 4.0}, {0.0, 4.0}};
-  furnish_room_shell(builder, outside, kHeight);
-  const auto inner = corners_of(block);
+  const auto inner = corners_of(loop_block);
   for (std::size_t i = 0; i < 4; ++i) {
     // Backwards, so that pictures hang on the outer side.
     const Point2 from = inner[(i + 1) % 4];
@@ -87,7 +77,7 @@ Scene make_loop(const SceneVariation& variation) {
     builder.wall(
         wall,
         builder.textured(noise_texture(random, 128, {tone, 0.95F * tone, 0.85F * tone}, 0.07)),
-        from, to, kHeight, 2.0);
+        from, to, loop_height_m, 2.0);
     double along = random.uniform(0.2, 0.6);
     while (along < distance(from, to) - 0.5) {
       const double width = random.uniform(0.4, 0.9);
@@ -98,55 +88,65 @@ Scene make_loop(const SceneVariation& variation) {
       along += width + random.uniform(0.3, 0.9);
     }
   }
-  // Walls with a doorway of 1.2 m part rooms from corridors.
+}
+
+// Walls with a doorway of 1.2 m, which part rooms from corridors.
+void add_doorways(SceneBuilder& builder) {
+  Random& random = builder.random();
   const int plaster = builder.textured(noise_texture(random, 128, {0.7F, 0.69F, 0.64F}, 0.06));
   const int frame = builder.textured(wood_texture(random, 64, {0.4F, 0.28F, 0.2F}));
   int number = 0;
   for (const double y : {1.0, 3.0}) {
     for (const bool left : {true, false}) {
-      const double x0 = left ? outside.low.x_m : block.high.x_m;
-      const double x1 = left ? block.low.x_m : outside.high.x_m;
+      const double x0 = left ? loop_outside.low.x_m : loop_block.high.x_m;
+      const double x1 = left ? loop_block.low.x_m : loop_outside.high.x_m;
       const double door = left ? 0.0 : 6.0;
       const std::string name = "doorway " + std::to_string(number++);
       const auto piece = [&](double a, double b) {
         if (b - a > 0.05) {
           builder.box(name, plaster, plaster, {{0.5 * (a + b), y}, 0.0}, {0.0, 0.0, 0.0},
-                      {b - a, 0.1, kHeight}, 1.5);
+                      {b - a, 0.1, loop_height_m}, 1.5);
         }
       };
       piece(x0, door - 0.65);
       piece(door + 0.65, x1);
       builder.box(name + " lintel", plaster, frame, {{door, y}, 0.0}, {0.0, 0.0, 2.1},
-                  {1.3, 0.1, kHeight - 2.1}, 1.5);
+                  {1.3, 0.1, loop_height_m - 2.1}, 1.5);
       for (const double side : {-0.65, 0.65}) {
         builder.box(name + " frame", frame, frame, {{door + side, y}, 0.0}, {0.0, 0.0, 0.0},
                     {0.08, 0.16, 2.1}, 0.5);
       }
     }
   }
-  // Furniture along the outer walls.
-  const FloorArea inside{{outside.low.x_m + 0.1, outside.low.y_m + 0.1},
-                         {outside.high.x_m - 0.1, outside.high.y_m - 0.1}};
+}
+
+// A piece of furniture of any kind.
+void add_any_furniture(SceneBuilder& builder, const std::string& name, const Footing& footing) {
+  Random& random = builder.random();
+  switch (random.index(4)) {
+    case 0: {
+      const double height_m = random.uniform(1.0, 2.0);
+      const double width_m = random.uniform(0.7, 1.0);
+      return add_shelf(builder, name, footing, width_m, height_m);
+    }
+    case 1:
+      return add_cabinet(builder, name, footing);
+    case 2:
+      return add_plant(builder, name, footing.centre);
+    default:
+      add_crate(builder, name, footing, {random.uniform(0.3, 0.6), 0.4, random.uniform(0.4, 1.2)});
+  }
+}
+
+// Furniture along the outer walls.
+void furnish_loop(SceneBuilder& builder) {
+  Random& random = builder.random();
+  const FloorArea inside{{loop_outside.low.x_m + 0.1, loop_outside.low.y_m + 0.1},
+                         {loop_outside.high.x_m - 0.1, loop_outside.high.y_m - 0.1}};
+  int number = 4;  // after the doorways
   const auto furnish = [&](Point2 at, double turn_rad) {
     const Footing footing = builder.movable({at, turn_rad}, 0.4, inside);
-    const std::string name = "furniture " + std::to_string(number++);
-    switch (random.index(4)) {
-      case 0: {
-        const double height_m = random.uniform(1.0, 2.0);
-        const double width_m = random.uniform(0.7, 1.0);
-        add_shelf(builder, name, footing, width_m, height_m);
-        break;
-      }
-      case 1:
-        add_cabinet(builder, name, footing);
-        break;
-      case 2:
-        add_plant(builder, name, footing.centre);
-        break;
-      default:
-        add_crate(builder, name, footing,
-                  {random.uniform(0.3, 0.6), 0.4, random.uniform(0.4, 1.2)});
-    }
+    add_any_furniture(builder, "furniture " + std::to_string(number++), footing);
   };
   for (double x = -1.0; x < 7.2; x += random.uniform(0.9, 1.7)) {
     furnish({x, -1.15}, std::numbers::pi);
@@ -156,100 +156,144 @@ Scene make_loop(const SceneVariation& variation) {
     furnish({-1.2, y}, 0.5 * std::numbers::pi);
     furnish({7.2, y}, -0.5 * std::numbers::pi);
   }
+}
+
+}  // namespace
+
+Scene make_loop(const SceneVariation& variation) {
+  SceneBuilder builder("loop", variation);
+  Scene& scene = builder.scene();
+  scene.floor_low = {-0.5, -0.5};
+  scene.floor_high = {6.5, 4.5};
+  scene.drivable = {{{-0.5, -0.5}, {6.5, 0.5}},
+                    {{-0.5, 3.5}, {6.5, 4.5}},
+                    {{-0.5, -0.5}, {0.5, 4.5}},
+                    {{5.5, -0.5}, {6.5, 4.5}}};
+  scene.ambient = 0.4F;
+  scene.tour = {{0.0, 0.0}, {6.0, 0.0}, {6.0, 4.0}, {0.0, 4.0}};
+  furnish_room_shell(builder, loop_outside, loop_height_m);
+  add_block(builder);
+  add_doorways(builder);
+  furnish_loop(builder);
   const int shine = builder.plain({0.98F, 0.98F, 0.95F}, 1.0F);
   for (const Point2 at : {Point2{0.0, 0.0}, Point2{3.0, 0.0}, Point2{6.0, 0.0}, Point2{6.0, 2.0},
                           Point2{6.0, 4.0}, Point2{3.0, 4.0}, Point2{0.0, 4.0}, Point2{0.0, 2.0}}) {
-    add_ceiling_lamp(builder, shine, at, kHeight, static_cast<float>(random.uniform(0.6, 1.0)));
+    add_ceiling_lamp(builder, shine, at, loop_height_m,
+                     static_cast<float>(builder.random().uniform(0.6, 1.0)));
   }
   return builder.finish();
 }
+
+namespace {
+
+// A ring of corridors, 2 m wide, whose middle lines are 12 m and 8 m long. Two narrower ones cross
+// the block inside and go on outside to a door: eight junctions that look alike.
+constexpr double ring_height_m = 2.5;
+constexpr double ring_half_m = 1.0;
+constexpr double ring_long_m = 12.0;
+constexpr double ring_short_m = 8.0;
+constexpr std::array<double, 2> crossings_m{4.0, 8.0};
+constexpr double half_crossing_m = 0.65;
+constexpr double dead_end_m = 2.0;
+
+// The outer wall, counter-clockwise as its inside is seen, with the dead ends.
+void add_outer_wall(SceneBuilder& builder, const CorridorStyle& look) {
+  std::vector<Point2> outline;
+  for (const double side : {1.0, -1.0}) {
+    const double y = side > 0.0 ? -ring_half_m : ring_short_m + ring_half_m;
+    const double end = y - side * dead_end_m;
+    outline.push_back({side > 0.0 ? -ring_half_m : ring_long_m + ring_half_m, y});
+    for (std::size_t i = 0; i < crossings_m.size(); ++i) {
+      const double x = crossings_m[side > 0.0 ? i : crossings_m.size() - 1 - i];
+      const double half = side * half_crossing_m;
+      outline.insert(outline.end(),
+                     {{x - half, y}, {x - half, end}, {x + half, end}, {x + half, y}});
+      add_lintel(builder, look, {x - half, y}, {x + half, y});
+    }
+    outline.push_back({side > 0.0 ? ring_long_m + ring_half_m : -ring_half_m, y});
+  }
+  add_wall_with_doors(builder, "outer wall", look, outline);
+}
+
+// The blocks between the corridors, clockwise.
+void add_inner_blocks(SceneBuilder& builder, const CorridorStyle& look) {
+  const std::array<double, 6> edges{ring_half_m,
+                                    crossings_m[0] - half_crossing_m,
+                                    crossings_m[0] + half_crossing_m,
+                                    crossings_m[1] - half_crossing_m,
+                                    crossings_m[1] + half_crossing_m,
+                                    ring_long_m - ring_half_m};
+  for (std::size_t i = 0; i < edges.size(); i += 2) {
+    auto corners =
+        corners_of({{edges[i], ring_half_m}, {edges[i + 1], ring_short_m - ring_half_m}});
+    std::reverse(corners.begin(), corners.end());
+    add_wall_with_doors(builder, "inner wall " + std::to_string(i / 2), look, corners);
+    if (i == 0) continue;
+    for (const double y : {ring_half_m, ring_short_m - ring_half_m}) {
+      add_lintel(builder, look, {edges[i - 1], y}, {edges[i], y});
+    }
+  }
+}
+
+// The few distinct places: a window, a notice board and a plant, each on a side of its own.
+void add_distinct_places(SceneBuilder& builder) {
+  Random& random = builder.random();
+  builder.on_wall("window", builder.textured(window_texture(random, 128), 0.8F),
+                  {-ring_half_m, -ring_half_m}, {ring_long_m + ring_half_m, -ring_half_m}, 11.55,
+                  0.9, 0.9, 2.1);
+  const double along = random.uniform() < 0.5 ? 1.5 : 11.5;
+  const int board = builder.textured(poster_texture(random, 128));
+  builder.on_wall("notice board", board, {ring_long_m + ring_half_m, ring_short_m + ring_half_m},
+                  {-ring_half_m, ring_short_m + ring_half_m}, along, 1.0, 0.8, 1.6);
+  add_plant(builder, "plant", {-ring_half_m + 0.3, random.uniform(2.0, 6.0)});
+}
+
+void add_ring_lamps(SceneBuilder& builder) {
+  const int shine = builder.plain({0.98F, 0.98F, 0.95F}, 1.0F);
+  for (double x = 0.0; x <= ring_long_m + 0.1; x += 2.0) {
+    add_ceiling_lamp(builder, shine, {x, 0.0}, ring_height_m, 0.7F);
+    add_ceiling_lamp(builder, shine, {x, ring_short_m}, ring_height_m, 0.7F);
+  }
+  for (double y = 2.0; y < ring_short_m - 0.1; y += 2.0) {
+    add_ceiling_lamp(builder, shine, {0.0, y}, ring_height_m, 0.7F);
+    add_ceiling_lamp(builder, shine, {ring_long_m, y}, ring_height_m, 0.7F);
+    for (const double x : crossings_m)
+      add_ceiling_lamp(builder, shine, {x, y}, ring_height_m, 0.7F);
+  }
+}
+
+}  // namespace
 
 Scene make_corridor(const SceneVariation& variation) {
   SceneBuilder builder("corridor", variation);
   Scene& scene = builder.scene();
   Random& random = builder.random();
-  // A ring of corridors, 2 m wide, whose middle lines are 12 m and 8 m long. Two narrower ones
-  // cross the block inside and go on outside to a door: eight junctions that look alike.
-  constexpr double kHeight = 2.5;
-  constexpr double kHalf = 1.0;
-  constexpr double kLong = 12.0;
-  constexpr double kShort = 8.0;
-  constexpr std::array<double, 2> kCrossings{4.0, 8.0};
-  constexpr double kHalfCrossing = 0.65;
-  constexpr double kDeadEnd = 2.0;
   scene.floor_low = {-0.6, -0.6};
-  scene.floor_high = {kLong + 0.6, kShort + 0.6};
-  scene.drivable = {{{-0.6, -0.6}, {kLong + 0.6, 0.6}},
-                    {{-0.6, kShort - 0.6}, {kLong + 0.6, kShort + 0.6}},
-                    {{-0.6, -0.6}, {0.6, kShort + 0.6}},
-                    {{kLong - 0.6, -0.6}, {kLong + 0.6, kShort + 0.6}}};
-  for (const double x : kCrossings) {
-    scene.drivable.push_back({{x - 0.4, -0.6}, {x + 0.4, kShort + 0.6}});
+  scene.floor_high = {ring_long_m + 0.6, ring_short_m + 0.6};
+  scene.drivable = {{{-0.6, -0.6}, {ring_long_m + 0.6, 0.6}},
+                    {{-0.6, ring_short_m - 0.6}, {ring_long_m + 0.6, ring_short_m + 0.6}},
+                    {{-0.6, -0.6}, {0.6, ring_short_m + 0.6}},
+                    {{ring_long_m - 0.6, -0.6}, {ring_long_m + 0.6, ring_short_m + 0.6}}};
+  for (const double x : crossings_m) {
+    scene.drivable.push_back({{x - 0.4, -0.6}, {x + 0.4, ring_short_m + 0.6}});
   }
   scene.ambient = 0.65F;
-  scene.tour = {{0.0, 0.0}, {kLong, 0.0}, {kLong, kShort}, {0.0, kShort}};
+  scene.tour = {{0.0, 0.0}, {ring_long_m, 0.0}, {ring_long_m, ring_short_m}, {0.0, ring_short_m}};
 
-  const Point2 low{-kHalf, -kHalf - kDeadEnd};
-  const Point2 high{kLong + kHalf, kShort + kHalf + kDeadEnd};
+  const Point2 low{-ring_half_m, -ring_half_m - dead_end_m};
+  const Point2 high{ring_long_m + ring_half_m, ring_short_m + ring_half_m + dead_end_m};
   const int carpet =
       builder.textured(noise_texture(random, 128, tint(random, 0.15, 0.5, 0.2), 0.08));
   builder.floor(carpet, low, high, 1.0);
-  builder.ceiling(builder.plain({0.85F, 0.85F, 0.84F}), low, high, kHeight, 1.0);
+  builder.ceiling(builder.plain({0.85F, 0.85F, 0.84F}), low, high, ring_height_m, 1.0);
   const CorridorStyle look{
       builder.textured(noise_texture(random, 128, tint(random, 0.5, 0.75, 0.1), 0.04)),
       builder.plain(tint(random, 0.1, 0.4, 0.2)),
-      builder.textured(door_texture(random, 128, tint(random, 0.1, 0.45, 0.3))), kHeight};
-
-  // The outer wall, counter-clockwise as its inside is seen, with the dead ends.
-  std::vector<Point2> outline;
-  for (const double side : {1.0, -1.0}) {
-    const double y = side > 0.0 ? -kHalf : kShort + kHalf;
-    const double end = y - side * kDeadEnd;
-    outline.push_back({side > 0.0 ? -kHalf : kLong + kHalf, y});
-    for (std::size_t i = 0; i < kCrossings.size(); ++i) {
-      const double x = kCrossings[side > 0.0 ? i : kCrossings.size() - 1 - i];
-      const double half = side * kHalfCrossing;
-      outline.insert(outline.end(),
-                     {{x - half, y}, {x - half, end}, {x + half, end}, {x + half, y}});
-      add_lintel(builder, look, {x - half, y}, {x + half, y});
-    }
-    outline.push_back({side > 0.0 ? kLong + kHalf : -kHalf, y});
-  }
-  add_wall_with_doors(builder, "outer wall", look, outline);
-  // The blocks between the corridors, clockwise.
-  const std::array<double, 6> edges{kHalf,
-                                    kCrossings[0] - kHalfCrossing,
-                                    kCrossings[0] + kHalfCrossing,
-                                    kCrossings[1] - kHalfCrossing,
-                                    kCrossings[1] + kHalfCrossing,
-                                    kLong - kHalf};
-  for (std::size_t i = 0; i < edges.size(); i += 2) {
-    auto corners = corners_of({{edges[i], kHalf}, {edges[i + 1], kShort - kHalf}});
-    std::reverse(corners.begin(), corners.end());
-    add_wall_with_doors(builder, "inner wall " + std::to_string(i / 2), look, corners);
-    if (i == 0) continue;
-    for (const double y : {kHalf, kShort - kHalf}) {
-      add_lintel(builder, look, {edges[i - 1], y}, {edges[i], y});
-    }
-  }
-  // The few distinct places: a window, a notice board and a plant, each on a side of its own.
-  builder.on_wall("window", builder.textured(window_texture(random, 128), 0.8F), {-kHalf, -kHalf},
-                  {kLong + kHalf, -kHalf}, 11.55, 0.9, 0.9, 2.1);
-  const double along = random.uniform() < 0.5 ? 1.5 : 11.5;
-  const int board = builder.textured(poster_texture(random, 128));
-  builder.on_wall("notice board", board, {kLong + kHalf, kShort + kHalf}, {-kHalf, kShort + kHalf},
-                  along, 1.0, 0.8, 1.6);
-  add_plant(builder, "plant", {-kHalf + 0.3, random.uniform(2.0, 6.0)});
-  const int shine = builder.plain({0.98F, 0.98F, 0.95F}, 1.0F);
-  for (double x = 0.0; x <= kLong + 0.1; x += 2.0) {
-    add_ceiling_lamp(builder, shine, {x, 0.0}, kHeight, 0.7F);
-    add_ceiling_lamp(builder, shine, {x, kShort}, kHeight, 0.7F);
-  }
-  for (double y = 2.0; y < kShort - 0.1; y += 2.0) {
-    add_ceiling_lamp(builder, shine, {0.0, y}, kHeight, 0.7F);
-    add_ceiling_lamp(builder, shine, {kLong, y}, kHeight, 0.7F);
-    for (const double x : kCrossings) add_ceiling_lamp(builder, shine, {x, y}, kHeight, 0.7F);
-  }
+      builder.textured(door_texture(random, 128, tint(random, 0.1, 0.45, 0.3))), ring_height_m};
+  add_outer_wall(builder, look);
+  add_inner_blocks(builder, look);
+  add_distinct_places(builder);
+  add_ring_lamps(builder);
   return builder.finish();
 }
 

@@ -139,45 +139,49 @@ std::string GazeboFiles::places() const {
   return text;
 }
 
-const XmlElement& GazeboFiles::sdf(const fs::path& file) {
+pugi::xml_node GazeboFiles::sdf(const fs::path& file) {
   const std::string key = file.lexically_normal().string();
-  if (const auto known = files_.find(key); known != files_.end()) return known->second;
-  XmlElement root;
+  if (const auto known = files_.find(key); known != files_.end())
+    return known->second.document_element();
+  pugi::xml_document document;
   try {
-    root = parse_xml(text_of_scene_file(file));
+    document = parse_xml(text_of_scene_file(file));
   } catch (const FileError&) {
     throw;
   } catch (const Error& error) {
     throw FileError(file.string(), "not an SDF file: " + readable_line(error.what()));
   }
-  if (root.name != "sdf" && root.name != "gazebo") {
-    throw FileError(file.string(), "not an SDF file: its first element is <" +
-                                       readable_line(root.name) + ">, not <sdf>");
+  const std::string name = document.document_element().name();
+  if (name != "sdf" && name != "gazebo") {
+    throw FileError(file.string(), "not an SDF file: its first element is <" + readable_line(name) +
+                                       ">, not <sdf>");
   }
-  return files_.emplace(key, std::move(root)).first->second;
+  return files_.emplace(key, std::move(document)).first->second.document_element();
 }
 
 fs::path GazeboFiles::description_in(const fs::path& folder) {
   std::error_code code;
   for (const char* list : {"model.config", "manifest.xml"}) {
     if (!fs::is_regular_file(folder / list, code)) continue;
-    const XmlElement* best = nullptr;
-    double best_version = -1.0;
-    XmlElement config;
+    pugi::xml_document config;
     try {
       config = parse_xml(text_of_scene_file(folder / list));
     } catch (const Error&) {
       break;  // the usual names may do
     }
-    for (const XmlElement& entry : config.children) {
-      const auto version = numbers_of(entry.attribute("version"));
+    std::optional<fs::path> best;
+    double best_version = -1.0;
+    for (const pugi::xml_node& entry : config.document_element().children("sdf")) {
+      const auto version = numbers_of(entry.attribute("version").value());
       const double number = version && version->size() == 1 ? version->front() : 0.0;
-      if (entry.name != "sdf" || entry.text.empty() || number <= best_version) continue;
-      if (!path_in_any_case(folder, entry.text)) continue;
-      best = &entry;
+      const std::string name = text_of(entry);
+      if (name.empty() || number <= best_version) continue;
+      const auto found = path_in_any_case(folder, name);
+      if (!found) continue;
+      best = found;
       best_version = number;
     }
-    if (best != nullptr) return *path_in_any_case(folder, best->text);
+    if (best) return *best;
   }
   if (const auto usual = path_in_any_case(folder, "model.sdf")) return *usual;
   std::vector<fs::path> others;

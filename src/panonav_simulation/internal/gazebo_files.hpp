@@ -41,8 +41,9 @@ class GazeboFiles {
   /// The model folders, for messages.
   [[nodiscard]] std::string places() const;
 
-  /// The root element <sdf> or <gazebo> of a file, read once. Throws FileError.
-  const XmlElement& sdf(const std::filesystem::path& file);
+  /// The root element <sdf> or <gazebo> of a file, read once; valid as long as *this. Throws
+  /// FileError.
+  pugi::xml_node sdf(const std::filesystem::path& file);
 
   /// The model description in a folder: of those that `model.config` lists the one of the highest
   /// version, else `model.sdf`, else the first *.sdf. Throws FileError.
@@ -51,7 +52,7 @@ class GazeboFiles {
  private:
   std::filesystem::path world_;
   std::vector<std::filesystem::path> folders_;
-  std::map<std::string, XmlElement> files_;
+  std::map<std::string, pugi::xml_document> files_;
 };
 
 }  // namespace panonav::simulation

@@ -111,25 +111,9 @@ void add_hedge(SceneBuilder& builder, const std::string& name, Point2 from, Poin
   }
 }
 
-}  // namespace
-
-Scene make_garden(const SceneVariation& variation) {
-  SceneBuilder builder("garden", variation);
-  Scene& scene = builder.scene();
+// Hedges around, with gaps through which far trees are seen.
+void add_hedges(SceneBuilder& builder) {
   Random& random = builder.random();
-  scene.floor_low = {0.0, 0.0};
-  scene.floor_high = {12.0, 10.0};
-  scene.ambient = 0.7F;
-  const double azimuth = random.uniform(-std::numbers::pi, std::numbers::pi);
-  scene.directional_lights.push_back({Direction3::from_angles(azimuth, 0.8), 0.8F});
-  const Point2 middle{6.0, 5.0};
-  add_sky(builder, middle, 150.0);
-  const int grass = builder.textured(noise_texture(random, 256, {0.25F, 0.36F, 0.16F}, 0.2, 1.4));
-  builder.floor(grass, {-160.0, -160.0}, {160.0, 160.0}, 3.0);
-  const int gravel = builder.textured(noise_texture(random, 256, {0.55F, 0.5F, 0.42F}, 0.15, 1.0));
-  builder.floor(gravel, {4.8, -1.0}, {6.4, 11.0}, 2.0, 0.01);
-
-  // Hedges around, with gaps through which far trees are seen.
   const std::array<Point2, 4> corners{Point2{-1.5, -1.5}, Point2{13.5, -1.5}, Point2{13.5, 11.5},
                                       Point2{-1.5, 11.5}};
   for (std::size_t i = 0; i < 4; ++i) {
@@ -143,8 +127,11 @@ Scene make_garden(const SceneVariation& variation) {
     add_hedge(builder, "hedge " + std::to_string(2 * i), a, along(gap), height);
     add_hedge(builder, "hedge " + std::to_string(2 * i + 1), along(gap + 0.18), b, height);
   }
-  const FloorArea plot{{-1.0, -1.0}, {13.0, 11.0}};
-  scene.tour = {{1.0, 1.0}, {11.0, 1.0}, {11.0, 9.0}, {1.0, 9.0}};
+}
+
+// Trees and flower boxes beside the tour.
+void add_trees_and_boxes(SceneBuilder& builder, const FloorArea& plot) {
+  Random& random = builder.random();
   const auto place = [&](double radius_m) {
     Point2 at;
     do {
@@ -166,13 +153,11 @@ Scene make_garden(const SceneVariation& variation) {
     add_crate(builder, "flower box " + std::to_string(i), builder.movable(wanted, kBox, plot),
               {random.uniform(0.4, 1.2), random.uniform(0.3, 0.6), random.uniform(0.3, 0.8)});
   }
-  const Colour plaster = tint(random, 0.4, 0.8, 0.2);
-  const Footing house{{random.uniform(2.0, 10.0), 18.0}, random.uniform(-0.2, 0.2)};
-  add_house(builder, "house", house, {9.0, 6.0, 3.2}, plaster, {0.5F, 0.25F, 0.2F});
-  const Colour tar = tint(random, 0.15, 0.4, 0.2);
-  const Footing shed{{-5.0, random.uniform(2.0, 8.0)}, random.uniform(1.2, 1.9)};
-  add_house(builder, "shed", shed, {3.0, 2.2, 2.0}, builder.palette().wood, tar);
-  // Far trees, of a few kinds, make the horizon.
+}
+
+// Far trees, of a few kinds, which make the horizon.
+void add_far_trees(SceneBuilder& builder, Point2 middle) {
+  Random& random = builder.random();
   std::array<TreeKind, 6> kinds;
   for (TreeKind& kind : kinds) kind = make_tree_kind(builder);
   for (int i = 0; i < 60; ++i) {
@@ -184,6 +169,37 @@ Scene make_garden(const SceneVariation& variation) {
              {middle.x_m + radius * std::cos(angle), middle.y_m + radius * std::sin(angle)},
              height_m);
   }
+}
+
+}  // namespace
+
+Scene make_garden(const SceneVariation& variation) {
+  SceneBuilder builder("garden", variation);
+  Scene& scene = builder.scene();
+  Random& random = builder.random();
+  scene.floor_low = {0.0, 0.0};
+  scene.floor_high = {12.0, 10.0};
+  scene.ambient = 0.7F;
+  const double azimuth = random.uniform(-std::numbers::pi, std::numbers::pi);
+  scene.directional_lights.push_back({Direction3::from_angles(azimuth, 0.8), 0.8F});
+  const Point2 middle{6.0, 5.0};
+  add_sky(builder, middle, 150.0);
+  const int grass = builder.textured(noise_texture(random, 256, {0.25F, 0.36F, 0.16F}, 0.2, 1.4));
+  builder.floor(grass, {-160.0, -160.0}, {160.0, 160.0}, 3.0);
+  const int gravel = builder.textured(noise_texture(random, 256, {0.55F, 0.5F, 0.42F}, 0.15, 1.0));
+  builder.floor(gravel, {4.8, -1.0}, {6.4, 11.0}, 2.0, 0.01);
+
+  add_hedges(builder);
+  const FloorArea plot{{-1.0, -1.0}, {13.0, 11.0}};
+  scene.tour = {{1.0, 1.0}, {11.0, 1.0}, {11.0, 9.0}, {1.0, 9.0}};
+  add_trees_and_boxes(builder, plot);
+  const Colour plaster = tint(random, 0.4, 0.8, 0.2);
+  const Footing house{{random.uniform(2.0, 10.0), 18.0}, random.uniform(-0.2, 0.2)};
+  add_house(builder, "house", house, {9.0, 6.0, 3.2}, plaster, {0.5F, 0.25F, 0.2F});
+  const Colour tar = tint(random, 0.15, 0.4, 0.2);
+  const Footing shed{{-5.0, random.uniform(2.0, 8.0)}, random.uniform(1.2, 1.9)};
+  add_house(builder, "shed", shed, {3.0, 2.2, 2.0}, builder.palette().wood, tar);
+  add_far_trees(builder, middle);
   return builder.finish();
 }
 

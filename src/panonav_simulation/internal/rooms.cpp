@@ -106,6 +106,40 @@ void add_lamps(SceneBuilder& builder, const FloorArea& room, double height_m, do
   }
 }
 
+// What the walls of the periodic hall are made of.
+struct PeriodicLook {
+  int plaster, poster, door, stone;
+  double height_m;
+};
+
+// A wall that carries the same picture and pillar every 2 m; the first one has a door.
+void add_periodic_wall(SceneBuilder& builder, const PeriodicLook& look, std::size_t number,
+                       Point2 from, Point2 to) {
+  const std::string wall = "wall " + std::to_string(number);
+  const double length = distance(from, to);
+  const auto on_line = [&](double along) {
+    const double share = along / length;
+    return Point2{from.x_m + share * (to.x_m - from.x_m), from.y_m + share * (to.y_m - from.y_m)};
+  };
+  constexpr double pillar_m = 0.35;
+  double wall_from = 0.0;  // the wall runs from pillar to pillar
+  for (double along = 0.5; along + 1.0 < length; along += 2.0) {
+    const bool is_door = number == 0 && std::abs(along - 4.5) < 1e-9;
+    if (is_door) {
+      builder.on_wall("door", look.door, from, to, along, 0.9, 0.0, 2.1);
+    } else {
+      builder.on_wall(wall + " picture", look.poster, from, to, along, 0.9, 0.6, 1.8);
+    }
+    const double pillar = along + 1.45;
+    builder.box(wall + " pillar", look.stone, look.stone, {on_line(pillar), 0.0}, {0.0, 0.0, 0.0},
+                {pillar_m, pillar_m, look.height_m}, 1.0);
+    builder.wall(wall, look.plaster, on_line(wall_from), on_line(pillar - 0.5 * pillar_m),
+                 look.height_m, 2.0);
+    wall_from = pillar + 0.5 * pillar_m;
+  }
+  builder.wall(wall, look.plaster, on_line(wall_from), to, look.height_m, 2.0);
+}
+
 }  // namespace
 
 Scene make_office(const SceneVariation& variation) {
@@ -173,31 +207,8 @@ Scene make_hall(const SceneVariation& variation, bool periodic) {
   const std::array<Point2, 4> corners{room.low, Point2{room.high.x_m, room.low.y_m}, room.high,
                                       Point2{room.low.x_m, room.high.y_m}};
   for (std::size_t i = 0; i < 4; ++i) {
-    const Point2 from = corners[i];
-    const Point2 to = corners[(i + 1) % 4];
-    const std::string wall = "wall " + std::to_string(i);
-    const double length = distance(from, to);
-    const auto on_line = [&](double along) {
-      const double share = along / length;
-      return Point2{from.x_m + share * (to.x_m - from.x_m), from.y_m + share * (to.y_m - from.y_m)};
-    };
-    constexpr double kPillar = 0.35;
-    double wall_from = 0.0;  // the wall runs from pillar to pillar
-    for (double along = 0.5; along + 1.0 < length; along += 2.0) {
-      const bool is_door = i == 0 && std::abs(along - 4.5) < 1e-9;
-      if (is_door) {
-        builder.on_wall("door", door, from, to, along, 0.9, 0.0, 2.1);
-      } else {
-        builder.on_wall(wall + " picture", poster, from, to, along, 0.9, 0.6, 1.8);
-      }
-      const double pillar = along + 1.45;
-      builder.box(wall + " pillar", stone, stone, {on_line(pillar), 0.0}, {0.0, 0.0, 0.0},
-                  {kPillar, kPillar, kHeight}, 1.0);
-      builder.wall(wall, plaster, on_line(wall_from), on_line(pillar - 0.5 * kPillar), kHeight,
-                   2.0);
-      wall_from = pillar + 0.5 * kPillar;
-    }
-    builder.wall(wall, plaster, on_line(wall_from), to, kHeight, 2.0);
+    add_periodic_wall(builder, {plaster, poster, door, stone, kHeight}, i, corners[i],
+                      corners[(i + 1) % 4]);
   }
   builder.on_wall("clock", builder.textured(poster_texture(random, 64)), corners[2], corners[3],
                   4.65, 0.6, 2.0, 2.6);

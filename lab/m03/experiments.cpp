@@ -1,0 +1,274 @@
+// What the experiments of [M03] share, and their order.
+
+#include "lab/m03/experiments.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "lab/reproduction_stages.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/core/statistics.hpp"
+#include "panonav_simulation/worlds.hpp"
+#include "panonav_viewer/scene_drawing.hpp"
+
+namespace panonav::lab {
+
+RunSet make_run_set(std::shared_ptr<const TrackingPlace> place, std::vector<TrackingRun> runs,
+                    Executor& executor) {
+  RunSet set{std::move(place), std::move(runs), {}};
+  set.single_images = localise_single_images(*set.place, set.runs, executor);
+  return set;
+}
+
+SingleImages sum_single_images(std::span<const RunSet> sets) {
+  SingleImages sum;
+  for (const RunSet& set : sets) sum.add(set.single_images);
+  return sum;
+}
+
+std::vector<double> capped_images(std::span<const TrackedRun> runs, double radius_m,
+                                  std::size_t first_step) {
+  std::vector<double> images;
+  for (const TrackedRun& run : runs) {
+    const int count = images_until_localised(run, radius_m, first_step).value_or(m03_most_images);
+    images.push_back(std::min(count, m03_most_images));
+  }
+  return images;
+}
+
+std::size_t localised_within(std::span<const TrackedRun> runs, double radius_m, int images,
+                             std::size_t first_step) {
+  return count_where(runs, [&](const TrackedRun& run) {
+    const auto count = images_until_localised(run, radius_m, first_step);
+    return count && *count <= images;
+  });
+}
+
+std::vector<double> errors_after(std::span<const TrackedRun> runs, std::size_t images,
+                                 std::size_t first_step) {
+  std::vector<double> errors;
+  for (const TrackedRun& run : runs) {
+    std::size_t count = 0;
+    for (const TrackedImage& image : run) {
+      if (image.step >= first_step && ++count == images) errors.push_back(image.error_m);
+    }
+  }
+  return errors;
+}
+
+viewer::Series error_over_images(const std::string& label, std::span<const TrackedRun> runs,
+                                 std::size_t images, std::size_t first_step, double shift) {
+  viewer::Series series{.label = label};
+  for (std::size_t i = 1; i <= images; ++i) {
+    const auto errors = errors_after(runs, i, first_step);
+    if (errors.empty()) break;
+    series.add(static_cast<double>(i) + shift, median(errors));
+    series.y_low.push_back(quantile(errors, 0.05));
+    series.y_high.push_back(quantile(errors, 0.95));
+  }
+  return series;
+}
+
+void RunRows::add_images(std::optional<Target> target,
+                         std::optional<std::pair<double, double>> published) const {
+  add_median(result, id + ".images",
+             what + ": images until the error is below " + centimetres(radius_m) + " from then on",
+             "images", capped_images(runs, radius_m, first_step), judged ? target : std::nullopt,
+             published);
+  tell_single_images();
+}
+
+void RunRows::add_images_mean() const {
+  add_mean(result, id + ".images_mean", what + ": images", "images",
+           capped_images(runs, radius_m, first_step));
+}
+
+void RunRows::add_within(int images, std::optional<Target> target) const {
+  const std::string count = std::to_string(images);
+  add_rate(result, id + ".within_" + count, what + ": runs localised within " + count + " images",
+           localised_within(runs, radius_m, images, first_step), runs.size(),
+           judged ? target : std::nullopt);
+}
+
+void RunRows::add_error_after(std::size_t images, std::optional<Target> target) const {
+  const std::string count = std::to_string(images);
+  add_median(result, id + ".error_" + count, what + ": error after " + count + " images", "m",
+             errors_after(runs, images), judged ? target : std::nullopt);
+}
+
+void RunRows::add_wrong(std::optional<Target> target) const {
+  std::size_t images = 0;
+  std::size_t wrong = 0;
+  for (const TrackedRun& run : runs) {
+    images += run.size();
+    wrong += count_where(
+        run, [](const TrackedImage& image) { return image.is_confidently_wrong(m03_wrong_m); });
+  }
+  add_rate(result, id + ".wrong",
+           what + ": images at which it says localised and is off by more than 1 m", wrong, images,
+           target);
+}
+
+void RunRows::tell_single_images() const {
+  const SingleImages sum = sum_single_images(sets);
+  const auto percent = [&](std::size_t count) {
+    return std::to_string(
+        std::lround(100.0 * static_cast<double>(count) / static_cast<double>(sum.asked)));
+  };
+  result.rows.back().over +=
+      sum.asked == 0
+          ? "; no image alone"
+          : "; one image alone: right " + percent(sum.right) + " % (by dissimilarity only " +
+                percent(sum.right_by_dissimilarity) + " %), within " +
+                centimetres(sets.front().place->spacing_m()) + " " + percent(sum.near) + " %";
+}
+
+namespace {
+
+// The layers of one panel: what the filter holds and says at a step.
+std::vector<viewer::MapLayer> particle_layers(const TrackingPlace& place, const Pose2& truth,
+                                              const MonteCarloLocaliser& filter,
+                                              const MonteCarloEstimate& estimate) {
+  viewer::MapLayer particles{.label = "particles", .colour = viewer::PlotColour::vermilion};
+  const Particles& held = filter.particles();
+  for (std::size_t i = 0; i < held.size(); ++i) particles.dots.push_back(held.position(i));
+  viewer::MapLayer guess{.label = "estimate", .colour = viewer::PlotColour::blue};
+  if (!estimate.modes.empty()) guess.circles = {estimate.modes.front().mean.position()};
+  return {
+      {.label = "references",
+       .colour = viewer::PlotColour::grey,
+       .dots = place.reference_positions()},
+      std::move(particles),
+      {.label = "ground truth", .colour = viewer::PlotColour::black, .crosses = {truth.position()}},
+      std::move(guess)};
+}
+
+}  // namespace
+
+std::vector<viewer::MapPlot> particle_maps(const TrackingPlace& place,
+                                           std::span<const viewer::MapLayer> furniture,
+                                           const TrackingRun& run, const FilterSetting& setting,
+                                           std::uint64_t seed, std::span<const std::size_t> steps,
+                                           const std::string& title) {
+  std::vector<viewer::MapPlot> maps;
+  // The estimate's line is cut where the robot was kidnapped.
+  std::vector<std::vector<Point2>> truths;
+  std::vector<std::vector<Point2>> estimates;
+  std::size_t images = 0;
+  const auto observe = [&](std::size_t step, const MonteCarloLocaliser& filter,
+                           const MonteCarloEstimate& estimate) {
+    const TrackingStep& there = run.steps[step];
+    if (!there.moved) truths.emplace_back();
+    if (step == 0) estimates.emplace_back();
+    truths.back().push_back(there.truth.position());
+    if (!estimate.modes.empty()) {
+      estimates.back().push_back(estimate.modes.front().mean.position());
+    }
+    images += there.view ? 1 : 0;
+    if (std::ranges::find(steps, step) == steps.end()) return;
+    auto layers = particle_layers(place, there.truth, filter, estimate);
+    layers[2].lines = truths;
+    layers[3].lines = estimates;
+    layers.insert(layers.begin(), furniture.begin(), furniture.end());
+    maps.push_back({.title = title + ", " + std::to_string(images) +
+                             (images == 1 ? " image" : " images") +
+                             (there.view ? "" : ", driving blind"),
+                    .layers = std::move(layers)});
+  };
+  (void)track_run(place, run, setting, seed, observe);
+  return maps;
+}
+
+simulation::PlaceRecording TrackingExperiments::record_variant(const std::string& scene, int number,
+                                                               double spacing_m,
+                                                               int columns) const {
+  return simulation::record_place({.scene = scene,
+                                   .seed = options.seed + static_cast<std::uint64_t>(number),
+                                   .spacing_m = spacing_m,
+                                   .queries = 1,
+                                   .rows = options.rows,
+                                   .columns = columns},
+                                  executor);
+}
+
+std::vector<TrackedRun> TrackingExperiments::track(std::span<const RunSet> sets,
+                                                   const FilterSetting& setting,
+                                                   std::uint64_t seed) const {
+  std::vector<TrackedRun> all;
+  for (const RunSet& set : sets) {
+    std::ranges::move(track_runs(*set.place, set.runs, setting, seed + all.size(), executor),
+                      std::back_inserter(all));
+  }
+  return all;
+}
+
+std::vector<RunSet> TrackingExperiments::sets_of(RunSet OfficeRuns::*set) const {
+  std::vector<RunSet> sets;
+  for (const OfficeRuns& office : offices) sets.push_back(office.*set);
+  return sets;
+}
+
+std::span<const std::string_view> tracking_reproduction_parts() {
+  static constexpr std::array<std::string_view, 6> parts{"office",  "corridor", "garden",
+                                                         "leaving", "worlds",   "recordings"};
+  return parts;
+}
+
+TrackingReproductionOptions quick_run(TrackingReproductionOptions options) {
+  options.scenes = 1;
+  options.variants = 2;
+  options.runs = 3;
+  return options;
+}
+
+Reproduction reproduce_m03(const TrackingReproductionOptions& options, Executor& executor,
+                           const ReproductionProgress& progress) {
+  require(options.scenes >= 1, "scenes", options.scenes, ">= 1");
+  require(options.variants >= 1, "variants", options.variants, ">= 1");
+  require(options.runs >= 2, "runs", options.runs, ">= 2");
+  const auto parts = tracking_reproduction_parts();
+  if (!options.only.empty() && std::ranges::find(parts, options.only) == parts.end()) {
+    throw ContractError("only", options.only,
+                        "office, corridor, garden, leaving, worlds, recordings");
+  }
+  make_folder(options.out);
+
+  Reproduction result;
+  TrackingExperiments m03{options, executor, result};
+  std::vector<ReproductionStage> stages;
+  const auto add = [&](std::string_view part, const std::string& name, double cost,
+                       std::function<void()> run) {
+    if (options.only.empty() || options.only == part)
+      stages.push_back({name, cost, std::move(run)});
+  };
+  const double scenes = options.scenes;
+  for (int s = 0; s < options.scenes; ++s) {
+    add("office", "office " + std::to_string(s + 1) + " of " + std::to_string(options.scenes), 20.0,
+        [&m03, s] { m03.record_office(s); });
+  }
+  add("office", "global localisation", 3.0 * scenes, [&] { m03.reproduce_global_localisation(); });
+  add("office", "position tracking", scenes, [&] { m03.reproduce_position_tracking(); });
+  add("office", "kidnapped robot", scenes, [&] { m03.reproduce_kidnapping(); });
+  add("office", "particles and odometry", 10.0 * scenes, [&] { m03.reproduce_sweeps(); });
+  add("corridor", "corridor", 10.0 * scenes, [&] { m03.reproduce_corridor(); });
+  add("garden", "garden", 10.0 * scenes, [&] { m03.reproduce_garden(); });
+  for (const std::string scene : {"hall", "loop"}) {
+    add("leaving", "leaving the " + scene, 5.0 * scenes,
+        [&m03, scene] { m03.reproduce_leaving(scene); });
+  }
+  for (const std::string& world : simulation::worlds_in(options.data)) {
+    add("worlds", world, 50.0, [&m03, world] { m03.reproduce_gazebo_world(world); });
+  }
+  if (simulation::has_data(options.data, "sussex_route")) {
+    add("recordings", "sussex_route", 10.0, [&] { m03.reproduce_recorded_route(); });
+  }
+  if (simulation::has_data(options.data, "gantry_plants")) {
+    add("recordings", "gantry_plants", 10.0, [&] { m03.reproduce_gantry(); });
+  }
+  run_stages(stages, progress);
+  return result;
+}
+
+}  // namespace panonav::lab

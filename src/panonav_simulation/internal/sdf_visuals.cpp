@@ -1,0 +1,191 @@
+#include "panonav_simulation/internal/sdf_visuals.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "panonav_simulation/internal/material_script.hpp"
+#include "panonav_simulation/internal/shapes.hpp"
+
+namespace panonav::simulation {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// A frame whose z axis is the plane's normal.
+Affine3 frame_along(const Vector3& normal) {
+  const double length = std::hypot(normal.x_m, normal.y_m, normal.z_m);
+  if (!(length > 0.0)) return {};
+  const Vector3 z{normal.x_m / length, normal.y_m / length, normal.z_m / length};
+  const double flat = std::hypot(z.x_m, z.z_m);
+  const Vector3 x =
+      flat > 1e-9 ? Vector3{z.z_m / flat, 0.0, -z.x_m / flat} : Vector3{1.0, 0.0, 0.0};
+  const Vector3 y{z.y_m * x.z_m - z.z_m * x.y_m, z.z_m * x.x_m - z.x_m * x.z_m,
+                  z.x_m * x.y_m - z.y_m * x.x_m};
+  return {{x.x_m, y.x_m, z.x_m, x.y_m, y.y_m, z.y_m, x.z_m, y.z_m, z.z_m}, {}};
+}
+
+// The mesh of a shape of SDF around its own origin; `nullopt` for an empty one. Throws Unusable.
+std::optional<Mesh> make_shape(pugi::xml_node shape) {
+  const std::string_view kind = shape.name();
+  if (kind == "box") {
+    const auto size = read_positive_size(shape, "size", 3);
+    return box_mesh({size[0], size[1], size[2]});
+  }
+  if (kind == "cylinder" || kind == "capsule") {
+    const double radius_m = read_positive_size(shape, "radius", 1)[0];
+    const double length_m = read_positive_size(shape, "length", 1)[0];
+    return kind == "capsule" ? capsule_mesh(radius_m, length_m) : cylinder_mesh(radius_m, length_m);
+  }
+  if (kind == "sphere") {
+    const double r = read_positive_size(shape, "radius", 1)[0];
+    return ellipsoid_mesh({r, r, r});
+  }
+  if (kind == "ellipsoid") {
+    const auto r = read_positive_size(shape, "radii", 3);
+    return ellipsoid_mesh({r[0], r[1], r[2]});
+  }
+  if (kind == "plane") {
+    const auto size = read_size(shape, "size", 2, 1.0);
+    return rectangle_mesh(size[0], size[1]);
+  }
+  if (kind == "empty") return std::nullopt;
+  throw Unusable{"panonav does not show a geometry of the kind " + in_quotes(kind)};
+}
+
+// Moves the middle of these parts to the origin.
+Affine3 centre_parts(const std::vector<const FileMesh*>& parts) {
+  Scene together;
+  for (const FileMesh* part : parts) together.meshes.push_back(part->mesh);
+  const auto [low, high] = *extent(together);
+  Affine3 shift;
+  shift.translation = {-0.5 * (low.x_m + high.x_m), -0.5 * (low.y_m + high.y_m),
+                       -0.5 * (low.z_m + high.z_m)};
+  return shift;
+}
+
+void shine(Material& material, const Colour& emissive) {
+  if (brightness(emissive) <= brightness(material.colour)) return;
+  material.colour = emissive;
+  material.emission = 1.0F;
+}
+
+}  // namespace
+
+void SdfVisuals::add(pugi::xml_node visual, const Affine3& world_from_visual,
+                     const SdfOrigin& origin) {
+  if (read_number(visual, "transparency", 0.0) > 0.5) return;
+  for (const pugi::xml_node& shape : visual.child("geometry")) {
+    if (shape.type() == pugi::node_element) add_shape(shape, visual, world_from_visual, origin);
+  }
+}
+
+void SdfVisuals::add_shape(pugi::xml_node shape, pugi::xml_node visual,
+                           const Affine3& world_from_visual, const SdfOrigin& origin) {
+  const std::string_view kind = shape.name();
+  if (kind == "mesh") return add_mesh_file(shape, visual, world_from_visual, origin);
+  const auto mesh = make_shape(shape);
+  if (!mesh) return;
+  Affine3 world_from_shape = world_from_visual;
+  if (kind == "plane") {
+    const auto n = value_of(shape, "normal").empty() ? std::vector{0.0, 0.0, 1.0}
+                                                     : read_size(shape, "normal", 3);
+    world_from_shape = world_from_visual * frame_along({n[0], n[1], n[2]});
+  }
+  Scene& scene = context_.scene;
+  scene.materials.push_back(dress({}, visual, origin));
+  place_mesh(scene, *mesh, world_from_shape, origin.object,
+             static_cast<int>(scene.materials.size()) - 1);
+  if (kind == "plane") planes_.push_back(scene.meshes.size() - 1);
+}
+
+void SdfVisuals::add_mesh_file(pugi::xml_node shape, pugi::xml_node visual,
+                               const Affine3& world_from_visual, const SdfOrigin& origin) {
+  std::string uri = value_of(shape, "uri");
+  if (uri.empty()) uri = value_of(shape, "filename");
+  const auto path = context_.find(uri, origin);
+  if (!path)
+    throw Unusable{"its mesh " + in_quotes(uri) + " was not found in " + context_.files.places()};
+  const pugi::xml_node submesh = shape.child("submesh");
+  const std::string name = value_of(submesh, "name");
+  std::vector<const FileMesh*> shown;
+  for (const FileMesh& part : meshes_.read(*path)) {
+    if (name.empty() || part.node == name || part.geometry == name) shown.push_back(&part);
+  }
+  if (shown.empty()) throw Unusable{path->string() + " has no part " + in_quotes(name)};
+  const auto scale = read_size(shape, "scale", 3, 1.0);
+  Affine3 world_from_mesh = world_from_visual * Affine3::scaling(scale[0], scale[1], scale[2]);
+  const std::string centre = value_of(submesh, "center");
+  if (!name.empty() && (centre == "true" || centre == "1"))
+    world_from_mesh = world_from_mesh * centre_parts(shown);
+  for (const FileMesh* part : shown) {
+    place_mesh(context_.scene, part->mesh, world_from_mesh, origin.object,
+               get_or_add_material(*part, visual, origin));
+  }
+}
+
+// Models that stand there many times share their materials, unless the visual changes them.
+int SdfVisuals::get_or_add_material(const FileMesh& part, pugi::xml_node visual,
+                                    const SdfOrigin& origin) {
+  const bool is_shared = !visual.child("material");
+  if (const auto known = materials_.find(&part); is_shared && known != materials_.end())
+    return known->second;
+  context_.scene.materials.push_back(dress(part.material, visual, origin));
+  const int index = static_cast<int>(context_.scene.materials.size()) - 1;
+  if (is_shared) materials_.emplace(&part, index);
+  return index;
+}
+
+// The material of a mesh with what the visual's <material> says on top.
+Material SdfVisuals::dress(Material material, pugi::xml_node visual, const SdfOrigin& origin) {
+  const pugi::xml_node said = visual.child("material");
+  if (!said) return material;
+  if (const auto diffuse = read_colour(said, "diffuse")) {
+    material.colour = *diffuse;
+  } else if (const auto ambient = read_colour(said, "ambient")) {
+    material.colour = *ambient;
+  }
+  if (const auto emissive = read_colour(said, "emissive")) shine(material, *emissive);
+  apply_script(material, said, origin);
+  for (const pugi::xml_node& workflow : said.child("pbr"))
+    set_texture(material, value_of(workflow, "albedo_map"), origin);
+  return material;
+}
+
+void SdfVisuals::set_texture(Material& material, const std::string& written,
+                             const SdfOrigin& origin) {
+  if (written.empty()) return;
+  const auto path = context_.find(written, origin);
+  const auto texture =
+      context_.textures.find(path ? fs::absolute(*path).string() : written, origin.directory);
+  if (!texture) return;
+  material.texture = texture;
+  material.colour = {1.0F, 1.0F, 1.0F};
+}
+
+void SdfVisuals::apply_script(Material& material, pugi::xml_node said, const SdfOrigin& origin) {
+  const pugi::xml_node script = said.child("script");
+  std::string name = value_of(script, "name");
+  if (name.empty()) name = value_of(said, "script");
+  if (name.empty()) return;
+  std::vector<fs::path> places;
+  for (const pugi::xml_node& uri : (script ? script : said).children("uri")) {
+    if (const auto found = context_.files.resolve(text_of(uri), origin.directory))
+      places.push_back(found->path);
+  }
+  // Models list the folders of their scripts and textures as several <uri>; they lie side by side.
+  places.push_back(origin.directory / "materials/scripts");
+  const auto known = find_script_material(name, places);
+  if (!known) {
+    context_.warn(origin.object, "material script " + in_quotes(name) +
+                                     " was not found; a plain colour is shown instead");
+    return;
+  }
+  material = Material{};
+  if (known->diffuse) material.colour = *known->diffuse;
+  if (known->emissive) shine(material, *known->emissive);
+  set_texture(material, known->texture, {known->texture_directory, origin.object});
+}
+
+}  // namespace panonav::simulation

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "panonav_simulation/internal/mesh_library.hpp"
+#include "panonav_simulation/internal/sdf_context.hpp"
+
+namespace panonav::simulation {
+
+/// Adds the visuals of a Gazebo world to its scene: shapes, mesh files and their materials.
+class SdfVisuals {
+ public:
+  /// `context` outlives *this.
+  explicit SdfVisuals(SdfContext& context) : context_(context), meshes_(context.textures) {}
+
+  /// Adds what a <visual> shows. Throws Unusable, Error.
+  void add(pugi::xml_node visual, const Affine3& world_from_visual, const SdfOrigin& origin);
+
+  /// Numbers of the scene's meshes that are planes.
+  [[nodiscard]] const std::vector<std::size_t>& planes() const { return planes_; }
+
+ private:
+  void add_shape(pugi::xml_node shape, pugi::xml_node visual, const Affine3& world_from_visual,
+                 const SdfOrigin& origin);
+  void add_mesh_file(pugi::xml_node shape, pugi::xml_node visual, const Affine3& world_from_visual,
+                     const SdfOrigin& origin);
+  int get_or_add_material(const FileMesh& part, pugi::xml_node visual, const SdfOrigin& origin);
+  Material dress(Material material, pugi::xml_node visual, const SdfOrigin& origin);
+  void set_texture(Material& material, const std::string& written, const SdfOrigin& origin);
+  void apply_script(Material& material, pugi::xml_node said, const SdfOrigin& origin);
+
+  SdfContext& context_;
+  MeshLibrary meshes_;
+  std::map<const FileMesh*, int> materials_;
+  std::vector<std::size_t> planes_;
+};
+
+}  // namespace panonav::simulation
