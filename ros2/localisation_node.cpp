@@ -465,7 +465,7 @@ struct LocalisationNode::Implementation {
     last_seen = std::move(seen);
     if (localised) poses.publish(pose_message(moment, stamp_ns, setup.frames.map));
     if (particles.subscribers() > 0) {
-      moment.particles = even_sample(tracker->localiser().particles(), shown_particles);
+      moment.particles = resample_systematically(tracker->localiser().particles(), shown_particles);
       particles.publish(poses_message(moment.particles, stamp_ns, setup.frames.map));
     }
     if (best_matches.subscribers() > 0) {

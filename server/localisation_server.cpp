@@ -22,8 +22,10 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav/localisation/place.hpp"
+#include "panonav/memory/view_index.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
-#include "panonav/pipeline/searched_recogniser.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
 #include "panonav/storage/memory_address.hpp"
 #include "panonav/storage/memory_changes.hpp"
 #include "panonav/storage/memory_file.hpp"
@@ -129,17 +131,10 @@ class MemoryWatch {
 /// A memory as it was read: held, or searched where it lies.
 struct LoadedMemory {
   LoadedMemory(const std::filesystem::path& path_, const LocalisationServerOptions& options)
-      : path(path_), file(MemoryFile::open(path, Access::read_only)) {
-    if (is_server_address(path) && file.views().size() > options.max_held_views) {
-      searched.emplace(path, PlaceRecogniserOptions{.localiser = options.localiser});
-    } else {
-      held.emplace(file, PlaceRecogniserOptions{.localiser = options.localiser});
-    }
-  }
-  [[nodiscard]] std::size_t size() const { return held ? held->memory().size() : searched->size(); }
-  [[nodiscard]] Place localise(const Observation& seen) const {
-    return held ? held->localise(seen) : searched->localise(seen);
-  }
+      : path(path_),
+        file(MemoryFile::open(path, Access::read_only)),
+        recogniser(path,
+                   {.localiser = options.localiser, .max_held_views = options.max_held_views}) {}
   /// A file that is open, also after its server was away.
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> thumbnail(const std::string& view) {
     const auto read = [&]() -> std::optional<std::vector<std::uint8_t>> {
@@ -149,15 +144,14 @@ struct LoadedMemory {
     try {
       return read();
     } catch (const FileError&) {
-      if (!searched) throw;
+      if (recogniser.is_held()) throw;
     }
     file = MemoryFile::open(path, Access::read_only);
     return read();
   }
   std::filesystem::path path;
   MemoryFile file;  // of the thread that speaks HTTP, once it is there
-  std::optional<PlaceRecogniser> held;
-  std::optional<SearchedRecogniser> searched;
+  PlaceRecogniser recogniser;
 };
 
 /// Counts how long something took, as Prometheus wants it.
@@ -377,7 +371,7 @@ struct LocalisationServer::Implementation {
     const auto memory = loaded(name);
     const SignatureShape& shape = memory->file.header().shape;
     return {{"name", name},
-            {"views", memory->size()},
+            {"views", memory->recogniser.size()},
             {"rows", shape.rows},
             {"components", shape.components}};
   }
@@ -420,7 +414,7 @@ struct LocalisationServer::Implementation {
     text += described("panonav_memory_views", "gauge", "Views of a memory.");
     for (const auto& [name, one] : served) {
       text += "panonav_memory_views{memory=\"" + name + "\"} " +
-              std::to_string(one.loaded->size()) + "\n";
+              std::to_string(one.loaded->recogniser.size()) + "\n";
     }
     text += search_metrics();
     text += described("panonav_memory_reloads_total", "counter",
@@ -441,24 +435,24 @@ struct LocalisationServer::Implementation {
                                 const std::string& help, const auto& value) {
       std::string lines;
       for (const auto& [memory, one] : served) {
-        if (!one.loaded->searched) continue;
-        lines += name + "{memory=\"" + memory + "\"} " + value(*one.loaded->searched) + "\n";
+        if (one.loaded->recogniser.is_held()) continue;
+        lines += name + "{memory=\"" + memory + "\"} " + value(one.loaded->recogniser) + "\n";
       }
       return lines.empty() ? lines : described(name, type, help) + lines;
     };
     return of_each("panonav_sketch_bytes", "gauge", "Bytes of sketches of a memory.",
-                   [](const SearchedRecogniser& of) { return std::to_string(of.bytes()); }) +
+                   [](const PlaceRecogniser& of) { return std::to_string(of.index_bytes()); }) +
            of_each("panonav_searches_total", "counter", "Exact searches in a memory on its server.",
-                   [](const SearchedRecogniser& of) {
-                     return std::to_string(of.counters().searches);
+                   [](const PlaceRecogniser& of) {
+                     return std::to_string(of.search_counters().searches);
                    }) +
            of_each("panonav_search_views_read_total", "counter",
                    "Views that searches read in full.",
-                   [](const SearchedRecogniser& of) {
-                     return std::to_string(of.counters().views_read);
+                   [](const PlaceRecogniser& of) {
+                     return std::to_string(of.search_counters().views_read);
                    }) +
            of_each("panonav_search_seconds_total", "counter", "Time that searches took.",
-                   [](const SearchedRecogniser& of) { return to_text(of.counters().seconds); });
+                   [](const PlaceRecogniser& of) { return to_text(of.search_counters().seconds); });
   }
 
   // ---- on the threads that answer
@@ -499,7 +493,7 @@ struct LocalisationServer::Implementation {
       const Observation seen(
           decode_image(std::span(bytes, job.picture.size()), "the picture", picture_limits));
       decoded = true;
-      const Place place = memory.localise(seen);
+      const Place place = memory.recogniser.localise(seen);
       known = place.known;
       ordered_json json{{"memory", job.memory}};
       json.update(place_json(place));
@@ -525,8 +519,8 @@ struct LocalisationServer::Implementation {
         const auto from = Clock::now();
         std::shared_ptr<LoadedMemory> again;
         std::string fault;
-        if (const auto searched = loaded(name); searched->searched) {
-          if (refresh(name, *searched->searched, fault)) {
+        if (const auto searched = loaded(name); !searched->recogniser.is_held()) {
+          if (refresh(name, searched->recogniser, fault)) {
             lock.lock();
             ++(fault.empty() ? one.reloads : one.failed_reloads);
             lock.unlock();
@@ -545,12 +539,12 @@ struct LocalisationServer::Implementation {
           pause = std::max(pause, std::chrono::duration_cast<std::chrono::milliseconds>(
                                       10 * (Clock::now() - from)));
           if (options.note) {
-            options.note(
-                name + ": " +
-                (again ? "the memory was changed; " + std::to_string(again->size()) + " views"
-                       : "the memory was changed and cannot be read; the memory stays as "
-                         "it was: " +
-                             fault));
+            options.note(name + ": " +
+                         (again ? "the memory was changed; " +
+                                      std::to_string(again->recogniser.size()) + " views"
+                                : "the memory was changed and cannot be read; the memory stays as "
+                                  "it was: " +
+                                      fault));
           }
         }
         lock.lock();
@@ -566,7 +560,7 @@ struct LocalisationServer::Implementation {
 
   /// Whether the memory was changed, or its server lost; then `fault` says why. A fault is told
   /// once, until the server is back.
-  bool refresh(const std::string& name, SearchedRecogniser& searched, std::string& fault) {
+  bool refresh(const std::string& name, PlaceRecogniser& searched, std::string& fault) {
     bool changed = false;
     try {
       changed = searched.refresh();

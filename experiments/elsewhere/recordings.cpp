@@ -15,6 +15,7 @@
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
 
 namespace panonav {
 

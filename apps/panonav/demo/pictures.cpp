@@ -30,7 +30,7 @@ MapPlot map_of_answers(const VisualMemory& memory, const std::vector<MapLayer>& 
   for (const auto& view : asked) {
     truth.crosses.push_back(view.truth.position());
     if (view.found.position) {
-      error.lines.push_back({view.truth.position(), view.found.position->position});
+      error.lines.push_back({view.truth.position(), view.found.position->position()});
     }
   }
   MapPlot map{.title = "The office from above", .layers = scene};

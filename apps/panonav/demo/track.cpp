@@ -127,7 +127,7 @@ DemoTrack show_track(const DemoOptions& options, const DemoRecordings& recording
   const VisualMemory& memory = tracker.memory();
   const std::size_t particles_kept = particles_shown(run.entries.size());
   const std::vector<Point2> at_first =
-      positions_of(even_sample(tracker.localiser().particles(), particles_kept));
+      positions_of(resample_systematically(tracker.localiser().particles(), particles_kept));
   std::vector<TrackedImage> images;
   RunPage played("A robot that is kidnapped", run.entries.size());
   const ShownReferences shown(memory);

@@ -56,10 +56,11 @@ TrackedImage track_image(Tracker& tracker, const PackedSignature& view,
   StageClock clock;
   image.estimate = tracker.observe(view);
   clock.stage("filter");
-  image.particles = even_sample(tracker.localiser().particles(), settings.particles_kept);
+  image.particles =
+      resample_systematically(tracker.localiser().particles(), settings.particles_kept);
   if (moment) {
     describe(*moment, image.estimate);
-    moment->particles = even_sample(tracker.localiser().particles(), 500);
+    moment->particles = resample_systematically(tracker.localiser().particles(), 500);
     if (moment->panorama) {
       if (settings.shown != nullptr) settings.shown->compare(*moment, tracker.memory(), view);
       const ViewId best = tracker.memory().search(view, {.top = 1}).matches.front().view;

@@ -120,9 +120,9 @@ std::optional<double> NeighbourSupport::supported_difference(
   return sum / ColumnProfiles::compared_columns;
 }
 
-void NeighbourSupport::put_best_supported_first(const ColumnProfiles& query,
-                                                std::vector<RankedMatch>& ranked,
-                                                std::span<const ViewId> excluded) const {
+void NeighbourSupport::rank_by_support(const ColumnProfiles& query,
+                                       std::vector<RankedMatch>& ranked,
+                                       std::span<const ViewId> excluded) const {
   if (ranked.empty() || sites_.empty()) return;
   const double limit = looked_at_share * ranked.front().score();
   const RankedMatch* chosen = nullptr;

@@ -173,7 +173,7 @@ std::array<double, place_features> features_of(const PlaceEvidence& evidence) no
 double place_probability(const PlaceEvidence& evidence) noexcept {
   if (evidence.views < 1 || !(evidence.chance > 0.0)) return 0.0;
   const double by_columns = 1.0 / (1.0 + std::exp(-log_odds_by_columns(evidence)));
-  if (!evidence.features || !leave_doubt(evidence)) return by_columns;
+  if (!evidence.features || !is_inconclusive(evidence)) return by_columns;
   constexpr std::array<double, doubtful_features> learnt{-2.99, 0.23, 3.10, 1.53};
   const FeatureEvidence& found = *evidence.features;
   if (learnt[0] + learnt[2] * log_share(found.seen, found.chance) <= 0.0) return by_columns;
@@ -182,7 +182,7 @@ double place_probability(const PlaceEvidence& evidence) noexcept {
   return 1.0 / (1.0 + std::exp(-z));
 }
 
-bool leave_doubt(const PlaceEvidence& evidence) noexcept {
+bool is_inconclusive(const PlaceEvidence& evidence) noexcept {
   if (evidence.views < 1 || !(evidence.chance > 0.0)) return false;
   static const double doubtful = std::log(0.98 / 0.02);
   return std::abs(log_odds_by_columns(evidence)) < doubtful;

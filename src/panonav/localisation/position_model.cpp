@@ -233,7 +233,7 @@ PositionModel learn_position_model(const ColumnRanking& ranking,
       excluded.push_back(other);
       std::erase_if(ranked, [&](const RankedMatch& match) { return match.match.view == other; });
     }
-    support.put_best_supported_first(ranking.profiles(view), ranked, excluded);
+    support.rank_by_support(ranking.profiles(view), ranked, excluded);
     // As in an answer, the nearest view must have a pose.
     const auto begins_posed = [&](std::span<const RankedMatch> matches) {
       return !matches.empty() && memory.info(matches[0].match.view).pose;
@@ -335,14 +335,16 @@ std::optional<PositionEstimate> interpolate_position(const ColumnRanking& rankin
   if (!nearest) return std::nullopt;
   PositionEstimate estimate;
   if (!model.learnt) {
-    estimate.position = nearest->position();
+    estimate.x_m = nearest->x_m;
+    estimate.y_m = nearest->y_m;
     estimate.shares = {{matches[0].match.view, 1.0}};
     return estimate;
   }
   const Neighbours neighbours = gather(ranking, matches);
   const Kriged kriged =
       krige(neighbours, model.neighbourhood_m, model.exponent, model.difference_unit);
-  estimate.position = kriged.position;
+  estimate.x_m = kriged.position.x_m;
+  estimate.y_m = kriged.position.y_m;
   estimate.radius_m =
       (is_surrounded(neighbours, model.spacing_m) ? model.radius_m_per_deviation
                                                   : model.edge_radius_m_per_deviation) *

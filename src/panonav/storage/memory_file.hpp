@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "panonav/mapping/topological_map.hpp"
+#include "panonav/memory/view_index.hpp"
 #include "panonav/memory/visual_memory.hpp"
 #include "panonav/panorama/picture.hpp"
 #include "panonav/panorama/picture_source.hpp"
@@ -42,14 +43,6 @@ struct NewView {
   PackedSignature signature;            ///< of the header's shape, packed with its full scale
   std::vector<std::uint8_t> thumbnail;  ///< a PNG or JPEG file for people to look at; empty: none
   std::vector<std::uint8_t> features;   ///< packed `LocalFeatures`; empty: none
-};
-
-/// A rectangle in the frame of the memory's positions.
-struct PositionBounds {
-  double min_x_m = 0.0,  ///< smallest x, included
-      max_x_m = 0.0;     ///< largest x, included
-  double min_y_m = 0.0,  ///< smallest y, included
-      max_y_m = 0.0;     ///< largest y, included
 };
 
 /// For what a memory file is opened.
