@@ -17,26 +17,26 @@ constexpr std::uint64_t seed_of_hard = 20'000;
 struct Rule {
   std::string id;
   std::string name;
-  ParticleInjection injection;
+  InjectionMethod injection;
 };
 
 const std::array<Rule, 4>& rules() {
   static const std::array<Rule, 4> all{
-      Rule{"none", "nothing injected", ParticleInjection::none},
-      Rule{"uniform", "50 injected anywhere", ParticleInjection::uniform},
-      Rule{"topological", "the paper's injection", ParticleInjection::topological},
-      Rule{"explained", "our rule of injection", ParticleInjection::explained}};
+      Rule{"none", "nothing injected", InjectionMethod::none},
+      Rule{"uniform", "50 injected anywhere", InjectionMethod::uniform},
+      Rule{"topological", "the paper's injection", InjectionMethod::topological},
+      Rule{"explained", "our rule of injection", InjectionMethod::explained}};
   return all;
 }
 
 void paper_rows(std::span<const RunSet> sets, Executor& executor, Reproduction& result) {
   for (const Rule& rule : {rules()[0], rules()[2]}) {
     FilterSetting setting = paper_setting();
-    setting.options.injection = rule.injection;
+    setting.injection = rule.injection;
     const auto runs = track_sets(sets, setting, seed_of_clean, executor);
     const std::string id = "m03.global.clean." + rule.id;
     const std::string name = "global localisation as the paper's, clean, " + rule.name;
-    const bool judged = rule.injection == ParticleInjection::none;
+    const bool judged = rule.injection == InjectionMethod::none;
     const auto target = [&](Target value) { return judged ? std::optional(value) : std::nullopt; };
     add_median(result, id + ".images",
                name + ": images until the error is below 25 cm from then on", "images",
@@ -57,8 +57,8 @@ void hard_rows(std::span<const RunSet> sets, const Rule& rule, std::span<const T
                Reproduction& result) {
   const std::string id = "m03.global.hard." + rule.id;
   const std::string name = "global localisation, heading unknown, compass on, hard, " + rule.name;
-  const bool judged = rule.injection == ParticleInjection::topological ||
-                      rule.injection == ParticleInjection::explained;
+  const bool judged = rule.injection == InjectionMethod::topological ||
+                      rule.injection == InjectionMethod::explained;
   const auto target = [&](Target value) { return judged ? std::optional(value) : std::nullopt; };
   const auto images = capped_images(runs, m03_spacing_m);
   add_median(result, id + ".images", name + ": images until the error is below 25 cm from then on",
@@ -92,9 +92,9 @@ void ratio_row(const Rule& rule, const std::vector<double>& with,
               ", over that with nothing injected (" + std::to_string(m03_most_images) +
               " for runs that need more)",
           mean_figure(saved), "",
-          rule.injection == ParticleInjection::uniform ? std::nullopt : std::optional(at_most(0.5)),
-          rule.injection == ParticleInjection::topological ? std::optional(std::pair{0.5, 0.6})
-                                                           : std::nullopt);
+          rule.injection == InjectionMethod::uniform ? std::nullopt : std::optional(at_most(0.5)),
+          rule.injection == InjectionMethod::topological ? std::optional(std::pair{0.5, 0.6})
+                                                         : std::nullopt);
 }
 
 }  // namespace
@@ -120,7 +120,7 @@ void reproduce_global_localisation(const TrackingReproductionOptions& options,
     const auto runs = track_sets(hard, compass_setting(rule.injection), seed_of_hard, executor);
     hard_rows(hard, rule, runs, result);
     const auto images = capped_images(runs, m03_spacing_m);
-    if (rule.injection == ParticleInjection::none) {
+    if (rule.injection == InjectionMethod::none) {
       without = images;
     } else {
       ratio_row(rule, images, without, result);
@@ -140,7 +140,7 @@ void reproduce_global_localisation(const TrackingReproductionOptions& options,
            "Global localisation with as many particles as references and nothing injected, heading "
            "unknown, hard ([M03] figure 7, 1 to 3).",
            particle_maps(*shown.hard.place, shown.furniture, shown.hard.runs.front(),
-                         compass_setting(ParticleInjection::none), seed_of_hard, steps,
+                         compass_setting(InjectionMethod::none), seed_of_hard, steps,
                          "Global localisation"),
            3);
 }

@@ -30,29 +30,29 @@ void reproduce_kidnapping(const TrackingReproductionOptions& options,
   std::vector<MapPlot> maps;
   std::vector<double> topological;
   for (const auto& [injection, id, name] :
-       {std::tuple{ParticleInjection::uniform, "uniform", "50 injected anywhere"},
-        {ParticleInjection::topological, "topological", "the paper's injection"},
-        {ParticleInjection::explained, "explained", "our rule of injection"}}) {
+       {std::tuple{InjectionMethod::uniform, "uniform", "50 injected anywhere"},
+        {InjectionMethod::topological, "topological", "the paper's injection"},
+        {InjectionMethod::explained, "explained", "our rule of injection"}}) {
     const FilterSetting setting = compass_setting(injection);
     const auto runs = track_sets(sets, setting, seed_of_kidnapping, executor);
     const std::string row = std::string("m03.kidnapped.hard.") + id;
     const std::string what = std::string("kidnapped, hard, ") + name;
-    const bool judged = injection != ParticleInjection::uniform;
+    const bool judged = injection != InjectionMethod::uniform;
     const auto target = [&](Target value) { return judged ? std::optional(value) : std::nullopt; };
     const auto images = capped_images(runs, m03_spacing_m, first_after);
     add_median(result, row + ".images",
                what + ": images until the error is below 25 cm from then on", "images", images,
                target(at_most(3.0)),
-               injection == ParticleInjection::topological ? std::optional(std::pair{3.0, 4.0})
-                                                           : std::nullopt);
+               injection == InjectionMethod::topological ? std::optional(std::pair{3.0, 4.0})
+                                                         : std::nullopt);
     tell_single_images(result.rows.back(), sets);
     add_mean(result, row + ".images_mean", what + ": images", "images", images);
     add_rate(result, row + ".within_8", what + ": runs localised within 8 images",
              localised_within(runs, m03_spacing_m, 8, first_after), runs.size(),
              target(at_least(0.99)));
     add_confidently_wrong(result, row + ".wrong", what, runs);
-    if (injection == ParticleInjection::topological) topological = images;
-    if (injection == ParticleInjection::explained) {
+    if (injection == InjectionMethod::topological) topological = images;
+    if (injection == InjectionMethod::explained) {
       std::vector<double> difference;
       for (std::size_t i = 0; i < images.size(); ++i) {
         difference.push_back(images[i] - topological[i]);

@@ -82,9 +82,9 @@ void reproduce_tracking_sweeps(const TrackingReproductionOptions& options,
   const std::vector<Kind> kinds{
       {"paper", "as the paper, clean", "as the paper, clean", &constant, paper_setting()},
       {"topological", "compass and the paper's injection, hard", "paper's injection, hard", &hard,
-       compass_setting(ParticleInjection::topological)},
+       compass_setting(InjectionMethod::topological)},
       {"explained", "compass and our rule of injection, hard", "our rule, hard", &hard,
-       compass_setting(ParticleInjection::explained)}};
+       compass_setting(InjectionMethod::explained)}};
   std::vector<Curve> particles;
   std::vector<Curve> odometry;
   for (const Kind& kind : kinds) {

@@ -17,7 +17,7 @@ constexpr std::size_t first_after_blind = images_before_blind + blind_steps;
 constexpr std::uint64_t seed_of_tracking = 30'000;
 
 // "Large odometric errors": 20 % of the distance and 10 degrees a metre.
-FilterSetting large_error_setting(ParticleInjection injection) {
+FilterSetting large_error_setting(InjectionMethod injection) {
   FilterSetting setting = compass_setting(injection);
   setting.odometry.translation_from_translation = 0.05;
   setting.odometry.translation_scale_error = 0.2;
@@ -48,9 +48,9 @@ void reproduce_position_tracking(const TrackingReproductionOptions& options,
                   .series = {},
                   .x_range = std::pair{0.5, 5.5}};
   for (const auto& [injection, id, name] :
-       {std::tuple{ParticleInjection::topological, "topological", "the paper's injection"},
-        {ParticleInjection::explained, "explained", "our rule of injection"},
-        {ParticleInjection::none, "none", "nothing injected"}}) {
+       {std::tuple{InjectionMethod::topological, "topological", "the paper's injection"},
+        {InjectionMethod::explained, "explained", "our rule of injection"},
+        {InjectionMethod::none, "none", "nothing injected"}}) {
     const auto runs = track_sets(sets, large_error_setting(injection), seed_of_tracking, executor);
     const std::string row = std::string("m03.tracking.hard.") + id;
     const std::string what = std::string(
@@ -72,7 +72,7 @@ void reproduce_position_tracking(const TrackingReproductionOptions& options,
     }
     add_rate(result, row + ".back_2", what + ": error below 25 cm at the first or second image",
              back, known.size(),
-             injection == ParticleInjection::none ? std::nullopt : std::optional(at_least(0.99)));
+             injection == InjectionMethod::none ? std::nullopt : std::optional(at_least(0.99)));
     tell_single_images(result.rows.back(), sets);
     add_rate(result, row + ".back_2_for_good",
              what + ": error below 25 cm within 2 images and from then on",
@@ -95,7 +95,7 @@ void reproduce_position_tracking(const TrackingReproductionOptions& options,
       "Position tracking: before, at the end of, and one image after 2 m without images ([M03] "
       "figure 7, 4 to 6).",
       particle_maps(*sets.front().place, offices.front().furniture, sets.front().runs.front(),
-                    large_error_setting(ParticleInjection::explained), seed_of_tracking, steps,
+                    large_error_setting(InjectionMethod::explained), seed_of_tracking, steps,
                     "Tracking"),
       3);
 }

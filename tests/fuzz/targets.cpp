@@ -20,7 +20,9 @@
 #include "panonav/io/recording.hpp"
 #include "panonav/io/ros_messages.hpp"
 #include "panonav/io/trajectory_file.hpp"
+#include "panonav/mapping/topological_map.hpp"
 #include "panonav/panorama/preprocessing.hpp"
+#include "panonav/route/route_panorama.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "support/temporary_folder.hpp"
 #ifdef PANONAV_FUZZ_WORLDS

@@ -11,6 +11,7 @@
 #include "panonav/io/live_pictures.hpp"
 #include "panonav/io/recorded_dataset.hpp"
 #include "panonav/io/video_file.hpp"
+#include "panonav/route/route_panorama.hpp"
 #include "panonav/storage/memory_file.hpp"
 
 namespace panonav::command {

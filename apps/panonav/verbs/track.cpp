@@ -418,13 +418,6 @@ Run declare_track(Arguments& arguments) {
   arguments.options("monte_carlo", wanted->filter);
   arguments.options("odometry", wanted->odometry, "odometry");
   arguments.common({"--seed"});
-  const auto injects = [wanted](ParticleInjection way) {
-    return [wanted, way] { return wanted->filter.injection == way; };
-  };
-  arguments.used_only({"--injection-share"}, injects(ParticleInjection::topological),
-                      "without --injection topological");
-  arguments.used_only({"--injection-number"}, injects(ParticleInjection::uniform),
-                      "without --injection uniform");
   return [wanted, &arguments](Session& session) { return track_run(arguments, *wanted, session); };
 }
 

@@ -38,7 +38,8 @@ bool FeatureTrial::is_significantly_better() const {
 
 FeatureTrial try_features(const ColumnRanking& ranking, const NeighbourSupport& support,
                           const FeatureSource& features) {
-  constexpr int max_sampled = 100;  // as of the other models
+  constexpr int max_sampled = 100;  // views left out in turn; chosen: 3 ms each
+  // Up to this ratio of its distance to that of the nearest view, a match is right. Chosen.
   constexpr double right_ratio = 1.5;
   const VisualMemory& memory = ranking.memory();
   const std::span<const ViewId> views = memory.views();

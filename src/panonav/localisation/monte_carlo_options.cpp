@@ -14,13 +14,8 @@ void visit_options(MonteCarloOptions& options, OptionVisitor& visitor) {
       option<&T::resample_below>(
           "effective sample size below which particles are resampled, as a share of them", 0, 1),
       option<&T::compass>("weigh headings by the visual compass"),
-      choice<&T::injection>("where new particles are drawn", "none", "uniform", "topological",
-                            "explained")
+      choice<&T::injection>("where new particles are drawn", "none", "explained")
           .formerly("redraw"),
-      option<&T::injection_share>("share of particles injected by 'topological'", 0, 1)
-          .formerly("redraw_share"),
-      option<&T::injection_number>("particles injected by 'uniform'", 0, 1e7)
-          .formerly("redraw_number"),
       option<&T::reranked_views>(
           "views compared column by column when no near one explains the picture", 0, 1e6)
           .formerly("compared_views"),

@@ -10,15 +10,16 @@
 #include <string_view>
 #include <vector>
 
-#include "panonav/mapping/topological_map.hpp"
 #include "panonav/memory/view_index.hpp"
 #include "panonav/memory/visual_memory.hpp"
 #include "panonav/panorama/picture.hpp"
 #include "panonav/panorama/picture_source.hpp"
 #include "panonav/panorama/preprocessing.hpp"
-#include "panonav/route/route_panorama.hpp"
 
 namespace panonav {
+
+class RoutePanorama;
+struct TopologicalMap;
 
 /// What a memory file says of all its views: how a picture becomes a signature that can be compared
 /// with them. Fixed when the file is made.
