@@ -16,6 +16,7 @@
 #include "panonav/pipeline/learnt_models.hpp"
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
 
 namespace {
 

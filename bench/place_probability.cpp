@@ -54,7 +54,7 @@ constexpr std::size_t asked_of_others = 6;
 constexpr std::size_t asked_of_variants = 20;
 
 enum class Whose { own, variant, other };
-struct Place {
+struct BuiltPlace {
   std::size_t kind;
   simulation::PlaceRecording recording;
   std::vector<simulation::PlacedView> disturbed;
@@ -89,7 +89,7 @@ PackedSignature truncated(PackedSignature view, SignatureShape shape) {
   return view;
 }
 
-std::vector<Sample> ask(const std::vector<Place>& places, const Place& place,
+std::vector<Sample> ask(const std::vector<BuiltPlace>& places, const BuiltPlace& place,
                         const Remembering& how, Executor& executor) {
   Random random(place.recording.seed, how.one_of);
   std::vector<Point2> kept;
@@ -113,7 +113,7 @@ std::vector<Sample> ask(const std::vector<Place>& places, const Place& place,
     bool for_features = false;
   };
   std::vector<Query> asked;
-  for (const Place& other : places) {
+  for (const BuiltPlace& other : places) {
     for (const bool disturbed : {false, true}) {
       const auto* const views = disturbed ? &other.disturbed : &other.recording.queries;
       for (std::size_t i = 0; i < views->size(); ++i) {
@@ -253,7 +253,7 @@ void report(const char* title, const std::vector<Sample>& samples, const Probabi
 
 int main() {
   Executor executor;
-  std::vector<Place> places;
+  std::vector<BuiltPlace> places;
   for (std::size_t k = 0; k < kinds.size(); ++k) {
     for (std::size_t v = 0; v < kinds[k].spacings_m.size(); ++v) {
       simulation::PlaceRecording recording =
@@ -273,7 +273,7 @@ int main() {
   std::vector<Sample> for_columns;
   std::vector<Sample> for_features;
   for (std::size_t h = 0; h < rememberings.size(); ++h) {
-    for (const Place& place : places) {
+    for (const BuiltPlace& place : places) {
       const auto more = ask(places, place, rememberings[h], executor);
       samples[h].insert(samples[h].end(), more.begin(), more.end());
     }

@@ -50,9 +50,10 @@ class RememberedPlace {
         localiser_(place_.localiser()) {
     const FeatureSource source = [kept = features_](ViewId view) { return kept->at(view); };
     const NeighbourSupport support(*place_.ranking());
-    localiser_.use_features(source, try_features(*place_.ranking(), support, source).tell_more());
+    localiser_.use_features(
+        source, try_features(*place_.ranking(), support, source).is_significantly_better());
   }
-  [[nodiscard]] Localisation localise(const Panorama& view) const {
+  [[nodiscard]] Place localise(const Panorama& view) const {
     return localiser_.localise(signature_for(view, place_.memory()), {}, features_of_query(view));
   }
   [[nodiscard]] const TrackingPlace& place() const noexcept { return place_; }
@@ -166,18 +167,17 @@ DayAnswers ask(const RememberedPlace& remembered, const std::vector<simulation::
   DayAnswers result;
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (!answers[i].known || !answers[i].position) continue;
-    const double error_m = distance(answers[i].position->position, views[i].pose.position());
+    const double error_m = distance(answers[i].position->position(), views[i].pose.position());
     result.errors_m.push_back(error_m);
     ++(error_m <= spacing_m ? result.right : result.wrong);
   }
   return result;
 }
 
-RunView run_view(const Pose2& odometry, const PackedSignature& signature,
-                 const Localisation& answer) {
+RunView run_view(const Pose2& odometry, const PackedSignature& signature, const Place& answer) {
   RunView view{odometry, signature, answer.known_probability, std::nullopt, std::nullopt};
   if (answer.position && answer.heading_rad) {
-    const Point2 at = answer.position->position;
+    const Point2 at = answer.position->position();
     view.pose = Pose2{at.x_m, at.y_m, *answer.heading_rad};
     view.radius_m = answer.position->radius_m;
   }

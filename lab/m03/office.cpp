@@ -26,22 +26,22 @@ constexpr std::size_t blind_steps = 8;  // of 0.25 m: 2 m
 constexpr std::size_t first_after_blind = images_before_blind + blind_steps;
 
 struct Rule {
-  ParticleInjection injection;
+  InjectionMethod injection;
   std::string id;
   std::string name;
 };
-const Rule no_injection{ParticleInjection::none, "none", "nothing injected"};
-const Rule uniform_injection{ParticleInjection::uniform, "uniform", "50 injected anywhere"};
-const Rule paper_injection{ParticleInjection::topological, "topological", "the paper's injection"};
-const Rule own_injection{ParticleInjection::explained, "explained", "our rule of injection"};
+const Rule no_injection{InjectionMethod::none, "none", "nothing injected"};
+const Rule anywhere_injection{InjectionMethod::uniform, "uniform", "50 injected anywhere"};
+const Rule paper_injection{InjectionMethod::topological, "topological", "the paper's injection"};
+const Rule own_injection{InjectionMethod::explained, "explained", "our rule of injection"};
 
 void add_paper_rows(const TrackingExperiments& m03) {
   const auto sets = m03.sets_of(&OfficeRuns::constant_heading);
   for (const Rule& rule : {no_injection, paper_injection}) {
     FilterSetting setting = paper_setting();
-    setting.options.injection = rule.injection;
+    setting.injection = rule.injection;
     const auto runs = m03.track(sets, setting, seed_of_clean);
-    const bool is_papers = rule.injection == ParticleInjection::none;
+    const bool is_papers = rule.injection == InjectionMethod::none;
     const RunRows rows{.result = m03.result,
                        .id = "m03.global.clean." + rule.id,
                        .what = "global localisation as the paper's, clean, " + rule.name,
@@ -63,8 +63,8 @@ void add_hard_rows(const TrackingExperiments& m03, std::span<const RunSet> sets,
                      .what = "global localisation, heading unknown, compass on, hard, " + rule.name,
                      .sets = sets,
                      .runs = runs,
-                     .judged = rule.injection == ParticleInjection::topological ||
-                               rule.injection == ParticleInjection::explained};
+                     .judged = rule.injection == InjectionMethod::topological ||
+                               rule.injection == InjectionMethod::explained};
   rows.add_images(at_most(4.0));
   rows.add_images_mean();
   rows.add_within(10, at_least(0.99));
@@ -93,13 +93,13 @@ void add_ratio_row(const Rule& rule, const std::vector<double>& with,
               ", over that with nothing injected (" + std::to_string(m03_most_images) +
               " for runs that need more)",
           mean_figure(saved), "",
-          rule.injection == ParticleInjection::uniform ? std::nullopt : std::optional(at_most(0.5)),
-          rule.injection == ParticleInjection::topological ? std::optional(std::pair{0.5, 0.6})
-                                                           : std::nullopt);
+          rule.injection == InjectionMethod::uniform ? std::nullopt : std::optional(at_most(0.5)),
+          rule.injection == InjectionMethod::topological ? std::optional(std::pair{0.5, 0.6})
+                                                         : std::nullopt);
 }
 
 // "Large odometric errors": 20 % of the distance and 10 degrees a metre.
-FilterSetting large_error_setting(ParticleInjection injection) {
+FilterSetting large_error_setting(InjectionMethod injection) {
   FilterSetting setting = compass_setting(injection);
   setting.odometry.translation_from_translation = 0.05;
   setting.odometry.translation_scale_error = 0.2;
@@ -133,10 +133,9 @@ void add_tracking_rows(const TrackingExperiments& m03, std::span<const RunSet> s
   const auto is_back = [](const TrackedRun& run) {
     return images_until_first_right(run, m03_spacing_m, first_after_blind).value_or(3) <= 2;
   };
-  add_rate(
-      m03.result, row + ".back_2", what + ": error below 25 cm at the first or second image",
-      count_where(known, is_back), known.size(),
-      rule.injection == ParticleInjection::none ? std::nullopt : std::optional(at_least(0.99)));
+  add_rate(m03.result, row + ".back_2", what + ": error below 25 cm at the first or second image",
+           count_where(known, is_back), known.size(),
+           rule.injection == InjectionMethod::none ? std::nullopt : std::optional(at_least(0.99)));
   const RunRows rows{.result = m03.result, .id = row, .what = what, .sets = sets, .runs = runs};
   rows.tell_single_images();
   add_rate(m03.result, row + ".back_2_for_good",
@@ -156,14 +155,14 @@ void add_kidnapping_rows(const TrackingExperiments& m03, std::span<const RunSet>
                      .sets = sets,
                      .runs = runs,
                      .first_step = m03_images_before_kidnapping,
-                     .judged = rule.injection != ParticleInjection::uniform};
-  rows.add_images(at_most(3.0), rule.injection == ParticleInjection::topological
+                     .judged = rule.injection != InjectionMethod::uniform};
+  rows.add_images(at_most(3.0), rule.injection == InjectionMethod::topological
                                     ? std::optional(std::pair{3.0, 4.0})
                                     : std::nullopt);
   rows.add_images_mean();
   rows.add_within(8, at_least(0.99));
   rows.add_wrong();
-  if (rule.injection != ParticleInjection::explained) return;
+  if (rule.injection != InjectionMethod::explained) return;
   std::vector<double> difference = capped_images(runs, m03_spacing_m, rows.first_step);
   for (std::size_t i = 0; i < difference.size(); ++i) difference[i] -= images_of_paper[i];
   add_row(m03.result, rows.id + ".images_less",
@@ -267,11 +266,11 @@ void TrackingExperiments::reproduce_global_localisation() {
       .log_y = true,
       .x_range = std::pair{0.5, 15.5}};
   std::vector<double> without;
-  for (const Rule& rule : {no_injection, uniform_injection, paper_injection, own_injection}) {
+  for (const Rule& rule : {no_injection, anywhere_injection, paper_injection, own_injection}) {
     const auto runs = track(hard, compass_setting(rule.injection), seed_of_hard);
     add_hard_rows(*this, hard, rule, runs);
     const auto images = capped_images(runs, m03_spacing_m);
-    if (rule.injection == ParticleInjection::none) {
+    if (rule.injection == InjectionMethod::none) {
       without = images;
     } else {
       add_ratio_row(rule, images, without, result);
@@ -289,7 +288,7 @@ void TrackingExperiments::reproduce_global_localisation() {
            "Global localisation with as many particles as references and nothing injected, heading "
            "unknown, hard ([M03] figure 7, 1 to 3).",
            particle_maps(*shown.hard.place, shown.furniture, shown.hard.runs.front(),
-                         compass_setting(ParticleInjection::none), seed_of_hard, steps,
+                         compass_setting(InjectionMethod::none), seed_of_hard, steps,
                          "Global localisation"),
            3);
 }
@@ -326,7 +325,7 @@ void TrackingExperiments::reproduce_position_tracking() {
       "Position tracking: before, at the end of, and one image after 2 m without images ([M03] "
       "figure 7, 4 to 6).",
       particle_maps(*sets.front().place, offices.front().furniture, sets.front().runs.front(),
-                    large_error_setting(ParticleInjection::explained), seed_of_tracking, steps,
+                    large_error_setting(InjectionMethod::explained), seed_of_tracking, steps,
                     "Tracking"),
       3);
 }
@@ -341,10 +340,10 @@ void TrackingExperiments::reproduce_kidnapping() {
                           .x_range = std::pair{0.5, 15.5}};
   std::vector<viewer::MapPlot> maps;
   std::vector<double> images_of_paper;
-  for (const Rule& rule : {uniform_injection, paper_injection, own_injection}) {
+  for (const Rule& rule : {anywhere_injection, paper_injection, own_injection}) {
     const FilterSetting setting = compass_setting(rule.injection);
     const auto runs = track(sets, setting, seed_of_kidnapping);
-    if (rule.injection == ParticleInjection::topological) {
+    if (rule.injection == InjectionMethod::topological) {
       images_of_paper = capped_images(runs, m03_spacing_m, first);
     }
     add_kidnapping_rows(*this, sets, rule, runs, images_of_paper);
@@ -382,9 +381,9 @@ void TrackingExperiments::reproduce_sweeps() {
        {Kind{"paper", "as the paper, clean", "as the paper, clean",
              sets_of(&OfficeRuns::constant_heading), paper_setting()},
         Kind{"topological", "compass and the paper's injection, hard", "paper's injection, hard",
-             hard, compass_setting(ParticleInjection::topological)},
+             hard, compass_setting(InjectionMethod::topological)},
         Kind{"explained", "compass and our rule of injection, hard", "our rule, hard", hard,
-             compass_setting(ParticleInjection::explained)}}) {
+             compass_setting(InjectionMethod::explained)}}) {
     const auto try_out = [&](const std::string& id, const std::string& what, std::uint64_t seed,
                              const FilterSetting& setting, double x, SweepCurve& curve) {
       const auto runs = track(kind.sets, setting, seed);

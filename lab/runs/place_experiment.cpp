@@ -29,7 +29,7 @@ class AskedPlace {
   AskedPlace& operator=(const AskedPlace&) = delete;
 
   [[nodiscard]] const VisualMemory& memory() const noexcept { return memory_; }
-  [[nodiscard]] Localisation ask(const Panorama& view) const {
+  [[nodiscard]] Place ask(const Panorama& view) const {
     return localiser_.localise(signature_for(view, memory_), {}, features_of_query(view));
   }
 
@@ -68,7 +68,7 @@ std::vector<PlaceResult> run_place_experiment(const simulation::PlaceRecording& 
   std::uint64_t seed = place.seed * 1000003U;
   for (const PlaceCondition& condition : conditions) {
     const std::size_t asked = place.queries.size();
-    std::vector<Localisation> answers(asked);
+    std::vector<Place> answers(asked);
     executor.for_chunks(asked, 1, [&](std::size_t begin, std::size_t, std::size_t) {
       Executor here(1);
       const simulation::FrameOptions frame{.camera_height_m = place.scene.camera_height_m,
@@ -88,8 +88,8 @@ std::vector<PlaceResult> run_place_experiment(const simulation::PlaceRecording& 
     std::vector<double> position_errors;
     for (std::size_t i = 0; i < asked; ++i) {
       const Pose2& truth = place.queries[i].pose;
-      const Localisation& answer = answers[i];
-      const LocalisedMatch& best = answer.matches.at(0);
+      const Place& answer = answers[i];
+      const PlaceMatch& best = answer.matches.at(0);
       const ReferencePose& found = *remembered.memory().info(best.view).pose;
       const Point2 wanted =
           place.references[place.nearest_reference(truth.position())].pose.position();
@@ -97,12 +97,12 @@ std::vector<PlaceResult> run_place_experiment(const simulation::PlaceRecording& 
       next += is_neighbour(found.position(), wanted, place.spacing_m) ? 1 : 0;
       known += answer.known ? 1 : 0;
       // No reading is as wrong as can be.
-      heading_errors.push_back(
-          best.compass ? std::abs(angle_difference(*found.heading_rad + best.compass->heading_rad,
-                                                   truth.heading_rad))
-                       : std::numbers::pi);
+      heading_errors.push_back(best.heading_rad
+                                   ? std::abs(angle_difference(
+                                         *found.heading_rad + *best.heading_rad, truth.heading_rad))
+                                   : std::numbers::pi);
       if (!answer.position) continue;
-      position_errors.push_back(distance(answer.position->position, truth.position()));
+      position_errors.push_back(distance(answer.position->position(), truth.position()));
       inside += position_errors.back() <= answer.position->radius_m.value_or(0.0) ? 1 : 0;
     }
     results.push_back({condition.name, success_rate(nearest, asked), success_rate(next, asked),

@@ -13,7 +13,7 @@ namespace panonav::lab {
 FilterSetting paper_setting() {
   FilterSetting setting;
   setting.options.compass = false;
-  setting.options.injection = ParticleInjection::none;
+  setting.injection = InjectionMethod::none;
   setting.particles_per_reference = 1.0;
   setting.odometry.drive = DriveKind::holonomic;
   setting.told_odometry.drive = DriveKind::holonomic;
@@ -21,9 +21,9 @@ FilterSetting paper_setting() {
   return setting;
 }
 
-FilterSetting compass_setting(ParticleInjection injection) {
+FilterSetting compass_setting(InjectionMethod injection) {
   FilterSetting setting;
-  setting.options.injection = injection;
+  setting.injection = injection;
   setting.particles_per_reference = 1.0;
   return setting;
 }
@@ -33,6 +33,8 @@ TrackedRun track_run(const TrackingPlace& place, const TrackingRun& run,
                      const StepObserver& observer) {
   MonteCarloOptions options = setting.options;
   options.seed = static_cast<int>(seed % 1000000007U);
+  options.injection = setting.injection == InjectionMethod::explained ? ParticleInjection::explained
+                                                                      : ParticleInjection::none;
   if (setting.particles_per_reference) {
     const double wanted =
         *setting.particles_per_reference * static_cast<double>(place.memory().size());
@@ -40,6 +42,7 @@ TrackedRun track_run(const TrackingPlace& place, const TrackingRun& run,
         std::max(1, static_cast<int>(std::lround(wanted)));
   }
   MonteCarloLocaliser filter(place.ranking(), place.model(), options, setting.told_odometry);
+  use_injection(filter, setting.injection, place.ranking());
   if (setting.heading_known && !run.steps.empty()) {
     filter.start_anywhere(run.steps.front().truth.heading_rad);
   }

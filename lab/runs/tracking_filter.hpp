@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "lab/runs/injection_rules.hpp"
 #include "lab/runs/tracking_run.hpp"
 #include "panonav/core/executor.hpp"
 #include "panonav/localisation/monte_carlo.hpp"
@@ -37,7 +38,8 @@ using TrackedRun = std::vector<TrackedImage>;
 
 /// A filter and the robot that it runs on.
 struct FilterSetting {
-  MonteCarloOptions options;  ///< but for the seed, which each run has of its own
+  MonteCarloOptions options;  ///< but for the injection, and the seed that each run has of its own
+  InjectionMethod injection = InjectionMethod::explained;
   /// As many particles as this times the references, at all times; empty: as the options say.
   std::optional<double> particles_per_reference;
   OdometryNoise odometry;       ///< of the robot
@@ -49,7 +51,7 @@ struct FilterSetting {
 /// references, nothing injected.
 [[nodiscard]] FilterSetting paper_setting();
 /// Heading unknown, compass on, differential drive, as many particles as references.
-[[nodiscard]] FilterSetting compass_setting(ParticleInjection injection);
+[[nodiscard]] FilterSetting compass_setting(InjectionMethod injection);
 
 /// Called after each step, also those without an image.
 using StepObserver = std::function<void(std::size_t step, const MonteCarloLocaliser& filter,

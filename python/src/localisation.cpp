@@ -1,11 +1,14 @@
 #include "bindings.hpp"
 #include "memories.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/localisation/hierarchical.hpp"
 #include "panonav/pipeline/memory_learner.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
 #include "panonav/pipeline/tracker.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
 #include "panonav/pipeline/visual_motion.hpp"
+#include "panonav/storage/memory_file.hpp"
 #include "recordings.hpp"
 
 namespace panonav::python {
@@ -30,10 +33,11 @@ void bind_places(py::module_& m) {
       .field("verified_features", &PlaceMatch::verified_features,
              "Local features that agree; None where they do not decide.")
       .field("heading_rad", &PlaceMatch::heading_rad, "Of the robot relative to this view.");
-  Record<PlacePosition>(m, "PlacePosition", "A position and how far off it may be.")
-      .field("x_m", &PlacePosition::x_m, "Along the x axis of the frame of the memory's positions.")
-      .field("y_m", &PlacePosition::y_m, "Along its y axis.")
-      .field("radius_m", &PlacePosition::radius_m,
+  Record<PositionEstimate>(m, "PlacePosition", "A position and how far off it may be.")
+      .field("x_m", &PositionEstimate::x_m,
+             "Along the x axis of the frame of the memory's positions.")
+      .field("y_m", &PositionEstimate::y_m, "Along its y axis.")
+      .field("radius_m", &PositionEstimate::radius_m,
              "The true position lies within it in 95 % of the cases.");
   Record<Circle>(m, "Circle", "A circle.")
       .field(

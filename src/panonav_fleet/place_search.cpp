@@ -14,10 +14,10 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/executor.hpp"
-#include "panonav_fleet/internal/areas_of_views.hpp"
 #include "panonav/storage/internal/memory_file_access.hpp"
 #include "panonav/storage/internal/memory_tables.hpp"
 #include "panonav/storage/memory_address.hpp"
+#include "panonav_fleet/internal/areas_of_views.hpp"
 #include "panonav_fleet/memory_changes.hpp"
 
 namespace panonav::fleet {
@@ -173,6 +173,13 @@ struct PlaceSearch::Implementation {
     dropped.swap(idle);
   }
 
+  void count(const SearchResult& found, std::chrono::steady_clock::duration duration) const {
+    const std::lock_guard lock(mutex);
+    ++counted.searches;
+    counted.views_read += found.views_in_full;
+    counted.seconds += std::chrono::duration<double>(duration).count();
+  }
+
   // ---- refreshing
 
   bool refresh() {
@@ -269,9 +276,10 @@ struct PlaceSearch::Implementation {
 
   std::filesystem::path path;
   MemoryHeader header;
-  mutable std::mutex mutex;  // of `current` and `idle`
+  mutable std::mutex mutex;  // of `current`, `idle` and `counted`
   std::shared_ptr<const Sketched> current;
   mutable std::vector<std::unique_ptr<MemoryTables>> idle;
+  mutable SearchCounters counted;
   mutable std::atomic<int> running = 0;  // searches
 
   std::mutex refreshing;  // of all below
@@ -353,6 +361,7 @@ std::size_t PlaceSearch::Snapshot::size() const noexcept {
 SearchResult PlaceSearch::Snapshot::search(const PackedSignature& query,
                                            const SearchOptions& options, const SearchMask& mask) {
   Implementation& own = *implementation_;
+  const auto start = std::chrono::steady_clock::now();
   // A search alone takes all cores; several at a time share them.
   struct Running {
     explicit Running(std::atomic<int>& all_) : all(all_), number(++all_) {}
@@ -365,7 +374,7 @@ SearchResult PlaceSearch::Snapshot::search(const PackedSignature& query,
   const Running running(own.search->running);
   const auto cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   Executor executor(size() < 100000 ? 1 : std::clamp(cores / running.number, 1, 16));
-  return own.sketched->sketches.search(
+  SearchResult result = own.sketched->sketches.search(
       query, options, mask,
       [&own](std::span<const ViewId> views, const ViewSketches::TakeView& take) {
         std::vector<ViewId> wanted;
@@ -379,6 +388,8 @@ SearchResult PlaceSearch::Snapshot::search(const PackedSignature& query,
         }
       },
       executor);
+  own.search->count(result, std::chrono::steady_clock::now() - start);
+  return result;
 }
 
 VisualMemory PlaceSearch::Snapshot::load(std::span<const ViewId> views) {
@@ -441,6 +452,15 @@ std::vector<ViewId> PlaceSearch::views() const {
 }
 std::uint64_t PlaceSearch::bytes() const {
   return implementation_->sketched()->bytes;
+}
+
+SearchCounters PlaceSearch::counters() const {
+  const std::lock_guard lock(implementation_->mutex);
+  return implementation_->counted;
+}
+
+std::unique_ptr<ViewIndex> PlaceSearch::index() const {
+  return std::make_unique<Snapshot>(snapshot());
 }
 
 PlaceSearch::Snapshot PlaceSearch::snapshot() const {

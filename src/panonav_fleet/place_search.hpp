@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "panonav/memory/view_index.hpp"
 #include "panonav/memory/view_sketches.hpp"
 #include "panonav/storage/memory_file.hpp"
 
@@ -19,47 +20,45 @@ namespace panonav::fleet {
 /// server that are larger than a machine, and for any number of machines that search one memory;
 /// nothing is written. A memory file is searched the same way. Several threads may use one object,
 /// each with a connection of its own.
-class PlaceSearch {
+class PlaceSearch final : public IndexedMemory {
  public:
   /// Reads the magnitudes of all views once, with as many connections as the machine has cores.
   /// Throws FileError as `MemoryFile::open`, and on views of another shape. Checksums cover whole
   /// rows, and only what a search reads in full is checked.
   explicit PlaceSearch(const std::filesystem::path& memory);
-  ~PlaceSearch();
+  ~PlaceSearch() override;
   /// What is left of the other may only be destroyed or assigned to.
   PlaceSearch(PlaceSearch&&) noexcept;
   PlaceSearch& operator=(PlaceSearch&&) noexcept;
 
   [[nodiscard]] const MemoryHeader& header() const noexcept;  ///< As the memory was made.
-  [[nodiscard]] std::size_t size() const;                     ///< Views that are sketched.
-  [[nodiscard]] std::vector<ViewId> views() const;            ///< Those, ascending. Cost: a pass.
-  [[nodiscard]] std::uint64_t bytes() const;                  ///< That sketches and ids take.
+  [[nodiscard]] std::size_t size() const override;            ///< Views that are sketched.
+  [[nodiscard]] std::vector<ViewId> views() const override;
+  [[nodiscard]] std::uint64_t bytes() const override;  ///< That sketches and ids take.
+  [[nodiscard]] SearchCounters counters() const override;
 
   /// The memory at one moment, for the questions of one query: what others change meanwhile is not
   /// seen. One thread uses it, and not for longer than it takes: it holds a transaction open. The
   /// search must outlive it. All throw FileError when the server cannot be reached, and on a view
   /// that does not match its checksum.
-  class Snapshot {
+  class Snapshot final : public ViewIndex {
    public:
-    ~Snapshot();
+    ~Snapshot() override;
     /// What is left of the other may only be destroyed or assigned to.
     Snapshot(Snapshot&&) noexcept;
     Snapshot& operator=(Snapshot&&) noexcept;
 
-    [[nodiscard]] std::size_t size() const noexcept;  ///< Views that are sketched.
+    [[nodiscard]] std::size_t size() const noexcept override;  ///< Views that are sketched.
     /// As `VisualMemory::search` over those views that are sketched and that the memory has: one or
     /// two statements to the server, a few where many views look alike. On all cores while no other
     /// search of this memory runs.
-    [[nodiscard]] SearchResult search(const PackedSignature& query,
-                                      const SearchOptions& options = {},
-                                      const SearchMask& mask = {});
+    [[nodiscard]] SearchResult search(const PackedSignature& query, const SearchOptions& options,
+                                      const SearchMask& mask) override;
     /// Those of the views that the memory has, without links, in one statement; what this snapshot
     /// read before is not read again.
-    [[nodiscard]] VisualMemory load(std::span<const ViewId> views);
-    /// The view of that name; empty when there is none.
-    [[nodiscard]] std::optional<ViewId> find(std::string_view name);
-    /// Views whose positions lie within one of the rectangles, ascending, each once.
-    [[nodiscard]] std::vector<ViewId> views_within(std::span<const PositionBounds> bounds);
+    [[nodiscard]] VisualMemory load(std::span<const ViewId> views) override;
+    [[nodiscard]] std::optional<ViewId> find(std::string_view name) override;
+    [[nodiscard]] std::vector<ViewId> views_within(std::span<const PositionBounds> bounds) override;
 
    private:
     friend class PlaceSearch;
@@ -69,6 +68,7 @@ class PlaceSearch {
   };
   /// Throws FileError when the server cannot be reached; the next one may find it again.
   [[nodiscard]] Snapshot snapshot() const;
+  [[nodiscard]] std::unique_ptr<ViewIndex> index() const override;  ///< The same.
   /// One search of a snapshot of its own.
   [[nodiscard]] SearchResult search(const PackedSignature& query, const SearchOptions& options = {},
                                     const SearchMask& mask = {}) const;
@@ -77,7 +77,7 @@ class PlaceSearch {
   /// areas are compared, otherwise the ids of all views. Searches go on
   /// meanwhile. Returns whether anything changed that others told or that was found. Throws
   /// FileError; then what is sketched stays, and the next call compares all.
-  bool refresh();
+  bool refresh() override;
 
  private:
   struct Implementation;

@@ -58,7 +58,7 @@ ros::DiagnosticArray diagnostics_message(const RunMoment& moment, std::int64_t s
   return {{stamp_ns, ""}, {status}};
 }
 
-std::vector<Pose2> even_sample(const Particles& particles, std::size_t count) {
+std::vector<Pose2> resample_systematically(const Particles& particles, std::size_t count) {
   std::vector<Pose2> sample;
   if (particles.size() <= count) {
     for (std::size_t i = 0; i < particles.size(); ++i) sample.push_back(particles.pose(i));

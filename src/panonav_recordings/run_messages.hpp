@@ -37,6 +37,7 @@ struct PointValues {
 };
 
 /// `count` particles drawn evenly by weight; all of them where there are fewer. No randomness.
-[[nodiscard]] std::vector<Pose2> even_sample(const Particles& particles, std::size_t count);
+[[nodiscard]] std::vector<Pose2> resample_systematically(const Particles& particles,
+                                                         std::size_t count);
 
 }  // namespace panonav::recordings

@@ -13,12 +13,12 @@
 #include "panonav/core/image.hpp"
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/localisation/monte_carlo.hpp"
+#include "panonav/localisation/place.hpp"
 #include "panonav/mapping/topological_map.hpp"
 #include "panonav/memory/visual_memory.hpp"
 #include "panonav/panorama/panorama.hpp"
 #include "panonav/panorama/tilt.hpp"
 #include "panonav/pipeline/observation.hpp"
-#include "panonav/pipeline/place_recogniser.hpp"
 
 namespace panonav::recordings {
 
@@ -66,8 +66,8 @@ struct RunMoment {
   std::optional<Pose2> pose;                  ///< of the robot
   /// Of x, y and heading, row-major, m^2, m rad and rad^2.
   std::optional<std::array<double, 9>> covariance;
-  std::vector<Pose2> particles;            ///< of a filter, or a sample of them (`even_sample`)
-  std::vector<PoseMode> modes;             ///< heaviest first; not in records
+  std::vector<Pose2> particles;  ///< of a filter, or a sample of them (`resample_systematically`)
+  std::vector<PoseMode> modes;   ///< heaviest first; not in records
   std::vector<RunComparison> comparisons;  ///< not in records
   std::optional<RunHoming> homing;         ///< not in records
   /// What the robot spent its time with since the moment before, ms; not in records.

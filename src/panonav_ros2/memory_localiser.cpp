@@ -151,7 +151,7 @@ void MemoryLocaliser::publish_estimate(recordings::RunMoment& moment, std::int64
   if (last_pose_) poses_.publish(recordings::pose_message(moment, stamp_ns, setup_.frames.map));
   if (particles_.subscribers() > 0) {
     moment.particles =
-        recordings::even_sample(tracker.localiser().particles(), max_shown_particles);
+        recordings::resample_systematically(tracker.localiser().particles(), max_shown_particles);
     particles_.publish(recordings::poses_message(moment.particles, stamp_ns, setup_.frames.map));
   }
   if (best_matches_.subscribers() > 0) {

@@ -44,12 +44,9 @@ bool MemoryWatch::has_changed() {
 
 LoadedMemory::LoadedMemory(const std::filesystem::path& memory,
                            const LocalisationServerOptions& options)
-    : path(memory), file(MemoryFile::open(path, Access::read_only)) {
-  if (is_server_address(path) && file.views().size() > options.max_held_views) {
-    searched.emplace(path, PlaceRecogniserOptions{.localiser = options.localiser});
-  } else {
-    held.emplace(file, PlaceRecogniserOptions{.localiser = options.localiser});
-  }
+    : path(memory),
+      file(MemoryFile::open(path, Access::read_only)),
+      recogniser(path, {.localiser = options.localiser, .max_held_views = options.max_held_views}) {
 }
 
 std::optional<std::vector<std::uint8_t>> LoadedMemory::thumbnail(const std::string& view) {
@@ -60,7 +57,7 @@ std::optional<std::vector<std::uint8_t>> LoadedMemory::thumbnail(const std::stri
   try {
     return read();
   } catch (const FileError&) {
-    if (!searched) throw;
+    if (recogniser.is_held()) throw;
   }
   file = MemoryFile::open(path, Access::read_only);
   return read();

@@ -11,7 +11,6 @@
 #include "panonav/pipeline/place_recogniser.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "panonav_fleet/memory_changes.hpp"
-#include "panonav_fleet/searched_recogniser.hpp"
 #include "panonav_server/localisation_server.hpp"
 
 namespace panonav::server {
@@ -39,18 +38,13 @@ class MemoryWatch {
 struct LoadedMemory {
   LoadedMemory(const std::filesystem::path& memory, const LocalisationServerOptions& options);
 
-  [[nodiscard]] std::size_t size() const { return held ? held->memory().size() : searched->size(); }
-  [[nodiscard]] Place localise(const Observation& observation) const {
-    return held ? held->localise(observation) : searched->localise(observation);
-  }
   /// Returns the picture of a view, `nullopt` where it has none. Opens the file again where its
   /// server was away.
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> thumbnail(const std::string& view);
 
   std::filesystem::path path;
   MemoryFile file;  // of the thread that speaks HTTP, once it is there
-  std::optional<PlaceRecogniser> held;
-  std::optional<fleet::SearchedRecogniser> searched;
+  PlaceRecogniser recogniser;
 };
 
 }  // namespace panonav::server

@@ -248,7 +248,7 @@ struct LocalisationServer::Implementation {
     const auto memory = loaded(name);
     const SignatureShape& shape = memory->file.header().shape;
     return {{"name", name},
-            {"views", memory->size()},
+            {"views", memory->recogniser.size()},
             {"rows", shape.rows},
             {"components", shape.components}};
   }
@@ -292,7 +292,7 @@ struct LocalisationServer::Implementation {
     text += describe_metric("panonav_memory_views", "gauge", "Views of a memory.");
     for (const auto& [name, one] : served) {
       text += "panonav_memory_views{memory=\"" + name + "\"} " +
-              std::to_string(one.loaded->size()) + "\n";
+              std::to_string(one.loaded->recogniser.size()) + "\n";
     }
     text += search_metrics();
     text += describe_metric("panonav_memory_reloads_total", "counter",
@@ -314,25 +314,24 @@ struct LocalisationServer::Implementation {
                                 const std::string& help, const auto& value) {
       std::string lines;
       for (const auto& [memory, one] : served) {
-        if (!one.loaded->searched) continue;
-        lines += name + "{memory=\"" + memory + "\"} " + value(*one.loaded->searched) + "\n";
+        if (one.loaded->recogniser.is_held()) continue;
+        lines += name + "{memory=\"" + memory + "\"} " + value(one.loaded->recogniser) + "\n";
       }
       return lines.empty() ? lines : describe_metric(name, type, help) + lines;
     };
     return of_each("panonav_sketch_bytes", "gauge", "Bytes of sketches of a memory.",
-                   [](const fleet::SearchedRecogniser& of) { return std::to_string(of.bytes()); }) +
+                   [](const PlaceRecogniser& of) { return std::to_string(of.index_bytes()); }) +
            of_each("panonav_searches_total", "counter", "Exact searches in a memory on its server.",
-                   [](const fleet::SearchedRecogniser& of) {
-                     return std::to_string(of.counters().searches);
+                   [](const PlaceRecogniser& of) {
+                     return std::to_string(of.search_counters().searches);
                    }) +
            of_each("panonav_search_views_read_total", "counter",
                    "Views that searches read in full.",
-                   [](const fleet::SearchedRecogniser& of) {
-                     return std::to_string(of.counters().views_read);
+                   [](const PlaceRecogniser& of) {
+                     return std::to_string(of.search_counters().views_read);
                    }) +
-           of_each(
-               "panonav_search_seconds_total", "counter", "Time that searches took.",
-               [](const fleet::SearchedRecogniser& of) { return to_text(of.counters().seconds); });
+           of_each("panonav_search_seconds_total", "counter", "Time that searches took.",
+                   [](const PlaceRecogniser& of) { return to_text(of.search_counters().seconds); });
   }
 
   // ---- on the threads that answer
@@ -373,7 +372,7 @@ struct LocalisationServer::Implementation {
       const Observation seen(
           decode_image(std::span(bytes, job.picture.size()), "the picture", picture_limits));
       decoded = true;
-      const Place place = memory.localise(seen);
+      const Place place = memory.recogniser.localise(seen);
       known = place.known;
       ordered_json json{{"memory", job.memory}};
       json.update(place_json(place));
@@ -399,8 +398,8 @@ struct LocalisationServer::Implementation {
         const auto from = Clock::now();
         std::shared_ptr<LoadedMemory> again;
         std::string fault;
-        if (const auto searched = loaded(name); searched->searched) {
-          if (refresh(name, *searched->searched, fault)) {
+        if (const auto searched = loaded(name); !searched->recogniser.is_held()) {
+          if (refresh(name, searched->recogniser, fault)) {
             lock.lock();
             ++(fault.empty() ? one.reloads : one.failed_reloads);
             lock.unlock();
@@ -419,12 +418,12 @@ struct LocalisationServer::Implementation {
           pause = std::max(pause, std::chrono::duration_cast<std::chrono::milliseconds>(
                                       10 * (Clock::now() - from)));
           if (options.note) {
-            options.note(
-                name + ": " +
-                (again ? "the memory was changed; " + std::to_string(again->size()) + " views"
-                       : "the memory was changed and cannot be read; the memory stays as "
-                         "it was: " +
-                             fault));
+            options.note(name + ": " +
+                         (again ? "the memory was changed; " +
+                                      std::to_string(again->recogniser.size()) + " views"
+                                : "the memory was changed and cannot be read; the memory stays as "
+                                  "it was: " +
+                                      fault));
           }
         }
         lock.lock();
@@ -440,7 +439,7 @@ struct LocalisationServer::Implementation {
 
   /// Whether the memory was changed, or its server lost; then `fault` says why. A fault is told
   /// once, until the server is back.
-  bool refresh(const std::string& name, fleet::SearchedRecogniser& searched, std::string& fault) {
+  bool refresh(const std::string& name, PlaceRecogniser& searched, std::string& fault) {
     bool changed = false;
     try {
       changed = searched.refresh();

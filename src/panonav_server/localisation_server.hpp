@@ -8,7 +8,7 @@
 #include <span>
 #include <string>
 
-#include "panonav/localisation/localiser.hpp"
+#include "panonav/localisation/localiser_options.hpp"
 
 namespace panonav::server {
 
@@ -26,7 +26,7 @@ struct LocalisationServerOptions {
   std::string token;                  ///< that clients must send; empty: none
   LocaliserOptions localiser;
   /// Memories on a server with more views are not held but searched where they lie
-  /// (`SearchedRecogniser`), which takes longer for each picture.
+  /// (`PlaceRecogniserOptions::max_held_views`), which takes longer for each picture.
   std::size_t max_held_views = 200'000;
   /// How often memory files are looked at for changes.
   std::chrono::milliseconds look_every{1000};

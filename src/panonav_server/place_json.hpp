@@ -2,7 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "panonav/pipeline/place_recogniser.hpp"
+#include "panonav/localisation/place.hpp"
 
 namespace panonav::server {
 

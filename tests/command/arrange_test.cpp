@@ -4,6 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "panonav/mapping/pose_graph.hpp"
+#include "panonav/mapping/topological_map.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "support/command_runner.hpp"
 #include "support/landmark_pictures.hpp"

@@ -17,6 +17,7 @@
 #include <thread>
 
 #include "panonav/core/random.hpp"
+#include "panonav/route/route_panorama.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "support/command_runner.hpp"
 #include "support/landmark_pictures.hpp"

@@ -12,6 +12,7 @@
 #include "panonav/core/text.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
 #include "support/command_runner.hpp"
 #include "support/landmark_pictures.hpp"
 #include "support/report_pages.hpp"

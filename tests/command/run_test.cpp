@@ -15,6 +15,7 @@
 #include "panonav/core/text.hpp"
 #include "panonav/io/atomic_file.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav/route/route_panorama.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "support/command_runner.hpp"
 #include "support/landmark_pictures.hpp"

@@ -420,8 +420,6 @@ TEST(Usage, AnOptionThatDoesNothingIsRefused) {
   const std::string on_navigate = "navigate m --goal 1 --scene office ";
   const std::vector<Unused> all{
       {"localise m x --area-tolerance 1", "--area-tolerance", "--areas"},
-      {"track m x --injection-share 0.1", "--injection-share", "--injection topological"},
-      {"track m x --injection-number 9", "--injection-number", "--injection uniform"},
       {"home a b --rising true", "--rising", "--iterations 2"},
       {"home a b --starting-estimates 3 --turn sequential", "--starting-estimates", ""},
       {"home a b --horizon --tilt true", "--tilt", ""},

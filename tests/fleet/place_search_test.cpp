@@ -102,9 +102,9 @@ TEST_F(PlaceSearchTest, ASearchSeesOneStateAndLeavesOutWhatIsGone) {
   const PackedSignature asked = query();
   const auto nearest = file.load().search(asked, {.top = 12}).matches;
   PlaceSearch::Snapshot before = search.snapshot();
-  EXPECT_EQ(before.search(asked, {.top = 12}).matches, nearest);
+  EXPECT_EQ(before.search(asked, {.top = 12}, {}).matches, nearest);
   file.remove(std::vector{nearest[0].view, nearest[4].view});
-  EXPECT_EQ(before.search(asked, {.top = 12}).matches, nearest);
+  EXPECT_EQ(before.search(asked, {.top = 12}, {}).matches, nearest);
   // Sketched, and gone from the memory.
   const auto left = search.search(asked, {.top = 10}).matches;
   EXPECT_EQ(left, file.load().search(asked, {.top = 10}).matches);

@@ -6,6 +6,8 @@
 #include <iostream>
 
 #include "panonav/core/error.hpp"
+#include "panonav/mapping/topological_map.hpp"
+#include "panonav/route/route_panorama.hpp"
 #include "panonav/storage/memory_address.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "panonav_fleet/memory_changes.hpp"

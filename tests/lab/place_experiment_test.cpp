@@ -126,19 +126,18 @@ TEST(PlaceExperiment, LocalFeaturesKnowOwnPlacesAtWhichColumnsLeaveDoubt) {
       return make(handedness);
     };
     const PackedSignature query = signature_for(view, memory);
-    const Localisation by_columns = plain.localise(query);
+    const Place by_columns = plain.localise(query);
     known_by_columns += by_columns.known ? 1 : 0;
     // A memory without features, or a query without: the same bits.
-    for (const Localisation& same :
-         {plain.localise(query, {}, features), informed.localise(query)}) {
+    for (const Place& same : {plain.localise(query, {}, features), informed.localise(query)}) {
       EXPECT_EQ(same.known_probability, by_columns.known_probability);
       EXPECT_EQ(same.known, by_columns.known);
     }
     EXPECT_EQ(computed, 0);
-    const Localisation found = informed.localise(query, {}, features);
-    EXPECT_EQ(computed, leave_doubt(by_columns.evidence) ? 2 : 0);
+    const Place found = informed.localise(query, {}, features);
+    EXPECT_EQ(computed, is_inconclusive(by_columns.evidence) ? 2 : 0);
     EXPECT_EQ(found.matches[0].view, by_columns.matches[0].view);
-    if (!leave_doubt(by_columns.evidence)) {
+    if (!is_inconclusive(by_columns.evidence)) {
       EXPECT_EQ(found.known_probability, by_columns.known_probability);
     }
     if (found.known && !by_columns.known) {

@@ -119,7 +119,7 @@ TEST(Tracking, FindsTheRobotInAnOfficeTheSameOnAnyNumberOfThreads) {
   EXPECT_GT(single.asked, 50U);
   EXPECT_LE(single.right, single.near);
   EXPECT_GT(2 * single.right, single.asked);
-  const auto setting = compass_setting(ParticleInjection::explained);
+  const auto setting = compass_setting(InjectionMethod::explained);
   const auto tracked = track_runs(*remembered, clean, setting, 5, two);
   const auto repeated = track_runs(*remembered, clean, setting, 5, one);
   std::size_t found = 0;

@@ -66,16 +66,15 @@ TEST(ColumnRanking, FindsThePlaceWhereSomebodyStandsInView) {
       const PackedSignature query =
           pack(compute_signature(with_somebody_in_view(place.room.see(pose), random)),
                place.memory.full_scale());
-      const auto error_m = [&](const Localisation& found) {
+      const auto error_m = [&](const Place& found) {
         return distance(place.memory.info(found.matches[0].view).pose->position(), pose.position());
       };
-      const Localisation found = localiser.localise(query);
+      const Place found = localiser.localise(query);
       by_columns += error_m(found) < place.step_m ? 1 : 0;
       by_dissimilarity += error_m(plain.localise(query)) < place.step_m ? 1 : 0;
-      const LocalisedMatch& best = found.matches[0];
+      const PlaceMatch& best = found.matches[0];
       heading_error += std::abs(angle_difference(
-          *place.memory.info(best.view).pose->heading_rad + best.compass->heading_rad,
-          pose.heading_rad));
+          *place.memory.info(best.view).pose->heading_rad + *best.heading_rad, pose.heading_rad));
       ++asked;
     }
   }

@@ -7,7 +7,7 @@ namespace {
 
 TEST(FeatureTrial, TellMoreWhereChanceRarelyGivesAsManyGains) {
   const auto trial = [](int gained, int lost) {
-    return FeatureTrial{.gained = gained, .lost = lost}.tell_more();
+    return FeatureTrial{.gained = gained, .lost = lost}.is_significantly_better();
   };
   EXPECT_FALSE(trial(0, 0));
   EXPECT_FALSE(trial(4, 0));  // 1 in 16

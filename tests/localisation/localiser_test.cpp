@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "panonav/core/error.hpp"
+#include "panonav/localisation/neighbour_support.hpp"
 #include "support/remembered_worlds.hpp"
 
 namespace panonav::testing {
@@ -19,30 +20,29 @@ TEST(Localiser, FindsAMemorisedViewItsPositionAndTheTurn) {
   Random random(1);
   for (const ViewId view : place.memory.views()) {
     const ReferencePose& truth = *place.memory.info(view).pose;
-    const Localisation same = localiser.localise(place.memory.packed(view));
+    const Place same = localiser.localise(place.memory.packed(view));
     EXPECT_TRUE(same.known);
     EXPECT_EQ(same.matches[0].view, view);
     EXPECT_EQ(same.matches[0].dissimilarity, 0U);
     ASSERT_TRUE(same.position && same.heading_rad);
-    EXPECT_NEAR(distance(same.position->position, truth.position()), 0.0, 1e-6);
+    EXPECT_NEAR(distance(same.position->position(), truth.position()), 0.0, 1e-6);
     EXPECT_NEAR(angle_difference(*same.heading_rad, *truth.heading_rad), 0.0, 1e-6);
 
     // A turn on the spot changes the heading and nothing else, but for rounding to bytes.
     const double turned_rad = random.uniform(-std::numbers::pi, std::numbers::pi);
-    const Localisation turned = localiser.localise(
+    const Place turned = localiser.localise(
         pack(turn(place.memory.signature(view), turned_rad), place.memory.full_scale()));
     EXPECT_TRUE(turned.known);
     ASSERT_EQ(turned.matches.size(), same.matches.size());
     EXPECT_EQ(turned.matches[0].view, view);
     EXPECT_EQ(turned.matches[0].dissimilarity, 0U);
-    ASSERT_TRUE(turned.matches[0].compass);
-    EXPECT_NEAR(angle_difference(turned.matches[0].compass->heading_rad, turned_rad), 0.0,
-                radians(0.5));
+    ASSERT_TRUE(turned.matches[0].heading_rad);
+    EXPECT_NEAR(angle_difference(*turned.matches[0].heading_rad, turned_rad), 0.0, radians(0.5));
     ASSERT_TRUE(turned.heading_rad);
     EXPECT_NEAR(angle_difference(*turned.heading_rad, *truth.heading_rad + turned_rad), 0.0,
                 radians(0.5));
     // The turn lies between two steps of the columns.
-    EXPECT_LT(distance(turned.position->position, truth.position()), 0.25 * place.step_m);
+    EXPECT_LT(distance(turned.position->position(), truth.position()), 0.25 * place.step_m);
   }
 }
 
@@ -56,9 +56,9 @@ TEST(Localiser, AnExcludedViewTellsAsMuchAsOneThatIsNotThere) {
     others.remove(view);
     const Localiser without(others, whole.place_model(), whole.position_model(), {}, 0.4);
     const PackedSignature query = place.memory.packed(view);
-    const Localisation expected = without.localise(query);
+    const Place expected = without.localise(query);
     const std::array excluded{view};
-    const Localisation found = whole.localise(query, {.excluded_views = excluded});
+    const Place found = whole.localise(query, {.excluded_views = excluded});
     ASSERT_EQ(found.matches.size(), expected.matches.size());
     for (std::size_t i = 0; i < found.matches.size(); ++i) {
       EXPECT_EQ(found.matches[i].view, expected.matches[i].view);
@@ -67,7 +67,7 @@ TEST(Localiser, AnExcludedViewTellsAsMuchAsOneThatIsNotThere) {
     ASSERT_EQ(found.position.has_value(), expected.position.has_value());
     if (!found.position) continue;
     ++known;
-    EXPECT_EQ(found.position->position, expected.position->position);
+    EXPECT_EQ(found.position->position(), expected.position->position());
   }
   EXPECT_GE(known, 10);
 }
@@ -81,12 +81,12 @@ TEST(Localiser, HeadingBetweenReferencesIsBetterThanByTheNearestAlone) {
   int count = 0;
   for (int i = 0; i < 80; ++i) {
     const Pose2 pose = place.room.between(place.grid, place.step_m, random);
-    const Localisation found = localiser.localise(
+    const Place found = localiser.localise(
         pack(compute_signature(place.room.see(pose)), place.memory.full_scale()));
     if (!found.heading_rad) continue;
     const auto& nearest = found.matches[0];
     const double of_nearest =
-        *place.memory.info(nearest.view).pose->heading_rad + nearest.compass->heading_rad;
+        *place.memory.info(nearest.view).pose->heading_rad + *nearest.heading_rad;
     sum_interpolated += std::abs(angle_difference(*found.heading_rad, pose.heading_rad));
     sum_nearest += std::abs(angle_difference(of_nearest, pose.heading_rad));
     ++count;
@@ -100,7 +100,7 @@ TEST(Localiser, ListsMatchesOfAnUnknownPlaceButClaimsNothing) {
   const RememberedRoom place(53, {}, 0.3);
   const Localiser localiser(place.memory, {.top = 4});
   const Room elsewhere(777, {6.0, 3.0, 6, 0.2});
-  const Localisation found = localiser.localise(
+  const Place found = localiser.localise(
       pack(compute_signature(elsewhere.see({3.0, 1.5, 0.0})), place.memory.full_scale()));
   EXPECT_FALSE(found.known);
   EXPECT_EQ(found.matches.size(), 4U);
@@ -117,12 +117,12 @@ TEST(Localiser, KnowsNoAbsoluteHeadingWithoutHeadingsAndNoPositionWithoutPoses) 
     place.memory.set_pose(view, pose);
   }
   const PackedSignature query = place.memory.packed(place.memory.views()[5]);
-  const Localisation without_heading = Localiser(place.memory).localise(query);
+  const Place without_heading = Localiser(place.memory).localise(query);
   EXPECT_TRUE(without_heading.known && without_heading.position);
   EXPECT_FALSE(without_heading.heading_rad);
-  EXPECT_TRUE(without_heading.matches[0].compass);
+  EXPECT_TRUE(without_heading.matches[0].heading_rad);
   for (const ViewId view : place.memory.views()) place.memory.set_pose(view, std::nullopt);
-  const Localisation without_pose = Localiser(place.memory).localise(query);
+  const Place without_pose = Localiser(place.memory).localise(query);
   EXPECT_TRUE(without_pose.known);
   EXPECT_FALSE(without_pose.position);
   EXPECT_FALSE(without_pose.heading_rad);
@@ -133,9 +133,9 @@ TEST(Localiser, LeavesOutExcludedViewsAndRowsThatDoNotCount) {
   const Localiser localiser(place.memory);
   const ViewId view = place.memory.views()[7];
   const std::array excluded = {view};
-  const Localisation others = localiser.localise(place.memory.packed(view),
-                                                 {.excluded_views = excluded, .allowed_rows = {}});
-  for (const LocalisedMatch& match : others.matches) EXPECT_NE(match.view, view);
+  const Place others = localiser.localise(place.memory.packed(view),
+                                          {.excluded_views = excluded, .allowed_rows = {}});
+  for (const PlaceMatch& match : others.matches) EXPECT_NE(match.view, view);
   // Four rows are spoilt; without them the view is found as if nothing had happened.
   PackedSignature spoilt = place.memory.packed(view);
   std::vector<std::uint8_t> allowed(16, 1);
@@ -143,8 +143,7 @@ TEST(Localiser, LeavesOutExcludedViewsAndRowsThatDoNotCount) {
     if (i % 16 < 4) spoilt.magnitudes[i] = 255;
   }
   for (int row = 0; row < 4; ++row) allowed[row] = 0;
-  const Localisation found =
-      localiser.localise(spoilt, {.excluded_views = {}, .allowed_rows = allowed});
+  const Place found = localiser.localise(spoilt, {.excluded_views = {}, .allowed_rows = allowed});
   EXPECT_EQ(found.matches[0].view, view);
   EXPECT_EQ(found.matches[0].dissimilarity, 0U);
   EXPECT_EQ(found.matches[0].column_difference, 0.0);
@@ -154,10 +153,10 @@ TEST(Localiser, LeavesOutExcludedViewsAndRowsThatDoNotCount) {
 TEST(Localiser, ComparesTheComponentsAskedFor) {
   const RememberedRoom place(56, {}, 0.4);
   const Localiser localiser(place.memory, {.components = 4});
-  const Localisation found = localiser.localise(place.memory.packed(place.memory.views()[3]));
+  const Place found = localiser.localise(place.memory.packed(place.memory.views()[3]));
   EXPECT_EQ(found.components, 4);
   EXPECT_EQ(found.matches[0].dissimilarity, 0U);
-  EXPECT_NEAR(distance(found.position->position,
+  EXPECT_NEAR(distance(found.position->position(),
                        place.memory.info(place.memory.views()[3]).pose->position()),
               0.0, 1e-6);
 }
@@ -170,16 +169,41 @@ TEST(Localiser, GivesTheSameAnswerWithModelsLearntBefore) {
   const PackedSignature query =
       pack(compute_signature(place.room.see(place.room.between(place.grid, 0.4, random))),
            place.memory.full_scale());
-  const Localisation a = one.localise(query);
-  const Localisation b = two.localise(query);
+  const Place a = one.localise(query);
+  const Place b = two.localise(query);
   EXPECT_EQ(a.matches[0].column_difference, b.matches[0].column_difference);
   EXPECT_EQ(a.heading_rad, b.heading_rad);
   ASSERT_EQ(a.position.has_value(), b.position.has_value());
   if (a.position) {
-    EXPECT_EQ(a.position->position, b.position->position);
+    EXPECT_EQ(a.position->position(), b.position->position());
   }
   EXPECT_THROW(Localiser(place.memory, one.place_model(), one.position_model(), {.components = 3}),
                ContractError);
+}
+
+TEST(Localiser, AnswersByAnIndexAsTheHeldMemoryDoes) {
+  const RememberedRoom place(57, {}, 0.4);
+  const Localiser held(place.memory);
+  const double spacing_m = NeighbourSupport(ColumnRanking(place.memory)).spacing_m();
+  HeldViewIndex index(place.memory);
+  const auto drawn =
+      std::make_shared<const VisualMemory>(index.load(drawn_views(place.memory.views())));
+  const Localiser searched(drawn, held.place_model(), held.position_model(), {}, spacing_m);
+  const std::vector<ViewId> excluded{place.memory.views()[3]};
+  Random random(4);
+  PackedSignature query;
+  for (int i = 0; i < 5; ++i) {
+    query = pack(compute_signature(place.room.see(place.room.between(place.grid, 0.4, random))),
+                 place.memory.full_scale());
+    const Place expected = held.localise(query, {.excluded_views = excluded});
+    const Place found = searched.localise(index, query, {.excluded_views = excluded});
+    EXPECT_EQ(found.known_probability, expected.known_probability);
+    EXPECT_EQ(found.heading_rad, expected.heading_rad);
+    ASSERT_EQ(found.matches.size(), expected.matches.size());
+    EXPECT_EQ(found.matches[0].view, expected.matches[0].view);
+    EXPECT_EQ(found.matches[0].heading_rad, expected.matches[0].heading_rad);
+  }
+  EXPECT_THROW((void)searched.localise(query), ContractError);
 }
 
 TEST(Localiser, RefusesBadInput) {

@@ -146,12 +146,13 @@ TEST(MonteCarlo, IsFoundAgainAfterItWasCarriedAway) {
   const RememberedRoom place(74, {}, 0.3);
   const auto ranking = std::make_shared<const ColumnRanking>(place.memory);
   const ObservationModel model = learn_observation_model(*ranking);
-  const auto images_needed = [&](ParticleInjection injection) {
+  const auto images_needed = [&](ParticleInjection injection, const InjectionRule& rule) {
     std::vector<int> needed;
     for (int seed = 1; seed <= 10; ++seed) {
       const Walk before = walk(place, 6, 200 + static_cast<std::uint64_t>(seed));
       const Walk after = walk(place, 12, 300 + static_cast<std::uint64_t>(seed));
       MonteCarloLocaliser filter(ranking, model, {.injection = injection, .seed = seed});
+      filter.set_injection_rule(rule);
       for (std::size_t k = 0; k < before.poses.size(); ++k) {
         if (k > 0) filter.move(before.step(k));
         filter.observe(before.views[k]);
@@ -168,8 +169,18 @@ TEST(MonteCarlo, IsFoundAgainAfterItWasCarriedAway) {
     std::ranges::sort(needed);
     return needed;
   };
-  const auto explained = images_needed(ParticleInjection::explained);
-  const auto topological = images_needed(ParticleInjection::topological);
+  // A tenth of the particles around the references whose dissimilarity is within a quarter of the
+  // best [M03 section 4.1].
+  const InjectionRule topological_rule = [&](const PackedSignature& view, std::size_t particles) {
+    InjectedParticles injected;
+    injected.count = static_cast<std::size_t>(std::lround(0.1 * static_cast<double>(particles)));
+    for (const Match& match : place.memory.hierarchy(view, 0.25).back().candidates) {
+      injected.around.push_back(match.view);
+    }
+    return injected;
+  };
+  const auto explained = images_needed(ParticleInjection::explained, {});
+  const auto topological = images_needed(ParticleInjection::none, topological_rule);
   EXPECT_LE(explained[explained.size() / 2], 2);
   EXPECT_LE(explained[explained.size() * 9 / 10 - 1], 8);
   EXPECT_LE(topological[topological.size() / 2], 3);

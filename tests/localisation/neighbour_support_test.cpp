@@ -68,7 +68,7 @@ TEST(NeighbourSupport, NeedsHeadings) {
   const auto before = ranked;
   EXPECT_TRUE(support.neighbours(memory.views()[4]).empty());
   EXPECT_FALSE(support.supported_difference(ColumnProfiles(query), ranked[0]));
-  support.put_best_supported_first(ColumnProfiles(query), ranked);
+  support.rank_by_support(ColumnProfiles(query), ranked);
   for (std::size_t i = 0; i < ranked.size(); ++i) EXPECT_EQ(ranked[i].match, before[i].match);
 }
 
@@ -84,7 +84,7 @@ TEST(NeighbourSupport, PutsThePlaceAndItsNeighboursFirst) {
         pack(compute_signature(place.room.see(pose)), place.memory.full_scale());
     auto ranked = ranking.rank(query, place.memory.search(query, {.top = 60}).matches);
     const std::size_t size = ranked.size();
-    support.put_best_supported_first(ColumnProfiles(query), ranked);
+    support.rank_by_support(ColumnProfiles(query), ranked);
     ASSERT_EQ(ranked.size(), size);
     const Point2 best = place.memory.info(ranked[0].match.view).pose->position();
     first_right += distance(best, pose.position()) < place.step_m ? 1 : 0;

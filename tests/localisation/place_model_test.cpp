@@ -139,7 +139,7 @@ TEST(PlaceModel, AcceptsItsOwnPlacesAndRefusesOtherRooms) {
     EXPECT_TRUE(localiser.place_model().learnt);
     const auto ask = [&](const std::vector<FourierSignature>& views, Count& count) {
       for (const FourierSignature& view : views) {
-        const Localisation found = localiser.localise(pack(view, memory.full_scale()));
+        const Place found = localiser.localise(pack(view, memory.full_scale()));
         EXPECT_EQ(found.known, found.known_probability >= 0.5);
         EXPECT_EQ(found.known, found.position.has_value());
         ++count.asked;
@@ -221,7 +221,7 @@ TEST(PlaceModel, ProbabilityFallsWithTheDifferenceAndIsNoneWhereNothingIsSeen) {
   // A picture of one brightness shows no place, not even where such pictures are remembered.
   const FourierSignature flat = compute_signature(Panorama(16, 96, std::nullopt));
   const VisualMemory memory = make_memory(std::vector<FourierSignature>(10, flat));
-  const Localisation found = Localiser(memory).localise(pack(flat, memory.full_scale()));
+  const Place found = Localiser(memory).localise(pack(flat, memory.full_scale()));
   EXPECT_EQ(found.known_probability, 0.0);
   EXPECT_FALSE(found.known);
   EXPECT_FALSE(found.matches.empty());
@@ -235,7 +235,7 @@ TEST(PlaceModel, VerifiedFeaturesCountWhereColumnsLeaveDoubtAlone) {
                          .views = 200,
                          .components = 15};
   const double by_columns = place_probability(doubtful);
-  ASSERT_TRUE(leave_doubt(doubtful));
+  ASSERT_TRUE(is_inconclusive(doubtful));
   double last = 0.0;
   for (const int verified : {0, 5, 10, 20, 40}) {
     doubtful.features = {.verified = verified, .chance = 5, .neighbour = 30, .seen = 100};
@@ -255,7 +255,7 @@ TEST(PlaceModel, VerifiedFeaturesCountWhereColumnsLeaveDoubtAlone) {
     PlaceEvidence certain = doubtful;
     certain.difference = certain.of_all_columns = difference;
     certain.features.reset();
-    EXPECT_FALSE(leave_doubt(certain));
+    EXPECT_FALSE(is_inconclusive(certain));
     const double probability = place_probability(certain);
     certain.features = {.verified = 40, .chance = 5, .neighbour = 30, .seen = 100};
     EXPECT_EQ(place_probability(certain), probability);

@@ -28,7 +28,8 @@ TEST(InterpolatedPosition, OfAMemorisedViewIsItsPosition) {
     ASSERT_EQ(found[0].match.view, view);
     const auto estimate = interpolate_position(ColumnRanking(place.memory), model, found);
     ASSERT_TRUE(estimate);
-    EXPECT_NEAR(distance(estimate->position, place.memory.info(view).pose->position()), 0.0, 1e-6);
+    EXPECT_NEAR(distance(estimate->position(), place.memory.info(view).pose->position()), 0.0,
+                1e-6);
     ASSERT_TRUE(estimate->radius_m);
     EXPECT_GT(*estimate->radius_m, 0.0);
   }
@@ -55,7 +56,7 @@ TEST(InterpolatedPosition, WeightsSumToOneAndGiveThePosition) {
                 model.neighbourhood_m);
     }
     EXPECT_NEAR(sum, 1.0, 1e-9);
-    EXPECT_NEAR(distance(mean, estimate->position), 0.0, 1e-9);
+    EXPECT_NEAR(distance(mean, estimate->position()), 0.0, 1e-9);
   }
 }
 
@@ -78,7 +79,7 @@ TEST(InterpolatedPosition, BeatsTheNearestReferenceAndItsRadiusHolds95PerCent) {
       ASSERT_TRUE(estimate && estimate->radius_m);
       nearest_errors.push_back(
           distance(place.memory.info(found[0].match.view).pose->position(), pose.position()));
-      errors.push_back(distance(estimate->position, pose.position()));
+      errors.push_back(distance(estimate->position(), pose.position()));
       inside += errors.back() <= *estimate->radius_m ? 1 : 0;
     }
   }
@@ -126,7 +127,7 @@ TEST(InterpolatedPosition, PlacesThatLookAlikeWidenTheRadiusThereAndNowhereElse)
     const auto estimate = interpolate_position(ranking, model, found);
     ASSERT_TRUE(estimate && estimate->radius_m);
     (in_the_corner ? radii_in_the_corner : radii).push_back(*estimate->radius_m);
-    inside += distance(estimate->position, pose.position()) <= *estimate->radius_m ? 1 : 0;
+    inside += distance(estimate->position(), pose.position()) <= *estimate->radius_m ? 1 : 0;
     ++asked;
   }
   ASSERT_GE(radii.size(), 40U);
@@ -173,7 +174,7 @@ TEST(InterpolatedPosition, TheRadiusIsWiderAtTheEdgeOfWhatIsRemembered) {
       ASSERT_TRUE(estimate && estimate->radius_m);
       Held& held = is_beyond ? beyond : between;
       ++held.asked;
-      held.inside += distance(estimate->position, pose.position()) <= *estimate->radius_m;
+      held.inside += distance(estimate->position(), pose.position()) <= *estimate->radius_m;
     }
   }
   ASSERT_GE(beyond.asked, 100);
@@ -219,7 +220,7 @@ TEST(InterpolatedPosition, ADoubleDoesNotWidenTheRadiusWhereQueriesTellItApart) 
     const auto estimate = interpolate_position(ranking, model, found);
     ASSERT_TRUE(estimate && estimate->radius_m);
     radii.push_back(*estimate->radius_m);
-    inside += distance(estimate->position, p) <= *estimate->radius_m;
+    inside += distance(estimate->position(), p) <= *estimate->radius_m;
   }
   EXPECT_LT(quantile(radii, 0.5), 2.0 * step_m);
   EXPECT_GE(inside, 52);
@@ -242,7 +243,7 @@ TEST(PositionModel, OfFewOrUnposedViewsIsTheNearestReference) {
   };
   const auto estimate = interpolate_position(ColumnRanking(memory), model, matches_of(1));
   ASSERT_TRUE(estimate);
-  EXPECT_EQ(estimate->position, poses[1]->position());
+  EXPECT_EQ(estimate->position(), poses[1]->position());
   EXPECT_FALSE(estimate->radius_m);  // nothing to learn it from
   EXPECT_FALSE(interpolate_position(ColumnRanking(memory), model, matches_of(3)));
   EXPECT_FALSE(interpolate_position(ColumnRanking(memory), model, {}));
@@ -264,7 +265,7 @@ TEST(PositionModel, StandsCoincidentAndEqualViews) {
     const auto estimate = interpolate_position(ColumnRanking(memory), model,
                                                ranked_matches(memory, memory.packed(view)));
     ASSERT_TRUE(estimate);
-    EXPECT_NEAR(distance(estimate->position, memory.info(view).pose->position()), 0.0, 1e-6);
+    EXPECT_NEAR(distance(estimate->position(), memory.info(view).pose->position()), 0.0, 1e-6);
   }
   // All at one place: no spacing, nothing to interpolate.
   for (auto& pose : poses) pose = ReferencePose{1.0, 1.0, 0.0};

@@ -68,12 +68,12 @@ PositionErrors position_errors(const Part& memorised, const Part& asked) {
   const Localiser localiser(memory);
   PositionErrors errors;
   for (std::size_t i = 0; i < asked.signatures.size(); ++i) {
-    const Localisation found = localiser.localise(pack(asked.signatures[i], memory.full_scale()));
+    const Place found = localiser.localise(pack(asked.signatures[i], memory.full_scale()));
     const Point2 truth = asked.poses[i]->position();
     errors.nearest_m.push_back(
         distance(memory.info(found.matches[0].view).pose->position(), truth));
     if (!found.position) continue;
-    errors.interpolated_m.push_back(distance(found.position->position, truth));
+    errors.interpolated_m.push_back(distance(found.position->position(), truth));
     errors.inside += errors.interpolated_m.back() <= found.position->radius_m.value() ? 1.0 : 0.0;
   }
   errors.inside /= static_cast<double>(errors.interpolated_m.size());
@@ -132,7 +132,7 @@ TEST(GantryPlants, AbsoluteHeadingBetweenReferences) {
   const Localiser localiser(memory);
   std::vector<double> errors;
   for (const auto& query : asked.signatures) {
-    const Localisation found = localiser.localise(pack(query, memory.full_scale()));
+    const Place found = localiser.localise(pack(query, memory.full_scale()));
     if (found.heading_rad) errors.push_back(std::abs(angle_difference(*found.heading_rad, 0.0)));
   }
   ASSERT_GE(errors.size(), 94U);
@@ -149,11 +149,10 @@ TEST(IndoorWalk, EveryTurnedImageFindsItselfAndItsTurn) {
   Random random(6);
   for (std::size_t i = 0; i < all.signatures.size(); ++i) {
     const double turned_rad = random.uniform(-std::numbers::pi, std::numbers::pi);
-    const Localisation found =
+    const Place found =
         localiser.localise(pack(turn(all.signatures[i], turned_rad), memory.full_scale()));
     EXPECT_EQ(found.matches[0].view, memory.views()[i]);
-    EXPECT_NEAR(angle_difference(found.matches[0].compass->heading_rad, turned_rad), 0.0,
-                radians(0.5));
+    EXPECT_NEAR(angle_difference(*found.matches[0].heading_rad, turned_rad), 0.0, radians(0.5));
     EXPECT_TRUE(found.known);
     EXPECT_FALSE(found.position);
   }

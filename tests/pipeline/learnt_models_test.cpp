@@ -10,8 +10,11 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/localisation/localiser.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
 #include "panonav/pipeline/tracker.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
+#include "panonav/storage/memory_file.hpp"
 #include "support/temporary_folder.hpp"
 
 namespace panonav {
@@ -96,14 +99,14 @@ TEST_F(KeptModels, AnswersAreThoseOfModelsLearntAnew) {
   EXPECT_EQ(tracker.localiser().model(), tracker_anew.localiser().model());
   for (int i = 0; i < 10; ++i) {
     const PackedSignature query = view_at(0, 0.37 * i, 0.21 * i).signature;
-    const Localisation a = kept.localiser().localise(query);
-    const Localisation b = anew.localiser().localise(query);
+    const Place a = kept.localiser().localise(query);
+    const Place b = anew.localiser().localise(query);
     EXPECT_EQ(a.known, b.known);
     ASSERT_EQ(a.matches.size(), b.matches.size());
     EXPECT_EQ(a.matches.front().view, b.matches.front().view);
     ASSERT_EQ(a.position.has_value(), b.position.has_value());
     if (a.position) {
-      EXPECT_EQ(a.position->position, b.position->position);
+      EXPECT_EQ(a.position->position(), b.position->position());
       EXPECT_EQ(a.position->radius_m, b.position->radius_m);
     }
     const MonteCarloEstimate c = tracker.observe(query);
@@ -159,7 +162,7 @@ TEST_F(KeptModels, AViewThatSomebodyForgetsMeanwhileHasNoFeatures) {
     const PackedSignature query = view_at(0, 0.1 * i, 0.07 * i).signature;
     const auto found =
         recogniser.localiser().localise(query, {}, [&](Handedness) { return features; });
-    doubtful += leave_doubt(found.evidence) ? 1 : 0;
+    doubtful += is_inconclusive(found.evidence) ? 1 : 0;
     EXPECT_FALSE(found.evidence.features);
   }
   EXPECT_GT(doubtful, 0);

@@ -23,6 +23,8 @@
 #include "panonav/core/random.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
 #include "panonav/pipeline/live_memory.hpp"
+#include "panonav/pipeline/place_recogniser.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
 #include "support/landmark_pictures.hpp"
 #include "support/temporary_folder.hpp"
 #include "support/text.hpp"

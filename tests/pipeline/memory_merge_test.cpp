@@ -10,6 +10,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/pipeline/mapper.hpp"
+#include "panonav/route/route_panorama.hpp"
 #include "support/remembered_worlds.hpp"
 #include "support/temporary_folder.hpp"
 

@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <string>
 
+#include "panonav/mapping/topological_map.hpp"
+#include "panonav/route/route_panorama.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "support/temporary_folder.hpp"
 

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "panonav/core/error.hpp"
+#include "panonav/mapping/topological_map.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "support/memory_samples.hpp"
 #include "support/temporary_folder.hpp"

@@ -9,6 +9,8 @@
 #include <map>
 
 #include "panonav/core/error.hpp"
+#include "panonav/mapping/topological_map.hpp"
+#include "panonav/route/route_panorama.hpp"
 #include "panonav/storage/checksum.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "support/memory_samples.hpp"

@@ -8,6 +8,8 @@
 #include <thread>
 
 #include "panonav/core/error.hpp"
+#include "panonav/mapping/topological_map.hpp"
+#include "panonav/route/route_panorama.hpp"
 #include "support/memory_samples.hpp"
 #include "support/temporary_folder.hpp"
 #include "support/test_cameras.hpp"

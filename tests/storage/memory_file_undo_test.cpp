@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "panonav/core/error.hpp"
+#include "panonav/mapping/topological_map.hpp"
+#include "panonav/route/route_panorama.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "support/memory_samples.hpp"
 

@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "panonav/core/error.hpp"
+#include "panonav/route/route_panorama.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "support/memory_samples.hpp"
 #include "support/temporary_folder.hpp"

@@ -13,6 +13,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav/storage/memory_file.hpp"
 #include "support/viewer_peer.hpp"
 
 namespace panonav::viewer {

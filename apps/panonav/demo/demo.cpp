@@ -89,7 +89,7 @@ std::vector<AskedView> ask(const Localiser& localiser, const ViewEncoder& pipeli
   for_each_entry(executor, queries.entries.size(), [&](std::size_t i) {
     const auto& entry = queries.entries[i];
     PackedSignature signature = pipeline.packed(pipeline.read(entry));
-    Localisation found = localiser.localise(signature);
+    Place found = localiser.localise(signature);
     const ReferencePose& pose = *entry.pose;
     asked[i] =
         AskedView{{pose.x_m, pose.y_m, *pose.heading_rad}, std::move(signature), std::move(found)};
@@ -122,7 +122,7 @@ Outcome outcome_of(const std::vector<AskedView>& asked, const VisualMemory& memo
       outcome.nearest_errors_m.push_back(distance(nearest, truth.position()));
     }
     if (found.position) {
-      outcome.errors_m.push_back(distance(found.position->position, truth.position()));
+      outcome.errors_m.push_back(distance(found.position->position(), truth.position()));
     }
     if (found.heading_rad) {
       outcome.heading_errors_rad.push_back(

@@ -32,7 +32,7 @@ viewer::MapPlot map_of_answers(const VisualMemory& memory,
   for (const auto& view : asked) {
     truth.crosses.push_back(view.truth.position());
     if (view.found.position) {
-      error.lines.push_back({view.truth.position(), view.found.position->position});
+      error.lines.push_back({view.truth.position(), view.found.position->position()});
     }
   }
   viewer::MapPlot map{.title = "The office from above", .layers = scene};

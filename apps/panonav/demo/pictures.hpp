@@ -15,7 +15,7 @@ namespace panonav::command {
 struct AskedView {
   Pose2 truth;
   PackedSignature signature;
-  Localisation found;
+  Place found;
 };
 
 /// True places, and a line from each to where the memory says it is, over the layers of the scene.

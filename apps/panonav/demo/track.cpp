@@ -130,7 +130,7 @@ DemoTrack show_track(const DemoOptions& options, const DemoRecordings& recording
   const VisualMemory& memory = tracker.memory();
   const std::size_t particles_kept = particles_shown(run.entries.size());
   const std::vector<Point2> at_first =
-      positions_of(recordings::even_sample(tracker.localiser().particles(), particles_kept));
+      positions_of(recordings::resample_systematically(tracker.localiser().particles(), particles_kept));
   std::vector<TrackedImage> images;
   viewer::RunPage played("A robot that is kidnapped", run.entries.size());
   const ShownReferences shown(memory);

@@ -19,7 +19,7 @@ namespace {
 constexpr std::size_t max_shown = 200;
 constexpr std::size_t max_rows = 500;
 
-std::string position_text(const PlacePosition& position) {
+std::string position_text(const PositionEstimate& position) {
   return "x " + fixed(position.x_m, 2) + " m, y " + fixed(position.y_m, 2) + " m";
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "panonav/pipeline/place_recogniser.hpp"
+#include "panonav/storage/memory_file.hpp"
 
 namespace panonav::command {
 

@@ -8,6 +8,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/route/route_panorama.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "panonav_recordings/live_pictures.hpp"
 #include "panonav_recordings/recorded_dataset.hpp"

@@ -1,6 +1,7 @@
 #include <cmath>
 #include <exception>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <numbers>
 
@@ -13,7 +14,10 @@
 #include "panonav/io/atomic_file.hpp"
 #include "panonav/pipeline/memory_learner.hpp"
 #include "panonav/pipeline/observation_source.hpp"
+#include "panonav/pipeline/place_recogniser.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
 #include "panonav/pipeline/visual_motion.hpp"
+#include "panonav/storage/memory_file.hpp"
 #include "panonav_recordings/recording.hpp"
 #include "reports/localise_report.hpp"
 #include "reports/report_page.hpp"
@@ -51,8 +55,8 @@ constexpr std::string_view csv_header =
 
 /// Unknown values are empty.
 std::string csv_row(const LocalisedQuery& answer) {
-  const auto& [probability, known, matches, position, heading_rad, components, read, areas] =
-      answer.place;
+  const Place& place = answer.place;
+  const auto& position = place.position;
   std::string row = csv_field(answer.file);
   const auto add = [&row](const std::string& field) {
     row += ',';
@@ -61,14 +65,14 @@ std::string csv_row(const LocalisedQuery& answer) {
   const auto add_degrees = [&](const std::optional<double>& angle_rad) {
     add(angle_rad ? to_text(written_degrees(*angle_rad)) : "");
   };
-  add(!answer.error.empty() ? "unreadable" : known ? "known" : "unknown");
-  add(answer.error.empty() ? fixed(probability, 4) : "");
+  add(!answer.error.empty() ? "unreadable" : place.known ? "known" : "unknown");
+  add(answer.error.empty() ? fixed(place.known_probability, 4) : "");
   add(position ? to_text(position->x_m) : "");
   add(position ? to_text(position->y_m) : "");
   add(position && position->radius_m ? to_text(*position->radius_m) : "");
-  add_degrees(heading_rad);
+  add_degrees(place.heading_rad);
   for (std::size_t i = 0; i < 2; ++i) {
-    const PlaceMatch* const match = i < matches.size() ? &matches[i] : nullptr;
+    const PlaceMatch* const match = i < place.matches.size() ? &place.matches[i] : nullptr;
     add(match ? csv_field(match->name) : "");
     add(match ? std::to_string(match->dissimilarity) : "");
     add(match ? to_text(match->column_difference) : "");
@@ -241,6 +245,17 @@ std::vector<LocalisedQuery> answer_all(const PlaceRecogniser& recogniser,
   return answers;
 }
 
+PlaceRecogniserOptions recogniser_options(const LocaliseArguments& wanted,
+                                          const PictureSource& source) {
+  PlaceRecogniserOptions options{.localiser = wanted.localiser, .source = source};
+  if (wanted.areas) options.areas = wanted.accuracy;
+  // These take all views of the memory, so that it is held whatever its size.
+  if (wanted.learn || wanted.report || wanted.record.file || wanted.record.view) {
+    options.max_held_views = std::numeric_limits<std::size_t>::max();
+  }
+  return options;
+}
+
 /// Answers pictures as they come until the source ends or the user interrupts.
 ExitCode localise_live(const Arguments& arguments, const LocaliseArguments& wanted,
                        const MemoryFile& file, Session& session) {
@@ -249,10 +264,7 @@ ExitCode localise_live(const Arguments& arguments, const LocaliseArguments& want
                           "where " + input + " is a live source");
   const auto source = open_live(arguments, input, checked_beside(wanted.pictures, file),
                                 file.header().source, wanted.live);
-  const PlaceRecogniser recogniser(
-      file, {.localiser = wanted.localiser,
-             .source = source->pictures(),
-             .areas = wanted.areas ? std::optional(wanted.accuracy) : std::nullopt});
+  const PlaceRecogniser recogniser(wanted.memory, recogniser_options(wanted, source->pictures()));
   RunRecord record(wanted.record, std::span(&wanted.memory, 1), true, session,
                    {.memory = wanted.memory});
   std::optional<ShownReferences> shown;
@@ -310,10 +322,7 @@ ExitCode localise(const Arguments& arguments, const LocaliseArguments& wanted, S
   std::optional<MemoryLearner> learner;  // refuses before anything is answered
   if (wanted.learn) learner.emplace(wanted.memory, wanted.update);
   auto recording = open_queries(wanted, file, session);
-  const PlaceRecogniser recogniser(
-      file, {.localiser = wanted.localiser,
-             .source = recording.source,
-             .areas = wanted.areas ? std::optional(wanted.accuracy) : std::nullopt});
+  const PlaceRecogniser recogniser(wanted.memory, recogniser_options(wanted, recording.source));
   const bool moves = std::ranges::all_of(
       recording.entries, [](const DatasetEntry& entry) { return entry.odometry.has_value(); });
   if (learner && !moves) {

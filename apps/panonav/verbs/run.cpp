@@ -12,8 +12,10 @@
 #include "panonav/mapping/visual_odometry.hpp"
 #include "panonav/pipeline/live_memory.hpp"
 #include "panonav/pipeline/observation_source.hpp"
+#include "panonav/pipeline/place_recogniser.hpp"
 #include "panonav/pipeline/route_follower.hpp"
 #include "panonav/pipeline/route_recorder.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
 #include "panonav/storage/memory_address.hpp"
 #include "verbs/live_run.hpp"
 #include "verbs/localised_query.hpp"
@@ -210,7 +212,8 @@ ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& se
                             .memoriser = {.source = source->pictures(),
                                           .signature = wanted.signature,
                                           .preprocessing = wanted.preprocessing},
-                            .localiser = {}};
+                            .localiser = {},
+                            .hold = wanted.record.file || wanted.record.view};
   if (wanted.learn_interval_s) options.min_interval_s = *wanted.learn_interval_s;
   LiveMemory memory(wanted.memory, options);
   RunRecord record(wanted.record, std::array{wanted.source, wanted.memory}, live, session,

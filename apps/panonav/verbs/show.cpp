@@ -9,6 +9,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav/mapping/topological_map.hpp"
 #include "panonav/pipeline/named_view.hpp"
 
 namespace panonav::command {

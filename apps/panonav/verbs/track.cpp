@@ -286,8 +286,8 @@ ExitCode track_live(const Arguments& arguments, const TrackArguments& wanted,
           if (number == 0) shown->put(*moment);
           clock.put(*moment);
         }
-        TrackedImage image = track_image(tracker, pack(view, encoder.header().full_scale),
-                                              settings, std::move(moment));
+        TrackedImage image = track_image(tracker, pack(view, encoder.header().full_scale), settings,
+                                         std::move(moment));
         moment = std::move(image.moment);
         if (moment && moved_by_hand) tell_wish(*moment);
         image.index = number;
@@ -410,13 +410,6 @@ Run declare_track(Arguments& arguments) {
   arguments.options("monte_carlo", wanted->filter);
   arguments.options("odometry", wanted->odometry, "odometry");
   arguments.common({"--seed"});
-  const auto injects = [wanted](ParticleInjection way) {
-    return [wanted, way] { return wanted->filter.injection == way; };
-  };
-  arguments.used_only({"--injection-share"}, injects(ParticleInjection::topological),
-                      "without --injection topological");
-  arguments.used_only({"--injection-number"}, injects(ParticleInjection::uniform),
-                      "without --injection uniform");
   return [wanted, &arguments](Session& session) {
     return track_run(arguments, *wanted, session);
   };

@@ -58,10 +58,10 @@ TrackedImage track_image(Tracker& tracker, const PackedSignature& view,
   image.estimate = tracker.observe(view);
   clock.stage("filter");
   image.particles =
-      recordings::even_sample(tracker.localiser().particles(), settings.particles_kept);
+      recordings::resample_systematically(tracker.localiser().particles(), settings.particles_kept);
   if (moment) {
     describe(*moment, image.estimate);
-    moment->particles = recordings::even_sample(tracker.localiser().particles(), 500);
+    moment->particles = recordings::resample_systematically(tracker.localiser().particles(), 500);
     if (moment->panorama) {
       if (settings.shown != nullptr) settings.shown->compare(*moment, tracker.memory(), view);
       const ViewId best = tracker.memory().search(view, {.top = 1}).matches.front().view;

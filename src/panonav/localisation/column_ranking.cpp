@@ -10,9 +10,10 @@ namespace panonav {
 
 double RankedMatch::score_of(double difference) const {
   // Two views may agree in all columns to the last byte and not in brightness, or the reverse.
-  constexpr double least = 1e-6;
-  constexpr double weight_of_dissimilarity = 0.125;
-  return (difference + least) * std::pow(match.dissimilarity + least, weight_of_dissimilarity);
+  constexpr double min_factor = 1e-6;
+  constexpr double dissimilarity_exponent = 0.125;  // chosen on recordings (docs/decisions.md)
+  return (difference + min_factor) *
+         std::pow(match.dissimilarity + min_factor, dissimilarity_exponent);
 }
 
 ColumnRanking::ColumnRanking(const VisualMemory& memory, int components, int max_kept)

@@ -14,7 +14,7 @@ namespace panonav {
 struct RankedMatch {
   Match match;          ///< as the search found it, by dissimilarity
   ColumnMatch columns;  ///< the turn at which the columns differ least
-  /// Of local features (`put_verified_first`); empty where none were compared.
+  /// Of local features (`rank_by_verified_features`); empty where none were compared.
   std::optional<int> verified_features = std::nullopt;
 
   /// The re-ranking score; the minimum is the best. Most of it comes from the columns. The

@@ -9,8 +9,8 @@
 
 namespace panonav {
 
-void put_verified_first(const LocalFeatures& query, const FeatureSource& features,
-                        std::vector<RankedMatch>& ranked) {
+void rank_by_verified_features(const LocalFeatures& query, const FeatureSource& features,
+                               std::vector<RankedMatch>& ranked) {
   const auto end = ranked.begin() + static_cast<std::ptrdiff_t>(
                                         std::min<std::size_t>(verified_candidates, ranked.size()));
   for (auto match = ranked.begin(); match != end; ++match) {
@@ -24,7 +24,7 @@ void put_verified_first(const LocalFeatures& query, const FeatureSource& feature
   });
 }
 
-bool FeatureTrial::tell_more() const {
+bool FeatureTrial::is_significantly_better() const {
   const int changed = gained + lost;
   // P(gained or more of `changed`), each with probability 1/2.
   double coefficient = 1.0;  // of `changed` over i
@@ -38,7 +38,8 @@ bool FeatureTrial::tell_more() const {
 
 FeatureTrial try_features(const ColumnRanking& ranking, const NeighbourSupport& support,
                           const FeatureSource& features) {
-  constexpr int max_sampled = 100;  // as of the other models
+  constexpr int max_sampled = 100;  // views left out in turn; chosen: 3 ms each
+  // Up to this ratio of its distance to that of the nearest view, a match is right. Chosen.
   constexpr double right_ratio = 1.5;
   const VisualMemory& memory = ranking.memory();
   const std::span<const ViewId> views = memory.views();
@@ -73,10 +74,10 @@ FeatureTrial try_features(const ColumnRanking& ranking, const NeighbourSupport& 
         query, {.top = verified_candidates, .components = ranking.components()}, {excluded, {}});
     std::vector<RankedMatch> ranked = ranking.rank(query, found.matches);
     if (ranked.empty()) continue;
-    support.put_best_supported_first(ColumnProfiles(query, ranking.components()), ranked, excluded);
+    support.rank_by_support(ColumnProfiles(query, ranking.components()), ranked, excluded);
     const auto is_right = [&] { return apart(ranked[0].match.view) <= right_ratio * nearest; };
     const bool by_columns = is_right();
-    put_verified_first(*own, features, ranked);
+    rank_by_verified_features(*own, features, ranked);
     const bool by_features = is_right();
     ++trial.sampled_views;
     trial.columns_right += by_columns ? 1 : 0;

@@ -29,8 +29,8 @@ inline constexpr int verified_candidates = 24;
 /// The last stage of re-ranking: puts the first `verified_candidates` in the order of the features
 /// that they share with the query (`match_features`), most first; equal ones keep their order. Each
 /// gets its number of verified features, and the turn where there are any. Cost: 0.1 ms a match.
-void put_verified_first(const LocalFeatures& query, const FeatureSource& features,
-                        std::vector<RankedMatch>& ranked);
+void rank_by_verified_features(const LocalFeatures& query, const FeatureSource& features,
+                               std::vector<RankedMatch>& ranked);
 
 /// What leaving out views of a memory in turn says of its local features.
 struct FeatureTrial {
@@ -41,7 +41,7 @@ struct FeatureTrial {
   int lost = 0;            ///< the reverse
   /// The sign test: had features been no better, as many gains among the changes would have come
   /// about in at most one of 20 cases [McNemar 1947].
-  [[nodiscard]] bool tell_more() const;
+  [[nodiscard]] bool is_significantly_better() const;
 };
 
 /// Whether local features find the places of this memory better than columns do: between views that

@@ -7,6 +7,8 @@
 
 #include "panonav/core/options.hpp"
 #include "panonav/geometry/voronoi.hpp"
+#include "panonav/localisation/localiser_options.hpp"
+#include "panonav/localisation/place.hpp"
 #include "panonav/memory/visual_memory.hpp"
 
 namespace panonav {
@@ -35,25 +37,6 @@ class ReferenceAreas {
   std::vector<ViewId> views_;  // posed ones, ascending; order of the positions given to `cells_`
   VoronoiCells cells_;
   std::vector<double> areas_m2_;  // by site
-};
-
-/// Where to stop.
-struct WantedAccuracy {
-  int components = 0;     ///< at most so many, 0: the memory's
-  double radius_m = 0.0;  ///< stop as soon as the circle is no larger; 0: never on this account
-  double tolerance =
-      0.0;  ///< candidates are kept up to (1 + tolerance) times the best dissimilarity
-};
-void visit_options(WantedAccuracy& accuracy, OptionVisitor& visitor);
-
-/// What is known of the place after a number of components has been compared. Every level's
-/// candidates, area and radius are at most those of the level before.
-struct LocalisationLevel {
-  int components = 0;             ///< compared so far
-  std::vector<Match> candidates;  ///< ascending (partial dissimilarity, view)
-  std::optional<double> area_m2;  ///< of the candidates' cells; empty when a candidate has no pose
-  std::optional<Circle> region;   ///< circle that covers the candidates' cells
-  std::uint64_t bytes_read = 0;   ///< of signatures, by all levels so far
 };
 
 /// Hierarchical localisation [M04 section 2.3, figures 9 and 10]: few components give a large area,

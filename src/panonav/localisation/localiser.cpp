@@ -10,6 +10,8 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/localisation/neighbour_support.hpp"
+#include "panonav/signature/compass.hpp"
 
 namespace panonav {
 
@@ -35,23 +37,28 @@ std::optional<LocalFeatures> with_rows(std::optional<LocalFeatures> features,
   return features;
 }
 
-constexpr std::size_t references = 4;  // the corners of a grid's square
+// Matches of which the heading is the mean, and the nearest one is listed first: the corners of a
+// grid's square.
+constexpr std::size_t nearest_references = 4;
 
-// The mean of what the nearest references say. The error of the compass grows with the distance,
-// and so does the square of the difference, so weights are its inverse fourth power. Only those
-// near to what the best match says count: a compass that locked on to a wrong maximum must not pull
-// the mean.
+// Half the width in which the compass searches: columns tell the turn to a step of theirs.
+constexpr double compass_window_rad = 2.0 * std::numbers::pi / ColumnProfiles::columns;
+
+// The weighted mean of the headings that the nearest references indicate. The error of the compass
+// grows with the distance, and so does the square of the difference, so weights are its inverse
+// fourth power. Only those near to what the best match indicates count: a compass that locked on to
+// a wrong maximum must not pull the mean.
 std::optional<double> absolute_heading(const VisualMemory& memory,
-                                       std::span<const LocalisedMatch> matches) {
-  constexpr double agreement_rad = radians(15.0);
-  constexpr double min_difference = 1e-2;
+                                       std::span<const PlaceMatch> matches) {
+  constexpr double agreement_rad = radians(15.0);  // chosen
+  constexpr double min_difference = 1e-2;          // below it all differences count alike
   std::optional<double> centre_rad;
   double sum = 0.0;
   double weights = 0.0;
-  for (const LocalisedMatch& match : matches.first(std::min(references, matches.size()))) {
+  for (const PlaceMatch& match : matches.first(std::min(nearest_references, matches.size()))) {
     const auto& pose = memory.info(match.view).pose;
-    if (!pose || !pose->heading_rad || !match.compass) continue;
-    const double heading_rad = *pose->heading_rad + match.compass->heading_rad;
+    if (!pose || !pose->heading_rad || !match.heading_rad) continue;
+    const double heading_rad = *pose->heading_rad + *match.heading_rad;
     if (!centre_rad) centre_rad = heading_rad;
     const double offset = angle_difference(heading_rad, *centre_rad);
     if (std::abs(offset) > agreement_rad) continue;
@@ -63,28 +70,77 @@ std::optional<double> absolute_heading(const VisualMemory& memory,
   return wrap_angle(*centre_rad + sum / weights);
 }
 
-// Columns tell the turn to a step of theirs.
-constexpr double compass_window_rad = 2.0 * std::numbers::pi / ColumnProfiles::columns;
-
-std::shared_ptr<const ColumnRanking> ranking_of(const VisualMemory& memory,
-                                                const LocaliserOptions& options) {
-  validate(options);
-  return std::make_shared<const ColumnRanking>(memory, options.components,
-                                               std::max(options.reranked_views, 1));
-}
-
-// Which of the best references is the nearest one: a position that many references agree on says it
-// better than their differences one by one, in which noise decides between neighbours.
+// Moves the nearest of the best references to the front: a position that many references agree on
+// tells it better than their differences one by one, in which noise decides between neighbours.
 void put_nearest_first(const VisualMemory& memory, Point2 position,
-                       std::vector<LocalisedMatch>& matches) {
+                       std::vector<PlaceMatch>& matches) {
   const auto end =
-      matches.begin() + static_cast<std::ptrdiff_t>(std::min(references, matches.size()));
-  const auto distance_m = [&](const LocalisedMatch& match) {
+      matches.begin() + static_cast<std::ptrdiff_t>(std::min(nearest_references, matches.size()));
+  const auto distance_m = [&](const PlaceMatch& match) {
     const auto& pose = memory.info(match.view).pose;
     return pose ? distance(pose->position(), position) : std::numeric_limits<double>::infinity();
   };
   const auto nearest = std::ranges::min_element(matches.begin(), end, {}, distance_m);
   std::rotate(matches.begin(), nearest, nearest + 1);
+}
+
+std::vector<ViewId> ids_of(std::span<const RankedMatch> matches) {
+  std::vector<ViewId> ids;
+  for (const RankedMatch& match : matches) ids.push_back(match.match.view);
+  return ids;
+}
+
+// Replaces rectangles that overlap by one around both.
+std::vector<PositionBounds> join_overlapping(std::vector<PositionBounds> boxes) {
+  const auto overlap = [](const PositionBounds& a, const PositionBounds& b) {
+    return a.min_x_m <= b.max_x_m && b.min_x_m <= a.max_x_m && a.min_y_m <= b.max_y_m &&
+           b.min_y_m <= a.max_y_m;
+  };
+  for (std::size_t i = 0; i < boxes.size();) {
+    const auto other =
+        std::find_if(boxes.begin() + static_cast<std::ptrdiff_t>(i) + 1, boxes.end(),
+                     [&](const PositionBounds& box) { return overlap(boxes[i], box); });
+    if (other == boxes.end()) {
+      ++i;
+      continue;
+    }
+    boxes[i] = {
+        std::min(boxes[i].min_x_m, other->min_x_m), std::max(boxes[i].max_x_m, other->max_x_m),
+        std::min(boxes[i].min_y_m, other->min_y_m), std::max(boxes[i].max_y_m, other->max_y_m)};
+    boxes.erase(other);
+    i = 0;
+  }
+  return boxes;
+}
+
+// Where the references lie that may support one of the matches (`NeighbourSupport`).
+std::vector<PositionBounds> bounds_of_supporters(const VisualMemory& memory,
+                                                 std::span<const RankedMatch> ranked,
+                                                 double spacing_m) {
+  std::vector<PositionBounds> boxes;
+  const double radius_m = NeighbourSupport::radius_m(spacing_m);
+  if (!(radius_m > 0.0)) return boxes;
+  for (const RankedMatch& match :
+       ranked.first(std::min(ranked.size(), NeighbourSupport::max_examined))) {
+    const auto& pose = memory.info(match.match.view).pose;
+    if (!pose || !pose->heading_rad) continue;
+    boxes.push_back(
+        {pose->x_m - radius_m, pose->x_m + radius_m, pose->y_m - radius_m, pose->y_m + radius_m});
+  }
+  return join_overlapping(std::move(boxes));
+}
+
+VisualMemory joined(const VisualMemory& part, const VisualMemory& drawn) {
+  VisualMemory all(part.shape(), part.full_scale(), part.elevations());
+  std::vector<ViewId> views;
+  std::ranges::set_union(part.views(), drawn.views(), std::back_inserter(views));
+  for (const ViewId view : views) {
+    const VisualMemory& from = part.contains(view) ? part : drawn;
+    // Somebody may have given its name to another view meanwhile.
+    if (all.find(from.info(view).name)) continue;
+    all.append_as(view, from.packed(view), from.info(view));
+  }
+  return all;
 }
 
 }  // namespace
@@ -101,117 +157,231 @@ void visit_options(LocaliserOptions& options, OptionVisitor& visitor) {
   table.visit(options, visitor);
 }
 
-int first_matches(const LocaliserOptions& options, bool by_features) {
-  return std::max({options.top, PositionModel::candidates, by_features ? verified_candidates : 0});
-}
+/// The views that queries are compared with, and what is kept of them for comparing.
+struct Localiser::ComparedViews {
+  ComparedViews(const VisualMemory& memory_, const LocaliserOptions& options,
+                std::optional<double> spacing_m, std::size_t views)
+      : memory(&memory_),
+        ranking(memory_, options.components, std::max(options.reranked_views, 1)),
+        support(ranking, spacing_m),
+        criterion(ranking, views) {}
+  ComparedViews(const ComparedViews&) = delete;
+  ComparedViews& operator=(const ComparedViews&) = delete;
 
-bool looks_further(const PlaceModel& model, std::span<const RankedMatch> first) {
-  return std::ranges::none_of(first, [&](const RankedMatch& match) {
-    return match.columns.difference <= model.neighbouring;
-  });
-}
+  const VisualMemory* memory;
+  ColumnRanking ranking;
+  NeighbourSupport support;  // looks at `ranking`
+  PlaceCriterion criterion;  // looks at `ranking`
+};
+
+/// One query on its way to an answer.
+class Localiser::Query {
+ public:
+  Query(const Localiser& localiser, ViewIndex& index, const PackedSignature& view,
+        const SearchMask& mask, const QueryFeatures& features)
+      : own_(localiser),
+        options_(localiser.options_),
+        index_(index),
+        view_(view),
+        mask_(mask),
+        make_features_(features),
+        compared_(localiser.held_.get()) {
+    const VisualMemory& memory = compared_ != nullptr ? *compared_->memory : *own_.drawn_;
+    place_.components = options_.components == 0 ? memory.shape().components : options_.components;
+    if (features && own_.ranks_by_features() && options_.reranked_views > 0) {
+      features_ = features_of(Handedness::as_seen);
+    }
+    ranks_by_features_ = features_.has_value();
+  }
+
+  Place answer() {
+    find_candidates();
+    if (ranked_.empty()) return std::move(place_);
+    load_compared_views();
+    weigh_columns();
+    rank_by_support();
+    rank_by_features();
+    weigh_features();
+    list_matches();
+    if (place_.known) estimate_pose();
+    return std::move(place_);
+  }
+
+ private:
+  /// Finds the views of least dissimilarity, in the order of their columns; more of them where none
+  /// explains the query [M04 section 2.2].
+  void find_candidates() {
+    const int first = std::max(
+        {options_.top, PositionModel::candidates, ranks_by_features_ ? verified_candidates : 0});
+    search_and_rank(first);
+    const bool is_explained = std::ranges::any_of(ranked_, [&](const RankedMatch& match) {
+      return match.columns.difference <= own_.place_model_.neighbouring;
+    });
+    if (!ranked_.empty() && !is_explained && options_.reranked_views > first) {
+      search_and_rank(options_.reranked_views);
+    }
+  }
+
+  void search_and_rank(int count) {
+    const SearchResult found =
+        index_.search(view_, {.top = count, .components = options_.components}, mask_);
+    place_.bytes_read += found.bytes_read;
+    place_.bytes_in_full = found.bytes_in_full;
+    place_.views_compared += found.matches.size();
+    if (compared_ != nullptr) {
+      ranked_ = compared_->ranking.rank(view_, found.matches, mask_.allowed_rows);
+      return;
+    }
+    std::vector<ViewId> views;
+    for (const Match& match : found.matches) views.push_back(match.view);
+    loaded_.emplace(index_.load(views));
+    ranked_ = ColumnRanking(*loaded_, options_.components, 0)
+                  .rank(view_, found.matches, mask_.allowed_rows);
+  }
+
+  /// Loads what the answer takes of a memory that is not held: the candidates, references that may
+  /// support them, and the views of chance.
+  void load_compared_views() {
+    if (compared_ != nullptr) return;
+    std::vector<ViewId> views = ids_of(ranked_);
+    views.insert(views.end(), mask_.excluded_views.begin(), mask_.excluded_views.end());
+    if (options_.reranked_views > 0) {
+      const auto around =
+          index_.views_within(bounds_of_supporters(*loaded_, ranked_, own_.spacing_m_));
+      views.insert(views.end(), around.begin(), around.end());
+    }
+    loaded_.emplace(joined(index_.load(views), *own_.drawn_));
+    compared_ =
+        &loaded_views_.emplace(*loaded_, options_, std::optional(own_.spacing_m_), index_.size());
+  }
+
+  void weigh_columns() { place_.evidence = compared_->criterion.evidence(view_, ranked_, mask_); }
+
+  void rank_by_support() {
+    // Profiles of the references are kept over all rows.
+    if (options_.reranked_views == 0 || !mask_.allowed_rows.empty()) return;
+    compared_->support.rank_by_support(ColumnProfiles(view_, options_.components), ranked_,
+                                       mask_.excluded_views);
+  }
+
+  void rank_by_features() {
+    if (ranks_by_features_) rank_by_verified_features(*features_, own_.features_, ranked_);
+  }
+
+  /// A sequential test: features count only where columns are inconclusive.
+  void weigh_features() {
+    is_known_by_columns_ = is_known();
+    if (make_features_ && own_.features_ && is_inconclusive(place_.evidence)) {
+      if (!features_) features_ = features_of(Handedness::as_seen);
+      const auto mirrored = features_of(Handedness::mirrored);
+      if (features_ && mirrored) {
+        place_.evidence.features = compared_->criterion.feature_evidence(
+            *features_, *mirrored, own_.features_, ranked_, mask_);
+      }
+    }
+    place_.known_probability = place_probability(place_.evidence);
+    place_.known = is_known();
+  }
+  [[nodiscard]] bool is_known() const { return place_probability(place_.evidence) >= 0.5; }
+
+  /// Lists the matches with the heading relative to each, by the visual compass.
+  void list_matches() {
+    if (options_.reranked_views == 0) {
+      std::ranges::sort(ranked_, {}, [](const RankedMatch& r) {
+        return std::pair(r.match.dissimilarity, r.match.view);
+      });
+    }
+    const PackedSignature seen = with_rows(view_, mask_.allowed_rows);
+    const VisualMemory& memory = *compared_->memory;
+    for (const RankedMatch& r : ranked_) {
+      if (static_cast<int>(place_.matches.size()) == options_.top) break;
+      std::optional<CompassReading> reading;
+      if (place_.components >= 2) {
+        reading = compass_near(seen, with_rows(memory.packed(r.match.view), mask_.allowed_rows),
+                               r.columns.heading_rad, compass_window_rad,
+                               {.components = options_.components});
+      }
+      place_.matches.push_back({memory.info(r.match.view).name, r.match.view, r.match.dissimilarity,
+                                r.columns.difference, r.verified_features,
+                                reading ? std::optional(reading->heading_rad) : std::nullopt});
+    }
+  }
+
+  /// Interpolates between references [M04 footnote 1].
+  void estimate_pose() {
+    const PositionModel& model = own_.position_model_;
+    place_.position = interpolate_position(compared_->ranking, model, ranked_);
+    // Columns alone do not know the place: so much do they say of the position.
+    if (!is_known_by_columns_ && place_.position && place_.position->radius_m) {
+      place_.position->radius_m = std::max(*place_.position->radius_m, model.neighbourhood_m);
+    }
+    place_.heading_rad = absolute_heading(*compared_->memory, place_.matches);
+    if (place_.position && options_.reranked_views > 0 && !ranks_by_features_) {
+      put_nearest_first(*compared_->memory, place_.position->position(), place_.matches);
+    }
+  }
+
+  [[nodiscard]] std::optional<LocalFeatures> features_of(Handedness handedness) const {
+    return with_rows(make_features_(handedness), mask_.allowed_rows);
+  }
+
+  const Localiser& own_;
+  const LocaliserOptions& options_;
+  ViewIndex& index_;
+  const PackedSignature& view_;
+  const SearchMask& mask_;
+  const QueryFeatures& make_features_;
+  const ComparedViews* compared_;       // null until `load_compared_views` of a memory not held
+  std::optional<VisualMemory> loaded_;  // its views
+  std::optional<ComparedViews> loaded_views_;
+  std::vector<RankedMatch> ranked_;
+  std::optional<LocalFeatures> features_;  // of the query, as seen
+  bool ranks_by_features_ = false;
+  bool is_known_by_columns_ = false;
+  Place place_;
+};
 
 Localiser::Localiser(const VisualMemory& memory, const LocaliserOptions& options)
-    : Localiser(memory, ranking_of(memory, options), options) {}
-
-Localiser::Localiser(const VisualMemory& memory, std::shared_ptr<const ColumnRanking> ranking,
-                     const LocaliserOptions& options)
-    : memory_(&memory),
-      options_(options),
-      ranking_(std::move(ranking)),
-      support_(*ranking_),
-      criterion_(*ranking_),
-      place_model_(learn_place_model(*ranking_)),
-      position_model_(learn_position_model(*ranking_)) {}
+    : options_(options) {
+  validate(options);
+  held_ = std::make_shared<const ComparedViews>(memory, options, std::nullopt, 0);
+  place_model_ = learn_place_model(held_->ranking);
+  position_model_ = learn_position_model(held_->ranking);
+}
 
 Localiser::Localiser(const VisualMemory& memory, const PlaceModel& place_model,
                      const PositionModel& position_model, const LocaliserOptions& options,
-                     std::optional<double> spacing_m, std::size_t views)
-    : memory_(&memory),
-      options_(options),
-      ranking_(ranking_of(memory, options)),
-      support_(*ranking_, spacing_m),
-      criterion_(*ranking_, views),
-      place_model_(place_model),
-      position_model_(position_model) {
+                     std::optional<double> spacing_m)
+    : options_(options), place_model_(place_model), position_model_(position_model) {
+  validate(options);
+  held_ = std::make_shared<const ComparedViews>(memory, options, spacing_m, 0);
   require(position_model_.components == options_.components, "components of the position model",
           position_model_.components, to_text(options_.components) + ", as asked for");
 }
 
-Localisation Localiser::localise(const PackedSignature& query, const SearchMask& mask,
-                                 const QueryFeatures& features) const {
-  Localisation result;
-  result.components = options_.components == 0 ? memory_->shape().components : options_.components;
-  const auto nearest = [&](int wanted) {
-    SearchResult found =
-        memory_->search(query, {.top = wanted, .components = options_.components}, mask);
-    result.bytes_read += found.bytes_read;
-    result.bytes_in_full = found.bytes_in_full;
-    result.views_compared += found.matches.size();
-    return ranking_->rank(query, found.matches, mask.allowed_rows);
-  };
-  std::optional<LocalFeatures> seen_features;
-  if (features && ranks_by_features() && options_.reranked_views > 0) {
-    seen_features = with_rows(features(Handedness::as_seen), mask.allowed_rows);
-  }
-  const bool by_features = seen_features.has_value();
-  const int first = first_matches(options_, by_features);
-  std::vector<RankedMatch> ranked = nearest(first);
-  if (ranked.empty()) return result;
-  if (options_.reranked_views > first && looks_further(place_model_, ranked)) {
-    ranked = nearest(options_.reranked_views);
-  }
-  result.evidence = criterion_.evidence(query, ranked, mask);
-  // Profiles of the references are kept over all rows.
-  if (options_.reranked_views > 0 && mask.allowed_rows.empty()) {
-    support_.put_best_supported_first(ColumnProfiles(query, options_.components), ranked,
-                                      mask.excluded_views);
-  }
-  if (by_features) put_verified_first(*seen_features, features_, ranked);
-  const bool known_by_columns = place_probability(result.evidence) >= 0.5;
-  if (features && features_ && leave_doubt(result.evidence)) {
-    if (!seen_features) {
-      seen_features = with_rows(features(Handedness::as_seen), mask.allowed_rows);
-    }
-    const auto mirrored = with_rows(features(Handedness::mirrored), mask.allowed_rows);
-    if (seen_features && mirrored) {
-      result.evidence.features =
-          criterion_.feature_evidence(*seen_features, *mirrored, features_, ranked, mask);
-    }
-  }
-  result.known_probability = place_probability(result.evidence);
-  result.known = result.known_probability >= 0.5;
-  if (options_.reranked_views == 0) {
-    std::ranges::sort(ranked, {}, [](const RankedMatch& r) {
-      return std::pair(r.match.dissimilarity, r.match.view);
-    });
-  }
+Localiser::Localiser(std::shared_ptr<const VisualMemory> drawn, const PlaceModel& place_model,
+                     const PositionModel& position_model, const LocaliserOptions& options,
+                     double spacing_m)
+    : options_(options),
+      drawn_(std::move(drawn)),
+      spacing_m_(spacing_m),
+      place_model_(place_model),
+      position_model_(position_model) {
+  validate(options);
+  require(position_model_.components == options_.components, "components of the position model",
+          position_model_.components, to_text(options_.components) + ", as asked for");
+}
 
-  const PackedSignature seen = with_rows(query, mask.allowed_rows);
-  for (const RankedMatch& r : ranked) {
-    if (static_cast<int>(result.matches.size()) == options_.top) break;
-    std::optional<CompassReading> reading;
-    if (result.components >= 2) {
-      reading = compass_near(seen, with_rows(memory_->packed(r.match.view), mask.allowed_rows),
-                             r.columns.heading_rad, compass_window_rad,
-                             {.components = options_.components});
-    }
-    result.matches.push_back(
-        {r.match.view, r.match.dissimilarity, r.columns.difference, r.verified_features, reading});
-  }
-  if (result.known) {
-    result.position = interpolate_position(*ranking_, position_model_, ranked);
-    // Columns alone do not know the place: so much do they say of the position.
-    if (!known_by_columns && result.position && result.position->radius_m) {
-      result.position->radius_m =
-          std::max(*result.position->radius_m, position_model_.neighbourhood_m);
-    }
-    result.heading_rad = absolute_heading(*memory_, result.matches);
-    if (result.position && options_.reranked_views > 0 && !by_features) {
-      put_nearest_first(*memory_, result.position->position, result.matches);
-    }
-  }
-  return result;
+Place Localiser::localise(const PackedSignature& query, const SearchMask& mask,
+                          const QueryFeatures& features) const {
+  if (!held_) throw ContractError("memory", "not held", "one that is held, or its index");
+  HeldViewIndex index(*held_->memory);
+  return localise(index, query, mask, features);
+}
+
+Place Localiser::localise(ViewIndex& index, const PackedSignature& query, const SearchMask& mask,
+                          const QueryFeatures& features) const {
+  return Query(*this, index, query, mask, features).answer();
 }
 
 }  // namespace panonav

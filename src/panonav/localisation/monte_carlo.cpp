@@ -2,17 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 #include <string>
 #include <utility>
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/kernels/similarity.hpp"
-#include "panonav/localisation/hierarchical.hpp"
+#include "panonav/localisation/internal/explained_injection.hpp"
 #include "panonav/localisation/internal/particle_motion.hpp"
+#include "panonav/localisation/internal/particle_weighing.hpp"
+#include "panonav/localisation/internal/pose_sampler.hpp"
 #include "panonav/localisation/internal/position_error.hpp"
 #include "panonav/localisation/internal/resampling.hpp"
 #include "panonav/localisation/internal/view_likelihood.hpp"
@@ -21,33 +20,53 @@ namespace panonav {
 
 namespace {
 
+// Sectors of the circle in which particles are gathered: 15 degrees each. Chosen.
+constexpr int heading_bins = 24;
+
+// Views that the search finds for each image, and references near the particles that are compared;
+// fewer while the robot is localised. Chosen: all modes are followed, in a time that the search
+// does not exceed.
 constexpr int searched_views = 16;
-constexpr int searched_when_localised = 4;
+constexpr int searched_views_when_localised = 4;
 constexpr std::size_t followed_sites = 256;
-constexpr double min_followed = 1e-3;  // share of the weight near a site
-constexpr std::size_t followed_when_localised = 16;
-constexpr int max_stages = 6;
-constexpr double min_share = 0.05;
-constexpr double nothing_left = 1e-37;      // the least exponential is 1e-38
-constexpr double enough_effective = 200.0;  // stand for a mode in three dimensions
-constexpr double max_against = 9.0;         // about 1 : 10 000
-// Chances from one image to the next.
-constexpr double kidnapped = 0.01;
-constexpr double leaving = 0.02;
-constexpr double coming_back = 0.1;
+constexpr std::size_t followed_sites_when_localised = 16;
+// Least share of the particles' weight near a reference that is compared for them. Chosen.
+constexpr double min_followed_weight = 1e-3;
+
+// Probabilities from one image to the next: that the robot was carried anywhere (docs/decisions.md,
+// particle injection), that it leaves the memorised area, and that it comes back. Chosen.
+constexpr double p_kidnap = 0.01;
+constexpr double p_leave = 0.02;
+constexpr double p_return = 0.1;
+// Probability of being elsewhere than where the particles were strewn while nothing is known.
+// Chosen.
+constexpr double p_elsewhere_at_start = 0.9;
+// Belief in being inside the memorised area before the first image: none either way.
+constexpr double p_inside_at_start = 0.5;
+
 // Log-likelihood ratio that a view of another place reaches by chance; one in a hundred reaches it
-// (docs/decisions.md).
-constexpr double by_chance = 1.0;
-constexpr double max_for = 5.0;
-constexpr double max_for_similar = 2.0;
-constexpr double localised_weight = 0.9;
-constexpr double memorised_reach = 2.0;  // times the spacing or the range of similarity
-constexpr double min_injected = 0.5;     // particles' worth of weight
-constexpr double nothing_known = 0.9;  // chance of being elsewhere than where particles were strewn
-// Deviations of new particles from the reference that tells them: within its square of the grid,
-// and within the turns that explain a view.
-constexpr double drawn_spacings = 0.4;
-constexpr double drawn_heading_widths = 0.25;
+// (docs/decisions.md, "Lost is a second belief"). One image never speaks against the area by more.
+constexpr double log_ratio_by_chance = 1.0;
+// The most by which one image speaks for it, by its likelihood or by its difference alone. Chosen.
+constexpr double max_log_ratio = 5.0;
+constexpr double max_log_ratio_of_difference = 2.0;
+// Log-likelihood ratio for each part of the way from an explained to an unrelated difference; and
+// the shortest such way, in differences. Chosen.
+constexpr double log_ratio_per_margin = 4.0;
+constexpr double min_margin_unit = 0.05;
+
+// Least exponent by which a view counts, however near it was taken to the one before. Chosen.
+constexpr double min_view_exponent = 0.05;
+
+// The robot is localised with this much of the weight in one mode, and in the memorised area up to
+// so many spacings or ranges of similarity from a reference (docs/decisions.md, "Localised means").
+constexpr double min_localised_weight = 0.9;
+constexpr double memorised_reach = 2.0;
+constexpr double min_inside = 0.5;
+
+double position_variance_m2(const ParticleModes& modes) {
+  return modes.modes.front().covariance[0] + modes.modes.front().covariance[4];
+}
 
 }  // namespace
 
@@ -57,16 +76,15 @@ struct MonteCarloLocaliser::Implementation {
   MonteCarloOptions options;
   OdometryNoise odometry;
   ViewLikelihood likelihood;
-  std::optional<ReferenceAreas> areas;
+  PoseSampler sampler;
+  ParticleWeighing weighing;
+  InjectionRule injection_rule;  // empty: none but the filter's own
   Random random;
   Particles particles;
-  std::vector<double> log_ratios;  // of the particles; scratch space of `weigh`, as the next two
-  std::vector<float> log_ratios_below_most;
-  std::vector<float> factors;
   double travelled_m = 0.0;  // since the last image
   PositionError error;
-  bool knows_nothing = true;
-  double inside = 0.5;  // belief that the robot is in the memorised area
+  bool knows_nothing = true;          // no image was seen since the start
+  double inside = p_inside_at_start;  // belief that the robot is in the memorised area
   MonteCarloEstimate latest;
 
   Implementation(std::shared_ptr<const ColumnRanking> ranking_, const ObservationModel& model_,
@@ -76,393 +94,185 @@ struct MonteCarloLocaliser::Implementation {
         options(options_),
         odometry(odometry_),
         likelihood(*ranking, model, options.compass),
+        sampler(likelihood, model, options.compass),
         random(static_cast<std::uint64_t>(options.seed)) {
     validate(options);
     validate(odometry);
     require(options.min_particles <= options.max_particles, "min_particles", options.min_particles,
             "<= max_particles, " + to_text(options.max_particles));
-    if (options.injection == ParticleInjection::topological) areas.emplace(ranking->memory());
   }
+  Implementation(const Implementation&) = delete;
+  Implementation& operator=(const Implementation&) = delete;
 
-  [[nodiscard]] PoseBins bins() const { return {.cell_m = model.spacing_m, .headings = 24}; }
+  [[nodiscard]] PoseBins bins() const {
+    return {.cell_m = model.spacing_m, .headings = heading_bins};
+  }
+  [[nodiscard]] ParticleModes modes() const { return find_modes(particles, bins()); }
 
-  Pose2 anywhere(std::optional<double> heading_rad) {
-    return anywhere_around(random.index(likelihood.sites().size()), heading_rad);
-  }
-  Pose2 anywhere_around(std::size_t number, std::optional<double> heading_rad) {
-    const auto& site = likelihood.sites()[number];
-    const double half = 0.5 * model.spacing_m;
-    const double x = site.position.x_m + random.uniform(-half, half);
-    const double y = site.position.y_m + random.uniform(-half, half);
-    const double turn = random.uniform(-std::numbers::pi, std::numbers::pi);
-    return {x, y, heading_rad.value_or(turn)};
-  }
-
-  // The heading that a new particle has when no compass tells it: somebody else's.
-  double borrowed_heading() { return particles.heading_rad[random.index(particles.size())]; }
-
-  void compare_views(const PackedSignature& view, bool was_localised);
-  // Whether a reference stands near enough to tell anything of the place.
-  [[nodiscard]] bool is_memorised(Point2 place) const {
-    if (!likelihood.sites_near(place).empty()) return true;
-    const double reach_m = memorised_reach * std::max(model.spacing_m, model.range_m);
-    return std::ranges::any_of(likelihood.sites(), [&](const ViewLikelihood::Site& site) {
-      return distance(site.position, place) <= reach_m;
-    });
-  }
-
-  // A site, and which of the two headings that fit there.
-  struct Candidate {
-    std::uint32_t site;
-    bool other;
-  };
-  [[nodiscard]] bool tells_heading(std::uint32_t site) const {
-    return options.compass && !std::isnan(likelihood.sites()[site].heading_rad);
-  }
-  // At a site, as far as the compass tells the heading, else with somebody's heading.
-  Pose2 pose_told_by(Candidate candidate) {
-    const auto& s = likelihood.sites()[candidate.site];
-    const double told = static_cast<double>(candidate.other ? s.other_heading_rad : s.heading_rad);
-    return {s.position.x_m, s.position.y_m,
-            wrap_angle(tells_heading(candidate.site) ? told : borrowed_heading())};
-  }
-  // As far around it as the truth may be.
-  Pose2 drawn_around(Candidate candidate) {
-    Pose2 pose = pose_told_by(candidate);
-    pose.x_m += random.normal(0.0, drawn_spacings * model.spacing_m);
-    pose.y_m += random.normal(0.0, drawn_spacings * model.spacing_m);
-    if (tells_heading(candidate.site)) {
-      pose.heading_rad = wrap_angle(
-          pose.heading_rad + random.normal(0.0, drawn_heading_widths * model.heading_width_rad));
-    }
-    return pose;
-  }
-  struct Weighed {
-    double sum = 0.0;
-    double squares = 0.0;
-  };
-  Weighed take_share(double share);
-  Weighed take_bearable_share(double& share);
-  double weigh(double whole);
-  void resample(std::size_t count, bool spread);
-  int inject_explained(double log_here);
-  int inject_fixed(const PackedSignature& view);
+  void restart(bool is_known);
   MonteCarloEstimate observe(const PackedSignature& view);
+  void compare_views(const PackedSignature& view, bool was_localised);
+  void compare_found(const PackedSignature& view, int count);
+  void compare_around_best();
+  void inject_by_rule(const PackedSignature& view);
+  void inject_explained();
+  void update_inside();
+  void update_error(const ParticleModes& before, const ParticleModes& after, double exponent,
+                    double correlation);
   void describe(MonteCarloEstimate& estimate, const ParticleModes& found) const;
+  void resample_if_needed(std::size_t occupied_bins);
+  [[nodiscard]] bool is_memorised(Point2 place) const;
 };
 
-// What is compared column by column: the views that the search finds, those around the best of
-// them, and those around the particles.
-void MonteCarloLocaliser::Implementation::compare_views(const PackedSignature& view,
-                                                        bool was_localised) {
-  likelihood.begin(view);
-  const auto sites = likelihood.sites();
-  const auto compare_found = [&](int count) {
-    const SearchResult found =
-        ranking->memory().search(view, {.top = count, .components = ranking->components()});
-    for (const Match& match : found.matches) {
-      if (const auto site = likelihood.site_of(match.view)) likelihood.compare(*site);
-    }
-  };
-  compare_found(was_localised ? searched_when_localised : searched_views);
-
-  const auto carried = likelihood.sites_near_most(
-      particles, was_localised ? followed_when_localised : followed_sites, min_followed);
-  for (const std::uint32_t site : carried) likelihood.compare(site);
-
-  const auto best_of = [&](std::span<const std::uint32_t> of) {
-    std::optional<std::uint32_t> best;
-    for (const std::uint32_t site : of) {
-      if (likelihood.compared(site) &&
-          (!best || sites[site].similarity > sites[*best].similarity)) {
-        best = site;
-      }
-    }
-    return best;
-  };
-  const auto here = likelihood.min_difference(carried);
-  const auto min_anywhere = likelihood.min_difference(likelihood.compared_sites());
-  const bool held = was_localised && here && min_anywhere && *here <= *min_anywhere;
-  if (knows_nothing || (!held && min_anywhere && *min_anywhere > model.neighbouring_difference)) {
-    if (sites.size() <= static_cast<std::size_t>(options.reranked_views)) {
-      for (std::uint32_t s = 0; s < sites.size(); ++s) likelihood.compare(s);
-    } else if (options.reranked_views > searched_views) {
-      compare_found(options.reranked_views);
-    }
-  }
-  if (const auto best = best_of(likelihood.compared_sites())) {
-    const Point2 place = sites[*best].position;
-    for (const std::uint32_t site : likelihood.sites_near(place)) likelihood.compare(site);
-  }
-  latest.difference_here = likelihood.min_difference(carried);
-  latest.difference_anywhere = likelihood.min_difference(likelihood.compared_sites());
-  latest.views_compared = likelihood.compared_sites().size();
-}
-
-// The uniform and the topological injection: new particles in the place of random ones.
-int MonteCarloLocaliser::Implementation::inject_fixed(const PackedSignature& view) {
-  const std::size_t size = particles.size();
-  std::size_t count = 0;
-  std::vector<Match> candidates;
-  if (options.injection == ParticleInjection::uniform) {
-    count = std::min(size, static_cast<std::size_t>(options.injection_number));
-  } else if (options.injection == ParticleInjection::topological) {
-    constexpr double tolerance = 0.25;
-    auto levels =
-        localise_hierarchically(ranking->memory(), *areas, view,
-                                {.components = ranking->components(), .tolerance = tolerance});
-    if (!levels.empty()) candidates = std::move(levels.back().candidates);
-    std::erase_if(candidates, [&](const Match& m) { return !likelihood.site_of(m.view); });
-    if (candidates.empty()) return 0;
-    count =
-        static_cast<std::size_t>(std::lround(options.injection_share * static_cast<double>(size)));
-  }
-  for (std::size_t n = 0; n < count; ++n) {
-    const std::size_t replaced = random.index(size);
-    Pose2 pose;
-    if (options.injection == ParticleInjection::uniform) {
-      const double heading = borrowed_heading();
-      pose = anywhere(options.compass ? std::nullopt : std::optional(heading));
-    } else {
-      const auto site = *likelihood.site_of(candidates[random.index(candidates.size())].view);
-      likelihood.compare(site);
-      pose = drawn_around({site, false});
-    }
-    particles.set(replaced, pose, 1.0 / static_cast<double>(size));
-  }
-  double sum = 0.0;
-  for (const double weight : particles.weight) sum += weight;
-  for (double& weight : particles.weight) weight /= sum;
-  return static_cast<int>(count);
-}
-
-// Takes the exponentials of `share` of the log-likelihoods; what they leave of the particles.
-MonteCarloLocaliser::Implementation::Weighed MonteCarloLocaliser::Implementation::take_share(
-    double share) {
-  factors.resize(log_ratios.size());
-  kernels::exponentials(log_ratios_below_most, static_cast<float>(share), factors,
-                        kernels::chosen_instructions());
-  Weighed weighed;
-  for (std::size_t i = 0; i < particles.size(); ++i) {
-    const double weight = particles.weight[i] * static_cast<double>(factors[i]);
-    weighed.sum += weight;
-    weighed.squares += weight * weight;
-  }
-  return weighed;
-}
-
-// The share of the log-likelihood, at most `most`, after which enough particles still count; it is
-// taken.
-MonteCarloLocaliser::Implementation::Weighed
-MonteCarloLocaliser::Implementation::take_bearable_share(double& share) {
-  const double wanted = std::min(enough_effective, static_cast<double>(particles.size()) / 3.0);
-  const auto bearable = [&](const Weighed& weighed) {
-    return weighed.sum * weighed.sum >= wanted * weighed.squares;
-  };
-  const double most = share;
-  const Weighed weighed = take_share(most);
-  if (bearable(weighed)) return weighed;
-  double low = 0.0;
-  double high = most;
-  for (int i = 0; i < 6; ++i) {
-    const double middle = 0.5 * (low + high);
-    (bearable(take_share(middle)) ? low : high) = middle;
-  }
-  share = std::max(low, most / 64.0);
-  return take_share(share);
-}
-
-// Weighs the particles by the view, in stages when one would leave only few of them: after each
-// stage they are resampled and spread by the kernel that their number and spread call for
-// (progressive correction of a regularised particle filter; Musso, Oudjane and Le Gland 2001).
-// The view counts by the exponent `whole`. Returns the logarithm of the mean likelihood.
-double MonteCarloLocaliser::Implementation::weigh(double whole) {
-  double evidence = 0.0;
-  double evidence_in_full = 0.0;
-  double left = whole;
-  for (int stage = 0; stage < max_stages; ++stage) {
-    log_ratios.resize(particles.size());
-    likelihood.log_ratios(particles, log_ratios);
-    const double most = *std::ranges::max_element(log_ratios);
-    log_ratios_below_most.resize(log_ratios.size());
-    std::ranges::transform(log_ratios, log_ratios_below_most.begin(),
-                           [most](double ratio) { return static_cast<float>(ratio - most); });
-    if (stage == 0) evidence_in_full = most + std::log(take_share(1.0).sum);
-    double share = left;
-    const double sum =
-        (stage + 1 == max_stages ? take_share(share) : take_bearable_share(share)).sum;
-    if (!(sum > nothing_left)) {  // what explains the view had lost all its weight
-      std::ranges::fill(particles.weight, 1.0 / static_cast<double>(particles.size()));
-      return evidence_in_full;
-    }
-    for (std::size_t i = 0; i < particles.size(); ++i) {
-      particles.weight[i] *= static_cast<double>(factors[i]) / sum;
-    }
-    evidence += share * most + std::log(sum);
-    left -= share;
-    if (!(left > 1e-9)) break;
-    resample(particles.size(), true);
-    likelihood.arrange(particles);
-  }
-  // Few particles may all miss a narrow maximum that the stages find; a small share of the view
-  // says little of the whole.
-  return whole >= 0.2 ? std::max(evidence_in_full, evidence / whole) : evidence_in_full;
-}
-
-void MonteCarloLocaliser::Implementation::resample(std::size_t count, bool spread) {
-  const auto survivors = low_variance_resample(particles.weight, count, random);
-  ParticleModes found;
-  std::vector<std::size_t> members;
-  if (spread) {
-    found = find_modes(particles, bins());
-    members.resize(found.modes.size());
-    for (const std::size_t s : survivors) {
-      if (found.mode_of[s] >= 0) ++members[static_cast<std::size_t>(found.mode_of[s])];
-    }
-  }
-  Particles next;
-  next.resize(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::size_t s = survivors[i];
-    Pose2 pose = particles.pose(s);
-    if (spread && found.mode_of[s] >= 0) {
-      // The kernel of least mean squared error for a normal distribution in three dimensions
-      // (Silverman 1986, eq. 4.14 and table 4.1: exponent 1 / (d + 4), factor (4 / (d + 2))).
-      const auto m = static_cast<std::size_t>(found.mode_of[s]);
-      const PoseMode& mode = found.modes[m];
-      const double width =
-          std::pow(0.8 / static_cast<double>(std::max<std::size_t>(1, members[m])), 1.0 / 7.0);
-      const auto [x, y] = random.normal_pair();
-      pose.x_m += x * width * std::sqrt(mode.covariance[0]);
-      pose.y_m += y * width * std::sqrt(mode.covariance[4]);
-      pose.heading_rad =
-          wrap_angle(pose.heading_rad + random.normal(0.0, width * std::sqrt(mode.covariance[8])));
-    }
-    next.set(i, pose, 1.0 / static_cast<double>(count));
-  }
-  particles = std::move(next);
-}
-
-// New particles where the view is explained, with the share of the weight that their evidence
-// earns them.
-int MonteCarloLocaliser::Implementation::inject_explained(double log_here) {
-  std::vector<Candidate> places;
-  Particles told;
-  const auto add = [&](Candidate candidate) {
-    places.push_back(candidate);
-    told.add(pose_told_by(candidate), 0.0);
-  };
-  for (const std::uint32_t site : likelihood.compared_sites()) {
-    add({site, false});
-    if (tells_heading(site) && likelihood.sites()[site].other_similarity > 0.0F) add({site, true});
-  }
-  if (places.empty()) return 0;
-  std::vector<double> values(told.size());
-  likelihood.log_ratios(told, values);
-  const double most = std::max(0.0, *std::ranges::max_element(values));
-  // Anywhere else, and in any other heading, nothing explains the view.
-  const double share = (options.compass ? model.heading_width_rad / std::numbers::pi : 1.0) /
-                       static_cast<double>(likelihood.sites().size());
-  double sum = 0.0;
-  for (double& value : values) {
-    value = std::exp(value - most);
-    sum += value;
-  }
-  const double unexplained = std::max(0.0, 1.0 - share * static_cast<double>(values.size()));
-  const double log_there = most + std::log(share * sum + unexplained * std::exp(-most));
-  latest.log_there = log_there;
-  // A robot that was outside may come back anywhere.
-  const double hazard = knows_nothing ? nothing_known : kidnapped + (1.0 - inside) * coming_back;
-  const double odds =
-      hazard / (1.0 - hazard) * std::exp(std::clamp(log_there - log_here, -50.0, 50.0));
-  const double mass = odds / (1.0 + odds);
-  const auto size = static_cast<double>(particles.size());
-  if (mass * size < min_injected) return 0;
-
-  const auto count =
-      static_cast<std::size_t>(std::max(1L, std::lround(std::max(0.05, 0.9 * mass) * size)));
-  const std::vector<std::size_t> drawn = low_variance_resample(values, count, random);
-  Particles fresh;
-  for (const std::size_t d : drawn) fresh.add(drawn_around(places[d]), 0.0);
-  std::vector<double> fresh_values(fresh.size());
-  likelihood.log_ratios(fresh, fresh_values);
-  double fresh_sum = 0.0;
-  for (std::size_t n = 0; n < fresh.size(); ++n) {
-    fresh.weight[n] = std::exp(std::max(fresh_values[n] - most, -max_against)) / values[drawn[n]];
-    fresh_sum += fresh.weight[n];
-  }
-  // They take the places of the lightest particles.
-  std::vector<std::size_t> order(particles.size());
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-  const auto lightest = order.begin() + static_cast<std::ptrdiff_t>(fresh.size());
-  std::nth_element(order.begin(), lightest, order.end(), [&](std::size_t a, std::size_t b) {
-    return std::pair(particles.weight[a], a) < std::pair(particles.weight[b], b);
-  });
-  for (std::size_t n = 0; n < fresh.size(); ++n) particles.set(order[n], fresh.pose(n), 0.0);
-  double kept = 0.0;
-  for (const double weight : particles.weight) kept += weight;
-  for (double& weight : particles.weight) weight *= kept > 0.0 ? (1.0 - mass) / kept : 0.0;
-  for (std::size_t n = 0; n < fresh.size(); ++n) {
-    particles.weight[order[n]] = (kept > 0.0 ? mass : 1.0) * fresh.weight[n] / fresh_sum;
-  }
-  return static_cast<int>(fresh.size());
+void MonteCarloLocaliser::Implementation::restart(bool is_known) {
+  error = {};
+  inside = is_known ? 1.0 - p_leave : p_inside_at_start;
+  knows_nothing = !is_known;
+  latest = {};
 }
 
 MonteCarloEstimate MonteCarloLocaliser::Implementation::observe(const PackedSignature& view) {
   const bool was_localised = latest.state == LocalisationState::localised;
   latest = {};
   likelihood.arrange(particles);
-  compare_views(view, was_localised);
-  if (options.injection == ParticleInjection::uniform ||
-      options.injection == ParticleInjection::topological) {
-    latest.injected = inject_fixed(view);
-  }
-  // Views from nearly the same place are alike, also in what misleads: they count for less, as far
-  // as views at that distance resemble each other.
+  compare_views(view, was_localised);  // [M03 section 4]: similarities at the references
+  inject_by_rule(view);                // [M03 section 4.1]
+  // Views from nearly the same place are alike, also in what misleads: a view counts as far as it
+  // is new.
   const double correlation = std::exp(-travelled_m / model.range_m);
-  const double share = knows_nothing ? 1.0 : std::max(min_share, 1.0 - correlation);
-  const ParticleModes before = knows_nothing ? ParticleModes{} : find_modes(particles, bins());
-  latest.log_here = weigh(share);
+  const double exponent = knows_nothing ? 1.0 : std::max(min_view_exponent, 1.0 - correlation);
+  const ParticleModes before = knows_nothing ? ParticleModes{} : modes();
+  latest.log_here = weighing.weigh(particles, likelihood, exponent, bins(), random);
+  inject_explained();  // Bayes' rule for a robot that was kidnapped
+  update_inside();
+  knows_nothing = false;
+  travelled_m = 0.0;
+  const ParticleModes after = modes();
+  latest.particles = static_cast<int>(particles.size());
+  latest.effective_particles = effective_sample_size(particles.weight);
+  update_error(before, after, exponent, correlation);
+  describe(latest, after);
+  resample_if_needed(after.occupied_bins);
+  return latest;
+}
+
+// Compares column by column the views that the search finds, those around the best of them, and
+// those around the particles.
+void MonteCarloLocaliser::Implementation::compare_views(const PackedSignature& view,
+                                                        bool was_localised) {
+  likelihood.begin(view);
+  compare_found(view, was_localised ? searched_views_when_localised : searched_views);
+  const std::size_t max_followed = was_localised ? followed_sites_when_localised : followed_sites;
+  const auto followed = likelihood.sites_near_most(particles, max_followed, min_followed_weight);
+  for (const std::uint32_t site : followed) likelihood.compare(site);
+
+  const auto here = likelihood.min_difference(followed);
+  const auto anywhere = likelihood.min_difference(likelihood.compared_sites());
+  const bool is_followed = was_localised && here && anywhere && *here <= *anywhere;
+  const bool is_unexplained = !is_followed && anywhere && *anywhere > model.neighbouring_difference;
+  if (knows_nothing || is_unexplained) {
+    const auto sites = static_cast<std::uint32_t>(likelihood.sites().size());
+    if (sites <= static_cast<std::size_t>(options.reranked_views)) {
+      for (std::uint32_t site = 0; site < sites; ++site) likelihood.compare(site);
+    } else if (options.reranked_views > searched_views) {
+      compare_found(view, options.reranked_views);
+    }
+  }
+  compare_around_best();
+  latest.difference_here = likelihood.min_difference(followed);
+  latest.difference_anywhere = likelihood.min_difference(likelihood.compared_sites());
+  latest.views_compared = likelihood.compared_sites().size();
+}
+
+void MonteCarloLocaliser::Implementation::compare_found(const PackedSignature& view, int count) {
+  const SearchResult found =
+      ranking->memory().search(view, {.top = count, .components = ranking->components()});
+  for (const Match& match : found.matches) {
+    if (const auto site = likelihood.site_of(match.view)) likelihood.compare(*site);
+  }
+}
+
+void MonteCarloLocaliser::Implementation::compare_around_best() {
+  const auto sites = likelihood.sites();
+  std::optional<std::uint32_t> best;
+  for (const std::uint32_t site : likelihood.compared_sites()) {
+    if (!best || sites[site].similarity > sites[*best].similarity) best = site;
+  }
+  if (!best) return;
+  const Point2 place = sites[*best].position;
+  for (const std::uint32_t site : likelihood.sites_near(place)) likelihood.compare(site);
+}
+
+// Puts new particles in the place of random ones, as a rule of the caller's says.
+void MonteCarloLocaliser::Implementation::inject_by_rule(const PackedSignature& view) {
+  if (!injection_rule) return;
+  const std::size_t size = particles.size();
+  const InjectedParticles wanted = injection_rule(view, size);
+  std::vector<std::uint32_t> sites;
+  for (const ViewId around : wanted.around) {
+    if (const auto site = likelihood.site_of(around)) sites.push_back(*site);
+  }
+  if (wanted.count == 0 || (sites.empty() && !wanted.around.empty())) return;
+  for (std::size_t n = 0; n < wanted.count; ++n) {
+    const std::size_t replaced = random.index(size);
+    Pose2 pose;
+    if (sites.empty()) {
+      pose = sampler.draw_anywhere(particles, random);
+    } else {
+      const std::uint32_t site = sites[random.index(sites.size())];
+      likelihood.compare(site);
+      pose = sampler.draw_around({site, false}, particles, random);
+    }
+    particles.set(replaced, pose, 1.0 / static_cast<double>(size));
+  }
+  double sum = 0.0;
+  for (const double weight : particles.weight) sum += weight;
+  for (double& weight : particles.weight) weight /= sum;
+  latest.injected = static_cast<int>(wanted.count);
+}
+
+void MonteCarloLocaliser::Implementation::inject_explained() {
+  if (options.injection != ParticleInjection::explained) return;
+  ExplainedInjection injection(likelihood, sampler, model, options.compass);
+  if (!injection.find_places(particles, random)) return;
+  latest.log_there = injection.log_evidence();
+  // A robot that was outside may come back anywhere.
+  const double prior = knows_nothing ? p_elsewhere_at_start : p_kidnap + (1.0 - inside) * p_return;
+  const double elsewhere = kidnap_probability(prior, latest.log_there, latest.log_here);
+  latest.injected = injection.inject(particles, elsewhere, random);
+}
+
+// Updates the belief in being inside by how much better the view is explained than by chance.
+void MonteCarloLocaliser::Implementation::update_inside() {
   double evidence = latest.log_here;
   if (options.injection == ParticleInjection::explained) {
-    latest.injected = inject_explained(latest.log_here);
-    evidence = std::max(evidence, latest.log_there + std::log(kidnapped));
+    evidence = std::max(evidence, latest.log_there + std::log(p_kidnap));
   }
   // Where nothing is known yet, a view like one of the memory's speaks for being inside.
   if (latest.difference_anywhere) {
-    const double margin = (model.explained_difference - *latest.difference_anywhere) /
-                          std::max(0.05, model.far_difference - model.explained_difference);
-    evidence = std::max(evidence, std::min(max_for_similar, 4.0 * margin) + by_chance);
+    const double unit =
+        std::max(min_margin_unit, model.far_difference - model.explained_difference);
+    const double margin = (model.explained_difference - *latest.difference_anywhere) / unit;
+    evidence =
+        std::max(evidence, std::min(max_log_ratio_of_difference, log_ratio_per_margin * margin) +
+                               log_ratio_by_chance);
   }
-  knows_nothing = false;
-  travelled_m = 0.0;
-  inside = inside * (1.0 - leaving) + (1.0 - inside) * coming_back;
-  const double ratio = std::exp(std::clamp(evidence - by_chance, -by_chance, max_for));
+  inside = inside * (1.0 - p_leave) + (1.0 - inside) * p_return;
+  const double ratio =
+      std::exp(std::clamp(evidence - log_ratio_by_chance, -log_ratio_by_chance, max_log_ratio));
   inside = inside * ratio / (inside * ratio + 1.0 - inside);
+}
 
-  const ParticleModes found = find_modes(particles, bins());
-  latest.particles = static_cast<int>(particles.size());
-  latest.effective_particles = effective_sample_size(particles.weight);
-  if (!found.modes.empty()) {
-    const auto variance_m2 = [](const ParticleModes& of) {
-      return of.modes.front().covariance[0] + of.modes.front().covariance[4];
-    };
-    if (before.modes.empty()) {
-      error.begin(variance_m2(found));
-    } else {
-      error.observe(variance_m2(before), variance_m2(found), share, correlation,
-                    latest.effective_particles);
-    }
+void MonteCarloLocaliser::Implementation::update_error(const ParticleModes& before,
+                                                       const ParticleModes& after, double exponent,
+                                                       double correlation) {
+  if (after.modes.empty()) return;
+  if (before.modes.empty()) {
+    error.begin(position_variance_m2(after));
+  } else {
+    error.observe(position_variance_m2(before), position_variance_m2(after), exponent, correlation,
+                  latest.effective_particles);
   }
-  describe(latest, found);
-  if (latest.effective_particles < options.resample_below * static_cast<double>(particles.size())) {
-    latest.resampled = true;
-    resample(std::clamp(kld_sample_size(found.occupied_bins, options.kld_error),
-                        static_cast<std::size_t>(options.min_particles),
-                        static_cast<std::size_t>(options.max_particles)),
-             false);
-  }
-  return latest;
 }
 
 void MonteCarloLocaliser::Implementation::describe(MonteCarloEstimate& estimate,
@@ -477,16 +287,35 @@ void MonteCarloLocaliser::Implementation::describe(MonteCarloEstimate& estimate,
   estimate.inside = inside;
   estimate.probability = found.modes.empty() ? 0.0 : inside * found.modes.front().weight;
   estimate.state = LocalisationState::lost;
-  if (inside < 0.5) return;
+  if (inside < min_inside) return;
   if (!found.modes.empty() && !is_memorised(found.modes.front().mean.position())) return;
   estimate.state = LocalisationState::ambiguous;
   if (found.modes.empty()) return;
   const PoseMode& first = found.modes.front();
   estimate.pose = first.mean;
   const double widest_m = std::max(model.spacing_m, model.range_m);
-  if (first.weight >= localised_weight && first.spread_m <= widest_m) {
+  if (first.weight >= min_localised_weight && first.spread_m <= widest_m) {
     estimate.state = LocalisationState::localised;
   }
+}
+
+void MonteCarloLocaliser::Implementation::resample_if_needed(std::size_t occupied_bins) {
+  const double min_effective = options.resample_below * static_cast<double>(particles.size());
+  if (!(latest.effective_particles < min_effective)) return;
+  latest.resampled = true;
+  const std::size_t count = std::clamp(kld_sample_size(occupied_bins, options.kld_error),
+                                       static_cast<std::size_t>(options.min_particles),
+                                       static_cast<std::size_t>(options.max_particles));
+  resample_particles(particles, count, random);
+}
+
+// Whether a reference stands near enough to tell anything of the place.
+bool MonteCarloLocaliser::Implementation::is_memorised(Point2 place) const {
+  if (!likelihood.sites_near(place).empty()) return true;
+  const double reach_m = memorised_reach * std::max(model.spacing_m, model.range_m);
+  return std::ranges::any_of(likelihood.sites(), [&](const ViewLikelihood::Site& site) {
+    return distance(site.position, place) <= reach_m;
+  });
 }
 
 MonteCarloLocaliser::MonteCarloLocaliser(const VisualMemory& memory,
@@ -512,6 +341,10 @@ MonteCarloLocaliser::~MonteCarloLocaliser() = default;
 MonteCarloLocaliser::MonteCarloLocaliser(MonteCarloLocaliser&&) noexcept = default;
 MonteCarloLocaliser& MonteCarloLocaliser::operator=(MonteCarloLocaliser&&) noexcept = default;
 
+void MonteCarloLocaliser::set_injection_rule(InjectionRule rule) {
+  implementation_->injection_rule = std::move(rule);
+}
+
 void MonteCarloLocaliser::start_anywhere(std::optional<double> heading_rad) {
   auto& own = *implementation_;
   const auto count = static_cast<std::size_t>(own.options.max_particles);
@@ -523,12 +356,10 @@ void MonteCarloLocaliser::start_anywhere(std::optional<double> heading_rad) {
     const double share = (static_cast<double>(i) + first) / static_cast<double>(count);
     const auto site =
         std::min(sites - 1, static_cast<std::size_t>(share * static_cast<double>(sites)));
-    own.particles.set(i, own.anywhere_around(site, heading_rad), 1.0 / static_cast<double>(count));
+    own.particles.set(i, own.sampler.draw_in_square(site, heading_rad, own.random),
+                      1.0 / static_cast<double>(count));
   }
-  own.error = {};
-  own.inside = 0.5;
-  own.knows_nothing = true;
-  own.latest = {};
+  own.restart(false);
 }
 
 void MonteCarloLocaliser::start_at(const Pose2& pose, double deviation_m,
@@ -542,10 +373,7 @@ void MonteCarloLocaliser::start_at(const Pose2& pose, double deviation_m,
     const double heading = own.random.normal(pose.heading_rad, heading_deviation_rad);
     own.particles.set(i, {x, y, wrap_angle(heading)}, 1.0 / static_cast<double>(count));
   }
-  own.error = {};
-  own.inside = 1.0 - leaving;
-  own.knows_nothing = false;
-  own.latest = {};
+  own.restart(true);
 }
 
 void MonteCarloLocaliser::move(const Pose2& step) {
@@ -562,8 +390,7 @@ MonteCarloEstimate MonteCarloLocaliser::observe(const PackedSignature& view) {
 
 MonteCarloEstimate MonteCarloLocaliser::estimate() const {
   MonteCarloEstimate estimate = implementation_->latest;
-  implementation_->describe(estimate,
-                            find_modes(implementation_->particles, implementation_->bins()));
+  implementation_->describe(estimate, implementation_->modes());
   return estimate;
 }
 

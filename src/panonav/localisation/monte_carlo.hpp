@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string_view>
@@ -18,11 +20,18 @@ namespace panonav {
 /// Particle injection: how many particles are replaced at each image, so that a kidnapped robot is
 /// found again, and where the new ones are drawn.
 enum class ParticleInjection {
-  none,         ///< none
-  uniform,      ///< a fixed number, anywhere in the memorised area: the standard way
-  topological,  ///< a fixed share, in the areas of the best matches [M03 section 4.1]
-  explained,    ///< as many as the view is better explained elsewhere than where the particles are
+  none,       ///< none
+  explained,  ///< as many as the view is better explained elsewhere than where the particles are
 };
+
+/// What a rule of particle injection asks for at an image.
+struct InjectedParticles {
+  std::size_t count = 0;       ///< replaced by new ones
+  std::vector<ViewId> around;  ///< references around which these are drawn; empty: anywhere
+};
+/// A rule of particle injection: from the image's signature and the number of particles.
+using InjectionRule =
+    std::function<InjectedParticles(const PackedSignature& view, std::size_t particles)>;
 
 /// How many particles there are, and how they are weighed and renewed.
 struct MonteCarloOptions {
@@ -33,8 +42,6 @@ struct MonteCarloOptions {
   bool compass = true;          ///< the visual compass weighs headings too
   /// How particles come to where the robot was carried.
   ParticleInjection injection = ParticleInjection::explained;
-  double injection_share = 0.1;  ///< of a topological injection [M03 section 4.1]
-  int injection_number = 50;     ///< of a uniform injection [M03 figure 8]
   int reranked_views = 1000;  ///< compared column by column when no near view explains the picture
   int seed = 1;               ///< of all random choices, >= 0
 };
@@ -101,6 +108,10 @@ class MonteCarloLocaliser {
   /// What is left of the other may only be destroyed or assigned to.
   MonteCarloLocaliser(MonteCarloLocaliser&&) noexcept;
   MonteCarloLocaliser& operator=(MonteCarloLocaliser&&) noexcept;
+
+  /// Injects particles by this rule before each image is weighed, besides `options.injection`
+  /// [M03 section 4.1]; empty: by none.
+  void set_injection_rule(InjectionRule rule);
 
   /// Forgets everything. `heading_rad`: where it is known.
   void start_anywhere(std::optional<double> heading_rad = std::nullopt);

@@ -14,10 +14,7 @@ void visit_options(MonteCarloOptions& options, OptionVisitor& visitor) {
       option<&T::resample_below>(
           "effective sample size below which particles are resampled, as a share of them", 0, 1),
       option<&T::compass>("weigh headings by the visual compass"),
-      choice<&T::injection>("where new particles are drawn", "none", "uniform", "topological",
-                            "explained"),
-      option<&T::injection_share>("share of particles injected by 'topological'", 0, 1),
-      option<&T::injection_number>("particles injected by 'uniform'", 0, 1e7),
+      choice<&T::injection>("where new particles are drawn", "none", "explained"),
       option<&T::reranked_views>(
           "views compared column by column when no near one explains the picture", 0, 1e6),
       option<&T::seed>("seed of all random choices", 0),

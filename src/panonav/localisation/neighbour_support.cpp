@@ -14,16 +14,21 @@ namespace panonav {
 
 namespace {
 
-constexpr std::size_t max_neighbours = 8;  // of a grid
-constexpr std::size_t counted_views = 4;   // the corners of a grid's square
-constexpr double spacings = 1.5;           // more than the diagonal of a grid's square
-constexpr double looked_at_share = 1.25;
+// Neighbours of a reference, and views that explain a query together: those of a grid, and the
+// corners of its square.
+constexpr std::size_t max_neighbours = 8;
+constexpr std::size_t counted_views = 4;
+// Spacings within which neighbours lie: more than the diagonal of a grid's square.
+constexpr double radius_spacings = 1.5;
+// Matches are examined up to this ratio of their score to that of the best. Chosen.
+constexpr double max_score_ratio = 1.25;
+// Neighbours that tell another heading than the chosen match by more are not of its group. Chosen.
 constexpr double heading_tolerance_rad = radians(20.0);
 
 }  // namespace
 
 double NeighbourSupport::radius_m(double spacing_m) noexcept {
-  return spacings * spacing_m;
+  return radius_spacings * spacing_m;
 }
 
 NeighbourSupport::NeighbourSupport(const ColumnRanking& ranking, std::optional<double> spacing_m)
@@ -120,11 +125,11 @@ std::optional<double> NeighbourSupport::supported_difference(
   return sum / ColumnProfiles::compared_columns;
 }
 
-void NeighbourSupport::put_best_supported_first(const ColumnProfiles& query,
-                                                std::vector<RankedMatch>& ranked,
-                                                std::span<const ViewId> excluded) const {
+void NeighbourSupport::rank_by_support(const ColumnProfiles& query,
+                                       std::vector<RankedMatch>& ranked,
+                                       std::span<const ViewId> excluded) const {
   if (ranked.empty() || sites_.empty()) return;
-  const double limit = looked_at_share * ranked.front().score();
+  const double limit = max_score_ratio * ranked.front().score();
   const RankedMatch* chosen = nullptr;
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < std::min(max_examined, ranked.size()); ++i) {

@@ -23,7 +23,7 @@ class NeighbourSupport {
 
   /// Within which neighbours lie, for this spacing of a memory.
   [[nodiscard]] static double radius_m(double spacing_m) noexcept;
-  /// The matches that `put_best_supported_first` may look at, of those that it is given.
+  /// The matches that `rank_by_support` may look at, of those that it is given.
   static constexpr std::size_t max_examined = 30;
 
   /// Between references with headings; 0 where there are fewer than two.
@@ -44,8 +44,8 @@ class NeighbourSupport {
   /// each group in the order that it was in. Only matches whose score is within a quarter of the
   /// first one's are looked at, `max_examined` at most. `ranked` stays as it is when no match has
   /// neighbours.
-  void put_best_supported_first(const ColumnProfiles& query, std::vector<RankedMatch>& ranked,
-                                std::span<const ViewId> excluded = {}) const;
+  void rank_by_support(const ColumnProfiles& query, std::vector<RankedMatch>& ranked,
+                       std::span<const ViewId> excluded = {}) const;
 
  private:
   struct Site {

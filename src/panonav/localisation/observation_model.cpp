@@ -22,15 +22,27 @@ namespace panonav {
 
 namespace {
 
-constexpr std::size_t near_sites = 12;  // as many as decide a likelihood
+// References around a place that are compared for it: as many as decide a likelihood
+// (`ViewLikelihood::sites_near`).
+constexpr std::size_t near_sites = 12;
+// Spacings from which on views are far from each other: chosen, longer than most ranges.
 constexpr double far_spacings = 6.0;
+// References up to which the fall of the similarity is fitted, in number and in spacings. Chosen.
+constexpr std::size_t fitted_sites = 48;
 constexpr double fitted_spacings = 4.0;
+// Spacings within which references are neighbours of a grid, diagonal ones included.
+constexpr double adjacent_site_spacings = 1.5;
+// Bounds of the range of similarity, in spacings: chosen; beyond them the fit is noise.
 constexpr double min_range_spacings = 0.4;
 constexpr double max_range_spacings = 20.0;
-// Beyond this no view is told apart better, and one odd view would count for all others.
+// Beyond this no view is told apart better, and one odd view would count for all others. Chosen.
 constexpr double max_log_likelihood = 50.0;
 // Columns tell turns in steps; three of them are what a neighbouring view may be off by.
 constexpr double min_heading_width_rad = 3.0 * 2.0 * std::numbers::pi / ColumnProfiles::columns;
+// The width in median errors of turns; larger errors than the other number are turns at which the
+// columns fit by chance or by symmetry. Chosen.
+constexpr double median_turn_errors = 3.0;
+constexpr double max_turn_error_rad = std::numbers::pi / 4.0;
 
 struct Site {
   ViewId view;
@@ -155,6 +167,128 @@ double fit_sharpness(std::span<const Explained> views) {
   return 0.5 * (low + high);
 }
 
+/// The posed views of a memory, those of them that are left out in turn, and the places that are
+/// candidates for each of these.
+class LearningSample {
+ public:
+  LearningSample(const ColumnRanking& ranking, const ObservationModelOptions& options)
+      : sites_(posed_sites(ranking.memory())) {
+    require(sites_.size() >= static_cast<std::size_t>(ObservationModel::min_views),
+            "views with a position in the memory", static_cast<double>(sites_.size()),
+            ">= " + to_text(ObservationModel::min_views));
+    std::vector<Point2> positions;
+    std::vector<ViewId> views;
+    for (const Site& site : sites_) {
+      positions.push_back(site.position);
+      views.push_back(site.view);
+    }
+    spacing_m_ = VoronoiCells(positions).spacing_m();
+    require(spacing_m_ > 0.0, "spacing of the memory's positions", spacing_m_, "> 0 m");
+    const auto number_of = [&](ViewId view) {
+      return static_cast<std::uint32_t>(std::ranges::lower_bound(views, view) - views.begin());
+    };
+    const auto seed = static_cast<std::uint64_t>(options.seed);
+    for (const ViewId view : sample_views(views, options.sampled_views, seed)) {
+      own_.push_back(number_of(view));
+      left_out_.emplace_back(ranking, sites_, own_.back());
+    }
+    // All, or so many that with the references around them the limit is kept.
+    const int count = static_cast<int>(sites_.size()) <= options.compared_views
+                          ? static_cast<int>(sites_.size())
+                          : std::max(8, options.compared_views / static_cast<int>(near_sites));
+    for (const ViewId view : sample_views(views, count, seed + 1)) {
+      candidates_.push_back(number_of(view));
+    }
+  }
+  LearningSample(const LearningSample&) = delete;
+  LearningSample& operator=(const LearningSample&) = delete;
+
+  [[nodiscard]] double spacing_m() const { return spacing_m_; }
+  [[nodiscard]] std::size_t size() const { return own_.size(); }
+
+  /// Learns how unlike views far from each other are.
+  double far_difference() {
+    std::vector<double> far;
+    for (std::size_t i = 0; i < own_.size(); ++i) {
+      for (const std::uint32_t c : candidates_) {
+        if (distance(sites_[c].position, sites_[own_[i]].position) < far_spacings * spacing_m_) {
+          continue;
+        }
+        far.push_back(left_out_[i].match(c).difference);
+      }
+    }
+    // A memory smaller than that: as unlike as views of places that have nothing in common.
+    return far.empty() ? PlaceModel::unrelated_difference : quantile(far, 0.5);
+  }
+
+  /// Learns how similarity falls with distance, and how wrong turns of neighbours are.
+  void learn_fall(ObservationModel& model) {
+    std::vector<std::pair<double, double>> curve;
+    std::vector<double> turns;
+    for (std::size_t i = 0; i < own_.size(); ++i) {
+      const Site& here = sites_[own_[i]];
+      for (const std::uint32_t s : nearest_sites(sites_, own_[i], fitted_sites)) {
+        const double distance_m = distance(sites_[s].position, here.position);
+        if (distance_m > fitted_spacings * spacing_m_) break;
+        const ColumnMatch& match = left_out_[i].match(s);
+        curve.emplace_back(distance_m, similarity_of(match, model.far_difference));
+        if (distance_m <= adjacent_site_spacings * spacing_m_ && here.heading_rad &&
+            sites_[s].heading_rad) {
+          turns.push_back(std::abs(
+              angle_difference(*sites_[s].heading_rad + match.heading_rad, *here.heading_rad)));
+        }
+      }
+    }
+    model.range_m = fit_range(curve, spacing_m_, model.far_difference);
+    model.neighbouring_difference =
+        model.far_difference * std::sqrt(1.0 - std::exp(-spacing_m_ / model.range_m));
+    std::erase_if(turns, [](double turn) { return turn > max_turn_error_rad; });
+    model.heading_width_rad =
+        turns.empty() ? min_heading_width_rad
+                      : std::max(median_turn_errors * quantile(turns, 0.5), min_heading_width_rad);
+  }
+
+  /// Squared similarity that each view left out explains at its own place and at the candidates.
+  std::vector<Explained> explain(const ObservationModel& model) {
+    near_.resize(sites_.size());
+    std::vector<Explained> explained;
+    for (std::size_t i = 0; i < own_.size(); ++i) {
+      Explained view{explained_at(i, own_[i], model)};
+      for (const std::uint32_t c : candidates_) {
+        if (c != own_[i]) view.push_back(explained_at(i, c, model));
+      }
+      explained.push_back(std::move(view));
+    }
+    return explained;
+  }
+
+ private:
+  double explained_at(std::size_t i, std::uint32_t where, const ObservationModel& model) {
+    if (near_[where].empty()) {
+      near_[where] = nearest_sites(sites_, where, near_sites);
+      near_[where].insert(near_[where].begin(), where);
+    }
+    double product = 0.0;
+    double square = 0.0;
+    for (const std::uint32_t s : near_[where]) {
+      if (s == own_[i]) continue;
+      const double expected =
+          std::exp(-distance(sites_[s].position, sites_[where].position) / model.range_m);
+      square += expected * expected;
+      product +=
+          expected * std::max(0.0, similarity_of(left_out_[i].match(s), model.far_difference));
+    }
+    return square > 0.0 ? product * product / square : 0.0;
+  }
+
+  std::vector<Site> sites_;
+  double spacing_m_ = 0.0;
+  std::vector<std::uint32_t> own_;                // sites of the views left out
+  std::vector<LeftOutView> left_out_;             // these views
+  std::vector<std::uint32_t> candidates_;         // sites
+  std::vector<std::vector<std::uint32_t>> near_;  // each site and those around it, where needed
+};
+
 }  // namespace
 
 void visit_options(ObservationModelOptions& options, OptionVisitor& visitor) {
@@ -171,109 +305,17 @@ void visit_options(ObservationModelOptions& options, OptionVisitor& visitor) {
 ObservationModel learn_observation_model(const ColumnRanking& ranking,
                                          const ObservationModelOptions& options) {
   validate(options);
-  const std::vector<Site> sites = posed_sites(ranking.memory());
-  require(sites.size() >= static_cast<std::size_t>(ObservationModel::min_views),
-          "views with a position in the memory", static_cast<double>(sites.size()),
-          ">= " + to_text(ObservationModel::min_views));
-  std::vector<Point2> positions;
-  std::vector<ViewId> views;
-  for (const Site& site : sites) {
-    positions.push_back(site.position);
-    views.push_back(site.view);
-  }
-  ObservationModel model;
-  model.spacing_m = VoronoiCells(positions).spacing_m();
-  require(model.spacing_m > 0.0, "spacing of the memory's positions", model.spacing_m, "> 0 m");
-  const auto seed = static_cast<std::uint64_t>(options.seed);
+  LearningSample sample(ranking, options);
   const PlaceModel place = learn_place_model(
       ranking, {.sampled_views = std::min(options.sampled_views, PlaceModelOptions{}.sampled_views),
                 .seed = options.seed});
+  ObservationModel model;
+  model.spacing_m = sample.spacing_m();
   model.explained_difference = place.threshold;
-
-  const std::vector<ViewId> sampled = sample_views(views, options.sampled_views, seed);
-  model.sampled_views = static_cast<int>(sampled.size());
-  // Candidate places: all, or so many that with the references around them the limit is kept.
-  const int limit = static_cast<int>(sites.size()) <= options.compared_views
-                        ? static_cast<int>(sites.size())
-                        : std::max(8, options.compared_views / static_cast<int>(near_sites));
-  const std::vector<ViewId> drawn = sample_views(views, limit, seed + 1);
-  const auto site_of = [&](ViewId view) {
-    return static_cast<std::uint32_t>(std::ranges::lower_bound(views, view) - views.begin());
-  };
-  std::vector<std::uint32_t> candidates;
-  for (const ViewId view : drawn) candidates.push_back(site_of(view));
-
-  std::vector<LeftOutView> left_out;
-  std::vector<std::uint32_t> own;
-  std::vector<double> far;
-  for (const ViewId view : sampled) {
-    own.push_back(site_of(view));
-    left_out.emplace_back(ranking, sites, own.back());
-    for (const std::uint32_t c : candidates) {
-      if (distance(sites[c].position, sites[own.back()].position) <
-          far_spacings * model.spacing_m) {
-        continue;
-      }
-      far.push_back(left_out.back().match(c).difference);
-    }
-  }
-  // A memory smaller than that: as unlike as views of places that have nothing in common.
-  model.far_difference = far.empty() ? PlaceModel::unrelated_difference : quantile(far, 0.5);
-
-  std::vector<std::pair<double, double>> curve;
-  std::vector<double> turns;
-  for (std::size_t i = 0; i < own.size(); ++i) {
-    const Site& here = sites[own[i]];
-    for (const std::uint32_t s : nearest_sites(sites, own[i], 48)) {
-      const double distance_m = distance(sites[s].position, here.position);
-      if (distance_m > fitted_spacings * model.spacing_m) break;
-      const ColumnMatch& match = left_out[i].match(s);
-      curve.emplace_back(distance_m, similarity_of(match, model.far_difference));
-      if (distance_m <= 1.5 * model.spacing_m && here.heading_rad && sites[s].heading_rad) {
-        turns.push_back(std::abs(
-            angle_difference(*sites[s].heading_rad + match.heading_rad, *here.heading_rad)));
-      }
-    }
-  }
-  model.range_m = fit_range(curve, model.spacing_m, model.far_difference);
-  model.neighbouring_difference =
-      model.far_difference * std::sqrt(1.0 - std::exp(-model.spacing_m / model.range_m));
-  model.heading_width_rad = min_heading_width_rad;
-  if (!turns.empty()) {
-    // Three median errors; turns at which the columns fit by chance or by symmetry are no errors.
-    std::erase_if(turns, [](double turn) { return turn > std::numbers::pi / 4; });
-    if (!turns.empty()) {
-      model.heading_width_rad = std::max(3.0 * quantile(turns, 0.5), min_heading_width_rad);
-    }
-  }
-
-  std::vector<std::vector<std::uint32_t>> near(sites.size());
-  std::vector<Explained> explained;
-  for (std::size_t i = 0; i < own.size(); ++i) {
-    const auto at = [&](std::uint32_t where) {
-      if (near[where].empty()) {
-        near[where] = nearest_sites(sites, where, near_sites);
-        near[where].insert(near[where].begin(), where);
-      }
-      double product = 0.0;
-      double square = 0.0;
-      for (const std::uint32_t s : near[where]) {
-        if (s == own[i]) continue;
-        const double expected =
-            std::exp(-distance(sites[s].position, sites[where].position) / model.range_m);
-        square += expected * expected;
-        product +=
-            expected * std::max(0.0, similarity_of(left_out[i].match(s), model.far_difference));
-      }
-      return square > 0.0 ? product * product / square : 0.0;
-    };
-    Explained view{at(own[i])};
-    for (const std::uint32_t c : candidates) {
-      if (c != own[i]) view.push_back(at(c));
-    }
-    explained.push_back(std::move(view));
-  }
-  model.sharpness = fit_sharpness(explained);
+  model.sampled_views = static_cast<int>(sample.size());
+  model.far_difference = sample.far_difference();
+  sample.learn_fall(model);
+  model.sharpness = fit_sharpness(sample.explain(model));
   return model;
 }
 

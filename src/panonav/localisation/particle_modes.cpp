@@ -114,19 +114,13 @@ std::int32_t bin_at(double cells) {
   return cell_index(cells, 1e9);
 }
 
-}  // namespace
-
-ParticleModes find_modes(const Particles& particles, const PoseBins& bins, double min_weight) {
-  require(bins.cell_m > 0.0, "side of a bin", bins.cell_m, "> 0 m");
-  require(bins.headings >= 1, "sectors of the circle", bins.headings, ">= 1");
-  ParticleModes result;
-  result.mode_of.assign(particles.size(), -1);
-
-  BinTable table(bins.headings);
+/// Puts the particles into bins; returns the bin of each. `sum`: of the weights.
+std::vector<std::uint32_t> fill_bins(const Particles& particles, const PoseBins& bins,
+                                     BinTable& table, double& sum) {
   std::vector<std::uint32_t> bin_of(particles.size());
   const double cells_per_metre = 1.0 / bins.cell_m;
   const double sectors_per_radian = bins.headings / (2.0 * std::numbers::pi);
-  double sum = 0.0;
+  sum = 0.0;
   for (std::size_t i = 0; i < particles.size(); ++i) {
     const GridCell place{bin_at(particles.x_m[i] * cells_per_metre),
                          bin_at(particles.y_m[i] * cells_per_metre)};
@@ -136,57 +130,86 @@ ParticleModes find_modes(const Particles& particles, const PoseBins& bins, doubl
     table.bins()[bin_of[i]].weight += particles.weight[i];
     sum += particles.weight[i];
   }
-  if (!(sum > 0.0)) return result;
+  return bin_of;
+}
 
+/// Gives the bins around the seed that are of no mode yet to this one; returns their weight.
+double gather_mode(BinTable& table, const PoseBins& bins, std::uint32_t seed, int mode) {
   const std::span<Bin> cells = table.bins();
-  const double share = sum / static_cast<double>(particles.size());
-  for (const Bin& bin : cells) result.occupied_bins += bin.weight >= 0.5 * share ? 1 : 0;
+  double weight = 0.0;
+  const std::int32_t turn_reach = bins.headings > 2 * reach ? reach : 0;
+  for (std::int32_t dx = -reach; dx <= reach; ++dx) {
+    for (std::int32_t dy = -reach; dy <= reach; ++dy) {
+      for (std::int32_t dh = -turn_reach; dh <= turn_reach; ++dh) {
+        const std::int32_t heading = (cells[seed].heading + dh + bins.headings) % bins.headings;
+        const GridCell place{cells[seed].place.x + dx, cells[seed].place.y + dy};
+        const auto found = table.find(place, heading);
+        if (!found || cells[*found].mode >= 0) continue;
+        cells[*found].mode = mode;
+        weight += cells[*found].weight;
+      }
+    }
+  }
+  return weight;
+}
 
+/// Gathers modes around the heaviest bins, the heaviest first, as long as one may have at least
+/// `min_weight`; returns their weights.
+std::vector<double> gather_modes(BinTable& table, const PoseBins& bins, double min_weight) {
+  const std::span<Bin> cells = table.bins();
   std::vector<std::uint32_t> order(cells.size());
   for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
   std::ranges::sort(order, [&](std::uint32_t a, std::uint32_t b) {
     if (cells[a].weight != cells[b].weight) return cells[a].weight > cells[b].weight;
     return a < b;
   });
-  int modes = 0;
   std::vector<double> weights;
   for (const std::uint32_t seed : order) {
     if (cells[seed].mode >= 0) continue;
     // No later mode can be heavier than all its bins at this weight.
     constexpr double max_bins = (2 * reach + 1) * (2 * reach + 1) * (2 * reach + 1);
-    if (cells[seed].weight * max_bins < min_weight * sum) break;
-    double weight = 0.0;
-    const std::int32_t turn_reach = bins.headings > 2 * reach ? reach : 0;
-    for (std::int32_t dx = -reach; dx <= reach; ++dx) {
-      for (std::int32_t dy = -reach; dy <= reach; ++dy) {
-        for (std::int32_t dh = -turn_reach; dh <= turn_reach; ++dh) {
-          const std::int32_t heading = (cells[seed].heading + dh + bins.headings) % bins.headings;
-          const GridCell beside{cells[seed].place.x + dx, cells[seed].place.y + dy};
-          const auto found = table.find(beside, heading);
-          if (!found || cells[*found].mode >= 0) continue;
-          cells[*found].mode = modes;
-          weight += cells[*found].weight;
-        }
-      }
-    }
-    weights.push_back(weight);
-    ++modes;
+    if (cells[seed].weight * max_bins < min_weight) break;
+    weights.push_back(gather_mode(table, bins, seed, static_cast<int>(weights.size())));
   }
+  return weights;
+}
 
-  std::vector<int> ranks(weights.size(), -1);
+/// Numbers the modes by their weight, and takes the bins of those below `min_weight` out of them.
+/// Returns how many are left.
+std::size_t renumber_by_weight(std::span<Bin> cells, const std::vector<double>& weights,
+                               double min_weight) {
   std::vector<int> by_weight;
-  for (int m = 0; m < modes; ++m) {
-    if (weights[static_cast<std::size_t>(m)] >= min_weight * sum) by_weight.push_back(m);
+  for (std::size_t m = 0; m < weights.size(); ++m) {
+    if (weights[m] >= min_weight) by_weight.push_back(static_cast<int>(m));
   }
   std::ranges::stable_sort(by_weight, std::greater{},
                            [&](int m) { return weights[static_cast<std::size_t>(m)]; });
+  std::vector<int> ranks(weights.size(), -1);
   for (std::size_t r = 0; r < by_weight.size(); ++r) {
     ranks[static_cast<std::size_t>(by_weight[r])] = static_cast<int>(r);
   }
   for (Bin& bin : cells) {
     if (bin.mode >= 0) bin.mode = ranks[static_cast<std::size_t>(bin.mode)];
   }
-  std::vector<Moments> moments(by_weight.size());
+  return by_weight.size();
+}
+
+}  // namespace
+
+ParticleModes find_modes(const Particles& particles, const PoseBins& bins, double min_weight) {
+  require(bins.cell_m > 0.0, "side of a bin", bins.cell_m, "> 0 m");
+  require(bins.headings >= 1, "sectors of the circle", bins.headings, ">= 1");
+  ParticleModes result;
+  result.mode_of.assign(particles.size(), -1);
+  BinTable table(bins.headings);
+  double sum = 0.0;
+  const std::vector<std::uint32_t> bin_of = fill_bins(particles, bins, table, sum);
+  if (!(sum > 0.0)) return result;
+  const std::span<Bin> cells = table.bins();
+  const double share = sum / static_cast<double>(particles.size());
+  for (const Bin& bin : cells) result.occupied_bins += bin.weight >= 0.5 * share ? 1 : 0;
+  const std::vector<double> weights = gather_modes(table, bins, min_weight * sum);
+  std::vector<Moments> moments(renumber_by_weight(cells, weights, min_weight * sum));
   for (std::size_t i = 0; i < particles.size(); ++i) {
     const int mode = cells[bin_of[i]].mode;
     result.mode_of[i] = mode;

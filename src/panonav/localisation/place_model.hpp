@@ -9,6 +9,7 @@
 #include "panonav/core/options.hpp"
 #include "panonav/localisation/column_ranking.hpp"
 #include "panonav/localisation/feature_ranking.hpp"
+#include "panonav/localisation/place.hpp"
 #include "panonav/memory/view_source.hpp"
 
 namespace panonav {
@@ -66,37 +67,6 @@ struct PlaceModel {
 [[nodiscard]] PlaceModel learn_place_model(const ColumnRanking& ranking,
                                            const PlaceModelOptions& options = {});
 
-/// What the local features of one query tell of whether its place is in the memory.
-struct FeatureEvidence {
-  int verified = 0;  ///< most that a match shares with the query (`match_features`)
-  /// Median of what the mirrored query shares with views drawn from the memory: so many agree with
-  /// one turn and one direction of motion by chance.
-  int chance = 0;
-  /// Most that the match with most verified features shares with another one: what views side by
-  /// side in this memory share. A place that is only built alike shares less.
-  int neighbour = 0;
-  int seen = 0;  ///< features of the query
-};
-
-/// What one query tells of whether its place is in the memory.
-struct PlaceEvidence {
-  /// Of the best match, as `ColumnMatch::difference`, over the better half of the compared columns
-  /// alone: what stands in view or has moved changes the other half.
-  double difference = 1.0;
-  /// The smallest over all columns.
-  double of_all_columns = 1.0;
-  /// As `difference`, of the tenth best match: many views of an unknown place fit equally badly.
-  double tenth = 1.0;
-  /// As `difference`, of the mirrored query and views drawn from the memory: mean less 1.28
-  /// standard deviations, so that one of ten differs by less if they are Gaussian. What the query's
-  /// own brightness, edges and textures reach in this memory by chance.
-  double chance = 1.0;
-  int views = 0;       ///< of which the best was chosen
-  int components = 0;  ///< of the memory
-  /// Empty where no features were compared.
-  std::optional<FeatureEvidence> features = std::nullopt;
-};
-
 /// What `place_probability` weighs: 1 and the logarithms of the difference's shares of chance and
 /// of the tenth best, of the number of views, of how many times the difference exceeds 0.4 and of
 /// the components' share of 15. A small difference tells nothing by itself, because scenes of
@@ -112,13 +82,13 @@ inline constexpr int place_features = 6;
 /// elsewhere. Logistic regression with coefficients that `bench/place_probability` learns on
 /// built-in scenes (docs/decisions.md). 0 where there is nothing to see.
 ///
-/// A sequential test: local features count only where columns `leave_doubt`. There the log odds are
-/// a sum of those by columns and of the logarithms of the verified features' shares, so that more
-/// of them never lower the probability. A query with too few features to raise it is judged by
+/// A sequential test: local features count only where columns `is_inconclusive`. There the log odds
+/// are a sum of those by columns and of the logarithms of the verified features' shares, so that
+/// more of them never lower the probability. A query with too few features to raise it is judged by
 /// columns alone.
 [[nodiscard]] double place_probability(const PlaceEvidence& evidence) noexcept;
 /// By the columns alone, the probability is between 0.02 and 0.98.
-[[nodiscard]] bool leave_doubt(const PlaceEvidence& evidence) noexcept;
+[[nodiscard]] bool is_inconclusive(const PlaceEvidence& evidence) noexcept;
 /// What `place_probability` weighs where columns leave doubt and features were compared: 1, the log
 /// odds by columns alone and the logarithms of the verified features' shares of chance and of what
 /// neighbours share, all counts increased by 1.

@@ -6,6 +6,7 @@
 
 #include "panonav/core/options.hpp"
 #include "panonav/localisation/column_ranking.hpp"
+#include "panonav/localisation/place.hpp"
 #include "panonav/memory/visual_memory.hpp"
 
 namespace panonav {
@@ -62,20 +63,6 @@ struct PositionModel {
 /// OptionError. Cost: `sampled_views` searches and about 1 ms for each.
 [[nodiscard]] PositionModel learn_position_model(const ColumnRanking& ranking,
                                                  const PositionModelOptions& options = {});
-
-/// A reference view's part in an interpolated position.
-struct PositionShare {
-  ViewId view;          ///< a posed view of the memory
-  double weight = 0.0;  ///< may be negative; all sum to 1
-};
-
-/// A position between reference views, finer than their spacing [M04 footnote 1].
-struct PositionEstimate {
-  Point2 position;  ///< in the frame of the memory's positions
-  /// The true position lies within it in 95 % of the cases; empty when nothing could be learnt.
-  std::optional<double> radius_m;
-  std::vector<PositionShare> shares;  ///< nearest first
-};
 
 /// Ordinary kriging in the space of the views: the position is the weighted mean of the
 /// neighbouring references' positions whose expected squared error is smallest, when half the mean

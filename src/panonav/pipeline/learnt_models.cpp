@@ -161,14 +161,19 @@ FeatureSource features_in(const MemoryFile& file) {
   };
 }
 
-LearntModels learn_models(const VisualMemory& memory, const FeatureSource& features) {
-  const ColumnRanking ranking(memory);
+LearntModels learn_place_models(const VisualMemory& memory, const FeatureSource& features,
+                                int components) {
+  const ColumnRanking ranking(memory, components);
   const NeighbourSupport support(ranking);
-  LearntModels models{learn_place_model(ranking), learn_position_model(ranking),
-                      support.spacing_m(), std::nullopt,
-                      features && try_features(ranking, support, features).tell_more()};
+  return {learn_place_model(ranking), learn_position_model(ranking), support.spacing_m(),
+          std::nullopt,
+          features && try_features(ranking, support, features).is_significantly_better()};
+}
+
+LearntModels learn_models(const VisualMemory& memory, const FeatureSource& features) {
+  LearntModels models = learn_place_models(memory, features, 0);
   try {
-    models.observation = learn_observation_model(ranking);
+    models.observation = learn_observation_model(ColumnRanking(memory));
   } catch (const ContractError&) {  // nothing to learn from
   }
   return models;

@@ -18,13 +18,19 @@ struct LearntModels {
   double spacing_m = 0.0;  ///< of references with headings (`NeighbourSupport`)
   /// Empty for a memory with too few views with a position, or all of them in one place.
   std::optional<ObservationModel> observation;
-  /// Whether local features decide between the best matches (`FeatureTrial::tell_more`).
+  /// Whether local features decide between the best matches
+  /// (`FeatureTrial::is_significantly_better`).
   bool by_features = false;
   friend bool operator==(const LearntModels&, const LearntModels&) = default;
 };
-/// `features`: empty where the memory has none.
+/// Learns the models of a memory. `features`: empty where the memory has none.
 [[nodiscard]] LearntModels learn_models(const VisualMemory& memory,
                                         const FeatureSource& features = {});
+
+/// Learns the models without that of observations, over `components` (0: all). Throws ContractError
+/// on more components than the memory's.
+[[nodiscard]] LearntModels learn_place_models(const VisualMemory& memory,
+                                              const FeatureSource& features, int components);
 
 /// Reads the local features of a view of the file each time that it is asked; empty where the file
 /// has none. The file must outlive it.

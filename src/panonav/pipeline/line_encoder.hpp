@@ -8,6 +8,7 @@
 #include "panonav/io/panorama_reader.hpp"
 #include "panonav/pipeline/observation.hpp"
 #include "panonav/route/horizon_scanline.hpp"
+#include "panonav/route/route_panorama.hpp"
 #include "panonav/storage/memory_file.hpp"
 
 namespace panonav {

@@ -6,6 +6,7 @@
 #include <deque>
 #include <exception>
 #include <future>
+#include <limits>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -14,6 +15,8 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/thread_priority.hpp"
+#include "panonav/localisation/observation_model.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
 #include "panonav/storage/memory_address.hpp"
 
 namespace panonav {
@@ -124,14 +127,17 @@ struct LiveMemory::Implementation {
   }
 
   [[nodiscard]] std::unique_ptr<PlaceRecogniser> make_recogniser() const {
-    return std::make_unique<PlaceRecogniser>(
-        path, PlaceRecogniserOptions{options.localiser, options.memoriser.source, std::nullopt});
+    PlaceRecogniserOptions wanted{.localiser = options.localiser,
+                                  .source = options.memoriser.source};
+    if (options.learn || options.hold)
+      wanted.max_held_views = std::numeric_limits<std::size_t>::max();
+    return std::make_unique<PlaceRecogniser>(path, wanted);
   }
 
   /// Learns from all views when a quarter of them is new, and takes over what was learnt beside.
   void refresh() {
     constexpr std::size_t min_new = 16;
-    const std::size_t views = recogniser ? recogniser->memory().size() : 0;
+    const std::size_t views = recogniser ? recogniser->size() : 0;
     const bool due = !recogniser || added.size() >= std::max(min_new, views / 5);
     if (due && !next.valid() && has_file()) {
       next = std::async(options.in_step ? std::launch::deferred : std::launch::async, [this] {
@@ -194,7 +200,8 @@ LiveMemory::Answer LiveMemory::answer(const Observation& observation) {
   const bool due = !self.last_added_s || !observation.stamp_s ||
                    *observation.stamp_s - *self.last_added_s >= self.options.min_interval_s ||
                    *observation.stamp_s < *self.last_added_s;  // the clock was set back
-  const bool stored = self.recogniser && self.recogniser->memory().find(observation.name);
+  const bool stored =
+      self.options.learn && self.recogniser && self.recogniser->memory().find(observation.name);
   const bool full = self.storer && self.storer->waiting() >= max_waiting;
   answer.is_new = self.options.learn && due && !stored && !full && !is_placed_later &&
                   !(answer.place && answer.place->known);
@@ -237,7 +244,7 @@ const PlaceRecogniser* LiveMemory::recogniser() const noexcept {
 }
 
 std::size_t LiveMemory::views() const noexcept {
-  return implementation_->recogniser ? implementation_->recogniser->memory().size() : 0;
+  return implementation_->recogniser ? implementation_->recogniser->size() : 0;
 }
 
 std::size_t LiveMemory::learnt() const noexcept {

@@ -28,6 +28,9 @@ struct LiveMemoryOptions {
   bool in_step = false;
   MemoriserOptions memoriser;  ///< of views that are added; its source serves for both
   LocaliserOptions localiser;  ///< of the answers
+  /// Hold a large memory on a server, too (`PlaceRecogniserOptions::max_held_views`). A memory that
+  /// is learnt from is always held.
+  bool hold = false;
 };
 
 /// Memorises and localises in one go, for robots that come to new places:

@@ -12,6 +12,8 @@
 #include "panonav/core/error.hpp"
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
+#include "panonav/storage/memory_file.hpp"
 
 namespace panonav {
 

@@ -6,7 +6,8 @@
 #include <string>
 
 #include "panonav/localisation/memory_update.hpp"
-#include "panonav/pipeline/place_recogniser.hpp"
+#include "panonav/localisation/place.hpp"
+#include "panonav/pipeline/observation.hpp"
 
 namespace panonav {
 

@@ -14,6 +14,7 @@
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
 #include "panonav/pipeline/mapper.hpp"
+#include "panonav/route/route_panorama.hpp"
 #include "panonav/storage/memory_address.hpp"
 
 namespace panonav {

@@ -1,153 +1,227 @@
 #include "panonav/pipeline/place_recogniser.hpp"
 
 #include <algorithm>
-#include <map>
 #include <memory>
 #include <mutex>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "panonav/core/error.hpp"
+#include "panonav/localisation/hierarchical.hpp"
+#include "panonav/localisation/localiser.hpp"
+#include "panonav/memory/view_index.hpp"
 #include "panonav/pipeline/internal/asked_view.hpp"
+#include "panonav/pipeline/internal/feature_cache.hpp"
+#include "panonav/pipeline/internal/learning_sample.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
+#include "panonav/storage/indexed_memory.hpp"
+#include "panonav/storage/memory_address.hpp"
+#include "panonav/storage/memory_file.hpp"
 
 namespace panonav {
 
 namespace {
 
-VisualMemory views_of(const MemoryFile& file) {
-  VisualMemory memory = file.load();
-  if (memory.empty()) {
-    throw FileError(file.path().string(), "holds no view; memorise a recording first");
+void check_options(const PlaceRecogniserOptions& options, const MemoryHeader& header,
+                   bool is_held) {
+  validate(options.localiser);
+  const int most = header.shape.components;
+  if (options.areas && !is_held) {
+    throw ContractError("areas", "asked for",
+                        "none in a memory that is not held: they take the positions of all views");
   }
-  return memory;
-}
-
-/// Those of the views that are in the file now, each read when it is first asked for, by a handle
-/// of its own: the caller's is not needed afterwards.
-FeatureSource kept_features(const MemoryFile& file, const VisualMemory& memory) {
-  struct Kept {
-    Kept(const MemoryFile& others, ViewId last_view)
-        : file(others.reopen(Access::read_only)), last(last_view) {}
-    MemoryFile file;
-    ViewId last;
-    FeatureSource read = features_in(file);
-    std::map<ViewId, std::optional<LocalFeatures>> views;
-    std::mutex mutex;
-  };
-  const auto kept = std::make_shared<Kept>(file, std::ranges::max(memory.views()));
-  if (!kept->read) return {};
-  return [kept](ViewId view) -> std::optional<LocalFeatures> {
-    if (kept->last < view) return std::nullopt;
-    const std::scoped_lock lock(kept->mutex);
-    const auto found = kept->views.find(view);
-    if (found != kept->views.end()) return found->second;
-    std::optional<LocalFeatures> features;
-    try {
-      features = kept->read(view);
-    } catch (const ContractError&) {  // forgotten since by somebody else
-    }
-    return kept->views.emplace(view, std::move(features)).first->second;
-  };
-}
-
-bool features_tell_more(const VisualMemory& memory, const FeatureSource& features, int components) {
-  const ColumnRanking ranking(memory, components);
-  return try_features(ranking, NeighbourSupport(ranking), features).tell_more();
-}
-
-Localiser localiser_for(const MemoryFile& file, const VisualMemory& memory,
-                        const LocaliserOptions& options) {
-  const int most = memory.shape().components;
-  if (options.components > most) {
-    throw ContractError("components", options.components,
+  if (options.localiser.components > most) {
+    throw ContractError("components", options.localiser.components,
                         "1 to " + std::to_string(most) + ", the memory's");
   }
-  // What is kept was learnt over all components.
-  const auto models = options.components == 0 ? kept_models(file, memory) : std::nullopt;
-  Localiser localiser =
-      models ? Localiser(memory, models->place, models->position, options, models->spacing_m)
-             : Localiser(memory, options);
-  if (const FeatureSource features = kept_features(file, memory)) {
-    const bool rank =
-        models ? models->by_features : features_tell_more(memory, features, options.components);
-    localiser.use_features(features, rank);
-  }
-  return localiser;
+}
+
+[[noreturn]] void refuse_empty(const MemoryFile& file) {
+  throw FileError(file.path().string(), "holds no view; memorise a recording first");
 }
 
 }  // namespace
 
 struct PlaceRecogniser::Implementation {
-  Implementation(const MemoryFile& file, const PlaceRecogniserOptions& options)
-      : memory(views_of(file)),
-        encoder(file.header(), options.source.value_or(file.header().source)),
-        localiser(localiser_for(file, memory, options.localiser)),
-        accuracy(options.areas) {
-    if (accuracy) areas.emplace(memory);
+  /// Holds the memory.
+  Implementation(const MemoryFile& file, const PlaceRecogniserOptions& options_)
+      : options(options_),
+        memory(file.load()),
+        encoder(file.header(), options.source.value_or(file.header().source)) {
+    check_options(options, file.header(), true);
+    if (memory->empty()) refuse_empty(file);
+    learn_held(file);
+    if (options.areas) areas.emplace(*memory);
+  }
+  /// Searches the memory where it lies.
+  Implementation(std::unique_ptr<IndexedMemory> index_, const MemoryFile& file,
+                 std::filesystem::path path_, const PlaceRecogniserOptions& options_)
+      : options(options_),
+        path(std::move(path_)),
+        indexed(std::move(index_)),
+        encoder(file.header(), options.source.value_or(file.header().source)) {
+    check_options(options, file.header(), false);
+    learn_indexed(file);
   }
 
-  VisualMemory memory;
-  ViewEncoder encoder;
-  Localiser localiser;
-  std::optional<WantedAccuracy> accuracy;
+  // What the file keeps was learnt over all components.
+  [[nodiscard]] bool takes_kept_models() const { return options.localiser.components == 0; }
+
+  /// Empty where the memory has no features.
+  FeatureSource get_or_create_features(const MemoryFile& file, std::optional<ViewId> last_view) {
+    if (!file.header().elevations || !file.has_features()) return {};
+    if (!features) features = std::make_shared<FeatureCache>(file, last_view);
+    return [cache = features](ViewId view) { return cache->features(view); };
+  }
+
+  void learn_held(const MemoryFile& file) {
+    const FeatureSource source = get_or_create_features(file, std::ranges::max(memory->views()));
+    if (takes_kept_models()) models = kept_models(file, *memory);
+    if (!models) models = learn_place_models(*memory, source, options.localiser.components);
+    Localiser localiser(*memory, models->place, models->position, options.localiser,
+                        models->spacing_m);
+    publish(std::move(localiser), source);
+  }
+
+  void learn_indexed(const MemoryFile& file) {
+    const std::vector<ViewId> views = indexed->views();
+    if (views.empty()) refuse_empty(file);
+    const FeatureSource source = get_or_create_features(file, std::nullopt);
+    const std::unique_ptr<ViewIndex> index = indexed->index();
+    const std::vector<ViewId> drawn = drawn_views(views);
+    models = find_models(file, *index, views, drawn, source);
+    Localiser localiser(std::make_shared<const VisualMemory>(index->load(drawn)), models->place,
+                        models->position, options.localiser, models->spacing_m);
+    publish(std::move(localiser), source);
+  }
+
+  /// Of a memory that is not held: of a small one as of one that is held, of a large one those that
+  /// the file keeps, those before, or those of a part.
+  [[nodiscard]] LearntModels find_models(const MemoryFile& file, ViewIndex& index,
+                                         std::span<const ViewId> views,
+                                         std::span<const ViewId> drawn,
+                                         const FeatureSource& source) const {
+    const bool is_small = views.size() <= options.max_learnt_views;
+    std::optional<LearntModels> found;
+    std::optional<VisualMemory> all;
+    if (is_small) all.emplace(index.load(views));
+    if (takes_kept_models()) found = is_small ? kept_models(file, *all) : kept_models(file);
+    if (!found && !is_small) found = models;
+    if (found) return *found;
+    if (!is_small) all = load_learning_sample(index, views, drawn, options.max_learnt_views);
+    return learn_place_models(*all, source, options.localiser.components);
+  }
+
+  void publish(Localiser localiser, const FeatureSource& source) {
+    if (source) localiser.use_features(source, models->by_features);
+    auto next = std::make_shared<const Localiser>(std::move(localiser));
+    const std::lock_guard lock(mutex);
+    current.swap(next);
+  }
+  [[nodiscard]] std::shared_ptr<const Localiser> localiser() const {
+    const std::lock_guard lock(mutex);
+    return current;
+  }
+
+  [[nodiscard]] std::unique_ptr<ViewIndex> index() const {
+    if (indexed) return indexed->index();
+    return std::make_unique<HeldViewIndex>(*memory);
+  }
+
+  void require_held() const {
+    if (!memory) throw ContractError("memory", "not held", "one that is held");
+  }
+
+  PlaceRecogniserOptions options;
+  std::optional<VisualMemory> memory;  // empty: not held
   std::optional<ReferenceAreas> areas;
+  std::filesystem::path path;              // where not held
+  std::unique_ptr<IndexedMemory> indexed;  // null: held
+  ViewEncoder encoder;
+  std::shared_ptr<FeatureCache> features;  // null: the memory has none
+  std::optional<LearntModels> models;      // what was learnt last
+  mutable std::mutex mutex;                // of `current`
+  std::shared_ptr<const Localiser> current;
 };
 
 PlaceRecogniser::PlaceRecogniser(const std::filesystem::path& memory,
-                                 const PlaceRecogniserOptions& options)
-    : PlaceRecogniser(MemoryFile::open(memory, Access::read_only), options) {}
+                                 const PlaceRecogniserOptions& options) {
+  const MemoryFile file = MemoryFile::open(memory, Access::read_only);
+  const bool is_held =
+      options.areas || !is_server_address(memory) || file.views().size() <= options.max_held_views;
+  implementation_ = is_held ? std::make_unique<Implementation>(file, options)
+                            : std::make_unique<Implementation>(open_indexed_memory(memory), file,
+                                                               memory, options);
+}
 PlaceRecogniser::PlaceRecogniser(const MemoryFile& file, const PlaceRecogniserOptions& options)
     : implementation_(std::make_unique<Implementation>(file, options)) {}
+PlaceRecogniser::PlaceRecogniser(std::unique_ptr<IndexedMemory> index,
+                                 const std::filesystem::path& memory,
+                                 const PlaceRecogniserOptions& options)
+    : implementation_(std::make_unique<Implementation>(
+          std::move(index), MemoryFile::open(memory, Access::read_only), memory, options)) {}
 PlaceRecogniser::~PlaceRecogniser() = default;
 PlaceRecogniser::PlaceRecogniser(PlaceRecogniser&&) noexcept = default;
 PlaceRecogniser& PlaceRecogniser::operator=(PlaceRecogniser&&) noexcept = default;
 
 Place PlaceRecogniser::localise(const Observation& observation,
                                 std::span<const std::string> excluded_names) const {
-  const auto& [memory, encoder, localiser, accuracy, areas] = std::as_const(*implementation_);
-  AskedView asked(encoder, observation);
-  const PackedSignature query = asked.query(localiser.ranks_by_features());
+  const Implementation& own = *implementation_;
+  const std::shared_ptr<const Localiser> localiser = own.localiser();
+  AskedView asked(own.encoder, observation);
+  const PackedSignature query = asked.query(localiser->ranks_by_features());
+  const std::unique_ptr<ViewIndex> index = own.index();
   std::vector<ViewId> excluded;
   for (const std::string& name : excluded_names) {
-    if (const auto view = memory.find(name)) excluded.push_back(*view);
+    if (const auto view = index->find(name)) excluded.push_back(*view);
   }
   const SearchMask mask{excluded, {}};
-  Place place = place_of(localiser.localise(query, mask, asked.features()), memory);
-  if (accuracy) place.areas = localise_hierarchically(memory, *areas, query, *accuracy, mask);
-  return place;
-}
-
-Place place_of(const Localisation& found, const VisualMemory& memory) {
-  Place place{.known_probability = found.known_probability,
-              .known = found.known,
-              .heading_rad = found.heading_rad,
-              .components = found.components,
-              .bytes_read = found.bytes_read};
-  for (const LocalisedMatch& match : found.matches) {
-    place.matches.push_back(
-        {memory.info(match.view).name, match.view, match.dissimilarity, match.column_difference,
-         match.verified_features,
-         match.compass ? std::optional(match.compass->heading_rad) : std::nullopt});
-  }
-  if (found.position) {
-    const auto& [position, radius_m, shares] = *found.position;
-    place.position = PlacePosition{position.x_m, position.y_m, radius_m};
+  Place place = localiser->localise(*index, query, mask, asked.features());
+  if (own.areas) {
+    place.areas = localise_hierarchically(*own.memory, *own.areas, query, *own.options.areas, mask);
   }
   return place;
 }
 
-void PlaceRecogniser::append(const ReferenceInfo& info, const PackedSignature& signature) {
-  implementation_->memory.append(signature, info);
+bool PlaceRecogniser::is_held() const noexcept {
+  return implementation_->memory.has_value();
 }
-
-const VisualMemory& PlaceRecogniser::memory() const noexcept {
-  return implementation_->memory;
+std::size_t PlaceRecogniser::size() const {
+  const Implementation& own = *implementation_;
+  return own.memory ? own.memory->size() : own.indexed->size();
 }
 const ViewEncoder& PlaceRecogniser::encoder() const noexcept {
   return implementation_->encoder;
 }
-const Localiser& PlaceRecogniser::localiser() const noexcept {
-  return implementation_->localiser;
+
+void PlaceRecogniser::append(const ReferenceInfo& info, const PackedSignature& signature) {
+  implementation_->require_held();
+  implementation_->memory->append(signature, info);
+}
+const VisualMemory& PlaceRecogniser::memory() const {
+  implementation_->require_held();
+  return *implementation_->memory;
+}
+const Localiser& PlaceRecogniser::localiser() const {
+  implementation_->require_held();
+  return *implementation_->current;
+}
+
+bool PlaceRecogniser::refresh() {
+  Implementation& own = *implementation_;
+  if (!own.indexed || !own.indexed->refresh()) return false;
+  own.learn_indexed(MemoryFile::open(own.path, Access::read_only));
+  return true;
+}
+std::uint64_t PlaceRecogniser::index_bytes() const {
+  const Implementation& own = *implementation_;
+  return own.indexed ? own.indexed->bytes() : 0;
+}
+SearchCounters PlaceRecogniser::search_counters() const {
+  const Implementation& own = *implementation_;
+  return own.indexed ? own.indexed->counters() : SearchCounters{};
 }
 
 }  // namespace panonav

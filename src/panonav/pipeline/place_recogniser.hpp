@@ -1,62 +1,39 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
-#include <vector>
 
-#include "panonav/localisation/hierarchical.hpp"
-#include "panonav/localisation/localiser.hpp"
-#include "panonav/pipeline/view_encoder.hpp"
-#include "panonav/storage/memory_file.hpp"
+#include "panonav/localisation/localiser_options.hpp"
+#include "panonav/localisation/place.hpp"
+#include "panonav/panorama/picture_source.hpp"
+#include "panonav/pipeline/observation.hpp"
 
 namespace panonav {
 
-/// A view of the memory that a picture resembles.
-struct PlaceMatch {
-  std::string name;                 ///< of the view
-  ViewId view;                      ///< its id in the memory
-  std::uint32_t dissimilarity = 0;  ///< integer L1 over packed magnitudes
-  double column_difference = 0.0;   ///< after turning (`ColumnMatch`)
-  /// Local features that agree with one turn and one direction of motion; empty where they do not
-  /// decide.
-  std::optional<int> verified_features;
-  /// Of the robot relative to this view; empty when one of them has no structure.
-  std::optional<double> heading_rad;
-};
+class IndexedMemory;
+class Localiser;
+class MemoryFile;
+class ViewEncoder;
+struct SearchCounters;
 
-/// Where the robot is, in the frame of the memory's positions.
-struct PlacePosition {
-  double x_m = 0.0;  ///< along the frame's x axis
-  double y_m = 0.0;  ///< along its y axis
-  /// The true position lies within it in 95 % of the cases; empty when nothing could be learnt.
-  std::optional<double> radius_m;
-};
-
-/// What one picture tells of where it was taken; see `Localisation` for what each means.
-struct Place {
-  double known_probability = 0.0;         ///< that the place is one of the memory's
-  bool known = false;                     ///< at least 0.5 probable
-  std::vector<PlaceMatch> matches;        ///< the best first; listed for unknown places, too
-  std::optional<PlacePosition> position;  ///< between references; empty for an unknown place
-  /// Of the robot, in the same frame; empty for an unknown place.
-  std::optional<double> heading_rad;
-  int components = 0;            ///< compared
-  std::uint64_t bytes_read = 0;  ///< by the search
-  /// From coarse to fine, where they were asked for; empty otherwise.
-  std::vector<LocalisationLevel> areas;
-};
-
-/// What a recogniser compares and tells.
+/// What a recogniser compares, tells and holds.
 struct PlaceRecogniserOptions {
   LocaliserOptions localiser;  ///< how many views are compared and listed
   /// How pictures lie; empty: as those that the memory was made from.
   std::optional<PictureSource> source;
-  /// Also tell the area where the robot may be, component by component.
+  /// Also tell the area where the robot may be, component by component. The memory is held for it,
+  /// as areas are cut out of the positions of all views.
   std::optional<WantedAccuracy> areas;
+  /// A memory on a server with more views is not held but searched where it lies: 350 bytes a view
+  /// instead of 2700, and a longer time for each picture (docs/scale.md). Files are always held.
+  std::size_t max_held_views = 200'000;
+  /// Views of which models are learnt at most in a memory that is not held.
+  std::size_t max_learnt_views = 20'000;
 };
 
 /// Tells from one picture where it was taken, by a memory file:
@@ -66,34 +43,56 @@ struct PlaceRecogniserOptions {
 /// (`position` is empty only for memories whose views have no poses.) Pictures become signatures as
 /// the file says, and what is learnt of its views comes from the file, too (`keep_models`); models
 /// that do not fit the views any more are learnt anew, which takes seconds in a large memory.
-/// Holds the whole memory; the file is not needed afterwards. Several threads may ask at a time.
+/// Several threads may ask at a time.
+///
+/// The whole memory is held, and the file is not needed afterwards; or, of a large memory on a
+/// server, only an index of its views, and each picture reads those that its answer takes. The
+/// answers are the same bits but for `bytes_read`. What is learnt takes views of all the memory: a
+/// memory that is not held and has more than `max_learnt_views` takes the models that were kept
+/// last (`keep_models`), whichever views came since; where none were kept it learns from whole
+/// areas with that many views in all, and places elsewhere that look alike count less than they
+/// should.
 class PlaceRecogniser {
  public:
   /// Throws FileError on a file that is missing, damaged or without views, ContractError on options
   /// that do not fit it.
   explicit PlaceRecogniser(const std::filesystem::path& memory,
                            const PlaceRecogniserOptions& options = {});
-  /// The same of a file that is open.
+  /// The same of a file that is open; its views are held, wherever it lies.
   explicit PlaceRecogniser(const MemoryFile& file, const PlaceRecogniserOptions& options = {});
+  /// The same of a memory that is not held, by its index.
+  PlaceRecogniser(std::unique_ptr<IndexedMemory> index, const std::filesystem::path& memory,
+                  const PlaceRecogniserOptions& options = {});
   ~PlaceRecogniser();
   /// What is left of the other may only be destroyed or assigned to.
   PlaceRecogniser(PlaceRecogniser&&) noexcept;
   PlaceRecogniser& operator=(PlaceRecogniser&&) noexcept;
 
-  /// Views called `excluded_names` are not found. Throws as `ViewEncoder::panorama`. Cost: that of
-  /// `Localiser::localise` and 0.1 ms for a mirror picture.
+  /// Views called `excluded_names` are not found. Throws as `ViewEncoder::panorama`; where the
+  /// memory is not held, FileError when its server cannot be reached, and the next picture may
+  /// reach it again. Cost: that of `Localiser::localise` and 0.1 ms for a mirror picture.
   [[nodiscard]] Place localise(const Observation& observation,
                                std::span<const std::string> excluded_names = {}) const;
 
-  /// A view that can be found from now on; it takes part in what is learnt of all views only in a
-  /// new PlaceRecogniser. The file is not touched. Not while another thread asks. Throws
-  /// ContractError as `VisualMemory::append`.
-  void append(const ReferenceInfo& info, const PackedSignature& signature);
-
-  [[nodiscard]] const VisualMemory& memory() const noexcept;  ///< The views that are held.
+  [[nodiscard]] bool is_held() const noexcept;  ///< False: the memory is searched where it lies.
+  [[nodiscard]] std::size_t size() const;       ///< Views that can be found.
   [[nodiscard]] const ViewEncoder& encoder() const noexcept;  ///< What makes queries of pictures.
-  /// What compares views; `localise` gives its answers by name.
-  [[nodiscard]] const Localiser& localiser() const noexcept;
+
+  /// Adds a view that can be found from now on; it takes part in what is learnt of all views only
+  /// in a new PlaceRecogniser. The file is not touched. Not while another thread asks. Throws
+  /// ContractError as `VisualMemory::append`, and where the memory is not held.
+  void append(const ReferenceInfo& info, const PackedSignature& signature);
+  /// The views that are held. Throws ContractError where the memory is not.
+  [[nodiscard]] const VisualMemory& memory() const;
+  /// What compares views; `localise` adds areas. Throws ContractError where the memory is not held.
+  [[nodiscard]] const Localiser& localiser() const;
+
+  /// Where the memory is not held, takes over which views came and went since, and what was learnt
+  /// of them (`IndexedMemory::refresh`). Pictures are answered meanwhile. Not from two threads at a
+  /// time. Returns whether anything changed.
+  bool refresh();
+  [[nodiscard]] std::uint64_t index_bytes() const;       ///< Of the index; 0: the memory is held.
+  [[nodiscard]] SearchCounters search_counters() const;  ///< Where the memory is not held.
 
  private:
   struct Implementation;

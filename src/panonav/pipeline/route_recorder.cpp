@@ -3,6 +3,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/pipeline/observation_source.hpp"
+#include "panonav/route/route_panorama.hpp"
 
 namespace panonav {
 

@@ -14,6 +14,7 @@
 #include "panonav/io/dataset.hpp"
 #include "panonav/pipeline/line_encoder.hpp"
 #include "panonav/pipeline/observation.hpp"
+#include "panonav/route/route_panorama.hpp"
 #include "panonav/storage/memory_file.hpp"
 
 namespace panonav {

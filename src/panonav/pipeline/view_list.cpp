@@ -6,6 +6,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/mapping/topological_map.hpp"
 
 namespace panonav {
 

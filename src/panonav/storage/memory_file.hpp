@@ -10,14 +10,16 @@
 #include <string_view>
 #include <vector>
 
-#include "panonav/mapping/topological_map.hpp"
+#include "panonav/memory/view_index.hpp"
 #include "panonav/memory/visual_memory.hpp"
 #include "panonav/panorama/picture.hpp"
 #include "panonav/panorama/picture_source.hpp"
 #include "panonav/panorama/preprocessing.hpp"
-#include "panonav/route/route_panorama.hpp"
 
 namespace panonav {
+
+class RoutePanorama;
+struct TopologicalMap;
 
 /// What a memory file says of all its views: how a picture becomes a signature that can be compared
 /// with them. Fixed when the file is made.
@@ -42,14 +44,6 @@ struct NewView {
   PackedSignature signature;            ///< of the header's shape, packed with its full scale
   std::vector<std::uint8_t> thumbnail;  ///< a PNG or JPEG file for people to look at; empty: none
   std::vector<std::uint8_t> features;   ///< packed `LocalFeatures`; empty: none
-};
-
-/// A rectangle in the frame of the memory's positions.
-struct PositionBounds {
-  double min_x_m = 0.0,  ///< smallest x, included
-      max_x_m = 0.0;     ///< largest x, included
-  double min_y_m = 0.0,  ///< smallest y, included
-      max_y_m = 0.0;     ///< largest y, included
 };
 
 /// For what a memory file is opened.

@@ -3,10 +3,12 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/storage/indexed_memory.hpp"
 #include "panonav/storage/memory_header.hpp"
 #include "panonav/storage/memory_scheme.hpp"
 #include "panonav_fleet/internal/postgresql_memory.hpp"
 #include "panonav_fleet/internal/postgresql_schema.hpp"
+#include "panonav_fleet/place_search.hpp"
 #include "panonav_fleet/postgresql_memories.hpp"
 
 namespace panonav::fleet {
@@ -113,6 +115,8 @@ class PostgresqlScheme final : public MemoryScheme {
 void register_postgresql_memories() {
   const auto scheme = std::make_shared<const PostgresqlScheme>();
   for (const char* const name : {"postgresql", "postgres"}) register_memory_scheme(name, scheme);
+  register_indexed_memories(
+      [](const std::filesystem::path& memory) { return std::make_unique<PlaceSearch>(memory); });
 }
 
 }  // namespace panonav::fleet

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "panonav/core/random.hpp"
+#include "panonav/localisation/particle_modes.hpp"
 
 namespace panonav {
 
@@ -18,6 +19,13 @@ namespace panonav {
 /// finite, or no weight at all. O(weights + count).
 [[nodiscard]] std::vector<std::size_t> low_variance_resample(std::span<const double> weights,
                                                              std::size_t count, Random& random);
+
+/// Replaces the particles by `count` of them, drawn by `low_variance_resample`, with equal weights.
+void resample_particles(Particles& particles, std::size_t count, Random& random);
+
+/// The same with as many as there are, each spread within its mode by the kernel that the mode's
+/// covariance and number of particles call for (a regularised particle filter).
+void resample_and_spread(Particles& particles, const PoseBins& bins, Random& random);
 
 /// Particles needed so that, with probability 0.99, the distribution over `occupied_bins` bins that
 /// they stand for is within `error` (Kullback-Leibler) of the true one [Fox 2003, eq. 7]. 1 for one

@@ -2,8 +2,8 @@
 
 #include <optional>
 
-#include "panonav/localisation/localiser.hpp"
-#include "panonav/pipeline/place_recogniser.hpp"
+#include "panonav/localisation/feature_ranking.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
 
 namespace panonav {
 
@@ -33,8 +33,5 @@ class AskedView {
   const Observation& seen_;
   std::optional<Panorama> unwarped_;
 };
-
-/// By names; `memory` holds the views that were found.
-[[nodiscard]] Place place_of(const Localisation& found, const VisualMemory& memory);
 
 }  // namespace panonav

@@ -1,11 +1,13 @@
-#include "panonav_fleet/searched_recogniser.hpp"
+#include "panonav/pipeline/place_recogniser.hpp"
 
 #include <gtest/gtest.h>
 
 #include <thread>
 
 #include "panonav/core/error.hpp"
+#include "panonav/memory/view_index.hpp"
 #include "panonav/pipeline/memoriser.hpp"
+#include "panonav_fleet/place_search.hpp"
 #include "support/landmark_pictures.hpp"
 #include "support/temporary_folder.hpp"
 
@@ -47,7 +49,7 @@ void expect_same(const Place& searched, const Place& held) {
   EXPECT_EQ(searched.components, held.components);
 }
 
-class SearchedRecogniserTest : public InTemporaryFolder {
+class RecogniserOfAnIndexTest : public InTemporaryFolder {
  protected:
   /// `posed`: every so many of the views have a pose; 0: none.
   void memorise(int side, std::size_t posed) {
@@ -63,6 +65,10 @@ class SearchedRecogniserTest : public InTemporaryFolder {
     }
     memoriser.finish();
   }
+  /// The memory is not held.
+  PlaceRecogniser search(const PlaceRecogniserOptions& options = {}) const {
+    return {std::make_unique<PlaceSearch>(path_), path_, options};
+  }
   /// In the memory, turned, between its views, elsewhere and nowhere.
   std::vector<Image> queries() const {
     std::vector<Image> pictures;
@@ -76,7 +82,7 @@ class SearchedRecogniserTest : public InTemporaryFolder {
   }
   void expect_same_answers(const PlaceRecogniserOptions& options = {}) {
     const PlaceRecogniser held(path_, options);
-    const SearchedRecogniser searched(path_, options);
+    const PlaceRecogniser searched = search(options);
     EXPECT_EQ(searched.size(), held.memory().size());
     const std::vector<std::string> excluded{view_name(8), view_name(3), "nothing"};
     for (const Image& picture : queries()) {
@@ -84,15 +90,15 @@ class SearchedRecogniserTest : public InTemporaryFolder {
       expect_same(searched.localise(seen), held.localise(seen));
       expect_same(searched.localise(seen, excluded), held.localise(seen, excluded));
     }
-    EXPECT_GE(searched.counters().searches, 2 * queries().size());
-    EXPECT_GT(searched.counters().views_read, 0U);
+    EXPECT_GE(searched.search_counters().searches, 2 * queries().size());
+    EXPECT_GT(searched.search_counters().views_read, 0U);
   }
 
   const ToyWorld world_ = landmark_world(5);
   const std::filesystem::path path_ = folder / "m.panonav";
 };
 
-TEST_F(SearchedRecogniserTest, AnswersAsTheHeldMemoryDoes) {
+TEST_F(RecogniserOfAnIndexTest, AnswersAsTheHeldMemoryDoes) {
   memorise(9, 1);
   expect_same_answers();
   expect_same_answers({.localiser = {.top = 40}});
@@ -101,7 +107,7 @@ TEST_F(SearchedRecogniserTest, AnswersAsTheHeldMemoryDoes) {
   expect_same_answers({.localiser = {.reranked_views = 30}});
 }
 
-TEST_F(SearchedRecogniserTest, AnswersAlikeWhereFewViewsOrNoneHavePoses) {
+TEST_F(RecogniserOfAnIndexTest, AnswersAlikeWhereFewViewsOrNoneHavePoses) {
   memorise(7, 3);
   expect_same_answers();
   std::filesystem::remove(path_);
@@ -109,15 +115,15 @@ TEST_F(SearchedRecogniserTest, AnswersAlikeWhereFewViewsOrNoneHavePoses) {
   expect_same_answers();
 }
 
-TEST_F(SearchedRecogniserTest, AnswersAlikeBeyondAThousandViews) {
+TEST_F(RecogniserOfAnIndexTest, AnswersAlikeBeyondAThousandViews) {
   memorise(33, 1);  // 1089: more than are ranked again, or whose columns are kept
   expect_same_answers();
 }
 
-TEST_F(SearchedRecogniserTest, OfALargeMemoryWhatIsKeptIsTaken) {
+TEST_F(RecogniserOfAnIndexTest, OfALargeMemoryWhatIsKeptIsTaken) {
   memorise(9, 1);
   const PlaceRecogniser held(path_);
-  SearchedRecogniser searched(path_, {}, 50);  // of 81
+  PlaceRecogniser searched = search({.max_learnt_views = 50});  // of 81
   for (const Image& picture : queries()) {
     expect_same(searched.localise(Observation(picture)), held.localise(Observation(picture)));
   }
@@ -132,12 +138,12 @@ TEST_F(SearchedRecogniserTest, OfALargeMemoryWhatIsKeptIsTaken) {
   for (const PlaceMatch& match : place.matches) EXPECT_NE(match.name, view_name(20));
 }
 
-TEST_F(SearchedRecogniserTest, OfALargeMemoryThatKeepsNothingPartsAreLearnt) {
+TEST_F(RecogniserOfAnIndexTest, OfALargeMemoryThatKeepsNothingPartsAreLearnt) {
   for (const std::size_t posed : {1U, 0U}) {
     std::filesystem::remove(path_);
     memorise(9, posed);
     MemoryFile::open(path_, Access::read_write).set_parameter("learnt models", "none");
-    const SearchedRecogniser searched(path_, {}, 50);
+    const PlaceRecogniser searched = search({.max_learnt_views = 50});
     const PlaceRecogniser held(path_);
     const Place place = searched.localise(Observation(landmark_picture(world_, {1.0, 1.5, 1.0})));
     EXPECT_TRUE(place.known);
@@ -148,9 +154,9 @@ TEST_F(SearchedRecogniserTest, OfALargeMemoryThatKeepsNothingPartsAreLearnt) {
   }
 }
 
-TEST_F(SearchedRecogniserTest, ThreadsAskAtOnce) {
+TEST_F(RecogniserOfAnIndexTest, ThreadsAskAtOnce) {
   memorise(6, 1);
-  const SearchedRecogniser searched(path_);
+  const PlaceRecogniser searched = search();
   const PlaceRecogniser held(path_);
   std::vector<std::thread> threads;
   for (int i = 0; i < 3; ++i) {
@@ -163,12 +169,17 @@ TEST_F(SearchedRecogniserTest, ThreadsAskAtOnce) {
   for (std::thread& thread : threads) thread.join();
 }
 
-TEST_F(SearchedRecogniserTest, RefusesWhatItCannotTell) {
-  EXPECT_THROW(SearchedRecogniser{path_}, FileError);
+TEST_F(RecogniserOfAnIndexTest, RefusesWhatItCannotTell) {
+  EXPECT_THROW((void)search(), FileError);
   memorise(3, 1);
-  EXPECT_THROW(SearchedRecogniser(path_, {.areas = WantedAccuracy{}}), ContractError);
-  EXPECT_THROW(SearchedRecogniser(path_, {.localiser = {.components = 99}}), ContractError);
-  EXPECT_THROW(SearchedRecogniser(path_, {.localiser = {.top = 0}}), Error);
+  PlaceRecogniser searched = search();
+  EXPECT_FALSE(searched.is_held());
+  EXPECT_THROW((void)searched.memory(), ContractError);
+  EXPECT_THROW((void)searched.localiser(), ContractError);
+  EXPECT_THROW(searched.append({.name = "new"}, PackedSignature{}), ContractError);
+  EXPECT_THROW((void)search({.areas = WantedAccuracy{}}), ContractError);
+  EXPECT_THROW((void)search({.localiser = {.components = 99}}), ContractError);
+  EXPECT_THROW((void)search({.localiser = {.top = 0}}), Error);
 }
 
 }  // namespace

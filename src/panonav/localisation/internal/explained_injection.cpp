@@ -1,0 +1,116 @@
+#include "panonav/localisation/internal/explained_injection.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "panonav/localisation/internal/resampling.hpp"
+
+namespace panonav {
+
+namespace {
+
+// Least weight of new particles, in particles' worth: less is none. Chosen.
+constexpr double min_injected_particles = 0.5;
+// Share of the particles that are replaced: that of the weight times the factor, so that a tenth of
+// the old ones stays where they have none; at least the other number. Chosen.
+constexpr double replaced_share_factor = 0.9;
+constexpr double min_replaced_share = 0.05;
+// Log-likelihood by which a drawn particle may be less likely than the best place; below it all
+// weigh alike, 1 : 8000. Chosen.
+constexpr double max_log_loss = 9.0;
+// Log-likelihood ratios beyond it decide alone; so that exponentials stay finite.
+constexpr double max_log_odds = 50.0;
+
+double sum_of(const std::vector<double>& values) {
+  double sum = 0.0;
+  for (const double value : values) sum += value;
+  return sum;
+}
+
+/// The numbers of the `count` lightest particles, in no order.
+std::vector<std::size_t> lightest_of(const Particles& particles, std::size_t count) {
+  std::vector<std::size_t> order(particles.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  const auto end = order.begin() + static_cast<std::ptrdiff_t>(count);
+  std::nth_element(order.begin(), end, order.end(), [&](std::size_t a, std::size_t b) {
+    return std::pair(particles.weight[a], a) < std::pair(particles.weight[b], b);
+  });
+  order.resize(count);
+  return order;
+}
+
+}  // namespace
+
+ExplainedInjection::ExplainedInjection(ViewLikelihood& likelihood, const PoseSampler& sampler,
+                                       const ObservationModel& model, bool compass)
+    : likelihood_(&likelihood),
+      sampler_(&sampler),
+      heading_share_(compass ? model.heading_width_rad / std::numbers::pi : 1.0) {}
+
+bool ExplainedInjection::find_places(const Particles& particles, Random& random) {
+  Particles poses;
+  const auto add = [&](PoseSampler::Candidate place) {
+    places_.push_back(place);
+    poses.add(sampler_->find_pose(place, particles, random), 0.0);
+  };
+  const auto sites = likelihood_->sites();
+  for (const std::uint32_t site : likelihood_->compared_sites()) {
+    add({site, false});
+    if (sampler_->has_heading(site) && sites[site].other_similarity > 0.0F) add({site, true});
+  }
+  if (places_.empty()) return false;
+  likelihoods_.resize(poses.size());
+  likelihood_->log_ratios(poses, likelihoods_);
+  log_largest_ = std::max(0.0, *std::ranges::max_element(likelihoods_));
+  for (double& value : likelihoods_) value = std::exp(value - log_largest_);
+  // Anywhere else, and in any other heading, nothing explains the view.
+  const double share = heading_share_ / static_cast<double>(sites.size());
+  const double unexplained = std::max(0.0, 1.0 - share * static_cast<double>(likelihoods_.size()));
+  log_evidence_ =
+      log_largest_ + std::log(share * sum_of(likelihoods_) + unexplained * std::exp(-log_largest_));
+  return true;
+}
+
+Particles ExplainedInjection::draw(const Particles& particles, std::size_t count,
+                                   Random& random) const {
+  const std::vector<std::size_t> drawn = low_variance_resample(likelihoods_, count, random);
+  Particles fresh;
+  for (const std::size_t d : drawn) {
+    fresh.add(sampler_->draw_around(places_[d], particles, random), 0.0);
+  }
+  std::vector<double> log_ratios(fresh.size());
+  likelihood_->log_ratios(fresh, log_ratios);
+  for (std::size_t n = 0; n < fresh.size(); ++n) {
+    fresh.weight[n] =
+        std::exp(std::max(log_ratios[n] - log_largest_, -max_log_loss)) / likelihoods_[drawn[n]];
+  }
+  return fresh;
+}
+
+int ExplainedInjection::inject(Particles& particles, double probability, Random& random) const {
+  const auto size = static_cast<double>(particles.size());
+  if (probability * size < min_injected_particles) return 0;
+  const double replaced = std::max(min_replaced_share, replaced_share_factor * probability) * size;
+  const auto count = static_cast<std::size_t>(std::max(1L, std::lround(replaced)));
+  const Particles fresh = draw(particles, count, random);
+  const std::vector<std::size_t> lightest = lightest_of(particles, fresh.size());
+  for (std::size_t n = 0; n < fresh.size(); ++n) particles.set(lightest[n], fresh.pose(n), 0.0);
+  const double kept = sum_of(particles.weight);
+  for (double& weight : particles.weight) weight *= kept > 0.0 ? (1.0 - probability) / kept : 0.0;
+  const double fresh_share = (kept > 0.0 ? probability : 1.0);
+  const double fresh_sum = sum_of(fresh.weight);
+  for (std::size_t n = 0; n < fresh.size(); ++n) {
+    particles.weight[lightest[n]] = fresh_share * fresh.weight[n] / fresh_sum;
+  }
+  return static_cast<int>(fresh.size());
+}
+
+double kidnap_probability(double prior, double log_elsewhere, double log_here) {
+  const double log_odds = std::clamp(log_elsewhere - log_here, -max_log_odds, max_log_odds);
+  const double odds = prior / (1.0 - prior) * std::exp(log_odds);
+  return odds / (1.0 + odds);
+}
+
+}  // namespace panonav

@@ -1,0 +1,128 @@
+#include "panonav/localisation/internal/kriging.hpp"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "panonav/geometry/angles.hpp"
+#include "panonav/localisation/position_model.hpp"
+
+namespace panonav {
+
+namespace {
+
+// Spacings within which references are next to each other: the neighbours on a grid, diagonal ones
+// included.
+constexpr double adjacent_spacings = 1.5;
+// A straight edge leaves half a turn free around the nearest reference; for rounding.
+constexpr double edge_tolerance_rad = radians(1.0);
+
+// Differences are means of roots; their squares grow with the distance.
+double squared(double difference) {
+  return difference * difference;
+}
+
+}  // namespace
+
+ResemblingViews compare_with_each_other(const ColumnRanking& ranking,
+                                        std::span<const RankedMatch> matches) {
+  ResemblingViews near;
+  std::vector<double> to_query;
+  std::vector<ColumnProfiles> profiles;
+  for (const RankedMatch& ranked : matches) {
+    if (near.views.size() == PositionModel::candidates) break;
+    const ViewId view = ranked.match.view;
+    const auto& pose = ranking.memory().info(view).pose;
+    if (!pose) continue;
+    near.views.push_back(view);
+    near.positions.push_back(pose->position());
+    to_query.push_back(squared(ranked.columns.difference));
+    profiles.push_back(ranking.profiles(view));
+  }
+  const auto size = static_cast<Eigen::Index>(near.views.size());
+  near.to_query = Eigen::Map<const Eigen::VectorXd>(to_query.data(), size);
+  near.between = Eigen::MatrixXd::Zero(size, size);
+  for (Eigen::Index i = 0; i < size; ++i) {
+    for (Eigen::Index j = 0; j < size; ++j) {
+      if (i == j) continue;
+      near.between(i, j) = squared(match_columns(profiles[static_cast<std::size_t>(j)],
+                                                 profiles[static_cast<std::size_t>(i)])
+                                       .difference);
+    }
+  }
+  return near;
+}
+
+double ratio_to_elsewhere(const ResemblingViews& near, double spacing_m) {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 1; i < near.views.size(); ++i) {
+    if (distance(near.positions[i], near.positions[0]) <= elsewhere_spacings * spacing_m) continue;
+    least = std::min(least, near.to_query(static_cast<Eigen::Index>(i)));
+  }
+  if (!(least < std::numeric_limits<double>::infinity())) return 0.0;
+  return least > 0.0 ? std::sqrt(near.to_query(0) / least) : 1.0;
+}
+
+bool is_surrounded(const ResemblingViews& near, double spacing_m) {
+  std::vector<double> directions;
+  for (const Point2& position : near.positions) {
+    const double distance_m = distance(position, near.positions[0]);
+    if (distance_m == 0.0 || distance_m > adjacent_spacings * spacing_m) continue;
+    directions.push_back(
+        std::atan2(position.y_m - near.positions[0].y_m, position.x_m - near.positions[0].x_m));
+  }
+  if (directions.empty()) return false;
+  std::ranges::sort(directions);
+  double gap = directions.front() + 2.0 * std::numbers::pi - directions.back();
+  for (std::size_t i = 1; i < directions.size(); ++i) {
+    gap = std::max(gap, directions[i] - directions[i - 1]);
+  }
+  return gap < std::numbers::pi - edge_tolerance_rad;
+}
+
+KrigedPosition krige(const ResemblingViews& near, double neighbourhood_m, double exponent,
+                     double unit) {
+  KrigedPosition result;
+  for (std::size_t i = 0; i < near.views.size(); ++i) {
+    if (distance(near.positions[i], near.positions[0]) <= neighbourhood_m) result.used.push_back(i);
+  }
+  const auto size = static_cast<Eigen::Index>(result.used.size());
+  const auto variogram = [&](double dissimilarity) {
+    return std::pow(dissimilarity / unit, exponent);
+  };
+  // The last row and column hold the multiplier of "weights sum to 1".
+  Eigen::MatrixXd matrix = Eigen::MatrixXd::Ones(size + 1, size + 1);
+  Eigen::VectorXd right = Eigen::VectorXd::Ones(size + 1);
+  matrix(size, size) = 0.0;
+  for (Eigen::Index i = 0; i < size; ++i) {
+    const auto a = static_cast<Eigen::Index>(result.used[i]);
+    right(i) = variogram(near.to_query(a));
+    for (Eigen::Index j = 0; j < size; ++j) {
+      matrix(i, j) = variogram(near.between(a, static_cast<Eigen::Index>(result.used[j])));
+    }
+  }
+  // Of least norm: references with equal signatures share their weight.
+  const Eigen::VectorXd solution = matrix.completeOrthogonalDecomposition().solve(right);
+  double total = 0.0;
+  for (Eigen::Index i = 0; i < size; ++i) total += solution(i);
+  for (Eigen::Index i = 0; i < size; ++i) {
+    const double weight = solution(i) / total;
+    result.weights.push_back(weight);
+    const Point2 p = near.positions[result.used[i]];
+    result.position = {result.position.x_m + weight * p.x_m, result.position.y_m + weight * p.y_m};
+  }
+  result.variance = std::max(0.0, solution.dot(right));
+  // dissimilarity^exponent above 1 need not be a valid variogram for the L1 distance; where it is
+  // not, the solution can leave the neighbourhood, which no position between references does.
+  if (!(distance(result.position, near.positions[0]) <= neighbourhood_m)) {
+    result.position = near.positions[0];
+    result.used = {0};
+    result.weights = {1.0};
+    result.variance = 2.0 * right(0);  // the variance of a single reference's error
+  }
+  return result;
+}
+
+}  // namespace panonav

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "panonav/geometry/pose2.hpp"
+#include "panonav/localisation/column_ranking.hpp"
+
+namespace panonav {
+
+/// Share of the typical kriging variance that stays even where the query equals a reference: noise
+/// of the sensor. Chosen.
+inline constexpr double min_variance_share = 0.1;
+/// Spacings of the references beyond which a place is elsewhere: farther than any neighbourhood of
+/// a place on a grid.
+inline constexpr double elsewhere_spacings = 3.0;
+
+/// Posed views that resemble a query, the best match first.
+struct ResemblingViews {
+  std::vector<ViewId> views;
+  std::vector<Point2> positions;
+  Eigen::VectorXd to_query;  ///< squared differences of columns
+  /// The same between the views. (i, j): view j asked, view i the reference. Comparing columns is
+  /// not quite symmetric, and only so is the answer to view j view j.
+  Eigen::MatrixXd between;
+};
+/// Compares the first `PositionModel::candidates` posed views of the matches with each other.
+[[nodiscard]] ResemblingViews compare_with_each_other(const ColumnRanking& ranking,
+                                                      std::span<const RankedMatch> matches);
+
+/// Ratio of the best match's difference to that of the best match elsewhere; 0 where there is no
+/// other.
+[[nodiscard]] double ratio_to_elsewhere(const ResemblingViews& near, double spacing_m);
+/// Whether the references next to the nearest one that look like the query stand all around it.
+[[nodiscard]] bool is_surrounded(const ResemblingViews& near, double spacing_m);
+
+/// A position by ordinary kriging.
+struct KrigedPosition {
+  Point2 position;
+  double variance = 0.0;  ///< in units of the variogram
+  std::vector<std::size_t> used;
+  std::vector<double> weights;
+};
+/// Takes part in it what lies within `neighbourhood_m` of the best match; the variogram is the
+/// squared difference over `unit`, to the power of `exponent`.
+[[nodiscard]] KrigedPosition krige(const ResemblingViews& near, double neighbourhood_m,
+                                   double exponent, double unit);
+
+}  // namespace panonav

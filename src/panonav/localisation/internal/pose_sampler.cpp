@@ -1,0 +1,68 @@
+#include "panonav/localisation/internal/pose_sampler.hpp"
+
+#include <cmath>
+#include <numbers>
+
+#include "panonav/geometry/angles.hpp"
+
+namespace panonav {
+
+namespace {
+
+// Standard deviations of new particles: of the place in spacings of the references, within the
+// square of the grid that the reference stands for; of the heading in widths of the turns that
+// explain a view. Chosen.
+constexpr double position_deviation_spacings = 0.4;
+constexpr double heading_deviation_widths = 0.25;
+
+/// The heading of a new particle where no compass tells it.
+double borrow_heading(const Particles& particles, Random& random) {
+  return particles.heading_rad[random.index(particles.size())];
+}
+
+}  // namespace
+
+bool PoseSampler::has_heading(std::uint32_t site) const {
+  return compass_ && !std::isnan(likelihood_->sites()[site].heading_rad);
+}
+
+Pose2 PoseSampler::find_pose(Candidate candidate, const Particles& particles,
+                             Random& random) const {
+  const auto& site = likelihood_->sites()[candidate.site];
+  const double heading_rad =
+      has_heading(candidate.site)
+          ? static_cast<double>(candidate.other ? site.other_heading_rad : site.heading_rad)
+          : borrow_heading(particles, random);
+  return {site.position.x_m, site.position.y_m, wrap_angle(heading_rad)};
+}
+
+Pose2 PoseSampler::draw_around(Candidate candidate, const Particles& particles,
+                               Random& random) const {
+  Pose2 pose = find_pose(candidate, particles, random);
+  pose.x_m += random.normal(0.0, position_deviation_spacings * model_->spacing_m);
+  pose.y_m += random.normal(0.0, position_deviation_spacings * model_->spacing_m);
+  if (has_heading(candidate.site)) {
+    pose.heading_rad =
+        wrap_angle(pose.heading_rad +
+                   random.normal(0.0, heading_deviation_widths * model_->heading_width_rad));
+  }
+  return pose;
+}
+
+Pose2 PoseSampler::draw_in_square(std::size_t site, std::optional<double> heading_rad,
+                                  Random& random) const {
+  const Point2 centre = likelihood_->sites()[site].position;
+  const double half = 0.5 * model_->spacing_m;
+  const double x = centre.x_m + random.uniform(-half, half);
+  const double y = centre.y_m + random.uniform(-half, half);
+  const double any_heading_rad = random.uniform(-std::numbers::pi, std::numbers::pi);
+  return {x, y, heading_rad.value_or(any_heading_rad)};
+}
+
+Pose2 PoseSampler::draw_anywhere(const Particles& particles, Random& random) const {
+  const double borrowed_rad = borrow_heading(particles, random);
+  const std::size_t site = random.index(likelihood_->sites().size());
+  return draw_in_square(site, compass_ ? std::nullopt : std::optional(borrowed_rad), random);
+}
+
+}  // namespace panonav

@@ -1,0 +1,27 @@
+#pragma once
+
+#include "panonav/core/options.hpp"
+
+namespace panonav {
+
+/// How much a localisation compares and lists.
+struct LocaliserOptions {
+  int top = 10;        ///< matches listed
+  int components = 0;  ///< Fourier components compared, 0 for all
+  /// Views compared column by column when those of least dissimilarity do not explain the query,
+  /// because people stand in view or the light has changed. 0: the order of dissimilarity stands,
+  /// and columns decide only whether the place is known.
+  int reranked_views = 1000;
+};
+void visit_options(LocaliserOptions& options, OptionVisitor& visitor);
+
+/// Where to stop.
+struct WantedAccuracy {
+  int components = 0;     ///< at most so many, 0: the memory's
+  double radius_m = 0.0;  ///< stop as soon as the circle is no larger; 0: never on this account
+  double tolerance =
+      0.0;  ///< candidates are kept up to (1 + tolerance) times the best dissimilarity
+};
+void visit_options(WantedAccuracy& accuracy, OptionVisitor& visitor);
+
+}  // namespace panonav

@@ -1,0 +1,252 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "panonav/core/statistics.hpp"
+#include "panonav/geometry/voronoi.hpp"
+#include "panonav/localisation/internal/kriging.hpp"
+#include "panonav/localisation/neighbour_support.hpp"
+#include "panonav/localisation/position_model.hpp"
+#include "panonav/localisation/sample.hpp"
+
+namespace panonav {
+
+namespace {
+
+// What the learning chooses from: neighbourhoods in spacings of the memory, exponents of the
+// variogram. 1 is exact for signatures that move as a random walk, 2 would be for signatures that
+// change linearly with the position but leaves the solution without a unique answer.
+constexpr std::array<double, 6> neighbourhoods = {1.6, 2.3, 3.2, 4.5, 6.5, 9.0};
+constexpr std::array<double, 3> exponents = {1.0, 1.25, 1.5};
+// Share of the true positions that lie within the radius; of the rest, half may lie in a place that
+// only looks alike.
+constexpr double coverage = 0.95;
+constexpr double max_wrong_share = 0.5 * (1.0 - coverage);
+// Matches that are searched for a view left out, of which the doubles are taken away. Chosen.
+constexpr int searched_matches = 4 * PositionModel::candidates;
+// Spacings up to which a view's nearest match shows the view's own place. Chosen.
+constexpr double own_place_spacings = 2.0;
+// Least unit of squared differences, for memories of equal views.
+constexpr double min_difference_unit = 1e-4;
+
+/// The views of a memory that have positions.
+struct PosedViews {
+  explicit PosedViews(const VisualMemory& memory) {
+    for (const ViewId view : memory.views()) {
+      if (const auto& pose = memory.info(view).pose) {
+        views.push_back(view);
+        positions.push_back(pose->position());
+      }
+    }
+  }
+  std::vector<ViewId> views;
+  std::vector<Point2> positions;
+};
+
+/// Views that were left out of the memory in turn, and what resembles them there.
+struct LeftOutViews {
+  std::vector<Point2> truths;
+  /// All that the search finds, its doubles included, which decide most where there are few views:
+  /// how to interpolate is learnt from it.
+  std::vector<ResemblingViews> found;
+  /// What an answer is made of: how far the result is off is learnt from it.
+  std::vector<ResemblingViews> answered;
+
+  [[nodiscard]] std::size_t size() const { return truths.size(); }
+  [[nodiscard]] bool is_found_near(std::size_t i, double spacing_m) const {
+    return distance(found[i].positions[0], truths[i]) <= own_place_spacings * spacing_m;
+  }
+  [[nodiscard]] bool is_answered_near(std::size_t i, double spacing_m) const {
+    return distance(answered[i].positions[0], truths[i]) <= own_place_spacings * spacing_m;
+  }
+};
+
+// Returns the best match of each place but that at `truth`, of what the search found for a view
+// taken there.
+std::vector<ViewId> find_doubles(const VisualMemory& memory, Point2 truth,
+                                 std::span<const RankedMatch> ranked, double spacing_m) {
+  std::vector<Point2> places{truth};
+  std::vector<ViewId> doubles;
+  for (const RankedMatch& match : ranked) {
+    const auto& pose = memory.info(match.match.view).pose;
+    if (!pose || std::ranges::any_of(places, [&](Point2 place) {
+          return distance(pose->position(), place) <= elsewhere_spacings * spacing_m;
+        })) {
+      continue;
+    }
+    places.push_back(pose->position());
+    doubles.push_back(match.match.view);
+  }
+  return doubles;
+}
+
+void leave_out(const ColumnRanking& ranking, const NeighbourSupport& support, ViewId view,
+               double spacing_m, LeftOutViews& left_out) {
+  const VisualMemory& memory = ranking.memory();
+  const PackedSignature own = memory.packed(view);
+  const Point2 truth = memory.info(view).pose->position();
+  std::vector<ViewId> excluded{view};
+  const SearchResult found =
+      memory.search(own, {.top = searched_matches, .components = ranking.components()},
+                    {.excluded_views = excluded, .allowed_rows = {}});
+  std::vector<RankedMatch> ranked = ranking.rank(own, found.matches);
+  const auto nearest =
+      std::span(found.matches)
+          .first(std::min<std::size_t>(found.matches.size(), PositionModel::candidates));
+  const std::vector<RankedMatch> all = ranking.rank(own, nearest);
+  for (const ViewId other : find_doubles(memory, truth, ranked, spacing_m)) {
+    excluded.push_back(other);
+    std::erase_if(ranked, [&](const RankedMatch& match) { return match.match.view == other; });
+  }
+  support.rank_by_support(ranking.profiles(view), ranked, excluded);
+  // As in an answer, the nearest view must have a pose.
+  const auto begins_posed = [&](std::span<const RankedMatch> matches) {
+    return !matches.empty() && memory.info(matches[0].match.view).pose;
+  };
+  if (!begins_posed(ranked) || !begins_posed(all)) return;
+  left_out.found.push_back(compare_with_each_other(ranking, all));
+  left_out.answered.push_back(compare_with_each_other(ranking, ranked));
+  left_out.truths.push_back(truth);
+}
+
+LeftOutViews leave_out_in_turn(const ColumnRanking& ranking, std::span<const ViewId> views,
+                               double spacing_m) {
+  const NeighbourSupport support(ranking);
+  LeftOutViews left_out;
+  for (const ViewId view : views) leave_out(ranking, support, view, spacing_m, left_out);
+  return left_out;
+}
+
+double learn_difference_unit(const LeftOutViews& left_out) {
+  std::vector<double> differences;
+  for (const ResemblingViews& near : left_out.found) differences.push_back(near.to_query(0));
+  return std::max(min_difference_unit, quantile(differences, 0.5));
+}
+
+// Chooses the neighbourhood and the exponent that place the views best. False where no view is
+// found near its place. Views whose nearest match only looks alike say nothing on how to
+// interpolate; a wide neighbourhood would then win because the middle of many wrong places is wrong
+// by less.
+bool choose_interpolation(const LeftOutViews& left_out, PositionModel& model) {
+  double best_sum_m = std::numeric_limits<double>::infinity();
+  for (const double spacings : neighbourhoods) {
+    for (const double exponent : exponents) {
+      const double neighbourhood_m = spacings * model.spacing_m;
+      double sum_m = 0.0;
+      for (std::size_t i = 0; i < left_out.size(); ++i) {
+        if (!left_out.is_found_near(i, model.spacing_m)) continue;
+        const KrigedPosition kriged =
+            krige(left_out.found[i], neighbourhood_m, exponent, model.difference_unit);
+        sum_m += distance(kriged.position, left_out.truths[i]);
+      }
+      if (sum_m < best_sum_m) {
+        best_sum_m = sum_m;
+        model.neighbourhood_m = neighbourhood_m;
+        model.exponent = exponent;
+      }
+    }
+  }
+  return std::isfinite(best_sum_m);
+}
+
+/// How far the interpolated positions are off, and their kriging variances.
+struct InterpolationErrors {
+  std::vector<double> errors_m;
+  std::vector<double> variances;
+};
+
+InterpolationErrors interpolate_all(const LeftOutViews& left_out, const PositionModel& model) {
+  InterpolationErrors result;
+  for (std::size_t i = 0; i < left_out.size(); ++i) {
+    const KrigedPosition kriged =
+        krige(left_out.answered[i], model.neighbourhood_m, model.exponent, model.difference_unit);
+    result.errors_m.push_back(distance(kriged.position, left_out.truths[i]));
+    result.variances.push_back(kriged.variance);
+  }
+  return result;
+}
+
+// Learns from which ratio on the wrong one of two places may have been taken: the largest share of
+// views, from the clearest on, of which hardly any was found elsewhere, is not ambiguous.
+void learn_ambiguity(const LeftOutViews& left_out, std::span<const double> errors_m,
+                     PositionModel& model) {
+  std::vector<std::pair<double, std::size_t>> by_ratio;
+  for (std::size_t i = 0; i < left_out.size(); ++i) {
+    by_ratio.emplace_back(ratio_to_elsewhere(left_out.answered[i], model.spacing_m), i);
+  }
+  std::ranges::sort(by_ratio);
+  std::size_t clear = 0;
+  std::size_t wrong = 0;
+  for (std::size_t i = 0; i < by_ratio.size(); ++i) {
+    wrong += left_out.is_answered_near(by_ratio[i].second, model.spacing_m) ? 0 : 1;
+    const double max_wrong = max_wrong_share * static_cast<double>(i + 1);
+    if (static_cast<double>(wrong) <= max_wrong) clear = i + 1;
+  }
+  if (clear == by_ratio.size()) return;
+  std::vector<double> ambiguous_errors_m;
+  for (std::size_t i = clear; i < by_ratio.size(); ++i) {
+    ambiguous_errors_m.push_back(errors_m[by_ratio[i].second]);
+  }
+  model.ambiguous_from = by_ratio[clear].first;
+  model.ambiguous_radius_m = quantile(ambiguous_errors_m, coverage);
+}
+
+// Learns how large a radius holds the errors of views found near their place, apart for those that
+// references surround. False where there is none to learn from.
+bool learn_radii(const LeftOutViews& left_out, const InterpolationErrors& errors,
+                 PositionModel& model) {
+  std::vector<double> all;
+  std::vector<double> surrounded;
+  std::vector<double> at_edge;
+  for (std::size_t i = 0; i < left_out.size(); ++i) {
+    const double variance = errors.variances[i] + min_variance_share * model.variance_unit;
+    if (!(variance > 0.0) || !left_out.is_answered_near(i, model.spacing_m)) continue;
+    all.push_back(errors.errors_m[i] / std::sqrt(variance));
+    (is_surrounded(left_out.answered[i], model.spacing_m) ? surrounded : at_edge)
+        .push_back(all.back());
+  }
+  // None near: then every answer is ambiguous.
+  if (all.empty() && model.ambiguous_from) all.push_back(0.0);
+  if (all.empty()) return false;
+  // The quantile of a sample of n that a further draw stays below with at least this probability;
+  // of all where there are few of a kind.
+  const auto bound = [&](const std::vector<double>& kind) {
+    const auto& of = kind.size() < PositionModel::min_views ? all : kind;
+    const double n = static_cast<double>(of.size());
+    return quantile(of, std::min(1.0, coverage * (n + 1.0) / n));
+  };
+  model.radius_m_per_deviation = bound(surrounded);
+  model.edge_radius_m_per_deviation = bound(at_edge);
+  return true;
+}
+
+}  // namespace
+
+PositionModel learn_position_model(const ColumnRanking& ranking,
+                                   const PositionModelOptions& options) {
+  validate(options);
+  const PosedViews posed(ranking.memory());
+  PositionModel model;
+  model.components = ranking.components();
+  model.spacing_m = VoronoiCells(posed.positions).spacing_m();
+  if (posed.views.size() < PositionModel::min_views || model.spacing_m == 0.0) return model;
+  const std::vector<ViewId> sample =
+      sample_views(posed.views, options.sampled_views, static_cast<std::uint64_t>(options.seed));
+  const LeftOutViews left_out = leave_out_in_turn(ranking, sample, model.spacing_m);
+  if (left_out.size() < PositionModel::min_views) return model;
+  model.sampled_views = static_cast<int>(left_out.size());
+  model.difference_unit = learn_difference_unit(left_out);
+  if (!choose_interpolation(left_out, model)) return model;
+  const InterpolationErrors errors = interpolate_all(left_out, model);
+  model.variance_unit = quantile(errors.variances, 0.5);
+  model.median_error_m = quantile(errors.errors_m, 0.5);
+  model.error95_m = quantile(errors.errors_m, coverage);
+  learn_ambiguity(left_out, errors.errors_m, model);
+  model.learnt = learn_radii(left_out, errors, model);
+  return model;
+}
+
+}  // namespace panonav

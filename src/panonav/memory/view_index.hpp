@@ -1,0 +1,87 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "panonav/memory/visual_memory.hpp"
+
+namespace panonav {
+
+/// A rectangle in the frame of the memory's positions.
+struct PositionBounds {
+  double min_x_m = 0.0,  ///< smallest x, included
+      max_x_m = 0.0;     ///< largest x, included
+  double min_y_m = 0.0,  ///< smallest y, included
+      max_y_m = 0.0;     ///< largest y, included
+};
+
+/// The views of a memory at one moment, found by what they show or where they are: those of a
+/// memory that is held (`HeldViewIndex`), or of one that lies elsewhere (`IndexedMemory`). One
+/// thread uses it, for the questions of one query. An index of views that lie elsewhere throws
+/// FileError when they cannot be read.
+class ViewIndex {
+ public:
+  virtual ~ViewIndex() = default;
+  [[nodiscard]] virtual std::size_t size() const = 0;  ///< Views that can be found.
+  /// Finds what `VisualMemory::search` finds among all views.
+  [[nodiscard]] virtual SearchResult search(const PackedSignature& query,
+                                            const SearchOptions& options,
+                                            const SearchMask& mask) = 0;
+  /// Returns a memory of those of the views that there are, without links; they may be in any
+  /// order.
+  [[nodiscard]] virtual VisualMemory load(std::span<const ViewId> views) = 0;
+  /// Returns the view of that name; empty when there is none.
+  [[nodiscard]] virtual std::optional<ViewId> find(std::string_view name) = 0;
+  /// Returns the views whose positions lie within one of the rectangles, ascending, each once.
+  [[nodiscard]] virtual std::vector<ViewId> views_within(
+      std::span<const PositionBounds> bounds) = 0;
+};
+
+/// The index of a memory that is held, which must outlive it.
+class HeldViewIndex final : public ViewIndex {
+ public:
+  /// Keeps a reference to the memory; copies nothing.
+  explicit HeldViewIndex(const VisualMemory& memory) : memory_(&memory) {}
+  [[nodiscard]] std::size_t size() const override { return memory_->size(); }
+  [[nodiscard]] SearchResult search(const PackedSignature& query, const SearchOptions& options,
+                                    const SearchMask& mask) override;
+  /// Copies the signatures.
+  [[nodiscard]] VisualMemory load(std::span<const ViewId> views) override;
+  [[nodiscard]] std::optional<ViewId> find(std::string_view name) override;
+  /// Cost: a pass over all views.
+  [[nodiscard]] std::vector<ViewId> views_within(std::span<const PositionBounds> bounds) override;
+
+ private:
+  const VisualMemory* memory_;
+};
+
+/// Counts the exact searches in a memory that is not held.
+struct SearchCounters {
+  std::uint64_t searches = 0;    ///< a picture needs one or two
+  std::uint64_t views_read = 0;  ///< views that searches read in full
+  double seconds = 0.0;          ///< time that searches took, the server's part included
+};
+
+/// A memory that is searched where it lies: what is held of it is an index of its views, which
+/// takes less than they do. Several threads may use one object.
+class IndexedMemory {
+ public:
+  virtual ~IndexedMemory() = default;
+  [[nodiscard]] virtual std::size_t size() const = 0;           ///< Views that can be found.
+  [[nodiscard]] virtual std::vector<ViewId> views() const = 0;  ///< Ascending. Cost: a pass.
+  [[nodiscard]] virtual std::uint64_t bytes() const = 0;        ///< That the index takes.
+  [[nodiscard]] virtual SearchCounters counters() const = 0;    ///< Since the index was made.
+  /// Returns the views as they are now; what others change meanwhile is not seen. *this must
+  /// outlive it. Throws FileError when the memory cannot be reached; the next call may reach it.
+  [[nodiscard]] virtual std::unique_ptr<ViewIndex> index() const = 0;
+  /// Takes over which views came and went since; searches continue meanwhile. Returns whether
+  /// anything changed. Throws FileError; then the index stays, and the next call compares all.
+  virtual bool refresh() = 0;
+};
+
+}  // namespace panonav

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <mutex>
+#include <optional>
+
+#include "panonav/localisation/feature_ranking.hpp"
+#include "panonav/storage/memory_file.hpp"
+
+namespace panonav {
+
+/// Local features of the views of a memory, read by a handle of its own when they are first needed
+/// and kept, up to a number. Several threads may use it.
+class FeatureCache {
+ public:
+  /// Opens the memory once more. Views above `last_view` came later and have no features here;
+  /// empty: all views count.
+  explicit FeatureCache(const MemoryFile& memory, std::optional<ViewId> last_view = std::nullopt);
+
+  /// Returns the features of a view; empty where it has none or is gone. Throws FileError when the
+  /// memory cannot be read; the next call opens it again.
+  [[nodiscard]] std::optional<LocalFeatures> features(ViewId view);
+
+ private:
+  static constexpr std::size_t max_kept_views = 10000;  ///< chosen: some 100 MB
+  std::mutex mutex_;
+  MemoryFile file_;
+  bool is_lost_ = false;  ///< `file_` has lost its server
+  std::optional<ViewId> last_view_;
+  FeatureSource read_;  ///< looks at `file_`; empty: the memory has no features
+  std::map<ViewId, std::optional<LocalFeatures>> views_;
+};
+
+}  // namespace panonav

@@ -1,0 +1,50 @@
+#include "panonav/pipeline/internal/learning_sample.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace panonav {
+
+namespace {
+
+// Side of the square areas that are loaded whole: chosen, some spacings of references wide.
+constexpr double area_side_m = 10.0;
+// Views loaded before a drawn one without a position, and as many from it on: chosen.
+constexpr std::size_t views_before = 128;
+
+PositionBounds area_around(Point2 position) {
+  const double x_m = std::floor(position.x_m / area_side_m) * area_side_m;
+  const double y_m = std::floor(position.y_m / area_side_m) * area_side_m;
+  return {x_m, x_m + area_side_m, y_m, y_m + area_side_m};
+}
+
+}  // namespace
+
+VisualMemory load_learning_sample(ViewIndex& index, std::span<const ViewId> views,
+                                  std::span<const ViewId> drawn, std::size_t max_views) {
+  std::vector<ViewId> sample;
+  const auto add = [&](std::span<const ViewId> more) {
+    sample.insert(sample.end(), more.begin(), more.end());
+  };
+  const VisualMemory seeds = index.load(drawn);
+  for (const ViewId seed : drawn) {
+    if (sample.size() >= max_views) break;
+    if (!seeds.contains(seed)) continue;
+    if (const auto& pose = seeds.info(seed).pose) {
+      const PositionBounds area = area_around(pose->position());
+      add(index.views_within(std::span(&area, 1)));
+    } else {
+      const auto at =
+          static_cast<std::size_t>(std::ranges::lower_bound(views, seed) - views.begin());
+      const std::size_t first = at - std::min(at, views_before);
+      add(views.subspan(first, std::min(2 * views_before, views.size() - first)));
+    }
+    std::ranges::sort(sample);
+    sample.erase(std::unique(sample.begin(), sample.end()), sample.end());
+  }
+  if (sample.size() > max_views) sample.resize(max_views);
+  return index.load(sample);
+}
+
+}  // namespace panonav

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+#include "panonav/memory/view_index.hpp"
+
+namespace panonav {
+
+/// Loads the part of a memory that is not held from which its models are learnt: whole areas around
+/// drawn views, or what was taken before and after those without a position; `max_views` at most.
+/// `views`: all of the memory, ascending; `drawn`: of these, in the order in which they were drawn.
+[[nodiscard]] VisualMemory load_learning_sample(ViewIndex& index, std::span<const ViewId> views,
+                                                std::span<const ViewId> drawn,
+                                                std::size_t max_views);
+
+}  // namespace panonav
