@@ -75,7 +75,7 @@ TEST_F(ReproduceAll, WritesOneTableOfWhatIsFinished) {
   auto arguments = continued();
   const auto people = run_panonav(arguments);
   ASSERT_EQ(people.exit_code, 0) << people.err;
-  EXPECT_TRUE(contains(people.out, "m04: 0 of 1 targets hold (finished by another run)"));
+  EXPECT_TRUE(contains(people.out, "m04: 0 of 1 targets hold (finished by an earlier run)"));
   EXPECT_TRUE(contains(people.out,
                        "missed in m04: 0.5 (0.4 .. 0.6) m, target at most 0.25: missed by "
                        "0.25; the floor is wet."));

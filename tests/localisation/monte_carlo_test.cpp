@@ -174,9 +174,8 @@ TEST(MonteCarlo, IsFoundAgainAfterItWasCarriedAway) {
   const InjectionRule topological_rule = [&](const PackedSignature& view, std::size_t particles) {
     InjectedParticles injected;
     injected.count = static_cast<std::size_t>(std::lround(0.1 * static_cast<double>(particles)));
-    for (const Match& match : place.memory.hierarchy(view, 0.25).back().candidates) {
-      injected.around.push_back(match.view);
-    }
+    const auto levels = place.memory.hierarchy(view, 0.25);
+    for (const Match& match : levels.back().candidates) injected.around.push_back(match.view);
     return injected;
   };
   const auto explained = images_needed(ParticleInjection::explained, {});

@@ -42,7 +42,6 @@ void register_outbuildings();
 [[nodiscard]] Verb serve_verb();
 [[nodiscard]] Verb show_verb();
 [[nodiscard]] Verb simulate_verb();
-[[nodiscard]] Verb sweep_verb();
 [[nodiscard]] Verb synchronise_verb();
 [[nodiscard]] Verb track_verb();
 [[nodiscard]] Verb run_verb();

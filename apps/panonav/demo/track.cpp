@@ -129,8 +129,8 @@ DemoTrack show_track(const DemoOptions& options, const DemoRecordings& recording
                          .source = run.source});
   const VisualMemory& memory = tracker.memory();
   const std::size_t particles_kept = particles_shown(run.entries.size());
-  const std::vector<Point2> at_first =
-      positions_of(recordings::resample_systematically(tracker.localiser().particles(), particles_kept));
+  const std::vector<Point2> at_first = positions_of(
+      recordings::resample_systematically(tracker.localiser().particles(), particles_kept));
   std::vector<TrackedImage> images;
   viewer::RunPage played("A robot that is kidnapped", run.entries.size());
   const ShownReferences shown(memory);

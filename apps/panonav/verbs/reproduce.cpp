@@ -68,8 +68,8 @@ Run declare_reproduce(Arguments& arguments) {
                    "Folder for the report (default: reproduction/PAPER; all: reproduction)");
   arguments.flag("--quick", wanted->quick, "A smoke run: few scenes, few questions or runs");
   arguments.flag("--continue", wanted->continues,
-                 "all: go on with a run of the same options that was stopped, or help one that "
-                 "runs; papers that are finished are not run again");
+                 "all: continue a run of the same options that was stopped; papers that are "
+                 "finished are not run again");
   const lab::ReproductionOptions m04;
   const lab::TrackingReproductionOptions m03;
   const lab::HomingReproductionOptions s06;
@@ -128,8 +128,7 @@ Verb reproduce_verb() {
           "The verb writes pictures, results.json, results.md and index.html into the folder. The "
           "full run "
           "of a paper takes minutes. `all` runs every paper in a folder of its own and writes one "
-          "table of all, and processes that mpirun starts divide the papers among themselves; "
-          "targets that are missed are results and do not change the exit code.",
+          "table of all; targets that are missed are results and do not change the exit code.",
           "  panonav reproduce m03\n  panonav reproduce m04 --quick --json -o smoke\n"
           "  panonav reproduce y03 -o routes --data DATA\n"
           "  panonav reproduce all -o results --data DATA\n"

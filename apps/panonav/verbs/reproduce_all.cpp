@@ -11,7 +11,6 @@
 #include "panonav/core/error.hpp"
 #include "panonav/io/atomic_file.hpp"
 #include "reports/results_page.hpp"
-#include "verbs/shared_jobs.hpp"
 
 namespace panonav::command {
 
@@ -123,48 +122,37 @@ ExitCode reproduce_all(const ReproduceArguments& wanted, Session& session) {
   const fs::path out(wanted.out.value_or("reproduction"));
   const ordered_json record = run_record(wanted);
   const auto papers = reproduced_papers();
-  SharedJobs shared(out, wanted.continues, [&](bool first) {
-    if (!first) require_same_run(out, record);
-    remove_file(out / results_file);
-    if (!first) return;
+  if (wanted.continues) {
+    require_same_run(out, record);
+  } else {
+    std::error_code error;
+    fs::create_directories(out, error);
+    if (error) throw FileError(out.string(), "cannot be made: " + error.message());
     // Nothing of an earlier run may be taken for a part of this one.
     for (const ReproducedPaper& paper : papers) remove_file(out / paper.name / results_file);
     write_file(out / run_file, record.dump(1) + "\n");
-  });
+  }
+  remove_file(out / results_file);
 
-  const auto is_done = [&](const ReproducedPaper& paper) {
-    return fs::exists(out / paper.name / results_file);
-  };
-  const auto tell = [&](const ReproducedPaper& paper, const std::vector<lab::ResultRow>& rows,
-                        std::string_view how) {
+  const auto report = [&](const ReproducedPaper& paper, const std::vector<lab::ResultRow>& rows,
+                          std::string_view how) {
     if (session.json()) return;
     const lab::TargetCount count = lab::count_targets(rows);
     session.print("  " + session.strong(paper.name) + ": " + std::to_string(count.held) + " of " +
                   std::to_string(count.judged) + " targets hold" + std::string(how));
   };
-  std::vector<bool> told(papers.size());
-  for (std::size_t i = 0; i < papers.size(); ++i) {
-    if (is_done(papers[i]) || !shared.claim(i)) continue;
-    if (!is_done(papers[i])) {  // nobody finished it meanwhile
-      tell(papers[i],
-           reproduce_paper(papers[i], wanted_of(papers[i], wanted), out / papers[i].name, session)
-               .rows,
-           "");
-      told[i] = true;
-    }
-    shared.release(i);
-  }
   lab::ResultsDocument document{
       .version = PANONAV_VERSION, .command = command_line(wanted), .papers = {}};
-  for (std::size_t i = 0; i < papers.size(); ++i) {
-    const fs::path file = out / papers[i].name / results_file;
-    if (!fs::exists(file)) {
-      session.note("other processes finish the rest");
-      return ExitCode::done;
+  for (const ReproducedPaper& paper : papers) {
+    const fs::path file = out / paper.name / results_file;
+    const bool is_done = fs::exists(file);
+    if (!is_done) {
+      static_cast<void>(
+          reproduce_paper(paper, wanted_of(paper, wanted), out / paper.name, session));
     }
-    lab::PaperResults results{std::string(papers[i].name), std::string(papers[i].title),
+    lab::PaperResults results{std::string(paper.name), std::string(paper.title),
                               lab::from_json(text_of(file), file.string())};
-    if (!told[i]) tell(papers[i], results.rows, " (finished by another run)");
+    report(paper, results.rows, is_done ? " (finished by an earlier run)" : "");
     document.papers.push_back(std::move(results));
   }
   const std::string json = to_json(document);

@@ -410,9 +410,7 @@ Run declare_track(Arguments& arguments) {
   arguments.options("monte_carlo", wanted->filter);
   arguments.options("odometry", wanted->odometry, "odometry");
   arguments.common({"--seed"});
-  return [wanted, &arguments](Session& session) {
-    return track_run(arguments, *wanted, session);
-  };
+  return [wanted, &arguments](Session& session) { return track_run(arguments, *wanted, session); };
 }
 
 }  // namespace
