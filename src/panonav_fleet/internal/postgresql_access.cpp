@@ -15,17 +15,17 @@ namespace panonav::fleet {
 
 MemoriesConnection connect_to_memories(const ServerAddress& address, bool make_schema) {
   PostgresqlConnection connection(address);
-  int version = schema_version(connection);
-  if (version == 0 && make_schema) {
+  auto version = schema_version(connection);
+  if (!version && make_schema) {
     create_schema_if_missing(connection);
     version = schema_version(connection);
   }
-  if (version != 0 && version != postgresql_schema_version) {
+  if (version && *version != postgresql_schema_version) {
     throw FileError(address.shown.native(),
-                    "has schema version " + std::to_string(version) +
+                    "has schema version " + std::to_string(*version) +
                         "; allowed: " + std::to_string(postgresql_schema_version));
   }
-  return {std::move(connection), version != 0};
+  return {std::move(connection), version.has_value()};
 }
 
 std::optional<FoundMemory> find_memory(MemoriesConnection& memories, const ServerAddress& address) {

@@ -15,7 +15,7 @@ constexpr const char* lock_schema = "SELECT pg_advisory_xact_lock(57866344088406
 
 }  // namespace
 
-int schema_version(PostgresqlConnection& connection) {
+std::optional<int> schema_version(PostgresqlConnection& connection) {
   const auto there = connection.run(
       "SELECT (to_regclass('panonav.schema_version') IS NOT NULL)::int4::int8, "
       "(EXISTS (SELECT FROM pg_namespace WHERE nspname = 'panonav'))::int4::int8");
@@ -26,7 +26,7 @@ int schema_version(PostgresqlConnection& connection) {
       throw FileError(connection.shown().native(),
                       "cannot be used: the database has a schema panonav of another program");
     }
-    return 0;
+    return std::nullopt;
   }
   return static_cast<int>(
       connection.run("SELECT version::int8 FROM panonav.schema_version").integer(0, 0));
@@ -36,7 +36,7 @@ void create_schema_if_missing(PostgresqlConnection& connection) {
   connection.execute("BEGIN");
   try {
     connection.execute(lock_schema);
-    if (schema_version(connection) == 0) {
+    if (!schema_version(connection)) {
       for (const std::string_view part : {sql::roles_sql, sql::tables_sql, sql::undo_sql,
                                           sql::synchronisation_sql, sql::rights_sql}) {
         connection.execute(std::string(part));

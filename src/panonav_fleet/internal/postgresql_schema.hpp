@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "panonav_fleet/internal/postgresql_connection.hpp"
 
 namespace panonav::fleet {
@@ -7,9 +9,9 @@ namespace panonav::fleet {
 /// Version of the schema `panonav` that `internal/sql` makes. Another version is refused.
 inline constexpr int postgresql_schema_version = 1;
 
-/// Version of the schema that is there; 0: there is none. Throws FileError when another program
-/// made it.
-[[nodiscard]] int schema_version(PostgresqlConnection& connection);
+/// Version of the schema that is there; nullopt: there is none. Throws FileError when another
+/// program made it.
+[[nodiscard]] std::optional<int> schema_version(PostgresqlConnection& connection);
 
 /// Makes the schema and the roles where there are none, in one transaction that waits for others
 /// that do so. Throws FileError without the rights.
