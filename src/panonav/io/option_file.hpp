@@ -24,6 +24,7 @@ class OptionFile {
   /// Throws FileError: missing, not TOML, a field outside all sections.
   explicit OptionFile(std::filesystem::path path);
   ~OptionFile();
+  /// What is left of the other may only be destroyed or assigned to.
   OptionFile(OptionFile&&) noexcept;
   OptionFile& operator=(OptionFile&&) noexcept;
 

@@ -58,6 +58,7 @@ class TopologicalMapper {
                              const VisualOdometryOptions& odometry = {},
                              const LoopClosureOptions& closure = {},
                              const PoseGraphOptions& graph = {});
+  /// What is left of the other may only be destroyed or assigned to.
   TopologicalMapper(TopologicalMapper&&) noexcept;
   TopologicalMapper& operator=(TopologicalMapper&&) noexcept;
   ~TopologicalMapper();
