@@ -138,6 +138,28 @@ double room_m(const VisualMemory& office) {
   return std::max(east - west, north - south);
 }
 
+std::string whole_centimetres(double metres) {
+  return fixed(100.0 * metres, 0) + " cm";
+}
+
+std::vector<std::pair<std::string, std::string>> figures_of(const DemoMaps& maps,
+                                                            const VisualMemory& office,
+                                                            std::size_t drive_views) {
+  std::vector<std::pair<std::string, std::string>> figures;
+  if (maps.lattice) {
+    figures.push_back({whole_centimetres(maps.lattice->rms_m),
+                       "from their true places lie the arranged views (root mean "
+                       "square), in a room " +
+                           fixed(room_m(office), 1) + " m long: " +
+                           fixed(100.0 * maps.lattice->rms_m / room_m(office), 1) + " % of it"});
+  }
+  figures.push_back({whole_centimetres(maps.map_rms_m),
+                     "from the true way lies the map of a drive of " +
+                         fixed(spacing_m * static_cast<double>(drive_views), 0) + " m"});
+  figures.push_back({whole_centimetres(maps.wheels_rms_m), "from it lies what the wheels tell"});
+  return figures;
+}
+
 }  // namespace
 
 DemoMaps show_maps(const VisualMemory& office, std::uint64_t seed, bool quick, Session& session,
@@ -167,8 +189,7 @@ DemoMaps show_maps(const VisualMemory& office, std::uint64_t seed, bool quick, S
   maps.wheels_rms_m =
       align(positions_of(recording.wheels), mapped.truth, {.allow_scale = true}).rms_m;
 
-  const auto centimetres = [](double metres) { return fixed(100.0 * metres, 0) + " cm"; };
-  const std::string arranged = maps.lattice ? centimetres(maps.lattice->rms_m) : "none";
+  const std::string arranged = maps.lattice ? whole_centimetres(maps.lattice->rms_m) : "none";
   page.part("How places lie",
             {arranged, "is how far off a map is that views made by how alike they look alone"});
   page.text(
@@ -189,23 +210,11 @@ DemoMaps show_maps(const VisualMemory& office, std::uint64_t seed, bool quick, S
       "recognises the place and closes the loop.");
   page.plots({{map_of_drive(place, recording, mapped),
                "The drive: " + std::to_string(recording.truth.size()) + " views, one every " +
-                   centimetres(spacing_m) +
+                   whole_centimetres(spacing_m) +
                    ". The blue map should lie on the black way; both it and the orange line are "
                    "laid over that in equal size. The orange one is what the wheels of a cheap "
                    "robot make of the same drive."}});
-  std::vector<std::pair<std::string, std::string>> figures;
-  if (maps.lattice) {
-    figures.push_back({arranged,
-                       "from their true places lie the arranged views (root mean "
-                       "square), in a room " +
-                           fixed(room_m(office), 1) + " m long: " +
-                           fixed(100.0 * maps.lattice->rms_m / room_m(office), 1) + " % of it"});
-  }
-  figures.push_back({centimetres(maps.map_rms_m),
-                     "from the true way lies the map of a drive of " +
-                         fixed(spacing_m * static_cast<double>(recording.truth.size()), 0) + " m"});
-  figures.push_back({centimetres(maps.wheels_rms_m), "from it lies what the wheels tell"});
-  page.figures(figures);
+  page.figures(figures_of(maps, office, recording.truth.size()));
   return maps;
 }
 

@@ -124,6 +124,68 @@ PlannedRun drive_through(const simulation::SimulatedWorld& world, double spacing
   return {std::move(there), std::move(poses), true};
 }
 
+// The remembered path through the corridor: a ring, 12 m by 8 m, and two narrow ones across it. In
+// one of these the robot could as well be in the other one, and either way round, as the plan is
+// the same turned by half and each of them the same as its neighbour.
+PlannedRun plan_remembered_ring(const simulation::SimulatedWorld& corridor, int seed) {
+  constexpr double remembered_every_m = 0.35;
+  PlannedRun ring = drive_through(corridor, remembered_every_m, seed,
+                                  {{0.0, 0.0}, {12.0, 0.0}, {12.0, 8.0}, {0.0, 8.0}, {0.0, 0.4}});
+  for (const double x : {4.0, 8.0}) {
+    const auto across = drive_through(corridor, remembered_every_m, seed, {{x, 0.4}, {x, 7.6}});
+    ring.poses = joined(std::move(ring.poses), across.poses);
+  }
+  return ring;
+}
+
+// A walk a hand's breadth beside the remembered line, in two parts of at most so many images: the
+// robot is carried from the end of the first to the start of the second. Also returns the last
+// image of the first.
+std::pair<PlannedRun, std::size_t> plan_kidnapped_walk(const simulation::SimulatedWorld& corridor,
+                                                       std::size_t images, int walk_seed,
+                                                       int after_seed) {
+  constexpr double driven_every_m = 0.25;
+  PlannedRun walk =
+      drive_through(corridor, driven_every_m, walk_seed, {{4.1, 6.0}, {4.1, 7.9}, {12.0, 7.9}});
+  auto after =
+      drive_through(corridor, driven_every_m, after_seed, {{7.9, 2.0}, {7.9, 0.1}, {12.0, 0.1}});
+  walk.poses.resize(std::min(walk.poses.size(), images));
+  after.poses.resize(std::min(after.poses.size(), images));
+  const std::size_t kidnapped_after = walk.poses.size() - 1;
+  walk.poses = joined(std::move(walk.poses), after.poses);
+  return {std::move(walk), kidnapped_after};
+}
+
+// Gives all runs the camera of the mirror that was found in their pictures.
+void set_found_camera(DemoRecordings& recordings, const MirrorCircle& mirror) {
+  // No picture shows a mirror's shape and how it is mounted; these are known of the robot.
+  const Camera camera =
+      camera_from_mirror(mirror, {.model = recordings.true_camera.model,
+                                  .direction = recordings.true_camera.direction,
+                                  .forward_angle_rad = recordings.true_camera.forward_angle_rad});
+  for (Dataset* run : {&recordings.memory_run, &recordings.query_run, &recordings.elsewhere_run,
+                       &recordings.corridor_run, &recordings.walk_run}) {
+    run->source.camera = camera;
+    write_dataset(*run);
+  }
+}
+
+// Renders what the robot sees in colour, for people.
+std::function<Image(const DatasetEntry&, Executor&)> make_colour_camera(
+    const simulation::SimulatedWorld& world, const Camera& camera,
+    const simulation::SensorOptions& sensor_options, Executor& executor) {
+  auto in_colour = std::make_shared<const simulation::Renderer>(
+      world.scene(), simulation::RendererOptions{.channels = 3}, executor);
+  return [renderer = std::move(in_colour), frame = world.options().frame, sensor = sensor_options,
+          seen_by = camera](const DatasetEntry& entry, Executor& threads) {
+    const simulation::Viewpoint viewpoint{
+        .pose = {entry.pose->x_m, entry.pose->y_m, *entry.pose->heading_rad},
+        .height_m = frame.camera_height_m};
+    return simulation::apply_sensor(renderer->render_image(viewpoint, seen_by, 3, threads), seen_by,
+                                    sensor, 1);
+  };
+}
+
 }  // namespace
 
 simulation::SimulatedWorldOptions simulation_of(const DemoOptions& options, int stream) {
@@ -174,30 +236,11 @@ std::optional<DemoRecordings> record_demo(const DemoOptions& options, Session& s
   const PlannedRun asked = plan(office.world.with(anywhere, seed_of(1)));
   const PlannedRun elsewhere =
       plan(world_of("lab", simulation_of(options, 2), executor).with(anywhere, seed_of(2)));
-  // The corridor is a ring, 12 m by 8 m, and two narrow ones across it. In one of these the robot
-  // could as well be in the other one, and either way round, as the plan is the same turned by half
-  // and each of them the same as its neighbour. It drives a hand's breadth beside the remembered
-  // line.
   const simulation::SimulatedWorld corridor =
       world_of("corridor", simulation_of(options, 5), executor);
-  constexpr double remembered_every_m = 0.35;
-  PlannedRun ring = drive_through(corridor, remembered_every_m, seed_of(5),
-                                  {{0.0, 0.0}, {12.0, 0.0}, {12.0, 8.0}, {0.0, 8.0}, {0.0, 0.4}});
-  for (const double x : {4.0, 8.0}) {
-    const auto across =
-        drive_through(corridor, remembered_every_m, seed_of(5), {{x, 0.4}, {x, 7.6}});
-    ring.poses = joined(std::move(ring.poses), across.poses);
-  }
-  constexpr double driven_every_m = 0.25;
-  PlannedRun walk =
-      drive_through(corridor, driven_every_m, seed_of(3), {{4.1, 6.0}, {4.1, 7.9}, {12.0, 7.9}});
-  auto after =
-      drive_through(corridor, driven_every_m, seed_of(4), {{7.9, 2.0}, {7.9, 0.1}, {12.0, 0.1}});
-  const auto images = static_cast<std::size_t>(options.walk_images() / 2);
-  walk.poses.resize(std::min(walk.poses.size(), images));
-  after.poses.resize(std::min(after.poses.size(), images));
-  const std::size_t kidnapped_after = walk.poses.size() - 1;
-  walk.poses = joined(std::move(walk.poses), after.poses);
+  const PlannedRun ring = plan_remembered_ring(corridor, seed_of(5));
+  const auto [walk, kidnapped_after] = plan_kidnapped_walk(
+      corridor, static_cast<std::size_t>(options.walk_images() / 2), seed_of(3), seed_of(4));
 
   Progress progress(session, "rendering",
                     office.poses.size() + asked.poses.size() + elsewhere.poses.size() +
@@ -222,30 +265,12 @@ std::optional<DemoRecordings> record_demo(const DemoOptions& options, Session& s
   const auto mirror = find_mirror_in(recordings.memory_run, recordings.calibrated_on);
   if (!mirror) return std::nullopt;
   recordings.mirror = *mirror;
-  // No picture shows a mirror's shape and how it is mounted; these are known of the robot.
-  const Camera camera =
-      camera_from_mirror(*mirror, {.model = recordings.true_camera.model,
-                                   .direction = recordings.true_camera.direction,
-                                   .forward_angle_rad = recordings.true_camera.forward_angle_rad});
-  for (Dataset* run : {&recordings.memory_run, &recordings.query_run, &recordings.elsewhere_run,
-                       &recordings.corridor_run, &recordings.walk_run}) {
-    run->source.camera = camera;
-    write_dataset(*run);
-  }
+  set_found_camera(recordings, *mirror);
 
   recordings.office_scene = office.world.scene();
   recordings.corridor_scene = corridor.scene();
-  auto in_colour = std::make_shared<const simulation::Renderer>(
-      office.world.scene(), simulation::RendererOptions{.channels = 3}, executor);
   recordings.colour_picture =
-      [renderer = std::move(in_colour), frame = office.world.options().frame, sensor = grid.sensor,
-       seen_by = recordings.true_camera](const DatasetEntry& entry, Executor& threads) {
-        const simulation::Viewpoint viewpoint{
-            .pose = {entry.pose->x_m, entry.pose->y_m, *entry.pose->heading_rad},
-            .height_m = frame.camera_height_m};
-        return simulation::apply_sensor(renderer->render_image(viewpoint, seen_by, 3, threads),
-                                        seen_by, sensor, 1);
-      };
+      make_colour_camera(office.world, recordings.true_camera, grid.sensor, executor);
   recordings.office_world = std::make_shared<const simulation::SimulatedWorld>(office.world);
   return recordings;
 }

@@ -67,17 +67,9 @@ viewer::RunPage played_run(const lab::RouteScene& place, const RoutePanorama& pa
   return page;
 }
 
-}  // namespace
-
-DemoRoute show_route(const simulation::Scene& office, double length_m, std::uint64_t seed,
-                     Session& session, viewer::ReportPage& page) {
-  constexpr double spacing_m = 0.1;
-  Executor& executor = session.executor();
-  lab::RouteScene place = lab::make_route_scene(office, "office", executor);
-  // What automatic exposure would choose in these rooms.
-  place.camera.sensor.exposure = 2.0;
-  const auto way = lab::curved_route(place, length_m, spacing_m, seed);
-  const RoutePanorama panorama = lab::record_route(place, way, seed, executor);
+/// Repeats the route there and back, and measures both drives.
+DemoRoute repeat_and_measure(const lab::RouteScene& place, const RoutePanorama& panorama,
+                             std::uint64_t seed, Executor& executor) {
   const RouteTracker tracker(panorama);
   DemoRoute route;
   route.length_m = panorama.length_m();
@@ -97,6 +89,21 @@ DemoRoute show_route(const simulation::Scene& office, double length_m, std::uint
     }
     route.position_m.insert(route.position_m.end(), run.position_m.begin(), run.position_m.end());
   }
+  return route;
+}
+
+}  // namespace
+
+DemoRoute show_route(const simulation::Scene& office, double length_m, std::uint64_t seed,
+                     Session& session, viewer::ReportPage& page) {
+  constexpr double spacing_m = 0.1;
+  Executor& executor = session.executor();
+  lab::RouteScene place = lab::make_route_scene(office, "office", executor);
+  // What automatic exposure would choose in these rooms.
+  place.camera.sensor.exposure = 2.0;
+  const auto way = lab::curved_route(place, length_m, spacing_m, seed);
+  const RoutePanorama panorama = lab::record_route(place, way, seed, executor);
+  DemoRoute route = repeat_and_measure(place, panorama, seed, executor);
   viewer::MapPlot map{.title = "The route, and both drives",
                       .layers = viewer::scene_layers(office)};
   std::ranges::move(lab::route_layers(way, route.runs), std::back_inserter(map.layers));

@@ -101,6 +101,26 @@ void add_table(viewer::ReportPage& page, const std::vector<LocalisedQuery>& quer
              rows);
 }
 
+/// How many places are known and how far off the answers are, where the truth is known.
+std::vector<std::pair<std::string, std::string>> summarise(
+    const std::vector<LocalisedQuery>& queries, std::size_t readable) {
+  std::vector<double> errors;
+  std::size_t known = 0;
+  for (const LocalisedQuery& query : queries) {
+    known += query.place.known ? 1 : 0;
+    if (const auto error = error_m(query)) errors.push_back(*error);
+  }
+  std::vector<std::pair<std::string, std::string>> summary{
+      {std::to_string(known) + " of " + std::to_string(readable), "pictures show a known place"}};
+  if (!errors.empty()) {
+    summary.emplace_back(fixed(median(errors), 2) + " m", "median error of the position");
+  }
+  if (readable < queries.size()) {
+    summary.emplace_back(std::to_string(queries.size() - readable), "could not be read");
+  }
+  return summary;
+}
+
 }  // namespace
 
 void write_localise_report(const std::filesystem::path& folder, const MemoryFile& file,
@@ -108,28 +128,15 @@ void write_localise_report(const std::filesystem::path& folder, const MemoryFile
                            const std::vector<LocalisedQuery>& queries,
                            const std::function<Panorama(std::size_t)>& panorama) {
   std::vector<std::size_t> readable;
-  std::vector<double> errors;
-  std::size_t known = 0;
   for (std::size_t i = 0; i < queries.size(); ++i) {
     if (queries[i].error.empty()) readable.push_back(i);
-    known += queries[i].place.known ? 1 : 0;
-    if (const auto error = error_m(queries[i])) errors.push_back(*error);
   }
   viewer::ReportPage page(
       "Where was this?",
       "What the robot saw, and the view of " + memory_name(file.path()) +
           " that resembles it most, turned as the robot faced. Where both show the "
           "same things in the same directions, the answer is right.");
-  std::vector<std::pair<std::string, std::string>> summary{
-      {std::to_string(known) + " of " + std::to_string(readable.size()),
-       "pictures show a known place"}};
-  if (!errors.empty()) {
-    summary.emplace_back(fixed(median(errors), 2) + " m", "median error of the position");
-  }
-  if (readable.size() < queries.size()) {
-    summary.emplace_back(std::to_string(queries.size() - readable.size()), "could not be read");
-  }
-  page.figures(summary);
+  page.figures(summarise(queries, readable.size()));
   page.text(
       "The difference compares the picture with a view column by column, both turned alike: "
       "0 where they are the same. The probability that the place is known follows from how much "

@@ -230,6 +230,26 @@ Image draw_lenses(ImageView picture, const Camera& camera) {
   return draw(with_left.view(), 1);
 }
 
+ordered_json as_json(const DualFisheyeCalibration& found, std::size_t images,
+                     const std::string& file) {
+  const auto& lenses = std::get<DualFisheyeModel>(found.camera.model).lenses;
+  ordered_json json{{"images", images},
+                    {"width_px", found.camera.image_size.width},
+                    {"height_px", found.camera.image_size.height},
+                    {"matches", found.matches},
+                    {"inlier_share", found.inlier_share},
+                    {"residual_deg", degrees(found.residual_rad)},
+                    {"azimuth_deviation_deg", degrees(found.azimuth_deviation_rad)},
+                    {"field_of_view_deg", ordered_json::array()},
+                    {"turns_deg", ordered_json::array()},
+                    {"camera", file}};
+  for (const FisheyeLens& lens : lenses) {
+    json["field_of_view_deg"].push_back(degrees(2 * lens.max_angle_rad));
+  }
+  for (const double turn : found.turns_rad) json["turns_deg"].push_back(degrees(turn));
+  return json;
+}
+
 ExitCode calibrate_lenses(const CalibrateArguments& wanted, const std::vector<std::string>& names,
                           const std::vector<ImageView>& all, Session& session) {
   // Of a turn in a video some, evenly spread: more cost time and memory, and tell little.
@@ -260,25 +280,11 @@ ExitCode calibrate_lenses(const CalibrateArguments& wanted, const std::vector<st
     write_png(*wanted.overlay, overlay.view());
   }
   write_camera(wanted.out, {found.camera, std::nullopt});
-  const auto& lenses = std::get<DualFisheyeModel>(found.camera.model).lenses;
   if (session.json()) {
-    ordered_json json{{"images", views.size()},
-                      {"width_px", found.camera.image_size.width},
-                      {"height_px", found.camera.image_size.height},
-                      {"matches", found.matches},
-                      {"inlier_share", found.inlier_share},
-                      {"residual_deg", degrees(found.residual_rad)},
-                      {"azimuth_deviation_deg", degrees(found.azimuth_deviation_rad)},
-                      {"field_of_view_deg", ordered_json::array()},
-                      {"turns_deg", ordered_json::array()},
-                      {"camera", wanted.out}};
-    for (const FisheyeLens& lens : lenses) {
-      json["field_of_view_deg"].push_back(degrees(2 * lens.max_angle_rad));
-    }
-    for (const double turn : found.turns_rad) json["turns_deg"].push_back(degrees(turn));
-    session.print(json_line(json));
+    session.print(json_line(as_json(found, views.size(), wanted.out)));
     return ExitCode::done;
   }
+  const auto& lenses = std::get<DualFisheyeModel>(found.camera.model).lenses;
   session.print(session.strong("two lenses found") + ": " +
                 fixed(degrees(2 * lenses[0].max_angle_rad), 1) + " and " +
                 fixed(degrees(2 * lenses[1].max_angle_rad), 1) + " degrees, brightness 1 to " +

@@ -180,6 +180,15 @@ void check(const Arguments& arguments, const LocaliseArguments& wanted,
 }
 
 /// All answers, told as they come. What cannot be read is named; throws where nothing can.
+void print_answer(const LocalisedQuery& query, const LocaliseArguments& wanted, Session& session) {
+  if (!query.error.empty()) session.note("skipped: " + readable_line(query.error));
+  if (session.json()) {
+    session.print(json_line(as_json(query, wanted.areas)));
+  } else if (query.error.empty()) {
+    session.print(as_text(query, session));
+  }
+}
+
 std::vector<LocalisedQuery> answer_all(const PlaceRecogniser& recogniser,
                                        const LocaliseArguments& wanted, const Dataset& recording,
                                        const MemoryFile& file, MemoryLearner* learner,
@@ -230,15 +239,7 @@ std::vector<LocalisedQuery> answer_all(const PlaceRecogniser& recogniser,
         progress.advance();
         if (told == 0 && made.failure) return;  // it may be all that there is to say
         progress.clear();
-        for (; told < answers.size(); ++told) {
-          const LocalisedQuery& given = answers[told];
-          if (!given.error.empty()) session.note("skipped: " + readable_line(given.error));
-          if (session.json()) {
-            session.print(json_line(as_json(given, wanted.areas)));
-          } else if (given.error.empty()) {
-            session.print(as_text(given, session));
-          }
-        }
+        for (; told < answers.size(); ++told) print_answer(answers[told], wanted, session);
       });
   if (told == 0 && failure) std::rethrow_exception(failure);
   record.close();
@@ -305,6 +306,29 @@ ExitCode localise_live(const Arguments& arguments, const LocaliseArguments& want
   return known > 0 ? ExitCode::done : ExitCode::no_answer;
 }
 
+/// Writes the table that was asked for and prints how many places are known; returns that number.
+std::size_t conclude(const LocaliseArguments& wanted, const std::vector<LocalisedQuery>& answers,
+                     Session& session) {
+  const auto count = [&](const auto& holds) {
+    return static_cast<std::size_t>(std::ranges::count_if(answers, holds));
+  };
+  const std::size_t known = count([](const LocalisedQuery& query) { return query.place.known; });
+  const std::size_t unread =
+      count([](const LocalisedQuery& query) { return !query.error.empty(); });
+  if (wanted.out) {
+    std::string table(csv_header);
+    for (const LocalisedQuery& one : answers) table += csv_row(one);
+    write_file(*wanted.out, std::string_view(table));
+  }
+  if (!session.json() && answers.size() > 1) {
+    session.print(
+        session.strong(std::to_string(known) + " of " + std::to_string(answers.size() - unread)) +
+        " views show a place of " + wanted.memory +
+        (unread > 0 ? "; " + std::to_string(unread) + " could not be read" : ""));
+  }
+  return known;
+}
+
 ExitCode localise(const Arguments& arguments, const LocaliseArguments& wanted, Session& session) {
   const auto file = MemoryFile::open(wanted.memory, Access::read_only);
   check(arguments, wanted, file.header());
@@ -332,23 +356,7 @@ ExitCode localise(const Arguments& arguments, const LocaliseArguments& wanted, S
   }
   const auto answers =
       answer_all(recogniser, wanted, recording, file, learner ? &*learner : nullptr, session);
-  const auto count = [&](const auto& holds) {
-    return static_cast<std::size_t>(std::ranges::count_if(answers, holds));
-  };
-  const std::size_t known = count([](const LocalisedQuery& query) { return query.place.known; });
-  const std::size_t unread =
-      count([](const LocalisedQuery& query) { return !query.error.empty(); });
-  if (wanted.out) {
-    std::string table(csv_header);
-    for (const LocalisedQuery& one : answers) table += csv_row(one);
-    write_file(*wanted.out, std::string_view(table));
-  }
-  if (!session.json() && answers.size() > 1) {
-    session.print(
-        session.strong(std::to_string(known) + " of " + std::to_string(answers.size() - unread)) +
-        " views show a place of " + wanted.memory +
-        (unread > 0 ? "; " + std::to_string(unread) + " could not be read" : ""));
-  }
+  const std::size_t known = conclude(wanted, answers, session);
   if (wanted.report) {
     write_localise_report(*wanted.report, file, recogniser, answers, [&](std::size_t i) {
       Observation seen = read_observation(recording.entries[i]);

@@ -355,6 +355,45 @@ std::optional<ViewId> goal_as_wished(RobotNavigator& robot,
   return view;
 }
 
+// Writes the log, the picture and the report that were asked for.
+void write_results(const NavigateArguments& wanted, const simulation::MissionPlace& place,
+                   const simulation::RememberedPlace& remembered, ViewId goal,
+                   const std::string& goal_file, const simulation::MissionRun& run,
+                   const viewer::RunPage& played) {
+  if (wanted.log) write_log(*wanted.log, run);
+  if (wanted.picture) {
+    viewer::write_mission_picture(
+        *wanted.picture,
+        "to " + goal_file + " in " + place.scene.name + ": " + std::string(name_of(run.end)), place,
+        remembered, wanted.mission.planner, goal, run);
+  }
+  if (wanted.report) {
+    write_navigate_report(
+        *wanted.report,
+        {goal_file, std::string(reason_of(run.end)), run,
+         viewer::mission_plot("", place, remembered, wanted.mission.planner, goal, run)},
+        played);
+  }
+}
+
+void print_graph(const RobotNavigator& robot, Session& session) {
+  session.print(std::to_string(robot.graph().size()) + " views, " +
+                std::to_string(robot.graph().edges().size()) + " edges from " +
+                (robot.origin() == GraphOrigin::arrangement
+                     ? "an arrangement made now (panonav arrange would keep one)"
+                     : "the memory's " + std::string(name_of(robot.origin()))));
+}
+
+/// A robot is carried away half of its way to the goal, so that the way must be known.
+void require_known_goal(const NavigateArguments& wanted, const RobotNavigator& robot,
+                        const simulation::RememberedPlace& remembered) {
+  if (!std::isfinite(remembered.truth[*remembered.graph.node_of(robot.goal())].x_m)) {
+    throw FileError(wanted.memory, "does not know where the view " + robot.info(robot.goal()).name +
+                                       " was taken, so half of the way neither; leave out "
+                                       "--kidnap");
+  }
+}
+
 ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, Session& session) {
   if (arguments.given("odometry", "drive")) {
     throw UsageError("--odometry-drive: the robot's drive is --drive here; leave it out");
@@ -370,12 +409,7 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
     arguments.refuse_unused({"--vignetting"}, "on the panoramas of this memory");
   }
   const simulation::RememberedPlace remembered = remembered_by(robot);
-  if (wanted.kidnap &&
-      !std::isfinite(remembered.truth[*remembered.graph.node_of(robot.goal())].x_m)) {
-    throw FileError(wanted.memory, "does not know where the view " + robot.info(robot.goal()).name +
-                                       " was taken, so half of the way neither; leave out "
-                                       "--kidnap");
-  }
+  if (wanted.kidnap) require_known_goal(wanted, robot, remembered);
   if (wanted.report) prepare_report_folder(*wanted.report, "navigate");
   viewer::RunPage played("", 100);
   RunRecord record(wanted.record, std::span(&wanted.memory, 1), false, session,
@@ -390,11 +424,7 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
   const auto seed = static_cast<std::uint64_t>(wanted.simulation.simulation.scene.seed);
   const simulation::Mission mission = mission_of(wanted, robot.goal(), place, seed);
   if (!session.json()) {
-    session.print(std::to_string(robot.graph().size()) + " views, " +
-                  std::to_string(robot.graph().edges().size()) + " edges from " +
-                  (robot.origin() == GraphOrigin::arrangement
-                       ? "an arrangement made now (panonav arrange would keep one)"
-                       : "the memory's " + std::string(name_of(robot.origin()))));
+    print_graph(robot, session);
   }
   const simulation::MissionRun run = simulation::run_mission(
       place, remembered, robot.navigator(), mission, wanted.mission, seed,
@@ -412,20 +442,7 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
       [&] { return goal_as_wished(robot, remembered, record, session); });
   record.close();
   const std::string goal_file = robot.info(robot.goal()).name;  // a viewer may have changed it
-  if (wanted.log) write_log(*wanted.log, run);
-  if (wanted.picture) {
-    viewer::write_mission_picture(
-        *wanted.picture,
-        "to " + goal_file + " in " + place.scene.name + ": " + std::string(name_of(run.end)), place,
-        remembered, wanted.mission.planner, robot.goal(), run);
-  }
-  if (wanted.report) {
-    write_navigate_report(
-        *wanted.report,
-        {goal_file, std::string(reason_of(run.end)), run,
-         viewer::mission_plot("", place, remembered, wanted.mission.planner, robot.goal(), run)},
-        played);
-  }
+  write_results(wanted, place, remembered, robot.goal(), goal_file, run, played);
   if (session.json()) {
     session.print(json_line(summary_json(wanted, robot, goal_file, mission.start, run)));
   } else {

@@ -50,6 +50,29 @@ void refuse_without_effect(const Arguments& arguments, const std::string& file,
   }
 }
 
+/// Prints for people what was kept, and what it costs.
+void print_loss(const PruneArguments& wanted, const SparseLoss& loss, std::size_t before,
+                std::size_t kept, double factor, std::size_t outdated,
+                const std::vector<std::string>& names, Session& session) {
+  session.print(std::string(wanted.dry_run ? "would keep " : "kept ") +
+                session.strong(std::to_string(kept)) + " of " + std::to_string(before) +
+                " views: " + fixed(factor, 1) + " times fewer" +
+                (outdated > 0 ? "; " + std::to_string(outdated) + " were outdated" : ""));
+  if (wanted.dry_run) {
+    for (const std::string& name : names) session.print("  would drop  " + name);
+  }
+  if (loss.positions) {
+    session.print("nearest reference of a dropped view  median " +
+                  fixed(loss.positions->median_after_m, 3) + " m (before " +
+                  fixed(loss.positions->median_before_m, 3) + ")  95 % within " +
+                  fixed(loss.positions->p95_after_m, 3) + " m (before " +
+                  fixed(loss.positions->p95_before_m, 3) + ")");
+  } else if (loss.asked > 0) {
+    session.print("dropped views differ from those that stand for them by " +
+                  fixed(loss.median_difference, 3) + " (median)");
+  }
+}
+
 ExitCode prune(const Arguments& arguments, const PruneArguments& wanted, Session& session) {
   auto file =
       MemoryFile::open(wanted.memory, wanted.dry_run ? Access::read_only : Access::read_write);
@@ -99,23 +122,7 @@ ExitCode prune(const Arguments& arguments, const PruneArguments& wanted, Session
                                          {"position_error", as_json(loss.positions)}}));
     return ExitCode::done;
   }
-  session.print(std::string(wanted.dry_run ? "would keep " : "kept ") +
-                session.strong(std::to_string(selection.kept.size())) + " of " +
-                std::to_string(memory.size()) + " views: " + fixed(factor, 1) + " times fewer" +
-                (outdated > 0 ? "; " + std::to_string(outdated) + " were outdated" : ""));
-  if (wanted.dry_run) {
-    for (const std::string& name : names) session.print("  would drop  " + name);
-  }
-  if (loss.positions) {
-    session.print("nearest reference of a dropped view  median " +
-                  fixed(loss.positions->median_after_m, 3) + " m (before " +
-                  fixed(loss.positions->median_before_m, 3) + ")  95 % within " +
-                  fixed(loss.positions->p95_after_m, 3) + " m (before " +
-                  fixed(loss.positions->p95_before_m, 3) + ")");
-  } else if (loss.asked > 0) {
-    session.print("dropped views differ from those that stand for them by " +
-                  fixed(loss.median_difference, 3) + " (median)");
-  }
+  print_loss(wanted, loss, memory.size(), selection.kept.size(), factor, outdated, names, session);
   if (!wanted.dry_run && !dropped.empty()) {
     session.suggest({"panonav", "undo", wanted.memory}, "To bring them back:");
   }

@@ -177,9 +177,16 @@ void refuse_to_go_on(const RunArguments& wanted, RoutePoses poses) {
                    " holds already; allowed without odometry: a new name");
 }
 
-ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& session) {
-  const bool live = recordings::is_live(wanted.source);
-  if (!live) refuse_live(arguments, wanted.source, false);
+/// Where the pictures of a run come from.
+struct RunSource {
+  std::unique_ptr<ObservationSource> observations;
+  RoutePoses poses = RoutePoses::pictures;  ///< by what a route is recorded
+};
+
+/// Opens the source as the memory's pictures lie, where there is a memory. Throws FileError where
+/// there is none and nothing is learnt.
+RunSource open_source(const Arguments& arguments, const RunArguments& wanted, bool is_live,
+                      Session& session) {
   std::optional<PictureSource> remembered;
   if (memory_exists(wanted.memory)) {
     const auto memory = MemoryFile::open(wanted.memory, Access::read_only);
@@ -188,15 +195,32 @@ ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& se
   } else if (!wanted.learn) {
     throw FileError(wanted.memory, "no such file; --learn makes it");
   }
-  std::unique_ptr<ObservationSource> source;
-  RoutePoses poses = RoutePoses::pictures;
-  if (live) {
-    source = open_live(arguments, wanted.source, wanted.pictures, remembered, wanted.live);
-  } else {
-    Dataset recording = open_recording(wanted.source, wanted.pictures, remembered, session);
-    poses = route_poses(recording);
-    source = std::make_unique<DatasetObservations>(std::move(recording), session.executor());
+  if (is_live) {
+    return {open_live(arguments, wanted.source, wanted.pictures, remembered, wanted.live)};
   }
+  Dataset recording = open_recording(wanted.source, wanted.pictures, remembered, session);
+  const RoutePoses poses = route_poses(recording);
+  return {std::make_unique<DatasetObservations>(std::move(recording), session.executor()), poses};
+}
+
+LiveMemoryOptions memory_options(const RunArguments& wanted, const PictureSource& pictures,
+                                 bool is_live) {
+  LiveMemoryOptions options{.learn = wanted.learn,
+                            .update = wanted.update,
+                            .in_step = !is_live,
+                            .memoriser = {.source = pictures,
+                                          .signature = wanted.signature,
+                                          .preprocessing = wanted.preprocessing},
+                            .localiser = {},
+                            .hold = wanted.record.file || wanted.record.view};
+  if (wanted.learn_interval_s) options.min_interval_s = *wanted.learn_interval_s;
+  return options;
+}
+
+ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& session) {
+  const bool live = recordings::is_live(wanted.source);
+  if (!live) refuse_live(arguments, wanted.source, false);
+  const auto [source, poses] = open_source(arguments, wanted, live, session);
   std::optional<RouteFollower> follower;
   std::optional<RunRouteRecorder> route;
   if (wanted.route && wanted.learn) {
@@ -206,16 +230,7 @@ ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& se
     follower.emplace(MemoryFile::open(wanted.memory, Access::read_only), source->pictures(),
                      RouteFollowerOptions{.name = wanted.route, .tracker = {}, .fit = {}});
   }
-  LiveMemoryOptions options{.learn = wanted.learn,
-                            .update = wanted.update,
-                            .in_step = !live,
-                            .memoriser = {.source = source->pictures(),
-                                          .signature = wanted.signature,
-                                          .preprocessing = wanted.preprocessing},
-                            .localiser = {},
-                            .hold = wanted.record.file || wanted.record.view};
-  if (wanted.learn_interval_s) options.min_interval_s = *wanted.learn_interval_s;
-  LiveMemory memory(wanted.memory, options);
+  LiveMemory memory(wanted.memory, memory_options(wanted, source->pictures(), live));
   RunRecord record(wanted.record, std::array{wanted.source, wanted.memory}, live, session,
                    {.memory = wanted.memory});
   RunMoments moments(memory, wanted.memory);

@@ -313,6 +313,24 @@ ExitCode track_live(const Arguments& arguments, const TrackArguments& wanted,
   return exit_code_of(summary);
 }
 
+/// Writes the poses of the images at which the robot was localised; `seconds` are stamps of all.
+void write_localised(const std::string& path, const std::vector<TrackedImage>& images,
+                     const std::vector<double>& seconds) {
+  std::vector<StampedPose> trajectory;
+  for (const TrackedImage& image : images) {
+    if (is_localised(image)) trajectory.push_back({seconds[image.index], *image.estimate.pose});
+  }
+  write_trajectory(path, trajectory);
+}
+
+/// Adds the odometry that the pictures themselves show, and says so.
+void read_motion(Dataset& run, const std::string& name, const Tracker& tracker, Session& session) {
+  session.note("panonav track: " + readable_line(name) +
+               " has no odometry (columns odom_x_m,odom_y_m,odom_heading_deg); motion is read "
+               "from the pictures, " +
+               add_visual_odometry(run, tracker.memory(), tracker.encoder(), session.executor()));
+}
+
 ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Session& session) {
   check(arguments, wanted);
   const auto file = MemoryFile::open(wanted.memory, Access::read_only);
@@ -327,12 +345,7 @@ ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Ses
       file, {wanted.filter,
              visual && !arguments.given("odometry") ? visual_odometry_noise() : wanted.odometry,
              run.source});
-  if (visual) {
-    session.note("panonav track: " + readable_line(wanted.dataset) +
-                 " has no odometry (columns odom_x_m,odom_y_m,odom_heading_deg); motion is read "
-                 "from the pictures, " +
-                 add_visual_odometry(run, tracker.memory(), tracker.encoder(), session.executor()));
-  }
+  if (visual) read_motion(run, wanted.dataset, tracker, session);
   start(tracker, wanted);
   TrackSettings settings{.every = wanted.every};
   if (wanted.report) {
@@ -364,13 +377,7 @@ ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Ses
   progress.clear();
   record.close();
 
-  if (wanted.tum) {
-    std::vector<StampedPose> trajectory;
-    for (const TrackedImage& image : images) {
-      if (is_localised(image)) trajectory.push_back({seconds[image.index], *image.estimate.pose});
-    }
-    write_trajectory(*wanted.tum, trajectory);
-  }
+  if (wanted.tum) write_localised(*wanted.tum, images, seconds);
   const TrackSummary summary = summarise_track(images);
   if (!session.json()) print_summary(summary, session);
   if (wanted.report) {
