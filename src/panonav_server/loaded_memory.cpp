@@ -1,17 +1,16 @@
 #include "panonav_server/loaded_memory.hpp"
 
-#include <chrono>
 #include <system_error>
 
 #include "panonav/core/error.hpp"
-#include "panonav/storage/memory_address.hpp"
 
 namespace panonav::server {
 
 MemoryWatch::MemoryWatch(std::filesystem::path memory)
-    : memory_(std::move(memory)), state_(read_state(memory_)) {
-  if (is_server_address(memory_)) changes_.emplace(memory_);
-}
+    : memory_(std::move(memory)),
+      state_(read_state(memory_)),
+      scheme_(find_memory_scheme(memory_)),
+      listener_(scheme_ ? scheme_->listen(memory_) : nullptr) {}
 
 MemoryWatch::FileState MemoryWatch::read_state(const std::filesystem::path& path) {
   FileState state;
@@ -27,17 +26,16 @@ MemoryWatch::FileState MemoryWatch::read_state(const std::filesystem::path& path
 }
 
 bool MemoryWatch::has_changed() {
-  if (!is_server_address(memory_)) {
+  if (!scheme_) {
     const FileState before = std::exchange(state_, read_state(memory_));
     return state_ != before;
   }
   try {
-    bool changed = !changes_;
-    if (!changes_) changes_.emplace(memory_);
-    while (changes_->wait(std::chrono::milliseconds(0))) changed = true;
-    return changed;
+    const bool was_away = !listener_;
+    if (was_away) listener_ = scheme_->listen(memory_);
+    return listener_->has_changed() || was_away;
   } catch (const FileError&) {
-    changes_.reset();
+    listener_.reset();
     return false;
   }
 }

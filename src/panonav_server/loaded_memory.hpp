@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -10,7 +11,7 @@
 
 #include "panonav/pipeline/place_recogniser.hpp"
 #include "panonav/storage/memory_file.hpp"
-#include "panonav_fleet/memory_changes.hpp"
+#include "panonav/storage/memory_scheme.hpp"
 #include "panonav_server/localisation_server.hpp"
 
 namespace panonav::server {
@@ -31,7 +32,8 @@ class MemoryWatch {
 
   std::filesystem::path memory_;
   FileState state_;
-  std::optional<fleet::MemoryChanges> changes_;
+  std::shared_ptr<const MemoryScheme> scheme_;  // null: a file
+  std::unique_ptr<MemoryListener> listener_;    // null while what keeps the memory is away
 };
 
 /// A memory as it was read: held, or searched where it lies.

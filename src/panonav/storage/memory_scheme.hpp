@@ -12,6 +12,15 @@ namespace panonav {
 
 class MemoryTables;
 
+/// Notices when others change a memory.
+class MemoryListener {
+ public:
+  virtual ~MemoryListener() = default;
+  /// True if the memory was changed since the last call. Does not wait. Throws FileError when what
+  /// keeps the memory cannot be reached.
+  [[nodiscard]] virtual bool has_changed() = 0;
+};
+
 /// Memories that do not lie in files: they have addresses "SCHEME://...". All functions throw
 /// FileError when what keeps the memories cannot be reached or refuses.
 class MemoryScheme {
@@ -29,6 +38,9 @@ class MemoryScheme {
   /// the user may not change it.
   [[nodiscard]] virtual std::unique_ptr<MemoryTables> open(const std::filesystem::path& address,
                                                            Access access) const = 0;
+  /// Listens to changes of a memory from here on. Throws FileError when there is none.
+  [[nodiscard]] virtual std::unique_ptr<MemoryListener> listen(
+      const std::filesystem::path& address) const = 0;
 };
 
 /// Makes addresses of this scheme ("postgresql") stand for memories wherever this process takes the

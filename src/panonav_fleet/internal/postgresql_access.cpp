@@ -1,5 +1,6 @@
 // Making and finding memories on a server.
 
+#include <chrono>
 #include <utility>
 
 #include "panonav/core/error.hpp"
@@ -8,6 +9,7 @@
 #include "panonav/storage/memory_scheme.hpp"
 #include "panonav_fleet/internal/postgresql_memory.hpp"
 #include "panonav_fleet/internal/postgresql_schema.hpp"
+#include "panonav_fleet/memory_changes.hpp"
 #include "panonav_fleet/place_search.hpp"
 #include "panonav_fleet/postgresql_memories.hpp"
 
@@ -71,6 +73,19 @@ void make_postgresql_memory(const ServerAddress& address, const MemoryHeader& he
 
 namespace {
 
+class PostgresqlListener final : public MemoryListener {
+ public:
+  explicit PostgresqlListener(const std::filesystem::path& address) : changes_(address) {}
+  [[nodiscard]] bool has_changed() override {
+    bool changed = false;
+    while (changes_.wait(std::chrono::milliseconds(0))) changed = true;
+    return changed;
+  }
+
+ private:
+  MemoryChanges changes_;
+};
+
 class PostgresqlScheme final : public MemoryScheme {
  public:
   [[nodiscard]] bool exists(const std::filesystem::path& address) const override {
@@ -91,6 +106,11 @@ class PostgresqlScheme final : public MemoryScheme {
   [[nodiscard]] std::unique_ptr<MemoryTables> open(const std::filesystem::path& address,
                                                    Access access) const override {
     return open_tables(parse_server_address(address), access);
+  }
+
+  [[nodiscard]] std::unique_ptr<MemoryListener> listen(
+      const std::filesystem::path& address) const override {
+    return std::make_unique<PostgresqlListener>(address);
   }
 
  private:

@@ -193,7 +193,8 @@ int Matching::near() const {
 void PatchMatcher::find_turns(State& state, double step_rad, double left_azimuth_rad) {
   static_cast<void>(planes(state, step_rad));
   // The first reduction serves all fields of view that are tried: they differ little.
-  const auto& [reduction, smooth_pictures] = planes_.front();
+  const int reduction = planes_.front().first;
+  const std::vector<SmoothPlanes>& smooth_pictures = planes_.front().second;
   constexpr int columns = 360;  // a value a degree
   constexpr int rows = 30;      // every second degree about the horizon
   const auto panorama = [&](int picture) {
