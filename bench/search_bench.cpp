@@ -110,10 +110,10 @@ int fill(const std::string& address, std::size_t views) {
     file.append(some);
     some.clear();
     if ((number + 1) % 1000000 == 0) {
-      std::cerr << number + 1 << " views in " << fixed(seconds_since(start), 0) << " s\n";
+      std::cerr << number + 1 << " views in " << format_fixed(seconds_since(start), 0) << " s\n";
     }
   }
-  std::cout << "fill: " << views << " views in " << fixed(seconds_since(start), 0) << " s\n";
+  std::cout << "fill: " << views << " views in " << format_fixed(seconds_since(start), 0) << " s\n";
   return 0;
 }
 
@@ -177,8 +177,9 @@ void print_load() {
 
 std::string times(std::vector<double> ms) {
   std::ranges::sort(ms);
-  return "median " + fixed(ms[ms.size() / 2], 1) + ", of ten nine " +
-         fixed(ms[ms.size() * 9 / 10], 1) + ", slowest " + fixed(ms.back(), 1) + " ms";
+  return "median " + format_fixed(ms[ms.size() / 2], 1) + ", of ten nine " +
+         format_fixed(ms[ms.size() * 9 / 10], 1) + ", slowest " + format_fixed(ms.back(), 1) +
+         " ms";
 }
 
 /// What is read from memory when nothing else is done.
@@ -253,16 +254,16 @@ void ask_rivals(const std::vector<PackedSignature>& queries) {
 int ask(const std::string& address, std::size_t views) {
   const std::vector<Queries> kinds = make_queries();
   print_load();
-  std::cout << "memory is read with " << fixed(read_gb_per_s(), 1) << " GB/s\n";
+  std::cout << "memory is read with " << format_fixed(read_gb_per_s(), 1) << " GB/s\n";
   const double before = gigabytes("VmRSS:");
   const auto start = Clock::now();
   const fleet::PlaceSearch search(address);
   const double taken_s = seconds_since(start);
-  std::cout << "start: " << search.size() << " views in " << fixed(taken_s, 1) << " s; sketches "
-            << fixed(1e-9 * double(search.bytes()), 2) << " GB, "
-            << fixed(double(search.bytes()) / double(search.size()), 0)
-            << " bytes a view; resident " << fixed(gigabytes("VmRSS:") - before, 2)
-            << " GB more, at most " << fixed(gigabytes("VmHWM:"), 2) << " GB in all\n";
+  std::cout << "start: " << search.size() << " views in " << format_fixed(taken_s, 1)
+            << " s; sketches " << format_fixed(1e-9 * double(search.bytes()), 2) << " GB, "
+            << format_fixed(double(search.bytes()) / double(search.size()), 0)
+            << " bytes a view; resident " << format_fixed(gigabytes("VmRSS:") - before, 2)
+            << " GB more, at most " << format_fixed(gigabytes("VmHWM:"), 2) << " GB in all\n";
   std::vector<const PackedSignature*> sampled;
   std::vector<std::vector<Match>> found;
   for (int round = 0; round < 2; ++round) {
@@ -288,7 +289,7 @@ int ask(const std::string& address, std::size_t views) {
       }
       std::cout << "  " << kind.name << ": " << times(ms) << "; processor time " << times(own_ms)
                 << "; " << in_full / kind.all.size() << " views read in full, "
-                << fixed(1e-6 * double(bytes) / double(kind.all.size()), 0) << " MB\n";
+                << format_fixed(1e-6 * double(bytes) / double(kind.all.size()), 0) << " MB\n";
     }
   }
   const bool equal = scan(sampled, views) == found;

@@ -67,8 +67,8 @@ int main(int argc, char** argv) {
     upload_s += seconds_since(start);
     own_s += processor_seconds() - before;
   }
-  std::cout << "upload: " << fixed(views / upload_s, 0) << " views a second by the clock, "
-            << fixed(1e6 * own_s / views, 1) << " us a view of this process\n";
+  std::cout << "upload: " << format_fixed(views / upload_s, 0) << " views a second by the clock, "
+            << format_fixed(1e6 * own_s / views, 1) << " us a view of this process\n";
 
   std::vector<double> times_ms;
   std::size_t read = 0;
@@ -81,8 +81,8 @@ int main(int argc, char** argv) {
     times_ms.push_back(1e3 * seconds_since(start));
   }
   std::ranges::sort(times_ms);
-  std::cout << "area: " << read / times_ms.size() << " views in " << fixed(times_ms[50], 2)
-            << " ms (median), " << fixed(times_ms.back(), 2) << " ms (slowest of 101)\n";
+  std::cout << "area: " << read / times_ms.size() << " views in " << format_fixed(times_ms[50], 2)
+            << " ms (median), " << format_fixed(times_ms.back(), 2) << " ms (slowest of 101)\n";
 
   std::vector<double> append_ms;
   for (int i = 0; i < 200; ++i) {
@@ -92,9 +92,9 @@ int main(int argc, char** argv) {
     append_ms.push_back(1e3 * seconds_since(start));
   }
   std::ranges::sort(append_ms);
-  std::cout << "append: one view in " << fixed(append_ms[100], 2) << " ms (median)\n";
+  std::cout << "append: one view in " << format_fixed(append_ms[100], 2) << " ms (median)\n";
   const auto start = Clock::now();
   const std::size_t loaded = file.load().size();
-  std::cout << "load: " << fixed(static_cast<double>(loaded) / seconds_since(start), 0)
+  std::cout << "load: " << format_fixed(static_cast<double>(loaded) / seconds_since(start), 0)
             << " views a second\n";
 }

@@ -82,7 +82,7 @@ void ElsewhereExperiments::reproduce_floor(const std::string& world, double spac
   const double trustworthiness = neighbour_preservation(estimate, truth, 8).trustworthiness;
   add_row(result, id + ".shape", what + ": shape difference of the largest component",
           shape_difference(estimate, truth).value, "", at_most(0.05))
-      .reason = "the trustworthiness of its neighbourhoods is " + fixed(trustworthiness, 3);
+      .reason = "the trustworthiness of its neighbourhoods is " + format_fixed(trustworthiness, 3);
   add_row(result, id + ".trustworthiness", what + ": trustworthiness of its neighbourhoods",
           trustworthiness, "");
   const auto missions = simulation::random_missions(place, remembered, {.count = options.runs},

@@ -184,7 +184,7 @@ void ElsewhereExperiments::reproduce_tracked_poses() {
              ground.name + ", walks: tracked poses within the 95 % ellipse of their covariance",
              inside, all.size(), at_least(0.9));
     result.rows.back().over += "; the median squared error is " +
-                               fixed(median(all) / quantile_50, 2) +
+                               format_fixed(median(all) / quantile_50, 2) +
                                " times that of a Gaussian with this covariance";
   }
 }

@@ -68,7 +68,7 @@ viewer::MapPlot map_of(const std::string& title, const ViewGrid& grid,
 }
 
 std::string with_mu(const std::string& title, double mu) {
-  return title + ", mu " + fixed(mu, 4);
+  return title + ", mu " + format_fixed(mu, 4);
 }
 
 class LatticeExperiment {

@@ -17,7 +17,7 @@ std::string_view symbol(Comparison comparison) {
 
 // Four significant digits: what a person compares.
 std::string shown(double value, const std::string& unit) {
-  return short_number(value, unit, 4);
+  return format_number(value, unit, 4);
 }
 
 // With its interval, without its unit.

@@ -213,10 +213,10 @@ class Taker final : public OptionVisitor {
       : given_(given), known_(known), prefix_(std::move(prefix)) {}
 
   void visit(const OptionInfo& info, int& value) override {
-    take(info, value, "whole numbers " + range_text(info));
+    take(info, value, "whole numbers " + describe_range(info));
   }
   void visit(const OptionInfo& info, double& value) override {
-    take(info, value, "numbers " + range_text(info));
+    take(info, value, "numbers " + describe_range(info));
   }
   void visit(const OptionInfo& info, bool& value) override {
     const auto [name, given] = find(info);
@@ -272,10 +272,10 @@ class Lister final : public OptionVisitor {
  public:
   Lister(std::string& text, std::string prefix) : text_(text), prefix_(std::move(prefix)) {}
   void visit(const OptionInfo& info, int& value) override {
-    list(info, "int", std::to_string(value), range_text(info));
+    list(info, "int", std::to_string(value), describe_range(info));
   }
   void visit(const OptionInfo& info, double& value) override {
-    list(info, "float", to_text(value), range_text(info));
+    list(info, "float", to_text(value), describe_range(info));
   }
   void visit(const OptionInfo& info, bool& value) override {
     list(info, "bool", value ? "True" : "False", "");

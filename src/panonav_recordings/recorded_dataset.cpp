@@ -237,9 +237,9 @@ RecordingSummary describe_recording(const fs::path& path) {
     if (span_s > 0.0) each.rate_hz = static_cast<double>(places.size() - 1) / span_s;
     if (!has_pictures(topics[i])) continue;
     try {
-      each.shows = readable_line(shown(recording->read(places.front()), topics[i]));
+      each.shows = to_readable_line(shown(recording->read(places.front()), topics[i]));
     } catch (const Error& error) {
-      each.shows = readable_line(error.what());
+      each.shows = to_readable_line(error.what());
     }
   }
   std::ranges::stable_sort(summary.topics, {},

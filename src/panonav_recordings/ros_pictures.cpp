@@ -40,7 +40,7 @@ constexpr std::array encodings{
 };
 
 [[noreturn]] void fail(std::string_view field, std::string_view value, std::string_view allowed) {
-  throw ContractError("sensor_msgs/Image " + std::string(field), readable_line(value), allowed);
+  throw ContractError("sensor_msgs/Image " + std::string(field), to_readable_line(value), allowed);
 }
 
 std::uint8_t clamped(int value) {
@@ -169,11 +169,11 @@ panonav::Image picture_of(const Image& message, const ImageLimits& limits) {
 
 panonav::Image picture_of(const CompressedImage& message, std::string_view name,
                           const ImageLimits& limits) {
-  const std::string format = lower_case(message.format);
+  const std::string format = to_lower_case(message.format);
   const auto says = [&](std::string_view word) { return format.find(word) != std::string::npos; };
   const bool known = format.empty() || says("jpeg") || says("jpg") || says("png");
   if (!known || says("compresseddepth")) {
-    throw ContractError("sensor_msgs/CompressedImage format", readable_line(message.format),
+    throw ContractError("sensor_msgs/CompressedImage format", to_readable_line(message.format),
                         "jpeg, png, or such as 'rgb8; jpeg compressed bgr8'");
   }
   return decode_image(message.data, name, limits);

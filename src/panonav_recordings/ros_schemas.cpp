@@ -87,7 +87,7 @@ const Definition& definition_of(std::string_view type) {
   std::string known;
   for (const auto& each : definitions)
     known += (known.empty() ? "" : ", ") + std::string(each.type);
-  throw ContractError("message type", readable_line(type), known);
+  throw ContractError("message type", to_readable_line(type), known);
 }
 
 }  // namespace
@@ -95,7 +95,7 @@ const Definition& definition_of(std::string_view type) {
 std::string ros2_type_name(std::string_view type) {
   const std::size_t package = type.find('/');
   if (package == std::string_view::npos) {
-    throw ContractError("message type", readable_line(type), "PACKAGE/NAME");
+    throw ContractError("message type", to_readable_line(type), "PACKAGE/NAME");
   }
   return std::string(type.substr(0, package)) + "/msg" + std::string(type.substr(package));
 }

@@ -112,8 +112,8 @@ void describe(RunMoment& moment, const MonteCarloEstimate& estimate) {
                  : estimate.state == LocalisationState::ambiguous ? "ambiguous"
                                                                   : "lost";
   moment.probability = estimate.probability;
-  moment.values = {{"probability", fixed(estimate.probability, 4)},
-                   {"inside", fixed(estimate.inside, 4)},
+  moment.values = {{"probability", format_fixed(estimate.probability, 4)},
+                   {"inside", format_fixed(estimate.inside, 4)},
                    {"modes", std::to_string(estimate.modes.size())},
                    {"particles", std::to_string(estimate.particles)}};
 }
@@ -122,7 +122,7 @@ void describe(RunMoment& moment, const Place& place) {
   moment.sure = place.known;
   moment.state = place.known ? "known place" : "unknown place";
   moment.probability = place.known_probability;
-  moment.values = {{"known_probability", fixed(place.known_probability, 4)}};
+  moment.values = {{"known_probability", format_fixed(place.known_probability, 4)}};
   if (!place.matches.empty()) {
     moment.best_match_turn_rad = place.matches.front().heading_rad;
     moment.values.emplace_back("best_match", place.matches.front().name);

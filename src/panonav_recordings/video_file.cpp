@@ -59,7 +59,7 @@ std::string output_of(const std::vector<std::string>& arguments, const std::stri
     while (errors.ends_with('\n')) errors.pop_back();
     const auto line = errors.rfind('\n');
     throw FileError(file, "is no video that ffmpeg can read: " +
-                              readable_line(errors.substr(line == errors.npos ? 0 : line + 1)));
+                              to_readable_line(errors.substr(line == errors.npos ? 0 : line + 1)));
   }
   return text;
 }
@@ -145,9 +145,9 @@ class VideoStore final : public PictureStore {
     }
     const std::string why = frames_->trouble();
     frames_.reset();
-    throw FileError(file_, "the picture at " + short_number(seconds(wanted)) +
+    throw FileError(file_, "the picture at " + format_number(seconds(wanted)) +
                                " s cannot be decoded" +
-                               (why.empty() ? "" : ": " + readable_line(why)));
+                               (why.empty() ? "" : ": " + to_readable_line(why)));
   }
 
  private:
@@ -213,7 +213,7 @@ class VideoStore final : public PictureStore {
 }  // namespace
 
 bool is_video(const fs::path& file) {
-  const std::string name = lower_case(file.extension().string());
+  const std::string name = to_lower_case(file.extension().string());
   constexpr std::array<std::string_view, 6> known{".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi"};
   return std::ranges::find(known, name) != known.end();
 }
@@ -231,7 +231,7 @@ Dataset read_video(const fs::path& file, PictureSource source, const PictureSele
   for (const std::int64_t stamp : index->stamps) {
     DatasetEntry entry;
     entry.stamp_s = static_cast<double>(stamp) * index->unit_s;
-    entry.file = file.filename().string() + "@" + fixed(*entry.stamp_s, 6);
+    entry.file = file.filename().string() + "@" + format_fixed(*entry.stamp_s, 6);
     entry.path = file;
     entry.store_index = dataset.entries.size();
     dataset.entries.push_back(std::move(entry));

@@ -112,8 +112,8 @@ void GoalDriver::drive_to_goal(const Observation& observation, const std::option
   if (!step.decided) return;
   feedback_.publish(make_message(
       fine, state,
-      {{"way", fixed(decision.way, 3)},
-       {"probability", fixed(decision.probability, 4)},
+      {{"way", format_fixed(decision.way, 3)},
+       {"probability", format_fixed(decision.probability, 4)},
        {"nearest", decision.nearest ? navigator_->info(*decision.nearest).name : std::string()}}));
 }
 
@@ -127,9 +127,9 @@ void GoalDriver::drive_along_route(const Observation& observation,
     return;
   }
   send(step.velocity);
-  std::vector<recordings::ros::KeyValue> values{{"along_m", fixed(step.along_m, 3)},
-                                                {"length_m", fixed(step.length_m, 3)}};
-  if (step.fix) values.push_back({"lateral_m", fixed(step.fix->lateral_m, 3)});
+  std::vector<recordings::ros::KeyValue> values{{"along_m", format_fixed(step.along_m, 3)},
+                                                {"length_m", format_fixed(step.length_m, 3)}};
+  if (step.fix) values.push_back({"lateral_m", format_fixed(step.fix->lateral_m, 3)});
   feedback_.publish(make_message(fine, state, std::move(values)));
 }
 
@@ -156,7 +156,7 @@ void GoalDriver::stop_if_silent() {
   if (!has_mission_ || Steady::now() - last_command_ < timeout) return;
   velocities_.publish({});
   last_command_ = Steady::now();
-  log_.warn("command", "no picture for " + fixed(setup_.node.command_timeout_s, 2) +
+  log_.warn("command", "no picture for " + format_fixed(setup_.node.command_timeout_s, 2) +
                            " s; the robot is stopped until one comes");
 }
 
@@ -180,7 +180,7 @@ recordings::ros::DiagnosticArray GoalDriver::make_message(
     std::uint8_t level, const std::string& state,
     std::vector<recordings::ros::KeyValue> values) const {
   return {{now_ns_(), setup_.frames.map},
-          {{level, "panonav: goal", readable_line(state), {}, std::move(values)}}};
+          {{level, "panonav: goal", to_readable_line(state), {}, std::move(values)}}};
 }
 
 }  // namespace panonav::ros2

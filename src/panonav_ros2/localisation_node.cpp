@@ -86,7 +86,7 @@ struct LocalisationNode::Implementation {
         next_check = Steady::now() + 1s;
         check_inputs();
       } catch (const Error& error) {
-        log.warn("sending", readable_line(error.what()));
+        log.warn("sending", to_readable_line(error.what()));
       }
     });
     queue.stop();
@@ -128,7 +128,7 @@ struct LocalisationNode::Implementation {
         }
       } catch (const Error& error) {
         log.warn("work", (work->request ? "" : sensors.picture_topic() + ": ") +
-                             readable_line(error.what()));
+                             to_readable_line(error.what()));
       }
     }
   }
@@ -152,7 +152,7 @@ struct LocalisationNode::Implementation {
       moment = localiser.localise(std::move(observation), stamp_ns, *moved);
       if (moment.sure && moment.pose) ++localised;
       const std::chrono::duration<double, std::milli> delay = Steady::now() - came;
-      moment.values.emplace_back("delay_ms", fixed(delay.count(), 1));
+      moment.values.emplace_back("delay_ms", format_fixed(delay.count(), 1));
       moment.values.emplace_back("dropped", std::to_string(queue.dropped()));
       moment.values.emplace_back("warnings", std::to_string(log.count()));
     }
@@ -198,13 +198,14 @@ struct LocalisationNode::Implementation {
         refuse(words, "relocalise, cancel, repeat ROUTE, learn NAME, forget NAME, load FILE");
       }
     } catch (const Error& error) {
-      return "refused: " + readable_line(error.what());
+      return "refused: " + to_readable_line(error.what());
     }
     return command + " done";
   }
 
   [[noreturn]] static void refuse(const std::string& words, std::string_view allowed) {
-    throw ContractError("command", "'" + readable_line(shortened(words, 80)) + "'", allowed);
+    throw ContractError("command", "'" + to_readable_line(shorten_middle(words, 80)) + "'",
+                        allowed);
   }
 
   void finish_teaching() {

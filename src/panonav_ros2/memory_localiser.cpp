@@ -46,7 +46,7 @@ void MemoryLocaliser::load_neighbour(const std::string& name) {
   const fs::path folder = fs::weakly_canonical(fs::absolute(loaded().path), code).parent_path();
   const fs::path path = fs::weakly_canonical(folder / name, code);
   if (code || path.parent_path() != folder) {
-    throw ContractError("file to load", "'" + readable_line(shortened(name, 80)) + "'",
+    throw ContractError("file to load", "'" + to_readable_line(shorten_middle(name, 80)) + "'",
                         "the name of a file in the folder of the memory");
   }
   load(path);
@@ -137,9 +137,9 @@ void MemoryLocaliser::correct_motion(const Pose2& map_from_base, const Pose2& pa
   if (!former) return;
   const Pose2 before = *former * path_from_base;
   const double turn_rad = angle_difference(before.heading_rad, map_from_base.heading_rad);
-  moment.values.emplace_back("correction_m",
-                             fixed(distance(before.position(), map_from_base.position()), 4));
-  moment.values.emplace_back("correction_rad", fixed(std::abs(turn_rad), 4));
+  moment.values.emplace_back(
+      "correction_m", format_fixed(distance(before.position(), map_from_base.position()), 4));
+  moment.values.emplace_back("correction_rad", format_fixed(std::abs(turn_rad), 4));
 }
 
 /// Publishes a pose where the moment is sure of one; particles and the best match if somebody

@@ -70,7 +70,7 @@ std::optional<Mission> MissionFile::load(WarningLog& log) {
   auto mission = read_mission(in);
   if (mission && age_s <= max_age_s_) return mission;
   log.warn("mission", path_.string() +
-                          (mission ? " is " + fixed(age_s, 0) + " s old" : " is damaged") +
+                          (mission ? " is " + format_fixed(age_s, 0) + " s old" : " is damaged") +
                           "; the robot is not sent on");
   remove();
   return std::nullopt;

@@ -70,7 +70,7 @@ std::optional<recordings::ros::Pose> FrameTree::lookup(const std::string& top,
     const auto found = links_.find(frame);
     if (found == links_.end()) return std::nullopt;
     if (hops > links_.size()) {
-      throw ContractError("parents of the frame " + readable_line(bottom), "a cycle", "a tree");
+      throw ContractError("parents of the frame " + to_readable_line(bottom), "a cycle", "a tree");
     }
     frame_from_bottom = found->second.parent_from_child * frame_from_bottom;
     frame = found->second.parent;

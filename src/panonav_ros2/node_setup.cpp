@@ -28,7 +28,8 @@ void visit_options(LocalisationNodeOptions& options, OptionVisitor& visitor) {
 void require_frame(const std::string& topic, const std::string& frame,
                    const std::string& expected) {
   if (frame == expected) return;
-  throw ContractError("frame of the message", "'" + readable_line(shortened(frame, 60)) + "'",
+  throw ContractError("frame of the message",
+                      "'" + to_readable_line(shorten_middle(frame, 60)) + "'",
                       expected + ", as the parameters name it for " + topic);
 }
 

@@ -38,7 +38,7 @@ int domain_number(const ParticipantOptions& options) {
   const bool digits = std::ranges::all_of(text, [](char c) { return c >= '0' && c <= '9'; });
   const int domain = digits && text.size() <= 3 ? std::stoi(text) : -1;
   if (domain < 0 || domain > max_domain) {
-    throw ContractError("ROS_DOMAIN_ID", readable_line(text), "0 .. 232");
+    throw ContractError("ROS_DOMAIN_ID", to_readable_line(text), "0 .. 232");
   }
   return domain;
 }
@@ -173,7 +173,7 @@ std::string full_name(std::string_view name, const ParticipantOptions& options) 
       after_slash = c == '/';
     }
     if (!well_formed) {
-      throw ContractError("name of a topic", readable_line(given),
+      throw ContractError("name of a topic", to_readable_line(given),
                           "letters, digits, _ and /, as camera/image or /camera/image");
     }
     return full;

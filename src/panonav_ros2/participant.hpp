@@ -118,7 +118,7 @@ void subscribe(Participant& participant, WarningLog& log, const std::string& top
             use(message, cdr);
           }
         } catch (const Error& error) {
-          log.warn(topic, topic + ": " + readable_line(error.what()));
+          log.warn(topic, topic + ": " + to_readable_line(error.what()));
         }
       });
 }

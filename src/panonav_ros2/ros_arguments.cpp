@@ -27,7 +27,7 @@ std::pair<std::string, std::string> sides_of(const std::string& text, const std:
                                              const std::string& allowed) {
   const std::size_t at = text.find(":=");
   if (at == 0 || at == std::string::npos || at + 2 == text.size()) {
-    throw ContractError(what, "'" + readable_line(shortened(text, 80)) + "'", allowed);
+    throw ContractError(what, "'" + to_readable_line(shorten_middle(text, 80)) + "'", allowed);
   }
   return {text.substr(0, at), text.substr(at + 2)};
 }
@@ -101,7 +101,7 @@ void read_parameter_file(const std::string& path, const std::string& node,
       take(root[inside][node]);
     }
   } catch (const YAML::Exception& error) {
-    throw FileError(path, "is no parameter file: " + readable_line(error.what()));
+    throw FileError(path, "is no parameter file: " + to_readable_line(error.what()));
   }
 }
 
@@ -131,7 +131,8 @@ std::vector<RosOption> split_words(std::span<const std::string> words,
       RosOption option{word, {}};
       if (!option.is({"-r", "--remap", "-p", "--param", "--params-file", "--log-level",
                       "--log-config-file", "--log-file-name", "-e", "--enclave"})) {
-        throw ContractError("word after --ros-args", "'" + readable_line(shortened(word, 80)) + "'",
+        throw ContractError("word after --ros-args",
+                            "'" + to_readable_line(shorten_middle(word, 80)) + "'",
                             "-r FROM:=TO, -p NAME:=VALUE, --params-file FILE");
       }
       if (++i == words.size()) throw ContractError("value of " + word, "missing", "one");
@@ -158,8 +159,8 @@ void read_parameter(const RosOption& option, const std::string& node, Parameters
     int nodes_left = max_nodes;
     flatten(YAML::Load(value), name, option.flag, 0, nodes_left, parameters);
   } catch (const YAML::Exception& error) {
-    throw ContractError("value of " + name, "'" + readable_line(shortened(value, 80)) + "'",
-                        std::string("YAML: ") + readable_line(error.what()));
+    throw ContractError("value of " + name, "'" + to_readable_line(shorten_middle(value, 80)) + "'",
+                        std::string("YAML: ") + to_readable_line(error.what()));
   }
 }
 

@@ -79,7 +79,8 @@ struct SimulatedRobot::Implementation {
 
   void carry_to(const Pose2& pose) {
     if (!surroundings.is_free(pose.position())) {
-      throw ContractError("place", fixed(pose.x_m, 2) + ", " + fixed(pose.y_m, 2), "a free one");
+      throw ContractError("place", format_fixed(pose.x_m, 2) + ", " + format_fixed(pose.y_m, 2),
+                          "a free one");
     }
     base.carry_to(pose);
   }
@@ -93,7 +94,7 @@ struct SimulatedRobot::Implementation {
       try {
         step(step_s);
       } catch (const Error& error) {
-        log.warn("step", readable_line(error.what()));
+        log.warn("step", to_readable_line(error.what()));
       }
     });
     camera_work.stop();
@@ -127,7 +128,7 @@ struct SimulatedRobot::Implementation {
       const Image picture = surroundings.picture(pose, Random(seed, ++picture_number).next());
       pictures.publish(make_message(picture, stamp_ns));
     } catch (const Error& error) {
-      log.warn("picture", readable_line(error.what()));
+      log.warn("picture", to_readable_line(error.what()));
     }
     is_taking_picture = false;
   }

@@ -123,7 +123,7 @@ struct HeadReader {
 };
 
 MHD_Result read_field(void* reader, MHD_ValueKind /*kind*/, const char* name, const char* value) {
-  static_cast<HeadReader*>(reader)->read_field(lower_case(name), value == nullptr ? "" : value);
+  static_cast<HeadReader*>(reader)->read_field(to_lower_case(name), value == nullptr ? "" : value);
   return MHD_YES;
 }
 

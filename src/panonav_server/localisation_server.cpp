@@ -70,7 +70,7 @@ HttpAnswer json_answer(const ordered_json& document, int status = 200) {
 }
 
 HttpAnswer refusal(int status, std::string_view why) {
-  return json_answer({{"error", readable_line(std::string(why))}}, status);
+  return json_answer({{"error", to_readable_line(std::string(why))}}, status);
 }
 
 }  // namespace
@@ -103,7 +103,7 @@ struct LocalisationServer::Implementation {
     require(options.max_waiting >= 1, "max_waiting", 0, "at least 1");
     for (const ServedMemory& memory : memories) {
       if (!is_name(memory.name)) {
-        throw ContractError("name of a memory", readable_line(memory.name),
+        throw ContractError("name of a memory", to_readable_line(memory.name),
                             "1 to 64 letters, digits, '-', '_' and '.'");
       }
       const auto [at, is_new] = served.try_emplace(memory.name);
@@ -412,7 +412,7 @@ struct LocalisationServer::Implementation {
           try {
             again = std::make_shared<LoadedMemory>(one.memory.path, options);
           } catch (const std::exception& error) {
-            fault = readable_line(error.what());
+            fault = to_readable_line(error.what());
           }
           // A memory that grows all the time leaves time to answer.
           pause = std::max(pause, std::chrono::duration_cast<std::chrono::milliseconds>(
@@ -444,7 +444,7 @@ struct LocalisationServer::Implementation {
     try {
       changed = searched.refresh();
     } catch (const std::exception& error) {
-      fault = readable_line(error.what());
+      fault = to_readable_line(error.what());
     }
     const bool told = !fault.empty() && !lost.insert(name).second;
     if (fault.empty()) lost.erase(name);

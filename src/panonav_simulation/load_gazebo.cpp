@@ -32,7 +32,7 @@ std::string well_known_name(std::string_view uri) {
   for (auto at = name.find("%20"); at != std::string::npos; at = name.find("%20"))
     name.replace(at, 3, "_");
   std::ranges::replace(name, ' ', '_');
-  return lower_case(name);
+  return to_lower_case(name);
 }
 
 // The two models of Gazebo's database that nearly all worlds take from there; else null.

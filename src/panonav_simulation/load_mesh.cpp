@@ -30,7 +30,7 @@ Affine3 affine(const aiMatrix4x4& m) {
 }
 
 std::string lower_ending(const fs::path& path) {
-  return lower_case(path.extension().string());
+  return to_lower_case(path.extension().string());
 }
 
 // What turns the importer's axes into z up. It has turned COLLADA files to y up already.
@@ -330,7 +330,7 @@ std::vector<FileMesh> MeshLibrary::read_new(const fs::path& path, UpAxis up) {
       source = importer.ReadFileFromMemory(text->data(), text->size(), steps, "dae");
   }
   if (source == nullptr || source->mRootNode == nullptr)
-    throw FileError(path.string(), "not a readable mesh file: " + readable_line(fault));
+    throw FileError(path.string(), "not a readable mesh file: " + to_readable_line(fault));
   Collector collector{*source, path, {}, {}};
   for (unsigned i = 0; i < source->mNumMaterials; ++i) {
     collector.materials.push_back(material_of(*source->mMaterials[i], path, textures_));

@@ -121,7 +121,7 @@ Scene load_scene(const std::string& name, const SceneOptions& options, const Giv
   }
   refuse_variations_of_file(name, given);
   Scene scene;
-  const std::string ending = lower_case(fs::path(name).extension().string());
+  const std::string ending = to_lower_case(fs::path(name).extension().string());
   if (ending == ".world" || ending == ".sdf") {
     GazeboOptions gazebo;
     gazebo.model_folders = gazebo_model_folders_of_environment();

@@ -31,18 +31,18 @@ std::optional<fs::path> find_in_folder(const fs::path& folder, const fs::path& n
   std::error_code error;
   std::vector<fs::path> entries;
   for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
-    if (lower_case(it->path().stem().string()) == lower_case(name.stem().string()) &&
+    if (to_lower_case(it->path().stem().string()) == to_lower_case(name.stem().string()) &&
         is_file(it->path())) {
       entries.push_back(it->path());
     }
   }
   // The order of a directory differs between machines.
   std::sort(entries.begin(), entries.end());
-  const std::array<std::string, 4> endings{lower_case(name.extension().string()), ".png", ".jpg",
+  const std::array<std::string, 4> endings{to_lower_case(name.extension().string()), ".png", ".jpg",
                                            ".jpeg"};
   for (const std::string& ending : endings) {
     for (const fs::path& entry : entries) {
-      if (lower_case(entry.extension().string()) == ending) return entry;
+      if (to_lower_case(entry.extension().string()) == ending) return entry;
     }
   }
   return std::nullopt;
@@ -105,7 +105,7 @@ std::shared_ptr<const Image> TextureStore::find(std::string_view written,
   }
   const std::string taken = found->filename().string();
   const std::string name = fs::path(path).filename().string();
-  if (taken != name && lower_case(taken) == lower_case(name) &&
+  if (taken != name && to_lower_case(taken) == to_lower_case(name) &&
       reported_missing_.emplace(path, true).second) {
     warnings_.push_back(directory.string() + ": texture \"" + path +
                         "\" was not found; taken instead, with letters of other case: " +

@@ -89,7 +89,7 @@ std::string whole_page(std::string_view title, std::string_view generator, std::
 
 std::string html_escaped(std::string_view text) {
   std::string html;
-  for (const char c : readable_line(text)) {
+  for (const char c : to_readable_line(text)) {
     switch (c) {
       case '&':
         html += "&amp;";

@@ -251,7 +251,7 @@ void draw_colour_bar(SvgDrawing& drawing, const SvgBox& box, const PlotAxis& axi
   drawing.add_frame(box, PlotColour::dark_grey);
   for (const double tick : axis.ticks(box.height / tick_px)) {
     drawing.add_text({box.right() + 5.0, box.bottom() - axis.share_of(tick) * box.height + 4.0},
-                     short_number(tick));
+                     format_number(tick));
   }
   drawing.add_text({box.right() + 62.0, box.top + 0.5 * box.height}, axis.label,
                    {.anchor = "middle", .rotation_deg = -90.0});

@@ -141,14 +141,14 @@ void PlotArea::draw_axes(SvgDrawing& drawing, const std::string& title) const {
   if (x.names.empty()) {
     for (const double tick : x.ticks(box.width / x_tick_px)) {
       drawing.add_text({box.left + x.share_of(tick) * box.width, box.bottom() + 16.0},
-                       short_number(tick), {.anchor = "middle"});
+                       format_number(tick), {.anchor = "middle"});
     }
   } else {
     draw_names(drawing);
   }
   for (const double tick : y.ticks(box.height / y_tick_px)) {
     drawing.add_text({box.left - 6.0, box.bottom() - y.share_of(tick) * box.height + 4.0},
-                     short_number(tick), {.anchor = "end"});
+                     format_number(tick), {.anchor = "end"});
   }
   const double middle = box.left + 0.5 * box.width;
   drawing.add_text({middle, box.bottom() + 36.0 + extra_margin_px()}, x.label,
@@ -172,7 +172,7 @@ void PlotArea::draw_names(SvgDrawing& drawing) const {
     const TextStyle style = is_turned ? TextStyle{.anchor = "end", .rotation_deg = turned_deg}
                                       : TextStyle{.anchor = "middle"};
     drawing.add_text({is_turned ? at + 4.0 : at, box.bottom() + 16.0},
-                     shortened(readable_line(name), max_characters), style);
+                     shorten_middle(to_readable_line(name), max_characters), style);
   }
 }
 

@@ -71,13 +71,14 @@ std::string view_element(const ReportView& view) {
   // As wide as high in angle would be true to the eye, but a small view must be seen at all.
   const double shape =
       std::clamp(static_cast<double>(picture.width()) / picture.height(), 2.5, 10.0);
-  std::string html = "<figure><div class=\"view\"><img style=\"aspect-ratio:" + fixed(shape, 2) +
-                     "\" alt=\"" + html_escaped(view.caption) + "\" src=\"" +
-                     data_url("image/jpeg", encode_jpeg(picture.view())) + "\">";
+  std::string html =
+      "<figure><div class=\"view\"><img style=\"aspect-ratio:" + format_fixed(shape, 2) +
+      "\" alt=\"" + html_escaped(view.caption) + "\" src=\"" +
+      data_url("image/jpeg", encode_jpeg(picture.view())) + "\">";
   for (const ViewMark& mark : view.marks) {
     const double percent = 50.0 - mark.azimuth_rad * 50.0 / std::numbers::pi;
     html += "<i" + std::string(mark.through ? "" : " class=\"arrow\"") +
-            " style=\"left:" + fixed(percent, 2) + "%;--key:var(--" +
+            " style=\"left:" + format_fixed(percent, 2) + "%;--key:var(--" +
             std::string(name_of(mark.colour)) + ")\"></i>";
   }
   return html + "</div>" + element("figcaption", view.caption) + "</figure>\n";

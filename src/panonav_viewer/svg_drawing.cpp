@@ -169,7 +169,7 @@ void SvgDrawing::add_marks(std::span<const Point2> points, PlotColour colour,
 void SvgDrawing::add_text(Point2 at, std::string_view text, const TextStyle& style) {
   constexpr std::size_t max_characters = 160;  // more than a picture is wide
   std::string escaped;
-  for (const char c : shortened(readable_line(text), max_characters)) {
+  for (const char c : shorten_middle(to_readable_line(text), max_characters)) {
     escaped += c == '&' ? "&amp;" : c == '<' ? "&lt;" : std::string(1, c);
   }
   const std::string place = point_text(at.x_m, at.y_m);
@@ -224,7 +224,7 @@ void write_drawing(const std::filesystem::path& path, const std::string& svg) {
       std::ifstream in(log.path());
       std::string line;
       std::getline(in, line);
-      throw FileError(path.string(), "cannot be made of SVG by ffmpeg: " + readable_line(line));
+      throw FileError(path.string(), "cannot be made of SVG by ffmpeg: " + to_readable_line(line));
     }
   }
   std::error_code error;

@@ -260,7 +260,7 @@ TEST_F(Localise, SeveralPicturesAndATable) {
             "difference,"
             "turn_deg,next,next_dissimilarity,next_column_difference,error");
   EXPECT_EQ(rows[1].find(gone + ",unreadable,,,,,,,,,,,,,"), 0U) << rows[1];
-  EXPECT_EQ(rows[2].find(pictures[1] + ",known," + fixed(one["known_probability"], 4) + "," +
+  EXPECT_EQ(rows[2].find(pictures[1] + ",known," + format_fixed(one["known_probability"], 4) + "," +
                          to_text(one["position"]["x_m"].get<double>())),
             0U)
       << rows[2];
@@ -294,7 +294,7 @@ TEST_F(Localise, TheReportShowsEachPictureAboveItsBestMatch) {
                   shown["values"]["answer"].get<std::string>(),
               title);
     EXPECT_TRUE(shown["values"]["difference to the best match"].get<std::string>().starts_with(
-        fixed(best["column_difference"], 3)));
+        format_fixed(best["column_difference"], 3)));
     const auto decoded = [&](const char* which) {
       return decode_image(bytes_of_url(shown["data"][which].get<std::string>()), which);
     };

@@ -331,7 +331,7 @@ TEST_F(RouteVerbs, ReportsShowTheRouteAndTheFixes) {
   for (std::size_t i = 0; i < run["moments"].size(); ++i) {
     const json& along = run["route"]["marks"][i][0];
     if (along.is_null()) continue;
-    EXPECT_EQ(fixed(along.get<double>(), 3), run["moments"][i]["values"]["along_m"]);
+    EXPECT_EQ(format_fixed(along.get<double>(), 3), run["moments"][i]["values"]["along_m"]);
   }
   for (const auto& panel : panels_of(followed)) {
     if (!panel.data.contains("image")) continue;

@@ -33,7 +33,7 @@ constexpr std::size_t count = 36;
 /// What a shell says on standard output; expects exit code 0.
 std::string said_by_shell(const std::string& command, const fs::path& folder) {
   const fs::path out = folder / "shell_output";
-  EXPECT_EQ(std::system((command + " > " + shell_quoted(out.string())).c_str()), 0) << command;
+  EXPECT_EQ(std::system((command + " > " + quote_for_shell(out.string())).c_str()), 0) << command;
   std::ostringstream text;
   text << std::ifstream(out).rdbuf();
   return text.str();
@@ -52,11 +52,11 @@ class Walk : public ::testing::Test {
     poses_ = grid_poses(6);
     write_dataset(folder / "walk", landmark_world(5), poses_);
     const std::string pictures = "ffmpeg -nostdin -v error -framerate 10 -i " +
-                                 shell_quoted((folder / "walk/view_%03d.png").string()) +
+                                 quote_for_shell((folder / "walk/view_%03d.png").string()) +
                                  " -pix_fmt ";
     fs::create_directories(folder / "jpegs");
     const auto make = [&](const std::string& words, const std::string& to) {
-      const std::string command = pictures + words + " " + shell_quoted((folder / to).string());
+      const std::string command = pictures + words + " " + quote_for_shell((folder / to).string());
       ASSERT_EQ(std::system(command.c_str()), 0) << command;
     };
     make("rgb24 -c:v libx264rgb -qp 0", "walk.mp4");
@@ -159,20 +159,20 @@ TEST_F(Walk, PartsOfAVideoAreTaken) {
 TEST_F(Walk, StandardInputGivesTheMemoryOfItsPictures) {
   run_well(with({"memorise", path("jpegs"), path("a.panonav")}, panoramas_));
   const std::string command =
-      shell_quoted(PANONAV_COMMAND) + " memorise - " + shell_quoted(path("b.panonav")) +
-      " --json --kind panorama --elevation-deg -20 20 < " + shell_quoted(path("walk.mjpeg"));
+      quote_for_shell(PANONAV_COMMAND) + " memorise - " + quote_for_shell(path("b.panonav")) +
+      " --json --kind panorama --elevation-deg -20 20 < " + quote_for_shell(path("walk.mjpeg"));
   EXPECT_EQ(json::parse(said_by_shell(command, folder.path())).at("appended"), count);
   expect_same_signatures(views(path("a.panonav")), views(path("b.panonav")));
 }
 
 TEST_F(Walk, PicturesOnStandardInputAreAnsweredAndTrackedAsTheyCome) {
   run_well({"memorise", path("walk"), path("a.panonav")});
-  const std::string command = " < " + shell_quoted(path("walk.mjpeg")) + " 2> /dev/null";
-  const auto answers = objects(said_by_shell(shell_quoted(PANONAV_COMMAND) + " localise " +
-                                                 shell_quoted(path("a.panonav")) + " - --json -o " +
-                                                 shell_quoted(path("a.csv")) + " --record " +
-                                                 shell_quoted(path("a.mcap")) + command,
-                                             folder.path()));
+  const std::string command = " < " + quote_for_shell(path("walk.mjpeg")) + " 2> /dev/null";
+  const auto answers = objects(said_by_shell(
+      quote_for_shell(PANONAV_COMMAND) + " localise " + quote_for_shell(path("a.panonav")) +
+          " - --json -o " + quote_for_shell(path("a.csv")) + " --record " +
+          quote_for_shell(path("a.mcap")) + command,
+      folder.path()));
   ASSERT_EQ(answers.size(), count);
   double before_s = 0.0;
   for (std::size_t i = 0; i < count; ++i) {
@@ -186,7 +186,7 @@ TEST_F(Walk, PicturesOnStandardInputAreAnsweredAndTrackedAsTheyCome) {
   EXPECT_EQ(topics_of(path("a.mcap")).at("/camera/image/compressed").second, count);
 
   const auto tracked = objects(said_by_shell(
-      "(" + shell_quoted(PANONAV_COMMAND) + " track " + shell_quoted(path("a.panonav")) +
+      "(" + quote_for_shell(PANONAV_COMMAND) + " track " + quote_for_shell(path("a.panonav")) +
           " - --json --every 2 --count 20" + command + " || true)",
       folder.path()));
   EXPECT_EQ(tracked.size(), 10U);
@@ -196,12 +196,13 @@ TEST_F(Walk, ALiveSourceIsReadWhileItIsOpen) {
   run_well({"memorise", path("walk"), path("a.panonav")});
   // The writer waits for the answer to the first picture before it ends its own stream.
   const std::string command =
-      "mkfifo " + shell_quoted(path("pipe")) + " && (" + shell_quoted(PANONAV_COMMAND) +
-      " localise " + shell_quoted(path("a.panonav")) + " - --json < " + shell_quoted(path("pipe")) +
-      " > " + shell_quoted(path("out")) + " 2> /dev/null & exec 3> " + shell_quoted(path("pipe")) +
-      "; cat " + shell_quoted(path("jpegs/000001.jpg")) + " " +
-      shell_quoted(path("jpegs/000002.jpg")) + " >&3; for i in $(seq 100); do [ -s " +
-      shell_quoted(path("out")) + " ] && echo answered && break; sleep 0.1; done; exec 3>&-; wait)";
+      "mkfifo " + quote_for_shell(path("pipe")) + " && (" + quote_for_shell(PANONAV_COMMAND) +
+      " localise " + quote_for_shell(path("a.panonav")) + " - --json < " +
+      quote_for_shell(path("pipe")) + " > " + quote_for_shell(path("out")) +
+      " 2> /dev/null & exec 3> " + quote_for_shell(path("pipe")) + "; cat " +
+      quote_for_shell(path("jpegs/000001.jpg")) + " " + quote_for_shell(path("jpegs/000002.jpg")) +
+      " >&3; for i in $(seq 100); do [ -s " + quote_for_shell(path("out")) +
+      " ] && echo answered && break; sleep 0.1; done; exec 3>&-; wait)";
   EXPECT_EQ(said_by_shell(command, folder.path()), "answered\n");
 }
 
@@ -238,10 +239,10 @@ TEST_F(Walk, RunLearnsANewPlaceOnceAndKnowsItThen) {
 
 TEST_F(Walk, ARecordOfAStreamHoldsItsJpegsToTheByte) {
   run_well({"memorise", path("walk"), path("a.panonav")});
-  said_by_shell(shell_quoted(PANONAV_COMMAND) + " run - --memory " +
-                    shell_quoted(path("a.panonav")) + " --record " +
-                    shell_quoted(path("run.mcap")) + " < " + shell_quoted(path("walk.mjpeg")) +
-                    " 2> /dev/null",
+  said_by_shell(quote_for_shell(PANONAV_COMMAND) + " run - --memory " +
+                    quote_for_shell(path("a.panonav")) + " --record " +
+                    quote_for_shell(path("run.mcap")) + " < " +
+                    quote_for_shell(path("walk.mjpeg")) + " 2> /dev/null",
                 folder.path());
   std::size_t number = 0;
   for_each_message<recordings::ros::CompressedImage>(
@@ -459,8 +460,8 @@ TEST_F(Walk, InfoListsWhatACameraOffers) {
   const json info =
       json::parse(said_by_shell("V4L2_SHIM_PICTURES=/dev/null "
                                 "ASAN_OPTIONS=verify_asan_link_order=0:detect_leaks=0 LD_PRELOAD=" +
-                                    shell_quoted(PANONAV_V4L2_SHIM) + " " +
-                                    shell_quoted(PANONAV_COMMAND) + " info /dev/video7 --json",
+                                    quote_for_shell(PANONAV_V4L2_SHIM) + " " +
+                                    quote_for_shell(PANONAV_COMMAND) + " info /dev/video7 --json",
                                 folder.path()));
   ASSERT_EQ(info.at("formats").size(), 2U);
   EXPECT_EQ(info.at("formats")[0].at("pixels"), "H264");
@@ -472,12 +473,13 @@ TEST_F(Walk, InfoListsWhatACameraOffers) {
 TEST_F(Walk, RunFollowsACameraThatIsUnpluggedAndComesBack) {
   write_camera_pictures();
   run_well({"memorise", path("walk"), path("a.panonav")});
-  const std::string command =
-      "V4L2_SHIM_RATE=20 V4L2_SHIM_UNPLUG=10 V4L2_SHIM_PICTURES=" + shell_quoted(path("pictures")) +
-      " ASAN_OPTIONS=verify_asan_link_order=0:detect_leaks=0 LD_PRELOAD=" +
-      shell_quoted(PANONAV_V4L2_SHIM) + " timeout -s INT 20 " + shell_quoted(PANONAV_COMMAND) +
-      " run /dev/video7 --memory " + shell_quoted(path("a.panonav")) + " --json --count 30 2> " +
-      shell_quoted(path("notes"));
+  const std::string command = "V4L2_SHIM_RATE=20 V4L2_SHIM_UNPLUG=10 V4L2_SHIM_PICTURES=" +
+                              quote_for_shell(path("pictures")) +
+                              " ASAN_OPTIONS=verify_asan_link_order=0:detect_leaks=0 LD_PRELOAD=" +
+                              quote_for_shell(PANONAV_V4L2_SHIM) + " timeout -s INT 20 " +
+                              quote_for_shell(PANONAV_COMMAND) + " run /dev/video7 --memory " +
+                              quote_for_shell(path("a.panonav")) + " --json --count 30 2> " +
+                              quote_for_shell(path("notes"));
   const auto answers = objects(said_by_shell(command, folder.path()));
   ASSERT_EQ(answers.size(), 30U);
   std::size_t right = 0;
@@ -496,12 +498,13 @@ TEST_F(Walk, RunFollowsACameraThatIsUnpluggedAndComesBack) {
 TEST_F(Walk, AnInterruptedMemoriseHasStoredWhatTheCameraSaw) {
   write_camera_pictures();
   const std::string command =
-      "V4L2_SHIM_RATE=50 V4L2_SHIM_PICTURES=" + shell_quoted(path("pictures")) +
+      "V4L2_SHIM_RATE=50 V4L2_SHIM_PICTURES=" + quote_for_shell(path("pictures")) +
       " ASAN_OPTIONS=verify_asan_link_order=0:detect_leaks=0 LD_PRELOAD=" +
-      shell_quoted(PANONAV_V4L2_SHIM) + " timeout --preserve-status -s INT 3 " +
-      shell_quoted(PANONAV_COMMAND) + " memorise /dev/video7 " + shell_quoted(path("new.panonav")) +
+      quote_for_shell(PANONAV_V4L2_SHIM) + " timeout --preserve-status -s INT 3 " +
+      quote_for_shell(PANONAV_COMMAND) + " memorise /dev/video7 " +
+      quote_for_shell(path("new.panonav")) +
       " --every 0.2s --json --kind panorama --elevation-deg -20 20 2> " +
-      shell_quoted(path("notes"));
+      quote_for_shell(path("notes"));
   const auto said = objects(said_by_shell(command, folder.path()));
   ASSERT_EQ(said.size(), 1U);
   EXPECT_GE(said[0].at("appended"), 5);
@@ -513,11 +516,11 @@ TEST_F(Walk, AnInterruptedMemoriseHasStoredWhatTheCameraSaw) {
 TEST_F(Walk, AnInterruptedRunHasStoredWhatItLearnt) {
   write_camera_pictures();
   const std::string command =
-      "V4L2_SHIM_RATE=50 V4L2_SHIM_PICTURES=" + shell_quoted(path("pictures")) +
+      "V4L2_SHIM_RATE=50 V4L2_SHIM_PICTURES=" + quote_for_shell(path("pictures")) +
       " ASAN_OPTIONS=verify_asan_link_order=0:detect_leaks=0 LD_PRELOAD=" +
-      shell_quoted(PANONAV_V4L2_SHIM) + " timeout --preserve-status -s INT 3 " +
-      shell_quoted(PANONAV_COMMAND) + " run /dev/video7 --memory " +
-      shell_quoted(path("new.panonav")) +
+      quote_for_shell(PANONAV_V4L2_SHIM) + " timeout --preserve-status -s INT 3 " +
+      quote_for_shell(PANONAV_COMMAND) + " run /dev/video7 --memory " +
+      quote_for_shell(path("new.panonav")) +
       " --learn --learn-interval-s 0.2 --json --kind panorama --elevation-deg -20 20";
   const auto answers = objects(said_by_shell(command, folder.path()));
   std::size_t learnt = 0;
@@ -547,8 +550,8 @@ TEST_F(Walk, ARunOutlivesLostCamerasAStalledReaderAndAClockThatIsSetBack) {
       std::to_string(seconds * rate / (2 * losses)) +
       " V4L2_SHIM_UNPLUGS=" + std::to_string(losses) +
       " V4L2_SHIM_CLOCK_BACK=" + std::to_string(seconds * rate / 3) +
-      " V4L2_SHIM_TAKEN=taken LD_PRELOAD=" + shell_quoted(PANONAV_V4L2_SHIM) + " " +
-      shell_quoted(PANONAV_COMMAND) +
+      " V4L2_SHIM_TAKEN=taken LD_PRELOAD=" + quote_for_shell(PANONAV_V4L2_SHIM) + " " +
+      quote_for_shell(PANONAV_COMMAND) +
       " run /dev/video7 --memory a.panonav --learn --record run.mcap --json > out 2> notes &\n"
       "run=$!\n"
       "resident() { grep VmRSS /proc/$run/status | tr -dc 0-9; }\n"
@@ -560,7 +563,7 @@ TEST_F(Walk, ARunOutlivesLostCamerasAStalledReaderAndAClockThatIsSetBack) {
       "; resident > late\n"
       "kill -INT $run; wait $run; echo $? > code; wait\n";
   write_file(folder / "script", std::string_view(script));
-  said_by_shell("cd " + shell_quoted(folder.path().string()) + " && bash script", folder.path());
+  said_by_shell("cd " + quote_for_shell(folder.path().string()) + " && bash script", folder.path());
 
   const auto number_in = [&](const std::string& file) {
     std::uint64_t number = 0;
@@ -585,7 +588,7 @@ TEST_F(Walk, ARunOutlivesLostCamerasAStalledReaderAndAClockThatIsSetBack) {
   EXPECT_LE(accounted, taken) << said;
   EXPECT_GE(accounted + 1 + static_cast<std::uint64_t>(losses), taken) << said;
   EXPECT_GT(pictures, taken / 4) << said;
-  EXPECT_EQ(objects(said_by_shell("cat " + shell_quoted(path("lines")), folder.path())).size() +
+  EXPECT_EQ(objects(said_by_shell("cat " + quote_for_shell(path("lines")), folder.path())).size() +
                 counted("lines were not printed for a slow reader"),
             pictures)
       << said;

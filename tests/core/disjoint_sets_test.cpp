@@ -38,8 +38,8 @@ TEST(DisjointSets, AreNumberedInTheOrderOfTheirFirstMembers) {
   EXPECT_TRUE(sets.join(4, 1));
   EXPECT_TRUE(sets.join(5, 2));
   EXPECT_FALSE(sets.join(1, 4));
-  EXPECT_EQ(sets.numbered(), (std::vector<std::size_t>{0, 1, 2, 3, 1, 2}));
-  EXPECT_TRUE(DisjointSets(0).numbered().empty());
+  EXPECT_EQ(sets.number_sets(), (std::vector<std::size_t>{0, 1, 2, 3, 1, 2}));
+  EXPECT_TRUE(DisjointSets(0).number_sets().empty());
 }
 
 }  // namespace

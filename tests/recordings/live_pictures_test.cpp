@@ -116,7 +116,7 @@ TEST(LivePictures, AnAddressGivesPicturesIsOpenedAgainAndStops) {
     const std::string command =
         "for i in 1 2 3; do timeout 20 ffmpeg -nostdin -v quiet -re -f lavfi -i "
         "testsrc=size=64x32:rate=20 -frames:v 10 -c:v mjpeg -f mpjpeg " +
-        shell_quoted(address + "?listen=1") + "; done";
+        quote_for_shell(address + "?listen=1") + "; done";
     (void)std::system(command.c_str());
   });
   const auto open = [&] {  // it may not listen yet

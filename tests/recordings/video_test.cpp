@@ -44,8 +44,8 @@ class Video : public ::testing::Test {
   [[nodiscard]] fs::path make(const std::string& name, const std::string& codec) const {
     const fs::path video = folder / name;
     const std::string command = "ffmpeg -nostdin -v error -framerate 10 -i " +
-                                shell_quoted((folder / "n%d.png").string()) + " " + codec + " " +
-                                shell_quoted(video.string());
+                                quote_for_shell((folder / "n%d.png").string()) + " " + codec + " " +
+                                quote_for_shell(video.string());
     EXPECT_EQ(std::system(command.c_str()), 0) << command;
     return video;
   }

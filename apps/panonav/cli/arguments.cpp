@@ -272,7 +272,7 @@ std::string Arguments::unknown_flag(const std::string& typed) const {
   for (const auto& info : infos()) {
     if (!info.positional()) names.emplace_back(info.name);
   }
-  return "no such option: " + typed + did_you_mean(typed, names);
+  return "no such option: " + typed + suggest_name(typed, names);
 }
 
 void Arguments::read(std::span<const std::string> words, std::string_view verb, bool may_miss) {
@@ -345,7 +345,7 @@ void Arguments::take_positionals(std::span<const std::string> words, std::string
     std::vector<std::string> swapped(words.begin(), words.end());
     std::swap(swapped[i], swapped[there]);
     std::string command = "panonav " + std::string(verb);
-    for (const auto& word : swapped) command.append(" ").append(shell_quoted(word));
+    for (const auto& word : swapped) command.append(" ").append(quote_for_shell(word));
     throw UsageError("MEMORY is '" + words[i] + "' and " +
                      infos[wanted[std::min(there, wanted.size() - 1)]].name + " is '" + *other +
                      "': they seem to be swapped (did you mean '" + command + "'?)");
@@ -513,12 +513,12 @@ const Verb& required_verb(std::span<const Verb> verbs, std::span<const std::stri
   }
   if (words.size() > 1) {  // the second word is part of what was meant, or is an argument
     const std::string both = words[0] + " " + words[1];
-    if (const auto meant = did_you_mean(both, names); !meant.empty()) {
+    if (const auto meant = suggest_name(both, names); !meant.empty()) {
       throw UsageError("'" + both + "' is no verb" + meant);
     }
   }
   throw UsageError("'" + typed + "' is no verb" +
-                   (longer.empty() ? did_you_mean(typed, names) : "; allowed: " + listed(longer)));
+                   (longer.empty() ? suggest_name(typed, names) : "; allowed: " + listed(longer)));
 }
 
 namespace {

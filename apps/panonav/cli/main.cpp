@@ -22,7 +22,7 @@ using panonav::command::ExitCode;
 /// One line, whatever the message holds.
 void report(std::string_view verb, std::string_view message) {
   std::cerr << "panonav" << (verb.empty() ? "" : " ") << verb << ": "
-            << panonav::readable_line(
+            << panonav::to_readable_line(
                    panonav::without_passwords(panonav::command::name_flags(message)))
             << '\n';
 }

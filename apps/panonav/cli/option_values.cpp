@@ -58,7 +58,7 @@ void TextApplier::visit(const OptionInfo& info, int& value) {
   if (typed == nullptr) return;
   const auto [end, error] = std::from_chars(typed->data(), typed->data() + typed->size(), value);
   if (error != std::errc() || end != typed->data() + typed->size()) {
-    refuse(info.name, *typed, "whole numbers " + range_text(info));
+    refuse(info.name, *typed, "whole numbers " + describe_range(info));
   }
 }
 

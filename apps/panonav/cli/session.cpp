@@ -39,7 +39,7 @@ std::string readable(std::string_view text) {
         next = mark;
       }
     }
-    result += readable_line(text.substr(0, end));
+    result += to_readable_line(text.substr(0, end));
     result += next;
     text.remove_prefix(end + next.size());
   }
@@ -50,8 +50,8 @@ std::string readable(std::string_view text) {
 std::string time_left(double elapsed_s, std::size_t done, std::size_t total) {
   if (elapsed_s < 2.0 || total < 10 || done < 5 || 20 * done < total || done >= total) return {};
   const double left_s = elapsed_s * static_cast<double>(total - done) / static_cast<double>(done);
-  if (left_s < 90.0) return ", about " + fixed(std::max(1.0, left_s), 0) + " s left";
-  return ", about " + fixed(left_s / 60.0, left_s < 570.0 ? 1 : 0) + " min left";
+  if (left_s < 90.0) return ", about " + format_fixed(std::max(1.0, left_s), 0) + " s left";
+  return ", about " + format_fixed(left_s / 60.0, left_s < 570.0 ? 1 : 0) + " min left";
 }
 
 }  // namespace
@@ -80,7 +80,7 @@ void Session::detail(std::string_view line) {
   if (!options_.verbose) return;
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start_;
   std::string text = "[";
-  say(text.append(fixed(elapsed.count(), 2)).append(" s] ").append(line));
+  say(text.append(format_fixed(elapsed.count(), 2)).append(" s] ").append(line));
 }
 
 ExitCode Session::no_answer(std::string_view line) {
@@ -91,7 +91,7 @@ ExitCode Session::no_answer(std::string_view line) {
 void Session::suggest(std::initializer_list<std::string_view> command, std::string_view lead) {
   if (options_.quiet || options_.json) return;
   std::string line(lead);
-  for (const auto word : command) line.append(" ").append(shell_quoted(word));
+  for (const auto word : command) line.append(" ").append(quote_for_shell(word));
   print(line);
 }
 
@@ -142,7 +142,7 @@ Progress::~Progress() {
   clear();
   const std::chrono::duration<double> elapsed = Clock::now() - start_;
   session_.detail(label_ + ": " + std::to_string(done_) + " of " + std::to_string(total_) + " in " +
-                  fixed(elapsed.count(), 2) + " s");
+                  format_fixed(elapsed.count(), 2) + " s");
 }
 
 void Progress::advance(std::size_t steps) {

@@ -34,7 +34,7 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string percent(double share) {
-  return fixed(100.0 * share, 0) + " %";
+  return format_fixed(100.0 * share, 0) + " %";
 }
 
 // Raw picture, what calibration found in it, and the cylinder made of it. Gives the first for the
@@ -49,7 +49,7 @@ viewer::ReportPicture show_camera(const DemoRecordings& recordings, Session& ses
 
   const Camera truth = recordings.true_camera;
   const MirrorCircle& found = recordings.mirror;
-  const std::string centre_px = fixed(
+  const std::string centre_px = format_fixed(
       std::hypot(found.centre.u_px - truth.centre.u_px, found.centre.v_px - truth.centre.v_px), 2);
   page.part("What the robot sees",
             {centre_px + " pixels",
@@ -70,7 +70,7 @@ viewer::ReportPicture show_camera(const DemoRecordings& recordings, Session& ses
            "What calibration found in " + std::to_string(recordings.calibrated_on) +
                " raw pictures: rim green, inner radius orange, centre red. The centre is off by " +
                centre_px + " pixels, the rim by " +
-               fixed(std::abs(found.rim_radius_px - truth.rim_radius_px), 2) + ".")});
+               format_fixed(std::abs(found.rim_radius_px - truth.rim_radius_px), 2) + ".")});
   page.text(
       "The picture is then unwrapped to a panoramic cylinder. Of each of its 80 rows only the "
       "first 15 Fourier components are kept, 2.4 kB a view. Their magnitudes do not change when "
@@ -137,13 +137,13 @@ Outcome outcome_of(const std::vector<AskedView>& asked, const VisualMemory& memo
 std::string median_text(const std::vector<double>& values, double unit, int digits,
                         std::string_view name) {
   if (values.empty()) return "none";
-  return fixed(unit * median(values), digits) + " " + std::string(name);
+  return format_fixed(unit * median(values), digits) + " " + std::string(name);
 }
 
 void show_answers(const VisualMemory& memory, const std::vector<viewer::MapLayer>& scene,
                   const std::vector<AskedView>& asked, const Outcome& own, const Outcome& foreign,
                   double spacing_m, viewer::ReportPage& page) {
-  const std::string spacing = fixed(100.0 * spacing_m, 0) + " cm";
+  const std::string spacing = format_fixed(100.0 * spacing_m, 0) + " cm";
   page.part("It remembers and localises itself",
             {median_text(own.errors_m, 100.0, 1, "cm"),
              "is how far off it says that it is, from one picture (median)"});
@@ -180,8 +180,8 @@ viewer::UnfoldingMap show_levels(const VisualMemory& memory,
                                  const std::vector<viewer::MapLayer>& scene, const AskedView& view,
                                  double spacing_m, viewer::ReportPage& page) {
   AreasShown areas = map_of_areas(memory, scene, view);
-  const std::string first = fixed(areas.areas_m2.front(), 1);
-  const std::string last = fixed(areas.areas_m2.back(), 2);
+  const std::string first = format_fixed(areas.areas_m2.front(), 1);
+  const std::string last = format_fixed(areas.areas_m2.back(), 2);
   page.part("As accurate as needed",
             {first + " to " + last + " m²",
              "is the area where it may be: a coarse look is cheap, a fine one exact"});
@@ -223,7 +223,7 @@ void show_what_next(const DemoOptions& wanted, const DemoRecordings& recordings,
            " --memory " + memory + " --report " + in_out("way_home"),
        "panonav navigate " + memory + " --scene office --scene-seed " +
            std::to_string(seen.simulation.scene.scene_seed) + " --exposure " +
-           short_number(seen.sensor.exposure) + mission + " --picture " + in_out("way.svg"),
+           format_number(seen.sensor.exposure) + mission + " --picture " + in_out("way.svg"),
        "panonav unwrap " + recordings.query_run.entries.front().path.string() + " --camera " +
            (recordings.query_run.folder / "camera.toml").string() + " -o panorama.png"});
 }
@@ -301,8 +301,8 @@ std::string of(std::size_t part, std::size_t all) {
 
 void print(const DemoResults& done, Session& session) {
   session.print("panonav demo: " + std::to_string(done.views) + " views of an office remembered, " +
-                std::to_string(done.questions) + " questions asked, " + fixed(done.seconds, 0) +
-                " s");
+                std::to_string(done.questions) + " questions asked, " +
+                format_fixed(done.seconds, 0) + " s");
   session.print(
       "  position: median error " + median_text(done.own.errors_m, 100.0, 1, "cm") +
       "; heading: " + median_text(done.own.heading_errors_rad, degrees(1.0), 2, "degrees"));
@@ -312,25 +312,26 @@ void print(const DemoResults& done, Session& session) {
                 "; kidnapped, found again " + images_text(done.track.until_found_again) +
                 "; median error " + median_text(done.track.errors_m, 100.0, 1, "cm") + "; " +
                 of(done.track.wrong, done.track.localised) + " answers wrong");
-  const auto centimetres = [](double metres) { return fixed(100.0 * metres, 0) + " cm"; };
+  const auto centimetres = [](double metres) { return format_fixed(100.0 * metres, 0) + " cm"; };
   session.print("  arranged by similarity alone: " +
                 (done.maps.lattice ? centimetres(done.maps.lattice->rms_m) : "none") +
                 " from the true places; map of a drive: " + centimetres(done.maps.map_rms_m) +
                 " from the true way, its wheels alone " + centimetres(done.maps.wheels_rms_m));
   session.print("  home from one metre away: " + of(done.homing.arrived, done.homing.runs.size()) +
                 " runs ended within 10 cm; median " +
-                fixed(100.0 * median(done.homing.distances_m), 1) + " cm");
-  session.print("  a route of " + fixed(done.route.length_m, 0) +
+                format_fixed(100.0 * median(done.homing.distances_m), 1) + " cm");
+  session.print("  a route of " + format_fixed(done.route.length_m, 0) +
                 " m repeated from 0.3 m off: " + of(done.route.completed, done.route.runs.size()) +
                 " runs reached its end; distance from it: median " +
                 median_text(done.route.lateral_m, 100.0, 1, "cm"));
   const DemoNavigation& navigation = done.navigation;
-  session.print("  missions by views alone: " + of(navigation.arrived, navigation.runs.size()) +
-                " arrived; way driven over the shortest: median " +
-                (navigation.detours.empty() ? "none" : fixed(median(navigation.detours), 2)) +
-                "; kidnapped half way: " + std::string(name_of(navigation.kidnapped.end)) +
-                "; a screen in the way: " +
-                (navigation.screened ? std::string(name_of(navigation.screened->end)) : "none"));
+  session.print(
+      "  missions by views alone: " + of(navigation.arrived, navigation.runs.size()) +
+      " arrived; way driven over the shortest: median " +
+      (navigation.detours.empty() ? "none" : format_fixed(median(navigation.detours), 2)) +
+      "; kidnapped half way: " + std::string(name_of(navigation.kidnapped.end)) +
+      "; a screen in the way: " +
+      (navigation.screened ? std::string(name_of(navigation.screened->end)) : "none"));
 }
 
 MemoryFile remember(const Dataset& run, const fs::path& path, Executor& executor) {

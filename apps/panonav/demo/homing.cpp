@@ -118,9 +118,9 @@ DemoHoming show_homing(const simulation::Scene& office, int runs, std::uint64_t 
       "its camera are noisy.");
   page.figures({{std::to_string(homing.arrived) + " of " + std::to_string(runs),
                  "runs that ended within 10 cm of home, and knew it"},
-                {fixed(100.0 * median(homing.distances_m), 1) + " cm",
+                {format_fixed(100.0 * median(homing.distances_m), 1) + " cm",
                  "median distance from home at the end"},
-                {fixed(static_cast<double>(steps) / runs, 0), "steps a run, on average"}});
+                {format_fixed(static_cast<double>(steps) / runs, 0), "steps a run, on average"}});
   page.plots({{map_of_runs(office, homing.runs),
                "All robots at once, step by step, from the green circles to the black squares. A "
                "run that ended elsewhere turns orange."}});

@@ -139,7 +139,7 @@ double room_m(const VisualMemory& office) {
 }
 
 std::string whole_centimetres(double metres) {
-  return fixed(100.0 * metres, 0) + " cm";
+  return format_fixed(100.0 * metres, 0) + " cm";
 }
 
 std::vector<std::pair<std::string, std::string>> figures_of(const DemoMaps& maps,
@@ -150,12 +150,13 @@ std::vector<std::pair<std::string, std::string>> figures_of(const DemoMaps& maps
     figures.push_back({whole_centimetres(maps.lattice->rms_m),
                        "from their true places lie the arranged views (root mean "
                        "square), in a room " +
-                           fixed(room_m(office), 1) + " m long: " +
-                           fixed(100.0 * maps.lattice->rms_m / room_m(office), 1) + " % of it"});
+                           format_fixed(room_m(office), 1) + " m long: " +
+                           format_fixed(100.0 * maps.lattice->rms_m / room_m(office), 1) +
+                           " % of it"});
   }
   figures.push_back({whole_centimetres(maps.map_rms_m),
                      "from the true way lies the map of a drive of " +
-                         fixed(spacing_m * static_cast<double>(drive_views), 0) + " m"});
+                         format_fixed(spacing_m * static_cast<double>(drive_views), 0) + " m"});
   figures.push_back({whole_centimetres(maps.wheels_rms_m), "from it lies what the wheels tell"});
   return figures;
 }

@@ -231,16 +231,17 @@ std::string end_text(const simulation::MissionRun& run, double within_m) {
 std::string log_of(const std::string& title, const std::string& goal,
                    const simulation::MissionRun& run, double within_m) {
   std::string text = title + ", to " + goal + ": " + end_text(run, within_m) + ", " +
-                     fixed(100.0 * run.end_distance_m, 0) + " cm from it\n";
+                     format_fixed(100.0 * run.end_distance_m, 0) + " cm from it\n";
   for (const NavigationDecision& decision : run.decisions) text += describe(decision) + "\n";
   return text + "\n";
 }
 
 /// What one mission more came to, as a sentence.
 std::string sentence_on(const simulation::MissionRun& run, double within_m) {
-  return "It ended as: " + end_text(run, within_m) + ", " + fixed(100.0 * run.end_distance_m, 0) +
-         " cm from the goal after " + std::to_string(run.decisions.size()) + " steps and " +
-         fixed(run.travelled_m, 1) + " m.";
+  return "It ended as: " + end_text(run, within_m) + ", " +
+         format_fixed(100.0 * run.end_distance_m, 0) + " cm from the goal after " +
+         std::to_string(run.decisions.size()) + " steps and " + format_fixed(run.travelled_m, 1) +
+         " m.";
 }
 
 /// What the page shows of them.
@@ -254,7 +255,7 @@ struct Shown {
 void add_part(const DemoNavigation& navigation, Shown shown, viewer::ReportPage& page) {
   const std::string count = std::to_string(navigation.runs.size());
   const std::string arrived = std::to_string(navigation.arrived) + " of " + count;
-  const std::string within = fixed(100.0 * navigation.within_m, 1) + " cm";
+  const std::string within = format_fixed(100.0 * navigation.within_m, 1) + " cm";
   page.part("It goes where it is told", {arrived, "missions arrived, by views alone"});
   page.text(
       "The goal is a remembered view. The robot knows how the views arranged themselves (part 5), "
@@ -271,9 +272,9 @@ void add_part(const DemoNavigation& navigation, Shown shown, viewer::ReportPage&
             within + ".");
   page.figures(
       {{arrived, "missions arrived within " + within + ", and knew it"},
-       {navigation.detours.empty() ? "none" : fixed(median(navigation.detours), 2),
+       {navigation.detours.empty() ? "none" : format_fixed(median(navigation.detours), 2),
         "times the shortest way, driven by those that arrived (median)"},
-       {fixed(median(navigation.steps), 0), "steps a mission (median)"},
+       {format_fixed(median(navigation.steps), 0), "steps a mission (median)"},
        {end_text(navigation.kidnapped, navigation.within_m), "the robot that was kidnapped"},
        {navigation.screened ? end_text(*navigation.screened, navigation.within_m) : "none",
         navigation.screened ? "the robot with a screen in its way"
@@ -349,8 +350,9 @@ DemoNavigation show_navigation(const DemoOptions& options, const DemoRecordings&
   }
   add_log("Kidnapped half way", missions.back(), navigation.kidnapped);
   navigation.first_mission = {"--goal", memory.info(first.goal).name, "--start",
-                              fixed(first.start.x_m, 3) + "," + fixed(first.start.y_m, 3) + "," +
-                                  fixed(degrees(first.start.heading_rad), 1)};
+                              format_fixed(first.start.x_m, 3) + "," +
+                                  format_fixed(first.start.y_m, 3) + "," +
+                                  format_fixed(degrees(first.start.heading_rad), 1)};
   constexpr int candidates = 30;
   if (const auto screened =
           screened_mission(place, remembered, random(screen_stream, candidates, false), recordings,

@@ -63,7 +63,7 @@ AreasShown map_of_areas(const VisualMemory& memory, const std::vector<viewer::Ma
     shown.map.frames.push_back(
         {.title = std::to_string(level.components) +
                   (level.components == 1 ? " component: " : " components: ") +
-                  fixed(shown.areas_m2.back(), 2) + " m²",
+                  format_fixed(shown.areas_m2.back(), 2) + " m²",
          .layers = {area, robot}});
   }
   return shown;

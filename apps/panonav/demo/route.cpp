@@ -51,7 +51,8 @@ viewer::RunPage played_run(const lab::RouteScene& place, const RoutePanorama& pa
     moment.truth = ReferencePose{truth.x_m, truth.y_m, truth.heading_rad};
     moment.sure = seen.has_value();
     moment.state = seen ? "on the route" : "off the route";
-    moment.values.emplace_back("beside the route", fixed(100.0 * run.lateral_m[i], 1) + " cm");
+    moment.values.emplace_back("beside the route",
+                               format_fixed(100.0 * run.lateral_m[i], 1) + " cm");
     if (seen) moment.pose = seen->pose;
     moment.panorama = simulation::take_panorama(
         *place.renderer, truth, {.rows = 40, .columns = 256, .rays_per_axis = 1},
@@ -109,7 +110,7 @@ DemoRoute show_route(const simulation::Scene& office, double length_m, std::uint
   std::ranges::move(lab::route_layers(way, route.runs), std::back_inserter(map.layers));
 
   const auto median_cm = [](const std::vector<double>& values) {
-    return values.empty() ? std::string("none") : fixed(100.0 * median(values), 1) + " cm";
+    return values.empty() ? std::string("none") : format_fixed(100.0 * median(values), 1) + " cm";
   };
   page.part("A route, again and again",
             {median_cm(route.lateral_m),
@@ -120,14 +121,14 @@ DemoRoute show_route(const simulation::Scene& office, double length_m, std::uint
       "Light in the plane of the camera goes straight from place to place, so that these lines "
       "also "
       "tell what is seen from beside the route. The robot was shown a route of " +
-      fixed(route.length_m, 0) +
+      format_fixed(route.length_m, 0) +
       " m once, then put down 0.3 m off its start and told that it stands on it, with wheels that "
       "are wrong by 5 %; it drove the route to its end, and another robot drove it back.");
   page.figures({{std::to_string(route.completed) + " of " + std::to_string(route.runs.size()),
                  "runs that reached the end of the route, and knew it"},
                 {median_cm(route.lateral_m), "median distance from the route, from 1 m on"},
                 {median_cm(route.position_m), "median error of the position"},
-                {fixed(1e-3 * static_cast<double>(route.bytes), 0) + " kB",
+                {format_fixed(1e-3 * static_cast<double>(route.bytes), 0) + " kB",
                  "what the route takes, before packing"}});
   page.text(
       "Below is the first of them. The striped picture is all that the robot keeps of the route: "

@@ -84,7 +84,7 @@ void add_part(const DemoTrack& track, double spacing_m, std::size_t kidnapped_af
               const viewer::RunPage& played, const viewer::MapPlot& whole,
               viewer::ReportPage& page) {
   const std::string median_text =
-      track.errors_m.empty() ? "none" : fixed(100.0 * median(track.errors_m), 1) + " cm";
+      track.errors_m.empty() ? "none" : format_fixed(100.0 * median(track.errors_m), 1) + " cm";
   page.part("It tracks itself",
             {pictures_text(track.until_localised), "until a robot knew which of " +
                                                        std::to_string(track.places_at_first) +
@@ -99,7 +99,7 @@ void add_part(const DemoTrack& track, double spacing_m, std::size_t kidnapped_af
   page.text("After " + std::to_string(kidnapped_after + 1) +
             " pictures somebody carries the robot to the other crossing and tells it nothing. It "
             "counts as localised when it says so and is right to " +
-            fixed(100.0 * spacing_m, 0) + " cm.");
+            format_fixed(100.0 * spacing_m, 0) + " cm.");
   page.figures(
       {{std::to_string(track.places_at_first), "places possible after the first picture"},
        {pictures_text(track.until_localised), "until it was localised"},

@@ -136,12 +136,12 @@ void write_arrange_report(const std::filesystem::path& folder, const std::string
        "views in the largest group that holds together"}};
   const auto comparison = compare_with_ground_truth(lattice, memory);
   if (comparison) {
-    figures.emplace_back(fixed(comparison->rms_m, 2) + " m",
+    figures.emplace_back(format_fixed(comparison->rms_m, 2) + " m",
                          "from the true places, root mean square, after the best alignment");
-    figures.emplace_back(fixed(comparison->shape_difference, 4),
+    figures.emplace_back(format_fixed(comparison->shape_difference, 4),
                          "Procrustes disparity (shape difference): 0 the same shape, 1 none");
     if (comparison->trustworthiness) {
-      figures.emplace_back(fixed(100.0 * *comparison->trustworthiness, 0) + " %",
+      figures.emplace_back(format_fixed(100.0 * *comparison->trustworthiness, 0) + " %",
                            "trustworthiness: neighbours on the map that truly are");
     }
   }

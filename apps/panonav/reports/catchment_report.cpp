@@ -143,16 +143,17 @@ void write_catchment_report(const std::filesystem::path& folder, const RecordedV
           " places as what the robot sees: does the home vector point home, and where "
           "does a robot end that follows it from place to place?");
   page.figures(
-      {{fixed(result.component, 3),
+      {{format_fixed(result.component, 3),
         "average homeward component, " + std::to_string(result.pairs) + " pairs"},
-       {fixed(degrees(result.orientation_error_rad), 1) + " degrees", "error of the heading"},
-       {fixed(result.areas[1], 1) + " of " + std::to_string(result.survey.places.size()),
-        "places from which runs end within " + fixed(result.spacing_m, 2) + " m"}});
+       {format_fixed(degrees(result.orientation_error_rad), 1) + " degrees",
+        "error of the heading"},
+       {format_fixed(result.areas[1], 1) + " of " + std::to_string(result.survey.places.size()),
+        "places from which runs end within " + format_fixed(result.spacing_m, 2) + " m"}});
   page.section("Against the distance");
   page.plots(curves(result));
   page.section("Place by place");
   page.plots({{sizes, "Share of all places from which runs end within " +
-                          fixed(result.spacing_m, 2) + " m of home, home by home"}});
+                          format_fixed(result.spacing_m, 2) + " m of home, home by home"}});
   page.section("One home: " + goals.files[goal]);
   page.plots({{field(places, vectors, result, goal),
                "Home vectors, and the catchment area [S06 figure 9]"},
@@ -161,9 +162,9 @@ void write_catchment_report(const std::filesystem::path& folder, const RecordedV
   page.section("Numbers");
   std::vector<std::vector<std::string>> rows;
   for (const CatchmentBin& bin : result.bins) {
-    rows.push_back({fixed(bin.homeward.distance_m, 3), std::to_string(bin.homeward.pairs),
-                    fixed(bin.homeward.component, 3),
-                    fixed(degrees(bin.orientation_error_rad), 1)});
+    rows.push_back({format_fixed(bin.homeward.distance_m, 3), std::to_string(bin.homeward.pairs),
+                    format_fixed(bin.homeward.component, 3),
+                    format_fixed(degrees(bin.orientation_error_rad), 1)});
   }
   page.table({"distance [m]", "pairs", "homeward component", "heading error [degrees]"}, rows);
   page.write(folder, "index.html", "panonav catchment");

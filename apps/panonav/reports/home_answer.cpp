@@ -12,8 +12,8 @@ std::string in_words(double direction_rad) {
   const double off = std::abs(degrees(direction_rad));
   if (off < 0.5) return "straight ahead";
   if (off >= 179.5) return "straight behind";
-  return fixed(off, 0) + (fixed(off, 0) == "1" ? " degree" : " degrees") + " to the " +
-         (direction_rad > 0.0 ? "left" : "right");
+  return format_fixed(off, 0) + (format_fixed(off, 0) == "1" ? " degree" : " degrees") +
+         " to the " + (direction_rad > 0.0 ? "left" : "right");
 }
 
 std::string turn_in_words(double heading_rad) {

@@ -29,7 +29,7 @@ std::string caption_of(const HomeAnswer& answer) {
   const WayHome& way = answer.way;
   if (!way.direction_rad) return answer.file + ": no direction home, " + why_none(way);
   return answer.file + ": home is " + in_words(*way.direction_rad) + ", about " +
-         fixed(way.distance_r, 2) + " R away; " + turn_in_words(way.vector.heading_rad);
+         format_fixed(way.distance_r, 2) + " R away; " + turn_in_words(way.vector.heading_rad);
 }
 
 /// Arrows as long as the nearest views are apart.
@@ -102,9 +102,10 @@ void write_home_report(const std::filesystem::path& folder, const Goal& goal,
   } else if (answers.size() == 1) {
     page.figures(
         {{first.direction_rad ? in_words(*first.direction_rad) : "none", "direction home"},
-         {fixed(first.distance_r, 2) + " R", "distance, R that of the things around"},
-         {fixed(degrees(first.turn_rad), 0) + " degrees", "turn of the robot since, left positive"},
-         {fixed(first.probability, 2),
+         {format_fixed(first.distance_r, 2) + " R", "distance, R that of the things around"},
+         {format_fixed(degrees(first.turn_rad), 0) + " degrees",
+          "turn of the robot since, left positive"},
+         {format_fixed(first.probability, 2),
           "probability that the direction is right within 45 degrees"}});
   }
   page.section(goal.panorama ? "Both views" : "What the robot sees");
@@ -129,12 +130,12 @@ void write_home_report(const std::filesystem::path& folder, const Goal& goal,
   for (const HomeAnswer& answer : answers) {
     const WayHome& way = answer.way;
     const auto if_known = [&](double value, int digits) {
-      return way.known ? fixed(value, digits) : std::string("no answer");
+      return way.known ? format_fixed(value, digits) : std::string("no answer");
     };
     rows.push_back({answer.file, way.direction_rad ? in_words(*way.direction_rad) : "none",
                     if_known(way.distance_r, 3), if_known(degrees(way.turn_rad), 1),
-                    fixed(way.vector.correlation, 3), fixed(way.vector.residual, 3),
-                    fixed(way.probability, 3)});
+                    format_fixed(way.vector.correlation, 3), format_fixed(way.vector.residual, 3),
+                    format_fixed(way.probability, 3)});
   }
   page.table({"view", "direction home", "distance [R]", "turned [degrees]", "correlation",
               "residual", "probability"},

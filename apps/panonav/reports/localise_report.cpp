@@ -20,11 +20,11 @@ constexpr std::size_t max_shown = 200;
 constexpr std::size_t max_rows = 500;
 
 std::string position_text(const PositionEstimate& position) {
-  return "x " + fixed(position.x_m, 2) + " m, y " + fixed(position.y_m, 2) + " m";
+  return "x " + format_fixed(position.x_m, 2) + " m, y " + format_fixed(position.y_m, 2) + " m";
 }
 
 std::string degrees_text(double angle_rad) {
-  return fixed(degrees(angle_rad), 1) + "\u00b0";
+  return format_fixed(degrees(angle_rad), 1) + "\u00b0";
 }
 
 std::optional<double> error_m(const LocalisedQuery& query) {
@@ -51,7 +51,7 @@ recordings::RunMoment moment_of(const LocalisedQuery& query, std::size_t number,
   if (const auto& position = query.place.position) {
     moment.values.emplace_back("position", position_text(*position));
     if (position->radius_m) {
-      moment.values.emplace_back("95 % within", fixed(*position->radius_m, 2) + " m");
+      moment.values.emplace_back("95 % within", format_fixed(*position->radius_m, 2) + " m");
     }
   }
   if (const auto& heading = query.place.heading_rad) {
@@ -59,11 +59,12 @@ recordings::RunMoment moment_of(const LocalisedQuery& query, std::size_t number,
   }
   if (matches.empty()) return moment;
   moment.values.emplace_back("probability that the place is known",
-                             fixed(query.place.known_probability, 2));
+                             format_fixed(query.place.known_probability, 2));
   for (std::size_t i = 0; i < std::min<std::size_t>(3, matches.size()); ++i) {
     constexpr std::array names{"best match", "second", "third"};
-    moment.values.emplace_back(std::string("difference to the ") + names.at(i),
-                               fixed(matches[i].column_difference, 3) + ", " + matches[i].name);
+    moment.values.emplace_back(
+        std::string("difference to the ") + names.at(i),
+        format_fixed(matches[i].column_difference, 3) + ", " + matches[i].name);
   }
   if (const auto thumbnail = file.thumbnail(matches.front().view)) moment.best_match = *thumbnail;
   return moment;
@@ -82,17 +83,17 @@ void add_table(viewer::ReportPage& page, const std::vector<LocalisedQuery>& quer
     const auto& position = query.place.position;
     const auto& heading = query.place.heading_rad;
     const auto difference = [&](std::size_t match) {
-      return match < matches.size() ? fixed(matches[match].column_difference, 3) : "";
+      return match < matches.size() ? format_fixed(matches[match].column_difference, 3) : "";
     };
     const auto error = error_m(query);
     const auto dissimilarity = [&](std::size_t match) {
       return match < matches.size() ? std::to_string(matches[match].dissimilarity) : "";
     };
     rows.push_back({query.file, answer_text(query),
-                    query.error.empty() ? fixed(query.place.known_probability, 2) : "",
+                    query.error.empty() ? format_fixed(query.place.known_probability, 2) : "",
                     position ? position_text(*position) : "", heading ? degrees_text(*heading) : "",
-                    error ? fixed(*error, 2) : "", difference(0), difference(1), dissimilarity(0),
-                    dissimilarity(1)});
+                    error ? format_fixed(*error, 2) : "", difference(0), difference(1),
+                    dissimilarity(0), dissimilarity(1)});
   }
   page.text(
       "Difference and dissimilarity (of the signatures) are to the best match and to the next.");
@@ -113,7 +114,7 @@ std::vector<std::pair<std::string, std::string>> summarise(
   std::vector<std::pair<std::string, std::string>> summary{
       {std::to_string(known) + " of " + std::to_string(readable), "pictures show a known place"}};
   if (!errors.empty()) {
-    summary.emplace_back(fixed(median(errors), 2) + " m", "median error of the position");
+    summary.emplace_back(format_fixed(median(errors), 2) + " m", "median error of the position");
   }
   if (readable < queries.size()) {
     summary.emplace_back(std::to_string(queries.size() - readable), "could not be read");

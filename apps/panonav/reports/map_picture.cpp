@@ -137,13 +137,13 @@ void write_map_report(const std::filesystem::path& folder, const std::string& na
   }
   const auto comparison = compare_with_ground_truth(recording, run);
   if (comparison) {
-    figures.emplace_back(fixed(comparison->rms_m, 2) + " m",
+    figures.emplace_back(format_fixed(comparison->rms_m, 2) + " m",
                          "from the true way, root mean square, after the best alignment" +
                              std::string(run.wheels ? "" : " with a free scale"));
-    figures.emplace_back(fixed(comparison->shape_difference, 4),
+    figures.emplace_back(format_fixed(comparison->shape_difference, 4),
                          "Procrustes disparity (shape difference): 0 the same shape, 1 none");
     if (comparison->odometry_shape_difference) {
-      figures.emplace_back(fixed(*comparison->odometry_shape_difference, 4),
+      figures.emplace_back(format_fixed(*comparison->odometry_shape_difference, 4),
                            "the same of the wheels alone");
     }
   }

@@ -20,12 +20,12 @@ void write_navigate_report(const std::filesystem::path& folder, const MissionRep
       {std::string(name_of(run.end)), mission.reason},
       {std::to_string(run.decisions.size()), "steps, a picture and a decision each"}};
   if (std::isfinite(run.end_distance_m)) {
-    figures.emplace_back(fixed(100.0 * run.end_distance_m, 0) + " cm",
+    figures.emplace_back(format_fixed(100.0 * run.end_distance_m, 0) + " cm",
                          "from where the goal's view was taken");
   }
-  figures.emplace_back(fixed(run.travelled_m, 1) + " m",
+  figures.emplace_back(format_fixed(run.travelled_m, 1) + " m",
                        std::isfinite(run.shortest_m)
-                           ? "driven; the shortest way is " + fixed(run.shortest_m, 1) + " m"
+                           ? "driven; the shortest way is " + format_fixed(run.shortest_m, 1) + " m"
                            : "driven");
   page.figures(figures);
   page.section("The mission, decision by decision");

@@ -184,7 +184,7 @@ void add_figure(std::vector<std::pair<std::string, std::string>>& figures,
                 const std::vector<double>& errors, double scale, int digits,
                 const std::string& unit, const std::string& meaning) {
   if (errors.empty()) return;
-  figures.emplace_back(fixed(scale * median(errors), digits) + unit, meaning);
+  figures.emplace_back(format_fixed(scale * median(errors), digits) + unit, meaning);
 }
 
 }  // namespace
@@ -200,9 +200,9 @@ void write_record_report(const std::filesystem::path& folder, const std::string&
       "its camera sees at its own height, and that is all it needs to follow the way "
       "again.");
   page.figures(
-      {{fixed(route.length_m(), 1) + " m", "long"},
+      {{format_fixed(route.length_m(), 1) + " m", "long"},
        {std::to_string(route.size()), "lines of " + std::to_string(route.columns()) + " pixels"},
-       {fixed(1e-6 * bytes_per_km, 2) + " MB", "a kilometre in the memory"}});
+       {format_fixed(1e-6 * bytes_per_km, 2) + " MB", "a kilometre in the memory"}});
   page.section("The route panorama");
   page.text(
       "Each row is one place, the start at the bottom, the end on top; from left to right all "
@@ -263,7 +263,7 @@ void write_follow_report(const std::filesystem::path& folder, const FollowedRout
         "scene is not as it was.");
     std::vector<std::vector<std::string>> rows;
     for (const auto& [from_m, to_m] : stretches) {
-      rows.push_back({fixed(from_m, 2) + " m", fixed(to_m, 2) + " m"});
+      rows.push_back({format_fixed(from_m, 2) + " m", format_fixed(to_m, 2) + " m"});
     }
     page.table({"from", "to"}, rows);
   }

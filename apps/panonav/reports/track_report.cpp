@@ -74,21 +74,22 @@ std::vector<std::vector<std::string>> stretches(const std::vector<TrackedImage>&
       if (const auto error = position_error_m(images[end])) errors.push_back(*error);
     }
     const std::string from = std::to_string(begin + 1);
-    rows.push_back({end == begin + 1 ? from : from + " to " + std::to_string(end),
-                    std::string(name_of(state)),
-                    errors.empty() ? "-" : fixed(median(errors), 3) + " m",
-                    errors.empty() ? "-" : fixed(*std::ranges::max_element(errors), 3) + " m"});
+    rows.push_back(
+        {end == begin + 1 ? from : from + " to " + std::to_string(end), std::string(name_of(state)),
+         errors.empty() ? "-" : format_fixed(median(errors), 3) + " m",
+         errors.empty() ? "-" : format_fixed(*std::ranges::max_element(errors), 3) + " m"});
     begin = end;
   }
   return rows;
 }
 
 std::string share_text(std::size_t count, std::size_t total) {
-  return fixed(100.0 * static_cast<double>(count) / static_cast<double>(total), 0) + " %";
+  return format_fixed(100.0 * static_cast<double>(count) / static_cast<double>(total), 0) + " %";
 }
 
 std::string length_text(double length_m) {
-  return length_m < 1.0 ? fixed(100.0 * length_m, 1) + " cm" : fixed(length_m, 1) + " m";
+  return length_m < 1.0 ? format_fixed(100.0 * length_m, 1) + " cm"
+                        : format_fixed(length_m, 1) + " m";
 }
 
 std::vector<std::pair<std::string, std::string>> main_figures(const TrackSummary& summary,
@@ -103,7 +104,7 @@ std::vector<std::pair<std::string, std::string>> main_figures(const TrackSummary
                          "holds 95 % of these errors");
   }
   if (!summary.heading_errors_rad.empty()) {
-    figures.emplace_back(fixed(degrees(median(summary.heading_errors_rad)), 1) + " degrees",
+    figures.emplace_back(format_fixed(degrees(median(summary.heading_errors_rad)), 1) + " degrees",
                          "median error of the heading");
   }
   return figures;
@@ -134,7 +135,7 @@ void write_track_report(const std::filesystem::path& folder, const VisualMemory&
   page.text(
       "Each small dot is a particle, a place where the robot may be. Grey dots are the remembered "
       "views, " +
-      fixed(100.0 * spacing_m, 0) +
+      format_fixed(100.0 * spacing_m, 0) +
       " cm apart. The large dot is the estimate, the mean of the heaviest group of particles; it "
       "is missing where the robot is lost." +
       std::string(truth_known ? " The ring is where the robot truly is." : ""));

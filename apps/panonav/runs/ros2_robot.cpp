@@ -36,8 +36,9 @@ ExitCode Ros2Robot::run(const simulation::SimulatedWorld& world, Session& sessio
        }},
       world.options().odometry, seed, [&](const std::string& line) { session.note(line); });
   const StopSignals signals([&] { robot.stop(); });
-  session.note("panonav simulate: a robot is in " + scene.name + " at " + fixed(start.x_m, 2) +
-               ", " + fixed(start.y_m, 2) + "; it obeys cmd_vel, and Ctrl-C ends it");
+  session.note("panonav simulate: a robot is in " + scene.name + " at " +
+               format_fixed(start.x_m, 2) + ", " + format_fixed(start.y_m, 2) +
+               "; it obeys cmd_vel, and Ctrl-C ends it");
   robot.run();
   return ExitCode::done;
 }

@@ -153,12 +153,14 @@ void print_result(const Lattice& lattice, const VisualMemory& memory, Session& s
   }
   if (const auto comparison = compare_with_ground_truth(lattice, memory)) {
     session.print("beside the ground truth: Procrustes disparity (shape difference) " +
-                  session.strong(fixed(comparison->shape_difference, 4)) + " over " +
-                  std::to_string(comparison->compared) + " views, " + fixed(comparison->rms_m, 2) +
-                  " m rms with a free scale of " + fixed(comparison->scale, 3));
+                  session.strong(format_fixed(comparison->shape_difference, 4)) + " over " +
+                  std::to_string(comparison->compared) + " views, " +
+                  format_fixed(comparison->rms_m, 2) + " m rms with a free scale of " +
+                  format_fixed(comparison->scale, 3));
     if (comparison->trustworthiness) {
-      session.print("neighbours kept: trustworthiness " + fixed(*comparison->trustworthiness, 3) +
-                    ", continuity " + fixed(*comparison->continuity, 3));
+      session.print("neighbours kept: trustworthiness " +
+                    format_fixed(*comparison->trustworthiness, 3) + ", continuity " +
+                    format_fixed(*comparison->continuity, 3));
     }
   }
 }

@@ -114,7 +114,7 @@ std::vector<DatasetEntry> entries_of(const std::string& input, const CalibrateAr
   }
   std::vector<DatasetEntry> all = open_recording(input, wanted.pictures, any, session).entries;
   if (all.size() <= max_pictures) return all;
-  session.note("of the " + std::to_string(all.size()) + " pictures of " + readable_line(input) +
+  session.note("of the " + std::to_string(all.size()) + " pictures of " + to_readable_line(input) +
                " " + std::to_string(max_pictures) + " are taken, evenly spread");
   std::vector<DatasetEntry> some;
   for (std::size_t i = 0; i < max_pictures; ++i) {
@@ -189,26 +189,27 @@ ordered_json as_json(const CalibrateArguments& wanted, std::size_t images,
 
 void print_text(const Arguments& arguments, const CalibrateArguments& wanted, bool several,
                 const MirrorCircle& mirror, const Camera& camera, Session& session) {
-  session.print(session.strong("mirror found") + ": centre " + fixed(mirror.centre.u_px, 1) + ", " +
-                fixed(mirror.centre.v_px, 1) + " px, rim radius " + fixed(mirror.rim_radius_px, 1) +
-                " px, inner radius " + fixed(camera.inner_radius_px, 1) + " px" +
+  session.print(session.strong("mirror found") + ": centre " + format_fixed(mirror.centre.u_px, 1) +
+                ", " + format_fixed(mirror.centre.v_px, 1) + " px, rim radius " +
+                format_fixed(mirror.rim_radius_px, 1) + " px, inner radius " +
+                format_fixed(camera.inner_radius_px, 1) + " px" +
                 (mirror.inner_radius_px || wanted.inner_radius_px
                      ? ""
                      : " (none found; give --inner-radius-px)"));
-  session.print("quality " + fixed(mirror.quality, 2) + " of 1, edges within " +
-                fixed(mirror.residual_px, 2) + " px of the rim");
+  session.print("quality " + format_fixed(mirror.quality, 2) + " of 1, edges within " +
+                format_fixed(mirror.residual_px, 2) + " px of the rim");
   if (const auto spread = agreement(mirror)) {
     session.print("over the " + std::to_string(spread->images) +
                   " images that show the rim alone, the centre varies by " +
-                  fixed(spread->centre_u_px, 2) + ", " + fixed(spread->centre_v_px, 2) +
-                  " px and the radius by " + fixed(spread->rim_radius_px, 2) +
-                  " px (standard deviations)");
+                  format_fixed(spread->centre_u_px, 2) + ", " +
+                  format_fixed(spread->centre_v_px, 2) + " px and the radius by " +
+                  format_fixed(spread->rim_radius_px, 2) + " px (standard deviations)");
   }
   if (!arguments.given("mirror")) {
     session.print(
         "A picture does not show the mirror's profile: elevations are taken to run evenly from " +
-        short_number(wanted.mirror.inner_elevation_deg) + " degrees at the inner radius to " +
-        short_number(wanted.mirror.rim_elevation_deg) +
+        format_number(wanted.mirror.inner_elevation_deg) + " degrees at the inner radius to " +
+        format_number(wanted.mirror.rim_elevation_deg) +
         " at the rim. Say what you know with --profile, --rim-elevation-deg and their companions.");
   }
   session.suggest({"panonav", "unwrap", wanted.inputs.front(), "--camera", wanted.out, "-o",
@@ -286,13 +287,14 @@ ExitCode calibrate_lenses(const CalibrateArguments& wanted, const std::vector<st
   }
   const auto& lenses = std::get<DualFisheyeModel>(found.camera.model).lenses;
   session.print(session.strong("two lenses found") + ": " +
-                fixed(degrees(2 * lenses[0].max_angle_rad), 1) + " and " +
-                fixed(degrees(2 * lenses[1].max_angle_rad), 1) + " degrees, brightness 1 to " +
-                fixed(lenses[1].gain / lenses[0].gain, 2));
+                format_fixed(degrees(2 * lenses[0].max_angle_rad), 1) + " and " +
+                format_fixed(degrees(2 * lenses[1].max_angle_rad), 1) +
+                " degrees, brightness 1 to " + format_fixed(lenses[1].gain / lenses[0].gain, 2));
   session.print(std::to_string(found.matches) + " patches found again, " +
-                fixed(100 * found.inlier_share, 0) + " % of those with structure, within " +
-                fixed(degrees(found.residual_rad), 3) + " degrees");
-  session.print("azimuths are uncertain by " + fixed(degrees(found.azimuth_deviation_rad), 3) +
+                format_fixed(100 * found.inlier_share, 0) + " % of those with structure, within " +
+                format_fixed(degrees(found.residual_rad), 3) + " degrees");
+  session.print("azimuths are uncertain by " +
+                format_fixed(degrees(found.azimuth_deviation_rad), 3) +
                 " degrees (standard deviation, far things)");
   session.suggest({"panonav", "unwrap", wanted.inputs.front(), "--camera", wanted.out,
                    "--elevation-deg", "-40", "40", "-o", "panorama.png"});

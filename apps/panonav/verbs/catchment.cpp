@@ -88,13 +88,13 @@ ordered_json as_json(const CatchmentArguments& wanted, const RecordedViews& goal
 
 void print_text(const CatchmentArguments& wanted, const CatchmentResult& result, Session& session) {
   const std::string range =
-      wanted.settings.up_to_m ? " up to " + short_number(*wanted.settings.up_to_m) + " m" : "";
+      wanted.settings.up_to_m ? " up to " + format_number(*wanted.settings.up_to_m) + " m" : "";
   session.print("Average homeward component over " + std::to_string(result.pairs) + " pairs" +
-                range + ": " + session.strong(fixed(result.component, 3)) +
+                range + ": " + session.strong(format_fixed(result.component, 3)) +
                 " (1: straight home, 0: chance)");
-  session.print("  heading off by " + fixed(degrees(result.orientation_error_rad), 1) +
+  session.print("  heading off by " + format_fixed(degrees(result.orientation_error_rad), 1) +
                 " degrees (circular standard deviation); a home vector of length 1 is worth " +
-                fixed(result.typical_distance_m, 2) + " m");
+                format_fixed(result.typical_distance_m, 2) + " m");
   session.print("  distance [m]  pairs     homeward  heading error [degrees]");
   for (const CatchmentBin& bin : result.bins) {
     // Rounding of a distance must not take its bin away.
@@ -104,18 +104,18 @@ void print_text(const CatchmentArguments& wanted, const CatchmentResult& result,
       text.resize(std::max(width, text.size()), ' ');
       return text;
     };
-    session.print("  " + padded(fixed(bin.homeward.distance_m, 3), 14) +
+    session.print("  " + padded(format_fixed(bin.homeward.distance_m, 3), 14) +
                   padded(std::to_string(bin.homeward.pairs), 10) +
-                  padded(fixed(bin.homeward.component, 3), 10) +
-                  fixed(degrees(bin.orientation_error_rad), 1));
+                  padded(format_fixed(bin.homeward.component, 3), 10) +
+                  format_fixed(degrees(bin.orientation_error_rad), 1));
   }
   session.print("Runs home over the " + std::to_string(result.survey.places.size()) + " places, " +
-                fixed(result.spacing_m, 3) + " m apart; mean catchment area:");
+                format_fixed(result.spacing_m, 3) + " m apart; mean catchment area:");
   const auto places = static_cast<double>(result.survey.places.size());
   for (std::size_t i = 0; i < result.areas.size(); ++i) {
-    session.print("  ending within " + fixed(result.accepted_m[i], 3) + " m: from " +
-                  fixed(result.areas[i], 1) + " places (" +
-                  fixed(100.0 * result.areas[i] / places, 0) + " %)");
+    session.print("  ending within " + format_fixed(result.accepted_m[i], 3) + " m: from " +
+                  format_fixed(result.areas[i], 1) + " places (" +
+                  format_fixed(100.0 * result.areas[i] / places, 0) + " %)");
   }
 }
 
@@ -150,12 +150,12 @@ ExitCode look_ahead(const CatchmentArguments& wanted, const RecordedViews& views
     const double degrees_left = degrees(mean->direction_rad);
     session.print("From each of " + std::to_string(directions.size()) + " views to the one " +
                   std::to_string(ahead) + " later: on average " +
-                  session.strong(fixed(std::abs(degrees_left), 1) + " degrees to the " +
+                  session.strong(format_fixed(std::abs(degrees_left), 1) + " degrees to the " +
                                  (degrees_left > 0.0 ? "left" : "right")) +
                   " of straight ahead");
-    session.print("  resultant length " + fixed(mean->resultant_length, 3) +
+    session.print("  resultant length " + format_fixed(mean->resultant_length, 3) +
                   " (1: all the same), spread " +
-                  fixed(degrees(circular_standard_deviation(*mean)), 1) + " degrees, " +
+                  format_fixed(degrees(circular_standard_deviation(*mean)), 1) + " degrees, " +
                   std::to_string(sideways) + " point backwards");
   } else {
     session.print(session.bad("no common direction"));
@@ -216,10 +216,10 @@ std::vector<int> read_stages(const std::string& text, int most) {
 
 ExitCode catchment(const Arguments& arguments, const CatchmentArguments& wanted, Session& session) {
   if (wanted.settings.up_to_m && !(*wanted.settings.up_to_m > 0.0)) {
-    throw UsageError("--up-to-m is " + short_number(*wanted.settings.up_to_m) + "; allowed: > 0");
+    throw UsageError("--up-to-m is " + format_number(*wanted.settings.up_to_m) + "; allowed: > 0");
   }
   if (wanted.settings.bin_m && !(*wanted.settings.bin_m > 0.0)) {
-    throw UsageError("--bin-m is " + short_number(*wanted.settings.bin_m) + "; allowed: > 0");
+    throw UsageError("--bin-m is " + format_number(*wanted.settings.bin_m) + "; allowed: > 0");
   }
   CatchmentSettings settings = wanted.settings;
   settings.homing =

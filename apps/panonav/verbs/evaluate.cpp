@@ -98,9 +98,10 @@ ordered_json as_json(const TrajectoryError& error) {
 }
 
 std::string line_of(const std::string& label, const ErrorSummary& errors, double unit, int digits) {
-  return label + "  RMSE " + fixed(errors.rms * unit, digits) + "  median " +
-         fixed(errors.median * unit, digits) + "  95 % within " + fixed(errors.p95 * unit, digits) +
-         "  maximum " + fixed(errors.largest * unit, digits);
+  return label + "  RMSE " + format_fixed(errors.rms * unit, digits) + "  median " +
+         format_fixed(errors.median * unit, digits) + "  95 % within " +
+         format_fixed(errors.p95 * unit, digits) + "  maximum " +
+         format_fixed(errors.largest * unit, digits);
 }
 
 Trajectory read(const std::string& path) {
@@ -171,13 +172,13 @@ MapFigures compare_as_map(const Estimate& estimate, const Trajectory& truth, dou
 
 void print_figures(const MapFigures& figures, Session& session) {
   if (figures.shape) {
-    session.print("Procrustes disparity " + fixed(figures.shape->value, 4) +
-                  "  with a reflection allowed " + fixed(figures.shape->with_reflection, 4));
+    session.print("Procrustes disparity " + format_fixed(figures.shape->value, 4) +
+                  "  with a reflection allowed " + format_fixed(figures.shape->with_reflection, 4));
   }
   if (figures.neighbours) {
     session.print("neighbours kept      trustworthiness " +
-                  fixed(figures.neighbours->trustworthiness, 3) + "  continuity " +
-                  fixed(figures.neighbours->continuity, 3));
+                  format_fixed(figures.neighbours->trustworthiness, 3) + "  continuity " +
+                  format_fixed(figures.neighbours->continuity, 3));
   }
   if (figures.closures) {
     session.print("loop closures        right " + std::to_string(figures.closures->right) +

@@ -24,9 +24,9 @@ void describe(recordings::RunMoment& moment, const FollowedImage& image) {
   moment.pose = image.fix->pose;
   moment.covariance = image.fix->covariance;
   moment.values = {{"origin", std::string(name_of(image.fix->origin))},
-                   {"along_m", fixed(image.fix->along_m, 3)},
-                   {"lateral_m", fixed(image.fix->lateral_m, 3)},
-                   {"correlation", fixed(image.fix->correlation, 4)},
+                   {"along_m", format_fixed(image.fix->along_m, 3)},
+                   {"lateral_m", format_fixed(image.fix->lateral_m, 3)},
+                   {"correlation", format_fixed(image.fix->correlation, 4)},
                    {"changed", std::to_string(image.changed.size())}};
 }
 

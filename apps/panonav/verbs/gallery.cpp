@@ -35,7 +35,7 @@ struct GalleryArguments {
 using Groups = std::vector<std::pair<std::string, std::vector<ViewRecord>>>;
 
 std::string span_text(double index, double side_m) {
-  return short_number(index * side_m) + " to " + short_number((index + 1.0) * side_m) + " m";
+  return format_number(index * side_m) + " to " + format_number((index + 1.0) * side_m) + " m";
 }
 
 /// Squares of the plane with eight views each or more in the mean, row by row from the upper left
@@ -99,8 +99,8 @@ std::string picture_of(const MemoryFile& memory, const ViewRecord& view) {
 std::string caption_of(const ViewRecord& view, bool pictured) {
   std::string text = std::to_string(view.view.value) + ": " + view.info.name;
   if (const auto& pose = view.info.pose) {
-    text += ", x " + fixed(pose->x_m, 2) + " y " + fixed(pose->y_m, 2) + " m";
-    if (pose->heading_rad) text += ", " + fixed(degrees(*pose->heading_rad), 0) + "\u00b0";
+    text += ", x " + format_fixed(pose->x_m, 2) + " y " + format_fixed(pose->y_m, 2) + " m";
+    if (pose->heading_rad) text += ", " + format_fixed(degrees(*pose->heading_rad), 0) + "\u00b0";
   }
   return pictured ? text : text + "; no thumbnail";
 }

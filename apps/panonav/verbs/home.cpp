@@ -56,10 +56,11 @@ ordered_json as_json(const std::string& goal, const HomeAnswer& answer) {
 std::string as_text(const HomeAnswer& answer, Session& session) {
   const WayHome& way = answer.way;
   if (!way.known) return answer.file + "  " + session.bad("no answer") + ": " + why_none(way);
-  const std::string sure = "; probability " + fixed(way.probability, 2);
+  const std::string sure = "; probability " + format_fixed(way.probability, 2);
   if (way.direction_rad) {
     return answer.file + "  home is " + session.good(in_words(*way.direction_rad)) + ", about " +
-           fixed(way.distance_r, 2) + " R away; " + turn_in_words(way.vector.heading_rad) + sure;
+           format_fixed(way.distance_r, 2) + " R away; " + turn_in_words(way.vector.heading_rad) +
+           sure;
   }
   return answer.file + "  " + session.bad("no direction home") + ": " + why_none(way) + sure;
 }

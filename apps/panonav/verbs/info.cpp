@@ -108,18 +108,18 @@ ExitCode show(const std::string& path, Session& session) {
   session.print("  pictures    " + std::string(kind_name(header.source.kind)) + ", " +
                 std::to_string(header.panorama_columns) + " columns, elevations " +
                 (header.elevations
-                     ? short_number(degrees(header.elevations->bottom_rad)) + " to " +
-                           short_number(degrees(header.elevations->top_rad)) + " degrees"
+                     ? format_number(degrees(header.elevations->bottom_rad)) + " to " +
+                           format_number(degrees(header.elevations->top_rad)) + " degrees"
                      : std::string("unknown")));
   session.print("  file        " + std::to_string(info.file_bytes) + " bytes, format " +
                 std::to_string(info.format_version) + ", " + std::to_string(info.thumbnails) +
                 " thumbnails");
   for (const auto& [name, lines, length_m, bytes] : routes_of(memory)) {
     session.print("  route       " + name + ": " + std::to_string(lines) + " lines over " +
-                  fixed(length_m, 1) + " m, " +
-                  (length_m > 0.0
-                       ? fixed(1e-3 * static_cast<double>(bytes) / length_m, 2) + " MB a kilometre"
-                       : std::to_string(bytes) + " bytes"));
+                  format_fixed(length_m, 1) + " m, " +
+                  (length_m > 0.0 ? format_fixed(1e-3 * static_cast<double>(bytes) / length_m, 2) +
+                                        " MB a kilometre"
+                                  : std::to_string(bytes) + " bytes"));
   }
   return ExitCode::done;
 }
@@ -162,17 +162,18 @@ ExitCode show_recording(const std::string& path, Session& session) {
   session.print(session.strong(path) + ": " + std::to_string(messages) + " messages of " +
                 std::to_string(summary.topics.size()) + " topics" +
                 (summary.time
-                     ? " in " + fixed(seconds(summary.time->end_ns - summary.time->begin_ns), 1) +
-                           " s from " + fixed(seconds(summary.time->begin_ns), 3) + " s on"
+                     ? " in " +
+                           format_fixed(seconds(summary.time->end_ns - summary.time->begin_ns), 1) +
+                           " s from " + format_fixed(seconds(summary.time->begin_ns), 3) + " s on"
                      : ""));
   const auto padded = [](std::string text, std::size_t width) {
     text.resize(std::max(width, text.size()), ' ');
-    return readable_line(text);
+    return to_readable_line(text);
   };
   for (const auto& [topic, time, rate_hz, shows] : summary.topics) {
     session.print("  " + padded(topic.name, name_width) + "  " + padded(topic.type, type_width) +
                   "  " + std::to_string(topic.messages) +
-                  (rate_hz ? ", " + short_number(*rate_hz, {}, 3) + " a second" : "") +
+                  (rate_hz ? ", " + format_number(*rate_hz, {}, 3) + " a second" : "") +
                   (shows ? ", " + *shows : ""));
   }
   for (const std::string& warning : summary.warnings) session.note(path + ": " + warning);
@@ -212,7 +213,7 @@ ExitCode show_video(const std::string& path, Session& session) {
   }
   session.print(session.strong(std::to_string(video.entries.size()) + " pictures") + " of " +
                 std::to_string(size.width) + " x " + std::to_string(size.height) + " px, from " +
-                short_number(begin_s) + " s to " + short_number(end_s) + " s");
+                format_number(begin_s) + " s to " + format_number(end_s) + " s");
   return ExitCode::done;
 }
 

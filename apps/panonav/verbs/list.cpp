@@ -48,16 +48,19 @@ std::size_t width_of(const std::string& text) {
 std::vector<std::string> table_of(const std::vector<ViewRecord>& views) {
   const std::vector<Column> columns{
       {"id", [](const ViewRecord& v) { return std::to_string(v.view.value); }},
-      {"name", [](const ViewRecord& v) { return shortened(readable_line(v.info.name), 60); }, true},
-      {"x [m]", [](const ViewRecord& v) { return v.info.pose ? fixed(v.info.pose->x_m, 2) : ""; }},
-      {"y [m]", [](const ViewRecord& v) { return v.info.pose ? fixed(v.info.pose->y_m, 2) : ""; }},
+      {"name",
+       [](const ViewRecord& v) { return shorten_middle(to_readable_line(v.info.name), 60); }, true},
+      {"x [m]",
+       [](const ViewRecord& v) { return v.info.pose ? format_fixed(v.info.pose->x_m, 2) : ""; }},
+      {"y [m]",
+       [](const ViewRecord& v) { return v.info.pose ? format_fixed(v.info.pose->y_m, 2) : ""; }},
       {"heading [deg]",
        [](const ViewRecord& v) {
          const auto& pose = v.info.pose;
-         return pose && pose->heading_rad ? fixed(degrees(*pose->heading_rad), 1) : "";
+         return pose && pose->heading_rad ? format_fixed(degrees(*pose->heading_rad), 1) : "";
        }},
       {"stamp [s]",
-       [](const ViewRecord& v) { return v.info.stamp_s ? fixed(*v.info.stamp_s, 3) : ""; }},
+       [](const ViewRecord& v) { return v.info.stamp_s ? format_fixed(*v.info.stamp_s, 3) : ""; }},
       {"links", [](const ViewRecord& v) { return v.links > 0 ? std::to_string(v.links) : ""; }},
       {"component",
        [](const ViewRecord& v) { return v.component ? std::to_string(*v.component) : ""; }},
@@ -84,7 +87,7 @@ std::vector<std::string> table_of(const std::vector<ViewRecord>& views) {
 
 std::string named(const std::string& what, const std::vector<std::string>& names) {
   std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + readable_line(name);
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + to_readable_line(name);
   return names.empty() ? "" : "; " + what + ": " + text;
 }
 

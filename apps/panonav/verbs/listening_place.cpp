@@ -19,7 +19,7 @@ ListeningPlace listening_place(std::string_view flag, const std::string& text) {
   in_addr ignored{};
   if (error != std::errc() || end != to || place.port < 0 || place.port > 65535 ||
       inet_pton(AF_INET, place.address.c_str(), &ignored) != 1) {
-    throw UsageError(std::string(flag) + " is " + readable_line(text) +
+    throw UsageError(std::string(flag) + " is " + to_readable_line(text) +
                      "; allowed: a port, 0 to 65535, or an IPv4 address of this machine with a " +
                      "port, such as 192.168.1.5:8080");
   }

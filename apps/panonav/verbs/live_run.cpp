@@ -87,7 +87,7 @@ class SkipNotes {
     next_ = now + std::chrono::seconds(1);
     session_.note(
         "skipped: " + (unsaid_ > 1 ? std::to_string(unsaid_) + " pictures, the last: " : "") +
-        readable_line(why));
+        to_readable_line(why));
     unsaid_ = 0;
   }
 
@@ -171,9 +171,9 @@ std::string events_text(const LiveCounts& counts, std::size_t moments_left_out) 
   add(counts.lines_left_out, "lines were not printed for a slow reader");
   add(moments_left_out, "moments were not recorded on a slow disk");
   if (!counts.delays_ms.empty()) {
-    text += "; from arrival to answer " + fixed(quantile(counts.delays_ms, 0.5), 1) +
-            " ms median (decoding " + fixed(quantile(counts.decoding_ms, 0.5), 1) + "), " +
-            fixed(quantile(counts.delays_ms, 0.99), 1) + " ms in 99 %";
+    text += "; from arrival to answer " + format_fixed(quantile(counts.delays_ms, 0.5), 1) +
+            " ms median (decoding " + format_fixed(quantile(counts.decoding_ms, 0.5), 1) + "), " +
+            format_fixed(quantile(counts.delays_ms, 0.99), 1) + " ms in 99 %";
   }
   return text;
 }

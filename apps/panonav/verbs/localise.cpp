@@ -57,28 +57,28 @@ constexpr std::string_view csv_header =
 std::string csv_row(const LocalisedQuery& answer) {
   const Place& place = answer.place;
   const auto& position = place.position;
-  std::string row = csv_field(answer.file);
+  std::string row = to_csv_field(answer.file);
   const auto add = [&row](const std::string& field) {
     row += ',';
     row += field;
   };
   const auto add_degrees = [&](const std::optional<double>& angle_rad) {
-    add(angle_rad ? to_text(written_degrees(*angle_rad)) : "");
+    add(angle_rad ? to_text(round_trip_degrees(*angle_rad)) : "");
   };
   add(!answer.error.empty() ? "unreadable" : place.known ? "known" : "unknown");
-  add(answer.error.empty() ? fixed(place.known_probability, 4) : "");
+  add(answer.error.empty() ? format_fixed(place.known_probability, 4) : "");
   add(position ? to_text(position->x_m) : "");
   add(position ? to_text(position->y_m) : "");
   add(position && position->radius_m ? to_text(*position->radius_m) : "");
   add_degrees(place.heading_rad);
   for (std::size_t i = 0; i < 2; ++i) {
     const PlaceMatch* const match = i < place.matches.size() ? &place.matches[i] : nullptr;
-    add(match ? csv_field(match->name) : "");
+    add(match ? to_csv_field(match->name) : "");
     add(match ? std::to_string(match->dissimilarity) : "");
     add(match ? to_text(match->column_difference) : "");
     if (i == 0) add_degrees(match ? match->heading_rad : std::nullopt);
   }
-  add(answer.error.empty() ? "" : csv_field(readable_line(answer.error)));
+  add(answer.error.empty() ? "" : to_csv_field(to_readable_line(answer.error)));
   return row + '\n';
 }
 
@@ -181,7 +181,7 @@ void check(const Arguments& arguments, const LocaliseArguments& wanted,
 
 /// All answers, told as they come. What cannot be read is named; throws where nothing can.
 void print_answer(const LocalisedQuery& query, const LocaliseArguments& wanted, Session& session) {
-  if (!query.error.empty()) session.note("skipped: " + readable_line(query.error));
+  if (!query.error.empty()) session.note("skipped: " + to_readable_line(query.error));
   if (session.json()) {
     session.print(json_line(as_json(query, wanted.areas)));
   } else if (query.error.empty()) {

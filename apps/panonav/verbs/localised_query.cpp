@@ -34,27 +34,28 @@ std::string as_text(const LocalisedQuery& answer, Session& session) {
   const PlaceMatch& nearest = found.matches.front();
   if (!found.known) {
     return line + session.bad("unknown place") + "  (probability " +
-           fixed(found.known_probability, 2) + "; most similar: " + nearest.name + ")";
+           format_fixed(found.known_probability, 2) + "; most similar: " + nearest.name + ")";
   }
-  line +=
-      session.good("near " + nearest.name) + "  probability " + fixed(found.known_probability, 2);
+  line += session.good("near " + nearest.name) + "  probability " +
+          format_fixed(found.known_probability, 2);
   if (found.position) {
-    line +=
-        "  x " + fixed(found.position->x_m, 2) + " m  y " + fixed(found.position->y_m, 2) + " m";
-    if (found.position->radius_m) line += "  within " + fixed(*found.position->radius_m, 2) + " m";
+    line += "  x " + format_fixed(found.position->x_m, 2) + " m  y " +
+            format_fixed(found.position->y_m, 2) + " m";
+    if (found.position->radius_m)
+      line += "  within " + format_fixed(*found.position->radius_m, 2) + " m";
   }
   if (found.heading_rad) {
-    line += "  heading " + fixed(degrees(*found.heading_rad), 1) + " degrees";
+    line += "  heading " + format_fixed(degrees(*found.heading_rad), 1) + " degrees";
   } else if (nearest.heading_rad) {
-    line += "  turned " + fixed(degrees(*nearest.heading_rad), 1) + " degrees from it";
+    line += "  turned " + format_fixed(degrees(*nearest.heading_rad), 1) + " degrees from it";
   }
   for (const auto& level : found.areas) {
     line += "\n    " + std::to_string(level.components) +
             (level.components == 1 ? " component: " : " components: ") +
             std::to_string(level.candidates.size()) +
             (level.candidates.size() == 1 ? " view" : " views");
-    if (level.area_m2) line += ", " + fixed(*level.area_m2, 2) + " m2";
-    if (level.region) line += ", within " + fixed(level.region->radius_m, 2) + " m";
+    if (level.area_m2) line += ", " + format_fixed(*level.area_m2, 2) + " m2";
+    if (level.region) line += ", within " + format_fixed(level.region->radius_m, 2) + " m";
   }
   return line;
 }

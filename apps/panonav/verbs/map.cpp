@@ -91,16 +91,17 @@ ordered_json as_json(const MapComparison& comparison) {
 
 void print_comparison(const MapComparison& comparison, const MappedRun& run, Session& session) {
   session.print("beside the ground truth: Procrustes disparity (shape difference) " +
-                session.strong(fixed(comparison.shape_difference, 4)) + ", " +
-                fixed(comparison.rms_m, 2) + " m rms" +
-                (run.wheels ? "" : " with a free scale of " + fixed(comparison.scale, 2)));
+                session.strong(format_fixed(comparison.shape_difference, 4)) + ", " +
+                format_fixed(comparison.rms_m, 2) + " m rms" +
+                (run.wheels ? "" : " with a free scale of " + format_fixed(comparison.scale, 2)));
   if (comparison.odometry_shape_difference) {
     session.print("the wheels alone: Procrustes disparity " +
-                  fixed(*comparison.odometry_shape_difference, 4));
+                  format_fixed(*comparison.odometry_shape_difference, 4));
   }
   if (comparison.trustworthiness) {
-    session.print("neighbours kept: trustworthiness " + fixed(*comparison.trustworthiness, 3) +
-                  ", continuity " + fixed(*comparison.continuity, 3));
+    session.print("neighbours kept: trustworthiness " +
+                  format_fixed(*comparison.trustworthiness, 3) + ", continuity " +
+                  format_fixed(*comparison.continuity, 3));
   }
   session.print("closures: right " + std::to_string(comparison.right_closures) + ", wrong " +
                 std::to_string(comparison.wrong_closures));
@@ -130,8 +131,8 @@ void print_result(const MapArguments& wanted, const Dataset& recording, const Ma
   }
   session.print(session.strong(std::to_string(nodes)) + " places from " +
                 std::to_string(recording.entries.size()) + " pictures, " +
-                std::to_string(number_of_closures(run.map)) + " closures; " + fixed(step_ms, 2) +
-                " ms a picture");
+                std::to_string(number_of_closures(run.map)) + " closures; " +
+                format_fixed(step_ms, 2) + " ms a picture");
   if (sizes.size() > 1) {
     std::string text;
     for (const std::size_t size : sizes) text += (text.empty() ? "" : ", ") + std::to_string(size);
@@ -144,11 +145,11 @@ void print_result(const MapArguments& wanted, const Dataset& recording, const Ma
   }
   const double height_m = wanted.mapper.odometry.camera_height_m;
   if (!run.wheels && height_m > 0.0) {
-    session.print("Lengths are read from the ground, " + short_number(height_m) +
+    session.print("Lengths are read from the ground, " + format_number(height_m) +
                   " m below the camera.");
   } else if (!run.wheels) {
     session.print("Lengths are read from the views: one unit counts as " +
-                  short_number(run.scale_m) + " m (--scale-m, --camera-height-m).");
+                  format_number(run.scale_m) + " m (--scale-m, --camera-height-m).");
   }
   if (comparison) print_comparison(*comparison, run, session);
   if (wanted.picture) {

@@ -42,7 +42,7 @@ struct Skipped {
 
 void skip(const std::string& file, const Error& error, std::vector<Skipped>& skipped,
           Session& session) {
-  session.note("skipped: " + readable_line(error.what()));
+  session.note("skipped: " + to_readable_line(error.what()));
   skipped.push_back({file, error.what()});
 }
 

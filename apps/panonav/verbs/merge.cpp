@@ -58,8 +58,8 @@ ExitCode merge(const MergeArguments& wanted, Session& session) {
                   " places in common; of " + std::to_string(merged.alignment->expected_places) +
                   " places where both maps lie upon each other, " +
                   std::to_string(merged.alignment->confirmed_places) + " match. " + wanted.second +
-                  " lies at x " + fixed(pose.x_m, 2) + " m, y " + fixed(pose.y_m, 2) +
-                  " m, turned by " + fixed(degrees(pose.heading_rad), 1) +
+                  " lies at x " + format_fixed(pose.x_m, 2) + " m, y " + format_fixed(pose.y_m, 2) +
+                  " m, turned by " + format_fixed(degrees(pose.heading_rad), 1) +
                   " degrees, in the frame of " + wanted.first + ".");
   } else {
     session.print(session.bad("no place in common was found") +

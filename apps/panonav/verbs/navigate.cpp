@@ -66,10 +66,10 @@ Pose2 free_pose(const std::string& flag, const std::string& text,
   const Pose2 pose = pose_from_text(flag, text);
   if (!space.is_free(pose.position())) {
     throw UsageError(
-        flag + " is at x " + short_number(pose.x_m) + " m, y " + short_number(pose.y_m) +
+        flag + " is at x " + format_number(pose.x_m) + " m, y " + format_number(pose.y_m) +
         " m, where the robot cannot stand; allowed: free places between x " +
-        short_number(space.low().x_m) + " to " + short_number(space.high().x_m) + " m and y " +
-        short_number(space.low().y_m) + " to " + short_number(space.high().y_m) + " m");
+        format_number(space.low().x_m) + " to " + format_number(space.high().x_m) + " m and y " +
+        format_number(space.low().y_m) + " to " + format_number(space.high().y_m) + " m");
   }
   return pose;
 }
@@ -133,7 +133,7 @@ std::string as_text(const NavigationDecision& decision, const RobotNavigator& ro
   std::string line = "step " + std::to_string(decision.step) + "  ";
   if (decision.nearest) {
     line += "at " + robot.info(*decision.nearest).name + " (probability " +
-            fixed(decision.probability, 2) + ")  ";
+            format_fixed(decision.probability, 2) + ")  ";
   }
   for (std::size_t i = 0; i < decision.events.size(); ++i) {
     line += (i > 0 ? ", " : "") + in_words(decision.events[i]);
@@ -193,11 +193,11 @@ void print_summary(const simulation::MissionRun& run, Session& session) {
                 " steps: " + std::string(reason_of(run.end)));
   if (std::isfinite(run.end_distance_m)) {
     session.print("from where the goal's view was taken: " +
-                  session.strong(fixed(run.end_distance_m, 3) + " m"));
+                  session.strong(format_fixed(run.end_distance_m, 3) + " m"));
   }
-  std::string way = "driven " + fixed(run.travelled_m, 2) + " m";
+  std::string way = "driven " + format_fixed(run.travelled_m, 2) + " m";
   if (std::isfinite(run.shortest_m)) {
-    way += "; the shortest way is " + fixed(run.shortest_m, 2) + " m long";
+    way += "; the shortest way is " + format_fixed(run.shortest_m, 2) + " m long";
   }
   session.print(way);
   const auto sure = std::ranges::count_if(run.decisions, [](const NavigationDecision& decision) {
@@ -253,7 +253,7 @@ class MissionMoments {
     moment.sure = decision.probability >= 0.5;
     moment.state = name_of(decision.state);
     moment.probability = decision.probability;
-    moment.values.emplace_back("probability", fixed(decision.probability, 4));
+    moment.values.emplace_back("probability", format_fixed(decision.probability, 4));
     for (const NavigationEvent event : decision.events) {
       moment.values.emplace_back("event", name_of(event));
     }
@@ -351,7 +351,7 @@ std::optional<ViewId> goal_as_wished(RobotNavigator& robot,
   const ViewId view = robot.graph().view(*nearest);
   const std::string name = robot.info(view).name;
   robot.set_goal(name);
-  session.note("a viewer sends the robot to " + readable_line(name));
+  session.note("a viewer sends the robot to " + to_readable_line(name));
   return view;
 }
 

@@ -56,20 +56,20 @@ void print_loss(const PruneArguments& wanted, const SparseLoss& loss, std::size_
                 const std::vector<std::string>& names, Session& session) {
   session.print(std::string(wanted.dry_run ? "would keep " : "kept ") +
                 session.strong(std::to_string(kept)) + " of " + std::to_string(before) +
-                " views: " + fixed(factor, 1) + " times fewer" +
+                " views: " + format_fixed(factor, 1) + " times fewer" +
                 (outdated > 0 ? "; " + std::to_string(outdated) + " were outdated" : ""));
   if (wanted.dry_run) {
     for (const std::string& name : names) session.print("  would drop  " + name);
   }
   if (loss.positions) {
     session.print("nearest reference of a dropped view  median " +
-                  fixed(loss.positions->median_after_m, 3) + " m (before " +
-                  fixed(loss.positions->median_before_m, 3) + ")  95 % within " +
-                  fixed(loss.positions->p95_after_m, 3) + " m (before " +
-                  fixed(loss.positions->p95_before_m, 3) + ")");
+                  format_fixed(loss.positions->median_after_m, 3) + " m (before " +
+                  format_fixed(loss.positions->median_before_m, 3) + ")  95 % within " +
+                  format_fixed(loss.positions->p95_after_m, 3) + " m (before " +
+                  format_fixed(loss.positions->p95_before_m, 3) + ")");
   } else if (loss.asked > 0) {
     session.print("dropped views differ from those that stand for them by " +
-                  fixed(loss.median_difference, 3) + " (median)");
+                  format_fixed(loss.median_difference, 3) + " (median)");
   }
 }
 

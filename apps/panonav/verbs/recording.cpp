@@ -147,7 +147,7 @@ PictureSelection selection_of(const PartArguments& part) {
   const bool fits = number && value > 0.0 && value <= most &&
                     (is_time || (value >= 1.0 && value == std::floor(value)));
   if (!fits) {
-    throw UsageError("--every is " + readable_line(*part.every) +
+    throw UsageError("--every is " + to_readable_line(*part.every) +
                      "; allowed: a whole number from 1 on, or seconds such as 0.5s");
   }
   if (is_time) {
@@ -217,7 +217,7 @@ const PictureArguments& checked_beside(const PictureArguments& pictures, const M
   if (!pictures.elevation_deg) return pictures;
   const auto [low, high] = *pictures.elevation_deg;
   const std::string typed =
-      "--elevation-deg is " + short_number(low) + " " + short_number(high) + "; allowed: ";
+      "--elevation-deg is " + format_number(low) + " " + format_number(high) + "; allowed: ";
   if (!header.elevations) {
     throw UsageError(typed + "none, as " + memory.path().string() +
                      " does not know the elevations of its views; leave it out or start a new "
@@ -227,7 +227,7 @@ const PictureArguments& checked_beside(const PictureArguments& pictures, const M
   const double kept_high = degrees(header.elevations->top_rad);
   constexpr double rounding_deg = 1e-4;
   if (std::abs(low - kept_low) > rounding_deg || std::abs(high - kept_high) > rounding_deg) {
-    throw UsageError(typed + short_number(kept_low) + " " + short_number(kept_high) +
+    throw UsageError(typed + format_number(kept_low) + " " + format_number(kept_high) +
                      ", the band of " + memory.path().string() +
                      "; leave it out or start a new memory");
   }
@@ -258,7 +258,7 @@ std::string how_to_add(const std::string& folder, const std::string& columns,
   const Dataset recording = described ? read_dataset(folder) : read_picture_folder(folder, {});
   const std::string table = "the columns file," + columns +
                             " and a line for each picture, such as " +
-                            readable_line(recording.entries.front().file) + "," + values;
+                            to_readable_line(recording.entries.front().file) + "," + values;
   if (described) return "; its table needs " + table;
   return "; write " + (fs::path(folder) / "dataset.toml").string() +
          " with [images] kind = \"panorama\" (or equirectangular, mirror) and [poses] file = "

@@ -39,14 +39,15 @@ ExitCode rename(const RenameArguments& wanted, Session& session) {
           memory.rename(find(), wanted.new_name);
         }
       },
-      "rename: " + what + " " + readable_line(former) + " to " + readable_line(wanted.new_name));
+      "rename: " + what + " " + to_readable_line(former) + " to " +
+          to_readable_line(wanted.new_name));
   if (session.json()) {
     session.print(json_line(ordered_json{
         {"memory", wanted.memory}, {"what", what}, {"former", former}, {"name", wanted.new_name}}));
     return ExitCode::done;
   }
-  session.print("the " + what + " " + readable_line(former) + " of " + wanted.memory +
-                " is now called " + session.strong(readable_line(wanted.new_name)));
+  session.print("the " + what + " " + to_readable_line(former) + " of " + wanted.memory +
+                " is now called " + session.strong(to_readable_line(wanted.new_name)));
   session.suggest({"panonav", "undo", wanted.memory}, "To take it back:");
   return ExitCode::done;
 }

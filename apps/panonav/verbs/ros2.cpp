@@ -28,7 +28,7 @@ struct Ros2Arguments {
 };
 
 std::string parameter_name(const ArgumentInfo& info) {
-  std::string name = lower_case(info.name.substr(info.positional() ? 0 : 2));
+  std::string name = to_lower_case(info.name.substr(info.positional() ? 0 : 2));
   std::ranges::replace(name, '-', '_');
   return name;
 }
@@ -60,8 +60,8 @@ std::vector<std::string> without_ros_arguments(std::span<const std::string> type
     const auto found = std::ranges::find(names, name);
     if (found == names.end()) {
       const std::vector<std::string_view> known(names.begin(), names.end());
-      throw UsageError(where + ": the node has no parameter '" + readable_line(name) + "'" +
-                       did_you_mean(name, known));
+      throw UsageError(where + ": the node has no parameter '" + to_readable_line(name) + "'" +
+                       suggest_name(name, known));
     }
     const auto& info = infos[static_cast<std::size_t>(found - names.begin())];
     if (info.name == "MEMORY") {

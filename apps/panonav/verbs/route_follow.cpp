@@ -79,13 +79,14 @@ std::string as_text(const FollowedImage& image, Session& session) {
   if (!image.fix) return image.file + "  " + session.bad("not on this route");
   const RouteFix& fix = *image.fix;
   std::string line = image.file + "  " + session.good(name_of(image.fix->origin)) + "  x " +
-                     fixed(fix.pose.x_m, 3) + " m  y " + fixed(fix.pose.y_m, 3) + " m  heading " +
-                     fixed(degrees(fix.pose.heading_rad), 1) + " degrees  along " +
-                     fixed(image.fix->along_m, 3) + " m  beside " + fixed(image.fix->lateral_m, 3) +
-                     " m  correlation " + fixed(fix.correlation, 3);
+                     format_fixed(fix.pose.x_m, 3) + " m  y " + format_fixed(fix.pose.y_m, 3) +
+                     " m  heading " + format_fixed(degrees(fix.pose.heading_rad), 1) +
+                     " degrees  along " + format_fixed(image.fix->along_m, 3) + " m  beside " +
+                     format_fixed(image.fix->lateral_m, 3) + " m  correlation " +
+                     format_fixed(fix.correlation, 3);
   for (const AzimuthRange& range : image.changed) {
-    line += "  changed at " + fixed(degrees(range.from_rad), 0) + " to " +
-            fixed(degrees(range.to_rad), 0) + " degrees";
+    line += "  changed at " + format_fixed(degrees(range.from_rad), 0) + " to " +
+            format_fixed(degrees(range.to_rad), 0) + " degrees";
   }
   return line;
 }
@@ -93,8 +94,8 @@ std::string as_text(const FollowedImage& image, Session& session) {
 void print_error(const std::string& what, const std::vector<double>& errors, double scale,
                  int digits, const std::string& unit, Session& session) {
   if (errors.empty()) return;
-  session.print(what + "  median " + fixed(scale * quantile(errors, 0.5), digits) + unit +
-                "  95 % within " + fixed(scale * quantile(errors, 0.95), digits) + unit);
+  session.print(what + "  median " + format_fixed(scale * quantile(errors, 0.5), digits) + unit +
+                "  95 % within " + format_fixed(scale * quantile(errors, 0.95), digits) + unit);
 }
 
 void print_summary(const FollowSummary& summary, const std::vector<FollowedImage>& images,
@@ -110,8 +111,8 @@ void print_summary(const FollowSummary& summary, const std::vector<FollowedImage
   print_error("error beside the route ", summary.lateral_m, 1.0, 4, " m", session);
   print_error("error of heading       ", summary.heading_rad, degrees(1.0), 2, " degrees", session);
   for (const auto& [from_m, to_m] : changed_stretches(images)) {
-    session.print("changed here: something seen from " + fixed(from_m, 2) + " to " +
-                  fixed(to_m, 2) + " m along the route");
+    session.print("changed here: something seen from " + format_fixed(from_m, 2) + " to " +
+                  format_fixed(to_m, 2) + " m along the route");
   }
 }
 

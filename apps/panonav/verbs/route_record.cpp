@@ -158,8 +158,8 @@ ExitCode record(const Arguments& arguments, const RecordArguments& wanted, Sessi
   }
   session.print(session.strong(std::to_string(recorded.appended)) + " lines recorded; route '" +
                 wanted.name + "' in " + wanted.memory + " has " +
-                std::to_string(recorded.route.size()) + " over " + fixed(length_m, 2) + " m, " +
-                fixed(1e-6 * bytes_per_km, 2) + " MB a kilometre");
+                std::to_string(recorded.route.size()) + " over " + format_fixed(length_m, 2) +
+                " m, " + format_fixed(1e-6 * bytes_per_km, 2) + " MB a kilometre");
   if (dataset.source.kind == PictureKind::panorama && !dataset.source.layout.elevations &&
       !recorder.source().horizon_rows) {
     session.print(

@@ -97,8 +97,8 @@ ordered_json as_json(const RouteStep& step) {
 
 std::string as_text(const RouteStep& step, Session& session) {
   if (!step.fix) return session.bad("not on the route");
-  return session.good("on the route") + ", along " + fixed(step.fix->along_m, 2) + " m  beside " +
-         fixed(step.fix->lateral_m, 2) + " m";
+  return session.good("on the route") + ", along " + format_fixed(step.fix->along_m, 2) +
+         " m  beside " + format_fixed(step.fix->lateral_m, 2) + " m";
 }
 
 std::string line_of(const Observation& seen, const LiveMemory::Answer& answer,
@@ -273,7 +273,8 @@ ExitCode run(const Arguments& arguments, const RunArguments& wanted, Session& se
       (changes ? ", " + as_text(*changes) : "") +
       (route ? ", " + std::to_string(lines) + " lines of the route" : "") +
       events_text(counts, record.left_out()) +
-      (live ? ", unwrapping " + fixed(unwrapping.count() / std::max(1.0, asked), 1) + " ms" : ""));
+      (live ? ", unwrapping " + format_fixed(unwrapping.count() / std::max(1.0, asked), 1) + " ms"
+            : ""));
   return counts.pictures > 0 ? ExitCode::done : ExitCode::no_answer;
 }
 

@@ -94,7 +94,7 @@ void RunRecord::add(recordings::RunMoment moment) {
     recorder_->add(std::move(moment));
   } catch (const Error& error) {
     failed_ = true;
-    session_.note("the recording ends here: " + readable_line(error.what()));
+    session_.note("the recording ends here: " + to_readable_line(error.what()));
   }
 }
 
@@ -105,7 +105,7 @@ void RunRecord::close() {
     recorder_->close();
   } catch (const Error& error) {
     failed_ = true;
-    session_.note("the recording is cut short: " + readable_line(error.what()));
+    session_.note("the recording is cut short: " + to_readable_line(error.what()));
   }
 }
 

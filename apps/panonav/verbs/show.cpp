@@ -91,17 +91,17 @@ ordered_json maps_with(const MemoryFile& file, ViewId view) {
 
 void tell(const ordered_json& view, Session& session) {
   const auto number = [](const ordered_json& value, int digits) {
-    return fixed(value.get<double>(), digits);
+    return format_fixed(value.get<double>(), digits);
   };
   const auto name_in = [](const ordered_json& json, const char* key) {
-    return readable_line(json[key].get<std::string>());
+    return to_readable_line(json[key].get<std::string>());
   };
   session.print(session.strong(name_in(view, "name")) + ", view " + view["id"].dump());
   std::string place = "not known";
   if (const auto& pose = view["pose"]; !pose.is_null()) {
     place = "x " + number(pose["x_m"], 2) + " m, y " + number(pose["y_m"], 2) + " m";
     const auto& heading = pose["heading_rad"];
-    if (!heading.is_null()) place += ", heading " + fixed(degrees(heading), 1) + " degrees";
+    if (!heading.is_null()) place += ", heading " + format_fixed(degrees(heading), 1) + " degrees";
   }
   session.print("  pose          " + place);
   if (!view["stamp_s"].is_null()) {
@@ -158,13 +158,13 @@ ExitCode show(const ShowArguments& wanted, Session& session) {
   }
   const auto bytes = file.thumbnail(view);
   if (!bytes && wanted.thumbnail) {
-    throw FileError(wanted.memory, "holds no thumbnail of " + readable_line(wanted.view) +
+    throw FileError(wanted.memory, "holds no thumbnail of " + to_readable_line(wanted.view) +
                                        "; memorise keeps them unless told --no-thumbnails");
   }
   if (bytes) {
     std::optional<Image> picture;
     try {
-      picture = decode_image(*bytes, "thumbnail of " + readable_line(info.name));
+      picture = decode_image(*bytes, "thumbnail of " + to_readable_line(info.name));
     } catch (const FileError&) {
       if (wanted.thumbnail) throw;
     }

@@ -166,7 +166,7 @@ ordered_json as_json(const TrackedImage& image) {
 }
 
 std::string place_text(const Pose2& pose) {
-  return "x " + fixed(pose.x_m, 2) + " m  y " + fixed(pose.y_m, 2) + " m";
+  return "x " + format_fixed(pose.x_m, 2) + " m  y " + format_fixed(pose.y_m, 2) + " m";
 }
 
 std::string as_text(const TrackedImage& image, Session& session) {
@@ -179,20 +179,20 @@ std::string as_text(const TrackedImage& image, Session& session) {
   const PoseMode& best = estimate.modes.front();
   if (is_localised(image)) {
     return line + session.good(state) + "  " + place_text(*estimate.pose) + "  heading " +
-           fixed(degrees(estimate.pose->heading_rad), 1) + " degrees  spread " +
-           fixed(best.spread_m, 2) + " m";
+           format_fixed(degrees(estimate.pose->heading_rad), 1) + " degrees  spread " +
+           format_fixed(best.spread_m, 2) + " m";
   }
   line += session.strong(state) + "  ";
   if (estimate.modes.size() == 1) {
     return line + "an area around " + place_text(best.mean) + "  spread " +
-           fixed(best.spread_m, 2) + " m";
+           format_fixed(best.spread_m, 2) + " m";
   }
   constexpr std::size_t max_shown = 3;
   line += std::to_string(estimate.modes.size()) + " places:";
   for (std::size_t i = 0; i < std::min(max_shown, estimate.modes.size()); ++i) {
     const PoseMode& mode = estimate.modes[i];
-    line += (i > 0 ? ",  " : "  ") + place_text(mode.mean) + " (" + fixed(100.0 * mode.weight, 0) +
-            " %)";
+    line += (i > 0 ? ",  " : "  ") + place_text(mode.mean) + " (" +
+            format_fixed(100.0 * mode.weight, 0) + " %)";
   }
   return estimate.modes.size() > max_shown ? line + ", .." : line;
 }
@@ -210,14 +210,16 @@ void print_summary(const TrackSummary& summary, Session& session) {
                      ? "; first localised at image " + std::to_string(*summary.first_localised)
                      : "; never localised"));
   if (!summary.errors_m.empty()) {
-    session.print("error of localised images  median " + fixed(quantile(summary.errors_m, 0.5), 3) +
-                  " m  95 % within " + fixed(quantile(summary.errors_m, 0.95), 3) + " m");
+    session.print("error of localised images  median " +
+                  format_fixed(quantile(summary.errors_m, 0.5), 3) + " m  95 % within " +
+                  format_fixed(quantile(summary.errors_m, 0.95), 3) + " m");
   }
   if (!summary.heading_errors_rad.empty()) {
     session.print("error of their headings    median " +
-                  fixed(degrees(quantile(summary.heading_errors_rad, 0.5)), 2) +
+                  format_fixed(degrees(quantile(summary.heading_errors_rad, 0.5)), 2) +
                   " degrees  95 % within " +
-                  fixed(degrees(quantile(summary.heading_errors_rad, 0.95)), 2) + " degrees");
+                  format_fixed(degrees(quantile(summary.heading_errors_rad, 0.95)), 2) +
+                  " degrees");
   }
 }
 
@@ -250,7 +252,7 @@ ExitCode track_live(const Arguments& arguments, const TrackArguments& wanted,
              source->pictures()});
   VisualOdometry odometry = visual_odometry(tracker.memory());
   session.note("panonav track: motion is read from the pictures; one unit of the views is " +
-               short_number(odometry.scale_m()) + " m, as in the memory");
+               format_number(odometry.scale_m()) + " m, as in the memory");
   start(tracker, wanted);
   RunRecord record(wanted.record, std::span(&wanted.memory, 1), true, session,
                    {.memory = wanted.memory, .takes = viewer::ViewWish::pose});
@@ -325,7 +327,7 @@ void write_localised(const std::string& path, const std::vector<TrackedImage>& i
 
 /// Adds the odometry that the pictures themselves show, and says so.
 void read_motion(Dataset& run, const std::string& name, const Tracker& tracker, Session& session) {
-  session.note("panonav track: " + readable_line(name) +
+  session.note("panonav track: " + to_readable_line(name) +
                " has no odometry (columns odom_x_m,odom_y_m,odom_heading_deg); motion is read "
                "from the pictures, " +
                add_visual_odometry(run, tracker.memory(), tracker.encoder(), session.executor()));
@@ -362,7 +364,7 @@ ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Ses
     settings.shown = &shown.emplace(tracker.memory());
     settings.wished = [&] { return start_as_wished(tracker, record); };
   }
-  viewer::RunPage played("panonav track: " + readable_line(wanted.dataset), looked_at);
+  viewer::RunPage played("panonav track: " + to_readable_line(wanted.dataset), looked_at);
   std::vector<TrackedImage> images;
   Progress progress(session, "tracking", looked_at);
   track(tracker, run, settings, session.executor(), [&](TrackedImage&& image) {

@@ -60,7 +60,8 @@ std::string as_text(const KeptChange& change) {
     std::strftime(text.data(), text.size(), "%Y-%m-%d %H:%M:%S UTC", &utc);
     when = text.data();
   }
-  return when + "  " + readable_line(change.what) + (change.undoable ? "" : "  (too old to undo)");
+  return when + "  " + to_readable_line(change.what) +
+         (change.undoable ? "" : "  (too old to undo)");
 }
 
 ExitCode history(const std::string& path, Session& session) {

@@ -40,8 +40,8 @@ std::string as_text(const Panorama& panorama) {
   std::string text = std::to_string(panorama.columns()) + " x " + std::to_string(panorama.rows()) +
                      " pixels, clockwise, forward in the middle";
   if (const auto& band = panorama.elevations()) {
-    text += ", elevations " + fixed(degrees(band->bottom_rad), 1) + " to " +
-            fixed(degrees(band->top_rad), 1) + " degrees";
+    text += ", elevations " + format_fixed(degrees(band->bottom_rad), 1) + " to " +
+            format_fixed(degrees(band->top_rad), 1) + " degrees";
   }
   if (const auto horizon = panorama.horizon_row()) {
     text += ", horizon in row " + std::to_string(*horizon);

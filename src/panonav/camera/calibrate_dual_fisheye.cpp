@@ -218,7 +218,7 @@ std::optional<std::string> Calibrator::count_matches(DualFisheyeCalibration& res
   }
   result.inlier_share = static_cast<double>(result.matches) / last_.textured;
   if (result.inlier_share < min_inlier_share || !both_lenses) {
-    return "the pictures do not agree: " + short_number(std::round(100 * result.inlier_share)) +
+    return "the pictures do not agree: " + format_number(std::round(100 * result.inlier_share)) +
            " % of the patches are found again, needed are 30 %; one place, turned about the "
            "vertical only, and circles that lie as the rolls say?";
   }
@@ -292,7 +292,7 @@ std::variant<DualFisheyeCalibration, std::string> Calibrator::run() {
                  azimuth_deviation(result.camera, fit_.covariance(last_.matches)));
   if (!(degrees(result.azimuth_deviation_rad) <= max_azimuth_deviation_deg)) {
     return "the pictures leave azimuths uncertain by " +
-           short_number(0.1 * std::round(10 * degrees(result.azimuth_deviation_rad))) +
+           format_number(0.1 * std::round(10 * degrees(result.azimuth_deviation_rad))) +
            " degrees, allowed is 1; add pictures turned by 60 to 120 degrees about the vertical";
   }
   return result;

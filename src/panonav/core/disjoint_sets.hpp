@@ -30,7 +30,7 @@ class DisjointSets {
     return a != b;
   }
   /// The set of each member, numbered from 0 in the order of their smallest members.
-  [[nodiscard]] std::vector<std::size_t> numbered() {
+  [[nodiscard]] std::vector<std::size_t> number_sets() {
     std::vector<std::size_t> number(parent_.size());
     std::size_t next = 0;
     for (std::size_t i = 0; i < number.size(); ++i) {

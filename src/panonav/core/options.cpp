@@ -6,7 +6,7 @@
 
 namespace panonav {
 
-std::string range_text(const OptionInfo& info) {
+std::string describe_range(const OptionInfo& info) {
   const bool has_low = std::isfinite(info.low);
   const bool has_high = std::isfinite(info.high);
   std::string low(info.low_open ? "> " : ">= ");
@@ -21,7 +21,7 @@ std::vector<std::string> option_faults(const OptionInfo& info, double value) {
   const bool inside = std::isfinite(value) && value <= info.high &&
                       (info.low_open ? value > info.low : value >= info.low);
   if (inside) return {};
-  return {std::string(info.name) + " is " + to_text(value) + "; allowed: " + range_text(info)};
+  return {std::string(info.name) + " is " + to_text(value) + "; allowed: " + describe_range(info)};
 }
 
 namespace detail {

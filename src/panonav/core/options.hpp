@@ -40,7 +40,7 @@ class OptionVisitor {
 };
 
 /// The allowed range in words: ">= 1 and <= 20".
-[[nodiscard]] std::string range_text(const OptionInfo& info);
+[[nodiscard]] std::string describe_range(const OptionInfo& info);
 
 /// Every value that is out of its range or not a number, one sentence each; empty when all is well.
 [[nodiscard]] std::vector<std::string> option_faults(const OptionInfo& info, double value);

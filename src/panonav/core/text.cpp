@@ -61,7 +61,7 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 
 }  // namespace
 
-std::string fixed(double value, int digits) {
+std::string format_fixed(double value, int digits) {
   std::ostringstream text;
   text << std::fixed << std::setprecision(digits) << value;
   const std::string shown = text.str();
@@ -70,7 +70,7 @@ std::string fixed(double value, int digits) {
   return nothing && shown.front() == '-' ? shown.substr(1) : shown;
 }
 
-std::string short_number(double value, std::string_view unit, int significant) {
+std::string format_number(double value, std::string_view unit, int significant) {
   if (!std::isfinite(value)) return "none";
   if (std::abs(value) >= 1e15) return (std::ostringstream() << value).str();
   constexpr std::array<std::pair<std::string_view, int>, 9> places_of{{{"m", 5},
@@ -90,7 +90,7 @@ std::string short_number(double value, std::string_view unit, int significant) {
     const double magnitude = std::floor(std::log10(std::abs(value)));
     places = std::clamp(significant - 1 - static_cast<int>(magnitude), 0, places);
   }
-  std::string text = fixed(value, places);
+  std::string text = format_fixed(value, places);
   if (text.find('.') != std::string::npos) {
     text.erase(text.find_last_not_of('0') + 1);
     if (text.back() == '.') text.pop_back();
@@ -98,7 +98,7 @@ std::string short_number(double value, std::string_view unit, int significant) {
   return text;
 }
 
-std::string lower_case(std::string_view text) {
+std::string to_lower_case(std::string_view text) {
   std::string lower(text);
   for (char& c : lower) {
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
@@ -106,7 +106,7 @@ std::string lower_case(std::string_view text) {
   return lower;
 }
 
-std::string readable_line(std::string_view text) {
+std::string to_readable_line(std::string_view text) {
   std::string line;
   line.reserve(text.size());
   while (!text.empty()) {
@@ -126,7 +126,7 @@ std::string readable_line(std::string_view text) {
   return line;
 }
 
-std::string csv_field(std::string_view text) {
+std::string to_csv_field(std::string_view text) {
   const auto blank = [](char c) { return c == ' ' || c == '\t'; };
   const bool quoted = text.empty() || text.find_first_of(",\"#\r\n") != std::string_view::npos ||
                       blank(text.front()) || blank(text.back());
@@ -139,7 +139,7 @@ std::string csv_field(std::string_view text) {
   return result + "\"";
 }
 
-std::string shortened(std::string_view text, std::size_t max_characters) {
+std::string shorten_middle(std::string_view text, std::size_t max_characters) {
   const auto characters =
       static_cast<std::size_t>(std::ranges::count_if(text, [](char c) { return !continues(c); }));
   if (characters <= max_characters) return std::string(text);
@@ -158,7 +158,7 @@ std::string shortened(std::string_view text, std::size_t max_characters) {
   return std::string(text.substr(0, begin)) + "..." + std::string(text.substr(end));
 }
 
-std::string did_you_mean(std::string_view typed, std::span<const std::string_view> names) {
+std::string suggest_name(std::string_view typed, std::span<const std::string_view> names) {
   constexpr std::size_t longest = 64;  // the work grows with the square
   if (typed.size() > longest) return {};
   std::size_t best = std::max<std::size_t>(1, typed.size() / 3) + 1;
@@ -174,7 +174,7 @@ std::string did_you_mean(std::string_view typed, std::span<const std::string_vie
   return nearest.empty() ? "" : " (did you mean '" + std::string(nearest) + "'?)";
 }
 
-std::string shell_quoted(std::string_view text) {
+std::string quote_for_shell(std::string_view text) {
   const auto plain = [](char c) {
     return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||
            std::string_view("_./:=,+@%-").find(c) != std::string_view::npos;

@@ -162,7 +162,7 @@ std::vector<DatasetEntry> read_entries(const fs::path& folder, const fs::path& p
 }
 
 bool is_picture(const fs::path& path) {
-  const std::string extension = lower_case(path.extension().string());
+  const std::string extension = to_lower_case(path.extension().string());
   return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
 }
 
@@ -266,22 +266,22 @@ std::string table_text(const std::vector<DatasetEntry>& entries, const DatasetFi
     if (entry.file.empty() || entry.file.find_first_of("\r\n") != std::string::npos) {
       throw ContractError("file", "a name that is empty or has a line break", "other names");
     }
-    table += csv_field(entry.file);
+    table += to_csv_field(entry.file);
     const auto add = [&table](double value) { table += "," + to_text(value); };
     if (columns.stamps) add(*entry.stamp_s);
     if (columns.positions) {
       add(entry.pose->x_m);
       add(entry.pose->y_m);
     }
-    if (columns.headings) add(written_degrees(*entry.pose->heading_rad));
+    if (columns.headings) add(round_trip_degrees(*entry.pose->heading_rad));
     if (columns.odometry) {
       add(entry.odometry->x_m);
       add(entry.odometry->y_m);
-      add(written_degrees(entry.odometry->heading_rad));
+      add(round_trip_degrees(entry.odometry->heading_rad));
     }
     if (columns.tilts) {
-      add(written_degrees(entry.tilt->roll_rad));
-      add(written_degrees(entry.tilt->pitch_rad));
+      add(round_trip_degrees(entry.tilt->roll_rad));
+      add(round_trip_degrees(entry.tilt->pitch_rad));
     }
     table += "\n";
   }
@@ -302,8 +302,8 @@ std::string images_text(const Dataset& dataset) {
             "\"\nforward_column = " + to_text(source.layout.forward_column) + "\n";
   }
   if (band) {
-    text += "elevation_deg = [" + to_text(written_degrees(band->bottom_rad)) + ", " +
-            to_text(written_degrees(band->top_rad)) + "]\n";
+    text += "elevation_deg = [" + to_text(round_trip_degrees(band->bottom_rad)) + ", " +
+            to_text(round_trip_degrees(band->top_rad)) + "]\n";
   }
   if (source.kind == PictureKind::mirror) {
     require(source.camera.has_value(), "camera of mirror pictures", 0.0, "one camera");
@@ -389,7 +389,7 @@ void select_pictures(Dataset& dataset, const PictureSelection& selection) {
   }
   if (kept.empty()) {
     throw FileError(name, "has no picture in the time that was asked for; it is " +
-                              short_number(stamps_s.back() - stamps_s.front()) + " s long");
+                              format_number(stamps_s.back() - stamps_s.front()) + " s long");
   }
   dataset.entries = std::move(kept);
 }

@@ -126,8 +126,8 @@ void OptionFile::require_sections(std::span<const std::string_view> own,
     if (std::ranges::find(others, field.name) != others.end()) continue;
     std::string all;
     for (const auto name : own) all += (all.empty() ? "" : ", ") + std::string(name);
-    throw FileError(path_.string(), "[" + readable_line(field.name) + "] is not a known section" +
-                                        did_you_mean(field.name, own) +
+    throw FileError(path_.string(), "[" + to_readable_line(field.name) +
+                                        "] is not a known section" + suggest_name(field.name, own) +
                                         "; known: " + (all.empty() ? "none" : all));
   }
 }

@@ -250,7 +250,7 @@ PoseGraphReport optimise_pose_graph(std::span<Pose2> nodes, std::span<const Pose
 std::vector<std::size_t> connected_components(std::size_t nodes, std::span<const PoseEdge> edges) {
   DisjointSets sets(nodes);
   for (const PoseEdge& edge : edges) sets.join(edge.a, edge.b);
-  return sets.numbered();
+  return sets.number_sets();
 }
 
 double edge_tension(const PoseEdge& edge, std::span<const Pose2> nodes) {

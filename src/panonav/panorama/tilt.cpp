@@ -103,7 +103,7 @@ void validate(const Tilt& tilt) {
   for (const auto& [name, angle] :
        {std::pair("roll", tilt.roll_rad), std::pair("pitch", tilt.pitch_rad)}) {
     if (std::abs(angle) <= max_tilt_rad) continue;
-    throw ContractError(name, short_number(degrees(angle), "deg") + " degrees",
+    throw ContractError(name, format_number(degrees(angle), "deg") + " degrees",
                         "-30 to 30 degrees");
   }
 }
@@ -158,8 +158,8 @@ Panorama level_panorama(const Panorama& seen, const Tilt& tilt) {
   constexpr double tolerated_rad = 0.5 * std::numbers::pi / 180.0;
   if (std::max(std::abs(tilt.roll_rad), std::abs(tilt.pitch_rad)) <= tolerated_rad) return seen;
   throw ContractError("tilt",
-                      short_number(degrees(tilt.roll_rad)) + ", " +
-                          short_number(degrees(tilt.pitch_rad)) + " degrees",
+                      format_number(degrees(tilt.roll_rad)) + ", " +
+                          format_number(degrees(tilt.pitch_rad)) + " degrees",
                       "up to 0.5 degrees in pictures whose elevations are not known");
 }
 

@@ -24,7 +24,7 @@ std::string_view name_of(LinkKind kind) {
 
 std::string escaped(std::string_view text) {
   std::string safe;
-  for (const char c : readable_line(text)) {
+  for (const char c : to_readable_line(text)) {
     switch (c) {
       case '&':
         safe += "&amp;";

@@ -33,7 +33,7 @@ bool names_a_file(const std::string& name) {
   constexpr std::size_t max_part_bytes = 200;
   constexpr std::size_t max_bytes = 1000;
   const fs::path path(name);
-  if (readable_line(name) != name || name.size() > max_bytes || path.is_absolute() ||
+  if (to_readable_line(name) != name || name.size() > max_bytes || path.is_absolute() ||
       path.lexically_normal().string() != name || !path.has_filename() ||
       std::ranges::find(own, path.begin()->string()) != own.end()) {
     return false;

@@ -23,7 +23,7 @@ std::string list_names(const std::vector<std::string>& names) {
   constexpr std::size_t max_listed = 8;
   std::string text;
   for (std::size_t i = 0; i < std::min(max_listed, names.size()); ++i) {
-    text += (i > 0 ? ", " : "") + readable_line(names[i]);
+    text += (i > 0 ? ", " : "") + to_readable_line(names[i]);
   }
   if (names.size() > max_listed) {
     text += " and " + std::to_string(names.size() - max_listed) + " more";
@@ -70,8 +70,8 @@ void warn_of_low_band(OpenedDataset& opened) {
   const auto size = first_picture_size(opened.dataset);
   if (!size || 360.0 * size->height < max_stretch * (high_deg - low_deg) * size->width) return;
   opened.warnings.push_back("hint: the elevation band of " +
-                            readable_line(opened.dataset.folder.string()) + " is " +
-                            short_number(low_deg) + " to " + short_number(high_deg) +
+                            to_readable_line(opened.dataset.folder.string()) + " is " +
+                            format_number(low_deg) + " to " + format_number(high_deg) +
                             " degrees; are these radians? elevation_deg is in degrees");
 }
 
@@ -86,7 +86,7 @@ void warn_of_other_kind(OpenedDataset& opened) {
   const auto size = first_picture_size(dataset);
   if (!size || size->width != 2 * size->height) return;
   opened.warnings.push_back(
-      "hint: " + readable_line(dataset.entries.front().path.string()) + " is " +
+      "hint: " + to_readable_line(dataset.entries.front().path.string()) + " is " +
       std::to_string(size->width) + " x " + std::to_string(size->height) +
       " px; a picture of the whole sphere is of the kind equirectangular, a panorama has an "
       "elevation band");
@@ -117,7 +117,7 @@ void refuse_unregistered(const fs::path& path) {
   }};
   std::error_code ignored;
   const bool is_rosbag2 = fs::exists(path / "metadata.yaml", ignored);
-  const std::string extension = lower_case(path.extension().string());
+  const std::string extension = to_lower_case(path.extension().string());
   for (const auto& [ending, name] : kinds) {
     if (extension != ending && !(is_rosbag2 && name == "recording")) continue;
     if (has_dataset_reader(std::string(name))) continue;

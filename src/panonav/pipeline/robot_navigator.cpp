@@ -96,7 +96,7 @@ KnownRoute route_among_views(const MemoryFileViews& source, const std::string& n
   KnownRoute known = known_route(route, views, options);
   if (known.references.empty()) {
     throw FileError(path, "none of the " + std::to_string(views.size()) +
-                              " views with a pose lies within " + short_number(options.beside_m) +
+                              " views with a pose lies within " + format_number(options.beside_m) +
                               " m of the route '" + name +
                               "'; allowed: views and a route in one frame, or a larger value of "
                               "the option route_beside_m");

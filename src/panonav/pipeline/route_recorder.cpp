@@ -113,9 +113,9 @@ void RouteRecorder::add(EncodedLine line) {
   if (!last_ && end_) {
     const double gap_m = distance(end_->position(), line.pose.position());
     if (gap_m > max_gap_m) {
-      throw FileError(file_.path().string(), "the first line lies " + short_number(gap_m) +
+      throw FileError(file_.path().string(), "the first line lies " + format_number(gap_m) +
                                                  " m from the end of the route '" + options_.name +
-                                                 "'; allowed: at most " + short_number(max_gap_m) +
+                                                 "'; allowed: at most " + format_number(max_gap_m) +
                                                  " m, or another name");
     }
   }

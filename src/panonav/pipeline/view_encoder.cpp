@@ -37,7 +37,7 @@ PanoramaShape shape_for(const MemoryHeader& header, const PictureSource& source)
 
 std::string band_text(const std::optional<ElevationBand>& band) {
   if (!band) return "unknown";
-  return short_number(degrees(band->bottom_rad)) + " to " + short_number(degrees(band->top_rad)) +
+  return format_number(degrees(band->bottom_rad)) + " to " + format_number(degrees(band->top_rad)) +
          " degrees";
 }
 

@@ -67,7 +67,7 @@ std::string add_visual_odometry(Dataset& run, const VisualMemory& memory,
         run.entries[i].odometry = odometry.pose();
       });
   return std::to_string(odometry.breaks()) + " of " + std::to_string(run.entries.size() - 1) +
-         " steps unread; one unit of the views is " + short_number(odometry.scale_m()) +
+         " steps unread; one unit of the views is " + format_number(odometry.scale_m()) +
          " m, as in the memory";
 }
 

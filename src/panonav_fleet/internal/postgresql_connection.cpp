@@ -262,7 +262,7 @@ PostgresqlConnection::PostgresqlConnection(const ServerAddress& address) : shown
 std::string PostgresqlConnection::message() const {
   std::string text = PQerrorMessage(connection_.get());
   while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
-  return without_passwords(readable_line(text));
+  return without_passwords(to_readable_line(text));
 }
 
 bool PostgresqlConnection::in_transaction() const noexcept {
@@ -280,7 +280,7 @@ void PostgresqlConnection::fail(const pg_result* result) const {
   const std::string state = sqlstate_of(result);
   const char* primary =
       result == nullptr ? nullptr : PQresultErrorField(result, PG_DIAG_MESSAGE_PRIMARY);
-  const std::string text = primary == nullptr ? message() : readable_line(primary);
+  const std::string text = primary == nullptr ? message() : to_readable_line(primary);
   if (state == "42501") {
     throw FileError(shown_.native(), "cannot be read or changed so: " + text +
                                          "; allowed: to read for members of panonav_reader, to "

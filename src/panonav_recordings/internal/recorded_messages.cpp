@@ -71,8 +71,8 @@ class MessageCollector {
     if (chain->connected()) return;
     if (choice_.frames_are_named) {
       const auto& [top, bottom] = *choice_.frames;
-      throw FileError(path_.string(), "no transforms lead from " + readable_line(top) + " to " +
-                                          readable_line(bottom) + "; it has: " + chain->known());
+      throw FileError(path_.string(), "no transforms lead from " + to_readable_line(top) + " to " +
+                                          to_readable_line(bottom) + "; it has: " + chain->known());
     }
     chain.reset();
   }

@@ -44,7 +44,7 @@ bool is_readable(const RecordedTopic& topic, IsType is_type) {
 std::string list_topics(const std::vector<std::string>& names) {
   std::string text;
   for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text.empty() ? "none" : readable_line(shortened(text, 400));
+  return text.empty() ? "none" : to_readable_line(shorten_middle(text, 400));
 }
 
 /// Chooses the topics of one recording, one role after the other.
@@ -103,7 +103,7 @@ class TopicChooser {
                                  list_topics(names) + "; name one with the option imu_topic");
     } else if (source.kind == PictureKind::panorama && !source.layout.elevations) {
       choice_.warnings.push_back(
-          "roll and pitch of " + readable_line(names[0]) +
+          "roll and pitch of " + to_readable_line(names[0]) +
           " are not used: panoramas of unknown elevations cannot be levelled");
     } else {
       use(numbers_of(names[0], is_imu_type), TopicRole::tilt);
@@ -140,7 +140,7 @@ class TopicChooser {
                                         std::string_view types) const {
     TopicNumbers found = numbers_of(name, is_type);
     if (found.empty()) {
-      throw FileError(path_.string(), "has no topic " + readable_line(name) + " of " +
+      throw FileError(path_.string(), "has no topic " + to_readable_line(name) + " of " +
                                           std::string(types) +
                                           "; it has: " + list_topics(names_of(is_type)));
     }

@@ -99,7 +99,7 @@ std::string TransformChain::known() const {
   for (const auto& [child, link] : links_) {
     text += (text.empty() ? "" : ", ") + link.parent + " -> " + child;
   }
-  return text.empty() ? "none" : readable_line(shortened(text, 400));
+  return text.empty() ? "none" : to_readable_line(shorten_middle(text, 400));
 }
 
 void TransformChain::connect() {

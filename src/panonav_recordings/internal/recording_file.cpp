@@ -57,7 +57,7 @@ void RecordingFile::call(const std::filesystem::path& name) {
 }
 
 void RecordingFile::warn(const FileError& error) const {
-  const std::string line = readable_line(error.what());
+  const std::string line = to_readable_line(error.what());
   const std::lock_guard lock(warnings_mutex_);
   if (std::ranges::find(warnings_, line) != warnings_.end()) return;
   if (warnings_.size() < max_warnings) {
@@ -68,7 +68,7 @@ void RecordingFile::warn(const FileError& error) const {
 }
 
 void RecordingFile::fail(std::string_view what) const {
-  throw FileError(path_.string(), readable_line(what));
+  throw FileError(path_.string(), to_readable_line(what));
 }
 
 void RecordingFile::require_room(std::size_t places, std::size_t most) const {

@@ -239,7 +239,7 @@ std::vector<fs::path> read_rosbag2_folder(const fs::path& folder) {
       files.push_back(folder / fs::path(file.as<std::string>()).filename());
     }
   } catch (const YAML::Exception& error) {
-    throw FileError(path.string(), "is no metadata of rosbag2: " + readable_line(error.what()));
+    throw FileError(path.string(), "is no metadata of rosbag2: " + to_readable_line(error.what()));
   }
   return files;
 }

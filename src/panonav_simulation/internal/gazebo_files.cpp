@@ -149,12 +149,12 @@ pugi::xml_node GazeboFiles::sdf(const fs::path& file) {
   } catch (const FileError&) {
     throw;
   } catch (const Error& error) {
-    throw FileError(file.string(), "not an SDF file: " + readable_line(error.what()));
+    throw FileError(file.string(), "not an SDF file: " + to_readable_line(error.what()));
   }
   const std::string name = document.document_element().name();
   if (name != "sdf" && name != "gazebo") {
-    throw FileError(file.string(), "not an SDF file: its first element is <" + readable_line(name) +
-                                       ">, not <sdf>");
+    throw FileError(file.string(), "not an SDF file: its first element is <" +
+                                       to_readable_line(name) + ">, not <sdf>");
   }
   return files_.emplace(key, std::move(document)).first->second.document_element();
 }

@@ -38,7 +38,7 @@ std::optional<std::filesystem::path> SdfContext::find(std::string_view uri,
   if (!found->as_written) {
     warn(origin.object, in_quotes(uri) +
                             " was not found; taken instead, with letters of other case: " +
-                            readable_line(found->path.string()));
+                            to_readable_line(found->path.string()));
   }
   return found->path;
 }

@@ -50,10 +50,10 @@ class SdfContext {
     } catch (const Unusable& fault) {
       warn(object, thing + " is left out: " + fault.why);
     } catch (const Error& error) {
-      warn(object, thing + " is left out: " + readable_line(error.what()));
+      warn(object, thing + " is left out: " + to_readable_line(error.what()));
     }
     while (texture_warnings_ < textures.warnings().size())
-      warn(object, readable_line(textures.warnings()[texture_warnings_++]));
+      warn(object, to_readable_line(textures.warnings()[texture_warnings_++]));
   }
 
  private:

@@ -49,7 +49,7 @@ std::vector<double> read_size(pugi::xml_node shape, const char* name, std::size_
   if (text.empty() && otherwise) return std::vector<double>(count, *otherwise);
   auto numbers = numbers_of(text);
   if (!numbers || numbers->size() != count) {
-    throw Unusable{"the " + std::string(name) + " of its " + readable_line(shape.name()) +
+    throw Unusable{"the " + std::string(name) + " of its " + to_readable_line(shape.name()) +
                    " is not " +
                    (count == 1 ? "a finite number" : std::to_string(count) + " finite numbers")};
   }
@@ -59,7 +59,7 @@ std::vector<double> read_size(pugi::xml_node shape, const char* name, std::size_
 std::vector<double> read_positive_size(pugi::xml_node shape, const char* name, std::size_t count) {
   auto numbers = read_size(shape, name, count);
   if (std::any_of(numbers.begin(), numbers.end(), [](double v) { return !(v > 0.0); })) {
-    throw Unusable{"the " + std::string(name) + " of its " + readable_line(shape.name()) +
+    throw Unusable{"the " + std::string(name) + " of its " + to_readable_line(shape.name()) +
                    " is not above 0"};
   }
   return numbers;
@@ -105,7 +105,7 @@ std::string_view frame_of_pose(pugi::xml_node part) {
 }
 
 std::string in_quotes(std::string_view text) {
-  return "\"" + readable_line(text) + "\"";
+  return "\"" + to_readable_line(text) + "\"";
 }
 
 }  // namespace panonav::simulation

@@ -61,7 +61,7 @@ TomlValue copy_of(const toml::node& node) {
       shown << value;
     }
   });
-  result.shown = shortened(readable_line(shown.str()), 60);
+  result.shown = shorten_middle(to_readable_line(shown.str()), 60);
   return result;
 }
 
@@ -105,7 +105,7 @@ TomlTable read_toml(const std::filesystem::path& path) {
     return copy_of(toml::parse(text));
   } catch (const toml::parse_error& error) {
     throw FileError(path.string(), "line " + std::to_string(error.source().begin.line) +
-                                       " is not TOML: " + readable_line(error.description()));
+                                       " is not TOML: " + to_readable_line(error.description()));
   }
 }
 
@@ -195,13 +195,14 @@ std::optional<std::size_t> TomlFields::choice(std::string_view field,
     if (*value == choices[i]) return i;
     allowed += (i > 0 ? ", \"" : "\"") + std::string(choices[i]) + "\"";
   }
-  fail(field, readable_line("\"" + *value + "\""), allowed);
+  fail(field, to_readable_line("\"" + *value + "\""), allowed);
 }
 
 void TomlFields::fail(std::string_view field, std::string_view found,
                       std::string_view allowed) const {
   const std::string where = section_.empty() ? std::string() : "[" + section_ + "] ";
-  throw FileError(path_.string(), where + readable_line(field) + " is " + readable_line(found) +
+  throw FileError(path_.string(), where + to_readable_line(field) + " is " +
+                                      to_readable_line(found) +
                                       "; allowed: " + std::string(allowed));
 }
 
@@ -212,8 +213,8 @@ void TomlFields::finish() const {
     for (const auto& name : asked_) known += (known.empty() ? "" : ", ") + name;
     const std::vector<std::string_view> names(asked_.begin(), asked_.end());
     throw FileError(path_.string(), (section_.empty() ? "" : "[" + section_ + "] ") +
-                                        readable_line(field.name) + " is not a known field" +
-                                        did_you_mean(field.name, names) + "; known: " + known);
+                                        to_readable_line(field.name) + " is not a known field" +
+                                        suggest_name(field.name, names) + "; known: " + known);
   }
 }
 

@@ -34,7 +34,7 @@ std::vector<std::size_t> LatticeGraph::components() const {
   for (std::size_t node = 0; node < size(); ++node) {
     for (const Neighbour& neighbour : neighbours(node)) sets.join(node, neighbour.node);
   }
-  std::vector<std::size_t> found = sets.numbered();
+  std::vector<std::size_t> found = sets.number_sets();
   std::vector<std::size_t> sizes;
   for (const std::size_t component : found) {
     sizes.resize(std::max(sizes.size(), component + 1));

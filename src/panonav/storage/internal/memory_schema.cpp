@@ -185,7 +185,7 @@ Settings read_settings(Database& database) {
     std::string key(rows.text(0));
     SettingValue value = value_in(rows, 1);
     if (rows.integer(2) != setting_checksum(key, value)) {
-      database.fail_damaged("checksum of setting " + readable_line(key));
+      database.fail_damaged("checksum of setting " + to_readable_line(key));
     }
     settings.emplace(std::move(key), std::move(value));
   }
