@@ -139,8 +139,7 @@ class OrbVlad final : public lab::RivalRecogniser {
 #endif
 
 void compare(const std::filesystem::path& folder) {
-  lab::ElsewhereReproductionOptions options;
-  options.out = std::filesystem::temp_directory_path();
+  const lab::ReproductionOptions options = lab::default_options("elsewhere");
   std::vector<std::unique_ptr<lab::RivalRecogniser>> rivals;
 #ifdef PANONAV_BENCH_ORB
   cv::setNumThreads(1);
@@ -148,8 +147,9 @@ void compare(const std::filesystem::path& folder) {
   rivals.push_back(std::make_unique<OrbVlad>());
 #endif
   Executor alone(1);
-  lab::Reproduction result;
-  ElsewhereExperiments{options, alone, result}.reproduce_leave_one_out(folder, std::move(rivals));
+  lab::Reproduction result{.out = std::filesystem::temp_directory_path()};
+  lab::ElsewhereExperiments{{options, alone, result}}.reproduce_leave_one_out(folder,
+                                                                              std::move(rivals));
   for (const lab::ResultRow& row : result.rows) {
     std::printf("%s: %s%s%s\n", row.what.c_str(), lab::shown_figure(row).c_str(),
                 row.over.empty() ? "" : ", ", row.over.c_str());

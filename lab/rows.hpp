@@ -64,11 +64,11 @@ template <typename Range, typename Predicate>
 /// One more point of a curve, with its interval as error bar.
 void add_point(viewer::Series& series, double x, const Figure& y);
 
-/// Writes a plot into the folder and lists it.
+/// Writes a plot into the folder of the result and lists it.
 template <typename... Plot>
-void add_plot(Reproduction& result, const std::filesystem::path& folder, const std::string& file,
-              const std::string& caption, const Plot&... plot) {
-  write_plot(folder / file, plot...);
+void add_plot(Reproduction& result, const std::string& file, const std::string& caption,
+              const Plot&... plot) {
+  write_plot(result.out / file, plot...);
   result.pictures.push_back({file, caption});
 }
 

@@ -316,7 +316,7 @@ class Days {
                  without_.errors_m);
     }
     for (const DailyRobot& robot : robots_) report(robot, id + robot.id, what + robot.what + ", ");
-    add_plot(result, options_.out, "days_" + name_ + ".svg",
+    add_plot(result, "days_" + name_ + ".svg",
              "Single pictures of " + name_ +
                  " that are localised within one spacing, while objects move and light changes.",
              viewer::LinePlot{.x_label = "day",
@@ -384,7 +384,7 @@ class Days {
   }
 
   ElsewhereExperiments& elsewhere_;
-  const ElsewhereReproductionOptions& options_;
+  const ReproductionOptions& options_;
   std::string name_;
   simulation::PlaceRecording place_;
   simulation::ChangingScene changing_;

@@ -6,9 +6,7 @@
 #include <vector>
 
 #include "lab/baselines/rivals.hpp"
-#include "lab/reproduction.hpp"
-#include "lab/rows.hpp"
-#include "panonav/core/executor.hpp"
+#include "lab/experiments.hpp"
 #include "panonav_simulation/place_recording.hpp"
 
 namespace panonav::lab {
@@ -20,12 +18,8 @@ struct RecordedGround {
       variants;  ///< references on a grid, queries at random poses
 };
 
-/// How well all of it does on ground where it was not made. Each experiment appends rows and writes
-/// pictures into `options.out`.
-struct ElsewhereExperiments {
-  const ElsewhereReproductionOptions& options;
-  Executor& executor;
-  Reproduction& result;
+/// How well all of it does on ground where it was not made.
+struct ElsewhereExperiments : Experiments {
   std::vector<RecordedGround> grounds{};  ///< that the next three experiments compare
 
   /// All built-in scenes for robots on a floor; the worlds of `options.data` that are there.

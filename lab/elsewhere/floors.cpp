@@ -101,8 +101,7 @@ void ElsewhereExperiments::reproduce_floor(const std::string& world, double spac
   layers.push_back({.label = "arranged, after the best rotation and scale",
                     .colour = viewer::PlotColour::orange,
                     .dots = simulation::laid_over(estimate, truth)});
-  add_plot(result, options.out,
-           "elsewhere_arrange_" + world + "_" + centimetres_id(spacing_m) + ".svg", what,
+  add_plot(result, "elsewhere_arrange_" + world + "_" + centimetres_id(spacing_m) + ".svg", what,
            viewer::MapPlot{.title = world, .layers = std::move(layers)});
 }
 

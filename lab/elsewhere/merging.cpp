@@ -157,7 +157,7 @@ void report_place(const std::string& name, const std::vector<Session>& walks,
 }  // namespace
 
 void ElsewhereExperiments::reproduce_merging() {
-  const std::filesystem::path folder = options.out / "merged";
+  const std::filesystem::path folder = result.out / "merged";
   std::filesystem::create_directories(folder);
   std::map<std::string, std::vector<Session>> sessions;
   for (const char* const name : {"loop", "small_warehouse", "small_house"}) {

@@ -221,7 +221,7 @@ void ElsewhereExperiments::reproduce_leave_one_out(
     const std::filesystem::path& recording, std::vector<std::unique_ptr<RivalRecogniser>> rivals) {
   const Dataset dataset = read_dataset(recording);
   const std::string name = recording.filename().string();
-  const RemovedInTheEnd memory{options.out / (name + ".panonav")};
+  const RemovedInTheEnd memory{result.out / (name + ".panonav")};
   const PlaceRecogniser by_columns = memorise(memory.file, dataset, false, executor);
   const PlaceRecogniser recogniser = memorise(memory.file, dataset, true, executor);
   const LeaveOneOut pictures(*this, dataset, recogniser, name);

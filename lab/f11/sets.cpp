@@ -271,7 +271,7 @@ simulation::PlaceRecording MappingExperiments::make_variant(const std::string& s
                                  options.columns, executor);
 }
 
-void MappingExperiments::reproduce_first_set() {
+void MappingExperiments::reproduce_first_set() const {
   MappedSet set{.id = "f11.loop",
                 .what = "loop, " + std::to_string(options.views) + " views 10 cm apart"};
   FirstSetVariations variations;
@@ -291,16 +291,15 @@ void MappingExperiments::reproduce_first_set() {
               .components = {26, 20}},
              "", result);
   variations.report(set.what, result);
-  add_plot(result, options.out, "f11_figure6a.svg",
-           "Figure 6 (a): shape difference against k1, for several k2",
+  add_plot(result, "f11_figure6a.svg", "Figure 6 (a): shape difference against k1, for several k2",
            plot_grid(set.grid, "First set: shape difference by the published rule, median"));
-  add_plot(result, options.out, "f11_figure4.svg",
+  add_plot(result, "f11_figure4.svg",
            "Figure 4: maps of the loop beside the truth and the wheels, laid over the truth with "
            "one scale",
            set.maps, 2);
 }
 
-void MappingExperiments::reproduce_second_set() {
+void MappingExperiments::reproduce_second_set() const {
   MappedSet set{.id = "f11.lab", .what = "lab, views captured by threshold"};
   const auto views = static_cast<std::size_t>(options.views);
   std::vector<double> nodes;
@@ -339,10 +338,9 @@ void MappingExperiments::reproduce_second_set() {
                    "closures correct it"
                  : "",
              result);
-  add_plot(result, options.out, "f11_figure6b.svg",
-           "Figure 6 (b): shape difference against k1, for several k2",
+  add_plot(result, "f11_figure6b.svg", "Figure 6 (b): shape difference against k1, for several k2",
            plot_grid(set.grid, "Second set: shape difference by the published rule, median"));
-  add_plot(result, options.out, "f11_figure5.svg",
+  add_plot(result, "f11_figure5.svg",
            "Figure 5: maps of the second set beside the truth and the wheels, laid over the truth",
            set.maps, 2);
 }

@@ -169,7 +169,7 @@ void map_indoor_walk(const MappingExperiments& f11) {
   add_row(f11.result, "f11.indoor_walk.without_sequence",
           "indoor_walk_360: loops that single views would close, were no sequence asked for",
           static_cast<double>(refused.size()), "closures");
-  add_plot(f11.result, f11.options.out, "f11_indoor_walk.svg",
+  add_plot(f11.result, "f11_indoor_walk.svg",
            "A walk through a building, pictures metres apart: steps that the views do not show "
            "count as 1.5 m straight ahead; closures in orange",
            plot_indoor_walk(bridged));
@@ -183,7 +183,7 @@ void map_indoor_walk(const MappingExperiments& f11) {
   if (refused.size() > max_pairs) refused.resize(max_pairs);
   std::vector<std::pair<Panorama, Panorama>> pairs;
   for (const MapEdge& edge : refused) pairs.emplace_back(view_of(edge.a), view_of(edge.b));
-  add_plot(f11.result, f11.options.out, "f11_indoor_walk_pairs.svg",
+  add_plot(f11.result, "f11_indoor_walk_pairs.svg",
            "Pairs of pictures (one over the other) that pass every check of a loop closure but the "
            "sequence: corridors of one kind on several floors. None of them becomes a closure",
            pairs_picture("indoor_walk_360: pairs that no sequence of views confirms", pairs));
@@ -293,7 +293,7 @@ struct WorldErrors {
 
 }  // namespace
 
-void MappingExperiments::measure_step_time() {
+void MappingExperiments::measure_step_time() const {
   const MirrorImages seen = take_mirror_images(*this);
   const StepTimes usual = time_steps(seen, components);
   add_row(result, "f11.time.step",
@@ -308,7 +308,7 @@ void MappingExperiments::measure_step_time() {
             "from signature to pose with " + std::to_string(count) + " components", times.y.back(),
             "ms");
   }
-  add_plot(result, options.out, "f11_figure6_time.svg",
+  add_plot(result, "f11_figure6_time.svg",
            "Figure 6: time of a step against the number of components",
            viewer::LinePlot{.title = "Time from a signature to a pose, median",
                             .x_label = "components",
@@ -316,7 +316,7 @@ void MappingExperiments::measure_step_time() {
                             .series = {times}});
 }
 
-void MappingExperiments::reproduce_identical_doors() {
+void MappingExperiments::reproduce_identical_doors() const {
   const int scenes = std::max(1, options.scenes / 5);
   constexpr double spacing_m = 0.2;
   const auto views = static_cast<std::size_t>(2 * options.views);
@@ -349,7 +349,7 @@ void MappingExperiments::reproduce_identical_doors() {
              what + ": shape difference with closure and steps from wheels", "", errors);
 }
 
-void MappingExperiments::reproduce_world(const std::string& name) {
+void MappingExperiments::reproduce_world(const std::string& name) const {
   constexpr double length_m = 60.0;
   constexpr double spacing_m = 0.15;
   const simulation::PlaceRecording place = simulation::empty_place(
@@ -384,11 +384,11 @@ void MappingExperiments::reproduce_world(const std::string& name) {
            errors.better(errors.ground), runs);
   add_rate(result, id + ".right_closures", what + "closures between views at most 1 m apart",
            errors.right, std::max<std::size_t>(1, errors.right + errors.wrong));
-  add_plot(result, options.out, "f11_" + name + ".svg",
+  add_plot(result, "f11_" + name + ".svg",
            "Paths of 60 m with two loops in " + name + ", laid over the truth", errors.maps, 2);
 }
 
-void MappingExperiments::reproduce_recordings() {
+void MappingExperiments::reproduce_recordings() const {
   if (simulation::has_data(options.data, "sussex_route")) {
     const auto route = read_recording(options.data / "sussex_route", {}, executor);
     const auto mapped = simulation::map_recording(route, {.mapping = {.close_loops = false}});
@@ -398,7 +398,7 @@ void MappingExperiments::reproduce_recordings() {
     add_row(result, "f11.sussex.shape", "sussex_route: shape difference",
             simulation::shape_error(mapped.estimate, mapped.truth), "");
     add_plot(
-        result, options.out, "f11_sussex_route.svg", "A route outdoors, laid over the tracker's",
+        result, "f11_sussex_route.svg", "A route outdoors, laid over the tracker's",
         viewer::MapPlot{
             .title = "sussex_route",
             .layers = {
@@ -410,7 +410,7 @@ void MappingExperiments::reproduce_recordings() {
   if (simulation::has_data(options.data, "indoor_walk_360")) map_indoor_walk(*this);
 }
 
-void MappingExperiments::measure_large_maps() {
+void MappingExperiments::measure_large_maps() const {
   // Round after round, each a little beside the others.
   constexpr int columns = 256;
   const simulation::PlaceRecording place = simulation::empty_place(

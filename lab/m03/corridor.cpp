@@ -118,7 +118,7 @@ struct CorridorRuns {
 };
 
 CorridorRuns record_corridors(const TrackingExperiments& m03) {
-  const TrackingReproductionOptions& options = m03.options;
+  const ReproductionOptions& options = m03.options;
   Executor& executor = m03.executor;
   CorridorRuns corridors;
   const int scenes = std::max(1, (options.scenes + 1) / 2);
@@ -233,7 +233,7 @@ void TrackingExperiments::reproduce_corridor() {
   const std::size_t last = shown.runs.front().steps.size() - 1;
   const std::size_t first = std::min(corridors.first_distinct.front().value_or(last), last);
   const std::array<std::size_t, 4> steps{0, first / 2, first, std::min(first + 2, last)};
-  add_plot(result, options.out, "corridor.svg",
+  add_plot(result, "corridor.svg",
            "A corridor of identical doors: the particles keep to places that look alike until "
            "something that stands only once comes into view.",
            particle_maps(*shown.place, corridors.things, shown.runs.front(), setting,

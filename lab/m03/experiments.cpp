@@ -7,7 +7,6 @@
 #include <cmath>
 #include <utility>
 
-#include "lab/reproduction_stages.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav_simulation/worlds.hpp"
@@ -216,59 +215,42 @@ std::span<const std::string_view> tracking_reproduction_parts() {
   return parts;
 }
 
-TrackingReproductionOptions quick_run(TrackingReproductionOptions options) {
-  options.scenes = 1;
-  options.variants = 2;
-  options.runs = 3;
-  return options;
-}
-
-Reproduction reproduce_m03(const TrackingReproductionOptions& options, Executor& executor,
-                           const ReproductionProgress& progress) {
-  require(options.scenes >= 1, "scenes", options.scenes, ">= 1");
-  require(options.variants >= 1, "variants", options.variants, ">= 1");
-  require(options.runs >= 2, "runs", options.runs, ">= 2");
+ReproductionPlan plan_m03(const Experiments& context) {
+  const ReproductionOptions& options = context.options;
+  require_minima({{"scenes", options.scenes, 1},
+                  {"variants", options.variants, 1},
+                  {"runs", options.runs, 2}});
   const auto parts = tracking_reproduction_parts();
   if (!options.only.empty() && std::ranges::find(parts, options.only) == parts.end()) {
     throw ContractError("only", options.only,
                         "office, corridor, garden, leaving, worlds, recordings");
   }
-  make_folder(options.out);
-
-  Reproduction result;
-  TrackingExperiments m03{options, executor, result};
-  std::vector<ReproductionStage> stages;
-  const auto add = [&](std::string_view part, const std::string& name, double cost,
-                       std::function<void()> run) {
-    if (options.only.empty() || options.only == part)
-      stages.push_back({name, cost, std::move(run)});
+  const auto m03 = std::make_shared<TrackingExperiments>(context);
+  ReproductionPlan plan;
+  const auto add = [&](std::string_view part, double cost, std::function<void()> run) {
+    if (options.only.empty() || options.only == part) plan.push_back({cost, std::move(run)});
   };
   const double scenes = options.scenes;
-  for (int s = 0; s < options.scenes; ++s) {
-    add("office", "office " + std::to_string(s + 1) + " of " + std::to_string(options.scenes), 20.0,
-        [&m03, s] { m03.record_office(s); });
-  }
-  add("office", "global localisation", 3.0 * scenes, [&] { m03.reproduce_global_localisation(); });
-  add("office", "position tracking", scenes, [&] { m03.reproduce_position_tracking(); });
-  add("office", "kidnapped robot", scenes, [&] { m03.reproduce_kidnapping(); });
-  add("office", "particles and odometry", 10.0 * scenes, [&] { m03.reproduce_sweeps(); });
-  add("corridor", "corridor", 10.0 * scenes, [&] { m03.reproduce_corridor(); });
-  add("garden", "garden", 10.0 * scenes, [&] { m03.reproduce_garden(); });
-  for (const std::string scene : {"hall", "loop"}) {
-    add("leaving", "leaving the " + scene, 5.0 * scenes,
-        [&m03, scene] { m03.reproduce_leaving(scene); });
+  for (int s = 0; s < options.scenes; ++s) add("office", 20.0, [=] { m03->record_office(s); });
+  add("office", 3.0 * scenes, [=] { m03->reproduce_global_localisation(); });
+  add("office", scenes, [=] { m03->reproduce_position_tracking(); });
+  add("office", scenes, [=] { m03->reproduce_kidnapping(); });
+  add("office", 10.0 * scenes, [=] { m03->reproduce_sweeps(); });
+  add("corridor", 10.0 * scenes, [=] { m03->reproduce_corridor(); });
+  add("garden", 10.0 * scenes, [=] { m03->reproduce_garden(); });
+  for (const char* const scene : {"hall", "loop"}) {
+    add("leaving", 5.0 * scenes, [=] { m03->reproduce_leaving(scene); });
   }
   for (const std::string& world : simulation::worlds_in(options.data)) {
-    add("worlds", world, 50.0, [&m03, world] { m03.reproduce_gazebo_world(world); });
+    add("worlds", 50.0, [=] { m03->reproduce_gazebo_world(world); });
   }
   if (simulation::has_data(options.data, "sussex_route")) {
-    add("recordings", "sussex_route", 10.0, [&] { m03.reproduce_recorded_route(); });
+    add("recordings", 10.0, [=] { m03->reproduce_recorded_route(); });
   }
   if (simulation::has_data(options.data, "gantry_plants")) {
-    add("recordings", "gantry_plants", 10.0, [&] { m03.reproduce_gantry(); });
+    add("recordings", 10.0, [=] { m03->reproduce_gantry(); });
   }
-  run_stages(stages, progress);
-  return result;
+  return plan;
 }
 
 }  // namespace panonav::lab

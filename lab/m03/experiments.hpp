@@ -7,10 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "lab/rows.hpp"
+#include "lab/experiments.hpp"
 #include "lab/runs/tracking_filter.hpp"
 #include "lab/runs/tracking_run.hpp"
-#include "panonav/core/executor.hpp"
 
 namespace panonav::lab {
 
@@ -85,12 +84,8 @@ struct RunRows {
   void tell_single_images() const;
 };
 
-/// The experiments of [M03] and what its authors only announced. Each appends rows and writes
-/// pictures into `options.out`.
-struct TrackingExperiments {
-  const TrackingReproductionOptions& options;
-  Executor& executor;
-  Reproduction& result;
+/// The experiments of [M03] and what its authors only announced.
+struct TrackingExperiments : Experiments {
   std::vector<OfficeRuns> offices{};  ///< the first four experiments need one at least
 
   void record_office(int number);

@@ -34,7 +34,7 @@ struct GardenRuns {
 };
 
 GardenRuns record_gardens(const TrackingExperiments& m03) {
-  const TrackingReproductionOptions& options = m03.options;
+  const ReproductionOptions& options = m03.options;
   Executor& executor = m03.executor;
   GardenRuns gardens;
   const int scenes = std::max(1, (options.scenes + 1) / 2);
@@ -110,7 +110,7 @@ void TrackingExperiments::reproduce_garden() {
   }
   (void)add_rows("light_changing", "light that changes at each image between 0.50 and 2.00",
                  gardens.changing);
-  add_plot(result, options.out, "garden_success.svg",
+  add_plot(result, "garden_success.svg",
            "Outdoors in other light than memorised: single images, and the filter.",
            viewer::LinePlot{.title = "Garden: localisation against brightness",
                             .x_label = "light, times that of the memory",
@@ -119,7 +119,7 @@ void TrackingExperiments::reproduce_garden() {
                             .log_x = true,
                             .x_range = std::pair{0.4, 2.5},
                             .y_range = std::pair{0.0, 1.02}});
-  add_plot(result, options.out, "garden_images.svg", "Images until localised against brightness.",
+  add_plot(result, "garden_images.svg", "Images until localised against brightness.",
            viewer::LinePlot{.title = "Garden: mean number of images until localised",
                             .x_label = "light, times that of the memory",
                             .y_label = "images",

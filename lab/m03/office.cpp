@@ -199,9 +199,8 @@ void draw_curves(const TrackingExperiments& m03, const std::string& file, const 
     success.series.push_back(curve.success);
     images.series.push_back(curve.images);
   }
-  const auto& out = m03.options.out;
-  add_plot(m03.result, out, file + "_success.svg", title + ": success.", success);
-  add_plot(m03.result, out, file + "_images.svg", title + ": images.", images);
+  add_plot(m03.result, file + "_success.svg", title + ": success.", success);
+  add_plot(m03.result, file + "_images.svg", title + ": images.", images);
 }
 
 std::string shortest_text(double factor) {
@@ -278,13 +277,13 @@ void TrackingExperiments::reproduce_global_localisation() {
     curves.series.push_back(error_over_images(rule.name, runs, m03_most_images, 0,
                                               0.08 * static_cast<double>(curves.series.size())));
   }
-  add_plot(result, options.out, "global_error.svg",
+  add_plot(result, "global_error.svg",
            "Error of the heaviest mode over the images, from no knowledge of position and heading, "
            "for four rules of injection.",
            curves);
   const std::array<std::size_t, 3> steps{0, 2, 8};
   const OfficeRuns& shown = offices.front();
-  add_plot(result, options.out, "fig07_global_localisation.svg",
+  add_plot(result, "fig07_global_localisation.svg",
            "Global localisation with as many particles as references and nothing injected, heading "
            "unknown, hard ([M03] figure 7, 1 to 3).",
            particle_maps(*shown.hard.place, shown.furniture, shown.hard.runs.front(),
@@ -315,13 +314,13 @@ void TrackingExperiments::reproduce_position_tracking() {
     curves.series.push_back(error_over_images(rule.name, known, 5, first_after_blind,
                                               0.05 * static_cast<double>(curves.series.size())));
   }
-  add_plot(result, options.out, "tracking_error.svg",
-           "Error of the heaviest mode after 2 m of dead reckoning.", curves);
+  add_plot(result, "tracking_error.svg", "Error of the heaviest mode after 2 m of dead reckoning.",
+           curves);
   if (sets.front().runs.empty()) return;
   const std::array<std::size_t, 3> steps{images_before_blind - 1, first_after_blind - 1,
                                          first_after_blind};
   add_plot(
-      result, options.out, "fig07_position_tracking.svg",
+      result, "fig07_position_tracking.svg",
       "Position tracking: before, at the end of, and one image after 2 m without images ([M03] "
       "figure 7, 4 to 6).",
       particle_maps(*sets.front().place, offices.front().furniture, sets.front().runs.front(),
@@ -356,11 +355,11 @@ void TrackingExperiments::reproduce_kidnapping() {
                                     setting, seed_of_kidnapping, steps, rule.name),
                       std::back_inserter(maps));
   }
-  add_plot(result, options.out, "kidnapped_error.svg",
+  add_plot(result, "kidnapped_error.svg",
            "Error of the heaviest mode after the robot was kidnapped by at least 1 m away.",
            curves);
   if (maps.empty()) return;
-  add_plot(result, options.out, "fig08_kidnapped.svg",
+  add_plot(result, "fig08_kidnapped.svg",
            "The kidnapped robot 1, 3 and 6 images after it was kidnapped: injected anywhere "
            "([M03] figure 8), around the best matches ([M03] figure 9), and by our rule.",
            maps, 3);

@@ -58,7 +58,7 @@ std::vector<Pose2> excursion(const simulation::FreeSpace& space, double border_m
 }
 
 OutsideRuns record_excursions(const TrackingExperiments& m03, const std::string& name) {
-  const TrackingReproductionOptions& options = m03.options;
+  const ReproductionOptions& options = m03.options;
   Executor& executor = m03.executor;
   OutsideRuns outside;
   const int scenes = std::max(1, options.scenes / 3);
@@ -215,7 +215,7 @@ void TrackingExperiments::reproduce_leaving(const std::string& name) {
     }
   }
   const std::string file = "leaving_" + name + ".svg";
-  add_plot(result, options.out, file,
+  add_plot(result, file,
            "What the filter says of itself, by how far the robot is from all references.",
            viewer::LinePlot{.title = "Leaving the memorised half of " + name,
                             .x_label = "way to the nearest reference [m]",

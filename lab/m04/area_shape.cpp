@@ -247,10 +247,10 @@ class AreaShape final : public Experiment {
     scenes_.push_back(here);
   }
 
-  void report(const std::filesystem::path& folder, Reproduction& result) const override {
+  void report(Reproduction& result) const override {
     require(!scenes_.empty(), "places", 0.0, ">= 1");
     if (!shown_.empty()) {
-      add_plot(result, folder, "fig10_areas_at_places.svg",
+      add_plot(result, "fig10_areas_at_places.svg",
                "Areas after 3 components at places of one office, with its furniture seen from "
                "above ([M04] figure 10).",
                shown_, 2);
@@ -272,7 +272,7 @@ class AreaShape final : public Experiment {
         }
       }
     }
-    add_plot(result, folder, "fig10_shape_against_surroundings.svg",
+    add_plot(result, "fig10_shape_against_surroundings.svg",
              "The open question of figure 10: how much farther or less far the area reaches in a "
              "direction than in other offices, by how the surroundings there differ from those in "
              "other offices.",

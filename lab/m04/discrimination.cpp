@@ -104,9 +104,9 @@ class Discrimination final : public Experiment {
     }
   }
 
-  void report(const std::filesystem::path& folder, Reproduction& result) const override {
+  void report(Reproduction& result) const override {
     require(trials_ >= 1, "queries", 0.0, ">= 1");
-    draw(folder, result);
+    draw(result);
     for (std::size_t condition = 0; condition < kConditions; ++condition) {
       const std::string& name = view_conditions()[condition].name;
       const std::string& id = view_conditions()[condition].id;
@@ -236,9 +236,9 @@ class Discrimination final : public Experiment {
                         .style = viewer::SeriesStyle::lines});
   }
 
-  void draw(const std::filesystem::path& folder, Reproduction& result) const {
+  void draw(Reproduction& result) const {
     add_plot(
-        result, folder, "fig06_similarity_profile.svg",
+        result, "fig06_similarity_profile.svg",
         "With 2 components the peak is broad; from 15 on it is narrow and stands at the true "
         "position.",
         viewer::LinePlot{
@@ -264,7 +264,7 @@ class Discrimination final : public Experiment {
       }
       rates.series.push_back(std::move(line));
     }
-    add_plot(result, folder, "fig06_success.svg",
+    add_plot(result, "fig06_success.svg",
              "How often the most similar reference is the nearest one: clean views, views with "
              "people around, and a noisy camera.",
              rates);

@@ -139,7 +139,7 @@ class DistanceCurve final : public Experiment {
     curves_.push_back(std::move(curve));
   }
 
-  void report(const std::filesystem::path& folder, Reproduction& result) const override {
+  void report(Reproduction& result) const override {
     require(!curves_.empty(), "places", 0.0, ">= 1");
     viewer::Series average{.label = "mean of " + std::to_string(curves_.size()) + " scenes",
                            .style = viewer::SeriesStyle::lines_and_points};
@@ -156,7 +156,7 @@ class DistanceCurve final : public Experiment {
                           .y_label = "dissimilarity (1: level of far views)",
                           .series = single_};
     plot.series.push_back(average);
-    add_plot(result, folder, "fig07_dissimilarity_distance.svg",
+    add_plot(result, "fig07_dissimilarity_distance.svg",
              "Dissimilarity from one view, as the robot drives away from it (thin), and the mean "
              "over all pairs of views of all scenes with its 95 % interval: steep and straight at "
              "first, then bent, then level.",
@@ -255,10 +255,10 @@ class SimilaritySurface final : public Experiment {
     }
   }
 
-  void report(const std::filesystem::path& folder, Reproduction& result) const override {
+  void report(Reproduction& result) const override {
     require(map_.has_value(), "queries", 0.0, ">= 1");
     add_plot(
-        result, folder, "fig08_similarity_surface.svg",
+        result, "fig08_similarity_surface.svg",
         "Similarity is highest around the place where the view was taken and falls on all sides.",
         *map_);
     add_row(result, "m04.fig8.monotony",

@@ -1,12 +1,9 @@
 #pragma once
 
-#include <filesystem>
-#include <functional>
 #include <memory>
 #include <string>
 
-#include "lab/rows.hpp"
-#include "panonav/core/executor.hpp"
+#include "lab/experiments.hpp"
 #include "panonav_simulation/place_recording.hpp"
 
 namespace panonav::lab {
@@ -18,9 +15,9 @@ class Experiment {
   virtual ~Experiment() = default;
   /// Measures in one place. Results depend on the places and their order alone.
   virtual void add(const simulation::PlaceRecording& place, Executor& executor) = 0;
-  /// Appends rows and writes pictures into `folder`. Called once, after the last place; throws
+  /// Appends rows and writes images. Called once, after the last place; throws
   /// ContractError when there was none.
-  virtual void report(const std::filesystem::path& folder, Reproduction& result) const = 0;
+  virtual void report(Reproduction& result) const = 0;
 };
 
 /// [M04] figure 4: what a turn on the spot changes, against what a step to the next reference
@@ -45,9 +42,8 @@ class Experiment {
 [[nodiscard]] std::unique_ptr<Experiment> rivals_experiment();
 
 /// [M04] section 3: views that arrange themselves (figures 12, 15, 16 and 17), in the hall, a small
-/// room and the periodic hall. `step` is told what comes next, once for each scene.
-void reproduce_lattice(const ReproductionOptions& options, Executor& executor,
-                       const std::function<void(const std::string&)>& step, Reproduction& result);
+/// room and the periodic hall.
+void reproduce_lattice(const Experiments& context);
 
 /// [M03] table 1: bits of the raw image, the cylinder and the signature, counted from the objects.
 void reproduce_memory_table(Reproduction& result);

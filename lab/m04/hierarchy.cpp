@@ -90,10 +90,10 @@ class HierarchicalAreas final : public Experiment {
     }
   }
 
-  void report(const std::filesystem::path& folder, Reproduction& result) const override {
+  void report(Reproduction& result) const override {
     require(trials_ >= 1, "queries", 0.0, ">= 1");
     add_plot(
-        result, folder, "fig09_hierarchical_areas.svg",
+        result, "fig09_hierarchical_areas.svg",
         "With more components the area where the robot may be shrinks around it ([M04] figure 9).",
         shown_, 2);
     viewer::LinePlot curve{.title = "Area where the robot may be, by number of components",
@@ -103,8 +103,7 @@ class HierarchicalAreas final : public Experiment {
     for (std::size_t m = 0; m < kLevels; ++m) {
       add_point(curve.series[0], static_cast<double>(m + 1), median_figure(areas_m2_[m]));
     }
-    add_plot(result, folder, "fig09_area_curve.svg", "The median area over all queries and scenes.",
-             curve);
+    add_plot(result, "fig09_area_curve.svg", "The median area over all queries and scenes.", curve);
     for (const std::size_t m : {std::size_t{1}, std::size_t{3}, kLevels}) {
       const std::string text = std::to_string(m);
       add_row(result, "m04.fig9.area_" + text,

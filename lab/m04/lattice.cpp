@@ -73,8 +73,8 @@ std::string with_mu(const std::string& title, double mu) {
 
 class LatticeExperiment {
  public:
-  LatticeExperiment(const ReproductionOptions& options, Executor& executor)
-      : options_(options), executor_(executor) {}
+  explicit LatticeExperiment(const Experiments& context)
+      : options_(context.options), executor_(context.executor), result_(context.result) {}
 
   void run_scene(int scene) {
     const std::uint64_t seed = options_.seed + static_cast<std::uint64_t>(scene);
@@ -87,42 +87,42 @@ class LatticeExperiment {
     }
   }
 
-  void report(Reproduction& result) const {
+  void report() const {
     add_rows("m04.fig15.phases", "figure 15: 10 x 8 views at 30 cm in the hall, unordered, phases",
-             phases_, true, result);
+             phases_, true, result_);
     add_rows("m04.fig15.plain", "figure 15: the same by dissimilarity alone, as published", plain_,
-             false, result);
+             false, result_);
     add_rows("m04.fig15.small_room", "10 x 8 views at 30 cm in a room of 4 x 3.5 m, phases",
-             small_room_, false, result);
-    add_row(result, "m04.fig15.turn_error",
+             small_room_, false, result_);
+    add_row(result_, "m04.fig15.turn_error",
             "section 3.4: error of the turn between neighbours 30 cm apart (median over scenes of "
             "the median; published: about 10 %)",
             median_figure(turn_error_deg_), "deg", at_most(2.0), std::pair{18.0, 36.0});
     for (std::size_t i = 0; i < error_.size(); ++i) {
       add_row(
-          result, "m04.fig12.error_" + std::to_string(i),
+          result_, "m04.fig12.error_" + std::to_string(i),
           "figure 12: error of a distance read as " + to_text(kErrorsAt[i]) + " spacings of 30 cm",
           median_figure(error_[i]), "spacings");
     }
-    add_row(result, "m04.fig12.range", "figure 12: largest distance at which views correlate (x_1)",
-            median_figure(range_), "spacings");
+    add_row(result_, "m04.fig12.range",
+            "figure 12: largest distance at which views correlate (x_1)", median_figure(range_),
+            "spacings");
     add_rows(
         "m04.fig17",
         "figure 17: 540 x 540 cm zigzag at 60 cm in the periodic hall, coarse motion and phases",
-        coarse_, true, result);
+        coarse_, true, result_);
     add_rows("m04.fig17.without_phases", "figure 17: the same without phases",
-             coarse_without_phases_, false, result);
+             coarse_without_phases_, false, result_);
     add_rows("m04.fig17.plain", "figure 17: the same by dissimilarity alone: it folds", folded_,
-             false, result);
+             false, result_);
     if (options_.fine_lattice_every > 0) {
       add_rows("m04.fig17.fine", "figure 17 at 30 cm, coarse motion and phases", fine_, true,
-               result);
+               result_);
       add_rows("m04.fig17.fine.without_phases", "figure 17 at 30 cm, without phases",
-               fine_without_phases_, false, result);
+               fine_without_phases_, false, result_);
     }
-    add_row(result, "m04.lattice.time", "section 3: time to arrange 80 views, phases",
+    add_row(result_, "m04.lattice.time", "section 3: time to arrange 80 views, phases",
             median_figure(time_ms_), "ms");
-    result.pictures.insert(result.pictures.end(), pictures_.begin(), pictures_.end());
   }
 
  private:
@@ -212,10 +212,9 @@ class LatticeExperiment {
     return DissimilarityCurve(pairs, quantile(values, 0.9));
   }
 
-  void draw(const std::string& file, std::string caption,
+  void draw(const std::string& file, const std::string& caption,
             const std::vector<viewer::MapPlot>& panels) {
-    viewer::write_plot(options_.out / file, panels, static_cast<int>(panels.size()));
-    pictures_.push_back({file, std::move(caption)});
+    add_plot(result_, file, caption, panels, static_cast<int>(panels.size()));
   }
 
   void draw_path(const ViewGrid& grid) {
@@ -228,10 +227,9 @@ class LatticeExperiment {
       way.push_back(pose.position());
       arrows.lines.push_back({pose.position(), pose * Point2{0.4 * grid.spacing_m, 0.0}});
     }
-    viewer::write_plot(options_.out / "fig16_path.svg",
-                       viewer::MapPlot{.title = "Path and headings ([M04] figure 16)",
-                                       .layers = {path, arrows, views}});
-    pictures_.push_back({"fig16_path.svg", "Where the images were taken, along a zigzag."});
+    add_plot(result_, "fig16_path.svg", "Where the images were taken, along a zigzag.",
+             viewer::MapPlot{.title = "Path and headings ([M04] figure 16)",
+                             .layers = {path, arrows, views}});
   }
 
   void draw_curve(const DissimilarityCurve& curve) {
@@ -242,40 +240,34 @@ class LatticeExperiment {
       error.add(knot.distance, knot.error);
       stiffness.add(knot.distance, curve.stiffness(knot.distance));
     }
-    viewer::write_plot(
-        options_.out / "fig12_error_stiffness.svg",
-        viewer::LinePlot{.title =
-                             "Error of the distance read from dissimilarity, and what it makes "
-                             "of springs ([M04] figure 12)",
-                         .x_label = "distance x [spacings of 30 cm]",
-                         .y_label = "E [spacings]; K",
-                         .series = {error, stiffness}});
-    pictures_.push_back({"fig12_error_stiffness.svg",
-                         "Estimated from the views alone: the error grows with the distance, so "
-                         "long springs are weak."});
+    add_plot(result_, "fig12_error_stiffness.svg",
+             "Estimated from the views alone: the error grows with the distance, so "
+             "long springs are weak.",
+             viewer::LinePlot{
+                 .title = "Error of the distance read from dissimilarity, and what it makes "
+                          "of springs ([M04] figure 12)",
+                 .x_label = "distance x [spacings of 30 cm]",
+                 .y_label = "E [spacings]; K",
+                 .series = {error, stiffness}});
   }
 
   static constexpr std::array<double, 3> kErrorsAt{1.0, 2.0, 3.0};
 
   const ReproductionOptions& options_;
   Executor& executor_;
+  Reproduction& result_;
   Arrangements phases_, plain_, small_room_, coarse_, coarse_without_phases_, folded_, fine_,
       fine_without_phases_;
   std::vector<double> turn_error_deg_, range_, time_ms_;
   std::array<std::vector<double>, kErrorsAt.size()> error_;
-  std::vector<ReproductionPicture> pictures_;
 };
 
 }  // namespace
 
-void reproduce_lattice(const ReproductionOptions& options, Executor& executor,
-                       const std::function<void(const std::string&)>& step, Reproduction& result) {
-  LatticeExperiment experiment(options, executor);
-  for (int scene = 0; scene < options.scenes; ++scene) {
-    step("lattice " + std::to_string(scene + 1) + " of " + std::to_string(options.scenes));
-    experiment.run_scene(scene);
-  }
-  experiment.report(result);
+void reproduce_lattice(const Experiments& context) {
+  LatticeExperiment experiment(context);
+  for (int scene = 0; scene < context.options.scenes; ++scene) experiment.run_scene(scene);
+  experiment.report();
 }
 
 }  // namespace panonav::lab

@@ -1,10 +1,8 @@
-#include <string>
+#include <memory>
 #include <vector>
 
 #include "lab/m04/experiment.hpp"
 #include "lab/navigation/experiments.hpp"
-#include "lab/reproduction_stages.hpp"
-#include "panonav/core/error.hpp"
 
 namespace panonav::lab {
 
@@ -13,83 +11,63 @@ namespace {
 // Other scenes than those of the offices.
 constexpr std::uint64_t mission_seeds_above = 1000;
 
-// Relative to one experiment in one office, for the progress.
-double cost_of(const MissionGrid& grid) {
-  return grid.scene == "garden" ? 80.0 : 15.0;
+using FigureExperiments = std::vector<std::unique_ptr<Experiment>>;
+
+FigureExperiments make_experiments() {
+  FigureExperiments experiments;
+  for (auto* const make :
+       {rotational_invariance_experiment, power_spectrum_experiment, discrimination_experiment,
+        distance_curve_experiment, similarity_surface_experiment, hierarchical_areas_experiment,
+        area_shape_experiment, component_weights_experiment, rivals_experiment}) {
+    experiments.push_back(make());
+  }
+  return experiments;
+}
+
+void add_office(const FigureExperiments& experiments, std::uint64_t seed,
+                const Experiments& context) {
+  const simulation::PlaceRecording place =
+      simulation::record_place({.scene = "office",
+                                .seed = seed,
+                                .spacing_m = 0.25,
+                                .queries = context.options.queries,
+                                .rows = context.options.rows},
+                               context.executor);
+  for (const auto& experiment : experiments) experiment->add(place, context.executor);
+}
+
+void reproduce_missions(const MissionGrid& grid, const Experiments& context) {
+  const ReproductionOptions missions{.seed = context.options.seed + mission_seeds_above,
+                                     .scenes = context.options.mission_scenes,
+                                     .runs = context.options.runs};
+  NavigationExperiments{{missions, context.executor, context.result}}.reproduce_grid_missions(
+      grid.scene, grid.spacing_m);
 }
 
 }  // namespace
 
-ReproductionOptions quick_run(ReproductionOptions options) {
-  options.scenes = 2;
-  options.queries = 15;
-  options.fine_lattice_every = 0;
-  options.mission_grids = {{"office", 0.3}};
-  options.missions = 2;
-  options.mission_scenes = 1;
-  return options;
-}
-
-Reproduction reproduce_m04(const ReproductionOptions& options, Executor& executor,
-                           const ReproductionProgress& progress) {
-  require(options.scenes >= 2, "scenes", options.scenes, ">= 2");
-  require(options.fine_lattice_every >= 0, "fine_lattice_every", options.fine_lattice_every,
-          ">= 0");
-  require(options.mission_scenes >= 1, "mission_scenes", options.mission_scenes, ">= 1");
-  require(options.missions >= options.mission_scenes, "missions", options.missions,
-          ">= mission_scenes");
-  make_folder(options.out);
-
-  std::vector<std::unique_ptr<Experiment>> experiments;
-  experiments.push_back(rotational_invariance_experiment());
-  experiments.push_back(power_spectrum_experiment());
-  experiments.push_back(discrimination_experiment());
-  experiments.push_back(distance_curve_experiment());
-  experiments.push_back(similarity_surface_experiment());
-  experiments.push_back(hierarchical_areas_experiment());
-  experiments.push_back(area_shape_experiment());
-  experiments.push_back(component_weights_experiment());
-  experiments.push_back(rivals_experiment());
-
-  // Each scene is one step for taking its views, one for every experiment and one for the lattice.
-  double steps = options.scenes * (2.0 + static_cast<double>(experiments.size()));
-  for (const MissionGrid& grid : options.mission_grids) steps += cost_of(grid);
-  double done = 0.0;
-  const auto step = [&](const std::string& stage, double cost = 1.0) {
-    if (progress) progress(stage, done / steps);
-    done += cost;
-  };
+ReproductionPlan plan_m04(const Experiments& context) {
+  const ReproductionOptions& options = context.options;
+  require_minima({{"scenes", options.scenes, 2},
+                  {"fine_lattice_every", options.fine_lattice_every, 0},
+                  {"mission_scenes", options.mission_scenes, 1},
+                  {"runs", options.runs, options.mission_scenes}});
+  const auto experiments = std::make_shared<const FigureExperiments>(make_experiments());
+  ReproductionPlan plan;
   for (int s = 0; s < options.scenes; ++s) {
-    const std::string name =
-        "office " + std::to_string(s + 1) + " of " + std::to_string(options.scenes);
-    step(name);
-    const simulation::PlaceRecording place =
-        simulation::record_place({.scene = "office",
-                                  .seed = options.seed + static_cast<std::uint64_t>(s),
-                                  .spacing_m = 0.25,
-                                  .queries = options.queries,
-                                  .rows = options.rows},
-                                 executor);
-    for (const auto& experiment : experiments) {
-      step(name);
-      experiment->add(place, executor);
-    }
+    const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(s);
+    plan.push_back({10.0, [=] { add_office(*experiments, seed, context); }});
   }
-  Reproduction result;
-  reproduce_memory_table(result);
-  for (const auto& experiment : experiments) experiment->report(options.out, result);
-  reproduce_lattice(options, executor, step, result);
+  plan.push_back({1.0 * options.scenes, [=] {
+                    reproduce_memory_table(context.result);
+                    for (const auto& experiment : *experiments) experiment->report(context.result);
+                    reproduce_lattice(context);
+                  }});
   for (const MissionGrid& grid : options.mission_grids) {
-    step("missions in " + grid.scene, cost_of(grid));
-    const NavigationReproductionOptions missions{.out = options.out,
-                                                 .scenes = options.mission_scenes,
-                                                 .runs = options.missions,
-                                                 .seed = options.seed + mission_seeds_above};
-    NavigationExperiments{missions, executor, result}.reproduce_grid_missions(grid.scene,
-                                                                              grid.spacing_m);
+    plan.push_back(
+        {grid.scene == "garden" ? 80.0 : 15.0, [=] { reproduce_missions(grid, context); }});
   }
-  if (progress) progress("done", 1.0);
-  return result;
+  return plan;
 }
 
 }  // namespace panonav::lab

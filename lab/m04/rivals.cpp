@@ -90,7 +90,7 @@ class Rivals final : public Experiment {
     }
   }
 
-  void report(const std::filesystem::path& folder, Reproduction& result) const override {
+  void report(Reproduction& result) const override {
     require(trials_ >= 1, "queries", 0.0, ">= 1");
     const auto conditions = rival_conditions();
     viewer::LinePlot plot{.title = "Nearest reference found, by way of recognising places",
@@ -125,7 +125,7 @@ class Rivals final : public Experiment {
             "rivals: difference between the colour channels of a pixel (mean; 0: grey, 1: pure "
             "colours)",
             mean_figure(colourfulness_), "");
-    add_plot(result, folder, "rivals.svg",
+    add_plot(result, "rivals.svg",
              "The Fourier signature beside what the paper argues against, on the same views.",
              plot);
   }

@@ -91,7 +91,7 @@ class RotationalInvariance final : public Experiment {
     }
   }
 
-  void report(const std::filesystem::path&, Reproduction& result) const override {
+  void report(Reproduction& result) const override {
     add_row(result, "m04.fig4.turn_against_step",
             "figure 4: dissimilarity after a turn on the spot, as a share of that to the next "
             "reference 25 cm away (median)",
@@ -132,7 +132,7 @@ class PowerSpectrum final : public Experiment {
     }
   }
 
-  void report(const std::filesystem::path& folder, Reproduction& result) const override {
+  void report(Reproduction& result) const override {
     require(!shares_.empty(), "views", 0.0, ">= 1");
     viewer::LinePlot plot{
         .title = "Power spectrum of the panoramic cylinder, mean over rows ([M04] figure 5)",
@@ -147,7 +147,7 @@ class PowerSpectrum final : public Experiment {
       average.add(k, total_[static_cast<std::size_t>(k)] / static_cast<double>(shares_.size()));
     }
     plot.series = {single, average};
-    add_plot(result, folder, "fig05_power_spectrum.svg",
+    add_plot(result, "fig05_power_spectrum.svg",
              "Power falls steeply with frequency: the first 15 components hold most of it.", plot);
     add_row(result, "m04.fig5.share_15",
             "figure 5: share of the power (without k = 0) in the first 15 components (median)",

@@ -34,7 +34,7 @@ class WeightsOfComponents final : public Experiment {
     for (std::size_t k = 0; k < before_->size(); ++k) weights_[k].push_back((*before_)[k]);
   }
 
-  void report(const std::filesystem::path& folder, Reproduction& result) const override {
+  void report(Reproduction& result) const override {
     require(trials_ >= 1, "scenes to learn weights in and to use them in",
             static_cast<double>(margins_[equal].size()), ">= 2");
     viewer::Series line{.label = "mean of " + std::to_string(margins_[equal].size()) + " scenes"};
@@ -46,8 +46,7 @@ class WeightsOfComponents final : public Experiment {
                               .y = {1.0, 1.0},
                               .style = viewer::SeriesStyle::lines};
     add_plot(
-        result, folder, "eq06_weights.svg",
-        "How much each component should count, learnt in each scene.",
+        result, "eq06_weights.svg", "How much each component should count, learnt in each scene.",
         viewer::LinePlot{
             .title = "Weights of the components, learnt from memories with poses ([M04] eq. 6)",
             .x_label = "component k [cycles per turn]",

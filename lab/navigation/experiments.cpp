@@ -87,24 +87,22 @@ void report(const std::string& id, const std::string& what, const Measures& meas
   add_median(result, id + ".steps", what + ": steps", "", measured.steps);
 }
 
-int runs_of(const NavigationReproductionOptions& options, int scene) {
+int runs_of(const ReproductionOptions& options, int scene) {
   return options.runs / options.scenes + (scene < options.runs % options.scenes ? 1 : 0);
 }
 
-void draw(const NavigationReproductionOptions& options, const std::string& name,
-          const simulation::MissionPlace& place, const simulation::RememberedPlace& remembered,
-          const simulation::Mission& mission, const simulation::MissionRun& run,
-          Reproduction& result) {
+void draw(const std::string& name, const simulation::MissionPlace& place,
+          const simulation::RememberedPlace& remembered, const simulation::Mission& mission,
+          const simulation::MissionRun& run, Reproduction& result) {
   const std::string file = "mission_" + name + ".svg";
-  viewer::write_mission_picture(options.out / file, name + "", place, remembered, {}, mission.goal,
-                                run);
+  viewer::write_mission_picture(result.out / file, name, place, remembered, {}, mission.goal, run);
   result.pictures.push_back(
       {file, "A mission in " + name +
                  ": every reference view says in which direction the goal lies; the robot takes "
                  "the direction of the one it is nearest to and looks again."});
 }
 
-simulation::Scene scene_of(const NavigationReproductionOptions& options, const std::string& name,
+simulation::Scene scene_of(const ReproductionOptions& options, const std::string& name,
                            const simulation::SceneVariation& variation) {
   const auto names = simulation::scene_names();
   if (std::ranges::find(names, name) != names.end()) return simulation::make_scene(name, variation);
@@ -165,7 +163,8 @@ std::optional<double> shutting_width_m(const simulation::Scene& scene,
 
 }  // namespace
 
-void NavigationExperiments::reproduce_grid_missions(const std::string& scene, double spacing_m) {
+void NavigationExperiments::reproduce_grid_missions(const std::string& scene,
+                                                    double spacing_m) const {
   Measures measured;
   for (int i = 0; i < options.scenes; ++i) {
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
@@ -180,7 +179,7 @@ void NavigationExperiments::reproduce_grid_missions(const std::string& scene, do
     const auto runs = simulation::run_missions(place, remembered, missions, mission,
                                                Random(seed, 3).next(), executor);
     measured.add(runs, 0.5 * spacing_m);
-    if (i == 0) draw(options, scene, place, remembered, missions.front(), runs.front(), result);
+    if (i == 0) draw(scene, place, remembered, missions.front(), runs.front(), result);
   }
   report("m04.fig18." + scene,
          "figure 18: " + scene + ", references every " + centimetres(spacing_m) +
@@ -188,7 +187,7 @@ void NavigationExperiments::reproduce_grid_missions(const std::string& scene, do
          measured, at_least(0.98), at_most(1.3), result);
 }
 
-void NavigationExperiments::reproduce_drive_missions(const std::string& scene) {
+void NavigationExperiments::reproduce_drive_missions(const std::string& scene) const {
   Measures same;
   Measures changed;
   Measures kidnapped;
@@ -219,7 +218,7 @@ void NavigationExperiments::reproduce_drive_missions(const std::string& scene) {
                                                  Random(seed, stream + 1).next(), executor);
       measures.add(runs, radius_m);
       if (i == 0 && &measures == &same) {
-        draw(options, scene, where, remembered, missions.front(), runs.front(), result);
+        draw(scene, where, remembered, missions.front(), runs.front(), result);
       }
     };
     run(place, false, 5, same);
@@ -248,7 +247,7 @@ void NavigationExperiments::reproduce_drive_missions(const std::string& scene) {
   }
 }
 
-void NavigationExperiments::reproduce_tours() {
+void NavigationExperiments::reproduce_tours() const {
   constexpr int goals_a_tour = 5;
   constexpr int people = 3;
   struct Kind {
@@ -301,7 +300,7 @@ void NavigationExperiments::reproduce_tours() {
   }
 }
 
-void NavigationExperiments::reproduce_route_missions() {
+void NavigationExperiments::reproduce_route_missions() const {
   struct Kind {
     std::string id;
     std::string what;
@@ -355,7 +354,7 @@ void NavigationExperiments::reproduce_route_missions() {
              what + ": distance from the way that was driven, on a leg", "m", on_route_m);
 }
 
-void NavigationExperiments::reproduce_blocked_missions() {
+void NavigationExperiments::reproduce_blocked_missions() const {
   Measures around;
   Measures shut;
   for (int i = 0; i < options.scenes; ++i) {
@@ -391,7 +390,7 @@ void NavigationExperiments::reproduce_blocked_missions() {
             Random(seed, 100 + static_cast<std::uint64_t>(k)).next(), executor);
         (both ? shut : around).add(runs, 0.5 * remembered.spacing_m);
         if (i == 0 && k == 0 && !both) {
-          draw(options, "loop_blocked", now, remembered, mission, runs.front(), result);
+          draw("loop_blocked", now, remembered, mission, runs.front(), result);
         }
       }
       ++k;

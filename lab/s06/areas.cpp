@@ -47,8 +47,7 @@ CatchmentAreas catchment_areas(ArenaSurveys& surveys) {
   return areas;
 }
 
-void compare_catchment_areas(std::span<const CatchmentAreas> arenas, std::uint64_t seed,
-                             Reproduction& result) {
+void compare_catchment_areas(std::span<const CatchmentAreas> arenas, const Experiments& context) {
   const std::string own = own_strategy().label;
   const std::string images = expected_image_strategy().label;
   const std::string many_stages = published_strategy({1, 2, 3, 4, 6, 10}).label;
@@ -60,8 +59,8 @@ void compare_catchment_areas(std::span<const CatchmentAreas> arenas, std::uint64
                          std::optional<std::pair<double, double>> published = std::nullopt) {
       std::vector<double> values;
       for (const auto& areas : arenas) values.push_back(figure(areas));
-      add_row(result, "s06." + name + "_" + id, what + within, mean_figure(values, seed), unit,
-              target, published);
+      add_row(context.result, "s06." + name + "_" + id, what + within,
+              mean_figure(values, context.options.seed), unit, target, published);
     };
     const auto ratio = [&](const std::string& name, const std::string& what,
                            const std::string& above, const std::string& below) {

@@ -156,12 +156,13 @@ void reproduce_snapshot_chains(const HomingPlace& place, const std::string& name
   add_mean(reproduction, id + ".bytes", what + ": size", "B/m", bytes);
 }
 
-void reproduce_snapshot_chains(std::uint64_t seed, int routes, Executor& executor,
-                               Reproduction& reproduction) {
+void reproduce_snapshot_chains(int routes, const Experiments& context) {
   for (const char* const name : {"office", "hall", "loop", "corridor"}) {
     const HomingPlace place =
-        make_homing_place(simulation::make_scene(name, {.seed = seed}), chain_camera(), executor);
-    reproduce_snapshot_chains(place, name, seed, routes, executor, reproduction);
+        make_homing_place(simulation::make_scene(name, {.seed = context.options.seed}),
+                          chain_camera(), context.executor);
+    reproduce_snapshot_chains(place, name, context.options.seed, routes, context.executor,
+                              context.result);
   }
 }
 

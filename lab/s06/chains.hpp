@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "lab/rows.hpp"
+#include "lab/experiments.hpp"
 #include "lab/runs/homing_run.hpp"
 #include "lab/s06/snapshot_chain.hpp"
 #include "panonav/core/executor.hpp"
@@ -55,7 +55,6 @@ void reproduce_snapshot_chains(const HomingPlace& place, const std::string& name
                                Reproduction& reproduction);
 
 /// The same in the built-in scenes office, hall, loop and corridor.
-void reproduce_snapshot_chains(std::uint64_t seed, int routes, Executor& executor,
-                               Reproduction& reproduction);
+void reproduce_snapshot_chains(int routes, const Experiments& context);
 
 }  // namespace panonav::lab

@@ -170,10 +170,10 @@ std::size_t choose_goal(const HomingSurvey& survey) {
 }
 
 // Figure 9.
-void draw_vectors(GoalPictures& of, const std::filesystem::path& folder, Reproduction& result) {
+void draw_vectors(GoalPictures& of, Reproduction& result) {
   const auto differences = of.differences(5);
   const auto ends = of.final_distances_of(published_strategy({5}));
-  add_plot(result, folder, "figure_09_vectors.svg",
+  add_plot(result, "figure_09_vectors.svg",
            "[S06] figure 9: home vectors to one goal (strokes from the dots), the darker the less "
            "similar "
            "the views. Other valleys lead astray.",
@@ -184,7 +184,7 @@ void draw_vectors(GoalPictures& of, const std::filesystem::path& folder, Reprodu
 }
 
 // Figure 14.
-void draw_stages(GoalPictures& of, const std::filesystem::path& folder, Reproduction& result) {
+void draw_stages(GoalPictures& of, Reproduction& result) {
   std::vector<viewer::MapPlot> panels;
   for (const int highest : {2, 4, 10}) {
     const std::string k = "K = " + std::to_string(highest);
@@ -197,15 +197,14 @@ void draw_stages(GoalPictures& of, const std::filesystem::path& folder, Reproduc
     panels.push_back(map_of(k + ": where runs end; yellow: at the goal, dark: beyond 40 cm",
                             of.shaded(ends, distance_limits), of.border(ends), of.goal_mark()));
   }
-  add_plot(result, folder, "figure_14_stages.svg",
+  add_plot(result, "figure_14_stages.svg",
            "[S06] figure 14: the same goal with K = 2, 4 and 10. Left: image difference and home "
            "vectors; right: how far from the goal runs end that start there.",
            panels, 2);
 }
 
 // Figure 15.
-void draw_areas_of_rules(GoalPictures& of, const std::filesystem::path& folder,
-                         Reproduction& result) {
+void draw_areas_of_rules(GoalPictures& of, Reproduction& result) {
   std::vector<viewer::MapPlot> panels;
   for (const HomingStrategy& strategy :
        {published_strategy({2, 4, 10}), own_strategy(), expected_image_strategy()}) {
@@ -214,15 +213,14 @@ void draw_areas_of_rules(GoalPictures& of, const std::filesystem::path& folder,
         map_of(strategy.label, of.shaded(ends, distance_limits), of.border(ends), of.goal_mark()));
   }
   add_plot(
-      result, folder, "figure_15_areas.svg",
+      result, "figure_15_areas.svg",
       "[S06] figure 15: where runs to this goal end, coarse to fine, by our rule and by expected "
       "images. Yellow: at the goal; dark: beyond 40 cm; orange: the area within 10 cm.",
       panels, 3);
 }
 
 // Figure 16, left.
-void draw_transects(const Arena& arena, const GoalPictures& of, const std::filesystem::path& folder,
-                    Reproduction& result) {
+void draw_transects(const Arena& arena, const GoalPictures& of, Reproduction& result) {
   const auto plot = [&](const std::string& axis, bool along_x) {
     viewer::LinePlot lines{.title = "Image difference along " + axis + " through the goal",
                            .x_label = "distance from the goal [m]",
@@ -233,16 +231,15 @@ void draw_transects(const Arena& arena, const GoalPictures& of, const std::files
     }
     return lines;
   };
-  add_plot(result, folder, "figure_16_transect_x.svg",
+  add_plot(result, "figure_16_transect_x.svg",
            "[S06] figure 16, left: the image difference along a line through the goal. More "
            "frequencies, a narrower valley.",
            plot("x", true));
-  add_plot(result, folder, "figure_16_transect_y.svg", "The same across.", plot("y", false));
+  add_plot(result, "figure_16_transect_y.svg", "The same across.", plot("y", false));
 }
 
 // Figure 16, right.
-void draw_surface(const Arena& arena, const GoalPictures& of, const std::filesystem::path& folder,
-                  Reproduction& result) {
+void draw_surface(const Arena& arena, const GoalPictures& of, Reproduction& result) {
   const auto surface = of.differences(10);
   viewer::HeatMap map{.title = "Image difference to the goal (cross), K = 10",
                       .value_label = "share of the energy of both views",
@@ -259,20 +256,19 @@ void draw_surface(const Arena& arena, const GoalPictures& of, const std::filesys
     const auto row = static_cast<std::size_t>(std::lround(at.y_m / map.spacing_m));
     map.values.at(row * static_cast<std::size_t>(map.columns) + column) = surface[p];
   }
-  add_plot(result, folder, "figure_16_surface.svg",
+  add_plot(result, "figure_16_surface.svg",
            "[S06] figure 16, right: the image difference over the arena.", map);
 }
 
 }  // namespace
 
-void reproduce_goal_figures(ArenaSurveys& surveys, const std::filesystem::path& folder,
-                            Reproduction& result) {
+void reproduce_goal_figures(ArenaSurveys& surveys, Reproduction& result) {
   GoalPictures of(surveys, choose_goal(surveys.published(2)));
-  draw_vectors(of, folder, result);
-  draw_stages(of, folder, result);
-  draw_areas_of_rules(of, folder, result);
-  draw_transects(surveys.arena(), of, folder, result);
-  draw_surface(surveys.arena(), of, folder, result);
+  draw_vectors(of, result);
+  draw_stages(of, result);
+  draw_areas_of_rules(of, result);
+  draw_transects(surveys.arena(), of, result);
+  draw_surface(surveys.arena(), of, result);
 }
 
 }  // namespace panonav::lab

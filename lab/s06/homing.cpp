@@ -29,8 +29,7 @@ viewer::LinePlot homeward_plot(const std::string& title) {
 }
 
 // Figure 10.
-void draw_homeward(ArenaSurveys& surveys, const std::filesystem::path& folder, Executor& executor,
-                   Reproduction& result) {
+void draw_homeward(ArenaSurveys& surveys, Executor& executor, Reproduction& result) {
   const double spacing_m = surveys.arena().options.spacing_m;
   viewer::LinePlot by_highest = homeward_plot("One home vector, no iteration");
   for (const int highest : {1, 2, 3, 5, 10}) {
@@ -40,7 +39,7 @@ void draw_homeward(ArenaSurveys& surveys, const std::filesystem::path& folder, E
   by_highest.series.push_back(
       homeward_series("expected images", surveys.expected_images(), spacing_m));
   by_highest.series.push_back(homeward_series("our rule, K = 10", surveys.own(10), spacing_m));
-  add_plot(result, folder, "figure_10_homeward.svg",
+  add_plot(result, "figure_10_homeward.svg",
            "[S06] figure 10a: how far home vectors point home, by the distance: few frequencies "
            "from afar, many close by.",
            by_highest);
@@ -56,8 +55,8 @@ void draw_homeward(ArenaSurveys& surveys, const std::filesystem::path& folder, E
       by_iterations.series.push_back(homeward_series(label, survey, spacing_m));
     }
   }
-  add_plot(result, folder, "figure_10_iterations.svg",
-           "[S06] figure 10b: the same with iterations.", by_iterations);
+  add_plot(result, "figure_10_iterations.svg", "[S06] figure 10b: the same with iterations.",
+           by_iterations);
 
   for (const double away_m : {0.1, 0.2, 0.4}) {
     const auto at = [&](const HomingSurvey& survey) {
@@ -114,14 +113,14 @@ viewer::Series no_run(const HomingSurvey& survey) {
 }
 
 // Figures 11 and 13.
-void draw_areas(ArenaSurveys& surveys, const std::filesystem::path& folder, Reproduction& result) {
+void draw_areas(ArenaSurveys& surveys, Reproduction& result) {
   viewer::LinePlot single = area_plot("Catchment area, one K, 3 solutions a vector");
   for (const int highest : {1, 2, 3, 5, 10}) {
     single.series.push_back(area_series(surveys, published_strategy({highest})));
   }
   single.series.push_back(area_series(surveys, expected_image_strategy()));
   single.series.push_back(no_run(surveys.expected_images()));
-  add_plot(result, folder, "figure_11_areas.svg",
+  add_plot(result, "figure_11_areas.svg",
            "[S06] figure 11: mean number of places from which runs end near the goal.", single);
 
   viewer::LinePlot staged = area_plot("Catchment area, K rising in stages");
@@ -131,15 +130,14 @@ void draw_areas(ArenaSurveys& surveys, const std::filesystem::path& folder, Repr
   }
   staged.series.push_back(area_series(surveys, expected_image_strategy()));
   staged.series.push_back(area_series(surveys, own_strategy()));
-  add_plot(result, folder, "figure_13_stages.svg",
+  add_plot(result, "figure_13_stages.svg",
            "[S06] figure 13: the same when more frequencies count where homing stops, and our rule "
            "in its stages.",
            staged);
 }
 
 // Figure 12.
-void draw_iterations(ArenaSurveys& surveys, const std::filesystem::path& folder, Executor& executor,
-                     Reproduction& result) {
+void draw_iterations(ArenaSurveys& surveys, Executor& executor, Reproduction& result) {
   constexpr std::array<double, 1> accepted{0.1};
   viewer::LinePlot plot{.title = "Iterations; runs that end within 10 cm",
                         .x_label = "solutions a vector, N + 1",
@@ -158,18 +156,18 @@ void draw_iterations(ArenaSurveys& surveys, const std::filesystem::path& folder,
     }
     plot.series.push_back(std::move(series));
   }
-  add_plot(result, folder, "figure_12_iterations.svg",
+  add_plot(result, "figure_12_iterations.svg",
            "[S06] figure 12: mean catchment area by the number of solutions of each home vector.",
            plot);
 }
 
 }  // namespace
 
-void reproduce_homing_figures(ArenaSurveys& surveys, const std::filesystem::path& folder,
-                              Executor& executor, Reproduction& result) {
-  draw_homeward(surveys, folder, executor, result);
-  draw_areas(surveys, folder, result);
-  draw_iterations(surveys, folder, executor, result);
+void reproduce_homing_figures(ArenaSurveys& surveys, const Experiments& context) {
+  const auto& [options, executor, result] = context;
+  draw_homeward(surveys, executor, result);
+  draw_areas(surveys, result);
+  draw_iterations(surveys, executor, result);
 }
 
 }  // namespace panonav::lab

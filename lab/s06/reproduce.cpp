@@ -3,7 +3,6 @@
 #include <string>
 #include <vector>
 
-#include "lab/reproduction_stages.hpp"
 #include "lab/s06/chains.hpp"
 #include "lab/s06/support.hpp"
 #include "lab/s06/worlds.hpp"
@@ -13,22 +12,10 @@
 
 namespace panonav::lab {
 
-HomingReproductionOptions quick_run(HomingReproductionOptions options) {
-  options.scenes = 2;
-  options.spacing_m = 0.05;
-  options.goals_every = 4;
-  options.goals_every_further = 8;
-  options.starts = 20;
-  return options;
-}
-
 namespace {
 
 /// The arenas of a run, one after the other; what is known of them and not yet reported.
-struct ArenaExperiments {
-  const HomingReproductionOptions& options;
-  Executor& executor;
-  Reproduction& result;
+struct ArenaExperiments : Experiments {
   std::optional<Arena> first{};
   std::unique_ptr<ArenaSurveys> surveys{};  ///< of the first
   std::vector<CatchmentAreas> areas{};
@@ -44,7 +31,7 @@ struct ArenaExperiments {
   }
 
   void finish_first() {
-    reproduce_goal_figures(*surveys, options.out, result);
+    reproduce_goal_figures(*surveys, result);
     reproduce_snapshot_bytes(*surveys, result);
     surveys.reset();
     first.reset();
@@ -82,56 +69,38 @@ struct ArenaExperiments {
 
 }  // namespace
 
-Reproduction reproduce_s06(const HomingReproductionOptions& options, Executor& executor,
-                           const ReproductionProgress& progress) {
-  require(options.scenes >= 2, "scenes", options.scenes, ">= 2");
-  require(options.goals_every >= 1, "goals_every", options.goals_every, ">= 1");
-  require(options.goals_every_further >= 1, "goals_every_further", options.goals_every_further,
-          ">= 1");
-  require(options.starts >= 1, "starts", options.starts, ">= 1");
+ReproductionPlan plan_s06(const Experiments& context) {
+  const auto& [options, executor, result] = context;
+  require_minima({{"scenes", options.scenes, 2},
+                  {"goals_every", options.goals_every, 1},
+                  {"goals_every_further", options.goals_every_further, 1},
+                  {"starts", options.starts, 1}});
   require(options.spacing_m >= 0.01 && options.spacing_m <= 0.1, "spacing_m", options.spacing_m,
           "0.01 .. 0.1");
-  make_folder(options.out);
-
-  Reproduction result;
-  ArenaExperiments arenas{options, executor, result};
+  const auto arenas = std::make_shared<ArenaExperiments>(context);
   const double all_goals = 1.0 / options.goals_every;
   const double further = 6.0 + 100.0 / options.goals_every_further;
-  const auto& out = options.out;
-  std::vector<ReproductionStage> stages{
-      {"arena 1", 6.0, [&] { arenas.record_first(); }},
-      {"views", 4.0, [&] { reproduce_view_figures(*arenas.first, out, executor, result); }},
-      {"expected images", 60.0 * all_goals, [&] { (void)arenas.surveys->expected_images(); }},
-      {"catchment areas", 40.0 * all_goals,
-       [&] { arenas.areas.push_back(catchment_areas(*arenas.surveys)); }},
-      {"homing", 60.0 * all_goals,
-       [&] { reproduce_homing_figures(*arenas.surveys, out, executor, result); }},
-      {"one goal", 4.0, [&] { arenas.finish_first(); }}};
+  ReproductionPlan plan{
+      {6.0, [=] { arenas->record_first(); }},
+      {4.0, [=] { reproduce_view_figures(*arenas->first, context); }},
+      {60.0 * all_goals, [=] { (void)arenas->surveys->expected_images(); }},
+      {40.0 * all_goals, [=] { arenas->areas.push_back(catchment_areas(*arenas->surveys)); }},
+      {60.0 * all_goals, [=] { reproduce_homing_figures(*arenas->surveys, context); }},
+      {4.0, [=] { arenas->finish_first(); }}};
   for (int scene = 1; scene < options.scenes; ++scene) {
-    stages.push_back(
-        {"arena " + std::to_string(scene + 1) + " of " + std::to_string(options.scenes), further,
-         [&arenas, scene] { arenas.add_variant(scene); }});
+    plan.push_back({further, [=] { arenas->add_variant(scene); }});
   }
-  stages.push_back({"pose noise", further, [&] { arenas.add_pose_noise(); }});
-  stages.push_back({"fixed heading", further, [&] { arenas.add_fixed_heading(); }});
-  stages.push_back(
-      {"comparison", 0.1, [&] { compare_catchment_areas(arenas.areas, options.seed, result); }});
+  plan.push_back({further, [=] { arenas->add_pose_noise(); }});
+  plan.push_back({further, [=] { arenas->add_fixed_heading(); }});
+  plan.push_back({0.1, [=] { compare_catchment_areas(arenas->areas, context); }});
   const int few_starts = (options.starts + 19) / 20;
-  stages.push_back({"runs home", 2.0 * few_starts, [&] {
-                      reproduce_homing_in_scenes(options.seed, few_starts, executor, result);
-                    }});
-  stages.push_back({"chains of snapshots", 10.0, [&] {
-                      reproduce_snapshot_chains(options.seed, (options.starts + 99) / 100, executor,
-                                                result);
-                    }});
+  plan.push_back({2.0 * few_starts, [=] { reproduce_homing_in_scenes(few_starts, context); }});
+  plan.push_back(
+      {10.0, [=] { reproduce_snapshot_chains((context.options.starts + 99) / 100, context); }});
   for (const std::string& name : simulation::worlds_in(options.data)) {
-    stages.push_back({name, 0.1 * options.starts, [&, name] {
-                        reproduce_homing_in_world(options.data, name, out, options.seed,
-                                                  options.starts, executor, result);
-                      }});
+    plan.push_back({0.1 * options.starts, [=] { reproduce_homing_in_world(name, context); }});
   }
-  run_stages(stages, progress);
-  return result;
+  return plan;
 }
 
 }  // namespace panonav::lab

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "lab/rows.hpp"
+#include "lab/experiments.hpp"
 #include "lab/s06/arena.hpp"
 #include "panonav/core/executor.hpp"
 #include "panonav/homing/homing_survey.hpp"
@@ -72,19 +72,14 @@ class ArenaSurveys {
   std::map<std::string, HomingSurvey> surveys_;
 };
 
-// The experiments; each appends rows and writes pictures into `folder`.
-
 /// [S06] figures 3, 6, 7, 8.
-void reproduce_view_figures(const Arena& arena, const std::filesystem::path& folder,
-                            Executor& executor, Reproduction& result);
+void reproduce_view_figures(const Arena& arena, const Experiments& context);
 /// Heading where both views are taken at the same place, with the tracker's noise: a row.
 void reproduce_heading_with_pose_noise(const Arena& arena, Reproduction& result);
 /// [S06] figures 10 to 13.
-void reproduce_homing_figures(ArenaSurveys& surveys, const std::filesystem::path& folder,
-                              Executor& executor, Reproduction& result);
+void reproduce_homing_figures(ArenaSurveys& surveys, const Experiments& context);
 /// [S06] figures 9, 14, 15, 16.
-void reproduce_goal_figures(ArenaSurveys& surveys, const std::filesystem::path& folder,
-                            Reproduction& result);
+void reproduce_goal_figures(ArenaSurveys& surveys, Reproduction& result);
 /// Three snapshots of K = 3 for the price of one image [S06 section 4.4].
 void reproduce_snapshot_bytes(ArenaSurveys& surveys, Reproduction& result);
 
@@ -92,8 +87,7 @@ void reproduce_snapshot_bytes(ArenaSurveys& surveys, Reproduction& result);
 using CatchmentAreas = std::map<std::string, std::array<double, s06_accepted_m.size()>>;
 [[nodiscard]] CatchmentAreas catchment_areas(ArenaSurveys& surveys);
 /// How the rules compare, over arenas.
-void compare_catchment_areas(std::span<const CatchmentAreas> arenas, std::uint64_t seed,
-                             Reproduction& result);
+void compare_catchment_areas(std::span<const CatchmentAreas> arenas, const Experiments& context);
 /// The same two recordings with the tracker's noise, or all at one heading: rows only.
 void report_variant(const std::string& id, const std::string& what, const CatchmentAreas& areas,
                     Reproduction& result);

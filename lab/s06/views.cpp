@@ -44,8 +44,7 @@ double true_turn(const Arena& arena, std::size_t goal, std::size_t place) {
 }
 
 // Figure 3.
-void draw_correlation(const Arena& arena, const std::filesystem::path& folder,
-                      Reproduction& result) {
+void draw_correlation(const Arena& arena, Reproduction& result) {
   // The place where the headings differ most nearly by 120 degrees, as in the paper.
   std::size_t shown = 0;
   double least = 10.0;
@@ -79,7 +78,7 @@ void draw_correlation(const Arena& arena, const std::filesystem::path& folder,
     }
     terms.series.push_back(std::move(series));
   }
-  add_plot(result, folder, "figure_03_correlation.svg",
+  add_plot(result, "figure_03_correlation.svg",
            "[S06] figure 3a: the first five terms of the correlation of two views from one place, "
            "and the whole. Only the whole has one clear maximum.",
            terms);
@@ -94,14 +93,14 @@ void draw_correlation(const Arena& arena, const std::filesystem::path& folder,
     series.add(highest, degrees(angle_difference(static_cast<double>(turn[0]), truth)));
   }
   maxima.series.push_back(std::move(series));
-  add_plot(result, folder, "figure_03_maximum.svg",
+  add_plot(result, "figure_03_maximum.svg",
            "[S06] figure 3b: the turn of the same two views by their first K frequencies, less the "
            "truth.",
            maxima);
 }
 
 // Figure 6.
-void draw_spectrum(const Arena& arena, const std::filesystem::path& folder, Reproduction& result) {
+void draw_spectrum(const Arena& arena, Reproduction& result) {
   viewer::Series series{.style = viewer::SeriesStyle::lines_and_points};
   std::vector<double> log_k;
   std::vector<double> log_power;
@@ -147,7 +146,7 @@ void draw_spectrum(const Arena& arena, const std::filesystem::path& folder, Repr
     line.add(k, std::exp(mean_log - slope * (std::log(k) - mean_k)));
   }
   series.label = "mean and standard deviation";
-  add_plot(result, folder, "figure_06_spectrum.svg",
+  add_plot(result, "figure_06_spectrum.svg",
            "[S06] figure 6: mean power of the views; a straight line is a power law.",
            viewer::LinePlot{.title = "Power spectrum of all views of the arena",
                             .x_label = "frequency k",
@@ -232,8 +231,7 @@ std::vector<HomingView> turned_north(const ArenaRecording& recording) {
 }
 
 // Figure 7.
-void draw_changes(const Arena& arena, const std::filesystem::path& folder, Executor& executor,
-                  Reproduction& result) {
+void draw_changes(const Arena& arena, Executor& executor, Reproduction& result) {
   constexpr std::array<int, 6> shown{1, 2, 3, 5, 10, 20};
   const auto homes = turned_north(arena.homes);
   const auto currents = turned_north(arena.currents);
@@ -274,11 +272,11 @@ void draw_changes(const Arena& arena, const std::filesystem::path& folder, Execu
     add(changes, &std::pair<double, double>::first);
     if (s < shown.size()) add(phases, &std::pair<double, double>::second);
   }
-  add_plot(result, folder, "figure_07_coefficients.svg",
+  add_plot(result, "figure_07_coefficients.svg",
            "[S06] figure 7a: change of coefficients with the distance, all pairs of places. It "
            "grows with the square of the distance farther out where frequencies are low.",
            changes);
-  add_plot(result, folder, "figure_07_phases.svg",
+  add_plot(result, "figure_07_phases.svg",
            "[S06] figure 7b: change of phases. High frequencies soon have nothing to do with each "
            "other.",
            phases);
@@ -322,8 +320,7 @@ double deviation_deg(const std::pair<double, double>& sums, double count) {
 }
 
 // Figure 8.
-void draw_headings(const Arena& arena, const std::filesystem::path& folder, Executor& executor,
-                   Reproduction& result) {
+void draw_headings(const Arena& arena, Executor& executor, Reproduction& result) {
   constexpr std::array<int, 5> shown{1, 2, 3, 5, 15};
   const auto shifts = best_shifts(arena, executor);
   const auto sums = sum_pairs(
@@ -352,7 +349,7 @@ void draw_headings(const Arena& arena, const std::filesystem::path& folder, Exec
         s < shown.size() ? "K = " + std::to_string(shown[s]) : "all shifts by whole pixels";
     if (s == shown.size()) plot.series.back().style = viewer::SeriesStyle::lines;
   }
-  add_plot(result, folder, "figure_08_headings.svg",
+  add_plot(result, "figure_08_headings.svg",
            "[S06] figure 8: error of the heading that the phases tell, by the distance of the two "
            "views; all pairs, random headings.",
            plot);
@@ -364,12 +361,12 @@ void draw_headings(const Arena& arena, const std::filesystem::path& folder, Exec
 
 }  // namespace
 
-void reproduce_view_figures(const Arena& arena, const std::filesystem::path& folder,
-                            Executor& executor, Reproduction& result) {
-  draw_correlation(arena, folder, result);
-  draw_spectrum(arena, folder, result);
-  draw_changes(arena, folder, executor, result);
-  draw_headings(arena, folder, executor, result);
+void reproduce_view_figures(const Arena& arena, const Experiments& context) {
+  const auto& [options, executor, result] = context;
+  draw_correlation(arena, result);
+  draw_spectrum(arena, result);
+  draw_changes(arena, executor, result);
+  draw_headings(arena, executor, result);
 }
 
 void reproduce_heading_with_pose_noise(const Arena& arena, Reproduction& result) {

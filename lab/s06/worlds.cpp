@@ -8,7 +8,7 @@
 #include <numbers>
 #include <vector>
 
-#include "lab/rows.hpp"
+#include "lab/experiments.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/positions.hpp"
 #include "panonav_simulation/scenes.hpp"
@@ -114,11 +114,12 @@ std::string reason_of_failure(const HomingRun& run) {
   return where;
 }
 
-void reproduce_homing_in_world(const std::filesystem::path& data, const std::string& name,
-                               const std::filesystem::path& out, std::uint64_t seed, int starts,
-                               Executor& executor, Reproduction& reproduction) {
-  const HomingPlace place = make_homing_place(simulation::read_world(data, name), {}, executor);
-  const auto tasks = random_homing_tasks(place, starts, homing_start_radius_m, seed);
+void reproduce_homing_in_world(const std::string& name, const Experiments& context) {
+  const auto& [options, executor, reproduction] = context;
+  const std::uint64_t seed = options.seed;
+  const HomingPlace place =
+      make_homing_place(simulation::read_world(options.data, name), {}, executor);
+  const auto tasks = random_homing_tasks(place, options.starts, homing_start_radius_m, seed);
   const auto runs = run_home(place, tasks, {}, seed, executor);
 
   const std::string id = "s06.world." + name;
@@ -142,9 +143,9 @@ void reproduce_homing_in_world(const std::filesystem::path& data, const std::str
   add_median(reproduction, id + ".steps", what + ": steps of a run", "steps", steps);
 
   const auto add_other = [&](const std::string& key, const std::string& text,
-                             const HomingRunOptions& options) {
+                             const HomingRunOptions& changed) {
     add_rate(reproduction, id + key, what + ", " + text + ": home within 10 cm",
-             successes(run_home(place, tasks, options, seed, executor)), runs.size());
+             successes(run_home(place, tasks, changed, seed, executor)), runs.size());
   };
   HomingRunOptions published;
   published.vector = published_homing(5);
@@ -160,19 +161,20 @@ void reproduce_homing_in_world(const std::filesystem::path& data, const std::str
   add_other(".stopped_by_obstacles", "the first obstacle ends a run", stopping);
 
   const std::string prefix = "s06_world_" + name;
-  add_plot(reproduction, out, prefix + ".svg",
+  add_plot(reproduction, prefix + ".svg",
            "Homing runs in " + name + " from starts within 1.5 m of random goals",
            map_of_all(place, runs, name));
   for (std::size_t i = 0; i < runs.size(); ++i) {
     if (runs[i].succeeds(homing_success_m)) continue;
     const viewer::MapPlot map = map_of_failure(place, runs[i], i);
     const std::string file = prefix + "_failure_" + std::to_string(i) + ".svg";
-    add_plot(reproduction, out, file, name + ", " + map.title, map);
+    add_plot(reproduction, file, name + ", " + map.title, map);
   }
 }
 
-void reproduce_homing_in_scenes(std::uint64_t seed, int starts, Executor& executor,
-                                Reproduction& reproduction) {
+void reproduce_homing_in_scenes(int starts, const Experiments& context) {
+  const auto& [options, executor, reproduction] = context;
+  const std::uint64_t seed = options.seed;
   constexpr std::array<const char*, 5> scenes{"office", "lab", "hall", "loop", "garden"};
   constexpr double tilt_rad = 3.0 * std::numbers::pi / 180.0;
   const std::uint64_t seeds_each = starts > 1 ? 2 : 1;
@@ -186,8 +188,8 @@ void reproduce_homing_in_scenes(std::uint64_t seed, int starts, Executor& execut
       HomingPlace place =
           make_homing_place(simulation::make_scene(name, {.seed = number}), {}, executor);
       const auto tasks = random_homing_tasks(place, starts, homing_start_radius_m, number);
-      const auto append = [&](std::vector<HomingRun>& all, const HomingRunOptions& options) {
-        for (HomingRun& run : run_home(place, tasks, options, number, executor)) {
+      const auto append = [&](std::vector<HomingRun>& all, const HomingRunOptions& changed) {
+        for (HomingRun& run : run_home(place, tasks, changed, number, executor)) {
           all.push_back(std::move(run));
         }
       };

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "lab/rows.hpp"
+#include "lab/experiments.hpp"
 #include "lab/runs/homing_run.hpp"
 #include "panonav/core/executor.hpp"
 
@@ -24,15 +24,12 @@ inline constexpr double homing_start_radius_m = 1.5;
 /// wrong places noticed, and of the published rule; pictures in `out`: a map of all runs,
 /// and one of each failure with its reason. Same arguments: same rows and pictures on any number of
 /// threads. Throws FileError, ContractError.
-void reproduce_homing_in_world(const std::filesystem::path& data, const std::string& name,
-                               const std::filesystem::path& out, std::uint64_t seed, int starts,
-                               Executor& executor, Reproduction& reproduction);
+void reproduce_homing_in_world(const std::string& name, const Experiments& context);
 
 /// The same figures over built-in scenes of several seeds: office, lab, hall, loop and garden, the
 /// robot on flat ground and tilted by up to 3 degrees in a random direction at each view, and a
 /// holonomic robot; and how much views differ where runs end at home and where they end elsewhere:
 /// `HomingPursuitOptions::arrived_difference` is to stand between.
-void reproduce_homing_in_scenes(std::uint64_t seed, int starts, Executor& executor,
-                                Reproduction& reproduction);
+void reproduce_homing_in_scenes(int starts, const Experiments& context);
 
 }  // namespace panonav::lab

@@ -145,7 +145,7 @@ Variant examine(const LabRoute& lab, bool sweeps) {
 // What is measured over all variants.
 class LabMeasures {
  public:
-  LabMeasures(const RouteReproductionOptions& options, Reproduction& result)
+  LabMeasures(const ReproductionOptions& options, Reproduction& result)
       : options_(options), result_(result) {}
 
   void add(const LabRoute& lab, const Variant& variant) {
@@ -256,7 +256,7 @@ class LabMeasures {
       add_point(series, 100.0 * x_m[i], mean_figure(errors[i].mean_cm, options_.seed));
     }
     add_plot(
-        result_, options_.out, id + ".svg", caption,
+        result_, id + ".svg", caption,
         viewer::LinePlot{
             .title = title, .x_label = x_label, .y_label = "mean error [cm]", .series = {series}});
     for (std::size_t i = 0; i < x_m.size(); ++i) {
@@ -266,7 +266,7 @@ class LabMeasures {
     }
   }
 
-  const RouteReproductionOptions& options_;
+  const ReproductionOptions& options_;
   Reproduction& result_;
   std::map<std::string, Errors> errors_;
   std::map<std::string, std::vector<Errors>> sweeps_;
@@ -279,14 +279,13 @@ class LabMeasures {
 
 }  // namespace
 
-void RouteExperiments::reproduce_lab_drives(const ReproductionProgress& progress) {
+void RouteExperiments::reproduce_lab_drives() const {
   LabMeasures measures(options, result);
   // A few variants at a time: each renders on all threads, then all are examined side by side.
   constexpr int batch = 4;
   for (int begin = 0; begin < options.scenes; begin += batch) {
     std::vector<LabRoute> labs;
     for (int i = begin; i < std::min(begin + batch, options.scenes); ++i) {
-      if (progress) progress("lab", static_cast<double>(i) / options.scenes);
       labs.push_back(record_lab_route(options.seed + static_cast<std::uint64_t>(i),
                                       i < options.swept ? lateral_offsets_m : std::vector<double>{},
                                       executor));
@@ -298,13 +297,13 @@ void RouteExperiments::reproduce_lab_drives(const ReproductionProgress& progress
     for (std::size_t i = 0; i < labs.size(); ++i) measures.add(labs[i], variants[i]);
     if (begin > 0) continue;
     const auto& drives = variants[0].drives;
-    draw_route_panorama(labs[0], options.out, result);
-    draw_virtual_view(labs[0], labs[0].beside[shown_offset], options.out, result);
+    draw_route_panorama(labs[0], result);
+    draw_virtual_view(labs[0], labs[0].beside[shown_offset], result);
     draw_drives(labs[0],
                 {drives.at("straight.fit"), drives.at("straight.contours"),
                  drives.at("changed.fit"), drives.at("changed.contours")},
-                options.out, result);
-    draw_goal_run(labs[0], variants[0].goal, options.out, result);
+                result);
+    draw_goal_run(labs[0], variants[0].goal, result);
   }
   measures.report();
   measures.draw_sweeps();

@@ -80,17 +80,15 @@ viewer::PicturePlot panorama_plot(const LabRoute& lab, const std::string& title)
 
 }  // namespace
 
-void draw_route_panorama(const LabRoute& lab, const std::filesystem::path& folder,
-                         Reproduction& result) {
+void draw_route_panorama(const LabRoute& lab, Reproduction& result) {
   const std::string file = "figure_03_route_panorama.svg";
-  add_plot(result, folder, file,
+  add_plot(result, file,
            "The route panorama of the straight path [Y03 figure 3], the start at the bottom. "
            "Things ahead and behind keep their place, things beside the path wander by.",
            panorama_plot(lab, "Route panorama: each row is the horizon at one place"));
 }
 
-void draw_virtual_view(const LabRoute& lab, const LineDrive& beside,
-                       const std::filesystem::path& folder, Reproduction& result) {
+void draw_virtual_view(const LabRoute& lab, const LineDrive& beside, Reproduction& result) {
   const std::size_t middle = beside.truth.size() / 2;
   const Pose2& pose = beside.truth[middle];
   const Pose2 in_path = inverse(lab.world_from_path) * pose;
@@ -117,7 +115,7 @@ void draw_virtual_view(const LabRoute& lab, const LineDrive& beside,
   const std::string where = std::to_string(std::lround(100.0 * in_path.y_m)) +
                             " cm to the left of the path, " +
                             std::to_string(std::lround(100.0 * in_path.x_m)) + " cm along it";
-  add_plot(result, folder, "figure_05_curve.svg",
+  add_plot(result, "figure_05_curve.svg",
            "Eq. 5 for a viewpoint " + where +
                " [Y03 figure 5]: along this curve the route panorama holds what is seen there.",
            plot);
@@ -132,7 +130,7 @@ void draw_virtual_view(const LabRoute& lab, const LineDrive& beside,
     if (!std::isfinite(shown[c])) continue;
     made.add(azimuth, static_cast<double>(shown[c]));
   }
-  add_plot(result, folder, "figure_05_lines.svg",
+  add_plot(result, "figure_05_lines.svg",
            "The line synthesised at that viewpoint, where no picture was taken, and the one that a "
            "camera sees there. Ahead and behind, the lines of sight do not cross the path.",
            viewer::LinePlot{.title = "The horizon " + where,
@@ -142,8 +140,7 @@ void draw_virtual_view(const LabRoute& lab, const LineDrive& beside,
                             .x_range = std::pair(-180.0, 180.0)});
 }
 
-void draw_drives(const LabRoute& lab, const LocalisedDrives& drives,
-                 const std::filesystem::path& folder, Reproduction& result) {
+void draw_drives(const LabRoute& lab, const LocalisedDrives& drives, Reproduction& result) {
   const auto panel = [&](const std::string& title, const LineDrive& drive, const DriveErrors& fit,
                          const DriveErrors& contours) {
     return viewer::MapPlot{
@@ -157,7 +154,7 @@ void draw_drives(const LabRoute& lab, const LocalisedDrives& drives,
              line_layer("direct fit", viewer::PlotColour::blue, in_path_frame(lab, fit.poses))})};
   };
   const std::string file = "figure_09_drives.svg";
-  add_plot(result, folder, file,
+  add_plot(result, file,
            "A robot crosses the memorised path at 30 degrees [Y03 figure 9]. The direct fit "
            "lies on the true drive.",
            std::vector<viewer::MapPlot>{
@@ -173,7 +170,7 @@ void draw_drives(const LabRoute& lab, const LocalisedDrives& drives,
     return line;
   };
   const std::string errors_file = "figure_09_errors.svg";
-  add_plot(result, folder, errors_file, "The errors of these drives, image by image.",
+  add_plot(result, errors_file, "The errors of these drives, image by image.",
            viewer::LinePlot{.title = "How far off along these drives",
                             .x_label = "image, 5 cm apart",
                             .y_label = "error of the position [cm]",
@@ -183,12 +180,11 @@ void draw_drives(const LabRoute& lab, const LocalisedDrives& drives,
                                        series("direct fit, things moved", drives.changed_fit)}});
 }
 
-void draw_goal_run(const LabRoute& lab, const GoalRun& run, const std::filesystem::path& folder,
-                   Reproduction& result) {
+void draw_goal_run(const LabRoute& lab, const GoalRun& run, Reproduction& result) {
   viewer::MapLayer goals{.label = "start, sub-goal and goal", .colour = viewer::PlotColour::green};
   for (const Point2 point : goal_run_points()) goals.squares.push_back(point);
   const std::string file = "figure_10_goal.svg";
-  add_plot(result, folder, file,
+  add_plot(result, file,
            "Closed loop under proportional control [Y03 figure 10]; the estimate lies on the true "
            "drive.",
            viewer::MapPlot{"To a goal over a sub-goal off the path",

@@ -11,12 +11,10 @@ namespace panonav::lab {
 // `result`.
 
 /// Figure 3: the route panorama of the path.
-void draw_route_panorama(const LabRoute& lab, const std::filesystem::path& folder,
-                         Reproduction& result);
+void draw_route_panorama(const LabRoute& lab, Reproduction& result);
 /// Figure 5: where in the route panorama a virtual viewpoint beside the path finds its lines of
 /// sight, and the line synthesised there beside the true one. `beside`: a drive there.
-void draw_virtual_view(const LabRoute& lab, const LineDrive& beside,
-                       const std::filesystem::path& folder, Reproduction& result);
+void draw_virtual_view(const LabRoute& lab, const LineDrive& beside, Reproduction& result);
 
 /// Drives across the path as localised in four ways.
 struct LocalisedDrives {
@@ -26,10 +24,8 @@ struct LocalisedDrives {
   const DriveErrors& changed_contours;
 };
 /// Figure 9.
-void draw_drives(const LabRoute& lab, const LocalisedDrives& drives,
-                 const std::filesystem::path& folder, Reproduction& result);
+void draw_drives(const LabRoute& lab, const LocalisedDrives& drives, Reproduction& result);
 /// Figure 10.
-void draw_goal_run(const LabRoute& lab, const GoalRun& run, const std::filesystem::path& folder,
-                   Reproduction& result);
+void draw_goal_run(const LabRoute& lab, const GoalRun& run, Reproduction& result);
 
 }  // namespace panonav::lab

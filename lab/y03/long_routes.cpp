@@ -82,7 +82,7 @@ struct RouteMeasures {
   }
 };
 
-void report_routes(const RouteReproductionOptions& options, const std::string& name,
+void report_routes(const ReproductionOptions& options, const std::string& name,
                    const RouteScene& first_place, const std::vector<RepeatedRoute>& routes,
                    Reproduction& result) {
   RouteMeasures of;
@@ -113,7 +113,7 @@ void report_routes(const RouteReproductionOptions& options, const std::string& n
   viewer::MapPlot map{.title = first_place.name, .layers = viewer::scene_layers(first_place.scene)};
   std::ranges::move(route_layers(routes.front().way, routes.front().runs),
                     std::back_inserter(map.layers));
-  add_plot(result, options.out, "route_" + name + ".svg",
+  add_plot(result, "route_" + name + ".svg",
            "A route of 60 m through " + name +
                ", recorded once and repeated forward and back; the driven ways lie on it.",
            map);
@@ -127,9 +127,9 @@ std::uint64_t file_bytes(const std::filesystem::path& path) {
   return bytes;
 }
 
-void measure_file(const RouteReproductionOptions& options, const std::vector<RepeatedRoute>& routes,
+void measure_file(const ReproductionOptions& options, const std::vector<RepeatedRoute>& routes,
                   Reproduction& result) {
-  const std::filesystem::path path = options.out / "routes.panonav";
+  const std::filesystem::path path = result.out / "routes.panonav";
   std::filesystem::remove(path);
   MemoryHeader header;
   header.shape = {1, 1};
@@ -165,13 +165,13 @@ void measure_file(const RouteReproductionOptions& options, const std::vector<Rep
           megabytes_per_km * static_cast<double>(stored), "MB");
 }
 
-int routes_of(const RouteReproductionOptions& options) {
+int routes_of(const ReproductionOptions& options) {
   return std::max(1, options.runs / runs_each);
 }
 
 }  // namespace
 
-void RouteExperiments::reproduce_loop_routes() {
+void RouteExperiments::reproduce_loop_routes() const {
   std::vector<RepeatedRoute> routes;
   std::optional<RouteScene> first;
   for (int i = 0; i < routes_of(options); ++i) {
@@ -185,7 +185,7 @@ void RouteExperiments::reproduce_loop_routes() {
   measure_file(options, routes, result);
 }
 
-void RouteExperiments::reproduce_world_routes(const std::string& name) {
+void RouteExperiments::reproduce_world_routes(const std::string& name) const {
   const RouteScene place =
       make_route_scene(simulation::read_world(options.data, name), name, executor);
   std::vector<RepeatedRoute> routes;
@@ -196,7 +196,7 @@ void RouteExperiments::reproduce_world_routes(const std::string& name) {
   report_routes(options, name, place, routes, result);
 }
 
-void RouteExperiments::reproduce_real_route() {
+void RouteExperiments::reproduce_real_route() const {
   const Dataset dataset = read_dataset(options.data / "sussex_route");
   const PanoramaReader reader(dataset.source, {});
   auto lines = simulation::make_each(executor, dataset.entries.size(), [&](std::size_t i) {
@@ -244,7 +244,7 @@ void RouteExperiments::reproduce_real_route() {
   viewer::MapLayer driven{
       .label = "driven way", .colour = viewer::PlotColour::grey, .lines = {places}};
   add_plot(
-      result, options.out, "sussex_route.svg",
+      result, "sussex_route.svg",
       "A real route outdoors: where each picture between the remembered lines was found, without "
       "odometry.",
       viewer::MapPlot{.title = "sussex_route", .layers = {driven, right, remembered}});

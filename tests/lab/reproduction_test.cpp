@@ -15,41 +15,36 @@ using Reproductions = ReproductionTest;
 
 TEST(NavigationReproduction, RefusesTooFewScenesAndRuns) {
   Executor executor(1);
-  EXPECT_THROW((void)reproduce_navigation({.out = "x", .scenes = 1}, executor), ContractError);
-  EXPECT_THROW((void)reproduce_navigation({.out = "x", .scenes = 4, .runs = 3}, executor),
-               ContractError);
+  for (const ReproductionOptions& options :
+       {ReproductionOptions{.out = "x", .scenes = 1}, {.out = "x", .scenes = 4, .runs = 3}}) {
+    EXPECT_THROW((void)reproduce("navigation", options, executor), ContractError);
+  }
 }
 
 TEST_F(Reproductions, SignaturesAreTheSameOnOneAndTwoThreads) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
-  const auto reproduce = [](const std::filesystem::path& out, Executor& executor) {
-    return reproduce_m04({.out = out,
-                          .scenes = 2,
-                          .queries = 3,
-                          .rows = 6,
-                          .fine_lattice_every = 0,
-                          .mission_grids = {},
-                          .seed = 5},
-                         executor);
-  };
-  expect_same_on_one_and_two_threads(reproduce, 100, 10);
+  expect_same_on_one_and_two_threads("m04",
+                                     {.seed = 5,
+                                      .scenes = 2,
+                                      .queries = 3,
+                                      .rows = 6,
+                                      .fine_lattice_every = 0,
+                                      .mission_grids = {}},
+                                     100, 10);
   EXPECT_GT(times, 0U);
 }
 
 TEST_F(Reproductions, TrackingIsTheSameOnOneAndTwoThreads) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
-  const auto reproduce = [](const std::filesystem::path& out, Executor& executor) {
-    return reproduce_m03({.out = out,
-                          .scenes = 1,
-                          .variants = 1,
-                          .runs = 2,
-                          .rows = 4,
-                          .columns = 64,
-                          .seed = 705,
-                          .only = "office"},
-                         executor);
-  };
-  expect_same_on_one_and_two_threads(reproduce, 100, 9);
+  expect_same_on_one_and_two_threads("m03",
+                                     {.seed = 705,
+                                      .scenes = 1,
+                                      .runs = 2,
+                                      .rows = 4,
+                                      .columns = 64,
+                                      .variants = 1,
+                                      .only = "office"},
+                                     100, 9);
   EXPECT_EQ(times, 0U);
   for (const std::string& id : ids) EXPECT_EQ(id.rfind("m03.", 0), 0U) << id;
   for (const char* const id :
@@ -62,47 +57,37 @@ TEST_F(Reproductions, TrackingIsTheSameOnOneAndTwoThreads) {
 
 TEST_F(Reproductions, HomingIsTheSameOnOneAndTwoThreads) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
-  const auto reproduce = [](const std::filesystem::path& out, Executor& executor) {
-    return reproduce_s06({.out = out,
-                          .scenes = 2,
-                          .goals_every = 8,
-                          .goals_every_further = 16,
-                          .spacing_m = 0.1,
-                          .seed = 7,
-                          .starts = 1},
-                         executor);
-  };
-  expect_same_on_one_and_two_threads(reproduce, 50, 16);
+  expect_same_on_one_and_two_threads("s06",
+                                     {.seed = 7,
+                                      .scenes = 2,
+                                      .goals_every = 8,
+                                      .goals_every_further = 16,
+                                      .spacing_m = 0.1,
+                                      .starts = 1},
+                                     50, 16);
   EXPECT_GE(judged, 15U);
 }
 
 TEST_F(Reproductions, MappingIsTheSameOnOneAndTwoThreads) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
-  const auto reproduce = [](const std::filesystem::path& out, Executor& executor) {
-    return reproduce_f11(
-        {.out = out, .scenes = 2, .runs = 1, .views = 16, .max_views = 100, .columns = 132},
-        executor);
-  };
-  expect_same_on_one_and_two_threads(reproduce, 30, 0);
+  expect_same_on_one_and_two_threads(
+      "f11", {.scenes = 2, .runs = 1, .columns = 132, .views = 16, .max_views = 100}, 30, 0);
 }
 
 TEST_F(Reproductions, ElsewhereIsTheSameOnOneAndTwoThreads) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
-  const auto reproduce = [](const std::filesystem::path& out, Executor& executor) {
-    return reproduce_elsewhere({.out = out,
-                                .built_in = {"office", "lab"},
-                                .scenes = 2,
-                                .queries = 4,
-                                .runs = 2,
-                                .rows = 20,
-                                .days = 3,
-                                .day_pictures = 12,
-                                .walks = 2,
-                                .walk_pictures = 40,
-                                .seed = 7},
-                               executor);
-  };
-  expect_same_on_one_and_two_threads(reproduce, 30, 1);
+  expect_same_on_one_and_two_threads("elsewhere",
+                                     {.seed = 7,
+                                      .scenes = 2,
+                                      .runs = 2,
+                                      .queries = 4,
+                                      .rows = 20,
+                                      .built_in = {"office", "lab"},
+                                      .days = 3,
+                                      .day_pictures = 12,
+                                      .walks = 2,
+                                      .walk_pictures = 40},
+                                     30, 1);
   for (const char* const id :
        {"elsewhere.places.office.clean.known", "elsewhere.places.lab.radius",
         "elsewhere.places.other", "elsewhere.places.variant", "elsewhere.home.foreign",
@@ -117,23 +102,32 @@ TEST_F(Reproductions, ElsewhereIsTheSameOnOneAndTwoThreads) {
 
 TEST_F(Reproductions, RefuseWhatMakesNoSenseAndFoldersThatCannotBeMade) {
   Executor executor(1);
-  const auto out = folder.path();
-  EXPECT_THROW((void)reproduce_m03({.out = out, .scenes = 0}, executor), ContractError);
-  EXPECT_THROW((void)reproduce_m03({.out = out, .runs = 1}, executor), ContractError);
-  EXPECT_THROW((void)reproduce_m03({.out = out, .only = "kitchen"}, executor), ContractError);
-  EXPECT_THROW((void)reproduce_m03({.out = "/dev/null/folder"}, executor), FileError);
-  EXPECT_THROW((void)reproduce_m04({.out = out, .scenes = 1}, executor), ContractError);
-  EXPECT_THROW((void)reproduce_m04({.out = out, .fine_lattice_every = -1}, executor),
-               ContractError);
-  EXPECT_THROW((void)reproduce_m04({.out = out, .missions = 3}, executor), ContractError);
-  EXPECT_THROW((void)reproduce_m04({.out = out, .mission_scenes = 0}, executor), ContractError);
-  EXPECT_THROW((void)reproduce_m04({.out = "/dev/null/folder"}, executor), FileError);
-  EXPECT_THROW((void)reproduce_s06({.out = out, .scenes = 1}, executor), ContractError);
-  EXPECT_THROW((void)reproduce_s06({.out = out, .spacing_m = 0.5}, executor), ContractError);
-  EXPECT_THROW((void)reproduce_s06({.out = "/dev/null/folder"}, executor), FileError);
-  EXPECT_THROW((void)reproduce_f11({.out = out, .scenes = 1}, executor), ContractError);
-  EXPECT_THROW((void)reproduce_y03({.out = out, .scenes = 1}, executor), ContractError);
-  EXPECT_THROW((void)reproduce_y03({.out = out, .runs = 1}, executor), ContractError);
+  const auto refuse = [&](const char* paper, auto change) {
+    ReproductionOptions options = default_options(paper);
+    options.out = folder.path();
+    change(options);
+    EXPECT_THROW((void)reproduce(paper, options, executor), ContractError) << paper;
+  };
+  for (const char* const paper : {"f11", "m04", "navigation", "s06", "y03"}) {
+    refuse(paper, [](auto& options) { options.scenes = 1; });
+  }
+  for (const char* const paper : {"m03", "elsewhere"}) {
+    refuse(paper, [](auto& options) { options.scenes = 0; });
+  }
+  for (const char* const paper : {"m03", "y03", "elsewhere"}) {
+    refuse(paper, [](auto& options) { options.runs = 1; });
+  }
+  refuse("m03", [](auto& options) { options.only = "kitchen"; });
+  refuse("m04", [](auto& options) { options.fine_lattice_every = -1; });
+  refuse("m04", [](auto& options) { options.runs = 3; });
+  refuse("m04", [](auto& options) { options.mission_scenes = 0; });
+  refuse("s06", [](auto& options) { options.spacing_m = 0.5; });
+  EXPECT_THROW((void)default_options("m05"), ContractError);
+  for (const char* const paper : {"m03", "m04", "s06"}) {
+    ReproductionOptions options = default_options(paper);
+    options.out = "/dev/null/folder";
+    EXPECT_THROW((void)reproduce(paper, options, executor), FileError);
+  }
 }
 
 }  // namespace

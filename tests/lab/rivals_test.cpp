@@ -153,15 +153,14 @@ TEST(LeaveOneOut, RivalsOfTheCallerAnswerTheSameQueriesInTheSameRun) {
   std::vector<Pose2> line;
   for (int i = 0; i < 10; ++i) line.push_back({0.4 * i, 0.0, 0.0});
   testing::write_dataset(folder / "line", testing::landmark_world(3), line);
-  ElsewhereReproductionOptions options;
-  options.out = folder.path();
+  const ReproductionOptions options = default_options("elsewhere");
   std::vector<std::unique_ptr<RivalRecogniser>> rivals;
   rivals.push_back(std::make_unique<NextOne>(1));
   rivals.push_back(std::make_unique<NextOne>(3));
   Executor executor(2);
-  Reproduction result;
-  ElsewhereExperiments{options, executor, result}.reproduce_leave_one_out(folder / "line",
-                                                                          std::move(rivals));
+  Reproduction result{.out = folder.path()};
+  ElsewhereExperiments{{options, executor, result}}.reproduce_leave_one_out(folder / "line",
+                                                                            std::move(rivals));
   const auto row = [&](const std::string& id) {
     const auto found = std::ranges::find(result.rows, "elsewhere.line." + id, &ResultRow::id);
     EXPECT_NE(found, result.rows.end()) << id;

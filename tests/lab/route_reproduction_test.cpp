@@ -72,10 +72,9 @@ TEST(RouteReproduction, TheFitIsBetterThanTheContoursAndMaskingHelps) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   const TemporaryFolder folder;
   Executor executor(2);
-  Reproduction result;
-  const RouteReproductionOptions options{
-      .out = folder.path(), .scenes = 1, .swept = 1, .runs = 2, .seed = 711};
-  RouteExperiments{options, executor, result}.reproduce_lab_drives({});
+  Reproduction result{.out = folder.path()};
+  const ReproductionOptions options{.seed = 711, .scenes = 1, .runs = 2, .swept = 1};
+  RouteExperiments{{options, executor, result}}.reproduce_lab_drives();
   std::map<std::string, double> ours;
   for (const ResultRow& row : result.rows) {
     EXPECT_TRUE(std::isfinite(row.ours)) << row.id;

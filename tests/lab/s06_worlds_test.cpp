@@ -44,9 +44,9 @@ TEST(S06Worlds, AWorldGivesItsRowsAndAPictureOfEachFailure) {
   PANONAV_REQUIRE_DATA(scenes, "scenes");
   const TemporaryFolder out;
   Executor executor(2);
-  Reproduction result;
-  reproduce_homing_in_world(scenes->parent_path(), "small_warehouse", out.path(), 5, 30, executor,
-                            result);
+  Reproduction result{.out = out.path()};
+  const ReproductionOptions options{.data = scenes->parent_path(), .seed = 5, .starts = 30};
+  reproduce_homing_in_world("small_warehouse", {options, executor, result});
   ASSERT_GE(result.rows.size(), 6U);
   EXPECT_EQ(result.rows.front().id, "s06.world.small_warehouse.success");
   EXPECT_GE(result.rows.front().ours, 0.8);
@@ -61,9 +61,9 @@ TEST(S06Worlds, AWorldGivesItsRowsAndAPictureOfEachFailure) {
 TEST(S06Worlds, AWorldThatIsNotThereIsAnError) {
   const TemporaryFolder out;
   Executor executor(1);
-  Reproduction result;
-  EXPECT_THROW(reproduce_homing_in_world(out.path(), "nowhere", out.path(), 1, 1, executor, result),
-               FileError);
+  Reproduction result{.out = out.path()};
+  const ReproductionOptions options{.data = out.path()};
+  EXPECT_THROW(reproduce_homing_in_world("nowhere", {options, executor, result}), FileError);
 }
 
 TEST(S06Chains, RowsAreTheSameOnAnyNumberOfThreads) {

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <set>
 #include <string>
+#include <string_view>
 
 #include "lab/reproduction.hpp"
 #include "panonav/core/executor.hpp"
@@ -15,17 +16,18 @@
 
 namespace panonav::testing {
 
-/// The rows of an experiment, none of them twice. `reproduce(folder, executor)` is run with one and
-/// with two threads: rows and pictures must be the same, to the byte, but for those of times.
+/// The rows of the experiments of a paper, none of them twice. They run with one and with two
+/// threads: rows and images must be the same, to the byte, except those of times.
 class ReproductionTest : public InTemporaryFolder {
  protected:
-  template <class Reproduce>
-  void expect_same_on_one_and_two_threads(const Reproduce& reproduce, std::size_t more_rows_than,
-                                          std::size_t min_pictures) {
+  void expect_same_on_one_and_two_threads(std::string_view paper, lab::ReproductionOptions options,
+                                          std::size_t more_rows_than, std::size_t min_pictures) {
     Executor alone(1);
     Executor both(2);
-    one = reproduce(folder / "1", alone);
-    const lab::Reproduction two = reproduce(folder / "2", both);
+    options.out = folder / "1";
+    one = lab::reproduce(paper, options, alone);
+    options.out = folder / "2";
+    const lab::Reproduction two = lab::reproduce(paper, options, both);
     ASSERT_GT(one.rows.size(), more_rows_than);
     ASSERT_EQ(one.rows.size(), two.rows.size());
     for (std::size_t i = 0; i < one.rows.size(); ++i) {

@@ -70,13 +70,13 @@ Run declare_reproduce(Arguments& arguments) {
   arguments.flag("--continue", wanted->continues,
                  "all: continue a run of the same options that was stopped; papers that are "
                  "finished are not run again");
-  const lab::ReproductionOptions m04;
-  const lab::TrackingReproductionOptions m03;
-  const lab::HomingReproductionOptions s06;
-  const lab::MappingReproductionOptions f11;
-  const lab::RouteReproductionOptions y03;
-  const lab::NavigationReproductionOptions navigation;
-  const lab::ElsewhereReproductionOptions elsewhere;
+  const auto m04 = lab::default_options("m04");
+  const auto m03 = lab::default_options("m03");
+  const auto s06 = lab::default_options("s06");
+  const auto f11 = lab::default_options("f11");
+  const auto y03 = lab::default_options("y03");
+  const auto navigation = lab::default_options("navigation");
+  const auto elsewhere = lab::default_options("elsewhere");
   const auto defaults = [](auto elsewhere_value, auto f11_value, auto m03_value, auto m04_value,
                            auto navigation_value, auto s06_value, auto y03_value) {
     return " (default: " + std::to_string(elsewhere_value) + " for elsewhere, " +
@@ -99,14 +99,14 @@ Run declare_reproduce(Arguments& arguments) {
   arguments.option("--queries", wanted->queries, 1,
                    "m04: questions in each" + fallback(m04.queries) + "); elsewhere: the same" +
                        fallback(elsewhere.queries) + ")");
-  arguments.option(
-      "--runs", wanted->runs, 2,
-      "elsewhere: homing runs and missions in each place" + fallback(elsewhere.runs) +
-          "); m04: missions of figure 18 in each kind of place" + fallback(m04.missions) +
-          "); m03: runs in each variant of an office" + fallback(m03.runs) +
-          "); f11: paths in each Gazebo world" + fallback(f11.runs) +
-          "); navigation: missions in each kind of place" + fallback(navigation.runs) +
-          "); y03: runs along routes of 60 m in each place" + fallback(y03.runs) + ")");
+  arguments.option("--runs", wanted->runs, 2,
+                   "elsewhere: homing runs and missions in each place" + fallback(elsewhere.runs) +
+                       "); m04: missions of figure 18 in each kind of place" + fallback(m04.runs) +
+                       "); m03: runs in each variant of an office" + fallback(m03.runs) +
+                       "); f11: paths in each Gazebo world" + fallback(f11.runs) +
+                       "); navigation: missions in each kind of place" + fallback(navigation.runs) +
+                       "); y03: runs along routes of 60 m in each place" + fallback(y03.runs) +
+                       ")");
   arguments.option("--rows", wanted->rows, 1,
                    "elsewhere, m03, m04: rows of the views" + fallback(m03.rows) + ")");
   arguments.option("--data FOLDER", wanted->data,

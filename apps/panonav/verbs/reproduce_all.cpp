@@ -98,22 +98,23 @@ lab::Reproduction reproduce_paper(const ReproducedPaper& paper, const ReproduceA
                                   const fs::path& out, Session& session) {
   Progress progress(session, "reproduce " + std::string(paper.name), 100);
   std::size_t shown_percent = 0;
-  const lab::ReproductionProgress report = [&](std::string_view, double fraction) {
+  const lab::ReproductionProgress report = [&](double fraction) {
     const auto percent = static_cast<std::size_t>(100.0 * fraction);
     if (percent > shown_percent) progress.advance(percent - shown_percent);
     shown_percent = std::max(shown_percent, percent);
   };
   remove_file(out / results_file);
-  auto [lead, result] = paper.run(wanted, out, session.executor(), report);
+  const lab::ReproductionOptions options = reproduction_options(paper, wanted, out);
+  lab::Reproduction result = lab::reproduce(paper.name, options, session.executor(), report);
   progress.clear();
   const std::string name(paper.name);
   write_file(out / "results.md",
              lab::to_markdown({.version = PANONAV_VERSION,
                                .command = "panonav reproduce " + name,
                                .papers = {{name, std::string(paper.title), result.rows}}}));
-  write_paper_page(out, paper, lead, result);
+  write_paper_page(out, paper, paper.lead(options), result);
   write_file(out / results_file, to_json(result.rows));
-  return std::move(result);
+  return result;
 }
 
 ExitCode reproduce_all(const ReproduceArguments& wanted, Session& session) {

@@ -11,134 +11,71 @@ namespace panonav::command {
 
 namespace {
 
-// Where they are to begin and how many variants, as wanted.
-template <typename Options>
-void set_scenes(const ReproduceArguments& wanted, Options& options) {
-  if (wanted.quick) options = lab::quick_run(options);
-  if (wanted.seed) options.seed = *wanted.seed;
-  check_scenes(wanted);
-  if (wanted.scenes) options.scenes = *wanted.scenes;
+std::string lead_of_f11(const lab::ReproductionOptions& options) {
+  return "Fernandez, Paya, Reinoso, Amoros 2011, run in " + std::to_string(options.scenes) +
+         " variants of two simulated places; loops closed, which its authors left to later work; "
+         "a corridor of identical doors, Gazebo worlds and recordings where they are at hand, "
+         "maps of up to " +
+         std::to_string(options.max_views) + " views. Published figures beside ours.";
 }
 
-PaperReproduction run_f11(const ReproduceArguments& wanted, const std::filesystem::path& out,
-                          Executor& executor, const lab::ReproductionProgress& progress) {
-  lab::MappingReproductionOptions options{.out = out, .data = data_folder(wanted)};
-  set_scenes(wanted, options);
-  if (wanted.runs) options.runs = *wanted.runs;
-  std::string lead =
-      "Fernandez, Paya, Reinoso, Amoros 2011, run in " + std::to_string(options.scenes) +
-      " variants of two simulated places; loops closed, which its authors left to later work; "
-      "a corridor of identical doors, Gazebo worlds and recordings where they are at hand, "
-      "maps of up to " +
-      std::to_string(options.max_views) + " views. Published figures beside ours.";
-  return {std::move(lead), lab::reproduce_f11(options, executor, progress)};
+std::string lead_of_m03(const lab::ReproductionOptions& options) {
+  return "Menegatti, Zoccarato, Pagello, Ishiguro 2003, run in " + std::to_string(options.scenes) +
+         " simulated offices with a 25 cm grid of reference views, " +
+         std::to_string(options.variants * options.runs) +
+         " runs in each, and what its authors announced: a corridor of identical doors and "
+         "the open air; Gazebo worlds and recordings where they are at hand. Published figures "
+         "beside ours. Few runs give wide intervals, and rows may then miss their target by "
+         "chance.";
 }
 
-PaperReproduction run_m03(const ReproduceArguments& wanted, const std::filesystem::path& out,
-                          Executor& executor, const lab::ReproductionProgress& progress) {
-  lab::TrackingReproductionOptions options{.out = out, .data = data_folder(wanted)};
-  if (wanted.quick) options = lab::quick_run(options);
-  if (wanted.seed) options.seed = *wanted.seed;
-  if (wanted.scenes) options.scenes = *wanted.scenes;
-  if (wanted.runs) options.runs = *wanted.runs;
-  if (wanted.only) options.only = *wanted.only;
-  if (wanted.rows) options.rows = *wanted.rows;
-  std::string lead =
-      "Menegatti, Zoccarato, Pagello, Ishiguro 2003, run in " + std::to_string(options.scenes) +
-      " simulated offices with a 25 cm grid of reference views, " +
-      std::to_string(options.variants * options.runs) +
-      " runs in each, and what its authors announced: a corridor of identical doors and "
-      "the open air; Gazebo worlds and recordings where they are at hand. Published figures "
-      "beside ours. Few runs give wide intervals, and rows may then miss their target by "
-      "chance.";
-  return {std::move(lead), lab::reproduce_m03(options, executor, progress)};
-}
-
-PaperReproduction run_m04(const ReproduceArguments& wanted, const std::filesystem::path& out,
-                          Executor& executor, const lab::ReproductionProgress& progress) {
-  lab::ReproductionOptions options{.out = out};
-  set_scenes(wanted, options);
-  if (wanted.queries) options.queries = *wanted.queries;
-  if (wanted.rows) options.rows = *wanted.rows;
-  if (wanted.runs) options.missions = *wanted.runs;
-  options.mission_scenes = std::min({options.mission_scenes, options.scenes, options.missions});
+std::string lead_of_m04(const lab::ReproductionOptions& options) {
   std::string places;
   for (const lab::MissionGrid& grid : options.mission_grids) {
     places += (places.empty() ? "" : ", ") + grid.scene;
   }
-  std::string lead =
-      "Menegatti, Maeda, Ishiguro 2004, run on " + std::to_string(options.scenes) +
-      " simulated offices with a 25 cm grid of reference views, " +
-      std::to_string(options.queries) + " questions in each; views that arrange themselves, and " +
-      std::to_string(options.missions) + " missions over such maps in each kind of place (" +
-      places +
-      "). Published figures beside "
-      "ours. Few offices and questions give wide intervals, and rows may then miss their "
-      "target by chance.";
-  return {std::move(lead), lab::reproduce_m04(options, executor, progress)};
+  return "Menegatti, Maeda, Ishiguro 2004, run on " + std::to_string(options.scenes) +
+         " simulated offices with a 25 cm grid of reference views, " +
+         std::to_string(options.queries) +
+         " questions in each; views that arrange themselves, and " + std::to_string(options.runs) +
+         " missions over such maps in each kind of place (" + places +
+         "). Published figures beside "
+         "ours. Few offices and questions give wide intervals, and rows may then miss their "
+         "target by chance.";
 }
 
-PaperReproduction run_navigation(const ReproduceArguments& wanted, const std::filesystem::path& out,
-                                 Executor& executor, const lab::ReproductionProgress& progress) {
-  lab::NavigationReproductionOptions options{.out = out, .data = data_folder(wanted)};
-  set_scenes(wanted, options);
-  if (wanted.runs) options.runs = *wanted.runs;
-  options.scenes = std::min(options.scenes, options.runs);
-  std::string lead =
-      "What Menegatti, Maeda, Ishiguro 2004, section 3.5, leave to later work: maps of drives, "
-      "changes, a robot that is kidnapped, blocked edges. " +
-      std::to_string(options.runs) +
-      " missions from random starts to random goals in each kind of place, " +
-      std::to_string(options.scenes) +
-      " variants of each. The robot sees pictures and feels what is in its way; it knows "
-      "neither where it is nor where its references were taken.";
-  return {std::move(lead), lab::reproduce_navigation(options, executor, progress)};
+std::string lead_of_navigation(const lab::ReproductionOptions& options) {
+  return "What Menegatti, Maeda, Ishiguro 2004, section 3.5, leave to later work: maps of drives, "
+         "changes, a robot that is kidnapped, blocked edges. " +
+         std::to_string(options.runs) +
+         " missions from random starts to random goals in each kind of place, " +
+         std::to_string(options.scenes) +
+         " variants of each. The robot sees pictures and feels what is in its way; it knows "
+         "neither where it is nor where its references were taken.";
 }
 
-PaperReproduction run_elsewhere(const ReproduceArguments& wanted, const std::filesystem::path& out,
-                                Executor& executor, const lab::ReproductionProgress& progress) {
-  lab::ElsewhereReproductionOptions options{.out = out, .data = data_folder(wanted)};
-  if (wanted.quick) options = lab::quick_run(options);
-  if (wanted.seed) options.seed = *wanted.seed;
-  if (wanted.scenes) options.scenes = *wanted.scenes;
-  if (wanted.queries) options.queries = *wanted.queries;
-  if (wanted.runs) options.runs = *wanted.runs;
-  if (wanted.rows) options.rows = *wanted.rows;
-  std::string lead =
-      "What panonav does on ground where it was not made: " + std::to_string(options.scenes) +
-      " variants of each built-in scene, and the Gazebo worlds and recordings that "
-      "are at hand; places of one asked of the memory of all others, noise, robots "
-      "that tilt, whole floors. Rivals see the same pictures in the same run.";
-  return {std::move(lead), lab::reproduce_elsewhere(options, executor, progress)};
+std::string lead_of_elsewhere(const lab::ReproductionOptions& options) {
+  return "What panonav does on ground where it was not made: " + std::to_string(options.scenes) +
+         " variants of each built-in scene, and the Gazebo worlds and recordings that "
+         "are at hand; places of one asked of the memory of all others, noise, robots "
+         "that tilt, whole floors. Rivals see the same pictures in the same run.";
 }
 
-PaperReproduction run_s06(const ReproduceArguments& wanted, const std::filesystem::path& out,
-                          Executor& executor, const lab::ReproductionProgress& progress) {
-  lab::HomingReproductionOptions options{.out = out, .data = data_folder(wanted)};
-  set_scenes(wanted, options);
-  std::string lead =
-      "Stürzl, Mallot 2006, run in " + std::to_string(options.scenes) +
-      " simulated toy house arenas, each recorded twice with different noise and slightly "
-      "different light, headings at random; pictures are of the first arena. Runs home and "
-      "chains of "
-      "snapshots in rooms and Gazebo worlds. Published figures beside ours.";
-  return {std::move(lead), lab::reproduce_s06(options, executor, progress)};
+std::string lead_of_s06(const lab::ReproductionOptions& options) {
+  return "Stürzl, Mallot 2006, run in " + std::to_string(options.scenes) +
+         " simulated toy house arenas, each recorded twice with different noise and slightly "
+         "different light, headings at random; pictures are of the first arena. Runs home and "
+         "chains of "
+         "snapshots in rooms and Gazebo worlds. Published figures beside ours.";
 }
 
-PaperReproduction run_y03(const ReproduceArguments& wanted, const std::filesystem::path& out,
-                          Executor& executor, const lab::ReproductionProgress& progress) {
-  lab::RouteReproductionOptions options{.out = out, .data = data_folder(wanted)};
-  set_scenes(wanted, options);
-  if (wanted.runs) options.runs = *wanted.runs;
-  options.swept = std::min(options.swept, options.scenes);
-  std::string lead =
-      "Yagi, Imai, Yachida 2003, run in " + std::to_string(options.scenes) +
-      " variants of a simulated lab seen through a mirror camera with its noise; pictures are "
-      "of the first. Then routes of 60 m, each recorded once and repeated in closed loop, " +
-      std::to_string(options.runs) +
-      " runs in each place, and a real route; Gazebo worlds and the recording where they are "
-      "at hand. Published figures beside ours.";
-  return {std::move(lead), lab::reproduce_y03(options, executor, progress)};
+std::string lead_of_y03(const lab::ReproductionOptions& options) {
+  return "Yagi, Imai, Yachida 2003, run in " + std::to_string(options.scenes) +
+         " variants of a simulated lab seen through a mirror camera with its noise; pictures are "
+         "of the first. Then routes of 60 m, each recorded once and repeated in closed loop, " +
+         std::to_string(options.runs) +
+         " runs in each place, and a real route; Gazebo worlds and the recording where they are "
+         "at hand. Published figures beside ours.";
 }
 
 constexpr std::array<ReproducedPaper, 7> papers{{
@@ -147,7 +84,7 @@ constexpr std::array<ReproducedPaper, 7> papers{{
      .subject = "visual odometry and maps",
      .runs = true,
      .data = true,
-     .run = run_f11},
+     .lead = lead_of_f11},
     {.name = "m03",
      .title = "Monte-Carlo localisation: the experiments of [M03]",
      .subject = "Monte-Carlo localisation",
@@ -155,31 +92,32 @@ constexpr std::array<ReproducedPaper, 7> papers{{
      .rows = true,
      .data = true,
      .only = true,
-     .run = run_m03},
+     .single_scene = true,
+     .lead = lead_of_m03},
     {.name = "m04",
      .title = "Image-based memory: the experiments of [M04]",
      .subject = "localisation and views that arrange themselves",
      .queries = true,
      .runs = true,
      .rows = true,
-     .run = run_m04},
+     .lead = lead_of_m04},
     {.name = "navigation",
      .title = "Going somewhere: what [M04] leaves to later work",
      .subject = "what m04 leaves to later work",
      .runs = true,
      .data = true,
-     .run = run_navigation},
+     .lead = lead_of_navigation},
     {.name = "s06",
      .title = "Visual homing: the experiments of [S06]",
      .subject = "homing",
      .data = true,
-     .run = run_s06},
+     .lead = lead_of_s06},
     {.name = "y03",
      .title = "Route panoramas: the experiments of [Y03]",
      .subject = "routes",
      .runs = true,
      .data = true,
-     .run = run_y03},
+     .lead = lead_of_y03},
     {.name = "elsewhere",
      .title = "Elsewhere: scenes, worlds and recordings beside each other",
      .subject = "known and unknown places, recordings, rivals",
@@ -187,13 +125,33 @@ constexpr std::array<ReproducedPaper, 7> papers{{
      .runs = true,
      .rows = true,
      .data = true,
-     .run = run_elsewhere},
+     .single_scene = true,
+     .lead = lead_of_elsewhere},
 }};
 
 }  // namespace
 
 std::span<const ReproducedPaper> reproduced_papers() {
   return papers;
+}
+
+lab::ReproductionOptions reproduction_options(const ReproducedPaper& paper,
+                                              const ReproduceArguments& arguments,
+                                              const std::filesystem::path& out) {
+  lab::ReproductionOptions options = lab::default_options(paper.name, arguments.quick);
+  options.out = out;
+  if (paper.data) options.data = data_folder(arguments);
+  options.seed = arguments.seed.value_or(options.seed);
+  if (!paper.single_scene) check_scenes(arguments);
+  options.scenes = arguments.scenes.value_or(options.scenes);
+  options.runs = arguments.runs.value_or(options.runs);
+  options.queries = arguments.queries.value_or(options.queries);
+  options.rows = arguments.rows.value_or(options.rows);
+  options.only = arguments.only.value_or(options.only);
+  if (paper.name == "navigation") options.scenes = std::min(options.scenes, options.runs);
+  options.mission_scenes = std::min({options.mission_scenes, options.scenes, options.runs});
+  options.swept = std::min(options.swept, options.scenes);
+  return options;
 }
 
 std::filesystem::path data_folder(const ReproduceArguments& wanted) {
@@ -206,6 +164,7 @@ std::filesystem::path data_folder(const ReproduceArguments& wanted) {
   const char* const folder = std::getenv("PANONAV_DATA");
   return folder == nullptr ? "" : folder;
 }
+
 void check_scenes(const ReproduceArguments& wanted) {
   if (wanted.scenes && *wanted.scenes < 2) {
     throw OptionError("--scenes is '" + std::to_string(*wanted.scenes) + "'; allowed for " +

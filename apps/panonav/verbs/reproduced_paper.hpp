@@ -8,7 +8,6 @@
 #include <string_view>
 
 #include "lab/reproduction.hpp"
-#include "panonav/core/executor.hpp"
 
 namespace panonav::command {
 
@@ -27,11 +26,6 @@ struct ReproduceArguments {
   std::optional<std::string> only;
 };
 
-struct PaperReproduction {
-  std::string lead;  ///< what the report says first: how much was run
-  lab::Reproduction result;
-};
-
 /// The experiments of a paper, and which options mean something to them.
 struct ReproducedPaper {
   std::string_view name;
@@ -42,12 +36,19 @@ struct ReproducedPaper {
   bool rows = false;
   bool data = false;
   bool only = false;
-  PaperReproduction (*run)(const ReproduceArguments& wanted, const std::filesystem::path& out,
-                           Executor& executor, const lab::ReproductionProgress& progress) = nullptr;
+  bool single_scene = false;  ///< a single scene will do; else intervals need two
+  /// Returns the first paragraph of the report: how much was run.
+  std::string (*lead)(const lab::ReproductionOptions& options) = nullptr;
 };
 
 /// All, in the order in which `all` runs them.
 [[nodiscard]] std::span<const ReproducedPaper> reproduced_papers();
+
+/// Returns the options of the paper's experiments: its defaults, then what the caller set. Throws
+/// OptionError, FileError.
+[[nodiscard]] lab::ReproductionOptions reproduction_options(const ReproducedPaper& paper,
+                                                            const ReproduceArguments& arguments,
+                                                            const std::filesystem::path& out);
 
 /// The folder with recordings and worlds: as asked for, else where the environment says; empty:
 /// none. Throws FileError when there is no such folder.
