@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "panonav/motion/odometry.hpp"
+#include "panonav_simulation/simulated_odometry.hpp"
 
 namespace panonav::bench {
 
@@ -45,9 +46,11 @@ std::vector<Walk> walks(const Corridor& corridor, const lab::RunCondition& condi
       truth.push_back(step.truth);
       walk.scans.push_back(scan_at(*corridor.place.renderer, step.truth));
     }
-    const auto told = simulate_odometry(truth, OdometryNoise{}, seed + made.size());
-    walk.odometry = steps_between(told);
-    walk.odometry.insert(walk.odometry.begin(), Pose2{});
+    const auto told = simulation::simulate_odometry(truth, OdometryNoise{}, seed + made.size());
+    walk.odometry.push_back({});
+    for (std::size_t i = 1; i < told.size(); ++i) {
+      walk.odometry.push_back(inverse(told[i - 1]) * told[i]);
+    }
     walk.run = std::move(run);
     made.push_back(std::move(walk));
   }

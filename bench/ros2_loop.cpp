@@ -24,7 +24,7 @@
 #include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/motion/steering.hpp"
+#include "panonav/motion/path_follower.hpp"
 #include "panonav/motion/trajectory_error.hpp"
 #include "panonav/motion/velocity.hpp"
 #include "panonav/storage/memory_file.hpp"
@@ -263,12 +263,12 @@ std::vector<StampedPose> teach(Judge& judge, const std::vector<Point2>& path,
     if (by_odometry.empty() || judge.now_s > by_odometry.back().stamp_s) {
       by_odometry.push_back({judge.now_s, judge.told()});
     }
-    const auto aim = follower.next_aim(judge.truth.position());
+    const auto aim = follower.next_target(judge.truth.position());
     Velocity velocity;
     if (aim) {
       const Point2 ahead = inverse(judge.truth) * *aim;
-      velocity =
-          command_towards(std::atan2(ahead.y_m, ahead.x_m), std::hypot(ahead.x_m, ahead.y_m), base);
+      velocity = compute_command_towards(std::atan2(ahead.y_m, ahead.x_m),
+                                         std::hypot(ahead.x_m, ahead.y_m), base);
     }
     judge.cmd_vel.publish({{velocity.forward_m_s, 0.0, 0.0}, {0.0, 0.0, velocity.turn_rad_s}});
     return !aim;

@@ -14,10 +14,11 @@
 #include "panonav/core/text.hpp"
 #include "panonav/localisation/memory_update.hpp"
 #include "panonav/motion/odometry.hpp"
-#include "panonav/motion/path.hpp"
 #include "panonav/panorama/preprocessing.hpp"
 #include "panonav_simulation/changing_scene.hpp"
 #include "panonav_simulation/make_each.hpp"
+#include "panonav_simulation/paths.hpp"
+#include "panonav_simulation/simulated_odometry.hpp"
 #include "panonav_simulation/worlds.hpp"
 
 namespace panonav::lab {
@@ -92,7 +93,7 @@ class DrivingRobot {
   /// The poses of the day's pictures; the day begins anywhere.
   std::vector<Pose2> pass_day(const simulation::FreeSpace& space, int pictures, Random& random) {
     ++day_;
-    std::vector<GridPosition> grid;
+    std::vector<simulation::GridPosition> grid;
     if (drive_ == DailyDrive::rounds) grid = space.grid(spacing_m);
     std::vector<Pose2> path;
     Point2 at = space.random_pose(random).position();
@@ -112,7 +113,7 @@ class DrivingRobot {
           at = {at.x_m + left_m * std::cos(heading_rad), at.y_m + left_m * std::sin(heading_rad)};
           leg_m -= left_m;
           path.push_back({at.x_m, at.y_m, heading_rad});
-          for (const GridPosition& place : grid) {
+          for (const simulation::GridPosition& place : grid) {
             if (distance(place.position, at) <= spacing_m) {
               passed_[square_of(place.position)] = day_;
             }
@@ -132,11 +133,11 @@ class DrivingRobot {
     return {std::lround(p.x_m / spacing_m), std::lround(p.y_m / spacing_m)};
   }
   /// Empty where the robot is at the only place that there is.
-  [[nodiscard]] std::optional<Point2> longest_ago(const std::vector<GridPosition>& grid,
+  [[nodiscard]] std::optional<Point2> longest_ago(const std::vector<simulation::GridPosition>& grid,
                                                   Point2 at) const {
     std::optional<Point2> best;
     std::pair<int, double> least;
-    for (const GridPosition& place : grid) {
+    for (const simulation::GridPosition& place : grid) {
       const auto found = passed_.find(square_of(place.position));
       const double distance_m = distance(place.position, at);
       const std::pair rank(found == passed_.end() ? 0 : found->second, distance_m);
@@ -203,7 +204,7 @@ class LearningRobot {
     const auto answers = simulation::make_each(executor, seen.size(), [&](std::size_t i) {
       return remembered_->localise(seen[i].panorama);
     });
-    SimulatedOdometry odometry(OdometryNoise{}, seed);
+    simulation::SimulatedOdometry odometry(OdometryNoise{}, seed);
     MemoryUpdate update(*remembered_->place().ranking(), remembered_->place().model(), use_);
     std::vector<PackedSignature> signatures;
     for (std::size_t i = 0; i < seen.size(); ++i) {

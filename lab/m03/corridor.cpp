@@ -11,7 +11,7 @@
 #include "lab/m03/experiments.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
-#include "panonav/motion/path.hpp"
+#include "panonav_simulation/paths.hpp"
 #include "panonav_viewer/scene_drawing.hpp"
 
 namespace panonav::lab {
@@ -96,7 +96,7 @@ std::vector<Pose2> drive_around(const simulation::Scene& scene, Random& random) 
     const Point2 p = ring[i % ring.size()];
     way.push_back({p.x_m, p.y_m, 0.0});
   }
-  const auto dense = resample(way, 0.01);
+  const auto dense = simulation::resample(way, 0.01);
   const auto lap = dense.size() / 2;
   const auto start = static_cast<std::size_t>(random.index(lap));
   std::vector<Pose2> poses;

@@ -9,7 +9,7 @@
 #include "lab/statistics.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
-#include "panonav/motion/path.hpp"
+#include "panonav_simulation/paths.hpp"
 
 namespace panonav::lab {
 
@@ -48,7 +48,7 @@ GardenRuns record_gardens(const TrackingExperiments& m03) {
     for (int r = 0; r < runs_each; ++r) {
       Random random(seed * 1000003U + 80U, static_cast<std::uint64_t>(r));
       const Pose2 start = place.free_space->random_pose(random);
-      ways.push_back(random_walk(
+      ways.push_back(simulation::random_walk(
           start, [&](Point2 p) { return place.free_space->is_free(p); },
           {.poses = images, .step_m = garden_spacing_m}, random));
     }

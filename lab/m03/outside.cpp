@@ -10,7 +10,7 @@
 #include "lab/statistics.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
-#include "panonav/motion/path.hpp"
+#include "panonav_simulation/paths.hpp"
 
 namespace panonav::lab {
 
@@ -48,7 +48,7 @@ std::vector<Pose2> excursion(const simulation::FreeSpace& space, double border_m
       way.push_back({p.x_m, p.y_m, 0.0});
     }
   }
-  auto poses = resample(way, m03_spacing_m);
+  auto poses = simulation::resample(way, m03_spacing_m);
   for (std::size_t i = 0; i + 1 < poses.size(); ++i) {
     poses[i].heading_rad =
         wrap_angle(std::atan2(poses[i + 1].y_m - poses[i].y_m, poses[i + 1].x_m - poses[i].x_m));

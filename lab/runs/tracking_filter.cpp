@@ -7,6 +7,7 @@
 
 #include "panonav/geometry/angles.hpp"
 #include "panonav_simulation/make_each.hpp"
+#include "panonav_simulation/simulated_odometry.hpp"
 
 namespace panonav::lab {
 
@@ -46,7 +47,7 @@ TrackedRun track_run(const TrackingPlace& place, const TrackingRun& run,
   if (setting.heading_known && !run.steps.empty()) {
     filter.start_anywhere(run.steps.front().truth.heading_rad);
   }
-  SimulatedOdometry odometry(setting.odometry, seed);
+  simulation::SimulatedOdometry odometry(setting.odometry, seed);
   Pose2 before = odometry.pose();
   TrackedRun tracked;
   for (std::size_t i = 0; i < run.steps.size(); ++i) {

@@ -8,9 +8,9 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/motion/odometry.hpp"
-#include "panonav/motion/path.hpp"
 #include "panonav/panorama/preprocessing.hpp"
 #include "panonav_simulation/make_each.hpp"
+#include "panonav_simulation/paths.hpp"
 
 namespace panonav::lab {
 
@@ -223,7 +223,7 @@ std::vector<TrackingRun> record_walks(const simulation::PlaceRecording& place,
     for (int r = 0; r < options.runs_each; ++r) {
       Random walk(seed, static_cast<std::uint64_t>(r) + 1);
       Pose2 start = space->random_pose(walk);
-      auto path = random_walk(
+      auto path = simulation::random_walk(
           start, [&](Point2 p) { return space->is_free(p); },
           {.poses = options.images, .step_m = options.step_m}, walk);
       if (options.constant_heading) {

@@ -7,6 +7,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
+#include "panonav_simulation/paths.hpp"
 #include "panonav_simulation/scenes.hpp"
 #include "panonav_simulation/sensor.hpp"
 
@@ -19,7 +20,7 @@ constexpr int camera_rows = 10;
 constexpr double half_band_rad = 5.0 * std::numbers::pi / 180.0;
 
 ArenaRecording record(const simulation::Renderer& renderer, const simulation::Scene& scene,
-                      std::span<const GridPosition> grid, const ArenaOptions& options,
+                      std::span<const simulation::GridPosition> grid, const ArenaOptions& options,
                       std::uint64_t stream, Executor& executor) {
   std::vector<std::optional<ArenaView>> views(grid.size());
   std::vector<std::vector<float>> rows(grid.size());
@@ -88,8 +89,8 @@ Arena record_arena(const ArenaOptions& options, Executor& executor) {
   arena.scene = simulation::make_scene("arena", {.seed = options.seed});
   arena.space = std::make_shared<const simulation::FreeSpace>(
       arena.scene, simulation::free_space_options(arena.scene));
-  std::vector<GridPosition> grid;
-  for (const GridPosition& place : arena.space->grid(options.spacing_m)) {
+  std::vector<simulation::GridPosition> grid;
+  for (const simulation::GridPosition& place : arena.space->grid(options.spacing_m)) {
     const Point2 at = place.position;
     const Point2 low = arena.scene.floor_low;
     const Point2 high = arena.scene.floor_high;

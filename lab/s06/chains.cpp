@@ -9,8 +9,9 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
-#include "panonav/motion/path.hpp"
+#include "panonav_simulation/paths.hpp"
 #include "panonav_simulation/scenes.hpp"
+#include "panonav_simulation/simulated_odometry.hpp"
 #include "panonav_simulation/simulated_robot.hpp"
 
 namespace panonav::lab {
@@ -50,7 +51,7 @@ std::vector<std::vector<Pose2>> random_routes(const simulation::FreeSpace& space
         corners.push_back({place.x_m, place.y_m, 0.0});
       }
     }
-    std::vector<Pose2> route = resample(corners, spacing_m);
+    std::vector<Pose2> route = simulation::resample(corners, spacing_m);
     for (std::size_t i = 0; i + 1 < route.size(); ++i) {
       route[i].heading_rad =
           wrap_angle(std::atan2(route[i + 1].y_m - route[i].y_m, route[i + 1].x_m - route[i].x_m));
@@ -64,7 +65,7 @@ std::vector<std::vector<Pose2>> random_routes(const simulation::FreeSpace& space
 SnapshotChain record_chain(const HomingPlace& place, std::span<const Pose2> route,
                            std::uint64_t seed) {
   ChainRecorder recorder;
-  SimulatedOdometry wheels({}, Random(seed, 3).next());
+  simulation::SimulatedOdometry wheels({}, Random(seed, 3).next());
   Random noise_of_views(seed, 4);
   for (std::size_t i = 0; i < route.size(); ++i) {
     const Pose2 before = wheels.pose();
@@ -88,7 +89,7 @@ ChainRun follow_chain(const HomingPlace& place, const SnapshotChain& chain,
   ChainFollower follower(chain, direction);
   simulation::SimulatedRobot robot(*place.free_space, {}, simulation::ObstacleRule::pass, start,
                                    seed);
-  SimulatedOdometry wheels({}, Random(seed, 3).next());
+  simulation::SimulatedOdometry wheels({}, Random(seed, 3).next());
   Random noise_of_views(seed, 2);
   ChainRun run;
   Pose2 moved;

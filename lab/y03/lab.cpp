@@ -6,16 +6,17 @@
 #include <optional>
 #include <utility>
 
+#include "lab/y03/steering.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/motion/odometry.hpp"
-#include "panonav/motion/steering.hpp"
 #include "panonav/route/route_changes.hpp"
 #include "panonav_simulation/free_space.hpp"
 #include "panonav_simulation/line_camera.hpp"
 #include "panonav_simulation/make_each.hpp"
 #include "panonav_simulation/scenes.hpp"
+#include "panonav_simulation/simulated_odometry.hpp"
 
 namespace panonav::lab {
 
@@ -41,7 +42,7 @@ LineDrive take_drive(const simulation::Renderer& renderer, std::vector<Pose2> po
                      const simulation::LineCamera& camera, std::uint64_t seed, Executor& executor) {
   LineDrive drive;
   drive.lines = take_lines(renderer, poses, camera, seed, executor);
-  const auto odometry = simulate_odometry(poses, {}, seed);
+  const auto odometry = simulation::simulate_odometry(poses, {}, seed);
   drive.steps.emplace_back();
   for (std::size_t i = 1; i < odometry.size(); ++i) {
     drive.steps.push_back(inverse(odometry[i - 1]) * odometry[i]);

@@ -18,7 +18,7 @@
 #include "panonav/geometry/positions.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/panorama_reader.hpp"
-#include "panonav/motion/headed_path.hpp"
+#include "panonav/motion/path.hpp"
 #include "panonav/route/horizon_scanline.hpp"
 #include "panonav/route/route_place.hpp"
 #include "panonav/route/route_tracker.hpp"
@@ -207,7 +207,7 @@ void RouteExperiments::reproduce_real_route() const {
     if (!entry.pose) throw FileError((options.data / "sussex_route").string(), "has no positions");
     places.push_back({entry.pose->x_m, entry.pose->y_m});
   }
-  const std::vector<Pose2> way = headed_along_way(places);
+  const std::vector<Pose2> way = estimate_headings(places);
   constexpr std::size_t every = 10;
   RoutePanorama route;
   for (std::size_t i = 0; i < way.size(); i += every) {

@@ -8,12 +8,13 @@
 #include <span>
 #include <utility>
 
+#include "lab/y03/steering.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/positions.hpp"
-#include "panonav/motion/path.hpp"
-#include "panonav/motion/steering.hpp"
+#include "panonav/motion/path_follower.hpp"
+#include "panonav_simulation/paths.hpp"
 #include "panonav_simulation/simulated_robot.hpp"
 
 namespace panonav::lab {
@@ -169,7 +170,7 @@ std::vector<Pose2> curved_route(const RouteScene& place, double length_m, double
     heading = direction((*leg)[leg->size() - 2], leg->back());
   }
   constexpr double fine_m = 0.05;
-  const std::vector<Pose2> sharp = resample(corners, fine_m);
+  const std::vector<Pose2> sharp = simulation::resample(corners, fine_m);
   // As round as leaves the room that the corners leave, but for a cell of the map.
   constexpr double cell_m = 0.025;
   const double room_kept_m = std::min(min_clearance_m(place, sharp) - cell_m,
@@ -181,7 +182,7 @@ std::vector<Pose2> curved_route(const RouteScene& place, double length_m, double
     way = std::move(round);
     break;
   }
-  way = resample(way, spacing_m);
+  way = simulation::resample(way, spacing_m);
   const auto most = static_cast<std::size_t>(std::floor(length_m / spacing_m)) + 1;
   if (way.size() > most) way.resize(most);
   for (std::size_t i = 0; i + 1 < way.size(); ++i) {
@@ -227,7 +228,7 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
   wheels.turn = scale();
   Pose2 robot = start_beside(place, path, start, options.start_off_m, random);
   tracker.set_pose(start);
-  PathFollower follower(path, {.steering = {.step_m = options.step_m}});
+  PathFollower follower(path);
   const auto max_steps = static_cast<int>(3.0 * follower.length_m() / options.step_m) + 50;
   RouteRun run;
   Pose2 told;
@@ -248,12 +249,15 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
     } else {
       ++run.off_route;
     }
-    const auto next = follower.next_step(tracker.pose().value_or(start));
-    if (!next) {
+    const Pose2 estimate = tracker.pose().value_or(start);
+    const auto target = follower.next_target(estimate.position());
+    if (!target) {
       run.arrived = true;
       break;
     }
-    const Pose2 wanted = unknown < patience ? *next : spiral_step(unknown - patience);
+    const Pose2 wanted = unknown < patience
+                             ? steer_to(estimate, *target, {.step_m = options.step_m})
+                             : spiral_step(unknown - patience);
     const auto free_step = step_past(place, robot, wanted);
     if (!free_step) {
       run.blocked = true;

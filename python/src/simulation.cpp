@@ -1,7 +1,7 @@
 #ifdef PANONAV_PYTHON_SIMULATES
 #include "panonav/core/error.hpp"
-#include "panonav/motion/simulated_base.hpp"
 #include "panonav_simulation/scenes.hpp"
+#include "panonav_simulation/simulated_base.hpp"
 #include "panonav_simulation/simulated_world.hpp"
 #include "recordings.hpp"
 
@@ -254,7 +254,7 @@ void bind_worlds(py::module_& m) {
 /// A base, and what its camera has seen so far.
 struct Robot {
   World world;
-  SimulatedBase base;
+  simulation::SimulatedBase base;
   std::uint64_t seed;
   std::uint64_t pictures = 0;
   double time_s = 0.0;

@@ -19,6 +19,7 @@
 #include "panonav/storage/memory_address.hpp"
 #include "panonav_fleet/internal/areas_of_views.hpp"
 #include "panonav_fleet/internal/server_address.hpp"
+#include "panonav_fleet/internal/view_sketches.hpp"
 #include "panonav_fleet/memory_changes.hpp"
 
 namespace panonav::fleet {

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "panonav/memory/view_index.hpp"
-#include "panonav/memory/view_sketches.hpp"
 #include "panonav/storage/memory_file.hpp"
 
 namespace panonav::fleet {

@@ -9,8 +9,8 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
-#include "panonav/motion/simulated_base.hpp"
 #include "panonav_ros2/work_queue.hpp"
+#include "panonav_simulation/simulated_base.hpp"
 
 namespace panonav::ros2 {
 
@@ -135,7 +135,7 @@ struct SimulatedRobot::Implementation {
 
   SimulatedRobotOptions options;
   SimulatedSurroundings surroundings;
-  SimulatedBase base;
+  simulation::SimulatedBase base;
   std::uint64_t seed;
   WarningLog log;
   Participant participant;

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/motion/path.hpp"
 #include "panonav_simulation/internal/occupancy.hpp"
 
 namespace panonav::simulation {

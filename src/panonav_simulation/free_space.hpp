@@ -9,7 +9,7 @@
 #include "panonav/core/options.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/pose2.hpp"
-#include "panonav/motion/path.hpp"
+#include "panonav_simulation/paths.hpp"
 #include "panonav_simulation/scene.hpp"
 
 namespace panonav::simulation {

@@ -11,6 +11,7 @@
 #include "panonav/panorama/preprocessing.hpp"
 #include "panonav_simulation/make_each.hpp"
 #include "panonav_simulation/recording.hpp"
+#include "panonav_simulation/simulated_odometry.hpp"
 
 namespace panonav::simulation {
 

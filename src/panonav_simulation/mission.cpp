@@ -17,6 +17,7 @@
 #include "panonav/signature/fourier_signature.hpp"
 #include "panonav_simulation/line_camera.hpp"
 #include "panonav_simulation/mapping_run.hpp"
+#include "panonav_simulation/simulated_odometry.hpp"
 #include "panonav_simulation/simulated_robot.hpp"
 
 namespace panonav::simulation {
@@ -214,7 +215,7 @@ Pose2 MissionRobot::take_odometry() noexcept {
 
 void MissionRobot::command(const Velocity& velocity) {
   wait(base_.period_s);
-  const Pose2 told = motion_after(velocity, base_.period_s);
+  const Pose2 told = integrate_velocity(velocity, base_.period_s);
   const Pose2 step = sample_step(told, motion_, random_);
   const Pose2 there = pose_ * step;
   if (!is_clear(pose_.position(), there.position())) {
@@ -266,10 +267,11 @@ bool drive(MissionRobot& robot, const BaseOptions& base, double direction_rad, d
   for (double time_s = 0.0; time_s < longest_s; time_s += base.period_s) {
     const double left_m = std::hypot(target.x_m, target.y_m);
     if (left_m <= near_m) return false;
-    const Velocity velocity = command_towards(std::atan2(target.y_m, target.x_m), left_m, base);
+    const Velocity velocity =
+        compute_command_towards(std::atan2(target.y_m, target.x_m), left_m, base);
     robot.command(velocity);
     if (robot.take_obstacle()) return true;
-    target = remaining_way(target, motion_after(velocity, base.period_s));
+    target = inverse(integrate_velocity(velocity, base.period_s)) * target;
   }
   return false;
 }

@@ -4,7 +4,8 @@
 #include <numbers>
 
 #include "panonav/core/error.hpp"
-#include "panonav/motion/path.hpp"
+#include "panonav_simulation/paths.hpp"
+#include "panonav_simulation/simulated_odometry.hpp"
 
 namespace panonav::simulation {
 

@@ -19,6 +19,7 @@
 #include "panonav_simulation/load_gazebo.hpp"
 #include "panonav_simulation/load_mesh.hpp"
 #include "panonav_simulation/mirror.hpp"
+#include "panonav_simulation/simulated_odometry.hpp"
 
 namespace panonav::simulation {
 

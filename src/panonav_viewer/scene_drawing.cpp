@@ -9,7 +9,6 @@
 #include <string>
 
 #include "panonav/core/error.hpp"
-#include "panonav/motion/path.hpp"
 #include "panonav/signature/fourier_signature.hpp"
 
 namespace panonav::viewer {

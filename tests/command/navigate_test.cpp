@@ -313,7 +313,7 @@ TEST(NavigateByLibrary, APictureInAndAVelocityOutWithOneAreaAtHand) {
     step = navigator.step(seen);
     decisions += step.decided ? 1 : 0;
     max_loaded = std::max(max_loaded, navigator.navigator().loaded_views());
-    robot = robot * motion_after(step.velocity, BaseOptions{}.period_s);
+    robot = robot * integrate_velocity(step.velocity, BaseOptions{}.period_s);
   } while (step.decision.state == NavigationState::moving && ++periods < 5000);
   EXPECT_EQ(step.decision.state, NavigationState::arrived);
   EXPECT_EQ(step.velocity, Velocity{});

@@ -13,7 +13,8 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/localisation/internal/position_error.hpp"
-#include "panonav/motion/path.hpp"
+#include "panonav_simulation/paths.hpp"
+#include "panonav_simulation/simulated_odometry.hpp"
 #include "support/remembered_worlds.hpp"
 #include "support/skips.hpp"
 
@@ -34,15 +35,15 @@ Walk walk(const RememberedRoom& place, int images, std::uint64_t seed,
           const OdometryNoise& noise = {}, double noise_deviation = 0.01) {
   Random random(seed);
   Walk run;
-  const FreePredicate is_free = [&](Point2 p) { return place.room.is_free(p); };
-  run.poses = random_walk(place.room.between(place.grid, place.step_m, random), is_free,
-                          {.poses = images, .step_m = 0.2}, random);
+  const simulation::FreePredicate is_free = [&](Point2 p) { return place.room.is_free(p); };
+  run.poses = simulation::random_walk(place.room.between(place.grid, place.step_m, random), is_free,
+                                      {.poses = images, .step_m = 0.2}, random);
   for (const Pose2& pose : run.poses) {
     run.views.push_back(
         pack(compute_signature(place.room.see(pose, 16, 96, {1.0, noise_deviation}, random.next())),
              place.memory.full_scale()));
   }
-  run.odometry = simulate_odometry(run.poses, noise, seed);
+  run.odometry = simulation::simulate_odometry(run.poses, noise, seed);
   return run;
 }
 

@@ -12,6 +12,7 @@
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/mapping/internal/loop_closure_finder.hpp"
 #include "panonav/motion/odometry.hpp"
+#include "panonav_simulation/simulated_odometry.hpp"
 #include "support/remembered_worlds.hpp"
 
 namespace panonav::testing {
@@ -91,11 +92,10 @@ TEST(TopologicalMapper, ClosesTheLoopOfASecondRound) {
 TEST(TopologicalMapper, WheelsSetTheScale) {
   const ToyWorld world = round_room(radius_m, 6);
   const auto truth = rounds(round + 20);
-  const auto steps = steps_between(truth);
   Mapping mapping;
   for (std::size_t i = 0; i < truth.size(); ++i) {
     mapping.add(round_room_signature(world, truth[i]),
-                i == 0 ? std::nullopt : std::optional(steps[i - 1]));
+                i == 0 ? std::nullopt : std::optional(inverse(truth[i - 1]) * truth[i]));
   }
   mapping.mapper.finish();
   EXPECT_LT(align(positions(mapping.mapper.poses()), positions(truth)).rms_m, 0.15);
@@ -132,7 +132,7 @@ TEST(TopologicalMapper, ViewsSteadyTheTurnsOfTheWheels) {
   double with_views = 0.0;  // squared errors of the last heading
   double alone = 0.0;
   for (std::uint64_t seed = 1; seed <= 24; ++seed) {
-    const auto wheels = simulate_odometry(truth, {}, seed);
+    const auto wheels = simulation::simulate_odometry(truth, {}, seed);
     const double turned_rad = wrap_angle(truth.back().heading_rad - truth.front().heading_rad);
     const auto heading_error = [&](double heading_rad) {
       return std::abs(angle_difference(heading_rad, turned_rad));

@@ -54,39 +54,6 @@ Statistics statistics(int count, Draw draw) {
 // deviation by more than 5 / sqrt(2 n) of itself about as seldom.
 constexpr double sigmas = 5.0;
 
-TEST(Odometry, StepsLeadFromPoseToPose) {
-  Random random(1);
-  for (int run = 0; run < 50; ++run) {
-    std::vector<Pose2> poses;
-    for (int i = 0; i < 20; ++i) poses.push_back(random_pose(random));
-    const auto steps = steps_between(poses);
-    ASSERT_EQ(steps.size(), 19U);
-    for (std::size_t i = 0; i < steps.size(); ++i) {
-      expect_same(poses[i] * steps[i], poses[i + 1], 1e-10);
-    }
-  }
-}
-
-TEST(Odometry, StepsDoNotDependOnTheWorldFrame) {
-  Random random(2);
-  const Pose2 other_from_world = random_pose(random);
-  std::vector<Pose2> poses, moved;
-  for (int i = 0; i < 10; ++i) {
-    poses.push_back(random_pose(random));
-    moved.push_back(other_from_world * poses.back());
-  }
-  const auto a = steps_between(poses);
-  const auto b = steps_between(moved);
-  ASSERT_EQ(a.size(), 9U);
-  for (std::size_t i = 0; i < a.size(); ++i) expect_same(a[i], b[i], 1e-10);
-}
-
-TEST(Odometry, FewerThanTwoPosesMakeNoStep) {
-  EXPECT_TRUE(steps_between({}).empty());
-  const std::vector<Pose2> one{{1.0, 2.0, 0.5}};
-  EXPECT_TRUE(steps_between(one).empty());
-}
-
 TEST(Odometry, WithoutNoiseAStepStaysAsItIs) {
   Random random(3);
   for (const DriveKind drive : {DriveKind::differential, DriveKind::holonomic}) {
@@ -181,50 +148,11 @@ TEST(Odometry, NoiseDoesNotDependOnTheNumberOfSteps) {
   }
 }
 
-TEST(Odometry, ScaleErrorIsConstantWithinARunAndDiffersBetweenRuns) {
-  OdometryNoise noise = no_noise(DriveKind::differential);
-  noise.translation_scale_error = 0.05;
-  noise.rotation_scale_error = 0.1;
-  const int runs = 2000;
-  std::uint64_t seed = 100;
-  const Statistics scale = statistics(runs, [&] {
-    SimulatedOdometry odometry(noise, seed++);
-    const double first = odometry.advance({1.0, 0.0, 0.0}).x_m;
-    const double second = odometry.advance({1.0, 0.0, 0.0}).x_m - first;
-    EXPECT_NEAR(first, second, 1e-12);
-    return first;
-  });
-  EXPECT_NEAR(scale.mean, 1.0, sigmas * 0.05 / std::sqrt(runs));
-  EXPECT_NEAR(scale.deviation, 0.05, sigmas * 0.05 / std::sqrt(2.0 * runs));
-  const Statistics turn = statistics(runs, [&] {
-    SimulatedOdometry odometry(noise, seed++);
-    return odometry.advance({0.0, 0.0, 1.0}).heading_rad;
-  });
-  EXPECT_NEAR(turn.mean, 1.0, sigmas * 0.1 / std::sqrt(runs));
-  EXPECT_NEAR(turn.deviation, 0.1, sigmas * 0.1 / std::sqrt(2.0 * runs));
-}
-
-TEST(Odometry, SimulatedRunStartsAtZeroAndRepeatsWithItsSeed) {
-  Random random(8);
-  std::vector<Pose2> truth;
-  for (int i = 0; i < 30; ++i) truth.push_back({0.1 * i, 0.01 * i * i, 0.02 * i});
-  const auto a = simulate_odometry(truth, {}, 9);
-  ASSERT_EQ(a.size(), truth.size());
-  EXPECT_EQ(a.front(), Pose2{});
-  EXPECT_EQ(a, simulate_odometry(truth, {}, 9));
-  EXPECT_NE(a, simulate_odometry(truth, {}, 10));
-  const auto exact = simulate_odometry(truth, no_noise(DriveKind::differential), 9);
-  for (std::size_t i = 0; i < truth.size(); ++i) {
-    expect_same(truth.front() * exact[i], truth[i], 1e-10);
-  }
-  EXPECT_TRUE(simulate_odometry({}, {}, 1).empty());
-}
-
 TEST(Odometry, OptionsOutOfRangeAreNamed) {
   OdometryNoise noise;
   noise.rotation_from_rotation = -0.1;
   noise.translation_scale_error = std::nan("");
-  const auto text = message_of<OptionError>([&] { SimulatedOdometry odometry(noise, 1); });
+  const auto text = message_of<OptionError>([&] { validate(noise); });
   EXPECT_TRUE(contains(text, "rotation_from_rotation is -0.1"));
   EXPECT_TRUE(contains(text, "translation_scale_error is nan"));
 }

@@ -2,152 +2,51 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
-#include <set>
+#include <vector>
 
 #include "panonav/core/error.hpp"
-#include "panonav/motion/trajectory.hpp"
+#include "panonav/core/random.hpp"
+#include "panonav/geometry/angles.hpp"
 
 namespace panonav {
 namespace {
 
-TEST(Trajectory, InterpolatesAlongTheShorterTurn) {
-  const Pose2 a{0.0, 0.0, 3.0};
-  const Pose2 b{2.0, 4.0, -3.0};
-  const Pose2 middle = interpolate(a, b, 0.5);
-  EXPECT_NEAR(middle.x_m, 1.0, 1e-12);
-  EXPECT_NEAR(middle.y_m, 2.0, 1e-12);
-  EXPECT_NEAR(std::abs(angle_difference(middle.heading_rad, std::numbers::pi)), 0.0, 1e-12);
-  EXPECT_NEAR(interpolate(a, b, 0.0).heading_rad, 3.0, 1e-12);
-  EXPECT_NEAR(interpolate(a, b, 1.0).heading_rad, -3.0, 1e-12);
-}
-
-TEST(Trajectory, AnswersInsideAndNothingOutside) {
-  const Trajectory trajectory(
-      {{1.0, {0.0, 0.0, 0.0}}, {2.0, {1.0, 0.0, 0.2}}, {5.0, {1.0, 3.0, 0.2}}});
-  ASSERT_TRUE(trajectory.at(1.5).has_value());
-  EXPECT_NEAR(trajectory.at(1.5)->x_m, 0.5, 1e-12);
-  EXPECT_NEAR(trajectory.at(1.5)->heading_rad, 0.1, 1e-12);
-  EXPECT_EQ(*trajectory.at(1.0), trajectory.poses()[0].pose);
-  EXPECT_EQ(*trajectory.at(5.0), trajectory.poses()[2].pose);
-  EXPECT_NEAR(trajectory.at(3.0)->y_m, 1.0, 1e-12);
-  EXPECT_FALSE(trajectory.at(0.999).has_value());
-  EXPECT_FALSE(trajectory.at(5.001).has_value());
-  EXPECT_FALSE(trajectory.at(std::nan("")).has_value());
-  EXPECT_FALSE(trajectory.at(3.0, 2.0).has_value());
-  EXPECT_TRUE(trajectory.at(1.5, 2.0).has_value());
-  EXPECT_FALSE(Trajectory().at(0.0).has_value());
-}
-
-TEST(Trajectory, RefusesStampsThatDoNotAscendAndNumbersThatAreNotFinite) {
-  EXPECT_THROW(Trajectory(std::vector<StampedPose>{{1.0, {}}, {1.0, {}}}), ContractError);
-  EXPECT_THROW(Trajectory(std::vector<StampedPose>{{std::nan(""), {}}}), ContractError);
-  Trajectory trajectory(std::vector<StampedPose>{{1.0, {}}});
-  EXPECT_THROW(trajectory.append({0.5, {}}), ContractError);
-  EXPECT_THROW(trajectory.append({2.0, {std::numeric_limits<double>::infinity(), 0.0, 0.0}}),
-               ContractError);
-  EXPECT_EQ(trajectory.size(), 1U);
-  trajectory.append({2.0, {}});
-  EXPECT_EQ(trajectory.size(), 2U);
-  try {
-    Trajectory({{1.0, {}}, {2.0, {}}, {1.5, {}}});
-    FAIL() << "no error";
-  } catch (const ContractError& error) {
-    EXPECT_STREQ(error.what(),
-                 "pose 2 of a trajectory: stamp_s is 1.5; allowed: > 2, the stamp before");
-  }
-}
-
-TEST(Path, ResamplingKeepsShapeAndSpacing) {
+TEST(Path, LengthIsThatOfTheLine) {
   const std::vector<Pose2> path{{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0}, {1.0, 1.0, 0.0}};
   EXPECT_NEAR(path_length_m(path), 2.0, 1e-12);
-  const auto poses = resample(path, 0.1);
-  ASSERT_EQ(poses.size(), 21U);
-  EXPECT_NEAR(poses[5].x_m, 0.5, 1e-9);
-  EXPECT_NEAR(poses[15].x_m, 1.0, 1e-9);
-  EXPECT_NEAR(poses[15].y_m, 0.5, 1e-9);
-  EXPECT_NEAR(poses[20].y_m, 1.0, 1e-9);
-  EXPECT_EQ(resample(path, 5.0).size(), 1U);
-  EXPECT_TRUE(resample({}, 0.1).empty());
-  EXPECT_THROW((void)resample(path, 0.0), ContractError);
-  EXPECT_THROW((void)resample(path, std::nan("")), ContractError);
-  // A robot that stood still adds nothing.
-  const std::vector<Pose2> waiting{{0.0, 0.0, 0.0}, {0.0, 0.0, 1.0}, {1.0, 0.0, 0.0}};
-  EXPECT_EQ(resample(waiting, 0.25).size(), 5U);
 }
 
-TEST(Path, GridIsCentredRegularAndComplete) {
-  // [M04]: 10 x 8 places at 30 cm in 270 x 210 cm.
-  const auto grid = grid_positions({0.0, 0.0}, {2.7, 2.1}, 0.3);
-  ASSERT_EQ(grid.size(), 80U);
-  EXPECT_EQ(grid.front().position, (Point2{0.0, 0.0}));
-  EXPECT_NEAR(grid.back().position.x_m, 2.7, 1e-12);
-  EXPECT_NEAR(grid.back().position.y_m, 2.1, 1e-12);
-  std::set<std::pair<int, int>> seen;
-  for (const auto& g : grid) {
-    EXPECT_TRUE(seen.insert({g.j, g.i}).second);
-    EXPECT_NEAR(g.position.x_m, 0.3 * g.i, 1e-12);
-    EXPECT_NEAR(g.position.y_m, 0.3 * g.j, 1e-12);
+TEST(Path, HeadingsFollowACircleAndScatterHardlyTurnsThem) {
+  Random random(3);
+  std::vector<Point2> exact;
+  std::vector<Point2> scattered;
+  for (int i = 0; i < 200; ++i) {
+    const double at = 0.02 * i;
+    exact.push_back({2.0 * std::cos(at), 2.0 * std::sin(at)});
+    scattered.push_back({exact.back().x_m + random.normal(0.0, 0.005),
+                         exact.back().y_m + random.normal(0.0, 0.005)});
   }
-  const auto loose = grid_positions({0.0, 0.0}, {1.0, 0.4}, 0.3);
-  ASSERT_EQ(loose.size(), 8U);
-  EXPECT_NEAR(loose.front().position.x_m, 0.05, 1e-12);
-  EXPECT_NEAR(loose.front().position.y_m, 0.05, 1e-12);
-  EXPECT_THROW((void)grid_positions({1.0, 0.0}, {0.0, 1.0}, 0.3), ContractError);
-  EXPECT_THROW((void)grid_positions({0.0, 0.0}, {1.0, 1.0}, 0.0), ContractError);
-  EXPECT_THROW((void)grid_positions({0.0, 0.0}, {1.0, 1e9}, 0.3), ContractError);
-}
-
-TEST(Path, ZigzagVisitsTheSamePlacesWithUnitSteps) {
-  const auto raster = grid_positions({0.0, 0.0}, {2.0, 1.5}, 0.5);
-  const auto zigzag = grid_positions({0.0, 0.0}, {2.0, 1.5}, 0.5, GridOrder::zigzag);
-  ASSERT_EQ(zigzag.size(), 20U);
-  for (std::size_t i = 1; i < zigzag.size(); ++i) {
-    EXPECT_NEAR(distance(zigzag[i - 1].position, zigzag[i].position), 0.5, 1e-12);
-  }
-  for (const auto& g : raster) {
-    EXPECT_NE(std::find(zigzag.begin(), zigzag.end(), g), zigzag.end());
+  const auto headed = estimate_headings(exact);
+  const auto rough = estimate_headings(scattered);
+  ASSERT_EQ(headed.size(), 200U);
+  for (std::size_t i = 20; i < 180; ++i) {
+    const double heading = 0.02 * static_cast<double>(i) + radians(90.0);
+    EXPECT_NEAR(angle_difference(headed[i].heading_rad, heading), 0.0, 1e-3);
+    EXPECT_NEAR(angle_difference(rough[i].heading_rad, heading), 0.0, radians(2.5));
+    EXPECT_EQ(headed[i].position(), exact[i]);
   }
 }
 
-TEST(Path, RandomWalkStaysInItsAreaAndRepeatsWithItsSeed) {
-  const FreePredicate in_box = [](Point2 p) {
-    return std::abs(p.x_m) < 1.0 && std::abs(p.y_m) < 0.7;
-  };
-  Random a(5), b(5), c(6);
-  const auto walk = random_walk({}, in_box, {.poses = 2000}, a);
-  ASSERT_EQ(walk.size(), 2000U);
-  double widest = 0.0;
-  for (std::size_t i = 0; i < walk.size(); ++i) {
-    EXPECT_TRUE(in_box(walk[i].position()));
-    widest = std::max(widest, std::abs(walk[i].x_m));
-    if (i == 0) continue;
-    const Pose2 step = inverse(walk[i - 1]) * walk[i];
-    EXPECT_NEAR(std::hypot(step.x_m, step.y_m), 0.1, 1e-9);
-    EXPECT_NEAR(std::atan2(step.y_m, step.x_m), step.heading_rad, 1e-9);
-  }
-  EXPECT_GT(widest, 0.8);  // guard: it does walk
-  EXPECT_EQ(walk, random_walk({}, in_box, {.poses = 2000}, b));
-  EXPECT_NE(walk, random_walk({}, in_box, {.poses = 2000}, c));
-}
-
-TEST(Path, RandomWalkEndsWhereThereIsNoWay) {
-  Random random(7);
-  const auto walk = random_walk(
-      {}, [](Point2 p) { return std::hypot(p.x_m, p.y_m) < 0.05; }, {}, random);
-  EXPECT_EQ(walk.size(), 1U);
-  EXPECT_THROW((void)random_walk(
-                   {1.0, 0.0, 0.0}, [](Point2) { return false; }, {}, random),
-               ContractError);
-  EXPECT_THROW((void)random_walk(
-                   {}, [](Point2) { return true; }, {.poses = 0}, random),
-               ContractError);
-  EXPECT_THROW((void)random_walk(
-                   {}, [](Point2) { return true; }, {.step_m = 0.0}, random),
-               ContractError);
+TEST(Path, NeighboursAreEnoughForAHeading) {
+  const auto headed = estimate_headings(std::vector<Point2>{{0.0, 0.0}, {0.0, 5.0}, {5.0, 5.0}});
+  ASSERT_EQ(headed.size(), 3U);
+  EXPECT_NEAR(headed[0].heading_rad, radians(90.0), 1e-9);
+  EXPECT_NEAR(headed[1].heading_rad, radians(45.0), 1e-9);
+  EXPECT_NEAR(headed[2].heading_rad, 0.0, 1e-9);
+  EXPECT_TRUE(estimate_headings({}).empty());
+  EXPECT_EQ(estimate_headings(std::vector<Point2>{{1.0, 2.0}}).size(), 1U);
+  EXPECT_THROW((void)estimate_headings({}, -1.0), ContractError);
 }
 
 }  // namespace

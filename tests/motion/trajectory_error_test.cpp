@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
+#include <numbers>
 #include <vector>
 
 #include "panonav/core/error.hpp"
@@ -28,6 +30,53 @@ Trajectory moved(const Trajectory& trajectory, const Pose2& b_from_a, double sca
     result.append({stamped.stamp_s, b_from_a * pose});
   }
   return result;
+}
+
+TEST(Trajectory, InterpolatesAlongTheShorterTurn) {
+  const Pose2 a{0.0, 0.0, 3.0};
+  const Pose2 b{2.0, 4.0, -3.0};
+  const Pose2 middle = interpolate(a, b, 0.5);
+  EXPECT_NEAR(middle.x_m, 1.0, 1e-12);
+  EXPECT_NEAR(middle.y_m, 2.0, 1e-12);
+  EXPECT_NEAR(std::abs(angle_difference(middle.heading_rad, std::numbers::pi)), 0.0, 1e-12);
+  EXPECT_NEAR(interpolate(a, b, 0.0).heading_rad, 3.0, 1e-12);
+  EXPECT_NEAR(interpolate(a, b, 1.0).heading_rad, -3.0, 1e-12);
+}
+
+TEST(Trajectory, AnswersInsideAndNothingOutside) {
+  const Trajectory trajectory(
+      {{1.0, {0.0, 0.0, 0.0}}, {2.0, {1.0, 0.0, 0.2}}, {5.0, {1.0, 3.0, 0.2}}});
+  ASSERT_TRUE(trajectory.at(1.5).has_value());
+  EXPECT_NEAR(trajectory.at(1.5)->x_m, 0.5, 1e-12);
+  EXPECT_NEAR(trajectory.at(1.5)->heading_rad, 0.1, 1e-12);
+  EXPECT_EQ(*trajectory.at(1.0), trajectory.poses()[0].pose);
+  EXPECT_EQ(*trajectory.at(5.0), trajectory.poses()[2].pose);
+  EXPECT_NEAR(trajectory.at(3.0)->y_m, 1.0, 1e-12);
+  EXPECT_FALSE(trajectory.at(0.999).has_value());
+  EXPECT_FALSE(trajectory.at(5.001).has_value());
+  EXPECT_FALSE(trajectory.at(std::nan("")).has_value());
+  EXPECT_FALSE(trajectory.at(3.0, 2.0).has_value());
+  EXPECT_TRUE(trajectory.at(1.5, 2.0).has_value());
+  EXPECT_FALSE(Trajectory().at(0.0).has_value());
+}
+
+TEST(Trajectory, RefusesStampsThatDoNotAscendAndNumbersThatAreNotFinite) {
+  EXPECT_THROW(Trajectory(std::vector<StampedPose>{{1.0, {}}, {1.0, {}}}), ContractError);
+  EXPECT_THROW(Trajectory(std::vector<StampedPose>{{std::nan(""), {}}}), ContractError);
+  Trajectory trajectory(std::vector<StampedPose>{{1.0, {}}});
+  EXPECT_THROW(trajectory.append({0.5, {}}), ContractError);
+  EXPECT_THROW(trajectory.append({2.0, {std::numeric_limits<double>::infinity(), 0.0, 0.0}}),
+               ContractError);
+  EXPECT_EQ(trajectory.size(), 1U);
+  trajectory.append({2.0, {}});
+  EXPECT_EQ(trajectory.size(), 2U);
+  try {
+    Trajectory({{1.0, {}}, {2.0, {}}, {1.5, {}}});
+    FAIL() << "no error";
+  } catch (const ContractError& error) {
+    EXPECT_STREQ(error.what(),
+                 "pose 2 of a trajectory: stamp_s is 1.5; allowed: > 2, the stamp before");
+  }
 }
 
 TEST(TrajectoryError, AnotherFrameIsNoError) {

@@ -17,8 +17,8 @@ TEST(Velocity, ArcsComposeToTheWhole) {
   for (int i = 0; i < 200; ++i) {
     const Velocity v{random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-2, 2)};
     const double t = random.uniform(0.0, 1.0);
-    const Pose2 whole = motion_after(v, 1.0);
-    const Pose2 parts = motion_after(v, t) * motion_after(v, 1.0 - t);
+    const Pose2 whole = integrate_velocity(v, 1.0);
+    const Pose2 parts = integrate_velocity(v, t) * integrate_velocity(v, 1.0 - t);
     EXPECT_NEAR(distance(whole.position(), parts.position()), 0.0, 1e-12);
     EXPECT_NEAR(std::remainder(whole.heading_rad - parts.heading_rad, 2.0 * std::numbers::pi), 0.0,
                 1e-12);
@@ -27,28 +27,10 @@ TEST(Velocity, ArcsComposeToTheWhole) {
 
 TEST(Velocity, SlowTurnsJoinStraightLines) {
   for (const double turn : {0.0, 1e-7, 9.9e-7, 1.01e-6, 1e-5}) {
-    const Pose2 step = motion_after({1.0, 0.0, turn}, 1.0);
+    const Pose2 step = integrate_velocity({1.0, 0.0, turn}, 1.0);
     EXPECT_NEAR(step.x_m, 1.0, 1e-10);
     EXPECT_NEAR(step.y_m, 0.5 * turn, 1e-10);
   }
-}
-
-TEST(Velocity, AnyStepIsMadeByItsVelocity) {
-  Random random(5);
-  for (int i = 0; i < 200; ++i) {
-    const double turn = i % 10 == 0 ? random.uniform(-1e-7, 1e-7)
-                                    : random.uniform(-std::numbers::pi, std::numbers::pi);
-    const Pose2 step{random.uniform(-1, 1), random.uniform(-1, 1), turn};
-    const double t = random.uniform(0.05, 2.0);
-    const Velocity velocity = velocity_for(step, t);
-    const Pose2 made = motion_after(velocity, t);
-    EXPECT_NEAR(distance(made.position(), step.position()), 0.0, 1e-12);
-    EXPECT_NEAR(std::remainder(made.heading_rad - turn, 2.0 * std::numbers::pi), 0.0, 1e-12);
-  }
-  // Wheels without slip: the chord has half the turn.
-  const Velocity arc = velocity_for({std::cos(0.2), std::sin(0.2), 0.4}, 0.5);
-  EXPECT_NEAR(arc.left_m_s, 0.0, 1e-12);
-  EXPECT_GT(arc.forward_m_s, 2.0);
 }
 
 TEST(Velocity, BothDrivesReachAnyPointAndKeepTheirLimits) {
@@ -61,8 +43,8 @@ TEST(Velocity, BothDrivesReachAnyPointAndKeepTheirLimits) {
       double way_m = 0.0;
       double time_s = 0.0;
       while (std::hypot(target.x_m, target.y_m) > 0.01 && time_s < 60.0) {
-        const Velocity v = command_towards(std::atan2(target.y_m, target.x_m),
-                                           std::hypot(target.x_m, target.y_m), options);
+        const Velocity v = compute_command_towards(std::atan2(target.y_m, target.x_m),
+                                                   std::hypot(target.x_m, target.y_m), options);
         ASSERT_LE(std::hypot(v.forward_m_s, v.left_m_s), options.speed_m_s + 1e-12);
         ASSERT_LE(std::abs(v.turn_rad_s), options.turn_rad_s + 1e-12);
         if (drive == DriveKind::differential) {
@@ -70,9 +52,9 @@ TEST(Velocity, BothDrivesReachAnyPointAndKeepTheirLimits) {
         } else {
           ASSERT_EQ(v.turn_rad_s, 0.0);
         }
-        const Pose2 step = motion_after(v, options.period_s);
+        const Pose2 step = integrate_velocity(v, options.period_s);
         way_m += std::hypot(v.forward_m_s, v.left_m_s) * options.period_s;
-        target = remaining_way(target, step);
+        target = inverse(step) * target;
         time_s += options.period_s;
       }
       EXPECT_LT(std::hypot(target.x_m, target.y_m), 0.01);
@@ -82,14 +64,12 @@ TEST(Velocity, BothDrivesReachAnyPointAndKeepTheirLimits) {
 }
 
 TEST(Velocity, StandsAtThePointAndRefusesWhatIsNoNumber) {
-  EXPECT_EQ(command_towards(1.0, 0.0, {}), Velocity{});
+  EXPECT_EQ(compute_command_towards(1.0, 0.0, {}), Velocity{});
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_THROW((void)command_towards(nan, 1.0, {}), ContractError);
-  EXPECT_THROW((void)command_towards(0.0, -1.0, {}), ContractError);
-  EXPECT_THROW((void)command_towards(0.0, 1.0, {.speed_m_s = 0.0}), OptionError);
-  EXPECT_THROW((void)motion_after({}, -1.0), ContractError);
-  EXPECT_THROW((void)velocity_for({}, 0.0), ContractError);
-  EXPECT_THROW((void)velocity_for({nan, 0.0, 0.0}, 1.0), ContractError);
+  EXPECT_THROW((void)compute_command_towards(nan, 1.0, {}), ContractError);
+  EXPECT_THROW((void)compute_command_towards(0.0, -1.0, {}), ContractError);
+  EXPECT_THROW((void)compute_command_towards(0.0, 1.0, {.speed_m_s = 0.0}), OptionError);
+  EXPECT_THROW((void)integrate_velocity({}, -1.0), ContractError);
 }
 
 }  // namespace

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "panonav/core/executor.hpp"
-#include "panonav/motion/path.hpp"
 #include "panonav/navigation/navigator.hpp"
 #include "panonav/route/route_place.hpp"
 #include "support/remembered_worlds.hpp"

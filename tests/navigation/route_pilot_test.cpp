@@ -9,7 +9,6 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/motion/odometry.hpp"
-#include "panonav/motion/path.hpp"
 #include "panonav/route/route_place.hpp"
 #include "support/smooth_path.hpp"
 #include "support/toy_world.hpp"

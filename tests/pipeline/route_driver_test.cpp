@@ -6,6 +6,7 @@
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/route_recorder.hpp"
 #include "panonav/route/route_place.hpp"
+#include "panonav_simulation/simulated_odometry.hpp"
 #include "support/remembered_worlds.hpp"
 #include "support/smooth_path.hpp"
 #include "support/temporary_folder.hpp"
@@ -29,7 +30,7 @@ class RouteDriving : public ::testing::Test {
     }
     memoriser.finish();
     RouteRecorder recorder(memory, {.odometry = true});
-    SimulatedOdometry drifting({}, 4);
+    simulation::SimulatedOdometry drifting({}, 4);
     Pose2 before = round.front();
     for (const Pose2& pose : round) {
       Observation seen(picture(pose));
@@ -51,7 +52,7 @@ class RouteDriving : public ::testing::Test {
   Pose2 drive(Pose2 robot, std::uint64_t seed, RouteDriveState& state,
               const std::function<void(int, Pose2&)>& carry = {}) {
     RouteDriver driver(MemoryFile::open(memory, Access::read_only), std::nullopt);
-    SimulatedOdometry wheels({}, seed);
+    simulation::SimulatedOdometry wheels({}, seed);
     Pose2 read;
     for (int i = 0; i < 2000; ++i) {
       Observation seen(picture(robot));
@@ -62,7 +63,7 @@ class RouteDriving : public ::testing::Test {
         EXPECT_EQ(step.velocity, Velocity{});
         break;
       }
-      const Pose2 moved = motion_after(step.velocity, BaseOptions{}.period_s);
+      const Pose2 moved = integrate_velocity(step.velocity, BaseOptions{}.period_s);
       read = wheels.advance(moved);
       robot = robot * moved;
       way_m += std::hypot(moved.x_m, moved.y_m);

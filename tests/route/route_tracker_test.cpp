@@ -8,7 +8,6 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/motion/path.hpp"
 #include "support/smooth_path.hpp"
 #include "support/toy_world.hpp"
 

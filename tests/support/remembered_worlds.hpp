@@ -154,7 +154,7 @@ class SimulatedRobot final : public RobotBase {
   }
 
   void command(const Velocity& velocity) override {
-    const Pose2 told = motion_after(velocity, base_.period_s);
+    const Pose2 told = integrate_velocity(velocity, base_.period_s);
     const Pose2 step = sample_step(told, noise_, random_);
     const Pose2 there = pose_ * step;
     if (!robot_fits(*world_, there.position())) {
@@ -174,10 +174,10 @@ class SimulatedRobot final : public RobotBase {
     obstacle_ = false;
     Point2 target{advance_m * std::cos(direction_rad), advance_m * std::sin(direction_rad)};
     for (int i = 0; i < 200 && !obstacle_ && std::hypot(target.x_m, target.y_m) > 0.005; ++i) {
-      const Velocity v = command_towards(std::atan2(target.y_m, target.x_m),
-                                         std::hypot(target.x_m, target.y_m), base_);
+      const Velocity v = compute_command_towards(std::atan2(target.y_m, target.x_m),
+                                                 std::hypot(target.x_m, target.y_m), base_);
       command(v);
-      target = remaining_way(target, motion_after(v, base_.period_s));
+      target = inverse(integrate_velocity(v, base_.period_s)) * target;
     }
     return obstacle_;
   }

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "panonav/geometry/pose2.hpp"
-#include "panonav/motion/path.hpp"
+#include "panonav_simulation/paths.hpp"
 
 namespace panonav::testing {
 
@@ -71,7 +71,7 @@ inline std::vector<Pose2> smooth_path(const std::vector<Point2>& points, double 
       fine.push_back({position.x_m, position.y_m, wrap_angle(heading)});
     }
   }
-  return resample(fine, spacing_m);
+  return simulation::resample(fine, spacing_m);
 }
 
 }  // namespace panonav::testing

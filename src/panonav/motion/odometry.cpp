@@ -5,14 +5,6 @@
 
 namespace panonav {
 
-std::vector<Pose2> steps_between(std::span<const Pose2> world_from_robot) {
-  std::vector<Pose2> steps;
-  for (std::size_t i = 1; i < world_from_robot.size(); ++i) {
-    steps.push_back(inverse(world_from_robot[i - 1]) * world_from_robot[i]);
-  }
-  return steps;
-}
-
 void visit_options(OdometryNoise& options, OptionVisitor& visitor) {
   using T = OdometryNoise;
   constexpr OptionTable table{
@@ -66,39 +58,6 @@ Pose2 StepSampler::move(const Pose2& world_from_robot, Random& random) const {
 
 Pose2 sample_step(const Pose2& step, const OdometryNoise& noise, Random& random) {
   return StepSampler(step, noise).move({}, random);
-}
-
-SimulatedOdometry::SimulatedOdometry(const OdometryNoise& noise, std::uint64_t seed)
-    : noise_(noise), random_(seed) {
-  validate(noise_);
-  translation_scale_ = random_.normal(1.0, noise_.translation_scale_error);
-  rotation_scale_ = random_.normal(1.0, noise_.rotation_scale_error);
-}
-
-Pose2 SimulatedOdometry::advance(const Pose2& step) {
-  Pose2 measured = sample_step(step, noise_, random_);
-  // The chord turns with half the heading, as in sample_step, so that wheels still do not slip.
-  const double extra_turn = (rotation_scale_ - 1.0) * measured.heading_rad;
-  const double half = noise_.drive == DriveKind::differential ? 0.5 * extra_turn : 0.0;
-  const double c = translation_scale_ * std::cos(half);
-  const double s = translation_scale_ * std::sin(half);
-  measured = {c * measured.x_m - s * measured.y_m, s * measured.x_m + c * measured.y_m,
-              wrap_angle(measured.heading_rad + extra_turn)};
-  odometry_from_robot_ = odometry_from_robot_ * measured;
-  return odometry_from_robot_;
-}
-
-std::vector<Pose2> simulate_odometry(std::span<const Pose2> world_from_robot,
-                                     const OdometryNoise& noise, std::uint64_t seed) {
-  SimulatedOdometry odometry(noise, seed);
-  std::vector<Pose2> readings;
-  readings.reserve(world_from_robot.size());
-  for (std::size_t i = 0; i < world_from_robot.size(); ++i) {
-    readings.push_back(
-        i == 0 ? odometry.pose()
-               : odometry.advance(inverse(world_from_robot[i - 1]) * world_from_robot[i]));
-  }
-  return readings;
 }
 
 }  // namespace panonav

@@ -12,9 +12,6 @@ namespace panonav {
 /// An odometry step is `robot_old_from_robot_new`: the pose of the robot after the step in the
 /// frame of the robot before it. It does not depend on any world frame.
 
-/// The steps between consecutive poses; one fewer than poses, none for fewer than two.
-[[nodiscard]] std::vector<Pose2> steps_between(std::span<const Pose2> world_from_robot);
-
 /// How a robot moves, and so which errors its odometry can make.
 enum class DriveKind {
   differential,  ///< cannot move sideways: travel errors lie along the heading at the middle of the
@@ -90,29 +87,5 @@ class StepSampler {
 
 /// One draw: the step itself.
 [[nodiscard]] Pose2 sample_step(const Pose2& step, const OdometryNoise& noise, Random& random);
-
-/// The odometry of one run: an absolute pose in the odometry frame, which is the robot's frame at
-/// the start of the run. The scale errors are drawn once, at construction.
-class SimulatedOdometry {
- public:
-  /// Throws OptionError.
-  SimulatedOdometry(const OdometryNoise& noise, std::uint64_t seed);
-
-  /// The robot truly moved by `step`; returns odometry_from_robot afterwards.
-  Pose2 advance(const Pose2& step);
-  /// Where the odometry believes the robot to be: odometry_from_robot.
-  [[nodiscard]] const Pose2& pose() const noexcept { return odometry_from_robot_; }
-
- private:
-  OdometryNoise noise_;
-  Random random_;
-  double translation_scale_ = 1.0;
-  double rotation_scale_ = 1.0;
-  Pose2 odometry_from_robot_;
-};
-
-/// Odometry along true poses, one reading per pose, the first one zero. Throws OptionError.
-[[nodiscard]] std::vector<Pose2> simulate_odometry(std::span<const Pose2> world_from_robot,
-                                                   const OdometryNoise& noise, std::uint64_t seed);
 
 }  // namespace panonav

@@ -22,7 +22,8 @@ void visit_options(BaseOptions& options, OptionVisitor& visitor) {
   table.visit(options, visitor);
 }
 
-Velocity command_towards(double direction_rad, double distance_m, const BaseOptions& options) {
+Velocity compute_command_towards(double direction_rad, double distance_m,
+                                 const BaseOptions& options) {
   validate(options);
   require(std::isfinite(direction_rad), "direction_rad", direction_rad, "finite");
   require(std::isfinite(distance_m) && distance_m >= 0.0, "distance_m", distance_m,
@@ -42,41 +43,17 @@ Velocity command_towards(double direction_rad, double distance_m, const BaseOpti
   return {forward, 0.0, turn};
 }
 
-namespace {
-
-/// sin(t) / t and (1 - cos(t)) / t: how far along and across an arc leads.
-struct Arc {
-  explicit Arc(double turn_rad) {
-    // Their series where the quotients lose their digits.
-    const bool small = std::abs(turn_rad) < 1e-6;
-    along = small ? 1.0 : std::sin(turn_rad) / turn_rad;
-    across = small ? 0.5 * turn_rad : (1.0 - std::cos(turn_rad)) / turn_rad;
-  }
-  double along, across;
-};
-
-}  // namespace
-
-Pose2 motion_after(const Velocity& velocity, double duration_s) {
+Pose2 integrate_velocity(const Velocity& velocity, double duration_s) {
   require(std::isfinite(duration_s) && duration_s >= 0.0, "duration_s", duration_s,
           ">= 0 and finite");
   const double turn = velocity.turn_rad_s * duration_s;
   const double x = velocity.forward_m_s * duration_s;
   const double y = velocity.left_m_s * duration_s;
-  const Arc arc(turn);
-  return {arc.along * x - arc.across * y, arc.across * x + arc.along * y, wrap_angle(turn)};
-}
-
-Velocity velocity_for(const Pose2& step, double duration_s) {
-  require(std::isfinite(duration_s) && duration_s > 0.0, "duration_s", duration_s,
-          "> 0 and finite");
-  if (!is_finite(step)) throw ContractError("step", "not finite", "finite numbers");
-  const double turn = wrap_angle(step.heading_rad);
-  const Arc arc(turn);
-  // The chord is as long as the arc times this, which is 2 / pi at least.
-  const double square = arc.along * arc.along + arc.across * arc.across;
-  return {(arc.along * step.x_m + arc.across * step.y_m) / square / duration_s,
-          (arc.along * step.y_m - arc.across * step.x_m) / square / duration_s, turn / duration_s};
+  // sin(t) / t and (1 - cos(t)) / t, by their series where the quotients lose their digits.
+  const bool small = std::abs(turn) < 1e-6;
+  const double along = small ? 1.0 : std::sin(turn) / turn;
+  const double across = small ? 0.5 * turn : (1.0 - std::cos(turn)) / turn;
+  return {along * x - across * y, across * x + along * y, wrap_angle(turn)};
 }
 
 }  // namespace panonav

@@ -38,21 +38,10 @@ void visit_options(BaseOptions& options, OptionVisitor& visitor);
 /// differential drive turns towards the point, on the spot first, and slows down with the cosine of
 /// the angle that is left. At distance 0 the robot stands. Throws ContractError on numbers that are
 /// not finite or a distance below 0, OptionError.
-[[nodiscard]] Velocity command_towards(double direction_rad, double distance_m,
-                                       const BaseOptions& options);
+[[nodiscard]] Velocity compute_command_towards(double direction_rad, double distance_m,
+                                               const BaseOptions& options);
 
 /// robot_old_from_robot_new after driving so for a time >= 0: an arc, or a straight line.
-[[nodiscard]] Pose2 motion_after(const Velocity& velocity, double duration_s);
-
-/// The constant velocity that makes an odometry step in a time > 0, as of `PathFollower`:
-/// motion_after(velocity_for(step, t), t) is the step. A differential drive can make it only if the
-/// chord of the step has half its turn. Throws ContractError.
-[[nodiscard]] Velocity velocity_for(const Pose2& step, double duration_s);
-
-/// A point of the old robot frame in the new one, after the robot moved by
-/// `robot_old_from_robot_new`.
-[[nodiscard]] inline Point2 remaining_way(Point2 target, const Pose2& robot_old_from_robot_new) {
-  return inverse(robot_old_from_robot_new) * target;
-}
+[[nodiscard]] Pose2 integrate_velocity(const Velocity& velocity, double duration_s);
 
 }  // namespace panonav

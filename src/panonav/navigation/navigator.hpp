@@ -123,9 +123,10 @@ struct NavigationDecision {
 /// route instead [Y03]; views still tell its place, and that it was kidnapped.
 ///
 /// Holds the state of a run, and of the memory the views of one area, two at a border. Knows
-/// nothing of how the robot moves: `command_towards` (motion/velocity.hpp) does. Same calls, same
-/// bits. Cost of an observation without a change of area: the search among the loaded views and
-/// three home vectors at most; with a line near a route also a plan, `RoutePilot::begin`, or a fit.
+/// nothing of how the robot moves: `compute_command_towards` (motion/velocity.hpp) does. Same
+/// calls, same bits. Cost of an observation without a change of area: the search among the loaded
+/// views and three home vectors at most; with a line near a route also a plan, `RoutePilot::begin`,
+/// or a fit.
 class Navigator {
  public:
   /// The source must hold all views of the planner's graph and outlive *this. Throws OptionError,

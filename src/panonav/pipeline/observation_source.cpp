@@ -5,7 +5,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/positions.hpp"
-#include "panonav/motion/headed_path.hpp"
+#include "panonav/motion/path.hpp"
 
 namespace panonav {
 
@@ -29,7 +29,7 @@ std::vector<Pose2> dataset_poses(const Dataset& dataset) {
     poses.push_back({entry.pose->x_m, entry.pose->y_m, entry.pose->heading_rad.value_or(0.0)});
   }
   if (headings || poses.size() < 2) return headings ? poses : std::vector<Pose2>{};
-  return headed_along_way(positions_of(poses));
+  return estimate_headings(positions_of(poses));
 }
 
 std::vector<Pose2> odometry_poses(const Dataset& dataset) {

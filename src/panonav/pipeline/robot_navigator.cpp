@@ -168,10 +168,10 @@ NavigationStep RobotNavigator::step(const Observation& observation, RobotReport 
   const BaseOptions& base = options_.base;
   const Pose2 moved = odometry_ && observation.odometry
                           ? inverse(*odometry_) * *observation.odometry
-                          : motion_after(last_.velocity, base.period_s);
+                          : integrate_velocity(last_.velocity, base.period_s);
   odometry_ = observation.odometry;
   moved_ = moved_ * moved;
-  target_ = remaining_way(target_, moved);
+  target_ = inverse(moved) * target_;
   time_left_s_ -= base.period_s;
   last_.decided =
       report.obstacle || time_left_s_ <= 0.0 || std::hypot(target_.x_m, target_.y_m) <= near_m;
@@ -187,7 +187,7 @@ NavigationStep RobotNavigator::step(const Observation& observation, RobotReport 
   last_.velocity = {};
   const double left_m = std::hypot(target_.x_m, target_.y_m);
   if (last_.decision.state == NavigationState::moving && left_m > 0.0) {
-    last_.velocity = command_towards(std::atan2(target_.y_m, target_.x_m), left_m, base);
+    last_.velocity = compute_command_towards(std::atan2(target_.y_m, target_.x_m), left_m, base);
   }
   return last_;
 }

@@ -62,13 +62,13 @@ RouteDriveStep RouteDriver::step(const Observation& observation,
   step.along_m = start_m_ + path_->along_m();
   step.state = RouteDriveState::lost;
   if (!robot || blind_m_ > max_blind_m) return step;
-  const auto aim = path_->next_aim(robot->position());
+  const auto aim = path_->next_target(robot->position());
   step.along_m = start_m_ + path_->along_m();
   step.state = aim ? RouteDriveState::driving : RouteDriveState::arrived;
   if (!aim) return step;
   const Point2 ahead = inverse(*robot) * *aim;
-  step.velocity = command_towards(std::atan2(ahead.y_m, ahead.x_m),
-                                  std::hypot(ahead.x_m, ahead.y_m), options_.base);
+  step.velocity = compute_command_towards(std::atan2(ahead.y_m, ahead.x_m),
+                                          std::hypot(ahead.x_m, ahead.y_m), options_.base);
   return step;
 }
 

@@ -4,7 +4,7 @@
 #include <span>
 #include <string_view>
 
-#include "panonav/motion/steering.hpp"
+#include "panonav/motion/path_follower.hpp"
 #include "panonav/motion/velocity.hpp"
 #include "panonav/pipeline/route_follower.hpp"
 

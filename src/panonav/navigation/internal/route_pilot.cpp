@@ -63,8 +63,8 @@ void RoutePilot::track(std::span<const float> line, const Pose2& moved) {
   }
   take_aim();
   // A place of the route that is not on the leg is of no use.
-  known &=
-      distance(tracker.pose()->position(), leg_->follower.place()) <= routes_[leg_->route].beside_m;
+  known &= distance(tracker.pose()->position(), leg_->follower.position()) <=
+           routes_[leg_->route].beside_m;
   leg_->unknown_steps = known ? 0 : leg_->unknown_steps + 1;
 }
 
@@ -84,7 +84,7 @@ ViewId RoutePilot::place() const {
 
 void RoutePilot::take_aim() {
   const Pose2 route_from_robot = *leg_->tracker.pose();
-  leg_->aim = leg_->follower.next_aim(route_from_robot.position());
+  leg_->aim = leg_->follower.next_target(route_from_robot.position());
   if (leg_->aim) leg_->aim = inverse(route_from_robot) * *leg_->aim;
 }
 

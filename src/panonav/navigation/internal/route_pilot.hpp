@@ -6,7 +6,7 @@
 #include <span>
 
 #include "panonav/geometry/pose2.hpp"
-#include "panonav/motion/steering.hpp"
+#include "panonav/motion/path_follower.hpp"
 #include "panonav/navigation/internal/route_stretch.hpp"
 #include "panonav/navigation/known_route.hpp"
 

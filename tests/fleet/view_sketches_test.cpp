@@ -1,4 +1,4 @@
-#include "panonav/memory/view_sketches.hpp"
+#include "panonav_fleet/internal/view_sketches.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,8 @@
 #include "panonav/core/error.hpp"
 #include "support/search_oracle.hpp"
 
-namespace panonav::testing {
+namespace panonav::fleet {
+using namespace testing;
 namespace {
 
 /// Sketches and the views that they are of.
@@ -220,4 +221,4 @@ TEST(ViewSketches, RefuseWhatDoesNotFit) {
 }
 
 }  // namespace
-}  // namespace panonav::testing
+}  // namespace panonav::fleet

@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "panonav/kernels/distance.hpp"
-#include "panonav/memory/internal/aligned_vector.hpp"
 #include "panonav/memory/visual_memory.hpp"
+#include "panonav_fleet/internal/large_page_vector.hpp"
 
-namespace panonav {
+namespace panonav::fleet {
 
 /// How views that are not held are sketched: sums of packed magnitudes over blocks of neighbouring
 /// rows at three levels, each finer than the one before. A block of a level consists of blocks of
@@ -123,4 +123,4 @@ class SketchSegment {
   std::array<Scale, 2> scales_;
 };
 
-}  // namespace panonav
+}  // namespace panonav::fleet

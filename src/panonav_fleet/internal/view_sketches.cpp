@@ -1,4 +1,4 @@
-#include "panonav/memory/view_sketches.hpp"
+#include "panonav_fleet/internal/view_sketches.hpp"
 
 #include <algorithm>
 #include <string>
@@ -6,9 +6,9 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/memory/internal/comparison.hpp"
-#include "panonav/memory/internal/sketch_search.hpp"
+#include "panonav_fleet/internal/sketch_search.hpp"
 
-namespace panonav {
+namespace panonav::fleet {
 
 namespace {
 
@@ -185,4 +185,4 @@ SearchResult ViewSketches::search(const PackedSignature& query, const SearchOpti
   return result;
 }
 
-}  // namespace panonav
+}  // namespace panonav::fleet

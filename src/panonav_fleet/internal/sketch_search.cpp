@@ -1,4 +1,4 @@
-#include "panonav/memory/internal/sketch_search.hpp"
+#include "panonav_fleet/internal/sketch_search.hpp"
 
 #include <algorithm>
 #include <array>
@@ -10,7 +10,7 @@
 #include "panonav/kernels/dispatch.hpp"
 #include "panonav/memory/internal/comparison.hpp"
 
-namespace panonav {
+namespace panonav::fleet {
 
 namespace {
 
@@ -356,4 +356,4 @@ SearchResult search_segments(const SegmentLayout& layout, std::span<const LiveSe
   return SketchSearch(layout, segments, query, components, mask, top, read, executor).run();
 }
 
-}  // namespace panonav
+}  // namespace panonav::fleet

@@ -1,4 +1,4 @@
-#include "panonav/memory/internal/sketch_segment.hpp"
+#include "panonav_fleet/internal/sketch_segment.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -6,7 +6,7 @@
 #include <limits>
 #include <numeric>
 
-namespace panonav {
+namespace panonav::fleet {
 
 namespace {
 
@@ -307,4 +307,4 @@ void SketchSegment::bounds_at(const SegmentLayout& layout, const kernels::Distan
                            rows.data(), rows.size(), encoded, bounds);
 }
 
-}  // namespace panonav
+}  // namespace panonav::fleet

@@ -10,7 +10,7 @@
 #include "panonav/core/executor.hpp"
 #include "panonav/memory/visual_memory.hpp"
 
-namespace panonav {
+namespace panonav::fleet {
 
 /// Sketches of views that are held elsewhere, such as on a server: what a search needs to tell the
 /// few views that can be among the nearest, which alone are read in full (docs/search.md). Of 80 x
@@ -61,4 +61,4 @@ class ViewSketches {
   std::unique_ptr<Implementation> implementation_;
 };
 
-}  // namespace panonav
+}  // namespace panonav::fleet

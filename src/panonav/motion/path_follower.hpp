@@ -9,32 +9,13 @@
 
 namespace panonav {
 
-/// Proportional control of a robot with differential drive.
-struct SteeringOptions {
-  double turn_gain = 0.8;     ///< of the error of direction, turned in one step
-  double max_turn_rad = 0.5;  ///< in one step
-  double travel_gain = 0.8;   ///< of the way that is left, driven in one step
-  double step_m = 0.05;       ///< driven in one step at most
-  /// With a larger error of direction the robot turns on the spot. It then comes no nearer to
-  /// obstacles beside its path than the path does.
-  double on_spot_rad = 0.5;
-  friend bool operator==(const SteeringOptions&, const SteeringOptions&) = default;
-};
-void visit_options(SteeringOptions& options, OptionVisitor& visitor);
-
-/// The next step towards a goal, as an odometry step [Y03 section 5.2]. The robot turns by a share
-/// of the error of direction and drives a share of the distance that is left. It drives less the
-/// farther the goal is off to the side, and not at all beyond `on_spot_rad`. Throws OptionError.
-[[nodiscard]] Pose2 steer_to(const Pose2& robot, Point2 goal, const SteeringOptions& options = {});
-
 /// How closely `PathFollower` keeps to a path.
 struct PathFollowerOptions {
   double look_ahead_m = 0.3;  ///< the robot steers to a place of the path at most so far ahead
   /// That place is so near that the straight line to it leaves the path by no more than this.
   /// Corners are not cut where there may be no room.
   double max_cut_m = 0.02;
-  double arrived_m = 0.02;   ///< so near to the end of the path the robot has arrived
-  SteeringOptions steering;  ///< how each step towards the place ahead is made
+  double arrived_m = 0.02;  ///< so near to the end of the path the robot has arrived
   friend bool operator==(const PathFollowerOptions&, const PathFollowerOptions&) = default;
 };
 void visit_options(PathFollowerOptions& options, OptionVisitor& visitor);
@@ -51,25 +32,23 @@ class PathFollower {
 
   /// Where a robot that is at `robot` has to steer to; empty when it has arrived. Cost: O(places of
   /// the path within twice the look-ahead, squared).
-  [[nodiscard]] std::optional<Point2> next_aim(Point2 robot);
-  /// The step there, as an odometry step; empty when it has arrived.
-  [[nodiscard]] std::optional<Pose2> next_step(const Pose2& robot);
+  [[nodiscard]] std::optional<Point2> next_target(Point2 robot);
 
   /// Distance along the path to the robot's place.
   [[nodiscard]] double along_m() const noexcept { return along_m_; }
   /// The robot's place on the path.
-  [[nodiscard]] Point2 place() const { return place_at(along_m_); }
+  [[nodiscard]] Point2 position() const { return position_at(along_m_); }
   /// Length of the whole path, in metres.
-  [[nodiscard]] double length_m() const noexcept { return way_m_.back(); }
+  [[nodiscard]] double length_m() const noexcept { return length_to_m_.back(); }
 
  private:
-  [[nodiscard]] Point2 place_at(double along_m) const;
+  [[nodiscard]] Point2 position_at(double along_m) const;
   void advance(Point2 robot);
-  [[nodiscard]] Point2 place_ahead() const;
+  [[nodiscard]] Point2 find_target() const;
 
   PathFollowerOptions options_;
   std::vector<Point2> path_;
-  std::vector<double> way_m_;  // to each place
+  std::vector<double> length_to_m_;  // to each place
   double along_m_ = 0.0;
 };
 

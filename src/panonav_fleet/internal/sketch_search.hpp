@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "panonav/core/executor.hpp"
-#include "panonav/memory/internal/sketch_segment.hpp"
-#include "panonav/memory/view_sketches.hpp"
+#include "panonav_fleet/internal/sketch_segment.hpp"
+#include "panonav_fleet/internal/view_sketches.hpp"
 
-namespace panonav {
+namespace panonav::fleet {
 
 /// A segment and which of its views are there.
 struct LiveSegment {
@@ -28,4 +28,4 @@ struct LiveSegment {
                                            const SearchMask& mask, std::size_t top,
                                            const ViewSketches::ReadViews& read, Executor& executor);
 
-}  // namespace panonav
+}  // namespace panonav::fleet

@@ -1,4 +1,4 @@
-#include "panonav/motion/steering.hpp"
+#include "panonav/motion/path_follower.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,33 +9,10 @@
 #include <vector>
 
 #include "panonav/core/error.hpp"
-#include "panonav/core/random.hpp"
+#include "panonav/motion/velocity.hpp"
 
 namespace panonav {
 namespace {
-
-TEST(Steering, ReachesGoalsFromAnywhere) {
-  Random random(5);
-  for (int trial = 0; trial < 50; ++trial) {
-    Pose2 robot{random.uniform(-2.0, 2.0), random.uniform(-2.0, 2.0),
-                random.uniform(-std::numbers::pi, std::numbers::pi)};
-    const Point2 goal{random.uniform(-2.0, 2.0), random.uniform(-2.0, 2.0)};
-    for (int step = 0; step < 300; ++step) robot = robot * steer_to(robot, goal);
-    EXPECT_LT(distance(robot.position(), goal), 1e-3) << trial;
-  }
-}
-
-TEST(Steering, ObeysItsLimits) {
-  const SteeringOptions options{.turn_gain = 0.5, .max_turn_rad = 0.2, .step_m = 0.1};
-  const Pose2 behind = steer_to({}, {-1.0, 0.01}, options);
-  EXPECT_EQ(behind.x_m, 0.0);
-  EXPECT_DOUBLE_EQ(behind.heading_rad, 0.2);
-  const Pose2 ahead = steer_to({}, {1.0, 0.0}, options);
-  EXPECT_DOUBLE_EQ(ahead.x_m, 0.1);
-  const Pose2 near = steer_to({}, {0.05, 0.0}, options);
-  EXPECT_DOUBLE_EQ(near.x_m, 0.04);
-  EXPECT_THROW((void)steer_to({}, {}, {.step_m = 0.0}), OptionError);
-}
 
 // An eight: crosses itself.
 std::vector<Point2> eight() {
@@ -45,6 +22,19 @@ std::vector<Point2> eight() {
     path.push_back({2.0 * std::sin(at), 2.0 * std::sin(at) * std::cos(at)});
   }
   return path;
+}
+
+/// Moves the robot by steps of up to `step_m`; false when it has arrived.
+bool follow(PathFollower& follower, Pose2& robot, double step_m = 0.05) {
+  const auto target = follower.next_target(robot.position());
+  if (!target) return false;
+  const Point2 ahead = inverse(robot) * *target;
+  const BaseOptions base{.speed_m_s = 10.0 * step_m, .turn_rad_s = 5.0, .on_spot_rad = 0.5};
+  robot =
+      robot * integrate_velocity(compute_command_towards(std::atan2(ahead.y_m, ahead.x_m),
+                                                         std::hypot(ahead.x_m, ahead.y_m), base),
+                                 base.period_s);
+  return true;
 }
 
 double off_path_m(Point2 place, const std::vector<Point2>& path) {
@@ -63,10 +53,7 @@ TEST(PathFollower, RepeatsAPathThatCrossesItselfForwardAndBack) {
     double worst_m = 0.0;
     double before_m = 0.0;
     int steps = 0;
-    for (; steps < 1000; ++steps) {
-      const auto step = follower.next_step(robot);
-      if (!step) break;
-      robot = robot * *step;
+    for (; steps < 1000 && follow(follower, robot); ++steps) {
       EXPECT_GE(follower.along_m(), before_m);
       before_m = follower.along_m();
       if (follower.along_m() > 1.0) {
@@ -92,14 +79,12 @@ TEST(PathFollower, CutsNoCorner) {
                                      : Point2{last.x_m, last.y_m + 0.1});
     }
   }
-  const PathFollowerOptions options{.steering = {.step_m = 0.15}};
-  PathFollower follower(path, options);
+  PathFollower follower(path);
   Pose2 robot;
   double max_m = 0.0;
   int steps = 0;
-  while (const auto step = follower.next_step(robot)) {
+  for (Pose2 there = robot; follow(follower, there, 0.15);) {
     ASSERT_LT(++steps, 500);
-    const Pose2 there = robot * *step;
     for (int k = 1; k <= 4; ++k) {
       const Point2 between{robot.x_m + 0.25 * k * (there.x_m - robot.x_m),
                            robot.y_m + 0.25 * k * (there.y_m - robot.y_m)};
@@ -128,7 +113,7 @@ TEST(PathFollower, RefusesWhatIsNoPath) {
   const std::vector<Point2> broken{{0.0, 0.0}, {std::nan(""), 0.0}};
   EXPECT_THROW(PathFollower{broken}, ContractError);
   const std::vector<Point2> same{{1.0, 0.0}, {1.0, 0.0}};
-  EXPECT_FALSE(PathFollower{same}.next_step({1.0, 0.0, 0.0}));
+  EXPECT_FALSE(PathFollower{same}.next_target({1.0, 0.0}));
 }
 
 }  // namespace

@@ -1,0 +1,116 @@
+#include "panonav/motion/path_follower.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/angles.hpp"
+
+namespace panonav {
+
+void visit_options(PathFollowerOptions& options, OptionVisitor& visitor) {
+  using T = PathFollowerOptions;
+  constexpr OptionTable table{
+      option<&T::look_ahead_m>("distance along the path to the point that the robot steers to",
+                               0.01, 100),
+      option<&T::max_cut_m>("largest distance of the path from the straight line to that point",
+                            1e-3, 10),
+      option<&T::arrived_m>("distance from the end of the path at which the robot has arrived",
+                            1e-3, 10),
+  };
+  table.visit(options, visitor);
+}
+
+PathFollower::PathFollower(std::span<const Point2> path, const PathFollowerOptions& options)
+    : options_(options), path_(path.begin(), path.end()) {
+  validate(options);
+  if (path.size() < 2) {
+    throw ContractError("places of the path", static_cast<double>(path.size()), "2 or more");
+  }
+  length_to_m_.push_back(0.0);
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    if (!std::isfinite(path[i].x_m) || !std::isfinite(path[i].y_m)) {
+      throw ContractError("place of the path", "not finite", "finite numbers");
+    }
+    if (i > 0) length_to_m_.push_back(length_to_m_.back() + distance(path[i - 1], path[i]));
+  }
+}
+
+Point2 PathFollower::position_at(double along_m) const {
+  const auto after = std::ranges::upper_bound(length_to_m_, along_m);
+  if (after == length_to_m_.end()) return path_.back();
+  const auto i = static_cast<std::size_t>(after - length_to_m_.begin());
+  if (i == 0) return path_.front();
+  const double share = (along_m - length_to_m_[i - 1]) / (length_to_m_[i] - length_to_m_[i - 1]);
+  return {path_[i - 1].x_m + share * (path_[i].x_m - path_[i - 1].x_m),
+          path_[i - 1].y_m + share * (path_[i].y_m - path_[i - 1].y_m)};
+}
+
+// Moves to the nearest point of the path, from the last one on and not farther than the robot can
+// have driven, even if it has cut a corner.
+void PathFollower::advance(Point2 robot) {
+  const double max_m = along_m_ + 2.0 * options_.look_ahead_m;
+  double least = std::numeric_limits<double>::infinity();
+  double best_m = along_m_;
+  const auto first = std::ranges::upper_bound(length_to_m_, along_m_);
+  auto i = static_cast<std::size_t>(std::max<std::ptrdiff_t>(1, first - length_to_m_.begin()));
+  for (; i < path_.size() && length_to_m_[i - 1] <= max_m; ++i) {
+    const double ex = path_[i].x_m - path_[i - 1].x_m;
+    const double ey = path_[i].y_m - path_[i - 1].y_m;
+    const double length = length_to_m_[i] - length_to_m_[i - 1];
+    if (!(length > 0.0)) continue;
+    const double foot =
+        ((robot.x_m - path_[i - 1].x_m) * ex + (robot.y_m - path_[i - 1].y_m) * ey) / length;
+    const double there_m =
+        std::clamp(length_to_m_[i - 1] + std::clamp(foot, 0.0, length), along_m_, max_m);
+    const double off = distance(position_at(there_m), robot);
+    if (off < least) {
+      least = off;
+      best_m = there_m;
+    }
+  }
+  along_m_ = best_m;
+}
+
+// Finds the point as far ahead as the path stays near the straight line there.
+Point2 PathFollower::find_target() const {
+  const Point2 here = position();
+  // Nearer, the robot would turn for every error of its position.
+  double ahead_m = along_m_ + options_.look_ahead_m / 3.0;
+  const double max_m = along_m_ + options_.look_ahead_m;
+  const auto leaves = [&](Point2 there) {
+    const double ex = there.x_m - here.x_m;
+    const double ey = there.y_m - here.y_m;
+    const double length = std::hypot(ex, ey);
+    if (!(length > 0.0)) return true;
+    const auto first = std::ranges::upper_bound(length_to_m_, along_m_);
+    for (auto i = static_cast<std::size_t>(first - length_to_m_.begin());
+         i < path_.size() && length_to_m_[i] < ahead_m; ++i) {
+      const double off = (path_[i].x_m - here.x_m) * ey - (path_[i].y_m - here.y_m) * ex;
+      if (std::abs(off) > options_.max_cut_m * length) return true;
+    }
+    return false;
+  };
+  constexpr int steps = 8;
+  const double step_m = (max_m - ahead_m) / steps;
+  Point2 there = position_at(ahead_m);
+  for (int i = 0; i < steps; ++i) {
+    ahead_m += step_m;
+    const Point2 farther = position_at(ahead_m);
+    if (leaves(farther)) break;
+    there = farther;
+  }
+  return there;
+}
+
+std::optional<Point2> PathFollower::next_target(Point2 robot) {
+  advance(robot);
+  // A robot beside the end has arrived, too.
+  const double left_m = length_m() - along_m_;
+  const bool near = distance(robot, path_.back()) <= options_.arrived_m;
+  if (left_m <= 1e-9 || (near && left_m <= options_.look_ahead_m)) return std::nullopt;
+  return find_target();
+}
+
+}  // namespace panonav

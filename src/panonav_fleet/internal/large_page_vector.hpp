@@ -1,0 +1,59 @@
+#pragma once
+
+#include <sys/mman.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <new>
+#include <vector>
+
+#include "panonav/memory/internal/aligned_vector.hpp"
+
+namespace panonav::fleet {
+
+/// Allocates on borders of large pages, which the system is asked for: bytes that are read here and
+/// there then cost no look-up of small pages. Straight from the system, as a heap keeps gaps
+/// between blocks on such borders.
+template <class T>
+struct LargePageAllocator {
+  static constexpr std::size_t page = std::size_t{2} << 20U;
+  using value_type = T;
+  LargePageAllocator() = default;
+  template <class U>
+  explicit LargePageAllocator(const LargePageAllocator<U>&) noexcept {}
+  [[nodiscard]] T* allocate(std::size_t count) {
+    if (is_small(count)) return CacheLineAllocator<T>().allocate(count);
+    const std::size_t bytes = rounded(count);
+    void* const got =
+        mmap(nullptr, bytes + page, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (got == MAP_FAILED) throw std::bad_alloc();
+    auto* const begin = static_cast<char*>(got);
+    const std::size_t before = (page - reinterpret_cast<std::uintptr_t>(begin) % page) % page;
+    if (before > 0) munmap(begin, before);
+    if (before < page) munmap(begin + before + bytes, page - before);
+#ifdef MADV_HUGEPAGE
+    static_cast<void>(madvise(begin + before, bytes, MADV_HUGEPAGE));
+#endif
+    return reinterpret_cast<T*>(begin + before);
+  }
+  void deallocate(T* pointer, std::size_t count) noexcept {
+    if (is_small(count)) return CacheLineAllocator<T>().deallocate(pointer, count);
+    munmap(pointer, rounded(count));
+  }
+  friend bool operator==(LargePageAllocator, LargePageAllocator) {
+    return true;
+  }
+
+ private:
+  static bool is_small(std::size_t count) {
+    return count * sizeof(T) < page / 2;
+  }
+  static std::size_t rounded(std::size_t count) {
+    return (count * sizeof(T) + page - 1) / page * page;
+  }
+};
+
+template <class T>
+using LargePageVector = std::vector<T, LargePageAllocator<T>>;
+
+}  // namespace panonav::fleet
