@@ -54,10 +54,10 @@ void run(benchmark::State& state, int rows, int components, const FourierHomingO
 }
 
 void published_k5(benchmark::State& state) {
-  run(state, 1, 7, published_homing(5));
+  run(state, 1, 7, published_homing_options(5));
 }
 void published_k5_two_iterations(benchmark::State& state) {
-  run(state, 1, 8, published_homing(5, 2));
+  run(state, 1, 8, published_homing_options(5, 2));
 }
 void own_k5(benchmark::State& state) {
   run(state, 1, 7, {.highest = 5});

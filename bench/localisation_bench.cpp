@@ -114,7 +114,7 @@ void time_first_image(benchmark::State& state, const lab::TrackingPlace& place,
     const Walk& walk = walks[i % walks.size()];
     const std::size_t step = i / walks.size() % walk.run.steps.size();
     ++i;
-    filter.start_anywhere();
+    filter.start_globally();
     state.ResumeTiming();
     const MonteCarloEstimate estimate = filter.observe(*walk.run.steps[step].view);
     compared += static_cast<double>(estimate.views_compared);

@@ -13,7 +13,7 @@
 #include "panonav/memory/view_source.hpp"
 #include "panonav/navigation/area_planner.hpp"
 #include "panonav/navigation/navigator.hpp"
-#include "panonav/navigation/search_everywhere.hpp"
+#include "panonav/navigation/search_whole_memory.hpp"
 #include "panonav/storage/memory_file_views.hpp"
 #include "support/fifty_rooms.hpp"
 
@@ -101,7 +101,7 @@ void plan_around(benchmark::State& state) {
     planning.close({&shut, 1});
     benchmark::DoNotOptimize(planning.field(area));
     state.PauseTiming();
-    planning.open_all();
+    planning.unblock_all();
     state.ResumeTiming();
   }
 }
@@ -113,7 +113,7 @@ void look(benchmark::State& state, bool border, bool from_file, bool all = false
   const auto views = source(from_file);
   AreaPlanner planning = planner();
   planning.set_goal(graph().view(graph().size() - 1));
-  const auto way = planning.planned_way(0);
+  const auto way = planning.plan_path(0);
   std::vector<FourierSignature> seen;
   for (const std::size_t node : way) seen.push_back(memory().signature(graph().view(node)));
   NavigatorOptions options;
@@ -167,7 +167,7 @@ void relocalise(benchmark::State& state, bool from_file) {
   for (auto _ : state) {
     const ViewId view = graph().view(random.index(graph().size()));
     benchmark::DoNotOptimize(
-        search_everywhere(*views, graph(), planner().areas(), memory().signature(view)));
+        search_whole_memory(*views, graph(), planner().areas(), memory().signature(view)));
   }
 }
 BENCHMARK_CAPTURE(relocalise, from_memory, false)->Unit(benchmark::kMillisecond);

@@ -68,15 +68,16 @@ struct Sample {
 };
 template <int size>
 using Vector = Eigen::Matrix<double, size, 1>;
-constexpr int column_features = place_features - 1;  // without that of the components
+constexpr int column_features = column_term_count - 1;  // without that of the components
 
 std::optional<Vector<column_features>> column_features_of(const PlaceEvidence& evidence) {
-  return Eigen::Map<const Vector<column_features>>(features_of(evidence).data());
+  return Eigen::Map<const Vector<column_features>>(column_terms(evidence).data());
 }
 // None where columns leave no doubt.
-std::optional<Vector<doubtful_features>> doubtful_features_of_query(const PlaceEvidence& evidence) {
+std::optional<Vector<feature_term_count>> doubtful_features_of_query(
+    const PlaceEvidence& evidence) {
   if (!evidence.features) return std::nullopt;
-  return Eigen::Map<const Vector<doubtful_features>>(doubtful_features_of(evidence).data());
+  return Eigen::Map<const Vector<feature_term_count>>(feature_terms(evidence).data());
 }
 double logistic(double z) {
   return 1.0 / (1.0 + std::exp(-z));
@@ -191,10 +192,11 @@ Vector<size> learn(const std::vector<Lesson<size>>& lessons) {
 
 // What features tell differs more from one kind of scene to another than what columns tell. The log
 // odds are shrunk as much as those learnt without a kind must be to be right of it.
-Vector<doubtful_features> learn_of_features(const std::vector<Lesson<doubtful_features>>& lessons) {
+Vector<feature_term_count> learn_of_features(
+    const std::vector<Lesson<feature_term_count>>& lessons) {
   std::vector<Lesson<2>> left_out;
   for (std::size_t kind = 0; kind < kinds.size(); ++kind) {
-    std::vector<Lesson<doubtful_features>> rest;
+    std::vector<Lesson<feature_term_count>> rest;
     std::ranges::copy_if(lessons, std::back_inserter(rest),
                          [&](const auto& lesson) { return lesson.kind != kind; });
     const auto without = learn(rest);
@@ -205,7 +207,7 @@ Vector<doubtful_features> learn_of_features(const std::vector<Lesson<doubtful_fe
     }
   }
   const Vector<2> shrinkage = learn(left_out);
-  Vector<doubtful_features> weights = learn(lessons);
+  Vector<feature_term_count> weights = learn(lessons);
   std::printf("features, not shrunk:");
   for (const double weight : weights) std::printf(" %.2f", weight);
   std::printf("; shrinkage %.2f, %.2f\n", shrinkage[0], shrinkage[1]);
@@ -299,7 +301,7 @@ int main() {
   for (const double weight : doubtful) std::printf("%.2f\n", weight);
   const auto by_columns = [&](const PlaceEvidence& evidence) {
     return logistic(columns.dot(*column_features_of(evidence)) +
-                    last * features_of(evidence).back());
+                    last * column_terms(evidence).back());
   };
   for (std::size_t h = 0; h < rememberings.size(); ++h) {
     std::printf("one of %d references, %d components\n", static_cast<int>(rememberings[h].one_of),

@@ -52,7 +52,7 @@ class RememberedPlace {
     const FeatureSource source = [kept = features_](ViewId view) { return kept->at(view); };
     const NeighbourSupport support(*place_.ranking());
     localiser_.use_features(
-        source, try_features(*place_.ranking(), support, source).is_significantly_better());
+        source, evaluate_features(*place_.ranking(), support, source).is_significantly_better());
   }
   [[nodiscard]] Place localise(const Panorama& view) const {
     return localiser_.localise(signature_for(view, place_.memory()), {}, features_of_query(view));
@@ -175,8 +175,10 @@ DayAnswers ask(const RememberedPlace& remembered, const std::vector<simulation::
   return result;
 }
 
-RunView run_view(const Pose2& odometry, const PackedSignature& signature, const Place& answer) {
-  RunView view{odometry, signature, answer.known_probability, std::nullopt, std::nullopt};
+MemoryUpdate::AnsweredView run_view(const Pose2& odometry, const PackedSignature& signature,
+                                    const Place& answer) {
+  MemoryUpdate::AnsweredView view{odometry, signature, answer.known_probability, std::nullopt,
+                                  std::nullopt};
   if (answer.position && answer.heading_rad) {
     const Point2 at = answer.position->position();
     view.pose = Pose2{at.x_m, at.y_m, *answer.heading_rad};
@@ -212,7 +214,7 @@ class LearningRobot {
       signatures.push_back(signature_for(seen[i].panorama, memory_));
       update.add(run_view(odometry.pose(), signatures.back(), answers[i]));
     }
-    RunChanges changes = update.finish();
+    MemoryUpdate::Changes changes = update.finish();
     use_ = std::move(changes.use);
     auto features = std::make_shared<FeatureMap>(*remembered_->features());
     for (const auto* views : {&changes.replaced, &changes.forgotten}) {

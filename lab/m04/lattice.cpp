@@ -199,7 +199,7 @@ class LatticeExperiment {
     const auto views = grid.memory.views();
     std::vector<PackedSignature> packed;
     for (const ViewId view : views) packed.push_back(grid.memory.packed(view));
-    std::vector<DissimilarityAtDistance> pairs;
+    std::vector<DissimilarityCurve::Sample> pairs;
     std::vector<double> values;
     for (std::size_t a = 0; a < views.size(); ++a) {
       for (std::size_t b = a + 1; b < views.size(); ++b) {

@@ -328,7 +328,8 @@ void NavigationExperiments::reproduce_route_missions() const {
       kind.measures.add(runs, 0.5 * remembered.spacing_m);
       for (const simulation::MissionRun& run : runs) {
         for (std::size_t step = 0; step < run.decisions.size(); ++step) {
-          const double off_m = std::abs(place_on_route(drive, run.path[step].position()).lateral_m);
+          const double off_m =
+              std::abs(project_onto_route(drive, run.path[step].position()).lateral_m);
           kind.off_m.push_back(off_m);
           if (run.decisions[step].on_route) on_route_m.push_back(off_m);
           for (const NavigationEvent event : run.decisions[step].events) ++events[event];

@@ -61,7 +61,7 @@ HomingRun run_home(const HomingPlace& place, const HomingView& home, const Pose2
   run.goal = goal;
   for (;;) {
     const HomingView view = take_homing_view(place, robot.pose(), noise_of_views.next());
-    const PursuitDecision decision = pursuit.decide(view);
+    const HomingPursuit::Decision decision = pursuit.decide(view);
     if (run.path.empty()) run.start_difference = decision.difference;
     run.path.push_back(robot.pose());
     run.vectors.push_back(decision.vector);
@@ -72,13 +72,13 @@ HomingRun run_home(const HomingPlace& place, const HomingView& home, const Pose2
       return run;
     };
     switch (decision.state) {
-      case PursuitState::moving:
+      case HomingPursuit::State::moving:
         break;
-      case PursuitState::arrived:
+      case HomingPursuit::State::arrived:
         return finish(HomingRunEnd::arrived);
-      case PursuitState::wrong_place:
+      case HomingPursuit::State::wrong_place:
         return finish(HomingRunEnd::wrong_place);
-      case PursuitState::exhausted:
+      case HomingPursuit::State::exhausted:
         return finish(HomingRunEnd::exhausted);
     }
     const auto direction_rad = robot.free_direction(decision.turn_rad, decision.advance_m);

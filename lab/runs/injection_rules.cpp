@@ -16,19 +16,20 @@ constexpr double topological_tolerance = 0.25;  // of the best dissimilarity; th
 
 }  // namespace
 
-InjectionRule uniform_injection() {
+MonteCarloLocaliser::InjectionRule uniform_injection() {
   return [](const PackedSignature&, std::size_t particles) {
-    return InjectedParticles{std::min(particles, uniform_number), {}};
+    return MonteCarloLocaliser::InjectedParticles{std::min(particles, uniform_number), {}};
   };
 }
 
-InjectionRule topological_injection(std::shared_ptr<const ColumnRanking> ranking) {
+MonteCarloLocaliser::InjectionRule topological_injection(
+    std::shared_ptr<const ColumnRanking> ranking) {
   const auto areas = std::make_shared<const ReferenceAreas>(ranking->memory());
   return [ranking = std::move(ranking), areas](const PackedSignature& view, std::size_t particles) {
     const auto levels = localise_hierarchically(
         ranking->memory(), *areas, view,
         {.components = ranking->components(), .tolerance = topological_tolerance});
-    InjectedParticles injected;
+    MonteCarloLocaliser::InjectedParticles injected;
     if (levels.empty()) return injected;
     for (const Match& match : levels.back().candidates) {
       if (ranking->memory().info(match.view).pose) injected.around.push_back(match.view);

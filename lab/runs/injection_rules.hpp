@@ -12,15 +12,16 @@ enum class InjectionMethod {
   none,         ///< none
   uniform,      ///< a fixed number, anywhere in the memorised area: the standard way
   topological,  ///< a fixed share, in the areas of the best matches [M03 section 4.1]
-  explained,    ///< `ParticleInjection::explained`
+  explained,    ///< `MonteCarloOptions::Injection::explained`
 };
 
 /// Replaces 50 particles at each image by new ones anywhere [M03 figure 8].
-[[nodiscard]] InjectionRule uniform_injection();
+[[nodiscard]] MonteCarloLocaliser::InjectionRule uniform_injection();
 
 /// Replaces 10 % of the particles at each image by new ones around the topological localisations,
 /// the references whose dissimilarity is within a quarter of the best [M03 section 4.1].
-[[nodiscard]] InjectionRule topological_injection(std::shared_ptr<const ColumnRanking> ranking);
+[[nodiscard]] MonteCarloLocaliser::InjectionRule topological_injection(
+    std::shared_ptr<const ColumnRanking> ranking);
 
 /// Makes the filter over this ranking inject particles so, besides its own way.
 void use_injection(MonteCarloLocaliser& filter, InjectionMethod method,

@@ -34,8 +34,9 @@ TrackedRun track_run(const TrackingPlace& place, const TrackingRun& run,
                      const StepObserver& observer) {
   MonteCarloOptions options = setting.options;
   options.seed = static_cast<int>(seed % 1000000007U);
-  options.injection = setting.injection == InjectionMethod::explained ? ParticleInjection::explained
-                                                                      : ParticleInjection::none;
+  options.injection = setting.injection == InjectionMethod::explained
+                          ? MonteCarloOptions::Injection::explained
+                          : MonteCarloOptions::Injection::none;
   if (setting.particles_per_reference) {
     const double wanted =
         *setting.particles_per_reference * static_cast<double>(place.memory().size());
@@ -45,7 +46,7 @@ TrackedRun track_run(const TrackingPlace& place, const TrackingRun& run,
   MonteCarloLocaliser filter(place.ranking(), place.model(), options, setting.told_odometry);
   use_injection(filter, setting.injection, place.ranking());
   if (setting.heading_known && !run.steps.empty()) {
-    filter.start_anywhere(run.steps.front().truth.heading_rad);
+    filter.start_globally(run.steps.front().truth.heading_rad);
   }
   simulation::SimulatedOdometry odometry(setting.odometry, seed);
   Pose2 before = odometry.pose();

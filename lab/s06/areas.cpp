@@ -193,7 +193,7 @@ void measure_homing_times(const Arena& arena, Reproduction& result) {
   const auto& currents = arena.currents;
   const std::size_t count = currents.views.size();
   double sum = 0.0;  // of what is computed, so that nothing is left out
-  const FourierHomingOptions published = published_homing(5);
+  const FourierHomingOptions published = published_homing_options(5);
   const double vector_us = microseconds(200, 200, [&](std::size_t i) {
     sum += home_vector_unchecked(homes.views[i % count].view, currents.views[7 * i % count].view,
                                  published)

@@ -179,8 +179,8 @@ void draw_vectors(GoalPictures& of, Reproduction& result) {
            "the views. Other valleys lead astray.",
            map_of("Home vectors, K = 5; orange: catchment area at 10 cm",
                   of.shaded(differences, difference_limits),
-                  of.vectors(published_homing(5, s06_iterations)), of.border(ends), of.goal_mark(),
-                  of.most_similar(differences)));
+                  of.vectors(published_homing_options(5, s06_iterations)), of.border(ends),
+                  of.goal_mark(), of.most_similar(differences)));
 }
 
 // Figure 14.
@@ -192,8 +192,8 @@ void draw_stages(GoalPictures& of, Reproduction& result) {
     const auto ends = of.final_distances_of(published_strategy({highest}));
     panels.push_back(map_of(k + ": image difference, home vectors",
                             of.shaded(differences, difference_limits),
-                            of.vectors(published_homing(highest, s06_iterations)), of.goal_mark(),
-                            of.most_similar(differences)));
+                            of.vectors(published_homing_options(highest, s06_iterations)),
+                            of.goal_mark(), of.most_similar(differences)));
     panels.push_back(map_of(k + ": where runs end; yellow: at the goal, dark: beyond 40 cm",
                             of.shaded(ends, distance_limits), of.border(ends), of.goal_mark()));
   }

@@ -14,7 +14,7 @@ namespace {
 viewer::Series homeward_series(const std::string& label, const HomingSurvey& survey,
                                double spacing_m) {
   viewer::Series series{.label = label};
-  for (const HomewardBin& bin : homeward_by_distance(survey, spacing_m)) {
+  for (const HomingSurvey::Bin& bin : homeward_by_distance(survey, spacing_m)) {
     if (bin.pairs < 20 || bin.distance_m > 0.8) continue;
     series.add(bin.distance_m, bin.component);
   }
@@ -50,7 +50,7 @@ void draw_homeward(ArenaSurveys& surveys, Executor& executor, Reproduction& resu
       const std::string label =
           "K = " + std::to_string(highest) + ", N + 1 = " + std::to_string(iterations + 1);
       const HomingSurvey survey =
-          survey_arena(surveys.arena(), published_homing(highest, iterations), executor,
+          survey_arena(surveys.arena(), published_homing_options(highest, iterations), executor,
                        2 * surveys.goals_every());
       by_iterations.series.push_back(homeward_series(label, survey, spacing_m));
     }
@@ -60,7 +60,7 @@ void draw_homeward(ArenaSurveys& surveys, Executor& executor, Reproduction& resu
 
   for (const double away_m : {0.1, 0.2, 0.4}) {
     const auto at = [&](const HomingSurvey& survey) {
-      for (const HomewardBin& bin : homeward_by_distance(survey, spacing_m)) {
+      for (const HomingSurvey::Bin& bin : homeward_by_distance(survey, spacing_m)) {
         if (std::abs(bin.distance_m - away_m) < 0.25 * spacing_m) return bin.component;
       }
       return std::nan("");
@@ -146,7 +146,7 @@ void draw_iterations(ArenaSurveys& surveys, Executor& executor, Reproduction& re
     viewer::Series series{.label = "K = " + std::to_string(highest)};
     for (const int solutions : {1, 2, 3, 5, 8}) {
       const HomingSurvey survey =
-          survey_arena(surveys.arena(), published_homing(highest, solutions - 1), executor,
+          survey_arena(surveys.arena(), published_homing_options(highest, solutions - 1), executor,
                        4 * surveys.goals_every());
       const HomingSurvey* const stage = &survey;
       series.add(solutions,

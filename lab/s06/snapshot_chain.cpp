@@ -162,10 +162,11 @@ bool ChainFollower::contradicts_odometry(const HomeVector& vector) const noexcep
 
 ChainDecision ChainFollower::approach_last(const HomingView& current) {
   if (!pursuit_) pursuit_.emplace(chain_[*target_].view, pursuit_options_, FourierHomingOptions{});
-  const PursuitDecision step = pursuit_->decide(current);
+  const HomingPursuit::Decision step = pursuit_->decide(current);
   ChainDecision decision{ChainState::following, *target_, step.turn_rad, step.advance_m};
-  if (step.state == PursuitState::arrived) decision.state = ChainState::finished;
-  if (step.state == PursuitState::wrong_place || step.state == PursuitState::exhausted) {
+  if (step.state == HomingPursuit::State::arrived) decision.state = ChainState::finished;
+  if (step.state == HomingPursuit::State::wrong_place ||
+      step.state == HomingPursuit::State::exhausted) {
     decision.state = ChainState::lost;
   }
   return decision;

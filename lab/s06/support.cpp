@@ -46,7 +46,7 @@ const HomingSurvey& ArenaSurveys::survey(const std::string& key, const Rule& rul
 
 const HomingSurvey& ArenaSurveys::published(int highest, int iterations) {
   const std::string key = "published " + std::to_string(highest) + " " + std::to_string(iterations);
-  return survey(key, published_homing(highest, iterations));
+  return survey(key, published_homing_options(highest, iterations));
 }
 
 const HomingSurvey& ArenaSurveys::own(int highest) {

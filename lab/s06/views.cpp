@@ -89,7 +89,7 @@ void draw_correlation(const Arena& arena, Reproduction& result) {
   viewer::Series series;
   for (int highest = 1; highest <= 20; ++highest) {
     std::array<float, 1> turn{};
-    if (highest_turns(correlation_of(home, current, highest), turn) == 0) continue;
+    if (find_highest_peaks(correlation_of(home, current, highest), turn) == 0) continue;
     series.add(highest, degrees(angle_difference(static_cast<double>(turn[0]), truth)));
   }
   maxima.series.push_back(std::move(series));
@@ -330,7 +330,7 @@ void draw_headings(const Arena& arena, Executor& executor, Reproduction& result)
             correlation_of(arena.homes.views[g].view, arena.currents.views[p].view, shown.back());
         for (std::size_t s = 0; s < shown.size(); ++s) {
           correlation.highest = shown[s];
-          const double error = static_cast<double>(sequential_turn(correlation)) - truth;
+          const double error = static_cast<double>(sequential_heading(correlation)) - truth;
           values[s] = {std::cos(error), std::sin(error)};
         }
         const double error = -2.0 * std::numbers::pi * shifts[g][p] / s06_columns - truth;
@@ -374,7 +374,7 @@ void reproduce_heading_with_pose_noise(const Arena& arena, Reproduction& result)
   double sines = 0.0;
   const std::size_t places = arena.homes.views.size();
   for (std::size_t i = 0; i < places; ++i) {
-    const double turned = static_cast<double>(sequential_turn(
+    const double turned = static_cast<double>(sequential_heading(
         correlation_of(arena.homes.views[i].view, arena.currents.views[i].view, 15)));
     const double error = turned - true_turn(arena, i, i);
     cosines += std::cos(error);

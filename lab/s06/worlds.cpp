@@ -148,10 +148,10 @@ void reproduce_homing_in_world(const std::string& name, const Experiments& conte
              successes(run_home(place, tasks, changed, seed, executor)), runs.size());
   };
   HomingRunOptions published;
-  published.vector = published_homing(5);
-  published.pursuit.strategy = PursuitStrategy::steady;
+  published.vector = published_homing_options(5);
+  published.pursuit.strategy = HomingPursuitOptions::Strategy::steady;
   add_other(".published", "the published rule with K = 5", published);
-  published.pursuit.strategy = PursuitStrategy::coarse_to_fine;
+  published.pursuit.strategy = HomingPursuitOptions::Strategy::coarse_to_fine;
   add_other(".published_coarse_to_fine", "the published rule with K = 2, 4, 10", published);
   HomingRunOptions holonomic;
   holonomic.motion.drive = DriveKind::holonomic;

@@ -94,7 +94,7 @@ void draw_virtual_view(const LabRoute& lab, const LineDrive& beside, Reproductio
   const Pose2 in_path = inverse(lab.world_from_path) * pose;
   const auto columns = static_cast<std::size_t>(lab.route.columns());
   std::vector<RouteCrossing> crossings(columns);
-  cross_route(lab.route.poses(), 0, pose.position(), equal_directions(columns), crossings);
+  find_crossings(lab.route.poses(), 0, pose.position(), equal_directions(columns), crossings);
   viewer::PicturePlot plot =
       panorama_plot(lab, "Light blue: where a viewpoint beside the path finds what it sees");
   // Directions in the world; the path is straight, so that its heading turns all lines alike.

@@ -229,7 +229,7 @@ void RouteExperiments::reproduce_real_route() const {
     }
     ++asked;
     if (!found[i]) continue;
-    const RoutePlace truth = place_on_route(route.poses(), places[i]);
+    const RoutePosition truth = project_onto_route(route.poses(), places[i]);
     along_cm.push_back(100.0 * std::abs(found[i]->along_m - truth.along_m));
     beside_cm.push_back(100.0 * std::abs(found[i]->lateral_m - truth.lateral_m));
     right.dots.push_back(found[i]->pose.position());

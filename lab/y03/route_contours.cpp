@@ -88,7 +88,7 @@ RouteContours::RouteContours(const RoutePanorama& route, const RouteContourOptio
   spacing_m_ = route.length_m() / static_cast<double>(route.size() - 1);
   for (std::size_t i = 0; i < route.size(); ++i) {
     const auto line =
-        slopes(smoothed_line(world_line(route, i), options.smoothing_deg * columns_ / 360.0));
+        slopes(smooth_line(world_line(route, i), options.smoothing_deg * columns_ / 360.0));
     edges_.insert(edges_.end(), line.begin(), line.end());
   }
 }
@@ -109,7 +109,7 @@ float RouteContours::edge(double along, double azimuth) const noexcept {
 
 std::vector<RouteCrossing> RouteContours::curve(Point2 viewpoint) const {
   std::vector<RouteCrossing> crossings(static_cast<std::size_t>(columns_));
-  cross_route(poses_, 0, viewpoint, directions_, crossings);
+  find_crossings(poses_, 0, viewpoint, directions_, crossings);
   return crossings;
 }
 
@@ -299,7 +299,7 @@ std::optional<RouteContourFix> RouteContours::fit(std::span<const float> line,
     throw ContractError("values of the line", static_cast<double>(line.size()),
                         std::to_string(columns_));
   }
-  const auto edges = slopes(smoothed_line(line, options_.smoothing_deg * columns_ / 360.0));
+  const auto edges = slopes(smooth_line(line, options_.smoothing_deg * columns_ / 360.0));
   std::vector<bool> joined;
   RouteContourFix fix = start(edges, predicted, joined);
   if (fix.columns.size() < min_points) return std::nullopt;

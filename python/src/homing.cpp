@@ -33,7 +33,7 @@ void bind_vectors(py::module_& m) {
       .field("chance", &ChanceMatch::chance,
              "Mean of the same over noise with the spectrum of the current view.")
       .field("deviation", &ChanceMatch::deviation, "Standard deviation of that.")
-      .field("beyond_chance", &ChanceMatch::beyond_chance, "The views have something in common.")
+      .field("beyond_chance", &ChanceMatch::is_beyond_chance, "The views have something in common.")
       .field("direction_probability", &ChanceMatch::direction_probability,
              "That the home vector points home within 45 degrees.");
   Record<PhaseReading>(m, "PhaseReading", "Relative pose of two views from their phases.")
@@ -72,7 +72,7 @@ void bind_vectors(py::module_& m) {
         FourierHomingOptions wanted;
         Keywords(keywords).options(wanted).finish();
         const py::gil_scoped_release free;
-        return chance_match(home, current, wanted);
+        return compare_with_chance(home, current, wanted);
       },
       py::arg("home"), py::arg("current"),
       ("How well two views match, beside how well noise does." + options).c_str());
@@ -215,7 +215,7 @@ void bind_catchment(py::module_& m) {
             throw ContractError("published", *published,
                                 "no option of homing but iterations beside");
           }
-          settings.homing = published_homing(*published, iterations);
+          settings.homing = published_homing_options(*published, iterations);
         }
         const Dataset homes = dataset_from(recording, source);
         std::optional<Dataset> second;

@@ -72,7 +72,7 @@ NamedPlace localise_one(const PlaceRecogniser& recogniser, const Observation& se
 PlaceRecogniserOptions recogniser_options(const std::optional<PictureSource>& source, bool areas,
                                           const py::kwargs& keywords) {
   PlaceRecogniserOptions options{.source = source};
-  WantedAccuracy accuracy;
+  LocalisationAccuracy accuracy;
   Keywords taken(keywords);
   taken.options(options.localiser);
   if (areas) {
@@ -115,7 +115,7 @@ std::vector<NamedPlace> localise_all(const SharedRecogniser& recogniser, const D
 
 void bind_recogniser(py::module_& m) {
   const std::string options =
-      with_options("", {options_of<LocaliserOptions>(), options_of<WantedAccuracy>("area")});
+      with_options("", {options_of<LocaliserOptions>(), options_of<LocalisationAccuracy>("area")});
   py::class_<SharedRecogniser>(
       m, "PlaceRecogniser",
       "Tells from one picture where it was taken, by a memory file. Several threads may ask at a "
@@ -307,7 +307,7 @@ void bind_tracker(py::module_& m) {
       .def(
           "start_anywhere",
           [](SharedTracker& tracker, std::optional<double> heading_rad) {
-            tracker.change([&](Tracker& t) { t.start_anywhere(heading_rad); });
+            tracker.change([&](Tracker& t) { t.start_globally(heading_rad); });
           },
           py::arg("heading_rad") = py::none(), "Forgets what is known of the robot.")
       .def(
@@ -398,7 +398,7 @@ void bind_learner(py::module_& m) {
       .def_property_readonly(
           "near_known_places",
           [](const SharedLearner& learner) {
-            return learner.read([](const MemoryLearner& l) { return l.near_known_places(); });
+            return learner.read([](const MemoryLearner& l) { return l.is_near_known_place(); });
           },
           "Whether the observation seen last is so near to one whose place was surely known that "
           "it will be placed by odometry.")

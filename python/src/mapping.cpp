@@ -126,21 +126,21 @@ void bind_maps(py::module_& m) {
 }
 
 void bind_lattices(py::module_& m) {
-  Record<LatticeNode>(m, "LatticeNode", "A view in an arrangement.")
-      .field("view", &LatticeNode::view, "Its id in the memory.")
-      .field("pose", &LatticeNode::pose, "In its component's frame.")
-      .field("component", &LatticeNode::component, "Index of its connected component.");
-  Record<LatticeSpring>(m, "LatticeSpring", "What two views say of where they lie.")
-      .field("a", &LatticeSpring::a, "Number of a node.")
-      .field("b", &LatticeSpring::b, "Number of the other, larger than a.")
-      .field("dissimilarity", &LatticeSpring::dissimilarity,
+  Record<Lattice::Node>(m, "LatticeNode", "A view in an arrangement.")
+      .field("view", &Lattice::Node::view, "Its id in the memory.")
+      .field("pose", &Lattice::Node::pose, "In its component's frame.")
+      .field("component", &Lattice::Node::component, "Index of its connected component.");
+  Record<Lattice::Spring>(m, "LatticeSpring", "What two views say of where they lie.")
+      .field("a", &Lattice::Spring::a, "Number of a node.")
+      .field("b", &Lattice::Spring::b, "Number of the other, larger than a.")
+      .field("dissimilarity", &Lattice::Spring::dissimilarity,
              "Of the two views, over the components asked for.")
-      .field("length", &LatticeSpring::length, "Rest length.")
-      .field("stiffness", &LatticeSpring::stiffness, "K of [M04 eq. 5].")
-      .field("weight", &LatticeSpring::weight, "Near 0: an outlier.");
-  Record<LatticeComponent>(m, "LatticeComponent", "Views that springs join.")
-      .field("views", &LatticeComponent::views, "Number of its nodes.")
-      .field("handedness_known", &LatticeComponent::handedness_known,
+      .field("length", &Lattice::Spring::length, "Rest length.")
+      .field("stiffness", &Lattice::Spring::stiffness, "K of [M04 eq. 5].")
+      .field("weight", &Lattice::Spring::weight, "Near 0: an outlier.");
+  Record<Lattice::Component>(m, "LatticeComponent", "Views that springs join.")
+      .field("views", &Lattice::Component::views, "Number of its nodes.")
+      .field("handedness_known", &Lattice::Component::handedness_known,
              "False: it may be the mirror image.");
   Record<Lattice>(m, "Lattice", "Views with the poses that their springs give them.")
       .field("nodes", &Lattice::nodes, "One for each view, in its order.")

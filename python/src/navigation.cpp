@@ -131,7 +131,7 @@ void bind_navigation(py::module_& m) {
           [](const SharedNavigator& navigator) {
             return navigator.read([](const RobotNavigator& n) {
               std::vector<std::pair<ViewId, ViewId>> edges;
-              for (const NavigationEdge& edge : n.graph().edges()) {
+              for (const NavigationGraph::Edge& edge : n.graph().edges()) {
                 edges.emplace_back(edge.a, edge.b);
               }
               return edges;

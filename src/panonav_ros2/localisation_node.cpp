@@ -185,7 +185,7 @@ struct LocalisationNode::Implementation {
       } else if (teacher) {
         refuse(words, "finish, as the memory is being learnt");
       } else if (command == "relocalise") {
-        localiser.start_anywhere();
+        localiser.start_globally();
       } else if (command == "repeat" && !argument.empty()) {
         driver.start({.route = argument});
       } else if (command == "learn" && !argument.empty()) {

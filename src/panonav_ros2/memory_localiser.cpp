@@ -84,8 +84,8 @@ void MemoryLocaliser::remove_view(const std::string& name) {
   reload();
 }
 
-void MemoryLocaliser::start_anywhere() {
-  loaded().tracker.start_anywhere();
+void MemoryLocaliser::start_globally() {
+  loaded().tracker.start_globally();
 }
 
 void MemoryLocaliser::start_at(const Pose2& map_from_base, double deviation_m,

@@ -32,7 +32,7 @@ class MemoryLocaliser {
   void add_view(const std::string& name);
   void remove_view(const std::string& name);
 
-  void start_anywhere();
+  void start_globally();
   void start_at(const Pose2& map_from_base, double deviation_m, double heading_deviation_rad);
   /// Starts at a pose that is known as well as poses in the map are.
   void start_at(const Pose2& map_from_base);

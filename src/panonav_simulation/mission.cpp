@@ -139,9 +139,9 @@ RememberedPlace remember_grid(const MissionPlace& place, double spacing_m, std::
     static_cast<void>(memory.append(views[i], {.name = std::to_string(i)}));
   }
   const Lattice lattice = arrange(memory, {}, {}, executor);
-  RememberedPlace remembered{std::move(memory), graph_of_lattice(lattice), std::move(poses),
+  RememberedPlace remembered{std::move(memory), graph_from_lattice(lattice), std::move(poses),
                              spacing_m};
-  for (const LatticeNode& node : lattice.nodes) {
+  for (const Lattice::Node& node : lattice.nodes) {
     remembered.arranged.push_back(node.component == 0 ? std::optional(node.pose.position())
                                                       : std::nullopt);
   }
@@ -168,15 +168,16 @@ RememberedPlace remember_drive(const MissionPlace& place, const std::vector<Pose
     memory.set_pose(node.view, ReferencePose{node.pose.x_m, node.pose.y_m, node.pose.heading_rad});
   }
   const double way_m = path_length_m(poses);
-  NavigationGraph graph = graph_of_map_and_neighbours(map, memory, executor);
+  NavigationGraph graph = graph_from_map_and_neighbours(map, memory, executor);
   std::vector<KnownRoute> routes;
   if (place.line) {
-    std::vector<RouteView> placed;
+    std::vector<KnownRoute::View> placed;
     for (const MapNode& node : map.nodes) {
       if (node.component == 0) placed.push_back({node.view, node.pose});
     }
     const std::uint64_t seed_of_lines = Random(seed, 1).next();
-    routes.push_back(known_route(record_route(place, poses, map, seed_of_lines, executor), placed));
+    routes.push_back(
+        make_known_route(record_route(place, poses, map, seed_of_lines, executor), placed));
   }
   return {std::move(memory), std::move(graph), poses,
           way_m / static_cast<double>(std::max<std::size_t>(1, poses.size() - 1)),

@@ -59,7 +59,7 @@ MapLayer planned_layer(const simulation::RememberedPlace& remembered, const Plan
   AreaPlanner planner(remembered.graph, options);
   planner.set_goal(goal);
   std::vector<Point2> way;
-  for (const std::size_t node : planner.planned_way(*remembered.graph.node_of(*known->nearest))) {
+  for (const std::size_t node : planner.plan_path(*remembered.graph.node_of(*known->nearest))) {
     if (is_known(remembered.truth[node])) way.push_back(remembered.truth[node].position());
   }
   if (way.size() > 1) layer.lines.push_back(std::move(way));

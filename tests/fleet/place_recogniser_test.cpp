@@ -177,7 +177,7 @@ TEST_F(RecogniserOfAnIndexTest, RefusesWhatItCannotTell) {
   EXPECT_THROW((void)searched.memory(), ContractError);
   EXPECT_THROW((void)searched.localiser(), ContractError);
   EXPECT_THROW(searched.append({.name = "new"}, PackedSignature{}), ContractError);
-  EXPECT_THROW((void)search({.areas = WantedAccuracy{}}), ContractError);
+  EXPECT_THROW((void)search({.areas = LocalisationAccuracy{}}), ContractError);
   EXPECT_THROW((void)search({.localiser = {.components = 99}}), ContractError);
   EXPECT_THROW((void)search({.localiser = {.top = 0}}), Error);
 }

@@ -18,7 +18,7 @@ HomingView seen_from(const ToyWorld& world, const Pose2& pose, int components = 
 }
 
 struct Ended {
-  PursuitState state = PursuitState::moving;
+  HomingPursuit::State state = HomingPursuit::State::moving;
   Pose2 pose;
   int steps = 0;
 };
@@ -26,19 +26,21 @@ struct Ended {
 // A robot that does exactly what it is told.
 Ended run(const ToyWorld& world, HomingPursuit pursuit, Pose2 pose) {
   for (;;) {
-    const PursuitDecision decision = pursuit.decide(seen_from(world, pose));
-    if (decision.state != PursuitState::moving) {
+    const HomingPursuit::Decision decision = pursuit.decide(seen_from(world, pose));
+    if (decision.state != HomingPursuit::State::moving) {
       EXPECT_EQ(decision.advance_m, 0.0);
       return {decision.state, pose, pursuit.steps()};
     }
     pose = pose * Pose2{0.0, 0.0, decision.turn_rad} * Pose2{decision.advance_m, 0.0, 0.0};
-    if (std::hypot(pose.x_m, pose.y_m) > 2.8) return {PursuitState::moving, pose, pursuit.steps()};
+    if (std::hypot(pose.x_m, pose.y_m) > 2.8)
+      return {HomingPursuit::State::moving, pose, pursuit.steps()};
   }
 }
 
 TEST(HomingPursuit, ReachesHomeFromAllAroundWhateverTheHeading) {
   for (const auto strategy :
-       {PursuitStrategy::steady, PursuitStrategy::coarse_to_fine, PursuitStrategy::recovering}) {
+       {HomingPursuitOptions::Strategy::steady, HomingPursuitOptions::Strategy::coarse_to_fine,
+        HomingPursuitOptions::Strategy::recovering}) {
     Random random(5);
     int arrived = 0;
     constexpr int starts = 60;
@@ -53,7 +55,7 @@ TEST(HomingPursuit, ReachesHomeFromAllAroundWhateverTheHeading) {
                         random.uniform(-std::numbers::pi, std::numbers::pi)};
       const HomingPursuitOptions options{.strategy = strategy, .typical_distance_m = 3.0};
       const Ended end = run(world, HomingPursuit(seen_from(world, home), options), start);
-      arrived += end.state == PursuitState::arrived &&
+      arrived += end.state == HomingPursuit::State::arrived &&
                  distance(end.pose.position(), home.position()) < 0.05;
     }
     EXPECT_GE(arrived, starts * 9 / 10) << "strategy " << static_cast<int>(strategy);
@@ -66,8 +68,8 @@ TEST(HomingPursuit, StepIsThatOfThePaper) {
   for (const double way_m : {0.1, 0.8}) {
     const HomingView current = seen_from(world, {way_m, 0.0, -1.0});
     const HomeVector vector = home_vector(home, current);
-    const PursuitDecision decision = HomingPursuit(home).decide(current);
-    ASSERT_EQ(decision.state, PursuitState::moving);
+    const HomingPursuit::Decision decision = HomingPursuit(home).decide(current);
+    ASSERT_EQ(decision.state, HomingPursuit::State::moving);
     EXPECT_EQ(decision.turn_rad, vector.direction_rad());
     EXPECT_EQ(decision.advance_m, std::min(0.3, 3.0 * vector.length()));
     EXPECT_EQ(decision.difference, image_difference(home, current));
@@ -80,7 +82,7 @@ TEST(HomingPursuit, EndsThoughTheThingsAroundAreMuchNearerThanAssumed) {
   const Pose2 home{0.2, 0.1, 1.0};
   const HomingPursuitOptions far{.typical_distance_m = 9.0, .max_step_m = 2.0};
   const Ended end = run(world, HomingPursuit(seen_from(world, home), far), {0.5, -0.1, 2.0});
-  EXPECT_EQ(end.state, PursuitState::arrived);
+  EXPECT_EQ(end.state, HomingPursuit::State::arrived);
   EXPECT_LT(distance(end.pose.position(), home.position()), 0.1);
   EXPECT_LT(end.steps, 30);
 }
@@ -93,11 +95,12 @@ TEST(HomingPursuit, NoticesAWrongPlace) {
     const ToyWorld world = striped_round_room(3.0, seed);
     const ToyWorld other = striped_round_room(3.0, seed + 1000);
     const HomingView home = seen_from(other, {0.1, 0.2, 0.0});
-    EXPECT_EQ(run(other, HomingPursuit(home, strict), {0.4, 0.0, 0.0}).state, PursuitState::arrived)
+    EXPECT_EQ(run(other, HomingPursuit(home, strict), {0.4, 0.0, 0.0}).state,
+              HomingPursuit::State::arrived)
         << "seed " << seed;
     const Ended end = run(world, HomingPursuit(home, strict), {0.4, 0.0, 0.0});
-    EXPECT_NE(end.state, PursuitState::arrived) << "seed " << seed;
-    stopped += end.state == PursuitState::wrong_place;
+    EXPECT_NE(end.state, HomingPursuit::State::arrived) << "seed " << seed;
+    stopped += end.state == HomingPursuit::State::wrong_place;
   }
   EXPECT_GT(stopped, 0);
 }
@@ -107,9 +110,9 @@ TEST(HomingPursuit, StopsAtOnceAtHomeAndStaysStopped) {
   const HomingView home = seen_from(world, {});
   HomingPursuit pursuit(home);
   for (int i = 0; i < 3; ++i) {
-    const PursuitDecision decision =
+    const HomingPursuit::Decision decision =
         pursuit.decide(i < 2 ? home : seen_from(world, {0.8, 0.2, 1.0}));
-    EXPECT_EQ(decision.state, PursuitState::arrived);
+    EXPECT_EQ(decision.state, HomingPursuit::State::arrived);
     EXPECT_EQ(decision.advance_m, 0.0);
     if (i < 2) {
       EXPECT_NEAR(decision.difference, 0.0, 1e-5);
@@ -122,26 +125,27 @@ TEST(HomingPursuit, GivesUpAfterTheMostSteps) {
   const ToyWorld world = striped_round_room(3.0, 10);
   HomingPursuit pursuit(seen_from(world, {}), {.max_steps = 3});
   const HomingView stuck = seen_from(world, {0.9, 0.0, 0.0});
-  for (int i = 0; i < 3; ++i) EXPECT_EQ(pursuit.decide(stuck).state, PursuitState::moving);
-  EXPECT_EQ(pursuit.decide(stuck).state, PursuitState::exhausted);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(pursuit.decide(stuck).state, HomingPursuit::State::moving);
+  EXPECT_EQ(pursuit.decide(stuck).state, HomingPursuit::State::exhausted);
 }
 
 TEST(HomingPursuit, StopsWhereViewsBecomeNoMoreAlike) {
   const ToyWorld world = striped_round_room(3.0, 10);
-  HomingPursuit pursuit(seen_from(world, {}), {.strategy = PursuitStrategy::steady, .patience = 3});
+  HomingPursuit pursuit(seen_from(world, {}),
+                        {.strategy = HomingPursuitOptions::Strategy::steady, .patience = 3});
   const HomingView stuck = seen_from(world, {0.9, 0.0, 0.0});
-  for (int i = 0; i < 3; ++i) EXPECT_EQ(pursuit.decide(stuck).state, PursuitState::moving);
-  EXPECT_EQ(pursuit.decide(stuck).state, PursuitState::wrong_place);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(pursuit.decide(stuck).state, HomingPursuit::State::moving);
+  EXPECT_EQ(pursuit.decide(stuck).state, HomingPursuit::State::wrong_place);
 }
 
 TEST(HomingPursuit, CoarseToFineGoesThroughItsStages) {
   const ToyWorld world = striped_round_room(3.0, 11);
   const HomingView home = seen_from(world, {});
-  HomingPursuit pursuit(home, {.strategy = PursuitStrategy::coarse_to_fine});
+  HomingPursuit pursuit(home, {.strategy = HomingPursuitOptions::Strategy::coarse_to_fine});
   EXPECT_EQ(pursuit.decide(seen_from(world, {0.8, 0.1, 0.0})).stage, 0);
-  const PursuitDecision last = pursuit.decide(home);
+  const HomingPursuit::Decision last = pursuit.decide(home);
   EXPECT_EQ(last.stage, 2);
-  EXPECT_EQ(last.state, PursuitState::arrived);
+  EXPECT_EQ(last.state, HomingPursuit::State::arrived);
 }
 
 TEST(HomingPursuit, ChecksItsInputs) {

@@ -54,7 +54,7 @@ TEST(HomingSurvey, PerfectVectorsLeadHomeFromEverywhereWhateverTheHeadings) {
   const auto areas = mean_catchment_areas(distances, poses.size(), std::array{0.0, 0.1});
   EXPECT_EQ(areas[0], 108.0);
   EXPECT_EQ(areas[1], 108.0);
-  EXPECT_NEAR(mean_homeward(survey, 1.0), 1.0, 1e-6);
+  EXPECT_NEAR(mean_homeward_component(survey, 1.0), 1.0, 1e-6);
   const auto bins = homeward_by_distance(survey, spacing_m);
   ASSERT_GT(bins.size(), 3U);
   EXPECT_EQ(bins[0].pairs, 0U);
@@ -71,9 +71,9 @@ TEST(HomingSurvey, HomewardComponentIsTheCosineOfTheError) {
       poses, poses,
       [&](std::size_t g, std::size_t p) { return true_vector(poses[g], poses[p], 0.5, 1.0); }, {},
       executor);
-  EXPECT_NEAR(mean_homeward(survey, 0.5), std::cos(1.0), 1e-6);
+  EXPECT_NEAR(mean_homeward_component(survey, 0.5), std::cos(1.0), 1e-6);
   EXPECT_TRUE(std::isnan(survey.homeward_of(3)[3]));
-  EXPECT_TRUE(std::isnan(mean_homeward(survey, 0.01)));
+  EXPECT_TRUE(std::isnan(mean_homeward_component(survey, 0.01)));
 }
 
 TEST(HomingSurvey, ZeroVectorsStopAndCountAsNoComponent) {
@@ -81,7 +81,7 @@ TEST(HomingSurvey, ZeroVectorsStopAndCountAsNoComponent) {
   Executor executor(1);
   const auto survey = survey_homing(
       poses, poses, [](std::size_t, std::size_t) { return HomeVector{}; }, {}, executor);
-  EXPECT_EQ(mean_homeward(survey, 1.0), 0.0);
+  EXPECT_EQ(mean_homeward_component(survey, 1.0), 0.0);
   const HomingSurvey* const stage = &survey;
   const auto distances = final_distances({&stage, 1}, {}, executor);
   EXPECT_EQ(mean_catchment_areas(distances, poses.size(), std::array{0.0}).at(0), 1.0);
@@ -166,7 +166,7 @@ TEST(HomingSurvey, SameBitsOnAnyNumberOfThreads) {
   const auto b = survey_homing(poses, poses, rule, {}, two);
   EXPECT_EQ(told, 1.0);
   EXPECT_EQ(a.next, b.next);
-  EXPECT_EQ(mean_homeward(a, 0.2), mean_homeward(b, 0.2));
+  EXPECT_EQ(mean_homeward_component(a, 0.2), mean_homeward_component(b, 0.2));
 }
 
 TEST(HomingSurvey, RefusesWhatMakesNoSense) {

@@ -78,16 +78,17 @@ std::vector<Pose2> line() {
 
 /// A run along the line. In pictures 6 to 9 `changed` is seen, whose places are known from the
 /// second run on.
-RunChanges run(const Room& room, const Room* changed, const VisualMemory& memory,
-               const MemoryUse& use, const MemoryUpdateOptions& options = {}, double sure = 1.0) {
+MemoryUpdate::Changes run(const Room& room, const Room* changed, const VisualMemory& memory,
+                          const MemoryUse& use, const MemoryUpdateOptions& options = {},
+                          double sure = 1.0) {
   const ColumnRanking ranking(memory);
   MemoryUpdate update(ranking, learn_observation_model(ranking), use, options);
   const std::vector<Pose2> poses = line();
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const bool is_changed = changed != nullptr && i >= 6 && i < 10;
-    RunView view{Pose2{5.0, 5.0, 2.0} * poses[i],
-                 seen(is_changed ? *changed : room, poses[i], memory), sure, std::nullopt,
-                 std::nullopt};
+    MemoryUpdate::AnsweredView view{Pose2{5.0, 5.0, 2.0} * poses[i],
+                                    seen(is_changed ? *changed : room, poses[i], memory), sure,
+                                    std::nullopt, std::nullopt};
     if (is_changed && use.runs == 0) {
       view.known_probability = 0.0;
     } else {
@@ -99,7 +100,7 @@ RunChanges run(const Room& room, const Room* changed, const VisualMemory& memory
 }
 
 /// Applies what a run changes, as a memory file would.
-MemoryUse apply(const Room& room, const RunChanges& changes, VisualMemory& memory) {
+MemoryUse apply(const Room& room, const MemoryUpdate::Changes& changes, VisualMemory& memory) {
   MemoryUse use = changes.use;
   for (const auto* views : {&changes.replaced, &changes.forgotten}) {
     for (const ViewId view : *views) memory.remove(view);
@@ -116,7 +117,7 @@ MemoryUse apply(const Room& room, const RunChanges& changes, VisualMemory& memor
 
 TEST(MemoryUpdate, WhatIsAsRememberedIsReinforcedAndNothingElseChanges) {
   const RememberedRoom place(31, empty_room, spacing_m);
-  const RunChanges changes = run(place.room, nullptr, place.memory, {});
+  const MemoryUpdate::Changes changes = run(place.room, nullptr, place.memory, {});
   EXPECT_EQ(changes.certain, line().size());
   EXPECT_GE(changes.matched.size(), 8U);
   EXPECT_TRUE(changes.added.empty());
@@ -129,7 +130,7 @@ TEST(MemoryUpdate, AnotherAppearanceStandsBesideTheFormerAndServesTheNextRun) {
   const RememberedRoom place(32, empty_room, spacing_m);
   const Room changed(77, empty_room);
   VisualMemory memory = place.memory;
-  const RunChanges first = run(place.room, &changed, memory, {});
+  const MemoryUpdate::Changes first = run(place.room, &changed, memory, {});
   ASSERT_GE(first.added.size(), 2U);
   EXPECT_LE(first.added.size(), 4U);
   for (const auto& [number, pose] : first.added) {
@@ -144,7 +145,7 @@ TEST(MemoryUpdate, AnotherAppearanceStandsBesideTheFormerAndServesTheNextRun) {
   }
   EXPECT_TRUE(first.replaced.empty());
   MemoryUse use = apply(changed, first, memory);
-  const RunChanges second = run(place.room, &changed, memory, use);
+  const MemoryUpdate::Changes second = run(place.room, &changed, memory, use);
   EXPECT_LE(second.added.size(), 1U);
   const auto matched_learnt = std::ranges::count_if(
       second.matched, [&](ViewId view) { return second.use.views.at(view).learnt; });
@@ -158,7 +159,7 @@ TEST(MemoryUpdate, NothingIsLearntWhereNoPlaceIsKnown) {
   const RememberedRoom place(33, empty_room, spacing_m);
   const Room elsewhere(78, empty_room);
   MemoryUse before;
-  const RunChanges changes = run(elsewhere, nullptr, place.memory, before, {}, 0.89);
+  const MemoryUpdate::Changes changes = run(elsewhere, nullptr, place.memory, before, {}, 0.89);
   EXPECT_EQ(changes.certain, 0U);
   EXPECT_TRUE(changes.added.empty() && changes.matched.empty());
 }
@@ -171,7 +172,8 @@ TEST(MemoryUpdate, SizeIsBoundedAndWhatIsTrueStaysHoweverManyOddRunsCome) {
   std::size_t replaced = 0;
   for (std::uint64_t r = 0; r < 12; ++r) {
     const Room odd(100 + r, empty_room);
-    const RunChanges changes = run(place.room, r % 2 == 0 ? &odd : nullptr, memory, use, options);
+    const MemoryUpdate::Changes changes =
+        run(place.room, r % 2 == 0 ? &odd : nullptr, memory, use, options);
     replaced += changes.replaced.size();
     use = apply(odd, changes, memory);
     EXPECT_LE(memory.size(), 2 * place.memory.size());
@@ -198,7 +200,7 @@ TEST(MemoryUpdate, WhatKeepsFailingIsForgottenOnceAnotherViewOfThePlaceMatches) 
   MemoryUse use;
   std::size_t forgotten = 0;
   for (int r = 0; r < 6; ++r) {
-    const RunChanges changes = run(place.room, &changed, memory, use, {.failures = 3});
+    const MemoryUpdate::Changes changes = run(place.room, &changed, memory, use, {.failures = 3});
     EXPECT_TRUE(r >= 3 || changes.forgotten.empty());
     forgotten += changes.forgotten.size();
     use = apply(changed, changes, memory);
@@ -210,8 +212,8 @@ TEST(MemoryUpdate, WhatKeepsFailingIsForgottenOnceAnotherViewOfThePlaceMatches) 
 TEST(MemoryUpdate, SameRunGivesTheSameChangesAndHoldsAFewPicturesOnly) {
   const RememberedRoom place(36, empty_room, spacing_m);
   const Room changed(80, empty_room);
-  const RunChanges one = run(place.room, &changed, place.memory, {});
-  const RunChanges two = run(place.room, &changed, place.memory, {});
+  const MemoryUpdate::Changes one = run(place.room, &changed, place.memory, {});
+  const MemoryUpdate::Changes two = run(place.room, &changed, place.memory, {});
   EXPECT_EQ(one.matched, two.matched);
   EXPECT_EQ(one.use, two.use);
   ASSERT_EQ(one.added.size(), two.added.size());
@@ -225,7 +227,7 @@ TEST(MemoryUpdate, SameRunGivesTheSameChangesAndHoldsAFewPicturesOnly) {
     update.add({Pose2{0.2 * i, 0.0, 0.0}, view, 0.0, std::nullopt, std::nullopt});
   }
   int wanted = 0;
-  for (std::size_t i = 0; i < 500; ++i) wanted += update.wants(i) ? 1 : 0;
+  for (std::size_t i = 0; i < 500; ++i) wanted += update.can_become_view(i) ? 1 : 0;
   EXPECT_GT(wanted, 0);
   EXPECT_LE(wanted, 65);
   EXPECT_THROW(MemoryUpdate(ranking, learn_observation_model(ranking), {}, {.appearances = 0}),

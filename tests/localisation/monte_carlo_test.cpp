@@ -147,7 +147,8 @@ TEST(MonteCarlo, IsFoundAgainAfterItWasCarriedAway) {
   const RememberedRoom place(74, {}, 0.3);
   const auto ranking = std::make_shared<const ColumnRanking>(place.memory);
   const ObservationModel model = learn_observation_model(*ranking);
-  const auto images_needed = [&](ParticleInjection injection, const InjectionRule& rule) {
+  const auto images_needed = [&](MonteCarloOptions::Injection injection,
+                                 const MonteCarloLocaliser::InjectionRule& rule) {
     std::vector<int> needed;
     for (int seed = 1; seed <= 10; ++seed) {
       const Walk before = walk(place, 6, 200 + static_cast<std::uint64_t>(seed));
@@ -172,15 +173,16 @@ TEST(MonteCarlo, IsFoundAgainAfterItWasCarriedAway) {
   };
   // A tenth of the particles around the references whose dissimilarity is within a quarter of the
   // best [M03 section 4.1].
-  const InjectionRule topological_rule = [&](const PackedSignature& view, std::size_t particles) {
-    InjectedParticles injected;
+  const MonteCarloLocaliser::InjectionRule topological_rule = [&](const PackedSignature& view,
+                                                                  std::size_t particles) {
+    MonteCarloLocaliser::InjectedParticles injected;
     injected.count = static_cast<std::size_t>(std::lround(0.1 * static_cast<double>(particles)));
     const auto levels = place.memory.hierarchy(view, 0.25);
     for (const Match& match : levels.back().candidates) injected.around.push_back(match.view);
     return injected;
   };
-  const auto explained = images_needed(ParticleInjection::explained, {});
-  const auto topological = images_needed(ParticleInjection::none, topological_rule);
+  const auto explained = images_needed(MonteCarloOptions::Injection::explained, {});
+  const auto topological = images_needed(MonteCarloOptions::Injection::none, topological_rule);
   EXPECT_LE(explained[explained.size() / 2], 2);
   EXPECT_LE(explained[explained.size() * 9 / 10 - 1], 8);
   EXPECT_LE(topological[topological.size() / 2], 3);
@@ -228,7 +230,7 @@ TEST(MonteCarlo, KnowsItsHeadingAndPlaceWhenTheyAreTold) {
   const Walk run = walk(place, 2, 7);
   MonteCarloLocaliser filter =
       quick_filter(place.memory, {.min_particles = 300, .max_particles = 300});
-  filter.start_anywhere(0.7);
+  filter.start_globally(0.7);
   for (const double heading_rad : filter.particles().heading_rad) EXPECT_EQ(heading_rad, 0.7);
   filter.start_at(run.poses[0], 0.05, 0.02);
   EXPECT_EQ(filter.particles().size(), 300U);

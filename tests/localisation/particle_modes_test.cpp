@@ -85,7 +85,7 @@ TEST(FindModes, NothingAndNoWeightGiveNoMode) {
   Particles weightless;
   weightless.resize(3);
   EXPECT_TRUE(find_modes(weightless, {}).modes.empty());
-  EXPECT_EQ(spread_of({}), 0.0);
+  EXPECT_EQ(position_spread_m({}), 0.0);
   EXPECT_THROW((void)find_modes({}, {.cell_m = 0.0}), ContractError);
   EXPECT_THROW((void)find_modes({}, {.headings = 0}), ContractError);
 }
@@ -95,7 +95,7 @@ TEST(SpreadOf, IsTheRootMeanSquareDistanceFromTheMean) {
                        .y_m = {0.0, 0.0, 2.0, 2.0},
                        .heading_rad = {0.0, 0.0, 0.0, 0.0},
                        .weight = {0.25, 0.25, 0.25, 0.25}};
-  EXPECT_NEAR(spread_of(four), std::numbers::sqrt2, 1e-12);
+  EXPECT_NEAR(position_spread_m(four), std::numbers::sqrt2, 1e-12);
 }
 
 }  // namespace

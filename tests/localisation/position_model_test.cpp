@@ -48,7 +48,7 @@ TEST(InterpolatedPosition, WeightsSumToOneAndGiveThePosition) {
     ASSERT_TRUE(estimate);
     double sum = 0.0;
     Point2 mean;
-    for (const PositionShare& share : estimate->shares) {
+    for (const PositionEstimate::Share& share : estimate->shares) {
       const Point2 p = place.memory.info(share.view).pose->position();
       sum += share.weight;
       mean = {mean.x_m + share.weight * p.x_m, mean.y_m + share.weight * p.y_m};

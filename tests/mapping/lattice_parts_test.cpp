@@ -21,7 +21,7 @@ namespace {
 
 TEST(DissimilarityCurve, FindsTheCurveThatPairsFollow) {
   Random random(1);
-  std::vector<DissimilarityAtDistance> pairs;
+  std::vector<DissimilarityCurve::Sample> pairs;
   const auto truth = [](double distance) { return 100.0 * (1.0 - std::exp(-distance)); };
   for (int i = 0; i < 4000; ++i) {
     const double distance = random.uniform(0.0, 2.0);
@@ -38,7 +38,7 @@ TEST(DissimilarityCurve, FindsTheCurveThatPairsFollow) {
 
 TEST(DissimilarityCurve, RisesWithErrorAndStiffnessAsInEquation5) {
   Random random(2);
-  std::vector<DissimilarityAtDistance> pairs;
+  std::vector<DissimilarityCurve::Sample> pairs;
   for (int i = 0; i < 3000; ++i) {
     const double distance = random.uniform(0.0, 3.0);
     pairs.push_back(
@@ -62,7 +62,7 @@ TEST(DissimilarityCurve, RisesWithErrorAndStiffnessAsInEquation5) {
 }
 
 TEST(DissimilarityCurve, TakesWhatHasNoExtent) {
-  const std::vector<DissimilarityAtDistance> equal(5, DissimilarityAtDistance{0.0, 0.0});
+  const std::vector<DissimilarityCurve::Sample> equal(5, DissimilarityCurve::Sample{0.0, 0.0});
   const DissimilarityCurve curve(equal, 0.0);
   EXPECT_EQ(curve.distance(0.0), 0.0);
   EXPECT_EQ(curve.stiffness(0.0), 1.0);
@@ -74,7 +74,7 @@ TEST(DissimilarityCurve, RefusesWhatIsNoNumber) {
   EXPECT_THROW((void)DissimilarityCurve({}, 1.0), ContractError);
   EXPECT_THROW((void)DissimilarityCurve{0.0}, ContractError);
   EXPECT_THROW((void)DissimilarityCurve{nan}, ContractError);
-  const std::vector<DissimilarityAtDistance> wrong{{nan, 1.0}};
+  const std::vector<DissimilarityCurve::Sample> wrong{{nan, 1.0}};
   EXPECT_THROW((void)DissimilarityCurve(wrong, 1.0), ContractError);
 }
 
@@ -220,7 +220,7 @@ TEST(LatticeSolver, RefusesWhatIsOutOfRange) {
 /// errors as from phases. The nearer, the less is left unexplained.
 struct TwoHalls {
   std::vector<Pose2> poses;
-  std::vector<LatticeSpring> springs;
+  std::vector<Lattice::Spring> springs;
   static constexpr std::size_t views = 36;  // of each
 
   explicit TwoHalls(std::uint64_t seed) : random(seed) {
@@ -239,7 +239,7 @@ struct TwoHalls {
   }
   void link(std::size_t a, std::size_t b, const Pose2& step, double residual) {
     const Pose2 back = inverse(step);
-    LatticeSpring spring{.a = a, .b = b, .dissimilarity = residual};
+    Lattice::Spring spring{.a = a, .b = b, .dissimilarity = residual};
     spring.phases =
         PhaseReading{.turn_rad = wrap_angle(step.heading_rad + random.normal(0.0, 0.03)),
                      .direction_a_rad = std::atan2(step.y_m, step.x_m) + random.normal(0.0, 0.08),
@@ -277,7 +277,7 @@ TEST(LatticeGrowth, FindsTheShapeAndKeepsWhatOnlyLooksAlikeApart) {
                 0.0, 0.1);
   }
   EXPECT_LT(shape_difference(found, truth).value, 0.01);
-  for (const LatticeSpring& spring : halls.springs) {
+  for (const Lattice::Spring& spring : halls.springs) {
     const bool false_one = spring.a / TwoHalls::views != spring.b / TwoHalls::views;
     EXPECT_EQ(grown.weights.contains({spring.a, spring.b}), !false_one);
   }
@@ -301,8 +301,8 @@ TEST(LatticeGrowth, TheOrderOfViewsDoesNotMatter) {
   halls.link_alike(8);
   const GrownLayout grown = grow_components(halls.poses.size(), halls.springs, 1.0);
   const std::size_t last = halls.poses.size() - 1;
-  std::vector<LatticeSpring> reversed = halls.springs;
-  for (LatticeSpring& spring : reversed) {
+  std::vector<Lattice::Spring> reversed = halls.springs;
+  for (Lattice::Spring& spring : reversed) {
     spring.a = last - spring.a;
     spring.b = last - spring.b;
   }

@@ -372,7 +372,7 @@ TEST(Lattice, AMapOfItHoldsAllNodesAndSprings) {
   EXPECT_NO_THROW(validate(map));
   ASSERT_EQ(map.nodes.size(), lattice.nodes.size());
   ASSERT_EQ(map.edges.size(), lattice.springs.size());
-  EXPECT_EQ(number_of_components(map), lattice.components.size());
+  EXPECT_EQ(count_components(map), lattice.components.size());
   for (std::size_t s = 0; s < map.edges.size(); ++s) {
     const Pose2& a = lattice.nodes[lattice.springs[s].a].pose;
     const Pose2& b = lattice.nodes[lattice.springs[s].b].pose;

@@ -80,7 +80,7 @@ TEST(AlignSessions, FindsHowTwoDrivesInOneRoomLieAndJoinsTheirMaps) {
   const TopologicalMap joined = join_sessions(first, second, *found);
   validate(joined);
   EXPECT_EQ(joined.nodes.size(), first.nodes.size() + second.nodes.size());
-  EXPECT_EQ(number_of_components(joined), 1U);
+  EXPECT_EQ(count_components(joined), 1U);
   double worst_m = 0.0;
   for (std::size_t i = 0; i < joined.nodes.size(); ++i) {
     const Pose2& pose =

@@ -53,7 +53,7 @@ TEST(SparseMemory, EveryDroppedViewHasOneThatStandsForIt) {
     EXPECT_GE(selection.kept.size(), 3U);
     EXPECT_LE(selection.kept.size(), 40U);
     const std::set<ViewId> kept(selection.kept.begin(), selection.kept.end());
-    for (const RedundantView& redundant : selection.redundant) {
+    for (const SparseSelection::Redundant& redundant : selection.redundant) {
       EXPECT_FALSE(kept.contains(redundant.view));
       EXPECT_TRUE(kept.contains(redundant.kept));
       EXPECT_LE(difference_of(memory, redundant.kept, redundant.view), options.max_difference);
@@ -112,7 +112,7 @@ TEST(SparseMemory, NewerViewsReplaceOutdatedOnes) {
   const auto selection =
       select_references(memory, {.max_difference = 0.01, .outdated_within_m = 0.1});
   ASSERT_EQ(selection.redundant.size(), 3U);
-  for (const RedundantView& redundant : selection.redundant) {
+  for (const SparseSelection::Redundant& redundant : selection.redundant) {
     EXPECT_TRUE(redundant.outdated);
     EXPECT_EQ(memory.info(redundant.view).name.substr(0, 3), "old");
     EXPECT_EQ(memory.info(redundant.kept).name.substr(0, 3), "new");

@@ -32,8 +32,8 @@ struct Mapping {
   TopologicalMapper mapper;
   explicit Mapping(const MappingOptions& options = {}) : mapper(memory, options, in_metres) {}
 
-  MapUpdate add(const FourierSignature& signature,
-                const std::optional<Pose2>& moved = std::nullopt) {
+  TopologicalMapper::Update add(const FourierSignature& signature,
+                                const std::optional<Pose2>& moved = std::nullopt) {
     const ViewId view = memory.append(signature, {.name = std::to_string(memory.size())});
     return mapper.add(view, OdometryView(signature), moved);
   }
@@ -86,7 +86,7 @@ TEST(TopologicalMapper, ClosesTheLoopOfASecondRound) {
   EXPECT_EQ(map.nodes.size(), truth.size());
   EXPECT_LE(map.edges.size(), truth.size() - 1 + closures);
   EXPECT_GT(map.edges.size(), truth.size() - 1 + closures / 2);  // most are not refuted
-  EXPECT_EQ(number_of_components(map), 1U);
+  EXPECT_EQ(count_components(map), 1U);
 }
 
 TEST(TopologicalMapper, WheelsSetTheScale) {
@@ -219,13 +219,13 @@ TEST(TopologicalMapper, WhatNothingConnectsBecomesAPartOfItsOwn) {
   for (std::size_t i = 0; i < 60; ++i) mapping.add(round_room_signature(world, truth[i]));
   EXPECT_TRUE(mapping.add(empty_view()).new_component);
   EXPECT_TRUE(mapping.add(round_room_signature(world, truth[60])).new_component);
-  EXPECT_EQ(number_of_components(mapping.mapper.map()), 3U);
+  EXPECT_EQ(count_components(mapping.mapper.map()), 3U);
   EXPECT_EQ(mapping.mapper.map().nodes.back().component, 2U);
   // Wheels bridge what the views do not show.
   Mapping with_wheels;
   with_wheels.add(round_room_signature(world, truth[0]));
   EXPECT_FALSE(with_wheels.add(empty_view(), Pose2{0.1, 0.0, 0.0}).new_component);
-  EXPECT_EQ(number_of_components(with_wheels.mapper.map()), 1U);
+  EXPECT_EQ(count_components(with_wheels.mapper.map()), 1U);
   Mapping bridged({.bridge_m = 0.5});
   bridged.add(round_room_signature(world, truth[0]));
   EXPECT_FALSE(bridged.add(empty_view()).new_component);
@@ -235,7 +235,7 @@ TEST(TopologicalMapper, WhatNothingConnectsBecomesAPartOfItsOwn) {
     mapping.add(round_room_signature(world, truth[i]));
   mapping.mapper.finish();
   const TopologicalMap map = mapping.mapper.map();
-  EXPECT_EQ(number_of_components(map), 2U);
+  EXPECT_EQ(count_components(map), 2U);
   EXPECT_EQ(map.nodes[0].component, map.nodes.back().component);
 }
 

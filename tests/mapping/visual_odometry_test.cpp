@@ -66,7 +66,8 @@ TEST(VisualOdometry, ThereAndBackIsNoMotion) {
 TEST(VisualOdometry, TheSameViewTwiceIsNoMotion) {
   const ToyWorld world = striped_round_room(radius_m, 3);
   const auto view = view_at(world, {0.5, 0.0, 1.0});
-  for (const StepRule rule : {StepRule::published, StepRule::home_vector}) {
+  for (const VisualOdometryOptions::Rule rule :
+       {VisualOdometryOptions::Rule::published, VisualOdometryOptions::Rule::home_vector}) {
     const auto step = visual_step(view, view, {.rule = rule});
     ASSERT_TRUE(step.has_value());
     EXPECT_NEAR(step->length_in_views, 0.0, 1e-6);
@@ -78,7 +79,8 @@ TEST(VisualOdometry, ViewsWithoutStructureShowNoStep) {
   const ToyWorld world = striped_round_room(radius_m, 3);
   const OdometryView nothing(empty_view());
   const auto view = view_at(world, {});
-  for (const StepRule rule : {StepRule::published, StepRule::home_vector}) {
+  for (const VisualOdometryOptions::Rule rule :
+       {VisualOdometryOptions::Rule::published, VisualOdometryOptions::Rule::home_vector}) {
     EXPECT_FALSE(visual_step(nothing, nothing, {.rule = rule}).has_value());
     EXPECT_FALSE(visual_step(view, nothing, {.rule = rule}).has_value());
   }
@@ -99,7 +101,8 @@ TEST(VisualOdometry, FollowsARoundTrip) {
     truth.push_back({1.2 * std::sin(angle), 1.2 - 1.2 * std::cos(angle), wrap_angle(angle)});
   }
   // The published rule knows no direction but ahead; ours needs none.
-  for (const StepRule rule : {StepRule::published, StepRule::home_vector}) {
+  for (const VisualOdometryOptions::Rule rule :
+       {VisualOdometryOptions::Rule::published, VisualOdometryOptions::Rule::home_vector}) {
     VisualOdometry odometry({.rule = rule});
     std::vector<Pose2> found;
     for (const Pose2& pose : truth) {
@@ -107,7 +110,7 @@ TEST(VisualOdometry, FollowsARoundTrip) {
       found.push_back(odometry.pose());
     }
     const double difference = shape_difference(positions(found), positions(truth)).value;
-    EXPECT_LT(difference, rule == StepRule::published ? 0.05 : 0.02);
+    EXPECT_LT(difference, rule == VisualOdometryOptions::Rule::published ? 0.05 : 0.02);
   }
   VisualOdometry sideways;
   std::vector<Pose2> found;

@@ -45,7 +45,7 @@ void expect_partition(const NavigationGraph& graph, const SubAreas& areas) {
   }
   EXPECT_EQ(views, graph.size());
   for (std::size_t p = 0; p < graph.edges().size(); ++p) {
-    const NavigationEdge& edge = graph.edges()[p];
+    const NavigationGraph::Edge& edge = graph.edges()[p];
     const bool crosses =
         areas.area_of[*graph.node_of(edge.a)] != areas.area_of[*graph.node_of(edge.b)];
     EXPECT_EQ(std::ranges::binary_search(areas.gates, p), crosses);
@@ -112,7 +112,7 @@ TEST(SubAreas, DoorsAreNarrowAndOpenBordersAreNot) {
   Random random(1);
   const int side = 8;
   const NavigationGraph graph = rooms_in_a_row(3, side, random);
-  const auto narrow = narrow_places(graph, divide(graph, {.views_per_area = side * side}), 1);
+  const auto narrow = find_narrow_places(graph, divide(graph, {.views_per_area = side * side}), 1);
   for (std::size_t node = 0; node < graph.size(); ++node) {
     const auto column = static_cast<int>(node % side);
     const auto row = static_cast<int>(node / side % side);
@@ -127,7 +127,7 @@ TEST(SubAreas, DoorsAreNarrowAndOpenBordersAreNot) {
   const NavigationGraph open = posed_graph(poses, 1.5, [](Point2, Point2) { return true; });
   const SubAreas areas = divide(open, {.views_per_area = 100});
   ASSERT_GT(areas.nodes.size(), 2U);
-  const auto none = narrow_places(open, areas, 2);
+  const auto none = find_narrow_places(open, areas, 2);
   EXPECT_EQ(std::ranges::count(none, std::uint8_t{0}), 400);
 }
 
@@ -147,7 +147,7 @@ TEST(AreaPlanner, WithAllGatesEveryWayIsAShortestOne) {
         EXPECT_EQ(planner.closed(), shut.size());
       } else if (round == 2) {
         std::ranges::fill(closed, std::uint8_t{0});
-        planner.open_all();
+        planner.unblock_all();
         EXPECT_EQ(planner.closed(), 0U);
       }
       const auto ways = all_ways(graph, closed);
@@ -164,7 +164,7 @@ TEST(AreaPlanner, WithAllGatesEveryWayIsAShortestOne) {
             ++compared;
           }
         }
-        const auto way = planner.planned_way((goal + 40) % graph.size());
+        const auto way = planner.plan_path((goal + 40) % graph.size());
         if (!way.empty()) {
           EXPECT_EQ(way.back(), goal);
         }
@@ -192,7 +192,7 @@ TEST(AreaPlanner, FewGatesReachTheGoalFromEverywhereByWaysHardlyLonger) {
     if (goal == start) continue;
     planner.set_goal(graph.view(goal));
     const auto flat = direction_field(graph, graph.view(goal));
-    const auto way = planner.planned_way(start);
+    const auto way = planner.plan_path(start);
     ASSERT_FALSE(way.empty());
     EXPECT_EQ(way.back(), goal);
     double length = 0.0;
@@ -212,11 +212,11 @@ TEST(AreaPlanner, AClosedDoorIsGoneRoundOrMakesTheGoalUnreachable) {
   const NavigationGraph graph = rooms_in_a_row(3, 5, random);
   AreaPlanner planner(graph, {.areas = {.views_per_area = 25}});
   planner.set_goal(graph.view(graph.size() - 1));
-  ASSERT_FALSE(planner.planned_way(0).empty());
+  ASSERT_FALSE(planner.plan_path(0).empty());
   planner.close(std::vector<std::size_t>{planner.areas().gates.front()});
-  EXPECT_TRUE(planner.planned_way(0).empty());
-  planner.open_all();
-  EXPECT_FALSE(planner.planned_way(0).empty());
+  EXPECT_TRUE(planner.plan_path(0).empty());
+  planner.unblock_all();
+  EXPECT_FALSE(planner.plan_path(0).empty());
   EXPECT_THROW(planner.close(std::vector<std::size_t>{99999}), ContractError);
   EXPECT_THROW(planner.set_goal(ViewId{1}), ContractError);
 }

@@ -36,8 +36,8 @@ ViewId id(std::size_t value) {
 }
 
 // Every third pose of a path, beside it by `lateral_m`; ids descend.
-std::vector<RouteView> views_beside(const std::vector<Pose2>& path, double lateral_m) {
-  std::vector<RouteView> views;
+std::vector<KnownRoute::View> views_beside(const std::vector<Pose2>& path, double lateral_m) {
+  std::vector<KnownRoute::View> views;
   for (std::size_t i = 0; i < path.size(); i += 3) {
     views.push_back({id(path.size() - i), path[i] * Pose2{0.0, lateral_m, 1.0}});
   }
@@ -48,7 +48,7 @@ TEST(KnownRoute, KnowsWhereItsViewsLie) {
   const auto path = curve();
   for (const double lateral_m : {0.0, 0.1, -0.1}) {
     const auto views = views_beside(path, lateral_m);
-    const KnownRoute known = known_route(blank_route(path), views, unlearnt);
+    const KnownRoute known = make_known_route(blank_route(path), views, unlearnt);
     ASSERT_EQ(known.references.size(), views.size());
     for (std::size_t i = 0; i < views.size(); ++i) {
       const auto along_m = known.along_m(views[i].view);
@@ -60,16 +60,16 @@ TEST(KnownRoute, KnowsWhereItsViewsLie) {
     EXPECT_TRUE(known.along_m(id(999)).empty());
   }
   const auto beyond = views_beside(path, 0.5);
-  EXPECT_TRUE(known_route(blank_route(path), beyond, unlearnt).references.empty());
+  EXPECT_TRUE(make_known_route(blank_route(path), beyond, unlearnt).references.empty());
 }
 
 // A way over views of the route in their order is the route between them, and back.
 TEST(KnownRoute, AWayOverItsViewsGoesAlongIt) {
   const auto path = curve();
   const auto views = views_beside(path, 0.0);
-  const KnownRoute known = known_route(blank_route(path), views, unlearnt);
+  const KnownRoute known = make_known_route(blank_route(path), views, unlearnt);
   const std::vector<Pose2> reversed(path.rbegin(), path.rend());
-  const KnownRoute back = known_route(blank_route(reversed), views, unlearnt);
+  const KnownRoute back = make_known_route(blank_route(reversed), views, unlearnt);
   const double length_m = path_length_m(path);
   Random random(3);
   for (int trial = 0; trial < 30; ++trial) {
@@ -100,9 +100,10 @@ TEST(KnownRoute, EndsWhereTheWayGoesAcross) {
   for (const Point2 corner : {Point2{0, 0}, Point2{5, 0}, Point2{5, 2}, Point2{0, 2}}) {
     path.push_back({corner.x_m, corner.y_m, 0.0});
   }
-  const std::vector<RouteView> views{{id(0), {1, 0, 0}}, {id(1), {2, 0, 0}}, {id(2), {3, 0, 0}},
-                                     {id(3), {3, 2, 0}}, {id(4), {2, 2, 0}}, {id(5), {5, 1, 0}}};
-  const KnownRoute known = known_route(blank_route(path), views, unlearnt);
+  const std::vector<KnownRoute::View> views{{id(0), {1, 0, 0}}, {id(1), {2, 0, 0}},
+                                            {id(2), {3, 0, 0}}, {id(3), {3, 2, 0}},
+                                            {id(4), {2, 2, 0}}, {id(5), {5, 1, 0}}};
+  const KnownRoute known = make_known_route(blank_route(path), views, unlearnt);
   const std::vector<ViewId> across{id(0), id(1), id(2), id(3), id(4)};
   const auto stretch = stretch_along(known, known.along_m(id(0)), across);
   ASSERT_TRUE(stretch.has_value());
@@ -119,7 +120,7 @@ TEST(KnownRoute, EndsWhereTheWayGoesAcross) {
 // Of several rounds the one that needs no other is taken, in the direction of the way.
 TEST(KnownRoute, GoesAlongTheRoundThatIsNearest) {
   std::vector<Pose2> path;
-  std::vector<RouteView> views;
+  std::vector<KnownRoute::View> views;
   for (int round = 0; round < 3; ++round) {
     for (int i = 0; i < 24; ++i) {
       const double angle = 2.0 * std::numbers::pi * i / 24.0;
@@ -127,7 +128,7 @@ TEST(KnownRoute, GoesAlongTheRoundThatIsNearest) {
       if (round == 0) views.push_back({id(static_cast<std::size_t>(i)), path.back()});
     }
   }
-  const KnownRoute known = known_route(blank_route(path), views, unlearnt);
+  const KnownRoute known = make_known_route(blank_route(path), views, unlearnt);
   ASSERT_EQ(known.along_m(id(5)).size(), 3U);
   const double part_m = distance(path[0].position(), path[1].position());
   for (const int step : {1, -1}) {
@@ -143,13 +144,14 @@ TEST(KnownRoute, GoesAlongTheRoundThatIsNearest) {
 TEST(KnownRoute, RefusesWhatMakesNoSense) {
   const auto path = curve();
   const RoutePanorama route = blank_route(path);
-  const std::vector<RouteView> twice{{id(1), path[0]}, {id(1), path[1]}};
-  EXPECT_THROW((void)known_route(route, twice, unlearnt), ContractError);
-  const std::vector<RouteView> nowhere{{id(1), {std::numeric_limits<double>::quiet_NaN(), 0, 0}}};
-  EXPECT_THROW((void)known_route(route, nowhere, unlearnt), ContractError);
-  EXPECT_THROW((void)known_route(blank_route({{0, 0, 0}}), {}, unlearnt), ContractError);
-  EXPECT_THROW((void)known_route(route, {}, {.beside_m = 0.0}), OptionError);
-  EXPECT_FALSE(stretch_along(known_route(route, {}, unlearnt), std::vector<double>{0.0},
+  const std::vector<KnownRoute::View> twice{{id(1), path[0]}, {id(1), path[1]}};
+  EXPECT_THROW((void)make_known_route(route, twice, unlearnt), ContractError);
+  const std::vector<KnownRoute::View> nowhere{
+      {id(1), {std::numeric_limits<double>::quiet_NaN(), 0, 0}}};
+  EXPECT_THROW((void)make_known_route(route, nowhere, unlearnt), ContractError);
+  EXPECT_THROW((void)make_known_route(blank_route({{0, 0, 0}}), {}, unlearnt), ContractError);
+  EXPECT_THROW((void)make_known_route(route, {}, {.beside_m = 0.0}), OptionError);
+  EXPECT_FALSE(stretch_along(make_known_route(route, {}, unlearnt), std::vector<double>{0.0},
                              std::vector<ViewId>{id(1)}));
 }
 

@@ -45,7 +45,7 @@ TEST(LargeMemory, EveryPlaceIsFoundWithOneAreaInMemory) {
   Navigator navigator(source, planner);
   navigator.set_goal(graph.view(9999));
   planning.set_goal(graph.view(9999));
-  const auto way = planning.planned_way(0);
+  const auto way = planning.plan_path(0);
   ASSERT_GT(way.size(), 100U);
   std::set<std::size_t> entered;
   for (const std::size_t node : way) {

@@ -34,16 +34,16 @@ struct World {
   World() {
     RoutePanorama route;
     for (const Pose2& pose : path) route.append(pose, two_rooms_line(walls, pose));
-    std::vector<RouteView> views;
+    std::vector<KnownRoute::View> views;
     for (const ViewId view : remembered.memory.views()) {
       views.push_back({view, remembered.pose_of(view)});
     }
-    routes.push_back(
-        known_route(route, views, {.beside_m = beside_m, .tracker = {.min_correlation = 0.7}}));
+    routes.push_back(make_known_route(route, views,
+                                      {.beside_m = beside_m, .tracker = {.min_correlation = 0.7}}));
   }
   [[nodiscard]] Navigator navigator() const {
     Executor executor(1);
-    return {source, AreaPlanner(graph_of_links(source, remembered.memory.links(), executor))};
+    return {source, AreaPlanner(graph_from_links(source, remembered.memory.links(), executor))};
   }
   [[nodiscard]] ViewId view_at(Point2 place) const {
     const auto& poses = remembered.poses;
@@ -52,7 +52,7 @@ struct World {
     return remembered.memory.views()[static_cast<std::size_t>(nearest - poses.begin())];
   }
   [[nodiscard]] double off_m(Point2 place) const {
-    return std::abs(place_on_route(path, place).lateral_m);
+    return std::abs(project_onto_route(path, place).lateral_m);
   }
 };
 

@@ -35,7 +35,7 @@ struct Drive {
 
 AreaPlanner phase_planner(const VisualMemory& memory, int views_per_area = 60) {
   Executor executor(1);
-  return AreaPlanner(graph_of_links(MemoryViewSource(memory), memory.links(), executor),
+  return AreaPlanner(graph_from_links(MemoryViewSource(memory), memory.links(), executor),
                      {.areas = {.views_per_area = views_per_area}});
 }
 
@@ -90,7 +90,7 @@ TEST(Navigator, ArrivesFromAnywhereByPhasesAlone) {
     for (const Link& link : remembered.memory.links()) {
       map.edges.push_back({link.a, link.b, {}, link.kind, 1.0});
     }
-    const NavigationGraph by_positions = graph_of_map(map);
+    const NavigationGraph by_positions = graph_from_map(map);
     Random random(seed, 3);
     for (int i = 0; i < 15; ++i) {
       const ViewId goal = remembered.memory.views()[random.index(remembered.memory.size())];
@@ -192,7 +192,7 @@ TEST(Navigator, ComparesAllComponentsWhereItMatters) {
   const RememberedWorld remembered(world, high, spacing_m, 1);
   const MemoryViewSource source(remembered.memory);
   AreaPlanner planner = phase_planner(remembered.memory);
-  const auto narrow = narrow_places(planner.graph(), planner.areas(), 2);
+  const auto narrow = find_narrow_places(planner.graph(), planner.areas(), 2);
   ASSERT_NE(std::ranges::count(narrow, std::uint8_t{1}), 0);
   Navigator navigator(source, std::move(planner));
   const NavigationGraph& graph = navigator.planner().graph();
@@ -201,7 +201,7 @@ TEST(Navigator, ComparesAllComponentsWhereItMatters) {
   const std::size_t goal = graph.size() - 1;
   navigator.set_goal(graph.view(goal));
   AreaPlanner planning = navigator.planner();
-  const auto way = planning.planned_way(0);
+  const auto way = planning.plan_path(0);
   ASSERT_GT(way.size(), 10U);
   const auto around_goal = nodes_around(graph, {&goal, 1}, 2);
   int coarse = 0;

@@ -25,7 +25,7 @@ namespace panonav::testing {
 namespace {
 
 NavigationGraph graph_of_memory(const VisualMemory& memory, Executor& executor) {
-  return graph_of_links(MemoryViewSource(memory), memory.links(), executor);
+  return graph_from_links(MemoryViewSource(memory), memory.links(), executor);
 }
 
 // A grid in a round room of 3 m, 0.5 m apart, headings at random.
@@ -63,7 +63,7 @@ TEST(NavigationGraph, PhasesAloneTellDirections) {
   const NavigationGraph graph = graph_of_memory(grid.memory, executor);
   ASSERT_EQ(graph.edges().size(), grid.memory.links().size());
   std::size_t told = 0;
-  for (const NavigationEdge& edge : graph.edges()) {
+  for (const NavigationGraph::Edge& edge : graph.edges()) {
     if (!edge.a_from_b) continue;
     ++told;
     const Pose2 truth = inverse(grid.poses[edge.a.value]) * grid.poses[edge.b.value];
@@ -103,22 +103,22 @@ TEST(NavigationGraph, AMapTellsWhatItsPosesTell) {
                            {{ViewId{1}, ViewId{4}, {}, LinkKind::sequence, 1.0},
                             {ViewId{4}, ViewId{6}, {}, LinkKind::closure, 0.05},
                             {ViewId{6}, ViewId{9}, {}, LinkKind::sequence, 1.0}}};
-  const NavigationGraph graph = graph_of_map(map);
+  const NavigationGraph graph = graph_from_map(map);
   ASSERT_EQ(graph.edges().size(), 1U);  // one contradicts the map, one leads to another frame
   EXPECT_NEAR(graph.edges()[0].length, 2.0, 1e-12);
   EXPECT_NEAR(graph.edges()[0].a_from_b->x_m, 2.0 * std::cos(0.3), 1e-12);
   EXPECT_NEAR(graph.edges()[0].a_from_b->y_m, -2.0 * std::sin(0.3), 1e-12);
-  EXPECT_EQ(graph_of_map(map, 0.0).edges().size(), 2U);
+  EXPECT_EQ(graph_from_map(map, 0.0).edges().size(), 2U);
 }
 
 TEST(NavigationGraph, ALatticeGivesLengthsAndPhasesGiveDirections) {
   const Grid grid;
   Executor executor(1);
   const Lattice lattice = arrange(grid.memory, {}, {}, executor);
-  const NavigationGraph graph = graph_of_lattice(lattice);
+  const NavigationGraph graph = graph_from_lattice(lattice);
   ASSERT_GT(graph.edges().size(), 60U);
   int right = 0;
-  for (const NavigationEdge& edge : graph.edges()) {
+  for (const NavigationGraph::Edge& edge : graph.edges()) {
     if (!edge.a_from_b) continue;
     const Pose2 truth = inverse(grid.poses[edge.a.value]) * grid.poses[edge.b.value];
     right += std::abs(angle_difference(std::atan2(edge.a_from_b->y_m, edge.a_from_b->x_m),
@@ -131,17 +131,17 @@ TEST(NavigationGraph, AStoredLatticeSaysTheSameAsTheLattice) {
   const Grid grid;
   Executor executor(1);
   const Lattice lattice = arrange(grid.memory, {}, {}, executor);
-  const NavigationGraph graph = graph_of_lattice(lattice);
+  const NavigationGraph graph = graph_from_lattice(lattice);
   const NavigationGraph stored =
-      graph_of_stored_lattice(map_of(lattice), MemoryViewSource(grid.memory), executor);
+      graph_from_stored_lattice(map_of(lattice), MemoryViewSource(grid.memory), executor);
   ASSERT_EQ(stored.size(), graph.size());
   // Springs may be longer than they came to lie, so the stored lattice has some edges more.
   ASSERT_GE(stored.edges().size(), graph.edges().size() * 9 / 10);
   std::size_t same = 0;
-  for (const NavigationEdge& edge : graph.edges()) {
-    const auto found = std::ranges::find_if(stored.edges(), [&](const NavigationEdge& other) {
-      return other.a == edge.a && other.b == edge.b;
-    });
+  for (const NavigationGraph::Edge& edge : graph.edges()) {
+    const auto found = std::ranges::find_if(
+        stored.edges(),
+        [&](const NavigationGraph::Edge& other) { return other.a == edge.a && other.b == edge.b; });
     if (found == stored.edges().end()) continue;
     const bool both = found->a_from_b && edge.a_from_b;
     if (both) {
@@ -196,9 +196,9 @@ bool has_edge(const NavigationGraph& graph, std::size_t a, std::size_t b) {
 TEST(NavigationGraph, LengthsAreInSpacingsOfTheReferences) {
   Lattice lattice = exact_grid(9, 5);
   add_springs_to_neighbours(lattice, 0, lattice.nodes.size());
-  const NavigationGraph graph = graph_of_lattice(lattice);
+  const NavigationGraph graph = graph_from_lattice(lattice);
   ASSERT_EQ(graph.edges().size(), lattice.springs.size());
-  for (const NavigationEdge& edge : graph.edges()) {
+  for (const NavigationGraph::Edge& edge : graph.edges()) {
     const Pose2 truth =
         inverse(lattice.nodes[edge.a.value].pose) * lattice.nodes[edge.b.value].pose;
     EXPECT_NEAR(edge.length, std::hypot(truth.x_m, truth.y_m), 1e-9);
@@ -219,11 +219,11 @@ TEST(NavigationGraph, LeavesOutEdgesToPlacesThatLookAlike) {
   add_spring(lattice, here, alike, beside.position());
   add_spring(lattice, here + columns, alike + columns, {beside.x_m, beside.y_m + 1.0});
   // They came to lie as near to each other as these springs say.
-  for (LatticeNode& node : lattice.nodes) {
+  for (Lattice::Node& node : lattice.nodes) {
     const auto column = static_cast<double>(node.view.value % columns);
     if (column >= 7.0) node.pose = {14.0 - column, node.pose.y_m, node.pose.heading_rad};
   }
-  const NavigationGraph graph = graph_of_lattice(lattice);
+  const NavigationGraph graph = graph_from_lattice(lattice);
   EXPECT_FALSE(has_edge(graph, here, alike));
   EXPECT_FALSE(has_edge(graph, here + columns, alike + columns));
   // All others, but those that the fold has bent.
@@ -242,7 +242,7 @@ TEST(NavigationGraph, KeepsTheOnlyEdgeBetweenTwoParts) {
   for (const std::size_t beyond : {door + side, door + side + 1}) {
     add_spring(lattice, door, beyond, lattice.nodes[beyond].pose.position());
   }
-  const NavigationGraph graph = graph_of_lattice(lattice);
+  const NavigationGraph graph = graph_from_lattice(lattice);
   EXPECT_TRUE(has_edge(graph, door, door + side));
   EXPECT_FALSE(has_edge(graph, door, door + side + 1));
   const auto guides = direction_field(graph, ViewId{0});
@@ -323,7 +323,7 @@ TEST(AreaViews, HoldsAnAreaAndFindsWhatTheWholeMemoryFinds) {
       }
       const std::size_t one[] = {node};
       EXPECT_EQ(views.nearest(graph, one, view)->node, node);
-      const auto anywhere = search_everywhere(source, graph, areas, seen);
+      const auto anywhere = search_whole_memory(source, graph, areas, seen);
       ASSERT_TRUE(anywhere.has_value());
       EXPECT_LT(distance(grid.poses[anywhere->node].position(), pose.position()), 0.4);
     }
@@ -377,7 +377,7 @@ TEST(AreaViews, FewComponentsReadLess) {
   const MemoryViewSource source(grid.memory);
   Executor executor(1);
   const NavigationGraph graph = graph_of_memory(grid.memory, executor);
-  const SubAreas areas = undivided(graph);
+  const SubAreas areas = make_single_area(graph);
   std::uint64_t read[2] = {0, 0};
   for (const int components : {0, 5}) {
     AreaViews views(source, 0);

@@ -29,7 +29,7 @@ struct RecordedRoute {
   RecordedRoute() {
     path = smooth_path(std::vector<Point2>{{-3, -0.8}, {-1.2, 0.5}, {0.6, -0.3}, {2.8, 0.6}}, 0.1);
     RoutePanorama route;
-    std::vector<RouteView> placed;
+    std::vector<KnownRoute::View> placed;
     for (std::size_t i = 0; i < path.size(); ++i) {
       route.append(path[i], room.line(path[i]));
       if (i % 3 != 0) continue;
@@ -37,7 +37,7 @@ struct RecordedRoute {
       placed.push_back({views.back(), path[i]});
     }
     // Learning it takes longer than the rest.
-    known.push_back(known_route(route, placed, {.tracker = {.min_correlation = 0.7}}));
+    known.push_back(make_known_route(route, placed, {.tracker = {.min_correlation = 0.7}}));
   }
   [[nodiscard]] const Pose2& pose_of(ViewId view) const { return path[3 * view.value]; }
   [[nodiscard]] std::vector<ViewId> way(std::size_t from, std::size_t to) const {
@@ -84,7 +84,7 @@ TEST(RoutePilot, DrivesToTheEndOfTheWayInBothDirections) {
       EXPECT_EQ(pilot.unknown_steps(), 0);
       // From the first half metre on it is on the route.
       if (steps > 2) {
-        EXPECT_LT(std::abs(place_on_route(route.path, robot.pose.position()).lateral_m), 0.05);
+        EXPECT_LT(std::abs(project_onto_route(route.path, robot.pose.position()).lateral_m), 0.05);
       }
     }
     EXPECT_FALSE(pilot.aim().has_value());
@@ -146,7 +146,7 @@ TEST(RoutePilot, CountsStepsWithoutAPlaceOnTheLeg) {
   }
   pilot.track(route.room.line(robot.pose), {});
   EXPECT_EQ(pilot.unknown_steps(), 0);
-  EXPECT_GT(place_on_route(route.path, robot.pose.position()).along_m, 0.6 + 0.5);
+  EXPECT_GT(project_onto_route(route.path, robot.pose.position()).along_m, 0.6 + 0.5);
 }
 
 }  // namespace

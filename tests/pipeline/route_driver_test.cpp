@@ -67,7 +67,7 @@ class RouteDriving : public ::testing::Test {
       read = wheels.advance(moved);
       robot = robot * moved;
       way_m += std::hypot(moved.x_m, moved.y_m);
-      beside_m = std::max(beside_m, std::abs(place_on_route(path, robot.position()).lateral_m));
+      beside_m = std::max(beside_m, std::abs(project_onto_route(path, robot.position()).lateral_m));
       if (carry) carry(i, robot);
     }
     return robot;

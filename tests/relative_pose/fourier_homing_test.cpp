@@ -18,6 +18,10 @@
 namespace panonav::testing {
 namespace {
 
+HeadingWindow heading_window(double middle_rad, double half_width_rad) {
+  return {static_cast<float>(middle_rad), static_cast<float>(half_width_rad)};
+}
+
 constexpr ElevationBand band{-0.6, 0.6};
 
 // What stands on a cylinder of radius 1 m around the place of the home view.
@@ -170,14 +174,14 @@ TEST_P(EveryRule, ViewsWithoutStructureGiveNothingAndNoNaN) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Rules, EveryRule,
-                         ::testing::Values(Rule{"ours", {}}, Rule{"published", published_homing(5)},
-                                           Rule{"published_iterated", published_homing(8, 2)},
-                                           Rule{"rising",
-                                                {.highest = 8, .iterations = 2, .rising = true}},
-                                           Rule{"equal_weights", {.weights = HomingWeights::equal}},
-                                           Rule{"several_starts", {.starting_estimates = 4}}),
-                         [](const auto& rule) { return std::string(rule.param.name); });
+INSTANTIATE_TEST_SUITE_P(
+    Rules, EveryRule,
+    ::testing::Values(Rule{"ours", {}}, Rule{"published", published_homing_options(5)},
+                      Rule{"published_iterated", published_homing_options(8, 2)},
+                      Rule{"rising", {.highest = 8, .iterations = 2, .rising = true}},
+                      Rule{"equal_weights", {.weights = FourierHomingOptions::Weights::equal}},
+                      Rule{"several_starts", {.starting_estimates = 4}}),
+    [](const auto& rule) { return std::string(rule.param.name); });
 
 TEST(FourierHoming, IterationsExplainAFarViewBetter) {
   double residual_once = 0.0;
@@ -188,8 +192,8 @@ TEST(FourierHoming, IterationsExplainAFarViewBetter) {
     const ToyWorld around = random_surroundings(300 + trial);
     const HomingView home = view_of(seen_from(around, 0.0, 0.0, 0.0, 1), 40);
     const HomingView current = view_of(seen_from(around, 0.3, 0.0, 0.0, 1), 40);
-    const HomeVector once = home_vector(home, current, published_homing(8));
-    const HomeVector often = home_vector(home, current, published_homing(8, 4));
+    const HomeVector once = home_vector(home, current, published_homing_options(8));
+    const HomeVector often = home_vector(home, current, published_homing_options(8, 4));
     residual_once += once.residual;
     residual_often += often.residual;
     length_once += std::abs(once.length() - 0.3);
@@ -271,7 +275,8 @@ TEST(FourierHoming, VerticalMotionIsTakenIntoAccount) {
     const HomingView current = view_of(seen_from(around, 0.05, 0.03, 0.0, 24));
     const auto error = [&](bool vertical) {
       const HomeVector v = home_vector(
-          home, current, {.weights = HomingWeights::equal, .vertical_motion = vertical});
+          home, current,
+          {.weights = FourierHomingOptions::Weights::equal, .vertical_motion = vertical});
       return std::hypot(v.xi + 0.05, v.eta + 0.03);
     };
     with += error(true);
@@ -343,22 +348,25 @@ TEST(FourierHoming, ATurnKnownCoarselyTellsAlikeTurnsApart) {
     const HomingView current = view_of(seen_from(around, 0.05, 0.02, 0.3, 1));
     for (int quarter = -1; quarter <= 2; ++quarter) {
       const double middle = -0.3 + quarter * 0.5 * std::numbers::pi;
-      const HomeVector near = home_vector_near(home, current, middle, 0.25 * std::numbers::pi);
+      const HomeVector near =
+          home_vector(home, current, {}, heading_window(middle, 0.25 * std::numbers::pi));
       if (near.residual >= 1.0) continue;
       EXPECT_NEAR(angle_difference(near.heading_rad, middle), 0.0, 0.25 * std::numbers::pi + 0.1);
       ++told_apart;
     }
-    const HomeVector right = home_vector_near(home, current, 0.0, 0.25 * std::numbers::pi);
+    const HomeVector right =
+        home_vector(home, current, {}, heading_window(0.0, 0.25 * std::numbers::pi));
     EXPECT_NEAR(right.heading_rad, -0.3, 0.1);
     // Without bounds it is what `home_vector` finds.
-    EXPECT_EQ(home_vector_near(home, current, 1.0, std::numbers::pi).heading_rad,
+    EXPECT_EQ(home_vector(home, current, {}, heading_window(1.0, std::numbers::pi)).heading_rad,
               home_vector(home, current).heading_rad);
   }
   EXPECT_GE(told_apart, 60);
   const HomingView one = view_of(seen_from(random_surroundings(1), 0, 0, 0, 1));
-  EXPECT_THROW((void)home_vector_near(one, one, NAN, 1.0), ContractError);
-  EXPECT_THROW((void)home_vector_near(one, one, 0.0, 0.0), ContractError);
-  EXPECT_THROW((void)home_vector_near(one, one, 0.0, 1.0, published_homing(3)), ContractError);
+  EXPECT_THROW((void)home_vector(one, one, {}, heading_window(NAN, 1.0)), ContractError);
+  EXPECT_THROW((void)home_vector(one, one, {}, heading_window(0.0, 0.0)), ContractError);
+  EXPECT_THROW((void)home_vector(one, one, published_homing_options(3), heading_window(0.0, 1.0)),
+               ContractError);
 }
 
 // Bounds may hold no turn at which the views correlate: the best one there is taken all the same.
@@ -368,7 +376,7 @@ TEST(FourierHoming, ATurnWithinBoundsMayCorrelateNegatively) {
     const HomingView home = view_of(seen_from(random_surroundings(trial), 0, 0, 0, 1));
     const HomingView current = view_of(seen_from(random_surroundings(trial + 100), 0, 0, 0, 1));
     for (const double middle : {-2.0, 0.0, 2.0}) {
-      const HomeVector near = home_vector_near(home, current, middle, 0.5);
+      const HomeVector near = home_vector(home, current, {}, heading_window(middle, 0.5));
       if (!(near.correlation < 0.0)) continue;
       EXPECT_GT(near.frequencies, 0.0);
       ++negative;
@@ -432,7 +440,7 @@ TEST(ChanceMatch, PicturesOfNothingMatchNoBetterThanNoise) {
     for (std::uint64_t pair = 0; pair < pairs; ++pair) {
       const HomingView a = view_of(picture_of_nothing(kind, 2 * pair + 100));
       const HomingView b = view_of(picture_of_nothing(kind, 2 * pair + 101));
-      known += chance_match(a, b).beyond_chance() ? 1 : 0;
+      known += compare_with_chance(a, b).is_beyond_chance() ? 1 : 0;
       confident += home_vector(a, b).confidence > 0.9 ? 1 : 0;
     }
   }
@@ -450,10 +458,10 @@ TEST(ChanceMatch, ViewsOfOnePlaceAreKnownWhicheverWayTheRobotFaces) {
       const double towards = static_cast<double>(seed);
       const HomingView here = view_of(
           seen_from(around, far * std::cos(towards), far * std::sin(towards), 2.0 * towards, 24));
-      const ChanceMatch match = chance_match(home, here);
-      known += match.beyond_chance() ? 1 : 0;
+      const ChanceMatch match = compare_with_chance(home, here);
+      known += match.is_beyond_chance() ? 1 : 0;
       ++asked;
-      const ChanceMatch turned = chance_match(turn(home, 1.0), turn(here, -2.0));
+      const ChanceMatch turned = compare_with_chance(turn(home, 1.0), turn(here, -2.0));
       EXPECT_NEAR(turned.match, match.match, 2e-3);
       EXPECT_NEAR(turned.chance, match.chance, 2e-2);
     }

@@ -75,7 +75,7 @@ TEST(RelativeTilt, IsFoundWhateverTheHeading) {
     largest_error = std::max({largest_error, std::abs(found.roll_rad - tilt.roll_rad),
                               std::abs(found.pitch_rad - tilt.pitch_rad)});
     // What is left of the difference.
-    const HomingView level = turn(levelled(current, found), -heading);
+    const HomingView level = turn(level_view(current, found), -heading);
     double before = 0.0;
     double after = 0.0;
     const HomingView same = turn(current, -heading);

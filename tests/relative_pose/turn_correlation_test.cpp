@@ -56,9 +56,9 @@ TEST(TurnCorrelation, ATurnThatAllComponentsTellIsFoundByBothRules) {
     const double turned = random.uniform(-3.1, 3.1);
     TurnCorrelation correlation;
     for (int k = 1; k <= 10; ++k) add(correlation, random.uniform(0.01, 1.0), k * turned);
-    EXPECT_LT(error_of(sequential_turn(correlation), turned), 1e-4);
+    EXPECT_LT(error_of(sequential_heading(correlation), turned), 1e-4);
     std::array<float, 1> highest{};
-    ASSERT_EQ(highest_turns(correlation, highest), 1);
+    ASSERT_EQ(find_highest_peaks(correlation, highest), 1);
     EXPECT_LT(error_of(highest[0], turned), 1e-4);
   }
 }
@@ -71,13 +71,13 @@ TEST(SequentialTurn, TriesTheOppositeStartWhenTheFirstComponentIsWeak) {
     return correlation;
   };
   // The rule as printed, without the second start, fails.
-  EXPECT_LT(error_of(sequential_turn(misled_by_first(4e-6)), 0.4), 1e-3);
+  EXPECT_LT(error_of(sequential_heading(misled_by_first(4e-6)), 0.4), 1e-3);
   // A strong first component that is wrong is believed: that is the rule, and why the other is
   // global.
   const TurnCorrelation strong = misled_by_first(0.25);
   std::array<float, 1> highest{};
-  ASSERT_EQ(highest_turns(strong, highest), 1);
-  EXPECT_LE(strong.at(sequential_turn(strong)), strong.at(highest[0]) + 1e-6F);
+  ASSERT_EQ(find_highest_peaks(strong, highest), 1);
+  EXPECT_LE(strong.at(sequential_heading(strong)), strong.at(highest[0]) + 1e-6F);
 }
 
 }  // namespace

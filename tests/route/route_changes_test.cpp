@@ -41,7 +41,7 @@ Named drive(const RouteLines& lines, const ToyWorld& room, Point2 thing,
     named.pictures += ranges.empty() ? 0 : 1;
     const double azimuth =
         std::atan2(thing.y_m - pose.y_m, thing.x_m - pose.x_m) - pose.heading_rad;
-    for (const AzimuthRange& range : ranges) {
+    for (const RouteChanges::AzimuthRange& range : ranges) {
       const double middle = range.from_rad + 0.5 * wrap_angle(range.to_rad - range.from_rad);
       ++named.ranges;
       named.right += std::abs(angle_difference(middle, azimuth)) < radians(40.0) ? 1 : 0;

@@ -41,7 +41,7 @@ TEST(RouteCrossing, IsTheNearestOfAllStretches) {
     const Point2 viewpoint{random.uniform(-3.0, 3.0), random.uniform(-3.0, 3.0)};
     const auto directions = equal_directions(90);
     std::vector<RouteCrossing> crossings(90);
-    cross_route(path, 7, viewpoint, directions, crossings);
+    find_crossings(path, 7, viewpoint, directions, crossings);
     for (std::size_t c = 0; c < directions.size(); ++c) {
       double nearest = std::numeric_limits<double>::infinity();
       double along = -1.0;
@@ -75,7 +75,7 @@ TEST(RouteCrossing, ChangesWithTheViewpointAsItSays) {
   const auto directions = equal_directions(72);
   const auto at = [&](Point2 viewpoint) {
     std::vector<RouteCrossing> crossings(72);
-    cross_route(path, 0, viewpoint, directions, crossings);
+    find_crossings(path, 0, viewpoint, directions, crossings);
     return crossings;
   };
   constexpr double step = 1e-3;

@@ -39,7 +39,7 @@ inline NavigationGraph graph_of_rooms() {
     return (x / room_width == to_x / room_width || door_across) &&
            (y / room_height == to_y / room_height || door_along);
   };
-  std::vector<NavigationEdge> edges;
+  std::vector<NavigationGraph::Edge> edges;
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       for (const auto& [dx, dy] : {std::pair{1, 0}, {0, 1}, {1, 1}, {-1, 1}}) {

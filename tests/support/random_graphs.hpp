@@ -24,7 +24,7 @@ inline std::vector<ViewId> numbered_views(std::size_t count) {
 inline NavigationGraph random_graph(std::size_t nodes, std::size_t edges, std::uint64_t seed) {
   Random random(seed);
   const auto views = numbered_views(nodes);
-  std::vector<NavigationEdge> made;
+  std::vector<NavigationGraph::Edge> made;
   for (std::size_t i = 0; i < edges; ++i) {
     const std::size_t a = random.index(nodes);
     const std::size_t b = random.index(nodes);
@@ -38,7 +38,7 @@ inline NavigationGraph random_graph(std::size_t nodes, std::size_t edges, std::u
 template <class Sees>
 NavigationGraph posed_graph(const std::vector<Pose2>& poses, double reach_m, const Sees& sees) {
   const auto views = numbered_views(poses.size());
-  std::vector<NavigationEdge> made;
+  std::vector<NavigationGraph::Edge> made;
   for (std::size_t a = 0; a < poses.size(); ++a) {
     for (std::size_t b = a + 1; b < poses.size(); ++b) {
       const double length = distance(poses[a].position(), poses[b].position());
@@ -57,7 +57,7 @@ inline std::vector<double> all_ways(const NavigationGraph& graph,
   for (std::size_t i = 0; i < n; ++i) ways[i * n + i] = 0.0;
   for (std::size_t p = 0; p < graph.edges().size(); ++p) {
     if (!closed.empty() && closed[p] != 0) continue;
-    const NavigationEdge& edge = graph.edges()[p];
+    const NavigationGraph::Edge& edge = graph.edges()[p];
     const std::size_t a = *graph.node_of(edge.a);
     const std::size_t b = *graph.node_of(edge.b);
     ways[a * n + b] = std::min(ways[a * n + b], edge.length);

@@ -74,7 +74,7 @@ viewer::UnfoldingMap map_of_growth(const Lattice& arranged, const VisualMemory& 
                                    const std::vector<Growth>& growth, std::uint64_t seed) {
   std::vector<Point2> truth;
   std::vector<Point2> ends;
-  for (const LatticeNode& node : arranged.nodes) {
+  for (const Lattice::Node& node : arranged.nodes) {
     truth.push_back(office.info(node.view).pose->position());
     ends.push_back(node.pose.position());
   }
@@ -108,7 +108,7 @@ viewer::UnfoldingMap map_of_growth(const Lattice& arranged, const VisualMemory& 
                           .layers = coloured(positions, truth)});
   }
   viewer::MapLayer springs{.label = "springs", .colour = viewer::PlotColour::light_grey};
-  for (const LatticeSpring& spring : arranged.springs) {
+  for (const Lattice::Spring& spring : arranged.springs) {
     if (spring.weight >= min_spring_weight)
       springs.lines.push_back({ends[spring.a], ends[spring.b]});
   }

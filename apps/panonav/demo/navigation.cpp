@@ -37,7 +37,7 @@ using Pipeline = std::shared_ptr<const ViewEncoder>;
 
 simulation::RememberedPlace remembered_place(const VisualMemory& memory, const Lattice& arranged,
                                              double spacing_m) {
-  simulation::RememberedPlace remembered{memory, graph_of_lattice(arranged), {}, spacing_m};
+  simulation::RememberedPlace remembered{memory, graph_from_lattice(arranged), {}, spacing_m};
   for (const ViewId view : remembered.graph.views()) {
     const ReferencePose& pose = *memory.info(view).pose;
     remembered.truth.push_back({pose.x_m, pose.y_m, *pose.heading_rad});
@@ -75,7 +75,7 @@ std::optional<ScreenedMission> screened_mission(const simulation::MissionPlace& 
     });
     planner.set_goal(mission.goal);
     const auto way =
-        planner.planned_way(static_cast<std::size_t>(nearest - remembered.truth.begin()));
+        planner.plan_path(static_cast<std::size_t>(nearest - remembered.truth.begin()));
     if (way.size() < 4) continue;
     const Point2 before = remembered.truth[way[way.size() / 2 - 1]].position();
     const Point2 behind = remembered.truth[way[way.size() / 2]].position();
@@ -198,7 +198,7 @@ viewer::RunPage played_run(const simulation::MissionPlace& place,
                .heading_rad;
       if (!planned) {  // the page shows one plan: that of the start
         for (const std::size_t node :
-             planner.planned_way(*remembered.graph.node_of(*decision.nearest))) {
+             planner.plan_path(*remembered.graph.node_of(*decision.nearest))) {
           moment.plan.push_back(remembered.truth[node]);
         }
         planned = true;

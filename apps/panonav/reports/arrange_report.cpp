@@ -19,15 +19,15 @@ using Springs = std::vector<std::pair<std::size_t, std::size_t>>;
 /// Those that hold, at most two of each view where there are many.
 Springs shown_springs(const Lattice& lattice) {
   constexpr std::size_t many = 1500;
-  std::vector<const LatticeSpring*> all;
-  for (const LatticeSpring& spring : lattice.springs) {
+  std::vector<const Lattice::Spring*> all;
+  for (const Lattice::Spring& spring : lattice.springs) {
     if (spring.weight >= 0.25) all.push_back(&spring);
   }
   const bool thin = all.size() > many;
   if (thin) std::ranges::stable_sort(all, {}, [](const auto* spring) { return spring->length; });
   std::vector<int> of(lattice.nodes.size(), 0);
   Springs shown;
-  for (const LatticeSpring* spring : all) {
+  for (const Lattice::Spring* spring : all) {
     if (thin && of[spring->a] >= 2 && of[spring->b] >= 2) continue;
     ++of[spring->a];
     ++of[spring->b];
@@ -117,7 +117,7 @@ viewer::UnfoldingMap LatticeSteps::unfold(const Lattice& lattice,
         laid_over(steps_[i].poses, steps_[i].components, end), steps_[i].components);
   }
   std::vector<std::size_t> components;
-  for (const LatticeNode& node : lattice.nodes) components.push_back(node.component);
+  for (const Lattice::Node& node : lattice.nodes) components.push_back(node.component);
   add("the arrangement", end, components);
   return map;
 }

@@ -21,7 +21,7 @@ struct Known {
 
 Known known_of(const Lattice& lattice, const VisualMemory& memory) {
   Known known;
-  for (const LatticeNode& node : lattice.nodes) {
+  for (const Lattice::Node& node : lattice.nodes) {
     const auto& pose = memory.info(node.view).pose;
     if (node.component != 0 || !pose) continue;
     known.arranged.push_back(node.pose.position());
@@ -34,7 +34,7 @@ Known known_of(const Lattice& lattice, const VisualMemory& memory) {
 viewer::MapLayer springs_between(const Lattice& lattice,
                                  const std::vector<std::optional<Point2>>& positions) {
   viewer::MapLayer layer{.label = "springs", .colour = viewer::PlotColour::light_grey};
-  for (const LatticeSpring& spring : lattice.springs) {
+  for (const Lattice::Spring& spring : lattice.springs) {
     const auto& a = positions[spring.a];
     const auto& b = positions[spring.b];
     if (spring.weight >= 0.25 && a && b) layer.lines.push_back({*a, *b});
@@ -85,7 +85,7 @@ std::vector<std::optional<Point2>> places_of(const Lattice& lattice, const Visua
         align(known.arranged, known.truth, {.allow_scale = true, .allow_reflection = true});
   }
   std::vector<std::optional<Point2>> places;
-  for (const LatticeNode& node : lattice.nodes) {
+  for (const Lattice::Node& node : lattice.nodes) {
     places.emplace_back();
     if (node.component == 0) places.back() = truth_from_lattice.apply(node.pose.position());
   }
@@ -100,7 +100,7 @@ std::vector<viewer::MapPlot> lattice_plots(const Lattice& lattice, const VisualM
     return {map};
   }
   std::vector<std::optional<Point2>> truth;
-  for (const LatticeNode& node : lattice.nodes) {
+  for (const Lattice::Node& node : lattice.nodes) {
     truth.emplace_back();
     const auto& pose = memory.info(node.view).pose;
     if (node.component == 0 && pose) truth.back() = pose->position();

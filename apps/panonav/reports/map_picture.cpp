@@ -130,7 +130,7 @@ void write_map_report(const std::filesystem::path& folder, const std::string& na
   std::vector<std::pair<std::string, std::string>> figures{
       {std::to_string(run.map.nodes.size()), "places"},
       {std::to_string(closures), "closures: places that were passed again"}};
-  const std::size_t components = number_of_components(run.map);
+  const std::size_t components = count_components(run.map);
   if (components > 1) {
     figures.emplace_back(std::to_string(components),
                          "connected components; the largest one is drawn");

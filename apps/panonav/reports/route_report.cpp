@@ -173,7 +173,7 @@ std::vector<viewer::RouteMark> marks_of(const std::vector<FollowedImage>& images
     viewer::RouteMark& mark = marks.emplace_back();
     if (image.fix) mark.along_m = image.fix->along_m;
     if (image.true_place) mark.true_along_m = image.true_place->along_m;
-    for (const AzimuthRange& range : image.changed) {
+    for (const RouteChanges::AzimuthRange& range : image.changed) {
       mark.changed_deg.emplace_back(degrees(range.from_rad), degrees(range.to_rad));
     }
   }

@@ -56,12 +56,12 @@ std::vector<CoarseMotion> motions_of(const ArrangeArguments& wanted, const Pictu
 /// Poses of the largest component in the order of the views; the stamp is the view's, or its
 /// number.
 std::vector<StampedPose> trajectory_of(const Lattice& lattice, const VisualMemory& memory) {
-  const auto has_stamp = [&](const LatticeNode& node) {
+  const auto has_stamp = [&](const Lattice::Node& node) {
     return memory.info(node.view).stamp_s.has_value();
   };
   const bool stamped = std::ranges::all_of(lattice.nodes, has_stamp);
   std::vector<StampedPose> trajectory;
-  for (const LatticeNode& node : lattice.nodes) {
+  for (const Lattice::Node& node : lattice.nodes) {
     if (node.component != 0) continue;
     trajectory.push_back(
         {stamped ? *memory.info(node.view).stamp_s : static_cast<double>(node.view.value),
@@ -94,12 +94,12 @@ ordered_json as_json(const LatticeComparison& comparison) {
 ordered_json as_json(const ArrangeArguments& wanted, const Lattice& lattice,
                      const VisualMemory& memory) {
   auto components = ordered_json::array();
-  for (const LatticeComponent& component : lattice.components) {
+  for (const Lattice::Component& component : lattice.components) {
     components.push_back(
         {{"views", component.views}, {"handedness_known", component.handedness_known}});
   }
   auto nodes = ordered_json::array();
-  for (const LatticeNode& node : lattice.nodes) {
+  for (const Lattice::Node& node : lattice.nodes) {
     nodes.push_back({{"view", node.view.value},
                      {"file", memory.info(node.view).name},
                      {"connected_component", node.component},

@@ -74,7 +74,7 @@ void follow(RouteFollower& follower, const Dataset& run, const std::vector<Pose2
                   const auto& route = follower.tracker().lines().poses();
                   if (!truth.empty()) {
                     image.truth = truth[index];
-                    image.true_place = place_on_route(route, truth[index].position());
+                    image.true_place = project_onto_route(route, truth[index].position());
                   }
                   if (image.moment) {
                     describe(*image.moment, image);

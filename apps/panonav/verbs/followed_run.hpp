@@ -23,11 +23,11 @@ struct FollowedImage {
   std::size_t index = 0;  ///< in the data set, from 0
   std::string file;
   std::optional<double> stamp_s;
-  std::vector<float> line;            ///< what was seen
-  std::optional<RouteFix> fix;        ///< empty: not on this route
-  std::vector<AzimuthRange> changed;  ///< where the scene is not as remembered
-  std::optional<Pose2> truth;         ///< in the route's frame, where it is known
-  std::optional<RoutePlace> true_place;
+  std::vector<float> line;                          ///< what was seen
+  std::optional<RouteFix> fix;                      ///< empty: not on this route
+  std::vector<RouteChanges::AzimuthRange> changed;  ///< where the scene is not as remembered
+  std::optional<Pose2> truth;                       ///< in the route's frame, where it is known
+  std::optional<RoutePosition> true_place;
   std::optional<recordings::RunMoment>
       moment;  ///< what was seen and said, where a record is wanted
 };

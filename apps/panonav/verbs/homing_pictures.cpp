@@ -25,7 +25,8 @@ void declare_homing(Arguments& arguments, HomingArguments& wanted) {
   arguments.used_only(
       {"--rising"}, [&wanted] { return wanted.homing.iterations > 0; }, "without --iterations");
   arguments.used_only(
-      {"--starting-estimates"}, [&wanted] { return wanted.homing.turn == TurnEstimate::global; },
+      {"--starting-estimates"},
+      [&wanted] { return wanted.homing.turn == FourierHomingOptions::TurnEstimate::global; },
       "with --turn sequential");
   arguments.used_only(
       rise, [&wanted] { return !wanted.views.horizon; }, "with --horizon");
@@ -42,7 +43,7 @@ FourierHomingOptions homing_options(const Arguments& arguments, const HomingArgu
       throw UsageError("--published sets '" + std::string(name) +
                        "' itself; leave one of them out");
     }
-    options = published_homing(*wanted.published, wanted.homing.iterations);
+    options = published_homing_options(*wanted.published, wanted.homing.iterations);
   }
   const int most = components - 2;
   if (most < 1) throw ContractError("components", components, ">= 3, for homing");

@@ -36,7 +36,7 @@ struct LocaliseArguments {
   std::vector<std::string> inputs;
   PictureArguments pictures;
   LocaliserOptions localiser;
-  WantedAccuracy accuracy;
+  LocalisationAccuracy accuracy;
   std::optional<std::uint64_t> turn_seed;
   bool exclude_same_file = false;
   bool learn = false;

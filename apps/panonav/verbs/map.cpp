@@ -64,7 +64,7 @@ std::vector<StampedPose> trajectory_of(const Dataset& recording, const MappedRun
 }
 
 std::vector<std::size_t> component_sizes(const TopologicalMap& map) {
-  std::vector<std::size_t> sizes(number_of_components(map), 0);
+  std::vector<std::size_t> sizes(count_components(map), 0);
   for (const MapNode& node : map.nodes) ++sizes[node.component];
   return sizes;
 }
@@ -370,11 +370,11 @@ Run declare_map(Arguments& arguments) {
       "with --close-loops false");
   arguments.used_only(
       {"--distance-components", "--turn-components"},
-      [wanted] { return wanted->mapper.odometry.rule == StepRule::published; },
+      [wanted] { return wanted->mapper.odometry.rule == VisualOdometryOptions::Rule::published; },
       "without --rule published");
   arguments.used_only(
       {"--iterations", "--nearer-side"},
-      [wanted] { return wanted->mapper.odometry.rule == StepRule::home_vector; },
+      [wanted] { return wanted->mapper.odometry.rule == VisualOdometryOptions::Rule::home_vector; },
       "with --rule published");
   return [wanted, &arguments](Session& session) { return map(arguments, *wanted, session); };
 }

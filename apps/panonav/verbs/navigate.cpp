@@ -281,7 +281,7 @@ class MissionMoments {
     std::vector<Pose2> way;
     const auto node = robot_.graph().node_of(view);
     if (!node) return way;
-    for (const std::size_t next : robot_.planner().planned_way(*node)) {
+    for (const std::size_t next : robot_.planner().plan_path(*node)) {
       const Pose2& pose = remembered_.truth[next];
       if (is_known(pose)) way.push_back({pose.x_m, pose.y_m, 0.0});
     }
@@ -498,10 +498,12 @@ Run declare_navigate(Arguments& arguments) {
       "with --route-levels 1");
   const auto& homing = wanted->mission.navigator.homing;
   arguments.used_only(
-      {"--coarse", "--middle"}, [&homing] { return homing.strategy != PursuitStrategy::steady; },
+      {"--coarse", "--middle"},
+      [&homing] { return homing.strategy != HomingPursuitOptions::Strategy::steady; },
       "with --strategy steady");
   arguments.used_only(
-      {"--fine"}, [&homing] { return homing.strategy == PursuitStrategy::coarse_to_fine; },
+      {"--fine"},
+      [&homing] { return homing.strategy == HomingPursuitOptions::Strategy::coarse_to_fine; },
       "without --strategy coarse_to_fine");
   return [wanted, &arguments](Session& session) { return navigate(arguments, *wanted, session); };
 }

@@ -34,7 +34,7 @@ std::vector<Pose2> true_poses(const NavigationGraph& graph, const MemoryFile& fi
 /// Median length of the edges between views whose places are known; 0 without any.
 double spacing_of(const NavigationGraph& graph, const std::vector<Pose2>& truth) {
   std::vector<double> lengths;
-  for (const NavigationEdge& edge : graph.edges()) {
+  for (const NavigationGraph::Edge& edge : graph.edges()) {
     const double length = distance(truth[*graph.node_of(edge.a)].position(),
                                    truth[*graph.node_of(edge.b)].position());
     if (std::isfinite(length)) lengths.push_back(length);

@@ -85,7 +85,7 @@ ExitCode prune(const Arguments& arguments, const PruneArguments& wanted, Session
   std::vector<ViewId> dropped;
   std::vector<std::string> names;
   std::size_t outdated = 0;
-  for (const RedundantView& redundant : selection.redundant) {
+  for (const SparseSelection::Redundant& redundant : selection.redundant) {
     dropped.push_back(redundant.view);
     names.push_back(memory.info(redundant.view).name);
     outdated += redundant.outdated ? 1 : 0;

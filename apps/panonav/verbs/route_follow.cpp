@@ -61,7 +61,7 @@ ordered_json as_json(const FollowedImage& image, bool headings_known) {
     json["covariance"] = fix.covariance;
     json["columns"] = fix.columns;
   }
-  for (const AzimuthRange& range : image.changed) {
+  for (const RouteChanges::AzimuthRange& range : image.changed) {
     json["changed"].push_back({{"from_rad", range.from_rad}, {"to_rad", range.to_rad}});
   }
   if (image.truth) {
@@ -84,7 +84,7 @@ std::string as_text(const FollowedImage& image, Session& session) {
                      " degrees  along " + format_fixed(image.fix->along_m, 3) + " m  beside " +
                      format_fixed(image.fix->lateral_m, 3) + " m  correlation " +
                      format_fixed(fix.correlation, 3);
-  for (const AzimuthRange& range : image.changed) {
+  for (const RouteChanges::AzimuthRange& range : image.changed) {
     line += "  changed at " + format_fixed(degrees(range.from_rad), 0) + " to " +
             format_fixed(degrees(range.to_rad), 0) + " degrees";
   }

@@ -123,7 +123,7 @@ void start(Tracker& tracker, const TrackArguments& wanted) {
     tracker.start_at({*wanted.start_x_m, *wanted.start_y_m, heading_rad}, wanted.start.deviation_m,
                      radians(wanted.start.heading_deviation_deg));
   } else {
-    tracker.start_anywhere(heading_rad);
+    tracker.start_globally(heading_rad);
   }
 }
 

@@ -50,11 +50,11 @@ HomingPursuit::HomingPursuit(HomingView home, const HomingPursuitOptions& option
 // Whether there is a further stage after homing stopped in this one.
 bool HomingPursuit::goes_on(double difference) const noexcept {
   switch (options_.strategy) {
-    case PursuitStrategy::steady:
+    case HomingPursuitOptions::Strategy::steady:
       return false;
-    case PursuitStrategy::coarse_to_fine:
+    case HomingPursuitOptions::Strategy::coarse_to_fine:
       return stage_ + 1 < stages_of_coarse_to_fine;
-    case PursuitStrategy::recovering:
+    case HomingPursuitOptions::Strategy::recovering:
       return difference > options_.arrived_difference && stage_ + 1 < stages_of_recovering;
   }
   return false;
@@ -63,10 +63,10 @@ bool HomingPursuit::goes_on(double difference) const noexcept {
 FourierHomingOptions HomingPursuit::vector_of_stage(const HomingView& current) const {
   FourierHomingOptions vector = vector_;
   int highest = 0;
-  if (options_.strategy == PursuitStrategy::coarse_to_fine) {
+  if (options_.strategy == HomingPursuitOptions::Strategy::coarse_to_fine) {
     highest = std::array{options_.coarse, options_.middle,
                          options_.fine}[static_cast<std::size_t>(stage_)];
-  } else if (options_.strategy == PursuitStrategy::recovering) {
+  } else if (options_.strategy == HomingPursuitOptions::Strategy::recovering) {
     highest = std::array{0, options_.coarse, options_.middle, 0}[static_cast<std::size_t>(stage_)];
   }
   if (highest > 0) {
@@ -84,14 +84,14 @@ HomingView HomingPursuit::tilted_as_at_home(const HomingView& seen) const {
     const HomeVector vector = home_vector(home_, level, vector_);
     const Tilt tilt = relative_tilt(home_, seen, vector.heading_rad);
     if (tilt == Tilt{}) return seen;
-    level = levelled(seen, tilt);
+    level = level_view(seen, tilt);
   }
   return level;
 }
 
-PursuitDecision HomingPursuit::decide(const HomingView& seen) {
+HomingPursuit::Decision HomingPursuit::decide(const HomingView& seen) {
   const HomingView current = vector_.tilt && home_.elevations() ? tilted_as_at_home(seen) : seen;
-  PursuitDecision decision;
+  HomingPursuit::Decision decision;
   decision.difference = image_difference(home_, current);
   ++steps_since_min_;
   if (decision.difference < min_difference_) {
@@ -116,14 +116,14 @@ PursuitDecision HomingPursuit::decide(const HomingView& seen) {
     const bool stops = vector.length() < options_.stop_length ||
                        decision.advance_m < options_.min_step_m ||
                        steps_since_min_ >= options_.patience;
-    if (state_ == PursuitState::moving && !stops && steps_ >= options_.max_steps) {
-      state_ = PursuitState::exhausted;
+    if (state_ == HomingPursuit::State::moving && !stops && steps_ >= options_.max_steps) {
+      state_ = HomingPursuit::State::exhausted;
     }
-    if (state_ == PursuitState::moving && !stops) {
+    if (state_ == HomingPursuit::State::moving && !stops) {
       ++steps_;
       return decision;
     }
-    if (state_ == PursuitState::moving && goes_on(decision.difference)) {
+    if (state_ == HomingPursuit::State::moving && goes_on(decision.difference)) {
       ++stage_;
       min_difference_ = decision.difference;
       steps_since_min_ = 0;
@@ -131,9 +131,10 @@ PursuitDecision HomingPursuit::decide(const HomingView& seen) {
       direction_in_home_rad_.reset();
       continue;
     }
-    if (state_ == PursuitState::moving) {
-      state_ = decision.difference <= options_.arrived_difference ? PursuitState::arrived
-                                                                  : PursuitState::wrong_place;
+    if (state_ == HomingPursuit::State::moving) {
+      state_ = decision.difference <= options_.arrived_difference
+                   ? HomingPursuit::State::arrived
+                   : HomingPursuit::State::wrong_place;
     }
     decision.state = state_;
     decision.advance_m = 0.0;

@@ -8,21 +8,21 @@
 
 namespace panonav {
 
-/// Which frequencies are used at which stage of a run home.
-enum class PursuitStrategy {
-  steady,          ///< as the options of the home vector say, all the way
-  coarse_to_fine,  ///< few frequencies first; when homing stops, more [S06 section 5]
-  /// Ours: steady. Where homing stops and the difference of the views says that this is not home,
-  /// coarse to fine from there, and at last once more as the options say. The home vector weights
-  /// frequencies by their coherence, so a wrong end is mostly a place too far from home for any but
-  /// the lowest ones.
-  recovering,
-};
-
 /// How a run home goes, and when it ends.
 struct HomingPursuitOptions {
+  /// Which frequencies are used at which stage of a run home.
+  enum class Strategy {
+    steady,          ///< as the options of the home vector say, all the way
+    coarse_to_fine,  ///< few frequencies first; when homing stops, more [S06 section 5]
+    /// Ours: steady. Where homing stops and the difference of the views says that this is not home,
+    /// coarse to fine from there, and at last once more as the options say. The home vector weights
+    /// frequencies by their coherence, so a wrong end is mostly a place too far from home for any
+    /// but the lowest ones.
+    recovering,
+  };
+
   /// Which frequencies count at which stage.
-  PursuitStrategy strategy = PursuitStrategy::recovering;
+  Strategy strategy = Strategy::recovering;
   /// Highest frequencies of the stages of coarse_to_fine [S06 figure 13]; the first two count for
   /// `recovering`, too. Where the views have fewer, all that they have.
   int coarse = 2;
@@ -45,24 +45,6 @@ struct HomingPursuitOptions {
 };
 void visit_options(HomingPursuitOptions& options, OptionVisitor& visitor);
 
-/// How far a run home has come.
-enum class PursuitState {
-  moving,       ///< another step is made
-  arrived,      ///< homing stopped, and the place looks like home
-  wrong_place,  ///< homing stopped, and the place does not look like home
-  exhausted,    ///< the most steps were made
-};
-
-/// The next motion of the robot after a view.
-struct PursuitDecision {
-  PursuitState state = PursuitState::moving;  ///< whether to go on
-  double turn_rad = 0.0;    ///< direction in which to go, in the current robot frame
-  double advance_m = 0.0;   ///< how far; 0 unless moving
-  HomeVector vector;        ///< on which the decision rests
-  int stage = 0;            ///< counts changes of the frequencies
-  double difference = 1.0;  ///< of the views, by `image_difference`
-};
-
 /// The run home of S06 section 3: one view in, one step out. Direction by the home vector, length
 /// min(l_max, R_typ length) [S06 section 3, step 3]. Where R is not what was assumed, or with
 /// noise, that alone oscillates around the goal. The step is therefore halved when a vector opposes
@@ -72,6 +54,23 @@ struct PursuitDecision {
 /// turns and drives, a holonomic one drives sideways, and the heading does not matter.
 class HomingPursuit {
  public:
+  /// How far a run home has come.
+  enum class State {
+    moving,       ///< another step is made
+    arrived,      ///< homing stopped, and the place looks like home
+    wrong_place,  ///< homing stopped, and the place does not look like home
+    exhausted,    ///< the most steps were made
+  };
+  /// The next motion of the robot after a view.
+  struct Decision {
+    State state = State::moving;  ///< whether to go on
+    double turn_rad = 0.0;        ///< direction in which to go, in the current robot frame
+    double advance_m = 0.0;       ///< how far; 0 unless moving
+    HomeVector vector;            ///< on which the decision rests
+    int stage = 0;                ///< counts changes of the frequencies
+    double difference = 1.0;      ///< of the views, by `image_difference`
+  };
+
   /// Throws OptionError.
   explicit HomingPursuit(HomingView home, const HomingPursuitOptions& options = {},
                          const FourierHomingOptions& vector = {});
@@ -79,7 +78,7 @@ class HomingPursuit {
   /// With the option `tilt` of the home vector and known elevations, the tilt of the robot against
   /// the one at home is found and taken out first (`relative_tilt`). Throws ContractError as
   /// `home_vector`. After a decision that stops, further ones do too.
-  [[nodiscard]] PursuitDecision decide(const HomingView& seen);
+  [[nodiscard]] Decision decide(const HomingView& seen);
 
   /// The view at home, as it was given.
   [[nodiscard]] const HomingView& home() const noexcept { return home_; }
@@ -99,7 +98,7 @@ class HomingPursuit {
   std::optional<double> direction_in_home_rad_;  // of the step before
   double min_difference_ = 2.0;                  // of the stage
   int steps_since_min_ = 0;
-  PursuitState state_ = PursuitState::moving;
+  State state_ = State::moving;
 };
 
 }  // namespace panonav

@@ -135,9 +135,9 @@ HomingSurvey survey_homing(std::span<const Pose2> goals, std::span<const Pose2> 
   return survey;
 }
 
-std::vector<HomewardBin> homeward_by_distance(const HomingSurvey& survey, double bin_m) {
+std::vector<HomingSurvey::Bin> homeward_by_distance(const HomingSurvey& survey, double bin_m) {
   require(bin_m > 0.0, "bin_m", bin_m, "> 0");
-  std::vector<HomewardBin> bins;
+  std::vector<HomingSurvey::Bin> bins;
   for (std::size_t g = 0; g < survey.goals.size(); ++g) {
     const auto homeward = survey.homeward_of(g);
     for (std::size_t p = 0; p < homeward.size(); ++p) {
@@ -157,7 +157,7 @@ std::vector<HomewardBin> homeward_by_distance(const HomingSurvey& survey, double
   return bins;
 }
 
-double mean_homeward(const HomingSurvey& survey, double max_m) {
+double mean_homeward_component(const HomingSurvey& survey, double max_m) {
   double sum = 0.0;
   std::size_t pairs = 0;
   for (std::size_t g = 0; g < survey.goals.size(); ++g) {

@@ -27,6 +27,13 @@ void visit_options(HomingSurveyOptions& options, OptionVisitor& visitor);
 
 /// What a rule does at every place for every goal.
 struct HomingSurvey {
+  /// The average homeward component over the pairs of a range of distances [S06 eq. 48].
+  struct Bin {
+    double distance_m = 0.0;  ///< middle of the bin
+    std::size_t pairs = 0;    ///< pairs of a place and a goal in the bin
+    double component = 0.0;   ///< mean cosine, -1 .. 1; NaN without pairs
+  };
+
   std::vector<Pose2> goals;   ///< where the home views were taken
   std::vector<Pose2> places;  ///< where the current views were taken, and where runs may stand
   /// For each goal one number per place: the place to which the step leads, the place itself where
@@ -57,20 +64,13 @@ using SurveyProgress = std::function<void(double fraction)>;
                                          const HomingSurveyOptions& options, Executor& executor,
                                          const SurveyProgress& progress = {});
 
-/// The average homeward component over the pairs of a range of distances [S06 eq. 48].
-struct HomewardBin {
-  double distance_m = 0.0;  ///< middle of the bin
-  std::size_t pairs = 0;    ///< pairs of a place and a goal in the bin
-  double component = 0.0;   ///< mean cosine, -1 .. 1; NaN without pairs
-};
-
 /// Bin i holds the distances within half a bin of i `bin_m`; so places on a grid of this spacing
 /// fall into the middle of bins. Throws ContractError unless bin_m > 0.
-[[nodiscard]] std::vector<HomewardBin> homeward_by_distance(const HomingSurvey& survey,
-                                                            double bin_m = 0.025);
+[[nodiscard]] std::vector<HomingSurvey::Bin> homeward_by_distance(const HomingSurvey& survey,
+                                                                  double bin_m = 0.025);
 
 /// Over all pairs above 0 and up to `max_m`; NaN when there is none.
-[[nodiscard]] double mean_homeward(const HomingSurvey& survey, double max_m);
+[[nodiscard]] double mean_homeward_component(const HomingSurvey& survey, double max_m);
 
 /// Where runs to the goal end that start at each place. With several stages a run goes on with the
 /// next one where the last has stopped [S06 section 5]: surveys of the same goals and places.

@@ -36,8 +36,8 @@ bool FeatureTrial::is_significantly_better() const {
   return changed > 0 && sum * std::pow(0.5, changed) <= 0.05;
 }
 
-FeatureTrial try_features(const ColumnRanking& ranking, const NeighbourSupport& support,
-                          const FeatureSource& features) {
+FeatureTrial evaluate_features(const ColumnRanking& ranking, const NeighbourSupport& support,
+                               const FeatureSource& features) {
   constexpr int max_sampled = 100;  // views left out in turn; chosen: 3 ms each
   // Up to this ratio of its distance to that of the nearest view, a match is right. Chosen.
   constexpr double right_ratio = 1.5;

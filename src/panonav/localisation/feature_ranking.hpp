@@ -48,8 +48,8 @@ struct FeatureTrial {
 /// are far apart they do, between neighbours 0.3 m apart columns are right already. 100 views are
 /// left out, at most, or all; the nearest view is the one at the smallest distance, or the next in
 /// the order of appending where views have no positions. Cost: 3 ms for each view left out.
-[[nodiscard]] FeatureTrial try_features(const ColumnRanking& ranking,
-                                        const NeighbourSupport& support,
-                                        const FeatureSource& features);
+[[nodiscard]] FeatureTrial evaluate_features(const ColumnRanking& ranking,
+                                             const NeighbourSupport& support,
+                                             const FeatureSource& features);
 
 }  // namespace panonav

@@ -72,8 +72,8 @@ std::optional<Circle> ReferenceAreas::enclosing_circle(std::span<const Match> vi
   return circle;
 }
 
-void visit_options(WantedAccuracy& accuracy, OptionVisitor& visitor) {
-  using T = WantedAccuracy;
+void visit_options(LocalisationAccuracy& accuracy, OptionVisitor& visitor) {
+  using T = LocalisationAccuracy;
   constexpr OptionTable table{
       option<&T::components>("Fourier components compared at most, 0 for all", 0),
       option<&T::radius_m>("stop as soon as the place is known to this radius, 0 for never", 0),
@@ -86,7 +86,7 @@ void visit_options(WantedAccuracy& accuracy, OptionVisitor& visitor) {
 std::vector<LocalisationLevel> localise_hierarchically(const VisualMemory& memory,
                                                        const ReferenceAreas& areas,
                                                        const PackedSignature& query,
-                                                       const WantedAccuracy& accuracy,
+                                                       const LocalisationAccuracy& accuracy,
                                                        const SearchMask& mask) {
   validate(accuracy);
   std::vector<LocalisationLevel> levels;

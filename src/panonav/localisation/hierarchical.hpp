@@ -45,6 +45,6 @@ class ReferenceAreas {
 /// ContractError on a query of another shape.
 [[nodiscard]] std::vector<LocalisationLevel> localise_hierarchically(
     const VisualMemory& memory, const ReferenceAreas& areas, const PackedSignature& query,
-    const WantedAccuracy& accuracy = {}, const SearchMask& mask = {});
+    const LocalisationAccuracy& accuracy = {}, const SearchMask& mask = {});
 
 }  // namespace panonav

@@ -28,7 +28,7 @@ class Localiser {
             const PositionModel& position_model, const LocaliserOptions& options = {},
             std::optional<double> spacing_m = std::nullopt);
   /// For a memory that is not held, with models learnt before. `drawn`: those of its views that
-  /// `drawn_views` draws. Throws as above.
+  /// `draw_views` draws. Throws as above.
   Localiser(std::shared_ptr<const VisualMemory> drawn, const PlaceModel& place_model,
             const PositionModel& position_model, const LocaliserOptions& options, double spacing_m);
 

@@ -16,12 +16,12 @@ struct LocaliserOptions {
 void visit_options(LocaliserOptions& options, OptionVisitor& visitor);
 
 /// Where to stop.
-struct WantedAccuracy {
+struct LocalisationAccuracy {
   int components = 0;     ///< at most so many, 0: the memory's
   double radius_m = 0.0;  ///< stop as soon as the circle is no larger; 0: never on this account
   double tolerance =
       0.0;  ///< candidates are kept up to (1 + tolerance) times the best dissimilarity
 };
-void visit_options(WantedAccuracy& accuracy, OptionVisitor& visitor);
+void visit_options(LocalisationAccuracy& accuracy, OptionVisitor& visitor);
 
 }  // namespace panonav

@@ -122,7 +122,7 @@ std::optional<PoseWitness> MemoryUpdate::Picture::witness() const {
   return PoseWitness{view.odometry, *view.pose, view.radius_m.value_or(0.0), 0.0};
 }
 
-void MemoryUpdate::add(RunView view) {
+void MemoryUpdate::add(MemoryUpdate::AnsweredView view) {
   const std::size_t number = count_++;
   double travelled_m = 0.0;
   if (!pictures_.empty()) {
@@ -211,14 +211,14 @@ void MemoryUpdate::decide(std::size_t index) {
   if ((!explained || !is_sure) && !is_learnt) chosen_.push_back({picture.number, *pose, explained});
 }
 
-bool MemoryUpdate::wants(std::size_t number) const {
+bool MemoryUpdate::can_become_view(std::size_t number) const {
   for (std::size_t i = undecided_; i < pictures_.size(); ++i) {
     if (pictures_[i].number == number) return true;
   }
   return std::ranges::any_of(chosen_, [&](const Chosen& c) { return c.number == number; });
 }
 
-bool MemoryUpdate::near_known_places() const {
+bool MemoryUpdate::is_near_known_place() const {
   if (pictures_.empty()) return false;
   const double from_m = pictures_.back().travelled_m - witness_reach_spacings * use_.spacing_m;
   return std::ranges::any_of(pictures_, [&](const Picture& picture) {
@@ -229,20 +229,20 @@ bool MemoryUpdate::near_known_places() const {
 bool MemoryUpdate::is_less_useful(ViewId a, ViewId b) const {
   const auto rank = [&](ViewId view) {
     const auto found = use_.views.find(view);
-    const ViewUse use = found == use_.views.end() ? ViewUse{} : found->second;
+    const MemoryUse::View use = found == use_.views.end() ? MemoryUse::View{} : found->second;
     return std::tuple(!(use.learnt && use.matched == 0), -use.failed, use.last_run, use.matched,
                       view);
   };
   return rank(a) < rank(b);
 }
 
-RunChanges MemoryUpdate::finish() {
+MemoryUpdate::Changes MemoryUpdate::finish() {
   decide_ready(true);
-  RunChanges changes;
+  MemoryUpdate::Changes changes;
   changes.certain = certain_;
   changes.matched.assign(matched_.begin(), matched_.end());
   for (const ViewId view : matched_) {
-    ViewUse& use = use_.views[view];
+    MemoryUse::View& use = use_.views[view];
     ++use.matched;
     use.failed = 0;
     use.last_run = use_.runs;
@@ -285,7 +285,7 @@ RunChanges MemoryUpdate::finish() {
         {chosen.number, {chosen.pose.x_m, chosen.pose.y_m, chosen.pose.heading_rad}});
   }
   for (const ViewId view : dropped) use_.views.erase(view);
-  std::ranges::sort(changes.added, {}, &RunChanges::Added::number);
+  std::ranges::sort(changes.added, {}, &MemoryUpdate::Changes::Added::number);
   std::ranges::sort(changes.replaced);
   changes.use = std::move(use_);
   return changes;

@@ -23,18 +23,18 @@ struct MemoryUpdateOptions {
 };
 void visit_options(MemoryUpdateOptions& options, OptionVisitor& visitor);
 
-/// How useful a view has been.
-struct ViewUse {
-  int matched = 0;      ///< runs in which it explained what a robot saw at its place
-  int failed = 0;       ///< runs in a row in which it did not and another view of the place did
-  int last_run = 0;     ///< in which it matched or was learnt; 0: none
-  bool learnt = false;  ///< by an update
-  friend bool operator==(const ViewUse&, const ViewUse&) = default;
-};
-
 /// What updates of a memory know of the runs before. Plain numbers, so that they can be kept beside
 /// the memory.
 struct MemoryUse {
+  /// How useful a view has been.
+  struct View {
+    int matched = 0;      ///< runs in which it explained what a robot saw at its place
+    int failed = 0;       ///< runs in a row in which it did not and another view of the place did
+    int last_run = 0;     ///< in which it matched or was learnt; 0: none
+    bool learnt = false;  ///< by an update
+    friend bool operator==(const View&, const View&) = default;
+  };
+
   int runs = 0;  ///< that the memory was updated by
   /// Of the memory before its first update: appearances of a place make references seem nearer to
   /// each other and less alike than places are. 0 before that.
@@ -43,33 +43,9 @@ struct MemoryUse {
   double range_m = 0.0;         ///< of the same memory, as `ObservationModel` has it
   /// Views of the memory before its first update, and of places that came later.
   int places = 0;
-  int size = 0;                     ///< views of the memory after the last update
-  std::map<ViewId, ViewUse> views;  ///< those that have been used
+  int size = 0;                  ///< views of the memory after the last update
+  std::map<ViewId, View> views;  ///< those that have been used
   friend bool operator==(const MemoryUse&, const MemoryUse&) = default;
-};
-
-/// One picture of a run, as a `Localiser` answered it by the memory that the run began with.
-struct RunView {
-  Pose2 odometry;                  ///< absolute, in its own frame
-  PackedSignature signature;       ///< of the picture, as the memory compares it
-  double known_probability = 0.0;  ///< of the answer
-  std::optional<Pose2> pose;       ///< of the answer; empty where position or heading is not known
-  std::optional<double> radius_m;  ///< of 95 %, of the position
-};
-
-/// What a run changes in its memory.
-struct RunChanges {
-  /// A picture of the run that becomes a view.
-  struct Added {
-    std::size_t number = 0;  ///< of the picture in the run
-    ReferencePose pose;      ///< where it certainly was taken, with its heading
-  };
-  std::vector<Added> added;       ///< ascending
-  std::vector<ViewId> replaced;   ///< dropped for an added one; ascending
-  std::vector<ViewId> forgotten;  ///< dropped because others have long been better; ascending
-  std::vector<ViewId> matched;    ///< ascending
-  std::size_t certain = 0;        ///< pictures whose place was certain
-  MemoryUse use;                  ///< to keep; knows nothing yet of what is added, nor the new size
 };
 
 /// Where a robot certainly was when it took a picture: by the answers to *other* pictures of the
@@ -111,26 +87,50 @@ struct PoseWitness {
 /// changes.
 class MemoryUpdate {
  public:
+  /// One picture of a run, as a `Localiser` answered it by the memory that the run began with.
+  struct AnsweredView {
+    Pose2 odometry;                  ///< absolute, in its own frame
+    PackedSignature signature;       ///< of the picture, as the memory compares it
+    double known_probability = 0.0;  ///< of the answer
+    std::optional<Pose2> pose;  ///< of the answer; empty where position or heading is not known
+    std::optional<double> radius_m;  ///< of 95 %, of the position
+  };
+
+  /// What a run changes in its memory.
+  struct Changes {
+    /// A picture of the run that becomes a view.
+    struct Added {
+      std::size_t number = 0;  ///< of the picture in the run
+      ReferencePose pose;      ///< where it certainly was taken, with its heading
+    };
+    std::vector<Added> added;       ///< ascending
+    std::vector<ViewId> replaced;   ///< dropped for an added one; ascending
+    std::vector<ViewId> forgotten;  ///< dropped because others have long been better; ascending
+    std::vector<ViewId> matched;    ///< ascending
+    std::size_t certain = 0;        ///< pictures whose place was certain
+    MemoryUse use;  ///< to keep; knows nothing yet of what is added, nor the new size
+  };
+
   /// `ranking` and its memory must outlive *this and not change. Throws OptionError.
   MemoryUpdate(const ColumnRanking& ranking, const ObservationModel& model, MemoryUse use = {},
                const MemoryUpdateOptions& options = {});
 
   /// The next picture; its number is the count of those before. One that lies less than a quarter
   /// of a spacing from the one before tells nothing new and is left out.
-  void add(RunView view);
+  void add(AnsweredView view);
   /// Whether the picture may still be added to the memory: it waits for a decision or was chosen.
-  [[nodiscard]] bool wants(std::size_t number) const;
+  [[nodiscard]] bool can_become_view(std::size_t number) const;
   /// The last picture lies within the reach of a sure answer before it, so that it may become
   /// certain.
-  [[nodiscard]] bool near_known_places() const;
+  [[nodiscard]] bool is_near_known_place() const;
   /// Decides what still waits. Nothing may be added afterwards.
-  [[nodiscard]] RunChanges finish();
+  [[nodiscard]] Changes finish();
 
  private:
   struct Picture {
     std::size_t number = 0;
     double travelled_m = 0.0;
-    RunView view;
+    AnsweredView view;
     [[nodiscard]] std::optional<PoseWitness> witness() const;
   };
   struct Chosen {

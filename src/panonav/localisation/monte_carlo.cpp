@@ -78,7 +78,7 @@ struct MonteCarloLocaliser::Implementation {
   ViewLikelihood likelihood;
   PoseSampler sampler;
   ParticleWeighing weighing;
-  InjectionRule injection_rule;  // empty: none but the filter's own
+  MonteCarloLocaliser::InjectionRule injection_rule;  // empty: none but the filter's own
   Random random;
   Particles particles;
   double travelled_m = 0.0;  // since the last image
@@ -207,7 +207,7 @@ void MonteCarloLocaliser::Implementation::compare_around_best() {
 void MonteCarloLocaliser::Implementation::inject_by_rule(const PackedSignature& view) {
   if (!injection_rule) return;
   const std::size_t size = particles.size();
-  const InjectedParticles wanted = injection_rule(view, size);
+  const MonteCarloLocaliser::InjectedParticles wanted = injection_rule(view, size);
   std::vector<std::uint32_t> sites;
   for (const ViewId around : wanted.around) {
     if (const auto site = likelihood.site_of(around)) sites.push_back(*site);
@@ -232,7 +232,7 @@ void MonteCarloLocaliser::Implementation::inject_by_rule(const PackedSignature& 
 }
 
 void MonteCarloLocaliser::Implementation::inject_explained() {
-  if (options.injection != ParticleInjection::explained) return;
+  if (options.injection != MonteCarloOptions::Injection::explained) return;
   ExplainedInjection injection(likelihood, sampler, model, options.compass);
   if (!injection.find_places(particles, random)) return;
   latest.log_there = injection.log_evidence();
@@ -245,7 +245,7 @@ void MonteCarloLocaliser::Implementation::inject_explained() {
 // Updates the belief in being inside by how much better the view is explained than by chance.
 void MonteCarloLocaliser::Implementation::update_inside() {
   double evidence = latest.log_here;
-  if (options.injection == ParticleInjection::explained) {
+  if (options.injection == MonteCarloOptions::Injection::explained) {
     evidence = std::max(evidence, latest.log_there + std::log(p_kidnap));
   }
   // Where nothing is known yet, a view like one of the memory's speaks for being inside.
@@ -283,7 +283,7 @@ void MonteCarloLocaliser::Implementation::describe(MonteCarloEstimate& estimate,
         error.stated(mode.covariance, mode.mean.heading_rad, odometry.translation_scale_error);
     mode.spread_m = std::sqrt(mode.covariance[0] + mode.covariance[4]);
   }
-  estimate.spread_m = spread_of(particles);
+  estimate.spread_m = position_spread_m(particles);
   estimate.inside = inside;
   estimate.probability = found.modes.empty() ? 0.0 : inside * found.modes.front().weight;
   estimate.state = LocalisationState::lost;
@@ -325,7 +325,7 @@ MonteCarloLocaliser::MonteCarloLocaliser(const VisualMemory& memory,
   auto ranking = std::make_shared<const ColumnRanking>(memory, 0);
   const ObservationModel model = learn_observation_model(*ranking, {.seed = options.seed});
   implementation_ = std::make_unique<Implementation>(ranking, model, options, odometry);
-  start_anywhere();
+  start_globally();
 }
 
 MonteCarloLocaliser::MonteCarloLocaliser(std::shared_ptr<const ColumnRanking> ranking,
@@ -334,18 +334,18 @@ MonteCarloLocaliser::MonteCarloLocaliser(std::shared_ptr<const ColumnRanking> ra
                                          const OdometryNoise& odometry)
     : implementation_(
           std::make_unique<Implementation>(std::move(ranking), model, options, odometry)) {
-  start_anywhere();
+  start_globally();
 }
 
 MonteCarloLocaliser::~MonteCarloLocaliser() = default;
 MonteCarloLocaliser::MonteCarloLocaliser(MonteCarloLocaliser&&) noexcept = default;
 MonteCarloLocaliser& MonteCarloLocaliser::operator=(MonteCarloLocaliser&&) noexcept = default;
 
-void MonteCarloLocaliser::set_injection_rule(InjectionRule rule) {
+void MonteCarloLocaliser::set_injection_rule(MonteCarloLocaliser::InjectionRule rule) {
   implementation_->injection_rule = std::move(rule);
 }
 
-void MonteCarloLocaliser::start_anywhere(std::optional<double> heading_rad) {
+void MonteCarloLocaliser::start_globally(std::optional<double> heading_rad) {
   auto& own = *implementation_;
   const auto count = static_cast<std::size_t>(own.options.max_particles);
   own.particles.resize(count);

@@ -17,31 +17,22 @@
 
 namespace panonav {
 
-/// Particle injection: how many particles are replaced at each image, so that a kidnapped robot is
-/// found again, and where the new ones are drawn.
-enum class ParticleInjection {
-  none,       ///< none
-  explained,  ///< as many as the view is better explained elsewhere than where the particles are
-};
-
-/// What a rule of particle injection asks for at an image.
-struct InjectedParticles {
-  std::size_t count = 0;       ///< replaced by new ones
-  std::vector<ViewId> around;  ///< references around which these are drawn; empty: anywhere
-};
-/// A rule of particle injection: from the image's signature and the number of particles.
-using InjectionRule =
-    std::function<InjectedParticles(const PackedSignature& view, std::size_t particles)>;
-
 /// How many particles there are, and how they are weighed and renewed.
 struct MonteCarloOptions {
+  /// Particle injection: how many particles are replaced at each image, so that a kidnapped robot
+  /// is found again, and where the new ones are drawn.
+  enum class Injection {
+    none,       ///< none
+    explained,  ///< as many as the view is better explained elsewhere than where the particles are
+  };
+
   int min_particles = 200;      ///< fewest, >= 1, also in one narrow mode
   int max_particles = 5000;     ///< most, when the robot may be anywhere
   double kld_error = 0.05;      ///< allowed between the particles' distribution and the true one
   double resample_below = 0.5;  ///< effective sample size, share of the particles
   bool compass = true;          ///< the visual compass weighs headings too
   /// How particles come to where the robot was carried.
-  ParticleInjection injection = ParticleInjection::explained;
+  Injection injection = Injection::explained;
   int reranked_views = 1000;  ///< compared column by column when no near view explains the picture
   int seed = 1;               ///< of all random choices, >= 0
 };
@@ -77,7 +68,8 @@ struct MonteCarloEstimate {
   std::optional<double> difference_here;
   std::optional<double> difference_anywhere;  ///< to those anywhere
   /// Log-likelihood of the view relative to that of a view that nothing explains: where the
-  /// particles were, and anywhere in the memory (only with `ParticleInjection::explained`).
+  /// particles were, and anywhere in the memory (only with
+  /// `MonteCarloOptions::Injection::explained`).
   double log_here = 0.0;
   double log_there = 0.0;  ///< anywhere in the memory
   /// Belief that the robot is in the memorised area, 0 .. 1; lost below one half.
@@ -97,6 +89,15 @@ struct MonteCarloEstimate {
 /// Runs in the calling thread. Same memory, options and calls: same bits.
 class MonteCarloLocaliser {
  public:
+  /// What a rule of particle injection asks for at an image.
+  struct InjectedParticles {
+    std::size_t count = 0;       ///< replaced by new ones
+    std::vector<ViewId> around;  ///< references around which these are drawn; empty: anywhere
+  };
+  /// A rule of particle injection: from the image's signature and the number of particles.
+  using InjectionRule =
+      std::function<InjectedParticles(const PackedSignature& view, std::size_t particles)>;
+
   /// Starts anywhere in the memorised area, with any heading. The memory must outlive *this and
   /// must not change. Throws OptionError; ContractError as `learn_observation_model`.
   explicit MonteCarloLocaliser(const VisualMemory& memory, const MonteCarloOptions& options = {},
@@ -114,7 +115,7 @@ class MonteCarloLocaliser {
   void set_injection_rule(InjectionRule rule);
 
   /// Forgets everything. `heading_rad`: where it is known.
-  void start_anywhere(std::optional<double> heading_rad = std::nullopt);
+  void start_globally(std::optional<double> heading_rad = std::nullopt);
   /// Around a known pose; deviations of each coordinate, >= 0.
   void start_at(const Pose2& pose, double deviation_m, double heading_deviation_rad);
 

@@ -223,7 +223,7 @@ ParticleModes find_modes(const Particles& particles, const PoseBins& bins, doubl
   return result;
 }
 
-double spread_of(const Particles& particles) {
+double position_spread_m(const Particles& particles) {
   if (particles.empty()) return 0.0;
   // Relative to the first, so that nothing is lost far from the origin.
   const Point2 anchor = particles.position(0);

@@ -73,6 +73,6 @@ struct ParticleModes {
                                        double min_weight = 0.01);
 
 /// Root mean square distance of the particles from their mean; 0 for none.
-[[nodiscard]] double spread_of(const Particles& particles);
+[[nodiscard]] double position_spread_m(const Particles& particles);
 
 }  // namespace panonav

@@ -10,20 +10,20 @@
 
 namespace panonav {
 
-/// What the local features of one query tell of whether its place is in the memory.
-struct FeatureEvidence {
-  int verified = 0;  ///< most that a match shares with the query (`match_features`)
-  /// Median of what the mirrored query shares with views drawn from the memory: so many agree with
-  /// one turn and one direction of motion by chance.
-  int chance = 0;
-  /// Most that the match with most verified features shares with another one: what views side by
-  /// side in this memory share. A place that is only built alike shares less.
-  int neighbour = 0;
-  int seen = 0;  ///< features of the query
-};
-
 /// What one query tells of whether its place is in the memory.
 struct PlaceEvidence {
+  /// What the local features of one query tell of whether its place is in the memory.
+  struct Features {
+    int verified = 0;  ///< most that a match shares with the query (`match_features`)
+    /// Median of what the mirrored query shares with views drawn from the memory: so many agree
+    /// with one turn and one direction of motion by chance.
+    int chance = 0;
+    /// Most that the match with most verified features shares with another one: what views side by
+    /// side in this memory share. A place that is only built alike shares less.
+    int neighbour = 0;
+    int seen = 0;  ///< features of the query
+  };
+
   /// Of the best match, as `ColumnMatch::difference`, over the better half of the compared columns
   /// alone: what stands in view or has moved changes the other half.
   double difference = 1.0;
@@ -38,7 +38,7 @@ struct PlaceEvidence {
   int views = 0;       ///< of which the best was chosen
   int components = 0;  ///< of the memory
   /// Empty where no features were compared.
-  std::optional<FeatureEvidence> features = std::nullopt;
+  std::optional<Features> features = std::nullopt;
 };
 
 /// What is known of the place after a number of components has been compared. Every level's
@@ -65,19 +65,19 @@ struct PlaceMatch {
   std::optional<double> heading_rad;
 };
 
-/// A reference view's part in an interpolated position.
-struct PositionShare {
-  ViewId view;          ///< a posed view of the memory
-  double weight = 0.0;  ///< may be negative; all sum to 1
-};
-
 /// A position between reference views, finer than their spacing [M04 footnote 1].
 struct PositionEstimate {
+  /// A reference view's part in an interpolated position.
+  struct Share {
+    ViewId view;          ///< a posed view of the memory
+    double weight = 0.0;  ///< may be negative; all sum to 1
+  };
+
   double x_m = 0.0;  ///< in the frame of the memory's positions
   double y_m = 0.0;  ///< in the frame of the memory's positions
   /// The true position lies within it in 95 % of the cases; empty when nothing could be learnt.
   std::optional<double> radius_m;
-  std::vector<PositionShare> shares;                            ///< nearest first
+  std::vector<Share> shares;                                    ///< nearest first
   [[nodiscard]] Point2 position() const { return {x_m, y_m}; }  ///< As a point.
 };
 

@@ -70,9 +70,9 @@ double tenth_of(std::vector<double> differences) {
 }
 
 double log_odds_by_columns(const PlaceEvidence& evidence) {
-  // By `bench/place_probability` (docs/decisions.md), in the order of `features_of`.
-  constexpr std::array<double, place_features> learnt{-1.58, -16.46, -9.30, -0.60, -6.43, 0.91};
-  const auto features = features_of(evidence);
+  // By `bench/place_probability` (docs/decisions.md), in the order of `column_terms`.
+  constexpr std::array<double, column_term_count> learnt{-1.58, -16.46, -9.30, -0.60, -6.43, 0.91};
+  const auto features = column_terms(evidence);
   return std::inner_product(learnt.begin(), learnt.end(), features.begin(), 0.0);
 }
 
@@ -82,7 +82,7 @@ double log_share(int verified, int chance) {
 
 }  // namespace
 
-std::vector<ViewId> drawn_views(std::span<const ViewId> views) {
+std::vector<ViewId> draw_views(std::span<const ViewId> views) {
   std::vector<std::pair<std::uint64_t, ViewId>> drawn;  // a heap, the largest number in front
   for (const ViewId view : views) {
     const std::pair number(Random(1, view.value).next(), view);
@@ -161,7 +161,7 @@ PlaceModel learn_place_model(const ColumnRanking& ranking, const PlaceModelOptio
   return model;
 }
 
-std::array<double, place_features> features_of(const PlaceEvidence& evidence) noexcept {
+std::array<double, column_term_count> column_terms(const PlaceEvidence& evidence) noexcept {
   // What `bench/place_probability` learnt from: below the least difference rounding decides, from
   // the large one on a view is unlike by itself, and memories had so many views and components.
   constexpr double min_difference = 0.02;
@@ -182,11 +182,11 @@ double place_probability(const PlaceEvidence& evidence) noexcept {
   if (evidence.views < 1 || !(evidence.chance > 0.0)) return 0.0;
   const double by_columns = 1.0 / (1.0 + std::exp(-log_odds_by_columns(evidence)));
   if (!evidence.features || !is_inconclusive(evidence)) return by_columns;
-  // By `bench/place_probability` (docs/decisions.md), in the order of `doubtful_features_of`.
-  constexpr std::array<double, doubtful_features> learnt{-2.99, 0.23, 3.10, 1.53};
-  const FeatureEvidence& found = *evidence.features;
+  // By `bench/place_probability` (docs/decisions.md), in the order of `feature_terms`.
+  constexpr std::array<double, feature_term_count> learnt{-2.99, 0.23, 3.10, 1.53};
+  const PlaceEvidence::Features& found = *evidence.features;
   if (learnt[0] + learnt[2] * log_share(found.seen, found.chance) <= 0.0) return by_columns;
-  const auto features = doubtful_features_of(evidence);
+  const auto features = feature_terms(evidence);
   const double z = std::inner_product(learnt.begin(), learnt.end(), features.begin(), 0.0);
   return 1.0 / (1.0 + std::exp(-z));
 }
@@ -197,8 +197,8 @@ bool is_inconclusive(const PlaceEvidence& evidence) noexcept {
   return std::abs(log_odds_by_columns(evidence)) < max_inconclusive_log_odds;
 }
 
-std::array<double, doubtful_features> doubtful_features_of(const PlaceEvidence& evidence) noexcept {
-  const FeatureEvidence found = evidence.features.value_or(FeatureEvidence{});
+std::array<double, feature_term_count> feature_terms(const PlaceEvidence& evidence) noexcept {
+  const PlaceEvidence::Features found = evidence.features.value_or(PlaceEvidence::Features{});
   return {1.0, log_odds_by_columns(evidence), log_share(found.verified, found.chance),
           log_share(found.verified, found.neighbour)};
 }
@@ -206,12 +206,12 @@ std::array<double, doubtful_features> doubtful_features_of(const PlaceEvidence& 
 PlaceCriterion::PlaceCriterion(const ColumnRanking& ranking, std::size_t views)
     : ranking_(&ranking),
       views_(static_cast<int>(std::min<std::size_t>(views, std::numeric_limits<int>::max()))),
-      sample_(drawn_views(ranking.memory().views())) {
+      sample_(draw_views(ranking.memory().views())) {
   for (const ViewId view : sample_) profiles_.push_back(profiles(view, {}));
 }
 
 PlaceCriterion::PlaceCriterion(const ViewSource& source)
-    : views_(static_cast<int>(source.views().size())), sample_(drawn_views(source.views())) {
+    : views_(static_cast<int>(source.views().size())), sample_(draw_views(source.views())) {
   std::vector<ViewId> ascending = sample_;
   std::ranges::sort(ascending);
   const VisualMemory loaded = source.load(ascending);
@@ -277,7 +277,7 @@ PlaceEvidence PlaceCriterion::evidence(const PackedSignature& query,
   return found;
 }
 
-std::optional<FeatureEvidence> PlaceCriterion::feature_evidence(
+std::optional<PlaceEvidence::Features> PlaceCriterion::feature_evidence(
     const LocalFeatures& query, const LocalFeatures& mirrored_query, const FeatureSource& features,
     std::span<const RankedMatch> matches, const SearchMask& mask) const {
   if (query.features.empty() || matches.empty() || !features(matches.front().match.view)) {
@@ -292,8 +292,8 @@ std::optional<FeatureEvidence> PlaceCriterion::feature_evidence(
     if (by_chance.size() == feature_views) break;
   }
   if (by_chance.empty()) return std::nullopt;
-  FeatureEvidence found{.chance = upper_median(std::move(by_chance)),
-                        .seen = static_cast<int>(query.features.size())};
+  PlaceEvidence::Features found{.chance = upper_median(std::move(by_chance)),
+                                .seen = static_cast<int>(query.features.size())};
   std::vector<LocalFeatures> candidates;
   std::size_t best = 0;
   for (const RankedMatch& match :

@@ -72,9 +72,9 @@ struct PlaceModel {
 /// the components' share of 15. A small difference tells nothing by itself, because scenes of
 /// little contrast differ little; a large one does. Views and components count within what was
 /// learnt from.
-inline constexpr int place_features = 6;
+inline constexpr int column_term_count = 6;
 /// The evidence as regression takes it: entry 0 is 1, the others as above.
-[[nodiscard]] std::array<double, place_features> features_of(
+[[nodiscard]] std::array<double, column_term_count> column_terms(
     const PlaceEvidence& evidence) noexcept;
 
 /// Probability that a place with this evidence is one of the memory's, where the prior is a third:
@@ -92,15 +92,15 @@ inline constexpr int place_features = 6;
 /// What `place_probability` weighs where columns leave doubt and features were compared: 1, the log
 /// odds by columns alone and the logarithms of the verified features' shares of chance and of what
 /// neighbours share, all counts increased by 1.
-inline constexpr int doubtful_features = 4;
+inline constexpr int feature_term_count = 4;
 /// The evidence as regression takes it: entry 0 is 1, the others as above. Without features their
 /// counts are 0.
-[[nodiscard]] std::array<double, doubtful_features> doubtful_features_of(
+[[nodiscard]] std::array<double, feature_term_count> feature_terms(
     const PlaceEvidence& evidence) noexcept;
 
 /// The views that a `PlaceCriterion` draws from a memory of these views: 80, each by its own
 /// number, or all, in the order in which they were drawn.
-[[nodiscard]] std::vector<ViewId> drawn_views(std::span<const ViewId> views);
+[[nodiscard]] std::vector<ViewId> draw_views(std::span<const ViewId> views);
 
 /// Tells a place of the memory from an unknown one, view by view. All components of the memory
 /// count, however many the search compares.
@@ -124,7 +124,7 @@ class PlaceCriterion {
   /// Chance is that of the first 12 drawn views that are not excluded and have features, and the
   /// match with most verified features is compared with the first 12 others. Empty where the query,
   /// the first match or all drawn views have none. Cost: 0.1 ms a view compared.
-  [[nodiscard]] std::optional<FeatureEvidence> feature_evidence(
+  [[nodiscard]] std::optional<PlaceEvidence::Features> feature_evidence(
       const LocalFeatures& query, const LocalFeatures& mirrored_query,
       const FeatureSource& features, std::span<const RankedMatch> matches,
       const SearchMask& mask = {}) const;

@@ -56,11 +56,11 @@ DissimilarityCurve::DissimilarityCurve(double slope) {
   max_dissimilarity_ = large;
 }
 
-DissimilarityCurve::DissimilarityCurve(std::span<const DissimilarityAtDistance> pairs,
+DissimilarityCurve::DissimilarityCurve(std::span<const DissimilarityCurve::Sample> pairs,
                                        double level) {
   require(std::isfinite(level) && level >= 0.0, "level of far views", level, "finite and >= 0");
   require(!pairs.empty(), "pairs of a dissimilarity curve", 0.0, ">= 1");
-  std::vector<DissimilarityAtDistance> sorted(pairs.begin(), pairs.end());
+  std::vector<DissimilarityCurve::Sample> sorted(pairs.begin(), pairs.end());
   for (const auto& pair : sorted) {
     require(std::isfinite(pair.dissimilarity) && pair.dissimilarity >= 0.0, "dissimilarity",
             pair.dissimilarity, "finite and >= 0");

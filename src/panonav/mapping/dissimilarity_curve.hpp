@@ -6,18 +6,18 @@
 
 namespace panonav {
 
-/// One sample of the curve, from a pair of views: their dissimilarity and their distance in the
-/// arrangement so far.
-struct DissimilarityAtDistance {
-  double dissimilarity = 0.0;  ///< of the two views, >= 0
-  double distance = 0.0;       ///< of their places in the arrangement, >= 0
-};
-
 /// Distance between two places read from the dissimilarity of their views, with its error [M04
 /// figures 7 and 12]. Distances are in the unit of the arrangement that it was fitted to.
 /// Invariant: rising (not strictly) with the dissimilarity, nowhere negative.
 class DissimilarityCurve {
  public:
+  /// One sample of the curve, from a pair of views: their dissimilarity and their distance in the
+  /// arrangement so far.
+  struct Sample {
+    double dissimilarity = 0.0;  ///< of the two views, >= 0
+    double distance = 0.0;       ///< of their places in the arrangement, >= 0
+  };
+
   /// Proportional: distance = dissimilarity * slope, without error and without a limit. It is the
   /// start, before there is an arrangement. Throws ContractError unless slope is finite and > 0.
   explicit DissimilarityCurve(double slope);
@@ -27,7 +27,7 @@ class DissimilarityCurve {
   /// down to zero at dissimilarity 0. `level`: dissimilarity of far views, where the curve is flat;
   /// correlation ends at 95 % of it. Throws ContractError on no pairs, or values that are not
   /// finite and >= 0. Cost: n log n.
-  DissimilarityCurve(std::span<const DissimilarityAtDistance> pairs, double level);
+  DissimilarityCurve(std::span<const Sample> pairs, double level);
 
   /// Read from the curve; beyond its last knot the distance there.
   [[nodiscard]] double distance(double dissimilarity) const;

@@ -36,7 +36,7 @@ class MeasuredPairs {
   MeasuredPairs(const SpringViews& views, Executor& executor)
       : views_(views), executor_(executor) {}
 
-  [[nodiscard]] const std::vector<LatticeSpring>& springs() const { return springs_; }
+  [[nodiscard]] const std::vector<Lattice::Spring>& springs() const { return springs_; }
 
   /// Measures the pairs that are not known yet; `hint(pair)`: what is known of their turns.
   template <class Hint>
@@ -63,7 +63,7 @@ class MeasuredPairs {
   const SpringViews& views_;
   Executor& executor_;
   std::set<NodePair> known_;
-  std::vector<LatticeSpring> springs_;
+  std::vector<Lattice::Spring> springs_;
 };
 
 class Arranger {
@@ -109,12 +109,13 @@ class Arranger {
   [[nodiscard]] std::size_t size() const { return lattice_.nodes.size(); }
 
   /// Returns what motion or the headings so far say of the turn between two nodes.
-  [[nodiscard]] std::optional<TurnHint> hint(NodePair pair) const {
+  [[nodiscard]] std::optional<HeadingWindow> hint(NodePair pair) const {
     if (!by_motion_) return std::nullopt;
-    if (layout_.poses.empty()) return motions_.turn_between(pair);
-    return TurnHint{angle_difference(layout_.poses[pair.second].heading_rad,
-                                     layout_.poses[pair.first].heading_rad),
-                    max_turn_error_rad};
+    if (layout_.poses.empty()) return motions_.heading_between(pair);
+    return HeadingWindow{
+        static_cast<float>(angle_difference(layout_.poses[pair.second].heading_rad,
+                                            layout_.poses[pair.first].heading_rad)),
+        static_cast<float>(max_turn_error_rad)};
   }
   void measure(const std::vector<NodePair>& pairs) {
     measured_.add(pairs, [this](NodePair pair) { return hint(pair); });
@@ -171,7 +172,7 @@ class Arranger {
     lattice_.iterations += grown.iterations;
     lattice_.springs.clear();
     std::vector<GraphEdge> edges;
-    for (const LatticeSpring& spring : measured_.springs()) {
+    for (const Lattice::Spring& spring : measured_.springs()) {
       const auto weight = grown.weights.find({spring.a, spring.b});
       const bool points = spring.phases && spring.phases->points;
       if (weight == grown.weights.end() || (!points && weight->second < min_grown_weight) ||
@@ -189,7 +190,7 @@ class Arranger {
   /// Springs within the curve's range whose views agree with each other and with a third one.
   void choose_springs() {
     lattice_.springs.clear();
-    for (const LatticeSpring& spring : measured_.springs()) {
+    for (const Lattice::Spring& spring : measured_.springs()) {
       if (spring.dissimilarity > lattice_.curve.max_dissimilarity() || !agrees(spring)) continue;
       add_spring(spring);
     }
@@ -198,8 +199,8 @@ class Arranger {
     }
   }
 
-  LatticeSpring& add_spring(const LatticeSpring& measured) {
-    LatticeSpring& spring = lattice_.springs.emplace_back(measured);
+  Lattice::Spring& add_spring(const Lattice::Spring& measured) {
+    Lattice::Spring& spring = lattice_.springs.emplace_back(measured);
     // Before the curve is known the views' own idea of the distance is the better one.
     spring.length = !curve_is_fitted_ && spring.phases
                         ? lattice_.errors.phase_unit * spring.phases->length
@@ -209,8 +210,8 @@ class Arranger {
   }
 
   /// Returns the springs, and the motions where there is no spring.
-  [[nodiscard]] std::vector<LatticeSpring> springs_and_motions() const {
-    std::vector<LatticeSpring> all = lattice_.springs;
+  [[nodiscard]] std::vector<Lattice::Spring> springs_and_motions() const {
+    std::vector<Lattice::Spring> all = lattice_.springs;
     for (const auto& step : motions_.all()) {
       const NodePair pair = std::minmax(step.a, step.b);
       all.push_back({.a = pair.first, .b = pair.second, .length = travel(step)});

@@ -49,49 +49,46 @@ void visit_options(CoarseMotionOptions& options, OptionVisitor& visitor);
 [[nodiscard]] CoarseMotion coarse_motion(ViewId from, ViewId to, const Pose2& step,
                                          const CoarseMotionOptions& options = {});
 
-/// A view in the arrangement.
-struct LatticeNode {
-  ViewId view;                ///< an id of the memory
-  Pose2 pose;                 ///< in its component's frame; heading 0 without phases
-  std::size_t component = 0;  ///< index of its group
-};
-
-/// A pair of views with a distance that their dissimilarity tells.
-struct LatticeSpring {
-  std::size_t a = 0;                   ///< nodes, a < b
-  std::size_t b = 0;                   ///< the other node
-  double dissimilarity = 0.0;          ///< of the two views, over the components asked for
-  double length = 0.0;                 ///< rest length, read from the dissimilarity
-  double stiffness = 1.0;              ///< K of [M04 eq. 5]
-  double weight = 1.0;                 ///< robust weight, 1 .. 0: near 0 it is an outlier
-  std::optional<PhaseReading> phases;  ///< what their phases tell; empty without phases
-};
-
-/// Standard deviations of springs, estimated from the arrangement itself; lengths in its unit.
-struct SpringErrors {
-  double length = 0.25;        ///< of the rest length of a spring of stiffness 1
-  double direction_rad = 0.1;  ///< of a direction in which both views agree
-  double turn_rad = 0.1;       ///< of a turn in which both views agree
-  /// How long the unit of the lengths that phases tell is, and how far these are off, as a share.
-  double phase_unit = 1.0;
-  double phase_length = 0.25;  ///< standard deviation of such a length, as a share of it
-};
-
-/// A connected component: views that springs join. Each component has its own frame, and nothing is
-/// known of their relative poses.
-struct LatticeComponent {
-  std::size_t views = 0;  ///< nodes of the component
-  /// False: it may as well be the mirror image.
-  bool handedness_known = false;
-};
-
 /// Views with the poses that their springs give them.
 struct Lattice {
-  std::vector<LatticeNode> nodes;            ///< one for each view of the memory, in its order
-  std::vector<LatticeSpring> springs;        ///< ascending (a, b)
-  std::vector<LatticeComponent> components;  ///< the largest first
-  DissimilarityCurve curve{1.0};             ///< of the last round
-  SpringErrors errors;                       ///< of the last round
+  /// A view in the arrangement.
+  struct Node {
+    ViewId view;                ///< an id of the memory
+    Pose2 pose;                 ///< in its component's frame; heading 0 without phases
+    std::size_t component = 0;  ///< index of its group
+  };
+  /// A pair of views with a distance that their dissimilarity tells.
+  struct Spring {
+    std::size_t a = 0;                   ///< nodes, a < b
+    std::size_t b = 0;                   ///< the other node
+    double dissimilarity = 0.0;          ///< of the two views, over the components asked for
+    double length = 0.0;                 ///< rest length, read from the dissimilarity
+    double stiffness = 1.0;              ///< K of [M04 eq. 5]
+    double weight = 1.0;                 ///< robust weight, 1 .. 0: near 0 it is an outlier
+    std::optional<PhaseReading> phases;  ///< what their phases tell; empty without phases
+  };
+  /// Standard deviations of springs, estimated from the arrangement itself; lengths in its unit.
+  struct Errors {
+    double length = 0.25;        ///< of the rest length of a spring of stiffness 1
+    double direction_rad = 0.1;  ///< of a direction in which both views agree
+    double turn_rad = 0.1;       ///< of a turn in which both views agree
+    /// How long the unit of the lengths that phases tell is, and how far these are off, as a share.
+    double phase_unit = 1.0;
+    double phase_length = 0.25;  ///< standard deviation of such a length, as a share of it
+  };
+  /// A connected component: views that springs join. Each component has its own frame, and nothing
+  /// is known of their relative poses.
+  struct Component {
+    std::size_t views = 0;  ///< nodes of the component
+    /// False: it may as well be the mirror image.
+    bool handedness_known = false;
+  };
+
+  std::vector<Node> nodes;            ///< one for each view of the memory, in its order
+  std::vector<Spring> springs;        ///< ascending (a, b)
+  std::vector<Component> components;  ///< the largest first
+  DissimilarityCurve curve{1.0};      ///< of the last round
+  Errors errors;                      ///< of the last round
   /// Pairs of views whose relative pose was read, or whose dissimilarity, without phases; those
   /// that are no springs were rejected.
   std::size_t candidates = 0;

@@ -28,7 +28,7 @@ Neighbourhood neighbourhood_of(const Lattice& lattice, const std::vector<std::si
     result.poses.push_back(lattice.nodes[node].pose);
   }
   for (std::size_t s = 0; s < lattice.springs.size(); ++s) {
-    const LatticeSpring& spring = lattice.springs[s];
+    const Lattice::Spring& spring = lattice.springs[s];
     const auto a = number.find(spring.a);
     const auto b = number.find(spring.b);
     if (a == number.end() || b == number.end()) continue;
@@ -45,7 +45,7 @@ class Extender {
  public:
   Extender(Lattice& lattice, const VisualMemory& memory, const LatticeOptions& options)
       : lattice_(lattice), memory_(memory), options_(options) {
-    for (const LatticeNode& node : lattice.nodes) {
+    for (const Lattice::Node& node : lattice.nodes) {
       require(memory.contains(node.view), "view of the lattice", node.view.value,
               "a view of the memory");
       require(number_.empty() || number_.rbegin()->first < node.view, "view of the lattice",
@@ -73,7 +73,7 @@ class Extender {
  private:
   void add(ViewId view, std::span<const ViewId> excluded) {
     const std::size_t node = lattice_.nodes.size();
-    std::vector<LatticeSpring> springs = springs_to(view, node, excluded);
+    std::vector<Lattice::Spring> springs = springs_to(view, node, excluded);
     number_.emplace(view, node);
     std::map<std::size_t, std::size_t> leads_to;
     for (const auto& spring : springs) ++leads_to[lattice_.nodes[spring.a].component];
@@ -93,18 +93,18 @@ class Extender {
     relax_around(node, springs);
   }
 
-  [[nodiscard]] std::vector<LatticeSpring> springs_to(ViewId view, std::size_t node,
-                                                      std::span<const ViewId> excluded) const {
-    std::vector<LatticeSpring> springs;
+  [[nodiscard]] std::vector<Lattice::Spring> springs_to(ViewId view, std::size_t node,
+                                                        std::span<const ViewId> excluded) const {
+    std::vector<Lattice::Spring> springs;
     if (node == 0) return springs;
     const PackedSignature seen = memory_.packed(view);
     const auto found = memory_.search(seen, {options_.neighbours, options_.components},
                                       {.excluded_views = excluded});
     for (const Match& match : found.matches) {
       if (match.dissimilarity > lattice_.curve.max_dissimilarity()) continue;
-      LatticeSpring spring{.a = number_.at(match.view),
-                           .b = node,
-                           .dissimilarity = static_cast<double>(match.dissimilarity)};
+      Lattice::Spring spring{.a = number_.at(match.view),
+                             .b = node,
+                             .dissimilarity = static_cast<double>(match.dissimilarity)};
       if (options_.phases) spring.phases = read_phases(homing(match.view), homing(view));
       if (!agrees(spring)) continue;
       spring.length = lattice_.curve.distance(spring.dissimilarity);
@@ -120,7 +120,7 @@ class Extender {
   }
 
   /// Of the places that the springs point to, the one of least energy.
-  void place(std::size_t node, std::span<const LatticeSpring> springs) {
+  void place(std::size_t node, std::span<const Lattice::Spring> springs) {
     std::vector<std::size_t> nodes;
     for (const auto& spring : springs) nodes.push_back(spring.a);
     nodes.push_back(node);
@@ -143,11 +143,11 @@ class Extender {
   }
 
   /// The new node and those that it hangs on give way; what these hang on stays.
-  void relax_around(std::size_t node, std::span<const LatticeSpring> springs) {
+  void relax_around(std::size_t node, std::span<const Lattice::Spring> springs) {
     std::vector<unsigned char> role(lattice_.nodes.size(), 0);  // 1 stays, 2 gives way
     role[node] = 2;
     for (const auto& spring : springs) role[spring.a] = 2;
-    for (const LatticeSpring& spring : lattice_.springs) {
+    for (const Lattice::Spring& spring : lattice_.springs) {
       if (role[spring.a] == 2 && role[spring.b] == 0) role[spring.b] = 1;
       if (role[spring.b] == 2 && role[spring.a] == 0) role[spring.a] = 1;
     }

@@ -4,11 +4,11 @@ namespace panonav {
 
 TopologicalMap map_of(const Lattice& lattice) {
   TopologicalMap map;
-  for (const LatticeNode& node : lattice.nodes)
+  for (const Lattice::Node& node : lattice.nodes)
     map.nodes.push_back({node.view, node.pose, node.component});
-  for (const LatticeSpring& spring : lattice.springs) {
-    const LatticeNode& a = lattice.nodes[spring.a];
-    const LatticeNode& b = lattice.nodes[spring.b];
+  for (const Lattice::Spring& spring : lattice.springs) {
+    const Lattice::Node& a = lattice.nodes[spring.a];
+    const Lattice::Node& b = lattice.nodes[spring.b];
     map.edges.push_back({.a = a.view,
                          .b = b.view,
                          .a_from_b = inverse(a.pose) * b.pose,

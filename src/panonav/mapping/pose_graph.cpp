@@ -253,7 +253,7 @@ std::vector<std::size_t> connected_components(std::size_t nodes, std::span<const
   return sets.number_sets();
 }
 
-double edge_tension(const PoseEdge& edge, std::span<const Pose2> nodes) {
+double normalised_residual(const PoseEdge& edge, std::span<const Pose2> nodes) {
   return std::sqrt(square(error_of(edge, nodes[edge.a], nodes[edge.b])));
 }
 

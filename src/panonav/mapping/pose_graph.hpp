@@ -58,6 +58,6 @@ PoseGraphReport optimise_pose_graph(std::span<Pose2> nodes, std::span<const Pose
                                                             std::span<const PoseEdge> edges);
 
 /// Residual of an edge at the nodes' poses, in standard deviations. The edge must be valid.
-[[nodiscard]] double edge_tension(const PoseEdge& edge, std::span<const Pose2> nodes);
+[[nodiscard]] double normalised_residual(const PoseEdge& edge, std::span<const Pose2> nodes);
 
 }  // namespace panonav

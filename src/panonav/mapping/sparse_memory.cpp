@@ -72,7 +72,7 @@ std::vector<ViewId> within_links(const VisualMemory& memory, ViewId view, int li
 class Representatives {
  public:
   explicit Representatives(const SparseSelection& selection) {
-    for (const RedundantView& redundant : selection.redundant) {
+    for (const SparseSelection::Redundant& redundant : selection.redundant) {
       kept_.emplace(redundant.view, redundant.kept);
     }
   }
@@ -122,7 +122,7 @@ SparseSelection select_references(const VisualMemory& memory, const SparseMemory
     const ViewId view = *at;
     HomingView seen = homing_view(memory, view);
     const auto& pose = memory.info(view).pose;
-    std::optional<RedundantView> best;
+    std::optional<SparseSelection::Redundant> best;
     const auto consider = [&](ViewId other, std::optional<double> distance_m) {
       const auto found = kept.find(other);
       if (found == kept.end()) return;
@@ -132,7 +132,7 @@ SparseSelection select_references(const VisualMemory& memory, const SparseMemory
           difference <= options.max_difference && (!distance_m || *distance_m <= options.reach_m);
       if (!outdated && !alike) return;
       if (best && best->difference <= difference) return;
-      best = RedundantView{view, other, difference, !alike};
+      best = SparseSelection::Redundant{view, other, difference, !alike};
     };
     if (pose) {
       by_place.visit_near(pose->position(), consider);
@@ -201,13 +201,14 @@ SparseLoss measure_loss(const VisualMemory& memory, const SparseSelection& selec
   const std::size_t count = selection.redundant.size();
   if (count == 0) return loss;
   std::vector<ViewId> dropped;
-  for (const RedundantView& redundant : selection.redundant) dropped.push_back(redundant.view);
+  for (const SparseSelection::Redundant& redundant : selection.redundant)
+    dropped.push_back(redundant.view);
   const std::size_t asked = std::min(count, max_asked);
   std::vector<double> differences;
   std::vector<double> before_m;
   std::vector<double> after_m;
   for (std::size_t i = 0; i < asked; ++i) {
-    const RedundantView& redundant = selection.redundant[i * count / asked];
+    const SparseSelection::Redundant& redundant = selection.redundant[i * count / asked];
     differences.push_back(redundant.difference);
     const auto& pose = memory.info(redundant.view).pose;
     if (!pose) continue;

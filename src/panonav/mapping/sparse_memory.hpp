@@ -26,19 +26,19 @@ struct SparseMemoryOptions {
 };
 void visit_options(SparseMemoryOptions& options, OptionVisitor& visitor);
 
-/// A view that is dropped, and the one that stands for it.
-struct RedundantView {
-  ViewId view;              ///< that the selection drops
-  ViewId kept;              ///< that stays in the memory
-  double difference = 0.0;  ///< of the two views
-  bool outdated = false;    ///< dropped because of a newer view at its place
-  friend bool operator==(const RedundantView&, const RedundantView&) = default;
-};
-
 /// What a memory keeps and what it drops.
 struct SparseSelection {
-  std::vector<ViewId> kept;              ///< ascending
-  std::vector<RedundantView> redundant;  ///< ascending by view
+  /// A view that is dropped, and the one that stands for it.
+  struct Redundant {
+    ViewId view;              ///< that the selection drops
+    ViewId kept;              ///< that stays in the memory
+    double difference = 0.0;  ///< of the two views
+    bool outdated = false;    ///< dropped because of a newer view at its place
+    friend bool operator==(const Redundant&, const Redundant&) = default;
+  };
+
+  std::vector<ViewId> kept;          ///< ascending
+  std::vector<Redundant> redundant;  ///< ascending by view
   friend bool operator==(const SparseSelection&, const SparseSelection&) = default;
 };
 

@@ -48,7 +48,7 @@ void renumber_components(TopologicalMap& map) {
   for (MapNode& node : map.nodes) node.component = numbers.at(node.component);
 }
 
-std::size_t number_of_components(const TopologicalMap& map) {
+std::size_t count_components(const TopologicalMap& map) {
   std::set<std::size_t> components;
   for (const MapNode& node : map.nodes) components.insert(node.component);
   return components.size();

@@ -42,6 +42,6 @@ void validate(const TopologicalMap& map);
 void renumber_components(TopologicalMap& map);
 
 /// The number of connected components.
-[[nodiscard]] std::size_t number_of_components(const TopologicalMap& map);
+[[nodiscard]] std::size_t count_components(const TopologicalMap& map);
 
 }  // namespace panonav

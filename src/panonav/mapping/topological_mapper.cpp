@@ -85,7 +85,7 @@ class TopologicalMapper::Implementation {
   }
 
   [[nodiscard]] bool is_new(const OdometryView& view) const;
-  MapUpdate add(ViewId view, OdometryView seen, const std::optional<Pose2>& moved);
+  TopologicalMapper::Update add(ViewId view, OdometryView seen, const std::optional<Pose2>& moved);
   void finish();
   [[nodiscard]] std::size_t size() const noexcept { return poses_.size(); }
   [[nodiscard]] std::span<const Pose2> poses() const noexcept { return poses_; }
@@ -94,10 +94,10 @@ class TopologicalMapper::Implementation {
 
  private:
   void add_step(const std::optional<VisualStep>& step, const std::optional<Pose2>& moved,
-                MapUpdate& update);
+                TopologicalMapper::Update& update);
   /// From the node before to the latest.
   [[nodiscard]] PoseEdge wheel_step(const Pose2& moved, const std::optional<VisualStep>& step);
-  void close_loops(MapUpdate& update);
+  void close_loops(TopologicalMapper::Update& update);
   void join_components(const LoopClosure& closure);
   void optimise_latest();
   void optimise();
@@ -131,7 +131,7 @@ bool TopologicalMapper::Implementation::is_new(const OdometryView& view) const {
 
 void TopologicalMapper::Implementation::add_step(const std::optional<VisualStep>& step,
                                                  const std::optional<Pose2>& moved,
-                                                 MapUpdate& update) {
+                                                 TopologicalMapper::Update& update) {
   const std::size_t here = nodes_.size() - 1;
   if (!step && !moved && options_.bridge_m > 0.0) {
     constexpr double any_heading_rad = 1.0;
@@ -195,8 +195,8 @@ PoseEdge TopologicalMapper::Implementation::wheel_step(const Pose2& moved,
   return edge;
 }
 
-MapUpdate TopologicalMapper::Implementation::add(ViewId view, OdometryView seen,
-                                                 const std::optional<Pose2>& moved) {
+TopologicalMapper::Update TopologicalMapper::Implementation::add(
+    ViewId view, OdometryView seen, const std::optional<Pose2>& moved) {
   if (!memory_->contains(view) || (!nodes_.empty() && view <= nodes_.back().view)) {
     throw ContractError("view", static_cast<double>(view.value),
                         "a view of the memory, later than those of the map");
@@ -204,7 +204,7 @@ MapUpdate TopologicalMapper::Implementation::add(ViewId view, OdometryView seen,
   if (moved) {
     require(is_finite(*moved), "step of the wheels", length(*moved), "finite");
   }
-  MapUpdate update;
+  TopologicalMapper::Update update;
   update.step = odometry_.add(std::move(seen));
   nodes_.push_back({view});
   if (nodes_.size() == 1) {
@@ -224,7 +224,7 @@ double TopologicalMapper::Implementation::scale_m() const {
   return length_scale_m(known_lengths_).value_or(odometry_.scale_m());
 }
 
-void TopologicalMapper::Implementation::close_loops(MapUpdate& update) {
+void TopologicalMapper::Implementation::close_loops(TopologicalMapper::Update& update) {
   const double scale_m = this->scale_m();
   update.closures = finder_.find(nodes_, poses_, *odometry_.last(), scale_m);
   for (const LoopClosure& closure : update.closures) {
@@ -239,7 +239,7 @@ void TopologicalMapper::Implementation::close_loops(MapUpdate& update) {
   changed_ = true;
   optimise_latest();
   for (std::size_t i = edges_.size() - update.closures.size(); i < edges_.size(); ++i) {
-    if (edge_tension(edges_[i], poses_) > pulling_deviations) pulled_ = true;
+    if (normalised_residual(edges_[i], poses_) > pulling_deviations) pulled_ = true;
   }
   if (pulled_ &&
       size() >= optimised_size_ + std::max<std::size_t>(1, optimised_size_ / nodes_per_new_node)) {
@@ -336,8 +336,8 @@ TopologicalMapper::~TopologicalMapper() = default;
 bool TopologicalMapper::is_new(const OdometryView& view) const {
   return implementation_->is_new(view);
 }
-MapUpdate TopologicalMapper::add(ViewId view, OdometryView seen,
-                                 const std::optional<Pose2>& moved) {
+TopologicalMapper::Update TopologicalMapper::add(ViewId view, OdometryView seen,
+                                                 const std::optional<Pose2>& moved) {
   return implementation_->add(view, std::move(seen), moved);
 }
 void TopologicalMapper::finish() {

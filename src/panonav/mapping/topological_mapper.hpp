@@ -36,14 +36,6 @@ struct MappingOptions {
 };
 void visit_options(MappingOptions& options, OptionVisitor& visitor);
 
-/// What the mapper did with a view.
-struct MapUpdate {
-  std::optional<VisualStep> step;     ///< from the node before
-  bool new_component = false;         ///< nothing connects the view with the node before
-  std::vector<LoopClosure> closures;  ///< that became certain; numbers of nodes
-  bool optimised = false;             ///< the whole map was
-};
-
 /// Makes a map from one view after the other: a node for each, linked with the one before by visual
 /// odometry; loops are closed as `LoopClosureOptions` says. A closure moves the nodes since the
 /// closure before so that they fit the older map. Where a contradiction remains and the map has
@@ -53,6 +45,14 @@ struct MapUpdate {
 /// with the others.
 class TopologicalMapper {
  public:
+  /// What the mapper did with a view.
+  struct Update {
+    std::optional<VisualStep> step;     ///< from the node before
+    bool new_component = false;         ///< nothing connects the view with the node before
+    std::vector<LoopClosure> closures;  ///< that became certain; numbers of nodes
+    bool optimised = false;             ///< the whole map was
+  };
+
   /// `memory` must outlive the mapper. Throws OptionError.
   explicit TopologicalMapper(const VisualMemory& memory, const MappingOptions& options = {},
                              const VisualOdometryOptions& odometry = {},
@@ -70,7 +70,7 @@ class TopologicalMapper {
   /// node (robot_old_from_robot_new), empty where there are none. Throws ContractError on a view
   /// that is not in the memory or not later than those before, on another shape, and on a step that
   /// is not finite.
-  MapUpdate add(ViewId view, OdometryView seen, const std::optional<Pose2>& moved = std::nullopt);
+  Update add(ViewId view, OdometryView seen, const std::optional<Pose2>& moved = std::nullopt);
 
   /// Optimises what is not optimised yet.
   void finish();

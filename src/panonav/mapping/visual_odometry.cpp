@@ -98,8 +98,9 @@ OdometryView::OdometryView(FourierSignature view)
 std::optional<VisualStep> visual_step(const OdometryView& before, const OdometryView& after,
                                       const VisualOdometryOptions& options) {
   validate(options);
-  auto step = options.rule == StepRule::published ? published_step(before, after, options)
-                                                  : home_vector_step(before, after, options);
+  auto step = options.rule == VisualOdometryOptions::Rule::published
+                  ? published_step(before, after, options)
+                  : home_vector_step(before, after, options);
   if (step && step->residual > options.max_residual) return std::nullopt;
   return step;
 }

@@ -13,20 +13,22 @@
 
 namespace panonav {
 
-/// How the motion between two views is estimated.
-enum class StepRule {
-  /// As published: the distance is that of the signatures [F11 eq. 2], the turn that of the compass
-  /// [F11 section 3.2], and the robot goes the way it faces at the middle of the step.
-  published,
-  /// Ours: the home vector [S06] from the one view to the other gives direction, turn and length. A
-  /// robot that drives sideways is therefore followed, too, and the turn is corrected for the
-  /// effect of displacement on the phases.
-  home_vector,
-};
-
 /// How a step is read from two views.
 struct VisualOdometryOptions {
-  StepRule rule = StepRule::home_vector;  ///< published, or our own
+  /// How the motion between two views is estimated.
+  enum class Rule {
+    /// As published: the distance is that of the signatures [F11 eq. 2], the turn that of the
+    /// compass
+    /// [F11 section 3.2], and the robot goes the way it faces at the middle of the step.
+    published,
+    /// Ours: the home vector [S06] from the one view to the other gives direction, turn and length.
+    /// A
+    /// robot that drives sideways is therefore followed, too, and the turn is corrected for the
+    /// effect of displacement on the phases.
+    home_vector,
+  };
+
+  Rule rule = Rule::home_vector;  ///< published, or our own
   /// Metres for each unit of length that the views give: the distance R of things around for
   /// `home_vector`, the distance of signatures 1 apart for `published`. See `length_scale_m`.
   double scale_m = 1.5;

@@ -43,7 +43,7 @@ AreaPlanner::AreaPlanner(NavigationGraph graph, SubAreas areas, const PlannerOpt
           "views in areas", static_cast<double>(areas_.area_of.size()), "those of the graph");
   std::map<std::pair<std::size_t, std::size_t>, std::size_t> known;
   for (const std::size_t gate : areas_.gates) {
-    const NavigationEdge& edge = graph_.edges()[gate];
+    const NavigationGraph::Edge& edge = graph_.edges()[gate];
     const auto [low, high] = std::minmax(areas_.area_of[*graph_.node_of(edge.a)],
                                          areas_.area_of[*graph_.node_of(edge.b)]);
     const auto [found, is_new] = known.try_emplace({low, high}, borders_.size());
@@ -193,7 +193,7 @@ void AreaPlanner::close(std::span<const std::size_t> edges) {
   plan_over_areas();
 }
 
-void AreaPlanner::open_all() {
+void AreaPlanner::unblock_all() {
   std::set<std::size_t> changed;
   for (std::size_t edge = 0; edge < closed_.size(); ++edge) {
     if (closed_[edge] == 0) continue;
@@ -230,7 +230,7 @@ std::vector<Guide> AreaPlanner::field(std::size_t area) const {
   return guides;
 }
 
-std::vector<std::size_t> AreaPlanner::planned_way(std::size_t start) const {
+std::vector<std::size_t> AreaPlanner::plan_path(std::size_t start) const {
   require(start < graph_.size(), "start", static_cast<double>(start), "a node of the graph");
   std::map<std::size_t, std::vector<Guide>> fields;
   std::vector<std::size_t> way;

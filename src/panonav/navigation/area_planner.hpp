@@ -51,9 +51,9 @@ class AreaPlanner {
   /// ways between gates of the areas at both ends are found anew, and the plan over areas.
   void close(std::span<const std::size_t> edges);
   /// All edges may be used again. Cost: as `close`, for the areas of the edges that were closed.
-  void open_all();
+  void unblock_all();
   /// Whether an edge, by its number, cannot be used now.
-  [[nodiscard]] bool is_closed(std::size_t edge) const { return closed_.at(edge) != 0; }
+  [[nodiscard]] bool is_blocked(std::size_t edge) const { return closed_.at(edge) != 0; }
   /// Number of edges that cannot be used now.
   [[nodiscard]] std::size_t closed() const noexcept;
 
@@ -63,7 +63,7 @@ class AreaPlanner {
 
   /// The nodes from `start` to the goal, both included; empty when it cannot be reached. Makes the
   /// fields of the areas on the way.
-  [[nodiscard]] std::vector<std::size_t> planned_way(std::size_t start) const;
+  [[nodiscard]] std::vector<std::size_t> plan_path(std::size_t start) const;
 
  private:
   /// Two areas and the edges between them.

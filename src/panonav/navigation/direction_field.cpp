@@ -109,7 +109,7 @@ std::vector<Guide> direction_field(const NavigationGraph& graph, ViewId goal,
   const auto node = graph.node_of(goal);
   require(node.has_value(), "goal", static_cast<double>(goal.value), "a view of the graph");
   const SearchRoot root{*node, 0.0, *node, 0};
-  const SubAreas areas = undivided(graph);
+  const SubAreas areas = make_single_area(graph);
   std::vector<Guide> guides = search_tree(graph, areas, 0, {&root, 1}, closed);
   set_directions(graph, areas, 0, options, guides);
   return guides;

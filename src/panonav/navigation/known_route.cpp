@@ -27,18 +27,18 @@ std::span<const double> KnownRoute::along_m(ViewId view) const {
   return found->along_m;
 }
 
-KnownRoute known_route(const RoutePanorama& route, std::span<const RouteView> views,
-                       const KnownRouteOptions& options) {
+KnownRoute make_known_route(const RoutePanorama& route, std::span<const KnownRoute::View> views,
+                            const KnownRouteOptions& options) {
   validate(options);
   KnownRoute known{RouteTracker(route, options.tracker, options.fit), {}, options.beside_m};
-  for (const RouteView& placed : views) {
+  for (const KnownRoute::View& placed : views) {
     if (!std::isfinite(placed.pose.x_m) || !std::isfinite(placed.pose.y_m)) {
       throw ContractError("place of view " + std::to_string(placed.view.value), "not finite",
                           "finite numbers");
     }
     KnownRoute::Reference reference{placed.view, {}};
-    for (const RoutePlace& place :
-         places_on_route(route.poses(), placed.pose.position(), options.beside_m)) {
+    for (const RoutePosition& place :
+         find_passes(route.poses(), placed.pose.position(), options.beside_m)) {
       reference.along_m.push_back(place.along_m);
     }
     if (!reference.along_m.empty()) known.references.push_back(std::move(reference));

@@ -22,15 +22,14 @@ struct KnownRouteOptions {
 };
 void visit_options(KnownRouteOptions& options, OptionVisitor& visitor);
 
-/// A reference view and its pose in a route's frame.
-struct RouteView {
-  ViewId view;  ///< an id of the memory
-  Pose2 pose;   ///< in the route's frame
-};
-
 /// A recorded route together with the references of the memory that lie on it, so that plans over
 /// the memory may lead along it. Made by `known_route`; cost of a copy: that of the tracker.
 struct KnownRoute {
+  /// A reference view and its pose in a route's frame.
+  struct View {
+    ViewId view;  ///< an id of the memory
+    Pose2 pose;   ///< in the route's frame
+  };
   /// A view that lies on the route.
   struct Reference {
     ViewId view;  ///< an id of the memory
@@ -50,7 +49,8 @@ struct KnownRoute {
 /// one drive. References out of reach are left out. Throws ContractError on a route of fewer than
 /// two lines, a pose that is not finite or a view that comes twice; OptionError. Cost: that of a
 /// `RouteTracker`, and views times lines.
-[[nodiscard]] KnownRoute known_route(const RoutePanorama& route, std::span<const RouteView> views,
-                                     const KnownRouteOptions& options = {});
+[[nodiscard]] KnownRoute make_known_route(const RoutePanorama& route,
+                                          std::span<const KnownRoute::View> views,
+                                          const KnownRouteOptions& options = {});
 
 }  // namespace panonav

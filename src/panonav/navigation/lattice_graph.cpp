@@ -85,7 +85,7 @@ std::vector<double> spacings_around(std::size_t views, const std::vector<Spring>
 
 // An edge that may be kept.
 struct Candidate {
-  NavigationEdge edge;
+  NavigationGraph::Edge edge;
   NodePair ends;
   double far = 0.0;         // in spacings of the references around
   bool joins_only = false;  // kept only where without it two components would not be joined
@@ -161,8 +161,8 @@ void doubt_lonely_edges(std::size_t views, std::vector<Candidate>& candidates) {
 }
 
 // The edges of the springs that may be kept.
-std::vector<NavigationEdge> edges_of(const std::vector<ViewId>& views, std::vector<Spring> springs,
-                                     double min_weight) {
+std::vector<NavigationGraph::Edge> edges_of(const std::vector<ViewId>& views,
+                                            std::vector<Spring> springs, double min_weight) {
   count_support(views.size(), springs);
   std::erase_if(springs, [&](const Spring& spring) {
     return (spring.weight < min_weight || !spring.one_component) && spring.support == 0;
@@ -174,7 +174,7 @@ std::vector<NavigationEdge> edges_of(const std::vector<ViewId>& views, std::vect
     return std::pair(candidate.joins_only, candidate.far);
   });
   DisjointSets groups(views.size());
-  std::vector<NavigationEdge> kept;
+  std::vector<NavigationGraph::Edge> kept;
   for (const Candidate& candidate : candidates) {
     const bool joins = groups.join(candidate.ends.a, candidate.ends.b);
     if (joins || !candidate.joins_only) kept.push_back(candidate.edge);
@@ -185,13 +185,13 @@ std::vector<NavigationEdge> edges_of(const std::vector<ViewId>& views, std::vect
 
 }  // namespace
 
-NavigationGraph graph_of_lattice(const Lattice& lattice, double min_weight) {
+NavigationGraph graph_from_lattice(const Lattice& lattice, double min_weight) {
   std::vector<ViewId> views;
-  for (const LatticeNode& node : lattice.nodes) views.push_back(node.view);
+  for (const Lattice::Node& node : lattice.nodes) views.push_back(node.view);
   std::vector<Spring> springs;
-  for (const LatticeSpring& spring : lattice.springs) {
-    const LatticeNode& a = lattice.nodes.at(spring.a);
-    const LatticeNode& b = lattice.nodes.at(spring.b);
+  for (const Lattice::Spring& spring : lattice.springs) {
+    const Lattice::Node& a = lattice.nodes.at(spring.a);
+    const Lattice::Node& b = lattice.nodes.at(spring.b);
     // Without phases the arrangement knows no headings, and so no direction in the frame of a view.
     springs.push_back({{spring.a, spring.b},
                        spring.phases ? motion_of(*spring.phases) : std::nullopt,
@@ -199,12 +199,13 @@ NavigationGraph graph_of_lattice(const Lattice& lattice, double min_weight) {
                        spring.weight,
                        a.component == b.component});
   }
-  std::vector<NavigationEdge> edges = edges_of(views, std::move(springs), min_weight);
+  std::vector<NavigationGraph::Edge> edges = edges_of(views, std::move(springs), min_weight);
   return {std::move(views), std::move(edges)};
 }
 
-NavigationGraph graph_of_stored_lattice(const TopologicalMap& arrangement, const ViewSource& source,
-                                        Executor& executor, double min_weight) {
+NavigationGraph graph_from_stored_lattice(const TopologicalMap& arrangement,
+                                          const ViewSource& source, Executor& executor,
+                                          double min_weight) {
   validate(arrangement);
   std::vector<ViewId> views;
   for (const MapNode& node : arrangement.nodes) views.push_back(node.view);
@@ -221,9 +222,9 @@ NavigationGraph graph_of_stored_lattice(const TopologicalMap& arrangement, const
     springs.push_back({ends, std::nullopt, distance(a.pose.position(), b.pose.position()),
                        edge.weight, a.component == b.component});
   }
-  const std::vector<NavigationEdge> read = read_edges(source, links, executor);
+  const std::vector<NavigationGraph::Edge> read = read_edges(source, links, executor);
   for (std::size_t i = 0; i < springs.size(); ++i) springs[i].motion = read[i].a_from_b;
-  std::vector<NavigationEdge> edges = edges_of(views, std::move(springs), min_weight);
+  std::vector<NavigationGraph::Edge> edges = edges_of(views, std::move(springs), min_weight);
   return {std::move(views), std::move(edges)};
 }
 

@@ -18,7 +18,7 @@ namespace panonav {
 
 namespace {
 
-void require_valid(const NavigationEdge& edge) {
+void require_valid(const NavigationGraph::Edge& edge) {
   require(edge.a != edge.b, "view of an edge", static_cast<double>(edge.a.value),
           "two different views");
   require(std::isfinite(edge.length) && edge.length > 0.0, "length of an edge", edge.length,
@@ -27,6 +27,10 @@ void require_valid(const NavigationEdge& edge) {
     throw ContractError("motion of an edge", "not finite", "finite");
   }
 }
+
+/// How far the heading of a map may be off where its views are compared: about 30 degrees, less
+/// than half of the quarter turn after which rooms look alike.
+constexpr float max_heading_error_rad = 0.5F;
 
 bool agree(const Pose2& a, const Pose2& b) {
   const double turned = angle_difference(a.heading_rad, b.heading_rad);
@@ -37,7 +41,7 @@ bool agree(const Pose2& a, const Pose2& b) {
 // Whether most triangles with a third view that tell anything say the same of an edge, as
 // `arrange` asks; true where there is no triangle at all, and false where none of them tells
 // anything.
-bool is_supported(const NavigationGraph& graph, const NavigationEdge& edge) {
+bool is_supported(const NavigationGraph& graph, const NavigationGraph::Edge& edge) {
   const std::size_t a = *graph.node_of(edge.a);
   const std::size_t b = *graph.node_of(edge.b);
   int triangles = 0;
@@ -59,7 +63,8 @@ bool is_supported(const NavigationGraph& graph, const NavigationEdge& edge) {
 
 }  // namespace
 
-NavigationGraph::NavigationGraph(std::vector<ViewId> views, std::vector<NavigationEdge> edges)
+NavigationGraph::NavigationGraph(std::vector<ViewId> views,
+                                 std::vector<NavigationGraph::Edge> edges)
     : views_(std::move(views)), begins_(views_.size() + 1) {
   for (std::size_t i = 1; i < views_.size(); ++i) {
     require(views_[i - 1] < views_[i], "views", static_cast<double>(views_[i].value), "ascending");
@@ -68,7 +73,7 @@ NavigationGraph::NavigationGraph(std::vector<ViewId> views, std::vector<Navigati
     std::size_t low, high, edge;
   };
   std::vector<Ends> ends;
-  for (const NavigationEdge& edge : edges) {
+  for (const NavigationGraph::Edge& edge : edges) {
     require_valid(edge);
     const auto a = node_of(edge.a);
     const auto b = node_of(edge.b);
@@ -103,7 +108,7 @@ std::optional<std::size_t> NavigationGraph::node_of(ViewId view) const {
 }
 
 std::optional<Pose2> NavigationGraph::motion_from(std::size_t node, std::size_t edge) const {
-  const NavigationEdge& p = edges_.at(edge);
+  const NavigationGraph::Edge& p = edges_.at(edge);
   if (!p.a_from_b || views_.at(node) == p.a) return p.a_from_b;
   return inverse(*p.a_from_b);
 }
@@ -124,14 +129,14 @@ std::vector<std::size_t> nodes_around(const NavigationGraph& graph,
   return {found.begin(), found.end()};
 }
 
-NavigationGraph graph_of_links(const ViewSource& source, std::span<const Link> links,
-                               Executor& executor) {
+NavigationGraph graph_from_links(const ViewSource& source, std::span<const Link> links,
+                                 Executor& executor) {
   const std::span<const ViewId> views = source.views();
-  std::vector<NavigationEdge> edges = read_edges(source, links, executor);
-  std::vector<NavigationEdge> read = edges;
+  std::vector<NavigationGraph::Edge> edges = read_edges(source, links, executor);
+  std::vector<NavigationGraph::Edge> read = edges;
   complete_lengths(read);
   const NavigationGraph graph({views.begin(), views.end()}, std::move(read));
-  for (NavigationEdge& edge : edges) {
+  for (NavigationGraph::Edge& edge : edges) {
     if (edge.a_from_b && !is_supported(graph, edge)) {
       edge = {edge.a, edge.b, 0.0, std::nullopt};
     }
@@ -140,11 +145,11 @@ NavigationGraph graph_of_links(const ViewSource& source, std::span<const Link> l
   return {{views.begin(), views.end()}, std::move(edges)};
 }
 
-NavigationGraph graph_of_map(const TopologicalMap& map, double min_weight) {
+NavigationGraph graph_from_map(const TopologicalMap& map, double min_weight) {
   validate(map);
   std::vector<ViewId> views;
   for (const MapNode& node : map.nodes) views.push_back(node.view);
-  std::vector<NavigationEdge> edges;
+  std::vector<NavigationGraph::Edge> edges;
   for (const MapEdge& edge : map.edges) {
     if (edge.weight < min_weight) continue;
     const MapNode& a = *std::ranges::lower_bound(map.nodes, edge.a, {}, &MapNode::view);
@@ -187,13 +192,13 @@ std::vector<NodePair> near_pairs(const TopologicalMap& map, double reach) {
 
 }  // namespace
 
-NavigationGraph graph_of_map_and_neighbours(const TopologicalMap& map, const VisualMemory& memory,
-                                            Executor& executor, double min_weight) {
-  const NavigationGraph mapped = graph_of_map(map, min_weight);
+NavigationGraph graph_from_map_and_neighbours(const TopologicalMap& map, const VisualMemory& memory,
+                                              Executor& executor, double min_weight) {
+  const NavigationGraph mapped = graph_from_map(map, min_weight);
   if (mapped.edges().empty()) return mapped;
   std::vector<double> lengths;
   std::vector<double> differences;
-  for (const NavigationEdge& edge : mapped.edges()) {
+  for (const NavigationGraph::Edge& edge : mapped.edges()) {
     lengths.push_back(edge.length);
     differences.push_back(image_difference(homing_view(memory.signature(edge.a)),
                                            homing_view(memory.signature(edge.b))));
@@ -202,7 +207,7 @@ NavigationGraph graph_of_map_and_neighbours(const TopologicalMap& map, const Vis
   const double reach = 1.5 * upper_median(lengths);
   const double max_difference = quantile(differences, 0.9);
   const std::vector<NodePair> pairs = near_pairs(map, reach);
-  std::vector<std::optional<NavigationEdge>> found(pairs.size());
+  std::vector<std::optional<NavigationGraph::Edge>> found(pairs.size());
   constexpr std::size_t pairs_per_chunk = 64;
   executor.for_chunks(
       pairs.size(), pairs_per_chunk, [&](std::size_t begin, std::size_t end, std::size_t) {
@@ -213,18 +218,19 @@ NavigationGraph graph_of_map_and_neighbours(const TopologicalMap& map, const Vis
           const HomingView view_b = homing_view(memory.signature(b.view));
           if (image_difference(view_a, view_b) > max_difference) continue;
           const Pose2 laid_out = inverse(a.pose) * b.pose;
-          const auto reading =
-              read_phases(view_a, view_b, TurnHint{.turn_rad = laid_out.heading_rad});
+          const auto reading = read_phases(
+              view_a, view_b,
+              HeadingWindow{static_cast<float>(laid_out.heading_rad), max_heading_error_rad});
           if (!reading || reading->disagreement_rad > max_disagreement_rad) continue;
           auto motion = motion_of(*reading);
           if (!motion) continue;
           const double length = length_of(laid_out);
           const double read = length_of(*motion);
           if (read > 0.0) scale_displacement(*motion, length / read);
-          found[i] = NavigationEdge{a.view, b.view, length, motion};
+          found[i] = NavigationGraph::Edge{a.view, b.view, length, motion};
         }
       });
-  std::vector<NavigationEdge> edges(mapped.edges().begin(), mapped.edges().end());
+  std::vector<NavigationGraph::Edge> edges(mapped.edges().begin(), mapped.edges().end());
   for (const auto& edge : found) {
     if (edge) edges.push_back(*edge);
   }

@@ -15,26 +15,26 @@
 
 namespace panonav {
 
-/// Two reference views between which a robot can move, both ways.
-struct NavigationEdge {
-  ViewId a;  ///< one end
-  ViewId b;  ///< the other
-  /// What the way costs, > 0; in whatever unit the graph has.
-  double length = 1.0;
-  /// How b lies to a, in the graph's unit. Empty: nothing tells. At the same place, x and y are 0:
-  /// no direction is meant.
-  std::optional<Pose2> a_from_b;
-  friend bool operator==(const NavigationEdge&, const NavigationEdge&) = default;
-};
-
 /// The reference views and the edges between them. Nodes are numbers 0 .. size() - 1 in the
 /// order of their views. Holds no signatures, about 100 bytes an edge. Immutable.
 class NavigationGraph {
  public:
+  /// Two reference views between which a robot can move, both ways.
+  struct Edge {
+    ViewId a;  ///< one end
+    ViewId b;  ///< the other
+    /// What the way costs, > 0; in whatever unit the graph has.
+    double length = 1.0;
+    /// How b lies to a, in the graph's unit. Empty: nothing tells. At the same place, x and y are
+    /// 0: no direction is meant.
+    std::optional<Pose2> a_from_b;
+    friend bool operator==(const Edge&, const Edge&) = default;
+  };
+
   /// `views` ascend. Of several edges between two views the first counts. Throws ContractError
   /// on an edge of a view that is not there or to itself, or numbers that are not finite or out
   /// of range.
-  NavigationGraph(std::vector<ViewId> views, std::vector<NavigationEdge> edges);
+  NavigationGraph(std::vector<ViewId> views, std::vector<Edge> edges);
 
   /// An edge as seen from one of its ends.
   struct Exit {
@@ -49,7 +49,7 @@ class NavigationGraph {
   /// Empty when there is no such view.
   [[nodiscard]] std::optional<std::size_t> node_of(ViewId view) const;
   /// Each once; edges are numbered in this order.
-  [[nodiscard]] std::span<const NavigationEdge> edges() const noexcept { return edges_; }
+  [[nodiscard]] std::span<const Edge> edges() const noexcept { return edges_; }
   /// Ascending by node.
   [[nodiscard]] std::span<const Exit> exits(std::size_t node) const {
     return std::span(exits_).subspan(begins_[node], begins_[node + 1] - begins_[node]);
@@ -59,7 +59,7 @@ class NavigationGraph {
 
  private:
   std::vector<ViewId> views_;
-  std::vector<NavigationEdge> edges_;
+  std::vector<Edge> edges_;
   std::vector<std::size_t> begins_;
   std::vector<Exit> exits_;
 };
@@ -78,23 +78,23 @@ inline constexpr double max_disagreement_rad = 0.78539816339744831;
 /// `arrange` asks, nothing is told: the edge counts as three times the median length. No more than
 /// some thousand views are held at once. Throws ContractError on a link of a view that the source
 /// has not. Cost: two home vectors a link, about a millisecond.
-[[nodiscard]] NavigationGraph graph_of_links(const ViewSource& source, std::span<const Link> links,
-                                             Executor& executor);
+[[nodiscard]] NavigationGraph graph_from_links(const ViewSource& source,
+                                               std::span<const Link> links, Executor& executor);
 
 /// An edge for each edge of a map within one component whose weight is at least `min_weight`: what
 /// lies below contradicts the rest of the map. Motions and lengths follow from the poses. Throws
 /// ContractError as `validate`.
-[[nodiscard]] NavigationGraph graph_of_map(const TopologicalMap& map, double min_weight = 0.1);
+[[nodiscard]] NavigationGraph graph_from_map(const TopologicalMap& map, double min_weight = 0.1);
 
 /// The same, and edges between nodes of one component that lie side by side in the map, up to one
 /// and a half of the median length of its edges, when their views look as alike as those of most
 /// edges and agree on a direction: a robot that comes by a place for the second time goes on as it
 /// went the first time. The memory must hold the map's views. Cost: a home vector and a half for
 /// each such pair.
-[[nodiscard]] NavigationGraph graph_of_map_and_neighbours(const TopologicalMap& map,
-                                                          const VisualMemory& memory,
-                                                          Executor& executor,
-                                                          double min_weight = 0.1);
+[[nodiscard]] NavigationGraph graph_from_map_and_neighbours(const TopologicalMap& map,
+                                                            const VisualMemory& memory,
+                                                            Executor& executor,
+                                                            double min_weight = 0.1);
 
 /// An edge for each spring that kept `min_weight` of itself and is no longer than two spacings
 /// of the references around, or that three third views confirm though the arrangement gave it up
@@ -104,13 +104,14 @@ inline constexpr double max_disagreement_rad = 0.78539816339744831;
 /// of the two views, so that the distortion of the arrangement bends none of them. Lengths, in
 /// spacings of the references around, are those of the arrangement, and of the phases where it gave
 /// the spring up. Cost: the springs times those of a view.
-[[nodiscard]] NavigationGraph graph_of_lattice(const Lattice& lattice, double min_weight = 0.1);
+[[nodiscard]] NavigationGraph graph_from_lattice(const Lattice& lattice, double min_weight = 0.1);
 
 /// The same of a lattice that was stored as a map (`map_of`): the phases are read anew from the
 /// views, with the support that the edges of links need. Throws ContractError as `validate`, and
 /// on a view that the source has not. Cost: two home vectors an edge.
-[[nodiscard]] NavigationGraph graph_of_stored_lattice(const TopologicalMap& arrangement,
-                                                      const ViewSource& source, Executor& executor,
-                                                      double min_weight = 0.1);
+[[nodiscard]] NavigationGraph graph_from_stored_lattice(const TopologicalMap& arrangement,
+                                                        const ViewSource& source,
+                                                        Executor& executor,
+                                                        double min_weight = 0.1);
 
 }  // namespace panonav

@@ -44,9 +44,9 @@ MemoryScales learn_scales(const ViewSource& source, const AreaPlanner& planner,
                       ? scales.place
                       : learn_place_scale(source, graph, scales.coarse_components);
   std::vector<double> lengths;
-  for (const NavigationEdge& edge : graph.edges()) lengths.push_back(edge.length);
+  for (const NavigationGraph::Edge& edge : graph.edges()) lengths.push_back(edge.length);
   if (!lengths.empty()) scales.typical_length = upper_median(std::move(lengths));
-  scales.narrow = narrow_places(graph, planner.areas(), options.near_links);
+  scales.narrow = find_narrow_places(graph, planner.areas(), options.near_links);
   return scales;
 }
 
@@ -65,7 +65,7 @@ Navigator::Core::Core(const ViewSource& source_, AreaPlanner planner_,
 }
 
 void Navigator::Core::set_goal(ViewId view) {
-  if (planner.closed() > 0) planner.open_all();
+  if (planner.closed() > 0) planner.unblock_all();
   planner.set_goal(view);
   const std::size_t node = *graph().node_of(view);
   const auto around = nodes_around(graph(), {&node, 1}, options.near_links);
@@ -135,7 +135,7 @@ void Navigator::Core::go_home(Step& step) {
     homing.emplace(goal->view, pursuit);
     step.note(NavigationEvent::homing);
   }
-  const PursuitDecision pursued = homing->decide(step.view.view);
+  const HomingPursuit::Decision pursued = homing->decide(step.view.view);
   NavigationDecision& decision = step.decision;
   decision.homing = true;
   decision.difference = pursued.difference;
@@ -143,7 +143,7 @@ void Navigator::Core::go_home(Step& step) {
   decision.direction_rad = pursued.turn_rad;
   decision.advance_m = pursued.advance_m;
   const bool obstructed = obstruction.level >= 2 * options.min_agreeing_steps;
-  if (pursued.state == PursuitState::moving && !obstructed) return;
+  if (pursued.state == HomingPursuit::State::moving && !obstructed) return;
   // Homing may stop for other reasons than a short vector; the place decides. Noise and new things
   // in view make a difference, too: a robot that sees no way left is there when the place may be
   // this one.
@@ -263,7 +263,7 @@ void Navigator::Core::begin_leg(Step& step) {
     return;
   }
   std::vector<ViewId> way;
-  for (const std::size_t node : planner.planned_way(*place.node)) way.push_back(graph().view(node));
+  for (const std::size_t node : planner.plan_path(*place.node)) way.push_back(graph().view(node));
   if (!pilot.begin(way, step.report.line, options.min_leg_m)) return;
   plan.under_way.reset();
   step.note(NavigationEvent::route);

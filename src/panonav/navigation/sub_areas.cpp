@@ -186,7 +186,7 @@ std::vector<std::vector<std::size_t>> pieces(const NavigationGraph& graph,
 
 }  // namespace
 
-SubAreas undivided(const NavigationGraph& graph) {
+SubAreas make_single_area(const NavigationGraph& graph) {
   SubAreas areas;
   areas.area_of.assign(graph.size(), 0);
   areas.place_of.resize(graph.size());
@@ -232,7 +232,7 @@ SubAreas divide(const NavigationGraph& graph, const SubAreaOptions& options) {
     }
   }
   for (std::size_t p = 0; p < graph.edges().size(); ++p) {
-    const NavigationEdge& edge = graph.edges()[p];
+    const NavigationGraph::Edge& edge = graph.edges()[p];
     if (areas.area_of[*graph.node_of(edge.a)] != areas.area_of[*graph.node_of(edge.b)]) {
       areas.gates.push_back(p);
     }
@@ -240,10 +240,10 @@ SubAreas divide(const NavigationGraph& graph, const SubAreaOptions& options) {
   return areas;
 }
 
-std::vector<std::uint8_t> narrow_places(const NavigationGraph& graph, const SubAreas& areas,
-                                        int links) {
+std::vector<std::uint8_t> find_narrow_places(const NavigationGraph& graph, const SubAreas& areas,
+                                             int links) {
   const auto ends_of = [&](std::size_t gate) {
-    const NavigationEdge& edge = graph.edges()[gate];
+    const NavigationGraph::Edge& edge = graph.edges()[gate];
     return std::pair(*graph.node_of(edge.a), *graph.node_of(edge.b));
   };
   std::map<std::pair<std::size_t, std::size_t>, std::size_t> widths;

@@ -27,7 +27,7 @@ struct SubAreas {
 };
 
 /// All views in one area, connected or not.
-[[nodiscard]] SubAreas undivided(const NavigationGraph& graph);
+[[nodiscard]] SubAreas make_single_area(const NavigationGraph& graph);
 
 /// Divides the views along the bottlenecks of the graph, as doors are, into connected areas of
 /// similar size: the outlook of [M04 section 3.5]. Components are halved again and again. The views
@@ -42,7 +42,7 @@ struct SubAreas {
 /// 1 for each node at most `links` edges away from a narrow gate, as doors are; 0 for the
 /// others. In the open, an area of n views is some sqrt(n) of them across, and its border on
 /// another one has three times as many edges; a third of that, over the smaller area, is narrow.
-[[nodiscard]] std::vector<std::uint8_t> narrow_places(const NavigationGraph& graph,
-                                                      const SubAreas& areas, int links);
+[[nodiscard]] std::vector<std::uint8_t> find_narrow_places(const NavigationGraph& graph,
+                                                           const SubAreas& areas, int links);
 
 }  // namespace panonav

@@ -124,7 +124,7 @@ void count_pairs(const std::vector<PairVector>& vectors, const CatchmentSettings
   }
   result.pairs = all.count;
   result.orientation_error_rad = all.deviation();
-  result.component = mean_homeward(survey, max_m + rounding_m);
+  result.component = mean_homeward_component(survey, max_m + rounding_m);
 }
 
 }  // namespace

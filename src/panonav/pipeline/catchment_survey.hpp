@@ -50,7 +50,7 @@ struct CatchmentSettings {
 
 /// Pairs of a range of distances.
 struct CatchmentBin {
-  HomewardBin homeward;  ///< pairs of these distances and their mean cosine
+  HomingSurvey::Bin homeward;  ///< pairs of these distances and their mean cosine
   /// Circular standard deviation of the error of the heading; NaN without pairs.
   double orientation_error_rad = 0.0;
 };

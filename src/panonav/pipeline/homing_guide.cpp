@@ -127,8 +127,8 @@ WayHome HomingGuide::home(const Observation& observation) const {
                           std::to_string(goal_.rows()) + ", as in " + goal_name_);
     }
     const HomeVector found = home_vector(goal_, view, options_);
-    const ChanceMatch match = chance_match(goal_, view, options_);
-    const bool known = match.beyond_chance();
+    const ChanceMatch match = compare_with_chance(goal_, view, options_);
+    const bool known = match.is_beyond_chance();
     return WayHome{
         known,
         known && points_home(found) ? std::optional(found.direction_rad()) : std::nullopt,

@@ -167,7 +167,7 @@ LearntModels learn_place_models(const VisualMemory& memory, const FeatureSource&
   const NeighbourSupport support(ranking);
   return {learn_place_model(ranking), learn_position_model(ranking), support.spacing_m(),
           std::nullopt,
-          features && try_features(ranking, support, features).is_significantly_better()};
+          features && evaluate_features(ranking, support, features).is_significantly_better()};
 }
 
 LearntModels learn_models(const VisualMemory& memory, const FeatureSource& features) {

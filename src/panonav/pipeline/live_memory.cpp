@@ -195,7 +195,7 @@ LiveMemory::Answer LiveMemory::answer(const Observation& observation) {
   bool is_placed_later = false;
   if (self.learner && answer.place && observation.odometry) {
     self.learner->see(observation, *self.panorama, *answer.place);
-    is_placed_later = self.learner->near_known_places();
+    is_placed_later = self.learner->is_near_known_place();
   }
   const bool due = !self.last_added_s || !observation.stamp_s ||
                    *observation.stamp_s - *self.last_added_s >= self.options.min_interval_s ||

@@ -55,7 +55,7 @@ MemoryUse from_parameter(const std::optional<std::string>& text) {
   use.far_difference = std::strtod(far.c_str(), nullptr);
   use.range_m = std::strtod(range.c_str(), nullptr);
   std::uint32_t view = 0;
-  ViewUse one;
+  MemoryUse::View one;
   std::string learnt;
   while (words >> view >> one.matched >> one.failed >> one.last_run >> learnt) {
     one.learnt = learnt == "learnt";
@@ -126,29 +126,31 @@ void MemoryLearner::see(const Observation& observation, const Panorama& panorama
   view.info.name = observation.name;
   view.info.stamp_s = observation.stamp_s;
   view.signature = self.encoder.packed(panorama);
-  RunView seen{*observation.odometry, view.signature, place.known_probability, {}, {}};
+  MemoryUpdate::AnsweredView seen{
+      *observation.odometry, view.signature, place.known_probability, {}, {}};
   if (place.position && place.heading_rad) {
     seen.pose = Pose2{place.position->x_m, place.position->y_m, *place.heading_rad};
     seen.radius_m = place.position->radius_m;
   }
   const std::size_t number = self.seen++;
   self.update.add(std::move(seen));
-  std::erase_if(self.kept, [&](const auto& one) { return !self.update.wants(one.first); });
-  if (!self.update.wants(number)) return;
+  std::erase_if(self.kept,
+                [&](const auto& one) { return !self.update.can_become_view(one.first); });
+  if (!self.update.can_become_view(number)) return;
   view.thumbnail = thumbnail_png(panorama);
   if (const auto features = self.encoder.features(panorama)) view.features = pack(*features);
   self.kept.emplace(number, std::move(view));
 }
 
-bool MemoryLearner::near_known_places() const {
-  return implementation_->update.near_known_places();
+bool MemoryLearner::is_near_known_place() const {
+  return implementation_->update.is_near_known_place();
 }
 
 MemoryLearner::Changes MemoryLearner::finish(const std::string& what) {
   auto& self = *implementation_;
   self.require_unfinished();
   self.finished = true;
-  RunChanges planned = self.update.finish();
+  MemoryUpdate::Changes planned = self.update.finish();
   Changes changes{.seen = self.seen, .certain = planned.certain, .views = self.memory.size()};
   if (planned.certain == 0) return changes;
   changes.reinforced = planned.matched.size();

@@ -36,7 +36,7 @@ class MemoryLearner {
   void see(const Observation& observation, const Panorama& panorama, const Place& place);
   /// The observation seen last is so near to one whose place was surely known that the update will
   /// place it by odometry.
-  [[nodiscard]] bool near_known_places() const;
+  [[nodiscard]] bool is_near_known_place() const;
 
   /// What a run did to its memory.
   struct Changes {

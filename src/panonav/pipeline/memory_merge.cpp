@@ -171,7 +171,7 @@ class Merge {
     set_poses(file, map);
     for (std::size_t i = 0; i < 2; ++i) add_routes(file, i);
     result_.views = all.size();
-    result_.connected_components = number_of_components(map);
+    result_.connected_components = count_components(map);
     return result_;
   }
 

@@ -90,7 +90,7 @@ struct PlaceRecogniser::Implementation {
     if (views.empty()) refuse_empty(file);
     const FeatureSource source = get_or_create_features(file, std::nullopt);
     const std::unique_ptr<ViewIndex> index = indexed->index();
-    const std::vector<ViewId> drawn = drawn_views(views);
+    const std::vector<ViewId> drawn = draw_views(views);
     models = find_models(file, *index, views, drawn, source);
     Localiser localiser(std::make_shared<const VisualMemory>(index->load(drawn)), models->place,
                         models->position, options.localiser, models->spacing_m);

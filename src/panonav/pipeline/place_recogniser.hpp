@@ -28,7 +28,7 @@ struct PlaceRecogniserOptions {
   std::optional<PictureSource> source;
   /// Also tell the area where the robot may be, component by component. The memory is held for it,
   /// as areas are cut out of the positions of all views.
-  std::optional<WantedAccuracy> areas;
+  std::optional<LocalisationAccuracy> areas;
   /// A memory on a server with more views is not held but searched where it lies: 350 bytes a view
   /// instead of 2700, and a longer time for each picture (docs/scale.md). Files are always held.
   std::size_t max_held_views = 200'000;

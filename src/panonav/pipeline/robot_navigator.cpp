@@ -28,20 +28,20 @@ std::optional<NavigationGraph> graph_from(GraphOrigin origin, const MemoryFileVi
       if (!map) return std::nullopt;
       std::vector<ViewId> views;
       for (const MapNode& node : map->nodes) views.push_back(node.view);
-      return graph_of_map_and_neighbours(*map, file.load(views), executor);
+      return graph_from_map_and_neighbours(*map, file.load(views), executor);
     }
     case GraphOrigin::lattice: {
       const auto map = file.map("lattice");
       if (!map) return std::nullopt;
-      return graph_of_stored_lattice(*map, source, executor);
+      return graph_from_stored_lattice(*map, source, executor);
     }
     case GraphOrigin::links: {
       const std::vector<Link> links = file.links();
       if (links.empty()) return std::nullopt;
-      return graph_of_links(source, links, executor);
+      return graph_from_links(source, links, executor);
     }
     case GraphOrigin::arrangement:
-      return graph_of_lattice(arrange(file.load(), {}, {}, executor));
+      return graph_from_lattice(arrange(file.load(), {}, {}, executor));
   }
   return std::nullopt;
 }
@@ -82,7 +82,7 @@ KnownRoute route_among_views(const MemoryFileViews& source, const std::string& n
                               "' is in the frame of its odometry, where no view is known to lie; "
                               "allowed: one recorded with the poses of a data set");
   }
-  std::vector<RouteView> views;
+  std::vector<KnownRoute::View> views;
   constexpr std::size_t at_once = 1024;
   for (std::size_t begin = 0; begin < source.views().size(); begin += at_once) {
     const auto some =
@@ -93,7 +93,7 @@ KnownRoute route_among_views(const MemoryFileViews& source, const std::string& n
       if (pose) views.push_back({view, {pose->x_m, pose->y_m, pose->heading_rad.value_or(0.0)}});
     }
   }
-  KnownRoute known = known_route(route, views, options);
+  KnownRoute known = make_known_route(route, views, options);
   if (known.references.empty()) {
     throw FileError(path, "none of the " + std::to_string(views.size()) +
                               " views with a pose lies within " + format_number(options.beside_m) +

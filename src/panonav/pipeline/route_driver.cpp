@@ -26,15 +26,15 @@ RouteDriver::RouteDriver(const MemoryFile& memory, const std::optional<PictureSo
 void RouteDriver::start_at(Point2 place) {
   // A route that ends where it begins is driven from its beginning.
   constexpr double reach_m = 0.5;
-  const auto passes = places_on_route(poses(), place, reach_m);
+  const auto passes = find_passes(poses(), place, reach_m);
   const auto pass = std::ranges::min_element(passes, {}, [&](const auto& each) {
     return options_.resume_m ? std::abs(each.along_m - *options_.resume_m) : each.along_m;
   });
-  start_m_ = pass == passes.end() ? place_on_route(poses(), place).along_m : pass->along_m;
+  start_m_ = pass == passes.end() ? project_onto_route(poses(), place).along_m : pass->along_m;
   // At its very end there still is a path.
   constexpr double min_way_m = 0.01;
   const double from_m = std::min(start_m_, std::max(0.0, length_m_ - min_way_m));
-  path_.emplace(stretch_of_route(poses(), from_m, length_m_), options_.path);
+  path_.emplace(route_segment(poses(), from_m, length_m_), options_.path);
 }
 
 RouteDriveStep RouteDriver::step(const Observation& observation,

@@ -23,9 +23,9 @@ struct RouteFollowerOptions {
 
 /// Where the robot is beside the route.
 struct RouteStep {
-  std::vector<float> line;            ///< what was seen
-  std::optional<RouteFix> fix;        ///< empty: not on this route
-  std::vector<AzimuthRange> changed;  ///< where the scene is not as remembered
+  std::vector<float> line;                          ///< what was seen
+  std::optional<RouteFix> fix;                      ///< empty: not on this route
+  std::vector<RouteChanges::AzimuthRange> changed;  ///< where the scene is not as remembered
 };
 
 /// Says where a robot is beside a recorded route [Y03], observation by observation. Odometry

@@ -59,8 +59,8 @@ Tracker::~Tracker() = default;
 Tracker::Tracker(Tracker&&) noexcept = default;
 Tracker& Tracker::operator=(Tracker&&) noexcept = default;
 
-void Tracker::start_anywhere(std::optional<double> heading_rad) {
-  implementation_->localiser.start_anywhere(heading_rad);
+void Tracker::start_globally(std::optional<double> heading_rad) {
+  implementation_->localiser.start_globally(heading_rad);
 }
 void Tracker::start_at(const Pose2& pose, double deviation_m, double heading_deviation_rad) {
   implementation_->localiser.start_at(pose, deviation_m, heading_deviation_rad);

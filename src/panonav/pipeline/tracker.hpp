@@ -39,7 +39,7 @@ class Tracker {
   Tracker& operator=(Tracker&&) noexcept;
 
   /// As `MonteCarloLocaliser`: forgets what is known of the robot.
-  void start_anywhere(std::optional<double> heading_rad = std::nullopt);
+  void start_globally(std::optional<double> heading_rad = std::nullopt);
   /// Around a known pose, in the frame of the memory's positions.
   void start_at(const Pose2& pose, double deviation_m, double heading_deviation_rad);
 

@@ -113,7 +113,7 @@ double match_of(const HomingView& home, const HomingView& current,
 
 }  // namespace
 
-bool ChanceMatch::beyond_chance() const noexcept {
+bool ChanceMatch::is_beyond_chance() const noexcept {
   // One draw more than the 40 of a normal distribution whose mean and deviation come from them:
   // Student's t of 39 degrees of freedom at 0.99, times the root of 1 + 1 / 40.
   constexpr double rare = 2.426 * 1.0124;
@@ -127,8 +127,8 @@ double ChanceMatch::direction_probability() const noexcept {
   return 1.0 / (1.0 + std::exp(2.301 - 1.074 * deviations));
 }
 
-ChanceMatch chance_match(const HomingView& home, const HomingView& current,
-                         const FourierHomingOptions& options) {
+ChanceMatch compare_with_chance(const HomingView& home, const HomingView& current,
+                                const FourierHomingOptions& options) {
   const HomingView goal = banded(home);
   const HomingView here = banded(current);
   ChanceMatch result;

@@ -16,7 +16,7 @@ struct ChanceMatch {
   /// Whether noise would match as well in less than 1 of 100 cases: the views have something in
   /// common. False for views without structure, and where all noise matches alike, as with one
   /// frequency.
-  [[nodiscard]] bool beyond_chance() const noexcept;
+  [[nodiscard]] bool is_beyond_chance() const noexcept;
   /// How probable it is that the home vector points home within 45 degrees, 0 .. 1, by how many
   /// deviations the match exceeds chance. Learnt once from views of built-in scenes, as many from
   /// up to 0.3 m, 1 m, 3 m, 6 m and from other scenes (docs/decisions.md). Places that repeat
@@ -29,7 +29,7 @@ struct ChanceMatch {
 /// the energy of each row. Rows are averaged to 16 bands first. Turning either robot on the spot
 /// changes nothing but rounding; no other randomness than fixed seeds. Throws as `home_vector`.
 /// Cost: that of 82 home vectors of 16 rows, some milliseconds.
-[[nodiscard]] ChanceMatch chance_match(const HomingView& home, const HomingView& current,
-                                       const FourierHomingOptions& options = {});
+[[nodiscard]] ChanceMatch compare_with_chance(const HomingView& home, const HomingView& current,
+                                              const FourierHomingOptions& options = {});
 
 }  // namespace panonav

@@ -23,7 +23,7 @@ namespace {
 class PairOfViews {
  public:
   PairOfViews(const HomingView& home, const HomingView& current,
-              const FourierHomingOptions& options, int highest, const TurnWindow& window = {})
+              const FourierHomingOptions& options, int highest, const HeadingWindow& window = {})
       : home_(home),
         current_(current),
         options_(options),
@@ -83,7 +83,7 @@ class PairOfViews {
   const HomingView& home_;
   const HomingView& current_;
   const FourierHomingOptions& options_;
-  TurnWindow window_;
+  HeadingWindow window_;
   std::size_t rows_;
   int max_frequency_;  // K
   int highest_;        // the same in the present iteration
@@ -170,11 +170,11 @@ std::span<const float> PairOfViews::find_turns(int iteration) {
   int count = 1;
   if (has_start() && iteration == 0) {
     turns_[0] = static_cast<float>(start_->turn_rad);
-  } else if (options_.turn == TurnEstimate::sequential) {
-    turns_[0] = sequential_turn(correlation_);
+  } else if (options_.turn == FourierHomingOptions::TurnEstimate::sequential) {
+    turns_[0] = sequential_heading(correlation_);
   } else {
     const auto estimates = static_cast<std::size_t>(options_.starting_estimates);
-    count = highest_turns(correlation_, std::span(turns_).first(estimates), window_);
+    count = find_highest_peaks(correlation_, std::span(turns_).first(estimates), window_);
   }
   return std::span(turns_).first(static_cast<std::size_t>(count));
 }
@@ -218,7 +218,7 @@ void PairOfViews::turn_home(double turn_rad) {
 
 void PairOfViews::weigh() {
   row_weights_.clear();
-  if (options_.weights == HomingWeights::equal) {
+  if (options_.weights == FourierHomingOptions::Weights::equal) {
     for (int k = 1; k <= highest_; ++k) component_weights_[static_cast<std::size_t>(k)] = 1.0;
     return;
   }
@@ -228,7 +228,7 @@ void PairOfViews::weigh() {
 
 // Both views, or the current one alone, as their slopes count [S06 eq. 20].
 void PairOfViews::average_views() {
-  const bool both = options_.gradient == HomingGradient::both;
+  const bool both = options_.gradient == FourierHomingOptions::Gradient::both;
   for (int k = 0; k <= std::min(known_, highest_ + 1); ++k) {
     const float* const ha = c_.home_a(k);
     const float* const hb = c_.home_b(k);
@@ -364,7 +364,8 @@ void PairOfViews::move_current(const DisplacementStart& start) {
 double PairOfViews::difference() {
   correlate();
   std::array<float, 1> turn{};
-  if (!(home_energy_ + current_energy_ > 0.0) || highest_turns(correlation_, turn) == 0) return 1.0;
+  if (!(home_energy_ + current_energy_ > 0.0) || find_highest_peaks(correlation_, turn) == 0)
+    return 1.0;
   turn_home(static_cast<double>(turn[0]));
   weigh();
   sum_equations();
@@ -398,23 +399,17 @@ double HomeVector::direction_rad() const noexcept {
 }
 
 HomeVector home_vector(const HomingView& home, const HomingView& current,
-                       const FourierHomingOptions& options) {
+                       const FourierHomingOptions& options,
+                       const std::optional<HeadingWindow>& window) {
   validate(options);
   check_pair(home, current, options.highest);
-  return home_vector_unchecked(home, current, options);
-}
-
-HomeVector home_vector_near(const HomingView& home, const HomingView& current, double heading_rad,
-                            double within_rad, const FourierHomingOptions& options) {
-  validate(options);
-  check_pair(home, current, options.highest);
-  require(std::isfinite(heading_rad), "heading", heading_rad, "finite");
-  require(within_rad > 0.0 && within_rad <= std::numbers::pi, "within", within_rad,
-          "> 0 and <= pi");
-  require(options.turn == TurnEstimate::global, "turn estimate", static_cast<double>(options.turn),
-          "global");
-  return PairOfViews(home, current, options, highest_used(home, current, options.highest),
-                     {static_cast<float>(heading_rad), static_cast<float>(within_rad)})
+  if (!window) return home_vector_unchecked(home, current, options);
+  require(std::isfinite(window->middle_rad), "heading", window->middle_rad, "finite");
+  require(window->half_width_rad > 0.0F && window->half_width_rad <= std::numbers::pi_v<float>,
+          "within", window->half_width_rad, "> 0 and <= pi");
+  require(options.turn == FourierHomingOptions::TurnEstimate::global, "turn estimate",
+          static_cast<double>(options.turn), "global");
+  return PairOfViews(home, current, options, highest_used(home, current, options.highest), *window)
       .find_vector();
 }
 
@@ -426,8 +421,8 @@ HomeVector home_vector_unchecked(const HomingView& home, const HomingView& curre
 
 double image_difference(const HomingView& home, const HomingView& current, int highest) {
   check_pair(home, current, highest);
-  FourierHomingOptions options = published_homing(highest);
-  options.gradient = HomingGradient::both;
+  FourierHomingOptions options = published_homing_options(highest);
+  options.gradient = FourierHomingOptions::Gradient::both;
   options.tilt = true;
   return PairOfViews(home, current, options, highest_used(home, current, highest)).difference();
 }

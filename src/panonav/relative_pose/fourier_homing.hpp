@@ -2,6 +2,7 @@
 
 #include "panonav/core/options.hpp"
 #include "panonav/relative_pose/homing_view.hpp"
+#include "panonav/relative_pose/turn_correlation.hpp"
 
 namespace panonav {
 
@@ -28,40 +29,38 @@ struct HomeVector {
   [[nodiscard]] double direction_rad() const noexcept;  ///< in the current robot frame
 };
 
-/// How the heading between the views is found first.
-enum class TurnEstimate {
-  sequential,  ///< S06's rule: each component refines those before [S06 eq. 40-43]
-  global,      ///< the maximum of the correlation over all headings
-};
-
-/// At which view the slope of the image is taken.
-enum class HomingGradient {
-  current,  ///< as published [S06 eq. 20]
-  both,     ///< the mean of both views: errors of second order in the displacement cancel
-};
-
-/// Weights of components and rows.
-enum class HomingWeights {
-  equal,  ///< as published: all alike
-  /// By the coherence of both views: components fade out where their phases are unrelated, which
-  /// happens at lower frequencies the farther the views are apart. A far view is thus compared
-  /// coarsely and a near one finely, without a known distance.
-  coherence,
-};
-
 /// The largest number of headings that can be tried.
 inline constexpr int max_starting_estimates = 6;
 
-/// The defaults are our own rule; `published_homing` is S06's.
+/// The defaults are our own rule; `published_homing_options` is S06's.
 struct FourierHomingOptions {
+  /// How the heading between the views is found first.
+  enum class TurnEstimate {
+    sequential,  ///< S06's rule: each component refines those before [S06 eq. 40-43]
+    global,      ///< the maximum of the correlation over all headings
+  };
+  /// At which view the slope of the image is taken.
+  enum class Gradient {
+    current,  ///< as published [S06 eq. 20]
+    both,     ///< the mean of both views: errors of second order in the displacement cancel
+  };
+  /// Weights of components and rows.
+  enum class Weights {
+    equal,  ///< as published: all alike
+    /// By the coherence of both views: components fade out where their phases are unrelated, which
+    /// happens at lower frequencies the farther the views are apart. A far view is thus compared
+    /// coarsely and a near one finely, without a known distance.
+    coherence,
+  };
+
   int highest = 0;     ///< K, the highest frequency; 0 takes all that both views have, but one
   int iterations = 0;  ///< N_it of S06 section 2.3
   /// The first iteration compares a few frequencies and each further one more, up to K [S06
   /// footnote 6].
   bool rising = false;
-  TurnEstimate turn = TurnEstimate::global;          ///< how the first heading is found
-  HomingGradient gradient = HomingGradient::both;    ///< where the slope of the image is taken
-  HomingWeights weights = HomingWeights::coherence;  ///< which components and rows count more
+  TurnEstimate turn = TurnEstimate::global;  ///< how the first heading is found
+  Gradient gradient = Gradient::both;        ///< where the slope of the image is taken
+  Weights weights = Weights::coherence;      ///< which components and rows count more
   /// Headings from which the displacement is solved; the one that explains the views best is taken
   /// [S06 footnote 10].
   int starting_estimates = 2;
@@ -79,7 +78,7 @@ struct FourierHomingOptions {
 void visit_options(FourierHomingOptions& options, OptionVisitor& visitor);
 
 /// hs_Fi as published, with K = `highest`.
-[[nodiscard]] FourierHomingOptions published_homing(int highest, int iterations = 0);
+[[nodiscard]] FourierHomingOptions published_homing_options(int highest, int iterations = 0);
 
 /// The home vector by Fourier homing [S06 section 2.3, eq. 16-30; signs and missing terms as in
 /// docs/equations.md]. Heading first, then displacement and a correction of the heading in least
@@ -87,20 +86,15 @@ void visit_options(FourierHomingOptions& options, OptionVisitor& visitor);
 /// solve again.
 /// Turning either robot on the spot turns the vector's frame and nothing else. Identical views give
 /// the zero vector with confidence 0; views without structure give all zeros and residual 1.
-/// Throws ContractError when the views differ in rows or share fewer than K + 2 components;
-/// OptionError. Cost: O(rows K) and no allocation for K <= 62; for one row and K = 5 less than a
-/// microsecond.
+/// With `window` only headings within it are considered, before least squares correct them, as in
+/// places that look alike after a quarter turn; where no heading there fits better than its
+/// neighbours, the vector is all zeros with residual 1.
+/// Throws OptionError; ContractError when the views differ in rows or share fewer than K + 2
+/// components, and for a window unless 0 < half_width_rad <= pi and the turn estimate is global.
+/// Cost: O(rows K) and no allocation for K <= 62; for one row and K = 5 less than a microsecond.
 [[nodiscard]] HomeVector home_vector(const HomingView& home, const HomingView& current,
-                                     const FourierHomingOptions& options = {});
-
-/// The same, but only headings within `within_rad` of `heading_rad` are considered, before least
-/// squares correct them: for a turn that is known coarsely from another source, as in places that
-/// look alike after a quarter turn. Where no heading there fits better than its neighbours, the
-/// vector is all zeros with residual 1. Throws ContractError also unless 0 < within_rad <= pi and
-/// the turn estimate is global.
-[[nodiscard]] HomeVector home_vector_near(const HomingView& home, const HomingView& current,
-                                          double heading_rad, double within_rad,
-                                          const FourierHomingOptions& options = {});
+                                     const FourierHomingOptions& options = {},
+                                     const std::optional<HeadingWindow>& window = std::nullopt);
 
 /// The same with options already checked, for loops.
 [[nodiscard]] HomeVector home_vector_unchecked(const HomingView& home, const HomingView& current,

@@ -21,12 +21,12 @@ void visit_options(FourierHomingOptions& options, OptionVisitor& visitor) {
   table.visit(options, visitor);
 }
 
-FourierHomingOptions published_homing(int highest, int iterations) {
+FourierHomingOptions published_homing_options(int highest, int iterations) {
   return {.highest = highest,
           .iterations = iterations,
-          .turn = TurnEstimate::sequential,
-          .gradient = HomingGradient::current,
-          .weights = HomingWeights::equal,
+          .turn = FourierHomingOptions::TurnEstimate::sequential,
+          .gradient = FourierHomingOptions::Gradient::current,
+          .weights = FourierHomingOptions::Weights::equal,
           .starting_estimates = 1,
           .displacement_search = false,
           .vertical_motion = false,

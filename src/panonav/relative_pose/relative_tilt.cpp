@@ -164,7 +164,7 @@ Tilt relative_tilt(const HomingView& home, const HomingView& current, double hea
   return tilt;
 }
 
-HomingView levelled(const HomingView& view, const Tilt& tilt) {
+HomingView level_view(const HomingView& view, const Tilt& tilt) {
   // Four columns a period and more, so that interpolation takes little of the finest.
   const int columns = 4 * view.components();
   return homing_view(compute_signature(

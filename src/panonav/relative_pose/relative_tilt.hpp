@@ -15,6 +15,6 @@ namespace panonav {
                                  double heading_rad);
 
 /// The view without the tilt, with the same components. Cost: 0.2 ms for 40 rows and 20 components.
-[[nodiscard]] HomingView levelled(const HomingView& view, const Tilt& tilt);
+[[nodiscard]] HomingView level_view(const HomingView& view, const Tilt& tilt);
 
 }  // namespace panonav

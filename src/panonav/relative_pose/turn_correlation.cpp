@@ -57,7 +57,7 @@ float TurnCorrelation::at(float turn_rad) const noexcept {
   return evaluate(*this, turn_rad).value;
 }
 
-float sequential_turn(const TurnCorrelation& correlation) noexcept {
+float sequential_heading(const TurnCorrelation& correlation) noexcept {
   std::array<float, TurnCorrelation::max_frequencies + 1> differences{};
   std::array<float, TurnCorrelation::max_frequencies + 1> weights{};
   float all = 0.0F;
@@ -91,8 +91,8 @@ float sequential_turn(const TurnCorrelation& correlation) noexcept {
   return correlation.at(opposite) > correlation.at(first) ? opposite : first;
 }
 
-int highest_turns(const TurnCorrelation& correlation, std::span<float> turns,
-                  const TurnWindow& window) noexcept {
+int find_highest_peaks(const TurnCorrelation& correlation, std::span<float> turns,
+                       const HeadingWindow& window) noexcept {
   std::size_t count = 16;
   while (count < 8 * static_cast<std::size_t>(correlation.highest)) count *= 2;
   const std::size_t stride = max_points / count;

@@ -20,7 +20,7 @@ struct TurnCorrelation {
 };
 
 /// The headings that are considered: within `half_width_rad` of `middle_rad`; all by default.
-struct TurnWindow {
+struct HeadingWindow {
   float middle_rad = 0.0F;      ///< heading that is most expected
   float half_width_rad = 4.0F;  ///< more than pi: all turns
 
@@ -33,12 +33,12 @@ struct TurnWindow {
 /// The heading of S06's sequential rule, as published [S06 eq. 40-43, sign of eq. 41 corrected]:
 /// each component refines the estimate of those before. Where the first weight is below a tenth of
 /// the mean, a second estimate starts at the opposite heading. In radians, not wrapped.
-[[nodiscard]] float sequential_turn(const TurnCorrelation& correlation) noexcept;
+[[nodiscard]] float sequential_heading(const TurnCorrelation& correlation) noexcept;
 
 /// Fills `turns` with the headings of the highest local maxima within the window, highest first,
 /// and returns how many there are; 0 when the correlation is zero everywhere. Eight points per
 /// period of the highest frequency are evaluated and the best refined by Newton's rule.
-[[nodiscard]] int highest_turns(const TurnCorrelation& correlation, std::span<float> turns,
-                                const TurnWindow& window = {}) noexcept;
+[[nodiscard]] int find_highest_peaks(const TurnCorrelation& correlation, std::span<float> turns,
+                                     const HeadingWindow& window = {}) noexcept;
 
 }  // namespace panonav

@@ -9,11 +9,11 @@
 namespace panonav {
 
 std::optional<PhaseReading> read_phases(const HomingView& a, const HomingView& b,
-                                        const std::optional<TurnHint>& hint) {
-  const HomeVector from_a =
-      hint ? home_vector_near(b, a, hint->turn_rad, hint->within_rad) : home_vector(b, a);
-  const HomeVector from_b =
-      hint ? home_vector_near(a, b, -hint->turn_rad, hint->within_rad) : home_vector(a, b);
+                                        const std::optional<HeadingWindow>& window) {
+  std::optional<HeadingWindow> reverse = window;
+  if (reverse) reverse->middle_rad = -reverse->middle_rad;
+  const HomeVector from_a = home_vector(b, a, {}, window);
+  const HomeVector from_b = home_vector(a, b, {}, reverse);
   if (!(from_a.correlation > 0.0) || !(from_b.correlation > 0.0)) return std::nullopt;
   const double turns_differ = angle_difference(from_a.heading_rad, -from_b.heading_rad);
   PhaseReading reading;

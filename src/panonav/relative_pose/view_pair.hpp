@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "panonav/relative_pose/homing_view.hpp"
+#include "panonav/relative_pose/turn_correlation.hpp"
 
 namespace panonav {
 
@@ -27,18 +28,14 @@ struct PhaseReading {
   double residual = 1.0;
 };
 
-/// A turn that is known coarsely from another source.
-struct TurnHint {
-  double turn_rad = 0.0;    ///< heading of b minus heading of a
-  double within_rad = 0.5;  ///< above 0, at most pi
-};
-
 /// Reads both ways, from a to b and back. Empty when either view has no structure. Throws
 /// ContractError when the views differ in shape or have fewer than three components. Cost: that of
 /// two home vectors.
-/// With `hint` only turns within its bounds are considered: places that look alike when turned by a
-/// quarter are then not mistaken for each other; empty also when no turn within them fits.
+/// With `window` only headings of b minus those of a within it are considered: places that look
+/// alike when turned by a quarter are then not mistaken for each other; empty also when no turn
+/// within them fits.
 [[nodiscard]] std::optional<PhaseReading> read_phases(
-    const HomingView& a, const HomingView& b, const std::optional<TurnHint>& hint = std::nullopt);
+    const HomingView& a, const HomingView& b,
+    const std::optional<HeadingWindow>& window = std::nullopt);
 
 }  // namespace panonav

@@ -84,7 +84,7 @@ std::vector<float> horizon_scanline(const Panorama& panorama,
   return line;
 }
 
-std::vector<float> smoothed_line(std::span<const float> line, double sigma) {
+std::vector<float> smooth_line(std::span<const float> line, double sigma) {
   if (sigma < 0.3 || line.empty()) return {line.begin(), line.end()};
   const auto reach = static_cast<std::size_t>(std::ceil(3.0 * sigma));
   std::vector<float> kernel(reach + 1);

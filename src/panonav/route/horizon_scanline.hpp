@@ -29,6 +29,6 @@ void visit_options(HorizonScanlineOptions& options, OptionVisitor& visitor);
 
 /// Smooths a closed line by a Gaussian of this standard deviation in columns; returns it as it is
 /// below 0.3. Cost: 3 sigma multiplications a column.
-[[nodiscard]] std::vector<float> smoothed_line(std::span<const float> line, double sigma);
+[[nodiscard]] std::vector<float> smooth_line(std::span<const float> line, double sigma);
 
 }  // namespace panonav

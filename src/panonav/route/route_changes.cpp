@@ -24,7 +24,7 @@ bool RouteChanges::counts(Point2 position) {
   return std::exchange(line_, nearest) != nearest;
 }
 
-std::vector<AzimuthRange> RouteChanges::add(const RouteFix& fix) {
+std::vector<RouteChanges::AzimuthRange> RouteChanges::add(const RouteFix& fix) {
   const auto limit = static_cast<float>(max_deviations * fix.noise);
   std::array<int, sectors> above{};
   std::array<int, sectors> all{};
@@ -50,7 +50,7 @@ std::vector<AzimuthRange> RouteChanges::add(const RouteFix& fix) {
     pictures_[s] = high ? std::max(1, so_far + more) : 0;
   }
   const auto changed = [&](std::size_t s) { return pictures_[s % sectors] >= min_pictures; };
-  std::vector<AzimuthRange> ranges;
+  std::vector<RouteChanges::AzimuthRange> ranges;
   for (std::size_t s = 0; s < sectors; ++s) {
     if (!changed(s) || changed(s + sectors - 1)) continue;
     std::size_t end = s + 1;

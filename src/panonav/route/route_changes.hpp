@@ -10,13 +10,6 @@
 
 namespace panonav {
 
-/// Azimuths in the robot's frame, counter-clockwise from the first to the second.
-struct AzimuthRange {
-  double from_rad = 0.0;  ///< in [-pi, pi)
-  /// In [-pi, pi); below `from_rad` where the range goes through straight behind.
-  double to_rad = 0.0;
-};
-
 /// Finds what has changed since a route was remembered: directions that fits leave unexplained
 /// picture after picture, unlike noise. A direction (one of 72, 5 degrees wide) is unexplained
 /// where at least half of its columns are off by more than three deviations of the noise. It is
@@ -25,6 +18,13 @@ struct AzimuthRange {
 /// two lines is interpolated, and pictures from the same gap all share its error.
 class RouteChanges {
  public:
+  /// Azimuths in the robot's frame, counter-clockwise from the first to the second.
+  struct AzimuthRange {
+    double from_rad = 0.0;  ///< in [-pi, pi)
+    /// In [-pi, pi); below `from_rad` where the range goes through straight behind.
+    double to_rad = 0.0;
+  };
+
   RouteChanges() = default;  ///< Without lines each picture counts.
   /// `lines`: where those of the route were seen from.
   explicit RouteChanges(std::span<const Pose2> lines) : lines_(lines.begin(), lines.end()) {}

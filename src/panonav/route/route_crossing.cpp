@@ -19,8 +19,8 @@ std::vector<Direction2> equal_directions(std::size_t count) {
   return directions;
 }
 
-void cross_route(std::span<const Pose2> path, std::size_t first, Point2 viewpoint,
-                 std::span<const Direction2> directions, std::span<RouteCrossing> crossings) {
+void find_crossings(std::span<const Pose2> path, std::size_t first, Point2 viewpoint,
+                    std::span<const Direction2> directions, std::span<RouteCrossing> crossings) {
   std::ranges::fill(crossings, RouteCrossing{});
   const std::size_t count = crossings.size();
   if (path.size() < 2 || count == 0) return;

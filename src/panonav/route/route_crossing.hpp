@@ -30,7 +30,7 @@ struct Direction2 {
 /// reaches the viewpoint either passed the crossing before or would have come to it after; the
 /// nearest crossing has the least in between. `path`: places of the lines `first` and on. Throws
 /// nothing. Cost: O(path + directions).
-void cross_route(std::span<const Pose2> path, std::size_t first, Point2 viewpoint,
-                 std::span<const Direction2> directions, std::span<RouteCrossing> crossings);
+void find_crossings(std::span<const Pose2> path, std::size_t first, Point2 viewpoint,
+                    std::span<const Direction2> directions, std::span<RouteCrossing> crossings);
 
 }  // namespace panonav

@@ -126,7 +126,7 @@ RouteLines::RouteLines(const RoutePanorama& route, const RouteFitOptions& option
   for (std::size_t i = 0; i < route.size(); ++i) {
     const auto turned = world_line(route, i);
     for (Level& level : levels_) {
-      const auto smooth = smoothed_line(turned, level.sigma);
+      const auto smooth = smooth_line(turned, level.sigma);
       level.values.insert(level.values.end(), smooth.begin(), smooth.end());
     }
   }
@@ -165,8 +165,8 @@ bool RouteLines::collect(const Level& level, std::span<const float> seen, const 
                          const Window& window, std::vector<RouteCrossing>& crossings,
                          std::vector<Term>& terms) const {
   crossings.resize(level.directions.size());
-  cross_route(std::span(poses_).subspan(window.begin, window.end - window.begin), window.begin,
-              pose.position(), level.directions, crossings);
+  find_crossings(std::span(poses_).subspan(window.begin, window.end - window.begin), window.begin,
+                 pose.position(), level.directions, crossings);
   const double columns_per_rad = columns_ / (2.0 * std::numbers::pi);
   const double turn = pose.heading_rad * columns_per_rad;
   const auto row = [&](std::size_t line) {
@@ -319,7 +319,7 @@ std::vector<float> RouteLines::shift_tolerant_residuals(const std::vector<Term>&
 bool RouteLines::descend(std::span<const Level> levels, std::span<const float> line,
                          const Window& near, Workspace& work, Pose2& pose) const {
   for (const Level& level : levels) {
-    work.seen = smoothed_line(line, level.sigma);
+    work.seen = smooth_line(line, level.sigma);
     const bool last = &level == &levels_.back();
     const double near_enough_m =
         last ? 3e-4 : 0.05 * usual_distance_m * level.sigma * 2.0 * std::numbers::pi / columns_;
@@ -388,7 +388,7 @@ std::optional<RouteFix> RouteLines::described(std::span<const float> line, const
                                               Workspace& work) const {
   const Matrix inverse = normal.matrix.ldlt().solve(Matrix::Identity());
   if (!inverse.allFinite()) return std::nullopt;
-  work.seen = smoothed_line(line, levels_.back().sigma);
+  work.seen = smooth_line(line, levels_.back().sigma);
   static_cast<void>(collect(levels_.back(), work.seen, pose, near, work.crossings, work.terms));
   RouteFix fix;
   fix.pose = pose;
@@ -421,8 +421,8 @@ std::vector<float> RouteLines::synthesise(const Pose2& pose) const {
   const auto near = window(pose.position());
   if (!near) return line;
   std::vector<RouteCrossing> crossings(line.size());
-  cross_route(std::span(poses_).subspan(near->begin, near->end - near->begin), near->begin,
-              pose.position(), levels_.back().directions, crossings);
+  find_crossings(std::span(poses_).subspan(near->begin, near->end - near->begin), near->begin,
+                 pose.position(), levels_.back().directions, crossings);
   std::vector<float> world(line.size(), nothing);
   for (std::size_t c = 0; c < line.size(); ++c) {
     if (crossings[c].along >= 0.0F) world[c] = shown(levels_.back(), crossings[c].along, c);

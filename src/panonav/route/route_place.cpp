@@ -8,7 +8,7 @@ namespace panonav {
 namespace {
 
 // Of a position on one part of a path, along that part.
-RoutePlace place_beside(Point2 from, Point2 to, Point2 position) {
+RoutePosition place_beside(Point2 from, Point2 to, Point2 position) {
   const double ex = to.x_m - from.x_m;
   const double ey = to.y_m - from.y_m;
   const double length = std::hypot(ex, ey);
@@ -22,14 +22,14 @@ RoutePlace place_beside(Point2 from, Point2 to, Point2 position) {
 
 }  // namespace
 
-RoutePlace place_on_route(std::span<const Pose2> path, Point2 position) {
-  RoutePlace place{0.0, distance(path.front().position(), position)};
+RoutePosition project_onto_route(std::span<const Pose2> path, Point2 position) {
+  RoutePosition place{0.0, distance(path.front().position(), position)};
   double least = path.size() > 1 ? INFINITY : 0.0;
   double way = 0.0;
   for (std::size_t i = 0; i + 1 < path.size(); ++i) {
     const Point2 from = path[i].position();
     const Point2 to = path[i + 1].position();
-    const RoutePlace here = place_beside(from, to, position);
+    const RoutePosition here = place_beside(from, to, position);
     if (std::abs(here.lateral_m) < least) {
       least = std::abs(here.lateral_m);
       place = {way + here.along_m, here.lateral_m};
@@ -39,15 +39,15 @@ RoutePlace place_on_route(std::span<const Pose2> path, Point2 position) {
   return place;
 }
 
-std::vector<RoutePlace> places_on_route(std::span<const Pose2> path, Point2 position,
-                                        double reach_m) {
-  std::vector<RoutePlace> places;
+std::vector<RoutePosition> find_passes(std::span<const Pose2> path, Point2 position,
+                                       double reach_m) {
+  std::vector<RoutePosition> places;
   bool near = false;  // the part before this one
   double way = 0.0;
   for (std::size_t i = 0; i + 1 < path.size(); ++i) {
     const Point2 from = path[i].position();
     const Point2 to = path[i + 1].position();
-    RoutePlace here = place_beside(from, to, position);
+    RoutePosition here = place_beside(from, to, position);
     here.along_m += way;
     way += distance(from, to);
     const bool was_near = near;
@@ -77,7 +77,7 @@ Point2 point_on_route(std::span<const Pose2> path, double along_m) {
   return path.back().position();
 }
 
-std::vector<Point2> stretch_of_route(std::span<const Pose2> path, double from_m, double to_m) {
+std::vector<Point2> route_segment(std::span<const Pose2> path, double from_m, double to_m) {
   const auto [low_m, high_m] = std::minmax(from_m, to_m);
   std::vector<Point2> places{point_on_route(path, low_m)};
   double way_m = 0.0;

@@ -8,7 +8,7 @@
 namespace panonav {
 
 /// Where a robot is as seen from a route.
-struct RoutePlace {
+struct RoutePosition {
   double along_m = 0.0;    ///< way along the path to its place nearest to the robot
   double lateral_m = 0.0;  ///< from there to the robot; positive to the left of the path
 };
@@ -17,18 +17,18 @@ struct RoutePlace {
 // O(path).
 
 /// The place of `position` beside the path. Places of a path of one pose are at 0 along it.
-[[nodiscard]] RoutePlace place_on_route(std::span<const Pose2> path, Point2 position);
+[[nodiscard]] RoutePosition project_onto_route(std::span<const Pose2> path, Point2 position);
 
 /// All places where the path passes `position` within `reach_m`, ascending along it: the nearest
 /// one of each stretch that is so near. Empty on a path of one pose.
-[[nodiscard]] std::vector<RoutePlace> places_on_route(std::span<const Pose2> path, Point2 position,
-                                                      double reach_m);
+[[nodiscard]] std::vector<RoutePosition> find_passes(std::span<const Pose2> path, Point2 position,
+                                                     double reach_m);
 
 /// Where the path is `along_m` from its start; before its start and beyond its end these.
 [[nodiscard]] Point2 point_on_route(std::span<const Pose2> path, double along_m);
 
 /// The path between two ways along it, both ends included; back when it begins at the greater one.
-[[nodiscard]] std::vector<Point2> stretch_of_route(std::span<const Pose2> path, double from_m,
-                                                   double to_m);
+[[nodiscard]] std::vector<Point2> route_segment(std::span<const Pose2> path, double from_m,
+                                                double to_m);
 
 }  // namespace panonav

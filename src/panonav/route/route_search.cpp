@@ -66,7 +66,7 @@ std::vector<float> RouteLines::coarse(std::span<const float> line) const {
     throw ContractError("values of the line", static_cast<double>(line.size()),
                         std::to_string(columns_));
   }
-  const auto smooth = smoothed_line(line, levels_.front().sigma);
+  const auto smooth = smooth_line(line, levels_.front().sigma);
   std::vector<float> result(coarse_columns);
   for (std::size_t c = 0; c < coarse_columns; ++c) {
     result[c] = sample_line(smooth, static_cast<double>(c) * columns_ / coarse_columns).value;
@@ -84,8 +84,8 @@ std::optional<RouteLines::Candidate> RouteLines::candidate(std::span<const float
   if (!near) return std::nullopt;
   static const std::vector<Direction2> directions = equal_directions(coarse_columns);
   std::vector<RouteCrossing> crossings(coarse_columns);
-  cross_route(std::span(poses_).subspan(near->begin, near->end - near->begin), near->begin,
-              position, directions, crossings);
+  find_crossings(std::span(poses_).subspan(near->begin, near->end - near->begin), near->begin,
+                 position, directions, crossings);
   std::vector<float> shown_there(coarse_columns, std::numeric_limits<float>::quiet_NaN());
   std::size_t count = 0;
   const auto size = static_cast<std::size_t>(columns_);

@@ -68,7 +68,7 @@ double RouteTracker::learnt_correlation(const RoutePanorama& route,
 }
 
 RouteFix RouteTracker::placed(RouteFix fix, RouteFix::Origin origin) const {
-  const RoutePlace place = place_on_route(lines_.poses(), fix.pose.position());
+  const RoutePosition place = project_onto_route(lines_.poses(), fix.pose.position());
   fix.origin = origin;
   fix.along_m = place.along_m;
   fix.lateral_m = place.lateral_m;

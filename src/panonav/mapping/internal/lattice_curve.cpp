@@ -21,7 +21,8 @@ double laid_out(std::span<const Pose2> poses, std::size_t a, std::size_t b) {
 }
 
 /// Returns the slopes of springs between each view and its nearest one, at distance 1.
-std::vector<double> slopes_to_nearest(std::span<const LatticeSpring> measured, std::size_t nodes) {
+std::vector<double> slopes_to_nearest(std::span<const Lattice::Spring> measured,
+                                      std::size_t nodes) {
   std::vector<double> nearest(nodes, INFINITY);
   for (const auto& spring : measured) {
     nearest[spring.a] = std::min(nearest[spring.a], spring.dissimilarity);
@@ -40,7 +41,7 @@ std::optional<double> level_of_far_views(const SpringViews& views, const Lattice
                                          double near) {
   const std::size_t nodes = layout.poses.size();
   Random random(1);
-  std::vector<DissimilarityAtDistance> drawn;
+  std::vector<DissimilarityCurve::Sample> drawn;
   for (std::size_t i = 0; i < far_pairs; ++i) {
     const auto a = static_cast<std::size_t>(random.index(nodes));
     const auto b = static_cast<std::size_t>(random.index(nodes));
@@ -64,9 +65,9 @@ std::optional<double> level_of_far_views(const SpringViews& views, const Lattice
 
 }  // namespace
 
-DissimilarityCurve make_first_curve(std::span<const LatticeSpring> measured,
+DissimilarityCurve make_first_curve(std::span<const Lattice::Spring> measured,
                                     const NodeMotions& motions, const SpringViews& views,
-                                    SpringErrors& errors) {
+                                    Lattice::Errors& errors) {
   std::vector<double> slopes;
   std::vector<double> units;
   for (const auto& spring : measured) {
@@ -87,10 +88,10 @@ DissimilarityCurve make_first_curve(std::span<const LatticeSpring> measured,
   return DissimilarityCurve(slopes.empty() ? 1.0 : upper_median(slopes));
 }
 
-std::optional<DissimilarityCurve> fit_curve(std::span<const LatticeSpring> measured,
-                                            std::span<const LatticeSpring> springs,
+std::optional<DissimilarityCurve> fit_curve(std::span<const Lattice::Spring> measured,
+                                            std::span<const Lattice::Spring> springs,
                                             const SpringViews& views, const LatticeStart& layout) {
-  std::vector<DissimilarityAtDistance> pairs;
+  std::vector<DissimilarityCurve::Sample> pairs;
   for (const auto& spring : springs.empty() ? measured : springs) {
     if (!springs.empty() && spring.weight < min_curve_weight) continue;
     pairs.push_back({spring.dissimilarity, laid_out(layout.poses, spring.a, spring.b)});
@@ -107,8 +108,8 @@ std::optional<DissimilarityCurve> fit_curve(std::span<const LatticeSpring> measu
   return DissimilarityCurve(pairs, far.value_or(2.0 * max_dissimilarity));
 }
 
-void fit_phase_unit(std::span<const LatticeSpring> springs, std::span<const Pose2> poses,
-                    SpringErrors& errors) {
+void fit_phase_unit(std::span<const Lattice::Spring> springs, std::span<const Pose2> poses,
+                    Lattice::Errors& errors) {
   std::vector<double> ratios;
   for (const auto& spring : springs) {
     if (spring.weight < min_curve_weight || !spring.phases || !spring.phases->points) continue;

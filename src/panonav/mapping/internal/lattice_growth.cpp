@@ -32,7 +32,7 @@ constexpr double length_tolerance_factor = 3.0;
 
 class Grower {
  public:
-  Grower(std::size_t nodes, std::span<const LatticeSpring> springs, double unit,
+  Grower(std::size_t nodes, std::span<const Lattice::Spring> springs, double unit,
          const LatticeStart& start, const LatticeWatch& watch)
       : watch_(watch), layout_(nodes, make_links(nodes, springs, unit), start) {}
 
@@ -184,7 +184,7 @@ class Grower {
 
 }  // namespace
 
-bool fits(const LatticeSpring& spring, double unit, const Pose2& a, const Pose2& b) {
+bool fits(const Lattice::Spring& spring, double unit, const Pose2& a, const Pose2& b) {
   if (!spring.phases || !agrees(spring)) return false;
   const Pose2 said = step_of(spring, unit);
   const Pose2 laid_out = inverse(a) * b;
@@ -200,8 +200,8 @@ bool fits(const LatticeSpring& spring, double unit, const Pose2& a, const Pose2&
          apart <= length_tolerance_factor * length && length <= length_tolerance_factor * apart;
 }
 
-GrownLayout grow_components(std::size_t nodes, std::span<const LatticeSpring> springs, double unit,
-                            const LatticeStart& start, const LatticeWatch& watch) {
+GrownLayout grow_components(std::size_t nodes, std::span<const Lattice::Spring> springs,
+                            double unit, const LatticeStart& start, const LatticeWatch& watch) {
   return Grower(nodes, springs, unit, start, watch).grow();
 }
 

@@ -45,12 +45,13 @@ struct GrownLayout {
 /// `watch` is called after each join. `start`: components to begin with, instead of single views;
 /// empty for none. Lengths in the layout are `unit` times those of the phases. Springs whose views
 /// disagree do not count. Deterministic. Cost: about 1 s for 1,000 views of 12 springs.
-[[nodiscard]] GrownLayout grow_components(std::size_t nodes, std::span<const LatticeSpring> springs,
-                                          double unit, const LatticeStart& start = {},
+[[nodiscard]] GrownLayout grow_components(std::size_t nodes,
+                                          std::span<const Lattice::Spring> springs, double unit,
+                                          const LatticeStart& start = {},
                                           const LatticeWatch& watch = {});
 
 /// Whether the poses of two views agree with what their spring's phases say, after the layout has
 /// been made: turn within 15 degrees, direction within 45, length within a factor of three.
-[[nodiscard]] bool fits(const LatticeSpring& spring, double unit, const Pose2& a, const Pose2& b);
+[[nodiscard]] bool fits(const Lattice::Spring& spring, double unit, const Pose2& a, const Pose2& b);
 
 }  // namespace panonav

@@ -186,7 +186,7 @@ void count_in_spacings(std::size_t nodes, std::vector<LatticeLink>& links) {
 
 }  // namespace
 
-Pose2 step_of(const LatticeSpring& spring, double unit) {
+Pose2 step_of(const Lattice::Spring& spring, double unit) {
   const PhaseReading& phases = *spring.phases;
   if (!phases.points) return {0.0, 0.0, phases.turn_rad};
   const double from_b = phases.direction_b_rad + phases.turn_rad - std::numbers::pi;
@@ -201,10 +201,10 @@ bool is_near(const Pose2& a, const Pose2& b, double within) {
          distance(a.position(), b.position()) <= within;
 }
 
-std::vector<LatticeLink> make_links(std::size_t nodes, std::span<const LatticeSpring> springs,
+std::vector<LatticeLink> make_links(std::size_t nodes, std::span<const Lattice::Spring> springs,
                                     double unit) {
   std::vector<LatticeLink> links;
-  for (const LatticeSpring& spring : springs) {
+  for (const Lattice::Spring& spring : springs) {
     if (!spring.phases || !agrees(spring)) continue;
     links.push_back({spring.a, spring.b, step_of(spring, unit), unit * spring.phases->length,
                      spring.phases->residual, 0.0});

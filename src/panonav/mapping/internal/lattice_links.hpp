@@ -24,7 +24,7 @@ struct LatticeLink {
 };
 
 /// The relative pose a_from_b that the phases of a spring say; `unit`: of their lengths.
-[[nodiscard]] Pose2 step_of(const LatticeSpring& spring, double unit);
+[[nodiscard]] Pose2 step_of(const Lattice::Spring& spring, double unit);
 
 /// Whether two poses have the same heading within the tolerance, and positions within `within`.
 [[nodiscard]] bool is_near(const Pose2& a, const Pose2& b, double within);
@@ -32,7 +32,7 @@ struct LatticeLink {
 /// The springs whose views agree, with probabilities learnt from their ranks and triangles, and
 /// with lengths in the spacing of the views around. Links of no length stay so.
 [[nodiscard]] std::vector<LatticeLink> make_links(std::size_t nodes,
-                                                  std::span<const LatticeSpring> springs,
+                                                  std::span<const Lattice::Spring> springs,
                                                   double unit);
 
 /// For each node the numbers of its links.

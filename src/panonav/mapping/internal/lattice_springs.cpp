@@ -29,7 +29,7 @@ constexpr double default_length_error = 0.25;
 constexpr double min_angle_deviation_rad = 0.0035;
 
 /// Displacement and turn of the spring from one of its ends.
-Pose2 step_from(std::size_t from, const LatticeSpring& spring) {
+Pose2 step_from(std::size_t from, const Lattice::Spring& spring) {
   const PhaseReading& phases = *spring.phases;
   const bool forward = from == spring.a;
   const double direction = forward ? phases.direction_a_rad : phases.direction_b_rad;
@@ -37,7 +37,7 @@ Pose2 step_from(std::size_t from, const LatticeSpring& spring) {
           forward ? phases.turn_rad : wrap_angle(-phases.turn_rad)};
 }
 
-bool has_direction(const LatticeSpring& spring) {
+bool has_direction(const Lattice::Spring& spring) {
   return spring.phases && spring.phases->points;
 }
 
@@ -79,20 +79,21 @@ double SpringViews::dissimilarity(NodePair pair) const {
   return dissimilarity_packed(packed_[pair.first], packed_[pair.second], components_);
 }
 
-LatticeSpring SpringViews::measure(NodePair pair, const std::optional<TurnHint>& hint) const {
-  LatticeSpring spring{.a = pair.first, .b = pair.second, .dissimilarity = dissimilarity(pair)};
+Lattice::Spring SpringViews::measure(NodePair pair,
+                                     const std::optional<HeadingWindow>& hint) const {
+  Lattice::Spring spring{.a = pair.first, .b = pair.second, .dissimilarity = dissimilarity(pair)};
   if (!homing_.empty()) spring.phases = read_phases(homing_[spring.a], homing_[spring.b], hint);
   return spring;
 }
 
-bool agrees(const LatticeSpring& spring) {
+bool agrees(const Lattice::Spring& spring) {
   if (!spring.phases) return true;
   return spring.phases->disagreement_rad <= max_disagreement_rad &&
          spring.phases->turn_disagreement_rad <= max_disagreement_rad;
 }
 
-void learn_errors(std::span<const LatticeSpring> springs, const DissimilarityCurve& curve,
-                  SpringErrors& errors) {
+void learn_errors(std::span<const Lattice::Spring> springs, const DissimilarityCurve& curve,
+                  Lattice::Errors& errors) {
   std::vector<double> lengths;
   std::vector<double> disagreements;
   std::vector<double> turn_disagreements;
@@ -116,7 +117,7 @@ void learn_errors(std::span<const LatticeSpring> springs, const DissimilarityCur
   errors.turn_rad = deviation(turn_disagreements);
 }
 
-SpringTerm spring_term(const LatticeSpring& spring, const SpringErrors& errors,
+SpringTerm spring_term(const Lattice::Spring& spring, const Lattice::Errors& errors,
                        bool phase_lengths) {
   SpringTerm term{.a = spring.a,
                   .b = spring.b,
@@ -136,7 +137,7 @@ SpringTerm spring_term(const LatticeSpring& spring, const SpringErrors& errors,
   return term;
 }
 
-std::vector<double> closing_triangles(std::size_t nodes, std::span<const LatticeSpring> springs) {
+std::vector<double> closing_triangles(std::size_t nodes, std::span<const Lattice::Spring> springs) {
   std::vector<GraphEdge> edges;
   for (const auto& spring : springs) edges.push_back({spring.a, spring.b, spring.length});
   const LatticeGraph graph(nodes, edges);
@@ -146,15 +147,15 @@ std::vector<double> closing_triangles(std::size_t nodes, std::span<const Lattice
   for (std::size_t a = 0; a < nodes; ++a) {
     for (const auto& n : graph.neighbours(a)) spring_to[n.node] = n.edge;
     for (const auto& n : graph.neighbours(a)) {
-      const LatticeSpring& ab = springs[n.edge];
+      const Lattice::Spring& ab = springs[n.edge];
       if (n.node < a || !has_direction(ab)) continue;
       const Pose2 to_b = step_from(a, ab);
       for (const auto& m : graph.neighbours(n.node)) {
         // Each triangle once.
         if (m.node < n.node || spring_to[m.node] == springs.size()) continue;
         const std::size_t across = spring_to[m.node];
-        const LatticeSpring& bc = springs[m.edge];
-        const LatticeSpring& ac = springs[across];
+        const Lattice::Spring& bc = springs[m.edge];
+        const Lattice::Spring& ac = springs[across];
         if (!has_direction(bc) || !has_direction(ac)) continue;
         const Pose2 by_b = to_b * step_from(n.node, bc);
         const Pose2 straight = step_from(a, ac);
@@ -177,7 +178,7 @@ std::vector<double> closing_triangles(std::size_t nodes, std::span<const Lattice
   return closing;
 }
 
-void keep_confirmed(std::size_t nodes, double min_closing, std::vector<LatticeSpring>& springs) {
+void keep_confirmed(std::size_t nodes, double min_closing, std::vector<Lattice::Spring>& springs) {
   const auto closes = closing_triangles(nodes, springs);
   std::vector<GraphEdge> confirmed;
   std::vector<unsigned char> has_support(nodes);
@@ -189,7 +190,7 @@ void keep_confirmed(std::size_t nodes, double min_closing, std::vector<LatticeSp
   }
   const auto components = LatticeGraph(nodes, confirmed).components();
   std::vector<std::map<std::size_t, std::size_t>> leads_to(nodes);
-  for (const LatticeSpring& spring : springs) {
+  for (const Lattice::Spring& spring : springs) {
     if (has_support[spring.b] != 0) ++leads_to[spring.a][components[spring.b]];
     if (has_support[spring.a] != 0) ++leads_to[spring.b][components[spring.a]];
   }
@@ -198,7 +199,7 @@ void keep_confirmed(std::size_t nodes, double min_closing, std::vector<LatticeSp
     return std::ranges::max_element(leads_to[node], {}, [](const auto& p) { return p.second; })
         ->first;
   };
-  std::vector<LatticeSpring> kept;
+  std::vector<Lattice::Spring> kept;
   for (std::size_t s = 0; s < springs.size(); ++s) {
     const auto [a, b] = std::pair{springs[s].a, springs[s].b};
     const bool supported_a = has_support[a] != 0;

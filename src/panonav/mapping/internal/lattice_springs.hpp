@@ -29,8 +29,8 @@ class SpringViews {
   [[nodiscard]] double dissimilarity(NodePair pair) const;
   /// Dissimilarity and, with the option, phases; no length yet. `hint`: turn from the first to the
   /// second node.
-  [[nodiscard]] LatticeSpring measure(NodePair pair,
-                                      const std::optional<TurnHint>& hint = std::nullopt) const;
+  [[nodiscard]] Lattice::Spring measure(
+      NodePair pair, const std::optional<HeadingWindow>& hint = std::nullopt) const;
 
  private:
   const VisualMemory* memory_;
@@ -40,26 +40,26 @@ class SpringViews {
 };
 
 /// Whether the two views of the spring agree on how they lie to each other; true without phases.
-[[nodiscard]] bool agrees(const LatticeSpring& spring);
+[[nodiscard]] bool agrees(const Lattice::Spring& spring);
 
 /// What the springs' views disagree on, and the curve's error, make the deviations; those of phase
 /// lengths are not touched.
-void learn_errors(std::span<const LatticeSpring> springs, const DissimilarityCurve& curve,
-                  SpringErrors& errors);
+void learn_errors(std::span<const Lattice::Spring> springs, const DissimilarityCurve& curve,
+                  Lattice::Errors& errors);
 
 /// The spring as the solver sees it. `phase_lengths`: the lengths that phases tell count, too.
-[[nodiscard]] SpringTerm spring_term(const LatticeSpring& spring, const SpringErrors& errors,
+[[nodiscard]] SpringTerm spring_term(const Lattice::Spring& spring, const Lattice::Errors& errors,
                                      bool phase_lengths);
 
 /// For each spring the share of the triangles with two others that close, in turn and in
 /// displacement by their rest lengths, 0 .. 1; 0 where there are none, and without phases. Cost:
 /// springs * springs of a node.
 [[nodiscard]] std::vector<double> closing_triangles(std::size_t nodes,
-                                                    std::span<const LatticeSpring> springs);
+                                                    std::span<const Lattice::Spring> springs);
 
 /// Leaves out springs of whose triangles no more than the share `min_closing` close. A view without
 /// any that does hangs on the one component to which most of its springs lead, so that it never
 /// joins two; or on others of its kind.
-void keep_confirmed(std::size_t nodes, double min_closing, std::vector<LatticeSpring>& springs);
+void keep_confirmed(std::size_t nodes, double min_closing, std::vector<Lattice::Spring>& springs);
 
 }  // namespace panonav

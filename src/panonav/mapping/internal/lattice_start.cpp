@@ -29,7 +29,7 @@ std::vector<std::vector<std::size_t>> members_of(const std::vector<std::size_t>&
 
 /// Headings from the springs whose views agree best: a spanning tree of least disagreement. The
 /// first view of each component has heading 0.
-void set_headings(const LatticeGraph& graph, std::span<const LatticeSpring> springs,
+void set_headings(const LatticeGraph& graph, std::span<const Lattice::Spring> springs,
                   std::vector<Pose2>& poses) {
   using Open = std::tuple<double, std::size_t, std::size_t>;  // disagreement, spring, node
   std::vector<unsigned char> done(poses.size());
@@ -50,7 +50,7 @@ void set_headings(const LatticeGraph& graph, std::span<const LatticeSpring> spri
       const auto [unused, edge, node] = open.top();
       open.pop();
       if (done[node] != 0) continue;
-      const LatticeSpring& spring = springs[edge];
+      const Lattice::Spring& spring = springs[edge];
       if (node == spring.b) {
         reach(node, poses[spring.a].heading_rad + spring.phases->turn_rad);
       } else {
@@ -81,11 +81,11 @@ std::vector<std::size_t> choose_landmarks(const LatticeGraph& graph, std::size_t
 /// where the views say. False when no spring points anywhere.
 bool turn_to_directions(const std::vector<std::size_t>& members,
                         const std::vector<std::size_t>& components,
-                        std::span<const LatticeSpring> springs, std::vector<Pose2>& poses) {
+                        std::span<const Lattice::Spring> springs, std::vector<Pose2>& poses) {
   std::vector<Point2> laid_out;
   std::vector<Point2> seen;
   const std::size_t component = components[members.front()];
-  for (const LatticeSpring& spring : springs) {
+  for (const Lattice::Spring& spring : springs) {
     if (components[spring.a] != component || !spring.phases || !spring.phases->points) continue;
     const Pose2& a = poses[spring.a];
     const Pose2& b = poses[spring.b];
@@ -109,7 +109,7 @@ bool turn_to_directions(const std::vector<std::size_t>& members,
 }
 
 /// What the phases say of the way from `from`, whichever end of the spring that is.
-PhaseReading seen_from(std::size_t from, const LatticeSpring& spring) {
+PhaseReading seen_from(std::size_t from, const Lattice::Spring& spring) {
   PhaseReading phases = *spring.phases;
   if (from == spring.a) return phases;
   phases.turn_rad = wrap_angle(-phases.turn_rad);
@@ -119,7 +119,7 @@ PhaseReading seen_from(std::size_t from, const LatticeSpring& spring) {
 
 }  // namespace
 
-LatticeStart lay_out_by_springs(std::size_t nodes, std::span<const LatticeSpring> springs,
+LatticeStart lay_out_by_springs(std::size_t nodes, std::span<const Lattice::Spring> springs,
                                 int landmarks) {
   std::vector<GraphEdge> edges;
   for (const auto& spring : springs) edges.push_back({spring.a, spring.b, spring.length});
@@ -160,9 +160,9 @@ bool is_compatible(const PhaseReading& phases, const CoarseMotion& motion) {
 }
 
 LatticeStart lay_out_by_motion(std::size_t nodes, std::span<const NodeMotion> motions,
-                               std::span<const LatticeSpring> springs) {
-  std::map<std::pair<std::size_t, std::size_t>, const LatticeSpring*> seen;
-  for (const LatticeSpring& spring : springs) {
+                               std::span<const Lattice::Spring> springs) {
+  std::map<std::pair<std::size_t, std::size_t>, const Lattice::Spring*> seen;
+  for (const Lattice::Spring& spring : springs) {
     if (spring.phases) seen[{spring.a, spring.b}] = &spring;
   }
   std::vector<GraphEdge> edges;

@@ -26,14 +26,14 @@ struct LatticeStart {
 /// shortest ways, component by component; headings along the springs whose views agree best; the
 /// mirror image that fits the directions better. Cost: landmarks * (springs log n) + landmarks^3.
 [[nodiscard]] LatticeStart lay_out_by_springs(std::size_t nodes,
-                                              std::span<const LatticeSpring> springs,
+                                              std::span<const Lattice::Spring> springs,
                                               int landmarks);
 
 /// Follows the motions from node to node, component by component; where a spring of `springs` joins
 /// the same two nodes and what its phases say is compatible with the motion, it gives turn and
 /// direction.
 [[nodiscard]] LatticeStart lay_out_by_motion(std::size_t nodes, std::span<const NodeMotion> motions,
-                                             std::span<const LatticeSpring> springs);
+                                             std::span<const Lattice::Spring> springs);
 
 /// Whether what the phases say lies within three deviations of the motion.
 [[nodiscard]] bool is_compatible(const PhaseReading& phases, const CoarseMotion& motion);

@@ -55,7 +55,7 @@ LoopClosureFinder::LoopClosureFinder(const VisualMemory& memory, const LoopClosu
     : memory_(&memory), options_(options), odometry_(odometry), scope_(scope) {
   validate(options);
   validate(odometry);
-  odometry_.rule = StepRule::home_vector;  // the other gives no direction
+  odometry_.rule = VisualOdometryOptions::Rule::home_vector;  // the other gives no direction
   odometry_.max_residual = options.max_residual;
 }
 

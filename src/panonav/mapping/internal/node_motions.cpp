@@ -11,8 +11,9 @@ namespace panonav {
 
 namespace {
 
-/// Deviations of a motion's turn within which phases are searched.
-constexpr double turn_hint_deviations = 3.0;
+/// Standard deviations of a motion's rotation within which phases are searched: normal errors
+/// exceed them once in 370 times.
+constexpr double max_heading_deviations = 3.0;
 
 void check(const CoarseMotion& motion, const VisualMemory& memory) {
   const double sum = motion.step.x_m + motion.step.y_m + motion.step.heading_rad;
@@ -55,13 +56,14 @@ bool NodeMotions::connect(std::size_t nodes) const {
   return std::ranges::count(components, 0U) == static_cast<long>(nodes);
 }
 
-std::optional<TurnHint> NodeMotions::turn_between(NodePair pair) const {
+std::optional<HeadingWindow> NodeMotions::heading_between(NodePair pair) const {
   const NodeMotion* moved = between(pair);
   if (moved == nullptr) return std::nullopt;
   const double turn_rad = moved->motion.step.heading_rad;
-  return TurnHint{
-      moved->a < moved->b ? turn_rad : -turn_rad,
-      std::min(std::numbers::pi, turn_hint_deviations * moved->motion.turn_deviation_rad)};
+  return HeadingWindow{
+      static_cast<float>(moved->a < moved->b ? turn_rad : -turn_rad),
+      static_cast<float>(
+          std::min(std::numbers::pi, max_heading_deviations * moved->motion.turn_deviation_rad))};
 }
 
 std::vector<SpringTerm> NodeMotions::terms() const {

@@ -23,8 +23,9 @@ class NodeMotions {
   [[nodiscard]] const NodeMotion* between(NodePair pair) const;
   /// Whether they lead from each of `nodes` nodes to every other one.
   [[nodiscard]] bool connect(std::size_t nodes) const;
-  /// What the motion between two nodes says of their turn.
-  [[nodiscard]] std::optional<TurnHint> turn_between(NodePair pair) const;
+  /// The headings of the second node in the frame of the first that the motion between them allows;
+  /// nullopt without a motion.
+  [[nodiscard]] std::optional<HeadingWindow> heading_between(NodePair pair) const;
   /// Each motion as a spring that is never rejected.
   [[nodiscard]] std::vector<SpringTerm> terms() const;
   /// The factor by which the layout must grow so that the motions have their lengths in it, by

@@ -8,7 +8,7 @@
 
 #include "panonav/memory/view_source.hpp"
 #include "panonav/navigation/navigation_graph.hpp"
-#include "panonav/navigation/search_everywhere.hpp"
+#include "panonav/navigation/search_whole_memory.hpp"
 #include "panonav/navigation/sub_areas.hpp"
 #include "panonav/relative_pose/homing_view.hpp"
 #include "panonav/relative_pose/reference_views.hpp"

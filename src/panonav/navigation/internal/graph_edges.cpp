@@ -17,7 +17,7 @@ constexpr double min_length_share = 0.1;
 
 // Reads some edges from the phases of their views, which are all held at once.
 void read_some_edges(const ViewSource& source, std::span<const Link> links,
-                     std::span<NavigationEdge> edges, Executor& executor) {
+                     std::span<NavigationGraph::Edge> edges, Executor& executor) {
   std::set<ViewId> wanted;
   for (const Link& link : links) wanted.insert({link.a, link.b});
   const VisualMemory memory = source.load(std::vector<ViewId>(wanted.begin(), wanted.end()));
@@ -47,22 +47,22 @@ std::optional<Pose2> motion_of(const PhaseReading& reading) {
                wrap_angle(reading.turn_rad)};
 }
 
-void complete_lengths(std::vector<NavigationEdge>& edges) {
+void complete_lengths(std::vector<NavigationGraph::Edge>& edges) {
   std::vector<double> lengths;
-  for (const NavigationEdge& edge : edges) {
+  for (const NavigationGraph::Edge& edge : edges) {
     if (edge.length > 0.0) lengths.push_back(edge.length);
   }
   const double typical = lengths.empty() ? 1.0 : upper_median(lengths);
-  for (NavigationEdge& edge : edges) {
+  for (NavigationGraph::Edge& edge : edges) {
     const bool known = edge.a_from_b || edge.length > 0.0;
     edge.length =
         known ? std::max(edge.length, min_length_share * typical) : unknown_length_share * typical;
   }
 }
 
-std::vector<NavigationEdge> read_edges(const ViewSource& source, std::span<const Link> links,
-                                       Executor& executor) {
-  std::vector<NavigationEdge> edges(links.size());
+std::vector<NavigationGraph::Edge> read_edges(const ViewSource& source, std::span<const Link> links,
+                                              Executor& executor) {
+  std::vector<NavigationGraph::Edge> edges(links.size());
   constexpr std::size_t links_at_once = 2048;
   for (std::size_t first = 0; first < links.size(); first += links_at_once) {
     const std::size_t count = std::min(links_at_once, links.size() - first);

@@ -39,11 +39,11 @@ inline void scale_displacement(Pose2& motion, double factor) {
 
 /// Sets the length of edges of which neither length nor motion is known from that of the others,
 /// and raises those between pictures of one place to a least one.
-void complete_lengths(std::vector<NavigationEdge>& edges);
+void complete_lengths(std::vector<NavigationGraph::Edge>& edges);
 
 /// Reads edges from the phases of their views; length 0 and no motion where nothing is read.
-[[nodiscard]] std::vector<NavigationEdge> read_edges(const ViewSource& source,
-                                                     std::span<const Link> links,
-                                                     Executor& executor);
+[[nodiscard]] std::vector<NavigationGraph::Edge> read_edges(const ViewSource& source,
+                                                            std::span<const Link> links,
+                                                            Executor& executor);
 
 }  // namespace panonav

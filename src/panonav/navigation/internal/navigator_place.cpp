@@ -36,7 +36,7 @@ void Navigator::Core::enter(std::size_t node, Step& step) {
 }
 
 void Navigator::Core::relocalise(Step& step) {
-  const auto found = search_everywhere(*source, graph(), planner.areas(), step.signature);
+  const auto found = search_whole_memory(*source, graph(), planner.areas(), step.signature);
   step.note(NavigationEvent::relocalised);
   if (!found) return;
   // A place that does not look like it either is no reason to leave the one that was expected.

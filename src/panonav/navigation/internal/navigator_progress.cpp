@@ -72,9 +72,9 @@ void Navigator::Core::try_again(Step& step, NavigationState otherwise) {
   homing.reset();
   if (planner.closed() == 0) return;
   for (std::size_t edge = 0; edge < graph().edges().size(); ++edge) {
-    if (planner.is_closed(edge)) progress.suspects.insert(edge);
+    if (planner.is_blocked(edge)) progress.suspects.insert(edge);
   }
-  planner.open_all();
+  planner.unblock_all();
   progress.tries.clear();
   progress.steps_in_vain = progress.ways_sought = 0;
   progress.closed_here = false;
@@ -95,8 +95,8 @@ bool Navigator::Core::find_way_from_here(Step& step) {
       has_way[areas.nodes[area][i]] = static_cast<std::uint8_t>(field[i].reachable());
     }
   }
-  const auto found = search_everywhere(*source, graph(), areas, step.signature,
-                                       [&](std::size_t node) { return has_way[node] != 0; });
+  const auto found = search_whole_memory(*source, graph(), areas, step.signature,
+                                         [&](std::size_t node) { return has_way[node] != 0; });
   step.note(NavigationEvent::relocalised);
   if (!found || found->difference > scales.place.limit()) return false;
   step.decision.difference = found->difference;
@@ -172,7 +172,7 @@ void Navigator::Core::notice_obstacles(Step& step) {
 // Of the edge ahead over that of a usual one; 0 where nothing tells.
 double Navigator::Core::relative_length(const Guide& ahead) const {
   if (!ahead.reachable()) return 0.0;
-  const NavigationEdge& edge = graph().edges()[ahead.edge];
+  const NavigationGraph::Edge& edge = graph().edges()[ahead.edge];
   return edge.a_from_b ? edge.length / scales.typical_length : 0.0;
 }
 

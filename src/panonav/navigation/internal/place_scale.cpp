@@ -49,7 +49,7 @@ PlaceScale learn_place_scale(const ViewSource& source, const NavigationGraph& gr
   std::vector<ViewPair> linked;
   const std::size_t edges = graph.edges().size();
   for (std::size_t i = 0; i < std::min(most, edges); ++i) {
-    const NavigationEdge& edge = graph.edges()[i * edges / std::min(most, edges)];
+    const NavigationGraph::Edge& edge = graph.edges()[i * edges / std::min(most, edges)];
     linked.emplace_back(edge.a, edge.b);
   }
   if (!linked.empty()) scale.neighbours = median_difference(source, linked, components);
@@ -72,7 +72,7 @@ ArrivalScale learn_arrival_scale(const ViewSource& source, const NavigationGraph
   ArrivalScale scale;
   if (graph.exits(*node).empty()) return scale;
   std::vector<double> lengths;
-  for (const NavigationEdge& edge : graph.edges()) lengths.push_back(edge.length);
+  for (const NavigationGraph::Edge& edge : graph.edges()) lengths.push_back(edge.length);
   const double usual = upper_median(std::move(lengths));
   // Views of the goal itself from another drive tell nothing of the spacing, unless there are no
   // others.

@@ -32,7 +32,7 @@ bool RoutePilot::begin(std::span<const ViewId> way, std::span<const float> line,
   // Line and view must agree on the place, which the route may pass several times.
   const auto path = route.tracker.lines().poses();
   std::vector<double> starts_m;
-  for (const RoutePlace& place : places_on_route(path, fix->pose.position(), route.beside_m)) {
+  for (const RoutePosition& place : find_passes(path, fix->pose.position(), route.beside_m)) {
     const auto agrees = [&](double along_m) {
       return std::abs(along_m - place.along_m) <= shortest_m;
     };
@@ -43,7 +43,7 @@ bool RoutePilot::begin(std::span<const ViewId> way, std::span<const float> line,
   leg_.emplace(Leg{chosen,
                    *stretch,
                    route.tracker,
-                   PathFollower(stretch_of_route(path, stretch->from_m, stretch->to_m)),
+                   PathFollower(route_segment(path, stretch->from_m, stretch->to_m)),
                    way[stretch->last],
                    {},
                    0});

@@ -143,7 +143,7 @@ void displace(Displacement displacement, std::span<const float> from_a,
 BestDisplacement best_displacement(std::span<const float> home_a, std::span<const float> home_b,
                                    std::span<const float> current_a,
                                    std::span<const float> current_b, int rows, int frequencies,
-                                   const TurnWindow& window) {
+                                   const HeadingWindow& window) {
   const auto stride = static_cast<std::size_t>(frequencies) + 1;
   BestDisplacement best;
   float least = std::numeric_limits<float>::infinity();
@@ -177,7 +177,7 @@ BestDisplacement best_displacement(std::span<const float> home_a, std::span<cons
         }
       }
       std::array<float, 1> turn{};
-      if (highest_turns(correlation, turn, window) == 0) continue;
+      if (find_highest_peaks(correlation, turn, window) == 0) continue;
       // A far displacement must explain more than a near one: of two that explain the views alike
       // the nearer is the likelier.
       const auto ring_square = static_cast<float>(ring * ring);
@@ -193,7 +193,7 @@ BestDisplacement best_displacement(std::span<const float> home_a, std::span<cons
 }
 
 DisplacementStart find_start(const HomingView& home, const HomingView& current, int known,
-                             const TurnWindow& window) {
+                             const HeadingWindow& window) {
   constexpr std::size_t max_bands = 8;
   const auto rows = static_cast<std::size_t>(home.rows());
   // The current view is known to more frequencies than are compared.

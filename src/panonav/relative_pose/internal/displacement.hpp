@@ -51,7 +51,7 @@ struct BestDisplacement {
                                                  std::span<const float> home_b,
                                                  std::span<const float> current_a,
                                                  std::span<const float> current_b, int rows,
-                                                 int frequencies, const TurnWindow& window = {});
+                                                 int frequencies, const HeadingWindow& window = {});
 
 /// Where the least squares of two views start, with the heading that fits there.
 struct DisplacementStart {
@@ -65,6 +65,6 @@ struct DisplacementStart {
 /// the current view has its maximum, so that a turn of the robot changes nothing. `known`: the
 /// highest frequency that both have.
 [[nodiscard]] DisplacementStart find_start(const HomingView& home, const HomingView& current,
-                                           int known, const TurnWindow& window);
+                                           int known, const HeadingWindow& window);
 
 }  // namespace panonav

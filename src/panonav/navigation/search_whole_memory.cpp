@@ -1,4 +1,4 @@
-#include "panonav/navigation/search_everywhere.hpp"
+#include "panonav/navigation/search_whole_memory.hpp"
 
 #include <vector>
 
@@ -14,9 +14,9 @@ constexpr int compared_per_area = 3;
 
 }  // namespace
 
-std::optional<FoundView> search_everywhere(const ViewSource& source, const NavigationGraph& graph,
-                                           const SubAreas& areas, const FourierSignature& view,
-                                           const std::function<bool(std::size_t)>& is_wanted) {
+std::optional<FoundView> search_whole_memory(const ViewSource& source, const NavigationGraph& graph,
+                                             const SubAreas& areas, const FourierSignature& view,
+                                             const std::function<bool(std::size_t)>& is_wanted) {
   const HomingView seen = homing_view(view);
   std::optional<FoundView> best;
   for (const auto& nodes : areas.nodes) {

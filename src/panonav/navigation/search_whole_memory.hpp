@@ -22,7 +22,7 @@ struct FoundView {
 /// held: of the least dissimilar views of each area the one whose difference is least. `is_wanted`:
 /// asked for each node whether it counts; empty: all do. Empty when there is no view. Cost: loads
 /// all that count.
-[[nodiscard]] std::optional<FoundView> search_everywhere(
+[[nodiscard]] std::optional<FoundView> search_whole_memory(
     const ViewSource& source, const NavigationGraph& graph, const SubAreas& areas,
     const FourierSignature& view, const std::function<bool(std::size_t node)>& is_wanted = {});
 
