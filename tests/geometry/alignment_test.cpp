@@ -94,8 +94,8 @@ TEST(Align, IsAsGoodAsBruteForce) {
   for (int trial = 0; trial < 12; ++trial) {
     const Points from = random_points(random, 6);
     const Points to = random_points(random, 6);
-    const AlignmentOptions options{.allow_scale = trial % 2 == 1,
-                                   .allow_reflection = trial % 4 >= 2};
+    const Alignment::Options options{.allow_scale = trial % 2 == 1,
+                                     .allow_reflection = trial % 4 >= 2};
     const Alignment found = align(from, to, options);
     const double oracle = brute_force_rms(from, to, options.allow_scale, options.allow_reflection);
     EXPECT_LE(found.rms_m, oracle + 1e-12);

@@ -23,7 +23,7 @@ TEST(SparseEquations, AreSolvedAsTheDenseOnes) {
       pairs.emplace_back(random.index(size), random.index(size));
     }
     for (const double damping : {0.0, 0.1, 0.0}) {
-      equations.begin(size);
+      equations.reset(size);
       Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(size, size);
       Eigen::VectorXd right = Eigen::VectorXd::Zero(size);
       for (int i = 0; i < size; ++i) {
@@ -56,7 +56,7 @@ TEST(SparseEquations, AreSolvedAsTheDenseOnes) {
 
 TEST(DenseEquations, OfAnArcTooShortHaveNoSolution) {
   DenseEquations<2> equations;
-  equations.begin();
+  equations.set_zero();
   equations.matrix << 1.0, 1.0, 1.0, 1.0 + 1e-9;
   equations.right << 1.0, 1.0;
   EXPECT_TRUE(equations.solve());
@@ -99,7 +99,7 @@ TEST(Minimise, FollowsABentValleyToItsEnd) {
   const double start = valley.cost();
   const auto report = minimise(valley, equations,
                                {.max_steps = 100, .damping = 1e-3, .min_relative_decrease = 1e-12});
-  EXPECT_TRUE(report.settled);
+  EXPECT_TRUE(report.converged);
   EXPECT_TRUE(report.solvable);
   EXPECT_NEAR(valley.x, 1.0, 1e-6);
   EXPECT_NEAR(valley.y, 1.0, 1e-6);
@@ -128,12 +128,12 @@ TEST(Minimise, TakesEachStepOfAProblemWithoutACost) {
   Root root;
   DenseEquations<1> equations;
   const auto report = minimise(root, equations, {.max_steps = 10});
-  EXPECT_TRUE(report.settled);
+  EXPECT_TRUE(report.converged);
   EXPECT_LT(report.steps, 8);
   EXPECT_NEAR(root.value, std::sqrt(2.0), 1e-12);
 
   Root short_of_it;
-  EXPECT_FALSE(minimise(short_of_it, equations, {.max_steps = 2}).settled);
+  EXPECT_FALSE(minimise(short_of_it, equations, {.max_steps = 2}).converged);
   EXPECT_GT(std::abs(short_of_it.value - std::sqrt(2.0)), 1e-4);
 
   Root blind{.can_linearise = false};
@@ -143,7 +143,7 @@ TEST(Minimise, TakesEachStepOfAProblemWithoutACost) {
 
 TEST(SparseEquations, OfAnUnknownThatNothingHoldsHaveNoSolutionUnlessDamped) {
   SparseEquations equations;
-  equations.begin(2);
+  equations.reset(2);
   equations.add(0, 0, 1.0);
   equations.add(1, 1, 0.0);
   equations.assemble();

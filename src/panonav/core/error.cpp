@@ -7,13 +7,9 @@ namespace panonav {
 
 namespace {
 
-std::string sentence(std::string_view field, std::string_view value, std::string_view allowed) {
-  std::string text(field);
-  text += " is ";
-  text += value;
-  text += "; allowed: ";
-  text += allowed;
-  return text;
+std::string describe_fault(std::string_view field, std::string_view value,
+                           std::string_view allowed) {
+  return std::string(field).append(" is ").append(value).append("; allowed: ").append(allowed);
 }
 
 }  // namespace
@@ -26,12 +22,12 @@ std::string to_text(double value) {
 
 ContractError::ContractError(std::string_view field, std::string_view value,
                              std::string_view allowed)
-    : Error(sentence(field, value, allowed)) {}
+    : Error(describe_fault(field, value, allowed)) {}
 
 ContractError::ContractError(std::string_view field, double value, std::string_view allowed)
-    : Error(sentence(field, to_text(value), allowed)) {}
+    : Error(describe_fault(field, to_text(value), allowed)) {}
 
-FileError::FileError(std::string_view path, std::string_view what)
-    : Error(std::string(path) + ": " + std::string(what)) {}
+FileError::FileError(std::string_view path, std::string_view fault)
+    : Error(std::string(path) + ": " + std::string(fault)) {}
 
 }  // namespace panonav

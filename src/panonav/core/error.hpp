@@ -34,9 +34,9 @@ class OptionError : public Error {
 /// written.
 class FileError : public Error {
  public:
-  /// Message "`path`: `what`". `what` names the field, the value and the allowed range where there
-  /// are any.
-  FileError(std::string_view path, std::string_view what);
+  /// Message "`path`: `fault`". `fault` names the field, the value and the allowed range where
+  /// there are any.
+  FileError(std::string_view path, std::string_view fault);
 };
 
 /// Throws ContractError(field, value, allowed) unless `holds`.

@@ -15,13 +15,13 @@ namespace panonav {
 
 struct Executor::Pool {
   std::mutex mutex;
-  std::condition_variable work_there;
+  std::condition_variable work_available;
   std::condition_variable work_done;
   std::vector<std::thread> workers;
-  std::function<void()> between;
+  std::function<void()> before_chunk;
   bool stopping = false;
 
-  // The loop under way; guarded by `mutex`.
+  // The loop that runs; guarded by `mutex`.
   const std::function<void(std::size_t, std::size_t, std::size_t)>* body = nullptr;
   std::size_t count = 0;
   std::size_t chunk = 1;
@@ -29,12 +29,12 @@ struct Executor::Pool {
   std::size_t open_chunks = 0;
   std::size_t failed_chunk = 0;
   std::exception_ptr failure;
-  std::exception_ptr ended;  // what `between` threw
+  std::exception_ptr interruption;  // thrown by `before_chunk`
 
-  // Takes chunks until none is left. `lock` is held on entry and on return.
-  void run(std::unique_lock<std::mutex>& lock, bool calling) {
+  // Runs chunks until none is left. `lock` is held on entry and on return.
+  void run(std::unique_lock<std::mutex>& lock, bool is_caller) {
     while (body != nullptr && next_chunk * chunk < count) {
-      if (calling && between && !go_on(lock)) return;
+      if (is_caller && before_chunk && !call_before_chunk(lock)) return;
       if (next_chunk * chunk >= count) return;  // others took the rest meanwhile
       const std::size_t number = next_chunk++;
       const auto* const work = body;
@@ -56,18 +56,18 @@ struct Executor::Pool {
     }
   }
 
-  // Asks `between`; where that throws, the chunks that nobody took count as done.
-  bool go_on(std::unique_lock<std::mutex>& lock) {
+  // Calls `before_chunk`; if it throws, the chunks that nobody took count as done. False then.
+  bool call_before_chunk(std::unique_lock<std::mutex>& lock) {
     lock.unlock();
     std::exception_ptr thrown;
     try {
-      between();
+      before_chunk();
     } catch (...) {
       thrown = std::current_exception();
     }
     lock.lock();
     if (!thrown) return true;
-    ended = thrown;
+    interruption = thrown;
     const std::size_t chunks = (count + chunk - 1) / chunk;
     open_chunks -= chunks - std::min(chunks, next_chunk);
     next_chunk = chunks;
@@ -75,23 +75,24 @@ struct Executor::Pool {
   }
 };
 
-Executor::Executor(int wanted, std::function<void()> between) : pool_(std::make_unique<Pool>()) {
-  require(wanted >= 0 && wanted <= 1024, "number of threads", wanted, "0 .. 1024");
-  if (wanted == 0) wanted = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  pool_->between = std::move(between);
-  pool_->workers.reserve(static_cast<std::size_t>(wanted - 1));
+Executor::Executor(int count, std::function<void()> before_chunk)
+    : pool_(std::make_unique<Pool>()) {
+  require(count >= 0 && count <= 1024, "number of threads", count, "0 .. 1024");
+  if (count == 0) count = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  pool_->before_chunk = std::move(before_chunk);
+  pool_->workers.reserve(static_cast<std::size_t>(count - 1));
   const auto work = [pool = pool_.get()] {
     std::unique_lock lock(pool->mutex);
     while (!pool->stopping) {
       pool->run(lock, false);
-      pool->work_there.wait(lock, [pool] {
+      pool->work_available.wait(lock, [pool] {
         return pool->stopping ||
                (pool->body != nullptr && pool->next_chunk * pool->chunk < pool->count);
       });
     }
   };
   try {
-    while (threads() < wanted) pool_->workers.emplace_back(work);
+    while (threads() < count) pool_->workers.emplace_back(work);
   } catch (const std::system_error&) {
     // The system has no thread left. Those that run do the same work, only more slowly.
   }
@@ -102,7 +103,7 @@ Executor::~Executor() {
     const std::lock_guard lock(pool_->mutex);
     pool_->stopping = true;
   }
-  pool_->work_there.notify_all();
+  pool_->work_available.notify_all();
   for (auto& worker : pool_->workers) worker.join();
 }
 
@@ -121,12 +122,12 @@ void Executor::for_chunks(std::size_t count, std::size_t chunk,
   pool_->next_chunk = 0;
   pool_->open_chunks = (count + chunk - 1) / chunk;
   pool_->failure = nullptr;
-  pool_->ended = nullptr;
-  pool_->work_there.notify_all();
+  pool_->interruption = nullptr;
+  pool_->work_available.notify_all();
   pool_->run(lock, true);
   pool_->work_done.wait(lock, [this] { return pool_->open_chunks == 0; });
   pool_->body = nullptr;
-  if (pool_->ended) std::rethrow_exception(std::exchange(pool_->ended, nullptr));
+  if (pool_->interruption) std::rethrow_exception(std::exchange(pool_->interruption, nullptr));
   if (pool_->failure) std::rethrow_exception(std::exchange(pool_->failure, nullptr));
 }
 

@@ -17,43 +17,44 @@ std::string describe_range(const OptionInfo& info) {
   return "any finite number";
 }
 
-std::vector<std::string> option_faults(const OptionInfo& info, double value) {
+std::optional<std::string> find_option_fault(const OptionInfo& info, double value) {
   const bool inside = std::isfinite(value) && value <= info.high &&
                       (info.low_open ? value > info.low : value >= info.low);
-  if (inside) return {};
-  return {std::string(info.name) + " is " + to_text(value) + "; allowed: " + describe_range(info)};
+  if (inside) return std::nullopt;
+  return std::string(info.name) + " is " + to_text(value) + "; allowed: " + describe_range(info);
 }
 
-namespace detail {
+namespace {
 
-void FaultCollector::visit(const OptionInfo& info, int& value) {
-  for (auto& fault : option_faults(info, value)) faults_.push_back(std::move(fault));
-}
-
-void FaultCollector::visit(const OptionInfo& info, double& value) {
-  for (auto& fault : option_faults(info, value)) faults_.push_back(std::move(fault));
-}
-
-void FaultCollector::visit(const OptionInfo& /*info*/, bool& /*value*/) {}
-
-void FaultCollector::visit(const OptionInfo& info, std::span<const std::string_view> choices,
-                           int& value) {
-  if (value >= 0 && value < static_cast<int>(choices.size())) return;
-  std::string text = std::string(info.name) + " is " + std::to_string(value) + "; allowed:";
-  for (const auto choice : choices) text.append(" ").append(choice);
-  faults_.push_back(std::move(text));
-}
-
-void FaultCollector::finish() const {
-  if (faults_.empty()) return;
-  std::string text;
-  for (const auto& fault : faults_) {
-    if (!text.empty()) text += "; ";
-    text += fault;
+/// Collects the faults of all options.
+class FaultCollector final : public OptionVisitor {
+ public:
+  void visit(const OptionInfo& info, int& value) override { add(find_option_fault(info, value)); }
+  void visit(const OptionInfo& info, double& value) override {
+    add(find_option_fault(info, value));
   }
-  throw OptionError(text);
-}
+  void visit(const OptionInfo& /*info*/, bool& /*value*/) override {}
+  void visit(const OptionInfo& info, std::span<const std::string_view> choices,
+             int& value) override {
+    if (value >= 0 && value < static_cast<int>(choices.size())) return;
+    std::string text = std::string(info.name) + " is " + std::to_string(value) + "; allowed:";
+    for (const auto choice : choices) text.append(" ").append(choice);
+    add(std::move(text));
+  }
+  std::string faults;
 
-}  // namespace detail
+ private:
+  void add(std::optional<std::string> fault) {
+    if (fault) faults += (faults.empty() ? "" : "; ") + *fault;
+  }
+};
+
+}  // namespace
+
+void detail::require_valid(const std::function<void(OptionVisitor&)>& visit) {
+  FaultCollector collector;
+  visit(collector);
+  if (!collector.faults.empty()) throw OptionError(collector.faults);
+}
 
 }  // namespace panonav

@@ -2,7 +2,9 @@
 
 #include <array>
 #include <cstddef>
+#include <functional>
 #include <limits>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -13,9 +15,18 @@
 
 namespace panonav {
 
-/// What a person must know of one option. Options live once, as members of the struct of their
+/// Name, help and range of one option. Options live once, as members of the struct of their
 /// module; the command line, TOML files and bindings are derived from its `OptionTable`.
 struct OptionInfo {
+  /// The smallest allowed value; a number stands for itself.
+  struct Low {
+    double value = -std::numeric_limits<double>::infinity();  ///< the bound
+    bool is_open = false;                                     ///< the bound itself is not allowed
+    constexpr Low() = default;                                ///< No bound.
+    /// A bound that is allowed itself unless it `is_open`.
+    constexpr Low(double bound, bool is_open_ = false)
+        : value(bound), is_open(is_open_) {}  // NOLINT
+  };
   std::string_view name;  ///< the member's: snake_case, with its unit
   std::string_view help;  ///< one plain line
   double low = -std::numeric_limits<double>::infinity();  ///< smallest allowed value
@@ -42,25 +53,14 @@ class OptionVisitor {
 /// The allowed range in words: ">= 1 and <= 20".
 [[nodiscard]] std::string describe_range(const OptionInfo& info);
 
-/// Every value that is out of its range or not a number, one sentence each; empty when all is well.
-[[nodiscard]] std::vector<std::string> option_faults(const OptionInfo& info, double value);
+/// Describes a value that is out of its range or not a number; nullopt when it is valid.
+[[nodiscard]] std::optional<std::string> find_option_fault(const OptionInfo& info, double value);
 
 namespace detail {
-class FaultCollector final : public OptionVisitor {
- public:
-  void visit(const OptionInfo& info, int& value) override;
-  void visit(const OptionInfo& info, double& value) override;
-  void visit(const OptionInfo& info, bool& value) override;
-  void visit(const OptionInfo& info, std::span<const std::string_view> choices,
-             int& value) override;
-  /// Throws OptionError with all faults in one line, if there are any.
-  void finish() const;
+/// Throws OptionError with the faults of all options that `visit` shows, if there are any.
+void require_valid(const std::function<void(OptionVisitor&)>& visit);
 
- private:
-  std::vector<std::string> faults_;
-};
-
-/// What the compiler writes for &Options::member ends in the member's name.
+/// Returns the member's name, with which the compiler's text of &Options::member ends.
 template <auto member>
 constexpr std::string_view member_name() {
   std::string_view text = __PRETTY_FUNCTION__;
@@ -89,11 +89,11 @@ consteval std::size_t member_count() {
   }
 }
 
-template <auto member, std::size_t choice_count>
+/// One member in an `OptionTable`; without `is_listed` no visitor sees it.
+template <auto member, std::size_t choice_count, bool is_listed = true>
 struct OptionEntry {
   using Options = OptionsWith<member>;
   static constexpr std::string_view name = member_name<member>();
-
   OptionInfo info = {.name = name, .help = {}};
   std::array<std::string_view, choice_count> choices = {};
 
@@ -103,41 +103,27 @@ struct OptionEntry {
       int value = static_cast<int>(options.*member);
       visitor.visit(info, choices, value);
       options.*member = static_cast<Value>(value);
-    } else if constexpr (std::is_arithmetic_v<Value>) {
+    } else if constexpr (is_listed && std::is_arithmetic_v<Value>) {
       visitor.visit(info, options.*member);
-    } else {
+    } else if constexpr (is_listed) {
       visit_options(options.*member, visitor);
     }
   }
 };
 
-template <auto member>
-struct UnlistedEntry {
-  using Options = OptionsWith<member>;
-  static constexpr std::string_view name = member_name<member>();
-  void visit(Options& /*options*/, OptionVisitor& /*visitor*/) const {}
-};
-
-/// The smallest value of an option; the largest one may be left away like it.
-struct Low {
-  double value = -std::numeric_limits<double>::infinity();
-  bool open = false;
-  constexpr Low() = default;
-  constexpr Low(double least, bool is_open = false) : value(least), open(is_open) {}  // NOLINT
-};
 }  // namespace detail
 
 /// Values above `low`, which is not allowed itself: `option<&T::step_m>("...", above(0), 100)`.
-constexpr detail::Low above(double low) {
+constexpr OptionInfo::Low above(double low) {
   return {low, true};
 }
 
 /// The entry of a number or of a bool.
 template <auto member>
-constexpr auto option(std::string_view help, detail::Low low = {},
+constexpr auto option(std::string_view help, OptionInfo::Low low = {},
                       double high = std::numeric_limits<double>::infinity()) {
   detail::OptionEntry<member, 0> entry;
-  entry.info = {entry.name, help, low.value, high, low.open};
+  entry.info = {entry.name, help, low.value, high, low.is_open};
   return entry;
 }
 
@@ -164,7 +150,7 @@ constexpr auto options_of() {
 /// A member that no user sets by name, and why.
 template <auto member>
 constexpr auto no_option(std::string_view /*reason*/) {
-  return detail::UnlistedEntry<member>();
+  return detail::OptionEntry<member, 0, false>();
 }
 
 /// The members of an options struct, each of them once and in the order in which they are shown; a
@@ -209,9 +195,7 @@ class OptionTable {
 template <class Options>
 void validate(const Options& options) {
   Options copy = options;
-  detail::FaultCollector collector;
-  visit_options(copy, collector);
-  collector.finish();
+  detail::require_valid([&copy](OptionVisitor& visitor) { visit_options(copy, visitor); });
 }
 
 }  // namespace panonav

@@ -56,7 +56,7 @@ Point2 Alignment::apply(Point2 p_in_from) const {
 }
 
 Alignment align(std::span<const Point2> from, std::span<const Point2> to,
-                const AlignmentOptions& options) {
+                const Alignment::Options& options) {
   require(!from.empty() && from.size() == to.size(), "number of points to align",
           static_cast<double>(from.size()), "the size of the other set, >= 1");
   const Point2 from_centre = centroid(from);

@@ -9,6 +9,11 @@ namespace panonav {
 /// The best map of one point set onto another: to ~ scale * R(rotation) * from + translation, with
 /// a mirror image first (y -> -y) when `reflected`.
 struct Alignment {
+  /// Freedoms of the fit beyond rotation and translation.
+  struct Options {
+    bool allow_scale = false;       ///< the unit of length of `from` is free
+    bool allow_reflection = false;  ///< a mirror image is taken where it fits better
+  };
   /// Metres of `to` for each unit of `from`; 1 unless the scale was free.
   double scale = 1.0;
   double rotation_rad = 0.0;  ///< counter-clockwise, in [-pi, pi]
@@ -20,16 +25,10 @@ struct Alignment {
   [[nodiscard]] Point2 apply(Point2 p_in_from) const;
 };
 
-/// What `align` may do beyond turning and moving.
-struct AlignmentOptions {
-  bool allow_scale = false;       ///< the unit of length of `from` is free
-  bool allow_reflection = false;  ///< a mirror image is taken where it fits better
-};
-
 /// Least-squares alignment (Procrustes, Umeyama 1991). Throws ContractError unless both sets have
 /// the same size >= 1. Coincident points align by translation alone.
 [[nodiscard]] Alignment align(std::span<const Point2> from, std::span<const Point2> to,
-                              const AlignmentOptions& options = {});
+                              const Alignment::Options& options = {});
 
 /// Procrustes disparity of two shapes, the "shape difference" mu that [F11 section 4] names but
 /// does not print: how much they differ after the best translation, rotation and scale. mu = 1 -

@@ -37,7 +37,7 @@ struct DenseEquations {
   double min_reciprocal_condition = 0.0;                     ///< below it there is no solution
 
   /// Sets all to zero; for a fixed number of unknowns.
-  void begin() {
+  void set_zero() {
     matrix.setZero();
     right.setZero();
   }
@@ -59,8 +59,8 @@ struct DenseEquations {
 /// The same for many unknowns of which few share a residual.
 class SparseEquations {
  public:
-  /// Sets all to zero.
-  void begin(int unknowns) {
+  /// Sets all to zero, for this number of unknowns.
+  void reset(int unknowns) {
     entries_.clear();
     right_ = Eigen::VectorXd::Zero(unknowns);
   }
@@ -131,9 +131,9 @@ struct LeastSquaresOptions {
 
 /// How a minimisation went.
 struct LeastSquaresReport {
-  int steps = 0;         ///< linearisations that were made
-  bool settled = false;  ///< false: `max_steps` were not enough
-  bool solvable = true;  ///< false: the equations could not be set up or solved
+  int steps = 0;           ///< linearisations that were made
+  bool converged = false;  ///< false: `max_steps` were not enough
+  bool solvable = true;    ///< false: the equations could not be set up or solved
 };
 
 /// Minimises a sum of weighted squares, from where `problem` stands:
@@ -145,7 +145,7 @@ struct LeastSquaresReport {
 /// With `double cost()`, `undo()` and `accept()` a step counts only where it lowers the cost (as
 /// Levenberg and Marquardt do): `undo` goes back to before `move`, damping grows tenfold after each
 /// failure and falls tenfold after each success. Without them each step counts, at constant
-/// damping (Gauss-Newton), and `bool move(change)` says whether the estimate has settled.
+/// damping (Gauss-Newton), and `bool move(change)` says whether the estimate has converged.
 /// Deterministic. Throws what the problem throws.
 template <class Problem, class Equations>
 LeastSquaresReport minimise(Problem& problem, Equations& equations,
@@ -180,14 +180,14 @@ LeastSquaresReport minimise(Problem& problem, Equations& equations,
         }
       }
       const double enough = std::max(options.min_decrease, options.min_relative_decrease * before);
-      report.settled = !(after < before) || before - after <= enough;
+      report.converged = !(after < before) || before - after <= enough;
     } else {
       const auto change = equations.solve(damping);
       report.solvable = change.has_value();
       if (!change) return report;
-      report.settled = problem.move(*change);
+      report.converged = problem.move(*change);
     }
-    if (report.settled) return report;
+    if (report.converged) return report;
   }
   return report;
 }

@@ -18,8 +18,9 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// Keeps the part of a convex polygon with normal . p <= offset.
-std::vector<Point2> clip(const std::vector<Point2>& polygon, Point2 normal, double offset) {
+// Clips a convex polygon to the half-plane normal . p <= offset.
+std::vector<Point2> clip_to_half_plane(const std::vector<Point2>& polygon, Point2 normal,
+                                       double offset) {
   std::vector<Point2> kept;
   kept.reserve(polygon.size() + 1);
   const auto excess = [&](Point2 p) { return normal.x_m * p.x_m + normal.y_m * p.y_m - offset; };
@@ -41,12 +42,12 @@ bool covers(const Circle& circle, Point2 p) {
   return distance(circle.centre, p) <= circle.radius_m * (1.0 + 1e-12) + 1e-15;
 }
 
-Circle through(Point2 a, Point2 b) {
+Circle circle_through(Point2 a, Point2 b) {
   const Point2 centre{0.5 * (a.x_m + b.x_m), 0.5 * (a.y_m + b.y_m)};
   return {centre, std::max(distance(centre, a), distance(centre, b))};
 }
 
-Circle through(Point2 a, Point2 b, Point2 c) {
+Circle circle_through(Point2 a, Point2 b, Point2 c) {
   const double bx = b.x_m - a.x_m;
   const double by = b.y_m - a.y_m;
   const double cx = c.x_m - a.x_m;
@@ -61,10 +62,10 @@ Circle through(Point2 a, Point2 b, Point2 c) {
   }
   if (std::isfinite(best.radius_m)) return best;
   // On one line two of the three span the circle.
-  for (const Circle& pair : {through(a, b), through(a, c), through(b, c)}) {
+  for (const Circle& pair : {circle_through(a, b), circle_through(a, c), circle_through(b, c)}) {
     if (covers(pair, a) && covers(pair, b) && covers(pair, c)) return pair;
   }
-  return through(a, b);
+  return circle_through(a, b);
 }
 
 }  // namespace
@@ -92,9 +93,9 @@ Circle smallest_enclosing_circle(std::span<const Point2> points) {
     circle = {order[i], 0.0};
     for (std::size_t j = 0; j < i; ++j) {
       if (covers(circle, order[j])) continue;
-      circle = through(order[i], order[j]);
+      circle = circle_through(order[i], order[j]);
       for (std::size_t k = 0; k < j; ++k) {
-        if (!covers(circle, order[k])) circle = through(order[i], order[j], order[k]);
+        if (!covers(circle, order[k])) circle = circle_through(order[i], order[j], order[k]);
       }
     }
   }
@@ -109,7 +110,7 @@ VoronoiCells::VoronoiCells(std::span<const Point2> positions, std::optional<doub
   }
   merge_positions(positions);
   sort_sites();
-  spacing_m_ = spacing_m ? *spacing_m : typical_spacing_m();
+  spacing_m_ = spacing_m ? *spacing_m : median_spacing_m();
 }
 
 void VoronoiCells::merge_positions(std::span<const Point2> positions) {
@@ -152,13 +153,13 @@ void VoronoiCells::sort_sites() {
   by_sweep_.resize(sites_.size());
   std::iota(by_sweep_.begin(), by_sweep_.end(), std::size_t{0});
   std::sort(by_sweep_.begin(), by_sweep_.end(), [this](std::size_t a, std::size_t b) {
-    return std::pair(along(sites_[a]), a) < std::pair(along(sites_[b]), b);
+    return std::pair(sweep_coordinate(sites_[a]), a) < std::pair(sweep_coordinate(sites_[b]), b);
   });
   rank_.resize(sites_.size());
   for (std::size_t i = 0; i < by_sweep_.size(); ++i) rank_[by_sweep_[i]] = i;
 }
 
-double VoronoiCells::typical_spacing_m() const {
+double VoronoiCells::median_spacing_m() const {
   if (sites_.size() < 2) return 0.0;
   std::vector<double> second(sites_.size());
   for (std::size_t site = 0; site < sites_.size(); ++site) {
@@ -171,15 +172,16 @@ double VoronoiCells::typical_spacing_m() const {
         nearest[1] = d;
       }
     };
-    const double here = along(sites_[site]);
+    const double here = sweep_coordinate(sites_[site]);
     std::size_t below = rank_[site];
     std::size_t above = rank_[site] + 1;
     // Outwards on both sides until no site there can be nearer than the second found.
-    while (below > 0 && here - along(sites_[by_sweep_[below - 1]]) < nearest[1]) {
+    while (below > 0 && here - sweep_coordinate(sites_[by_sweep_[below - 1]]) < nearest[1]) {
       consider(by_sweep_[--below]);
       if (above < sites_.size()) consider(by_sweep_[above++]);
     }
-    while (above < sites_.size() && along(sites_[by_sweep_[above]]) - here < nearest[1]) {
+    while (above < sites_.size() &&
+           sweep_coordinate(sites_[by_sweep_[above]]) - here < nearest[1]) {
       consider(by_sweep_[above++]);
     }
     second[site] = std::isfinite(nearest[1]) ? nearest[1] : nearest[0];
@@ -188,14 +190,14 @@ double VoronoiCells::typical_spacing_m() const {
 }
 
 template <class Visit>
-void VoronoiCells::visit_near(std::size_t site, double radius_m, const Visit& visit) const {
-  const double here = along(sites_[site]);
+void VoronoiCells::visit_sites_within(std::size_t site, double radius_m, const Visit& visit) const {
+  const double here = sweep_coordinate(sites_[site]);
   for (std::size_t i = rank_[site]; i-- > 0;) {
-    if (here - along(sites_[by_sweep_[i]]) > radius_m) break;
+    if (here - sweep_coordinate(sites_[by_sweep_[i]]) > radius_m) break;
     visit(by_sweep_[i]);
   }
   for (std::size_t i = rank_[site] + 1; i < by_sweep_.size(); ++i) {
-    if (along(sites_[by_sweep_[i]]) - here > radius_m) break;
+    if (sweep_coordinate(sites_[by_sweep_[i]]) - here > radius_m) break;
     visit(by_sweep_[i]);
   }
 }
@@ -208,7 +210,7 @@ std::vector<Point2> VoronoiCells::cell(std::size_t site) const {
   const double reach_m = spacing_m_ * std::sqrt(2.0);
   const Point2 here = sites_[site];
   std::vector<std::pair<double, Point2>> near;  // distance and offset of the other sites
-  visit_near(site, reach_m, [&](std::size_t other) {
+  visit_sites_within(site, reach_m, [&](std::size_t other) {
     const double d = distance(here, sites_[other]);
     if (d <= reach_m) {
       near.emplace_back(d, Point2{sites_[other].x_m - here.x_m, sites_[other].y_m - here.y_m});
@@ -227,7 +229,7 @@ std::vector<Point2> VoronoiCells::cell(std::size_t site) const {
        {std::pair(-h, -h), std::pair(h, -h), std::pair(h, h), std::pair(-h, h)}) {
     polygon.push_back({u * axis.x_m - v * axis.y_m, u * axis.y_m + v * axis.x_m});
   }
-  for (const auto& [d, offset] : near) polygon = clip(polygon, offset, 0.5 * d * d);
+  for (const auto& [d, offset] : near) polygon = clip_to_half_plane(polygon, offset, 0.5 * d * d);
   for (Point2& corner : polygon) corner = {corner.x_m + here.x_m, corner.y_m + here.y_m};
   return polygon;
 }

@@ -23,8 +23,7 @@ struct Circle {
 /// expected (Welzl 1991, with a fixed order of visiting).
 [[nodiscard]] Circle smallest_enclosing_circle(std::span<const Point2> points);
 
-/// Voronoi cells of positions, clipped at half the spacing [M04 figures 9 and
-/// 10].
+/// Voronoi cells of positions, clipped at half the spacing [M04 figures 9 and 10].
 ///
 /// Positions that coincide share one site. A cell is the part of the plane that is nearer to its
 /// site than to any other, cut by a square of side `spacing_m` around the site that stands along
@@ -62,10 +61,12 @@ class VoronoiCells {
   // Sets sweep_x_, by_sweep_ and rank_.
   void sort_sites();
   // The median distance to the second-nearest other site; 0 below two sites.
-  [[nodiscard]] double typical_spacing_m() const;
+  [[nodiscard]] double median_spacing_m() const;
   template <class Visit>
-  void visit_near(std::size_t site, double radius_m, const Visit& visit) const;
-  [[nodiscard]] double along(Point2 p) const noexcept { return sweep_x_ ? p.x_m : p.y_m; }
+  void visit_sites_within(std::size_t site, double radius_m, const Visit& visit) const;
+  [[nodiscard]] double sweep_coordinate(Point2 p) const noexcept {
+    return sweep_x_ ? p.x_m : p.y_m;
+  }
 
   std::vector<Point2> sites_;
   std::vector<std::size_t> site_of_;

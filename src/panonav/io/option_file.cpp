@@ -52,8 +52,8 @@ class OptionReader final : public OptionVisitor {
 
  private:
   void check(const OptionInfo& info, double value) const {
-    for (const auto& fault : option_faults(info, value)) {
-      throw FileError(path_.string(), where_ + fault);
+    if (const auto fault = find_option_fault(info, value)) {
+      throw FileError(path_.string(), where_ + *fault);
     }
   }
   const std::filesystem::path& path_;

@@ -91,7 +91,7 @@ class Graph {
   }
 
   bool linearise(SparseEquations& equations) {
-    equations.begin(static_cast<int>(nodes_.size() * unknowns));
+    equations.reset(static_cast<int>(nodes_.size() * unknowns));
     for (std::size_t i = 0; i < nodes_.size() * unknowns; ++i) {
       // A component may hang on nothing but edges whose weight has fallen to almost nothing.
       const double held = fixed_[i / unknowns] != 0 ? 1.0 : 1e-9;
@@ -241,7 +241,7 @@ PoseGraphReport optimise_pose_graph(std::span<Pose2> nodes, std::span<const Pose
   const LeastSquaresReport solved =
       minimise(problem, equations, {.max_steps = options.max_iterations});
   report.iterations = solved.steps;
-  report.settled = solved.settled;
+  report.settled = solved.converged;
   report.cost = problem.half_cost();
   report.edge_weights = problem.weights();
   return report;

@@ -76,7 +76,7 @@ class TiltProblem {
 
   /// False where nothing is left to explain.
   bool linearise(Equations& equations) const {
-    equations.begin();
+    equations.set_zero();
     const Panorama level = level_panorama(current_, tilt_);
     const double values = static_cast<double>((level.rows() - 2 * margin_) * level.columns());
     const double noise = add_rows(level, equations) / values;

@@ -262,7 +262,7 @@ class CircleProblem {
     }
     // A tenth of a pixel is what the parabola of the edge gives at best.
     const double scale = tukey * std::max(0.1, 1.4826 * upper_median(deviations));
-    equations.begin();
+    equations.set_zero();
     double weights = 0;
     double squares = 0;
     int used = 0;

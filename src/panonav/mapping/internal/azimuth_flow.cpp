@@ -136,7 +136,7 @@ class FlowProblem {
   [[nodiscard]] const AzimuthFlow& flow() const { return flow_; }
 
   [[nodiscard]] bool linearise(Equations& equations) const {
-    equations.begin();
+    equations.set_zero();
     const auto sums_of = [](const Pixels& x, const Pixels& y) -> Eigen::RowVectorXd {
       return x.cwiseProduct(y).colwise().sum().cast<double>();
     };

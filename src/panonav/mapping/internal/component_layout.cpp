@@ -85,7 +85,7 @@ class ComponentAverage {
   template <class Missing, class Weight>
   std::optional<Eigen::VectorXd> solve(const Missing& missing, const Weight& weight) {
     const int unknowns = static_cast<int>(unknown_.size()) - 1;
-    equations_.begin(unknowns);
+    equations_.reset(unknowns);
     for (int i = 0; i < unknowns; ++i) equations_.add(i, i, 1e-9);
     for (const std::size_t k : inside_) {
       const double w = weight(k);

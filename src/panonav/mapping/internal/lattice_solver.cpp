@@ -203,7 +203,7 @@ class SpringEnergy {
   bool linearise(SparseEquations& equations) {
     start_.assign(poses_.begin(), poses_.end());
     set_trust();
-    equations.begin(unknowns_);
+    equations.reset(unknowns_);
     // Every diagonal entry is there, whatever the springs touch.
     for (int i = 0; i < unknowns_; ++i) equations.add(i, i, 0.0);
     for (std::size_t s = 0; s < springs_.size(); ++s) add_spring(s, equations);
