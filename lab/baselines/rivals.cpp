@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <functional>
 #include <limits>
 #include <numbers>
 
@@ -43,109 +44,73 @@ std::size_t argmin(std::size_t count, std::optional<std::size_t> left_out,
   return *best;
 }
 
-double l1(const std::vector<float>& a, const std::vector<float>& b) {
+// Compares a descriptor of each view: the nearest is the one of the smallest difference.
+template <class Descriptor>
+class DescriptorRecogniser final : public RivalRecogniser {
+ public:
+  struct Method {
+    std::string name;
+    std::function<Descriptor(const RivalView& view)> describe;
+    std::function<double(const Descriptor& a, const Descriptor& b)> difference;
+    std::function<double(const Descriptor& reference)> bytes;
+  };
+  explicit DescriptorRecogniser(Method method) : method_(std::move(method)) {}
+  [[nodiscard]] std::string name() const override { return method_.name; }
+  void memorise(const std::vector<RivalView>& references) override {
+    require_references(references);
+    references_.clear();
+    for (const auto& view : references) references_.push_back(method_.describe(view));
+  }
+  [[nodiscard]] std::size_t nearest(const RivalView& query,
+                                    std::optional<std::size_t> left_out) const override {
+    const Descriptor descriptor = method_.describe(query);
+    return argmin(references_.size(), left_out,
+                  [&](std::size_t i) { return method_.difference(descriptor, references_[i]); });
+  }
+  [[nodiscard]] double bytes_per_view() const override {
+    return references_.empty() ? 0.0 : method_.bytes(references_.front());
+  }
+
+ private:
+  Method method_;
+  std::vector<Descriptor> references_;
+};
+
+template <class Descriptor>
+std::unique_ptr<RivalRecogniser> make_recogniser(
+    typename DescriptorRecogniser<Descriptor>::Method method) {
+  return std::make_unique<DescriptorRecogniser<Descriptor>>(std::move(method));
+}
+
+using Floats = std::vector<float>;
+
+double l1(const Floats& a, const Floats& b) {
   double sum = 0.0;
   for (std::size_t i = 0; i < a.size(); ++i) sum += std::abs(a[i] - b[i]);
   return sum;
 }
 
-class FourierSignatureRecogniser final : public RivalRecogniser {
- public:
-  explicit FourierSignatureRecogniser(int components) : components_(components) {}
-  [[nodiscard]] std::string name() const override { return "Fourier signature"; }
-  void memorise(const std::vector<RivalView>& references) override {
-    require_references(references);
-    signatures_.clear();
-    for (const auto& view : references) {
-      signatures_.push_back(compute_signature(view.panorama, components_));
-    }
+Floats grey_histogram(const Panorama& view, int bins) {
+  Floats counts(static_cast<std::size_t>(bins));
+  for (const float value : view.values()) {
+    const int bin = static_cast<int>(std::floor(value * static_cast<float>(bins)));
+    counts[static_cast<std::size_t>(std::clamp(bin, 0, bins - 1))] += 1.0F;
   }
-  [[nodiscard]] std::size_t nearest(const RivalView& query,
-                                    std::optional<std::size_t> left_out) const override {
-    const auto signature = compute_signature(query.panorama, components_);
-    return argmin(signatures_.size(), left_out,
-                  [&](std::size_t i) { return dissimilarity_l1(signature, signatures_[i]); });
-  }
-  [[nodiscard]] double bytes_per_view() const override {
-    return signatures_.empty() ? 0.0 : 2.0 * static_cast<double>(signatures_[0].shape().size());
-  }
+  for (auto& count : counts) count /= static_cast<float>(view.values().size());
+  return counts;
+}
 
- private:
-  int components_;
-  std::vector<FourierSignature> signatures_;
-};
-
-// One histogram over the whole view: what Ulrich and Nourbakhsh use, in grey.
-class GreyHistogramRecogniser final : public RivalRecogniser {
- public:
-  explicit GreyHistogramRecogniser(int bins) : bins_(bins) {
-    require(bins >= 2 && bins <= 256, "histogram bins", bins, "2 .. 256");
+Floats colour_histogram(const Image& view, int bins) {
+  require(view.channels() == 3, "channels of a view", view.channels(), "3");
+  Floats counts(static_cast<std::size_t>(bins) * bins * bins);
+  const auto pixels = view.pixels();
+  const float share = 3.0F / static_cast<float>(pixels.size());
+  for (std::size_t i = 0; i < pixels.size(); i += 3) {
+    const auto bin = [&](std::size_t c) { return pixels[i + c] * bins / 256; };
+    counts[static_cast<std::size_t>((bin(0) * bins + bin(1)) * bins + bin(2))] += share;
   }
-  [[nodiscard]] std::string name() const override { return "grey histogram"; }
-  void memorise(const std::vector<RivalView>& references) override {
-    require_references(references);
-    histograms_.clear();
-    for (const auto& view : references) histograms_.push_back(histogram(view.panorama));
-  }
-  [[nodiscard]] std::size_t nearest(const RivalView& query,
-                                    std::optional<std::size_t> left_out) const override {
-    const auto wanted = histogram(query.panorama);
-    return argmin(histograms_.size(), left_out,
-                  [&](std::size_t i) { return l1(wanted, histograms_[i]); });
-  }
-  [[nodiscard]] double bytes_per_view() const override { return 2.0 * bins_; }
-
- private:
-  [[nodiscard]] std::vector<float> histogram(const Panorama& view) const {
-    std::vector<float> counts(static_cast<std::size_t>(bins_));
-    for (const float value : view.values()) {
-      const int bin = static_cast<int>(std::floor(value * static_cast<float>(bins_)));
-      counts[static_cast<std::size_t>(std::clamp(bin, 0, bins_ - 1))] += 1.0F;
-    }
-    for (auto& count : counts) count /= static_cast<float>(view.values().size());
-    return counts;
-  }
-  int bins_;
-  std::vector<std::vector<float>> histograms_;
-};
-
-// One histogram of colours over the whole view. Colour needs no phases and no unwarping, and does
-// not change when the robot turns.
-class ColourHistogramRecogniser final : public RivalRecogniser {
- public:
-  explicit ColourHistogramRecogniser(int bins_per_channel) : bins_(bins_per_channel) {
-    require(bins_per_channel >= 2 && bins_per_channel <= 32, "histogram bins per channel",
-            bins_per_channel, "2 .. 32");
-  }
-  [[nodiscard]] std::string name() const override { return "colour histogram"; }
-  void memorise(const std::vector<RivalView>& references) override {
-    require_references(references);
-    histograms_.clear();
-    for (const auto& view : references) histograms_.push_back(histogram(view.picture));
-  }
-  [[nodiscard]] std::size_t nearest(const RivalView& query,
-                                    std::optional<std::size_t> left_out) const override {
-    const auto wanted = histogram(query.picture);
-    return argmin(histograms_.size(), left_out,
-                  [&](std::size_t i) { return l1(wanted, histograms_[i]); });
-  }
-  [[nodiscard]] double bytes_per_view() const override { return 2.0 * bins_ * bins_ * bins_; }
-
- private:
-  [[nodiscard]] std::vector<float> histogram(const Image& view) const {
-    require(view.channels() == 3, "channels of a view", view.channels(), "3");
-    std::vector<float> counts(static_cast<std::size_t>(bins_) * bins_ * bins_);
-    const auto pixels = view.pixels();
-    const float share = 3.0F / static_cast<float>(pixels.size());
-    for (std::size_t i = 0; i < pixels.size(); i += 3) {
-      const auto bin = [&](std::size_t c) { return pixels[i + c] * bins_ / 256; };
-      counts[static_cast<std::size_t>((bin(0) * bins_ + bin(1)) * bins_ + bin(2))] += share;
-    }
-    return counts;
-  }
-  int bins_;
-  std::vector<std::vector<float>> histograms_;
-};
+  return counts;
+}
 
 // The zero-phase representation [Pajdla and Hlavac 1999]: the view is turned so that the phase of
 // its first harmonic, summed over rows, becomes zero.
@@ -160,31 +125,6 @@ Panorama turned_to_zero_phase(const Panorama& view) {
   const double columns_per_radian = view.columns() / (2.0 * std::numbers::pi);
   return turn_columns(view, static_cast<int>(std::lround(-std::arg(first) * columns_per_radian)));
 }
-
-class ZeroPhaseRecogniser final : public RivalRecogniser {
- public:
-  [[nodiscard]] std::string name() const override { return "zero-phase representation"; }
-  void memorise(const std::vector<RivalView>& references) override {
-    require_references(references);
-    views_.clear();
-    for (const auto& view : references) {
-      const Panorama turned = turned_to_zero_phase(view.panorama);
-      views_.emplace_back(turned.values().begin(), turned.values().end());
-    }
-  }
-  [[nodiscard]] std::size_t nearest(const RivalView& query,
-                                    std::optional<std::size_t> left_out) const override {
-    const Panorama turned = turned_to_zero_phase(query.panorama);
-    const std::vector<float> wanted(turned.values().begin(), turned.values().end());
-    return argmin(views_.size(), left_out, [&](std::size_t i) { return l1(wanted, views_[i]); });
-  }
-  [[nodiscard]] double bytes_per_view() const override {
-    return views_.empty() ? 0.0 : static_cast<double>(views_[0].size());
-  }
-
- private:
-  std::vector<std::vector<float>> views_;
-};
 
 // Principal components of views turned to zero phase: eigenimages are not indifferent to a turn, so
 // the papers that use them turn the views to a canonical heading first.
@@ -243,38 +183,45 @@ class EigenimageRecogniser final : public RivalRecogniser {
 // Every pixel, every turn by whole columns: the most that can be had from pixels, at the highest
 // price. The sum of squared differences over all turns comes from the full spectra, which is the
 // same and takes seconds instead of hours.
-class PixelRecogniser final : public RivalRecogniser {
+class Spectra {
  public:
-  [[nodiscard]] std::string name() const override { return "pixels over all turns"; }
-  void memorise(const std::vector<RivalView>& references) override {
-    require_references(references);
-    matrix_ = transform_matrix(references[0].panorama.columns(),
-                               references[0].panorama.columns() / 2 + 1);
-    views_.clear();
-    for (const auto& view : references) views_.push_back(spectrum(view.panorama));
-  }
-  [[nodiscard]] std::size_t nearest(const RivalView& query,
-                                    std::optional<std::size_t> left_out) const override {
-    const Spectrum wanted = spectrum(query.panorama);
-    return argmin(views_.size(), left_out,
-                  [&](std::size_t i) { return distance(wanted, views_[i]); });
-  }
-  [[nodiscard]] double bytes_per_view() const override {
-    return views_.empty() ? 0.0 : static_cast<double>(views_[0].pixels);
-  }
-
- private:
   struct Spectrum {
     Eigen::MatrixXcf rows;  // rows x frequencies 0 .. columns / 2
     double energy = 0.0;
     std::size_t pixels = 0;
-    int columns = 0;
   };
 
-  static Eigen::MatrixXcf transform_matrix(int columns, int frequencies) {
-    Eigen::MatrixXcf matrix(columns, frequencies);
+  [[nodiscard]] Spectrum spectrum(const Panorama& view) {
+    if (matrix_.size() == 0) matrix_ = transform_matrix(view.columns());
+    require(view.columns() == matrix_.rows(), "columns of a view", view.columns(),
+            "those of the reference views");
+    using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    const Eigen::Map<const RowMajor> values(view.values().data(), view.rows(), view.columns());
+    return {values.cast<std::complex<float>>() * matrix_, values.cast<double>().squaredNorm(),
+            view.values().size()};
+  }
+
+  // min over turns of the sum of squared differences = |a|^2 + |b|^2 - 2 max correlation.
+  [[nodiscard]] double distance(const Spectrum& a, const Spectrum& b) const {
+    const Eigen::VectorXcf cross =
+        (a.rows.array() * b.rows.array().conjugate()).colwise().sum().transpose();
+    Eigen::VectorXcf weighted = cross;
+    const Eigen::Index columns = matrix_.rows();
+    const Eigen::Index last = weighted.size() - 1;
+    for (Eigen::Index k = 1; k <= last; ++k) {
+      if (!(k == last && columns % 2 == 0)) weighted(k) *= 2.0F;
+    }
+    // Correlation at turn c: (1/N) Re sum_k w_k cross_k exp(+j 2 pi k c / N).
+    const Eigen::VectorXf correlation = (matrix_.conjugate() * weighted).real();
+    return a.energy + b.energy -
+           2.0 * static_cast<double>(correlation.maxCoeff()) / static_cast<double>(columns);
+  }
+
+ private:
+  static Eigen::MatrixXcf transform_matrix(int columns) {
+    Eigen::MatrixXcf matrix(columns, columns / 2 + 1);
     for (int c = 0; c < columns; ++c) {
-      for (int k = 0; k < frequencies; ++k) {
+      for (int k = 0; k <= columns / 2; ++k) {
         const int step = static_cast<int>((static_cast<long long>(c) * k) % columns);
         matrix(c, k) = std::polar(1.0F, -2.0F * std::numbers::pi_v<float> *
                                             static_cast<float>(step) / static_cast<float>(columns));
@@ -283,153 +230,135 @@ class PixelRecogniser final : public RivalRecogniser {
     return matrix;
   }
 
-  [[nodiscard]] Spectrum spectrum(const Panorama& view) const {
-    require(view.columns() == matrix_.rows(), "columns of a view", view.columns(),
-            "those of the reference views");
-    using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    const Eigen::Map<const RowMajor> values(view.values().data(), view.rows(), view.columns());
-    Spectrum result;
-    result.rows = values.cast<std::complex<float>>() * matrix_;
-    result.energy = values.cast<double>().squaredNorm();
-    result.pixels = view.values().size();
-    result.columns = view.columns();
-    return result;
-  }
-
-  // min over turns of the sum of squared differences = |a|^2 + |b|^2 - 2 max correlation.
-  [[nodiscard]] double distance(const Spectrum& a, const Spectrum& b) const {
-    const Eigen::VectorXcf cross =
-        (a.rows.array() * b.rows.array().conjugate()).colwise().sum().transpose();
-    Eigen::VectorXcf weighted = cross;
-    const Eigen::Index last = weighted.size() - 1;
-    for (Eigen::Index k = 1; k <= last; ++k) {
-      if (!(k == last && a.columns % 2 == 0)) weighted(k) *= 2.0F;
-    }
-    // Correlation at turn c: (1/N) Re sum_k w_k cross_k exp(+j 2 pi k c / N).
-    const Eigen::VectorXf correlation = (matrix_.conjugate() * weighted).real();
-    return a.energy + b.energy -
-           2.0 * static_cast<double>(correlation.maxCoeff()) / static_cast<double>(a.columns);
-  }
-
   Eigen::MatrixXcf matrix_;  // columns x frequencies
-  std::vector<Spectrum> views_;
 };
 
-class PatchNormalisedRecogniser final : public RivalRecogniser {
- public:
-  [[nodiscard]] std::string name() const override { return "patch-normalised pixels"; }
-  void memorise(const std::vector<RivalView>& references) override {
-    require_references(references);
-    views_.clear();
-    for (const auto& view : references) views_.push_back(normalised(view.panorama));
-  }
-  [[nodiscard]] std::size_t nearest(const RivalView& query,
-                                    std::optional<std::size_t> left_out) const override {
-    const Panorama wanted = normalised(query.panorama);
-    return argmin(views_.size(), left_out,
-                  [&](std::size_t i) { return difference(wanted, views_[i]); });
-  }
-  [[nodiscard]] double bytes_per_view() const override {
-    return views_.empty() ? 0.0 : static_cast<double>(views_[0].values().size());
-  }
+// SeqSLAM's 64 x 32 pixels and patches of 8 x 8; a panorama is wider.
+constexpr int small_columns = 128;
+constexpr int small_rows = 32;
+constexpr int half_patch = 4;
 
- private:
-  // SeqSLAM's 64 x 32 pixels and patches of 8 x 8; a panorama is wider.
-  static constexpr int small_columns = 128;
-  static constexpr int small_rows = 32;
-  static constexpr int half_patch = 4;
-
-  static Panorama shrunk(const Panorama& view) {
-    const int rows = std::min(view.rows(), small_rows);
-    const int columns = std::min(view.columns(), small_columns);
-    Panorama small(rows, columns, std::nullopt);
-    for (int y = 0; y < rows; ++y) {
-      for (int c = 0; c < columns; ++c) {
-        double sum = 0.0;
-        int count = 0;
-        for (int v = y * view.rows() / rows; v < (y + 1) * view.rows() / rows; ++v) {
-          for (int u = c * view.columns() / columns; u < (c + 1) * view.columns() / columns; ++u) {
-            sum += view.at(v, u);
-            ++count;
-          }
-        }
-        small.at(y, c) = static_cast<float>(sum / count);
-      }
-    }
-    return small;
-  }
-
-  static Panorama normalised(const Panorama& view) {
-    const Panorama small = shrunk(view);
-    Panorama result = small;
-    for (int y = 0; y < small.rows(); ++y) {
-      for (int c = 0; c < small.columns(); ++c) {
-        double sum = 0.0;
-        double squares = 0.0;
-        int count = 0;
-        for (int v = std::max(0, y - half_patch); v < std::min(small.rows(), y + half_patch); ++v) {
-          for (int u = c - half_patch; u < c + half_patch; ++u) {
-            const double value = small.at(v, (u + small.columns()) % small.columns());
-            sum += value;
-            squares += value * value;
-            ++count;
-          }
-        }
-        const double mean = sum / count;
-        const double deviation = std::sqrt(std::max(0.0, squares / count - mean * mean));
-        // A patch without structure tells nothing.
-        result.at(y, c) =
-            deviation > 1e-3 ? static_cast<float>((small.at(y, c) - mean) / deviation) : 0.0F;
-      }
-    }
-    return result;
-  }
-
-  static double difference(const Panorama& a, const Panorama& b) {
-    double least = std::numeric_limits<double>::infinity();
-    const auto columns = static_cast<std::size_t>(a.columns());
-    for (std::size_t turn = 0; turn < columns; ++turn) {
-      float sum = 0.0F;
-      for (int y = 0; y < a.rows(); ++y) {
-        const float* const row_a = a.values().data() + static_cast<std::size_t>(y) * columns;
-        const float* const row_b = b.values().data() + static_cast<std::size_t>(y) * columns;
-        for (std::size_t c = 0; c + turn < columns; ++c) {
-          sum += std::abs(row_a[c + turn] - row_b[c]);
-        }
-        for (std::size_t c = columns - turn; c < columns; ++c) {
-          sum += std::abs(row_a[c + turn - columns] - row_b[c]);
+Panorama shrunk(const Panorama& view) {
+  const int rows = std::min(view.rows(), small_rows);
+  const int columns = std::min(view.columns(), small_columns);
+  Panorama small(rows, columns, std::nullopt);
+  for (int y = 0; y < rows; ++y) {
+    for (int c = 0; c < columns; ++c) {
+      double sum = 0.0;
+      int count = 0;
+      for (int v = y * view.rows() / rows; v < (y + 1) * view.rows() / rows; ++v) {
+        for (int u = c * view.columns() / columns; u < (c + 1) * view.columns() / columns; ++u) {
+          sum += view.at(v, u);
+          ++count;
         }
       }
-      least = std::min(least, static_cast<double>(sum));
+      small.at(y, c) = static_cast<float>(sum / count);
     }
-    return least;
   }
+  return small;
+}
 
-  std::vector<Panorama> views_;
-};
+Panorama normalised(const Panorama& view) {
+  const Panorama small = shrunk(view);
+  Panorama result = small;
+  for (int y = 0; y < small.rows(); ++y) {
+    for (int c = 0; c < small.columns(); ++c) {
+      double sum = 0.0;
+      double squares = 0.0;
+      int count = 0;
+      for (int v = std::max(0, y - half_patch); v < std::min(small.rows(), y + half_patch); ++v) {
+        for (int u = c - half_patch; u < c + half_patch; ++u) {
+          const double value = small.at(v, (u + small.columns()) % small.columns());
+          sum += value;
+          squares += value * value;
+          ++count;
+        }
+      }
+      const double mean = sum / count;
+      const double deviation = std::sqrt(std::max(0.0, squares / count - mean * mean));
+      // A patch without structure tells nothing.
+      result.at(y, c) =
+          deviation > 1e-3 ? static_cast<float>((small.at(y, c) - mean) / deviation) : 0.0F;
+    }
+  }
+  return result;
+}
+
+double difference(const Panorama& a, const Panorama& b) {
+  double least = std::numeric_limits<double>::infinity();
+  const auto columns = static_cast<std::size_t>(a.columns());
+  for (std::size_t turn = 0; turn < columns; ++turn) {
+    float sum = 0.0F;
+    for (int y = 0; y < a.rows(); ++y) {
+      const float* const row_a = a.values().data() + static_cast<std::size_t>(y) * columns;
+      const float* const row_b = b.values().data() + static_cast<std::size_t>(y) * columns;
+      for (std::size_t c = 0; c + turn < columns; ++c) {
+        sum += std::abs(row_a[c + turn] - row_b[c]);
+      }
+      for (std::size_t c = columns - turn; c < columns; ++c) {
+        sum += std::abs(row_a[c + turn - columns] - row_b[c]);
+      }
+    }
+    least = std::min(least, static_cast<double>(sum));
+  }
+  return least;
+}
 
 }  // namespace
 
 std::unique_ptr<RivalRecogniser> fourier_signature_recogniser(int components) {
-  return std::make_unique<FourierSignatureRecogniser>(components);
+  return make_recogniser<FourierSignature>(
+      {"Fourier signature",
+       [=](const RivalView& view) { return compute_signature(view.panorama, components); },
+       [](const auto& a, const auto& b) { return dissimilarity_l1(a, b); },
+       [](const auto& signature) { return 2.0 * static_cast<double>(signature.shape().size()); }});
 }
+
+// One histogram over the whole view: what Ulrich and Nourbakhsh use, in grey.
 std::unique_ptr<RivalRecogniser> grey_histogram_recogniser(int bins) {
-  return std::make_unique<GreyHistogramRecogniser>(bins);
+  require(bins >= 2 && bins <= 256, "histogram bins", bins, "2 .. 256");
+  return make_recogniser<Floats>(
+      {"grey histogram", [=](const RivalView& view) { return grey_histogram(view.panorama, bins); },
+       l1, [](const Floats& histogram) { return 2.0 * static_cast<double>(histogram.size()); }});
 }
+
+// Colour needs no phases and no unwarping, and does not change when the robot turns.
 std::unique_ptr<RivalRecogniser> colour_histogram_recogniser(int bins_per_channel) {
-  return std::make_unique<ColourHistogramRecogniser>(bins_per_channel);
+  require(bins_per_channel >= 2 && bins_per_channel <= 32, "histogram bins per channel",
+          bins_per_channel, "2 .. 32");
+  return make_recogniser<Floats>(
+      {"colour histogram",
+       [=](const RivalView& view) { return colour_histogram(view.picture, bins_per_channel); }, l1,
+       [](const Floats& histogram) { return 2.0 * static_cast<double>(histogram.size()); }});
 }
+
 std::unique_ptr<RivalRecogniser> eigenimage_recogniser(int dimensions) {
   return std::make_unique<EigenimageRecogniser>(dimensions);
 }
+
 std::unique_ptr<RivalRecogniser> zero_phase_recogniser() {
-  return std::make_unique<ZeroPhaseRecogniser>();
+  return make_recogniser<Floats>(
+      {"zero-phase representation",
+       [](const RivalView& view) {
+         const Panorama turned = turned_to_zero_phase(view.panorama);
+         return Floats(turned.values().begin(), turned.values().end());
+       },
+       l1, [](const Floats& pixels) { return static_cast<double>(pixels.size()); }});
 }
+
 std::unique_ptr<RivalRecogniser> pixels_over_all_turns_recogniser() {
-  return std::make_unique<PixelRecogniser>();
+  const auto spectra = std::make_shared<Spectra>();
+  return make_recogniser<Spectra::Spectrum>(
+      {"pixels over all turns",
+       [=](const RivalView& view) { return spectra->spectrum(view.panorama); },
+       [=](const auto& a, const auto& b) { return spectra->distance(a, b); },
+       [](const auto& spectrum) { return static_cast<double>(spectrum.pixels); }});
 }
+
 std::unique_ptr<RivalRecogniser> patch_normalised_recogniser() {
-  return std::make_unique<PatchNormalisedRecogniser>();
+  return make_recogniser<Panorama>(
+      {"patch-normalised pixels", [](const RivalView& view) { return normalised(view.panorama); },
+       difference, [](const Panorama& view) { return static_cast<double>(view.values().size()); }});
 }
 
 }  // namespace panonav::lab

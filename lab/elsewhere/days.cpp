@@ -338,11 +338,8 @@ class Days {
 
   [[nodiscard]] simulation::PlaceRecording place_today(double light) const {
     simulation::PlaceRecording today = place_;
-    today.scene = changing_.scene(light);
-    today.renderer = std::make_shared<const simulation::Renderer>(
-        today.scene, simulation::RendererOptions{}, executor());
-    today.free_space = std::make_shared<const simulation::FreeSpace>(
-        today.scene, simulation::free_space_options(today.scene));
+    static_cast<simulation::SimulatedPlace&>(today) =
+        simulation::make_place(changing_.scene(light), executor());
     return today;
   }
 

@@ -11,6 +11,7 @@
 #include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav_simulation/paths.hpp"
+#include "panonav_simulation/recording.hpp"
 
 namespace panonav::lab {
 
@@ -49,11 +50,8 @@ std::vector<Pose2> excursion(const simulation::FreeSpace& space, double border_m
     }
   }
   auto poses = simulation::resample(way, m03_spacing_m);
-  for (std::size_t i = 0; i + 1 < poses.size(); ++i) {
-    poses[i].heading_rad =
-        wrap_angle(std::atan2(poses[i + 1].y_m - poses[i].y_m, poses[i + 1].x_m - poses[i].x_m));
-  }
-  if (poses.size() > 1) poses.back().heading_rad = poses[poses.size() - 2].heading_rad;
+  simulation::face_path(poses);
+  for (Pose2& pose : poses) pose.heading_rad = wrap_angle(pose.heading_rad);
   return poses;
 }
 

@@ -13,6 +13,7 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/positions.hpp"
 #include "panonav/signature/dissimilarity.hpp"
+#include "panonav_simulation/mapping_run.hpp"
 #include "panonav_simulation/scenes.hpp"
 #include "panonav_viewer/plot.hpp"
 
@@ -126,9 +127,15 @@ class LatticeExperiment {
   }
 
  private:
+  [[nodiscard]] simulation::PlaceRecording place_of(simulation::Scene scene,
+                                                    std::uint64_t seed) const {
+    auto place = simulation::empty_place(std::move(scene), seed, 256, executor_);
+    place.rendering.rows = options_.rows;
+    return place;
+  }
+
   void unordered_in_hall(std::uint64_t seed, bool drawn) {
-    const auto place =
-        place_of(simulation::make_scene("hall", {.seed = seed}), seed, options_.rows, executor_);
+    const auto place = place_of(simulation::make_scene("hall", {.seed = seed}), seed);
     const ViewGrid grid = take_grid(place, 10, 8, 0.3, GridHeadings::random, executor_);
     const auto start = std::chrono::steady_clock::now();
     const Lattice arranged = arrange(grid.memory, {}, {}, executor_);
@@ -157,15 +164,14 @@ class LatticeExperiment {
   }
 
   void unordered_in_small_room(std::uint64_t seed) {
-    const auto place = place_of(small_room(seed), seed, options_.rows, executor_);
+    const auto place = place_of(small_room(seed), seed);
     const ViewGrid grid = take_grid(place, 10, 8, 0.3, GridHeadings::random, executor_);
     small_room_.add(compare_with_grid(grid, arrange(grid.memory, {}, {}, executor_)), false);
   }
 
   void with_motion(std::uint64_t seed, int side, double spacing_m, Arrangements& with,
                    Arrangements& without, bool drawn) {
-    const auto place = place_of(simulation::make_scene("hall_periodic", {.seed = seed}), seed,
-                                options_.rows, executor_);
+    const auto place = place_of(simulation::make_scene("hall_periodic", {.seed = seed}), seed);
     const ViewGrid grid =
         take_grid(place, side, side, spacing_m, GridHeadings::along_path, executor_);
     const auto motion = coarse_motion(grid, kDistanceShare, kDirectionShare, seed);

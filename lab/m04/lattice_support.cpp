@@ -10,6 +10,7 @@
 #include "panonav/geometry/nearest_points.hpp"
 #include "panonav/geometry/positions.hpp"
 #include "panonav_simulation/furniture.hpp"
+#include "panonav_simulation/recording.hpp"
 
 namespace panonav::lab {
 
@@ -65,17 +66,6 @@ bool coincide(std::span<const Point2> points) {
 
 }  // namespace
 
-simulation::PlaceRecording place_of(simulation::Scene scene, std::uint64_t seed, int rows,
-                                    Executor& executor) {
-  simulation::PlaceRecording place;
-  place.seed = seed;
-  place.scene = std::move(scene);
-  place.renderer = std::make_shared<const simulation::Renderer>(
-      place.scene, simulation::RendererOptions{}, executor);
-  place.rendering = {.rows = rows, .columns = 256, .rays_per_axis = 1};
-  return place;
-}
-
 ViewGrid take_grid(const simulation::PlaceRecording& place, int columns, int rows, double spacing_m,
                    GridHeadings headings, Executor& executor) {
   ViewGrid grid{.columns = columns,
@@ -92,15 +82,7 @@ ViewGrid take_grid(const simulation::PlaceRecording& place, int columns, int row
                           middle_y + (at.j - 0.5 * (rows - 1)) * spacing_m,
                           random.uniform(-std::numbers::pi, std::numbers::pi)});
   }
-  if (headings == GridHeadings::along_path) {
-    for (std::size_t i = 0; i + 1 < grid.poses.size(); ++i) {
-      grid.poses[i].heading_rad = std::atan2(grid.poses[i + 1].y_m - grid.poses[i].y_m,
-                                             grid.poses[i + 1].x_m - grid.poses[i].x_m);
-    }
-    if (grid.poses.size() > 1) {
-      grid.poses.back().heading_rad = grid.poses[grid.poses.size() - 2].heading_rad;
-    }
-  }
+  if (headings == GridHeadings::along_path) simulation::face_path(grid.poses);
   const auto views = simulation::take_views(place, place.rendering, grid.poses,
                                             place.seed * 100003U + 90000U, {}, executor);
   grid.memory = memory_of(views, signatures_of(views, m04_components, executor));

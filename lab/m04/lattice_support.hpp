@@ -20,13 +20,9 @@ struct ViewGrid {
 
 enum class GridHeadings { random, along_path };
 
-/// Takes the views. `place` needs scene, renderer, rendering and seed only.
+/// Takes the views. `place` needs no references.
 [[nodiscard]] ViewGrid take_grid(const simulation::PlaceRecording& place, int columns, int rows,
                                  double spacing_m, GridHeadings headings, Executor& executor);
-
-/// A scene as `take_grid` needs it.
-[[nodiscard]] simulation::PlaceRecording place_of(simulation::Scene scene, std::uint64_t seed,
-                                                  int rows, Executor& executor);
 
 /// An empty room of 4 x 3.5 m with pictures, windows and a door on its walls.
 [[nodiscard]] simulation::Scene small_room(std::uint64_t seed);

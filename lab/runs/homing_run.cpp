@@ -13,15 +13,8 @@
 namespace panonav::lab {
 
 HomingPlace make_homing_place(simulation::Scene scene, HomingCamera camera, Executor& executor) {
-  HomingPlace place;
-  place.scene = std::move(scene);
-  place.free_space = std::make_shared<const simulation::FreeSpace>(
-      place.scene, simulation::free_space_options(place.scene));
-  place.renderer = std::make_shared<const simulation::Renderer>(
-      place.scene, simulation::RendererOptions{}, executor);
-  camera.frame.camera_height_m = place.scene.camera_height_m;
-  place.camera = camera;
-  return place;
+  camera.frame.camera_height_m = scene.camera_height_m;
+  return {simulation::make_place(std::move(scene), executor), camera};
 }
 
 HomingView take_homing_view(const HomingPlace& place, const Pose2& pose, std::uint64_t seed) {

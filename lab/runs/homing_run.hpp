@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <string_view>
 #include <vector>
 
@@ -10,11 +9,8 @@
 #include "panonav/homing/homing_pursuit.hpp"
 #include "panonav/motion/odometry.hpp"
 #include "panonav/relative_pose/homing_view.hpp"
-#include "panonav_simulation/free_space.hpp"
+#include "panonav_simulation/place_recording.hpp"
 #include "panonav_simulation/recording.hpp"
-#include "panonav_simulation/renderer.hpp"
-#include "panonav_simulation/scene.hpp"
-#include "panonav_simulation/sensor.hpp"
 #include "panonav_simulation/simulated_robot.hpp"
 
 namespace panonav::lab {
@@ -28,11 +24,8 @@ struct HomingCamera {
   int components = 20;
 };
 
-/// A place in which robots are sent home. Shared by any number of runs on any number of threads.
-struct HomingPlace {
-  simulation::Scene scene;
-  std::shared_ptr<const simulation::FreeSpace> free_space;
-  std::shared_ptr<const simulation::Renderer> renderer;
+/// A place in which robots are sent home.
+struct HomingPlace : simulation::SimulatedPlace {
   HomingCamera camera;
 };
 

@@ -205,33 +205,30 @@ std::vector<TrackingRun> record_walks(const simulation::PlaceRecording& place,
     const std::uint64_t seed =
         mixed(mixed(options.seed, place.seed), static_cast<std::uint64_t>(v));
     Random random(seed);
-    std::shared_ptr<const simulation::Renderer> renderer = place.renderer;
-    std::shared_ptr<const simulation::FreeSpace> space = place.free_space;
+    simulation::SimulatedPlace now = place;
     if (changed) {
-      const simulation::Scene scene = simulation::make_scene(
-          place.scene.name,
-          {.seed = place.seed,
-           .moved_objects = condition.moved_objects,
-           .moved_seed = seed,
-           .light = random.uniform(1.0 - condition.light_change, 1.0 + condition.light_change)});
-      renderer = std::make_shared<const simulation::Renderer>(scene, simulation::RendererOptions{},
-                                                              executor);
-      space = std::make_shared<const simulation::FreeSpace>(scene,
-                                                            simulation::free_space_options(scene));
+      now = simulation::make_place(
+          simulation::make_scene(place.scene.name,
+                                 {.seed = place.seed,
+                                  .moved_objects = condition.moved_objects,
+                                  .moved_seed = seed,
+                                  .light = random.uniform(1.0 - condition.light_change,
+                                                          1.0 + condition.light_change)}),
+          executor);
     }
     std::vector<std::vector<Pose2>> poses;
     for (int r = 0; r < options.runs_each; ++r) {
       Random walk(seed, static_cast<std::uint64_t>(r) + 1);
-      Pose2 start = space->random_pose(walk);
+      Pose2 start = now.free_space->random_pose(walk);
       auto path = simulation::random_walk(
-          start, [&](Point2 p) { return space->is_free(p); },
+          start, [&](Point2 p) { return now.free_space->is_free(p); },
           {.poses = options.images, .step_m = options.step_m}, walk);
       if (options.constant_heading) {
         for (Pose2& pose : path) pose.heading_rad = 0.0;
       }
       poses.push_back(std::move(path));
     }
-    auto recorded = record_along(poses, place, *renderer, remembered, condition.sensor,
+    auto recorded = record_along(poses, place, *now.renderer, remembered, condition.sensor,
                                  mixed(seed, 50000), executor);
     std::ranges::move(recorded, std::back_inserter(runs));
   }

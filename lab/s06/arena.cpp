@@ -84,13 +84,11 @@ std::vector<float> arena_row(const simulation::Renderer& renderer, const simulat
 }
 
 Arena record_arena(const ArenaOptions& options, Executor& executor) {
-  Arena arena;
-  arena.options = options;
-  arena.scene = simulation::make_scene("arena", {.seed = options.seed});
-  arena.space = std::make_shared<const simulation::FreeSpace>(
-      arena.scene, simulation::free_space_options(arena.scene));
+  Arena arena{
+      simulation::make_place(simulation::make_scene("arena", {.seed = options.seed}), executor),
+      options};
   std::vector<simulation::GridPosition> grid;
-  for (const simulation::GridPosition& place : arena.space->grid(options.spacing_m)) {
+  for (const simulation::GridPosition& place : arena.free_space->grid(options.spacing_m)) {
     const Point2 at = place.position;
     const Point2 low = arena.scene.floor_low;
     const Point2 high = arena.scene.floor_high;
@@ -100,8 +98,7 @@ Arena record_arena(const ArenaOptions& options, Executor& executor) {
     }
   }
   require(!grid.empty(), "free places", 0.0, ">= 1");
-  const simulation::Renderer first(arena.scene, {}, executor);
-  arena.homes = record(first, arena.scene, grid, options, 0, executor);
+  arena.homes = record(*arena.renderer, arena.scene, grid, options, 0, executor);
   const simulation::Scene later =
       simulation::make_scene("arena", {.seed = options.seed, .light = options.light});
   const simulation::Renderer second(later, {}, executor);

@@ -1,16 +1,13 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <span>
 #include <vector>
 
 #include "lab/baselines/expected_image_homing.hpp"
 #include "panonav/core/executor.hpp"
 #include "panonav/homing/homing_survey.hpp"
-#include "panonav_simulation/free_space.hpp"
-#include "panonav_simulation/renderer.hpp"
-#include "panonav_simulation/scene.hpp"
+#include "panonav_simulation/place_recording.hpp"
 
 namespace panonav::lab {
 
@@ -57,10 +54,8 @@ struct ArenaRecording {
 };
 
 /// Goals and places have the same numbers: those of the grid, row by row.
-struct Arena {
+struct Arena : simulation::SimulatedPlace {
   ArenaOptions options;
-  simulation::Scene scene;
-  std::shared_ptr<const simulation::FreeSpace> space;
   ArenaRecording homes;     ///< first recording
   ArenaRecording currents;  ///< second, at the same places
 };

@@ -52,11 +52,8 @@ std::vector<std::vector<Pose2>> random_routes(const simulation::FreeSpace& space
       }
     }
     std::vector<Pose2> route = simulation::resample(corners, spacing_m);
-    for (std::size_t i = 0; i + 1 < route.size(); ++i) {
-      route[i].heading_rad =
-          wrap_angle(std::atan2(route[i + 1].y_m - route[i].y_m, route[i + 1].x_m - route[i].x_m));
-    }
-    if (route.size() > 1) route.back().heading_rad = route[route.size() - 2].heading_rad;
+    simulation::face_path(route);
+    for (Pose2& pose : route) pose.heading_rad = wrap_angle(pose.heading_rad);
     routes.push_back(std::move(route));
   }
   return routes;

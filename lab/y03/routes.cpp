@@ -15,6 +15,7 @@
 #include "panonav/geometry/positions.hpp"
 #include "panonav/motion/path_follower.hpp"
 #include "panonav_simulation/paths.hpp"
+#include "panonav_simulation/recording.hpp"
 #include "panonav_simulation/simulated_robot.hpp"
 
 namespace panonav::lab {
@@ -135,12 +136,8 @@ Pose2 spiral_step(int step) {
 }  // namespace
 
 RouteScene make_route_scene(simulation::Scene scene, const std::string& name, Executor& executor) {
-  auto space =
-      std::make_shared<const simulation::FreeSpace>(scene, simulation::free_space_options(scene));
-  auto renderer =
-      std::make_shared<const simulation::Renderer>(scene, simulation::RendererOptions{}, executor);
   const double height_m = scene.camera_height_m;
-  return {name, std::move(scene), std::move(space), std::move(renderer),
+  return {simulation::make_place(std::move(scene), executor), name,
           simulation::make_line_camera(height_m)};
 }
 
@@ -185,10 +182,7 @@ std::vector<Pose2> curved_route(const RouteScene& place, double length_m, double
   way = simulation::resample(way, spacing_m);
   const auto most = static_cast<std::size_t>(std::floor(length_m / spacing_m)) + 1;
   if (way.size() > most) way.resize(most);
-  for (std::size_t i = 0; i + 1 < way.size(); ++i) {
-    way[i].heading_rad = direction(way[i].position(), way[i + 1].position());
-  }
-  if (way.size() > 1) way.back().heading_rad = way[way.size() - 2].heading_rad;
+  simulation::face_path(way);
   return way;
 }
 

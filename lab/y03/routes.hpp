@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,20 +11,15 @@
 #include "panonav/motion/odometry.hpp"
 #include "panonav/route/route_panorama.hpp"
 #include "panonav/route/route_tracker.hpp"
-#include "panonav_simulation/free_space.hpp"
 #include "panonav_simulation/line_camera.hpp"
-#include "panonav_simulation/renderer.hpp"
-#include "panonav_simulation/scene.hpp"
+#include "panonav_simulation/place_recording.hpp"
 #include "panonav_viewer/plot.hpp"
 
 namespace panonav::lab {
 
-/// A place in which robots repeat routes. Shared by any number of runs on any number of threads.
-struct RouteScene {
+/// A place in which robots repeat routes.
+struct RouteScene : simulation::SimulatedPlace {
   std::string name;
-  simulation::Scene scene;
-  std::shared_ptr<const simulation::FreeSpace> free_space;  ///< where the robot can be
-  std::shared_ptr<const simulation::Renderer> renderer;
   simulation::LineCamera camera;
 };
 [[nodiscard]] RouteScene make_route_scene(simulation::Scene scene, const std::string& name,

@@ -40,12 +40,7 @@ float largest_structure(const MappingRecording& recording, int components) {
 }  // namespace
 
 PlaceRecording empty_place(Scene scene, std::uint64_t seed, int columns, Executor& executor) {
-  PlaceRecording place;
-  place.seed = seed;
-  place.scene = std::move(scene);
-  place.free_space =
-      std::make_shared<const FreeSpace>(place.scene, free_space_options(place.scene));
-  place.renderer = std::make_shared<const Renderer>(place.scene, RendererOptions{}, executor);
+  PlaceRecording place{make_place(std::move(scene), executor), seed};
   place.rendering = {.rows = 80, .columns = columns, .rays_per_axis = 1};
   return place;
 }

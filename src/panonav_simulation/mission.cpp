@@ -95,12 +95,7 @@ double shortest_way_m(const FreeSpace& space, Point2 from, Point2 to) {
 }  // namespace
 
 MissionPlace make_mission_place(Scene scene, Executor& executor, std::optional<Point2> inside) {
-  MissionPlace place;
-  place.scene = std::move(scene);
-  place.free_space =
-      std::make_shared<const FreeSpace>(place.scene, free_space_options(place.scene), inside);
-  place.renderer = std::make_shared<const Renderer>(place.scene, RendererOptions{}, executor);
-  return place;
+  return {make_place(std::move(scene), executor, inside)};
 }
 
 std::function<std::vector<float>(const Pose2& pose, std::uint64_t seed)> mirror_lines(

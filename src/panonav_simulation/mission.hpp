@@ -18,19 +18,13 @@
 #include "panonav/navigation/known_route.hpp"
 #include "panonav/navigation/navigation_graph.hpp"
 #include "panonav/navigation/navigator.hpp"
-#include "panonav_simulation/free_space.hpp"
 #include "panonav_simulation/people.hpp"
-#include "panonav_simulation/renderer.hpp"
-#include "panonav_simulation/scene.hpp"
-#include "panonav_simulation/sensor.hpp"
+#include "panonav_simulation/place_recording.hpp"
 
 namespace panonav::simulation {
 
-/// A place to explore and to go about in. Shared by any number of runs on any number of threads.
-struct MissionPlace {
-  Scene scene;
-  std::shared_ptr<const FreeSpace> free_space;
-  std::shared_ptr<const Renderer> renderer;
+/// A place to explore and to go about in.
+struct MissionPlace : SimulatedPlace {
   PanoramaRendering rendering{.rows = 40, .columns = 256, .rays_per_axis = 1};
   SensorOptions sensor;
   int components = 15;
@@ -42,8 +36,7 @@ struct MissionPlace {
   std::function<std::vector<float>(const Pose2& pose, std::uint64_t seed)> line;
 };
 
-/// `inside`: of a place in several components, a position in the component that is meant; empty:
-/// the largest. Throws ContractError as the components.
+/// As `make_place`.
 [[nodiscard]] MissionPlace make_mission_place(Scene scene, Executor& executor,
                                               std::optional<Point2> inside = std::nullopt);
 

@@ -1,6 +1,5 @@
 #include "panonav_simulation/place_recording.hpp"
 
-#include <optional>
 #include <utility>
 
 #include "panonav/core/error.hpp"
@@ -9,6 +8,12 @@
 #include "panonav_simulation/scenes.hpp"
 
 namespace panonav::simulation {
+
+SimulatedPlace make_place(Scene scene, Executor& executor, std::optional<Point2> inside) {
+  auto space = std::make_shared<const FreeSpace>(scene, free_space_options(scene), inside);
+  auto renderer = std::make_shared<const Renderer>(scene, RendererOptions{}, executor);
+  return {std::move(scene), std::move(space), std::move(renderer)};
+}
 
 std::size_t PlaceRecording::nearest_reference(Point2 position) const {
   std::size_t nearest = 0;
@@ -55,13 +60,9 @@ PlaceRecording record_place(const PlaceRecordingOptions& options, Executor& exec
 
 PlaceRecording record_place(Scene scene, const PlaceRecordingOptions& options, Executor& executor) {
   require(options.queries >= 1, "queries", options.queries, ">= 1");
-  PlaceRecording place;
+  PlaceRecording place{make_place(std::move(scene), executor)};
   place.seed = options.seed;
-  place.scene = std::move(scene);
   place.spacing_m = options.spacing_m;
-  place.free_space =
-      std::make_shared<const FreeSpace>(place.scene, free_space_options(place.scene));
-  place.renderer = std::make_shared<const Renderer>(place.scene, RendererOptions{}, executor);
   place.rendering = {.rows = options.rows, .columns = options.columns, .rays_per_axis = 1};
 
   std::vector<Pose2> grid;

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,19 @@
 
 namespace panonav::simulation {
 
+/// A scene with what a robot in it needs. Shared by any number of runs on any number of threads.
+struct SimulatedPlace {
+  Scene scene;
+  std::shared_ptr<const FreeSpace> free_space;  ///< where the robot of the scene can be
+  std::shared_ptr<const Renderer> renderer;
+};
+
+/// Computes free space and light of a scene. `inside`: of free space in several components, a
+/// position in the component that is meant; empty: the largest. Throws ContractError as `FreeSpace`
+/// and `Renderer`.
+[[nodiscard]] SimulatedPlace make_place(Scene scene, Executor& executor,
+                                        std::optional<Point2> inside = std::nullopt);
+
 struct PlacedView {
   Pose2 pose;
   Panorama panorama;
@@ -23,11 +37,8 @@ struct PlacedView {
 
 /// A simulated place as an experiment needs it: reference views on a grid, queries at random poses
 /// in between, and a camera for further views (`take_view`).
-struct PlaceRecording {
+struct PlaceRecording : SimulatedPlace {
   std::uint64_t seed = 1;
-  Scene scene;
-  std::shared_ptr<const FreeSpace> free_space;
-  std::shared_ptr<const Renderer> renderer;
   PanoramaRendering rendering;
   double spacing_m = 0.25;
   std::vector<PlacedView> references;

@@ -167,6 +167,13 @@ std::vector<RecordedPose> plan_recording(const Scene& scene, const FreeSpace& sp
   return result;
 }
 
+void face_path(std::vector<Pose2>& poses) {
+  for (std::size_t i = 0; i + 1 < poses.size(); ++i) {
+    poses[i].heading_rad = direction(poses[i].position(), poses[i + 1].position());
+  }
+  if (poses.size() > 1) poses.back().heading_rad = poses[poses.size() - 2].heading_rad;
+}
+
 Panorama take_panorama(const Renderer& renderer, const Pose2& pose,
                        const PanoramaRendering& rendering, const FrameOptions& options,
                        const SensorOptions& sensor, std::uint64_t seed, Executor& executor) {

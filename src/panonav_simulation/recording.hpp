@@ -63,6 +63,9 @@ struct RecordedPose {
                                                        std::uint64_t seed,
                                                        std::span<const Point2> way_points = {});
 
+/// Turns each pose towards the next one, -pi .. pi; the last keeps the heading of the one before.
+void face_path(std::vector<Pose2>& poses);
+
 /// What is rendered: a picture through a camera, or the panoramic cylinder directly.
 using RecordingCamera = std::variant<PanoramaRendering, Camera>;
 
