@@ -2,14 +2,151 @@
 
 #include <algorithm>
 #include <array>
+#include <memory>
 #include <system_error>
 
+#include "lab/elsewhere/experiments.hpp"
 #include "lab/experiments.hpp"
+#include "lab/m03/experiments.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav_simulation/worlds.hpp"
 
 namespace panonav::lab {
 
 namespace {
+
+ReproductionPlan plan_f11(const Experiments& context) {
+  const ReproductionOptions& options = context.options;
+  require_minima({{"scenes", options.scenes, 2},
+                  {"runs", options.runs, 1},
+                  {"views", options.views, 10},
+                  {"max_views", options.max_views, 100},
+                  {"columns", options.columns, 132}});  // twice the components
+  MappingExperiments f11{context};
+  ReproductionPlan plan{{6.0 * options.scenes, [=] { f11.reproduce_first_set(); }},
+                        {10.0 * options.scenes, [=] { f11.reproduce_second_set(); }},
+                        {1.0, [=] { f11.measure_step_time(); }},
+                        {15.0, [=] { f11.reproduce_identical_doors(); }}};
+  for (const std::string& name : simulation::worlds_in(options.data)) {
+    plan.push_back({10.0 * options.runs, [=] { f11.reproduce_world(name); }});
+  }
+  plan.push_back({5.0, [=] { f11.reproduce_recordings(); }});
+  plan.push_back({0.02 * options.max_views, [=] { f11.measure_large_maps(); }});
+  return plan;
+}
+
+ReproductionPlan plan_navigation(const Experiments& context) {
+  const ReproductionOptions& options = context.options;
+  require_minima({{"scenes", options.scenes, 2}, {"runs", options.runs, options.scenes}});
+  NavigationExperiments navigation{context};
+  ReproductionPlan plan;
+  std::vector<std::string> scenes = simulation::worlds_in(options.data);
+  scenes.insert(scenes.begin(), {"loop", "corridor"});
+  for (const std::string& scene : scenes) {
+    plan.push_back({6.0, [=] { navigation.reproduce_drive_missions(scene); }});
+  }
+  plan.push_back({4.0, [=] { navigation.reproduce_tours(); }});
+  plan.push_back({3.0, [=] { navigation.reproduce_route_missions(); }});
+  plan.push_back({2.0, [=] { navigation.reproduce_blocked_missions(); }});
+  return plan;
+}
+
+ReproductionPlan plan_y03(const Experiments& context) {
+  const ReproductionOptions& options = context.options;
+  require_minima({{"scenes", options.scenes, 2}, {"runs", options.runs, 2}});
+  require(options.swept >= 1 && options.swept <= options.scenes, "swept", options.swept,
+          "1 to scenes");
+  const double routes = 3.0 * options.runs;
+  const RouteExperiments y03{context};
+  ReproductionPlan plan{{3.0 * options.scenes, [=] { y03.reproduce_lab_drives(); }},
+                        {routes, [=] { y03.reproduce_loop_routes(); }}};
+  for (const std::string& world : simulation::worlds_in(options.data)) {
+    plan.push_back({routes, [=] { y03.reproduce_world_routes(world); }});
+  }
+  if (simulation::has_data(options.data, "sussex_route")) {
+    plan.push_back({1.0, [=] { y03.reproduce_real_route(); }});
+  }
+  return plan;
+}
+
+ReproductionPlan plan_elsewhere(const Experiments& context) {
+  const ReproductionOptions& options = context.options;
+  require_minima({{"scenes", options.scenes, 1},
+                  {"queries", options.queries, 4},
+                  {"runs", options.runs, 2},
+                  {"days", options.days, 1},
+                  {"day_pictures", options.day_pictures, 4},
+                  {"walks", options.walks, 2},
+                  {"walk_pictures", options.walk_pictures, 32}});
+  require(!options.built_in.empty(), "built-in scenes", 0.0, ">= 1");
+  const auto elsewhere = std::make_shared<ElsewhereExperiments>(context);
+  ReproductionPlan plan;
+  for (const std::string& name : elsewhere->ground_names()) {
+    plan.push_back({10.0, [=] { elsewhere->record_ground(name); }});
+  }
+  plan.push_back({100.0, [=] { elsewhere->reproduce_known_places(); }});
+  plan.push_back({40.0, [=] { elsewhere->reproduce_tracked_poses(); }});
+  plan.push_back({60.0, [=] { elsewhere->reproduce_home_vectors(); }});
+  plan.push_back({60.0, [=] {
+                    elsewhere->grounds.clear();
+                    elsewhere->reproduce_tilted_homing();
+                  }});
+  for (const char* const recording : {"ciirc_b670", "gantry_plants", "indoor_walk_360"}) {
+    if (!simulation::has_data(options.data, recording)) continue;
+    const std::filesystem::path folder = options.data / recording;
+    plan.push_back({20.0, [=] { elsewhere->reproduce_leave_one_out(folder); }});
+  }
+  for (const char* const name : {"office", "small_warehouse"}) {
+    if (!simulation::has_scene(options.data, name)) continue;
+    plan.push_back({60.0, [=] { elsewhere->reproduce_days(name); }});
+  }
+  plan.push_back({200.0, [=] { elsewhere->reproduce_merging(); }});
+  if (!options.floors) return plan;
+  for (const std::string& world : simulation::all_worlds_in(options.data)) {
+    for (const double spacing_m : {0.5, 0.3}) {
+      plan.push_back({60.0, [=] { elsewhere->reproduce_floor(world, spacing_m); }});
+    }
+  }
+  return plan;
+}
+
+ReproductionPlan plan_m03(const Experiments& context) {
+  const ReproductionOptions& options = context.options;
+  require_minima({{"scenes", options.scenes, 1},
+                  {"variants", options.variants, 1},
+                  {"runs", options.runs, 2}});
+  const auto parts = tracking_reproduction_parts();
+  if (!options.only.empty() && std::ranges::find(parts, options.only) == parts.end()) {
+    throw ContractError("only", options.only,
+                        "office, corridor, garden, leaving, worlds, recordings");
+  }
+  const auto m03 = std::make_shared<TrackingExperiments>(context);
+  ReproductionPlan plan;
+  const auto add = [&](std::string_view part, double cost, std::function<void()> run) {
+    if (options.only.empty() || options.only == part) plan.push_back({cost, std::move(run)});
+  };
+  const double scenes = options.scenes;
+  for (int s = 0; s < options.scenes; ++s) add("office", 20.0, [=] { m03->record_office(s); });
+  add("office", 3.0 * scenes, [=] { m03->reproduce_global_localisation(); });
+  add("office", scenes, [=] { m03->reproduce_position_tracking(); });
+  add("office", scenes, [=] { m03->reproduce_kidnapping(); });
+  add("office", 10.0 * scenes, [=] { m03->reproduce_sweeps(); });
+  add("corridor", 10.0 * scenes, [=] { m03->reproduce_corridor(); });
+  add("garden", 10.0 * scenes, [=] { m03->reproduce_garden(); });
+  for (const char* const scene : {"hall", "loop"}) {
+    add("leaving", 5.0 * scenes, [=] { m03->reproduce_leaving(scene); });
+  }
+  for (const std::string& world : simulation::worlds_in(options.data)) {
+    add("worlds", 50.0, [=] { m03->reproduce_gazebo_world(world); });
+  }
+  if (simulation::has_data(options.data, "sussex_route")) {
+    add("recordings", 10.0, [=] { m03->reproduce_recorded_route(); });
+  }
+  if (simulation::has_data(options.data, "gantry_plants")) {
+    add("recordings", 10.0, [=] { m03->reproduce_gantry(); });
+  }
+  return plan;
+}
 
 struct Paper {
   std::string_view name;

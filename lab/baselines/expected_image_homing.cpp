@@ -18,6 +18,9 @@ namespace {
 // Expected views that are compared together: they and their products stay in the first cache.
 constexpr std::size_t block = 8;
 
+// Largest distance of the positions, in units of R.
+constexpr double position_reach = 2.0 / 3.0;
+
 struct LatticePoint {
   int x = 0;
   int y = 0;
@@ -46,30 +49,20 @@ double mean_of(std::span<const float> values) {
 
 }  // namespace
 
-void visit_options(ExpectedImageOptions& options, OptionVisitor& visitor) {
-  using T = ExpectedImageOptions;
-  constexpr OptionTable table{
-      option<&T::reach>("how far away positions are tried, in units of the assumed distance", 0.01,
-                        0.99),
-      option<&T::positions>("positions that are tried at most", 5, 10000),
-  };
-  table.visit(options, visitor);
-}
-
-ExpectedImageHoming::ExpectedImageHoming(int columns, const ExpectedImageOptions& options)
+ExpectedImageHoming::ExpectedImageHoming(int columns, int max_positions)
     : columns_(columns), spacing_(0.0) {
   require(columns >= 4 && columns <= 65536, "columns", columns, "4 .. 65536");
-  validate(options);
-  const auto points = lattice(options.positions);
+  require(max_positions >= 5 && max_positions <= 10000, "positions", max_positions, "5 .. 10000");
+  const auto points = lattice(max_positions);
   // Whole rings of equally far points, the next of which would lie at the reach.
   std::size_t count = 0;
   while (true) {
     std::size_t next = count;
     while (points[next].square() == points[count].square()) ++next;
-    if (next > static_cast<std::size_t>(options.positions)) break;
+    if (next > static_cast<std::size_t>(max_positions)) break;
     count = next;
   }
-  spacing_ = options.reach / std::sqrt(static_cast<double>(points[count].square()));
+  spacing_ = position_reach / std::sqrt(static_cast<double>(points[count].square()));
   const double pixels_per_radian = columns / (2.0 * std::numbers::pi);
   table_.reserve(count * static_cast<std::size_t>(columns));
   for (std::size_t p = 0; p < count; ++p) {

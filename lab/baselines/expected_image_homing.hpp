@@ -4,19 +4,9 @@
 #include <span>
 #include <vector>
 
-#include "panonav/core/options.hpp"
 #include "panonav/relative_pose/fourier_homing.hpp"
 
 namespace panonav::lab {
-
-struct ExpectedImageOptions {
-  /// Positions lie within this distance, in units of R. Beyond 1 the image would fold over.
-  double reach = 2.0 / 3.0;
-  /// How many there are at most: those of the finest square lattice around (0, 0) with so few. 200
-  /// gives 197.
-  int positions = 200;
-};
-void visit_options(ExpectedImageOptions& options, OptionVisitor& visitor);
 
 /// Homing by expected images (hs_ei, Franz et al. 1998), as [S06 section 2.2] tells it: what the
 /// current view, one row of pixels, would look like from P positions around it if all things were
@@ -31,8 +21,10 @@ class ExpectedImageHoming {
     float eta = 0.0F;
   };
 
-  /// For rows of `columns` pixels. Throws ContractError unless 4 <= columns <= 65536; OptionError.
-  explicit ExpectedImageHoming(int columns, const ExpectedImageOptions& options = {});
+  /// For rows of `columns` pixels, with the positions of the finest square lattice around (0, 0)
+  /// that has at most `max_positions` within 2/3 R (200 gives 197): beyond R the image would fold
+  /// over. Throws ContractError unless 4 <= columns <= 65536 and 5 <= max_positions <= 10000.
+  explicit ExpectedImageHoming(int columns, int max_positions = 200);
 
   [[nodiscard]] int columns() const noexcept { return columns_; }
   /// From (0, 0) outwards.

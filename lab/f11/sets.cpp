@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "lab/f11/experiments.hpp"
+#include "lab/experiments.hpp"
 #include "lab/rows.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/alignment.hpp"
@@ -17,6 +17,7 @@
 #include "panonav/geometry/positions.hpp"
 #include "panonav/signature/compass.hpp"
 #include "panonav/signature/dissimilarity.hpp"
+#include "panonav_simulation/mapping_run.hpp"
 #include "panonav_simulation/scenes.hpp"
 #include "panonav_viewer/plot.hpp"
 #include "panonav_viewer/scene_drawing.hpp"

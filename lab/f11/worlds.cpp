@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "lab/f11/experiments.hpp"
+#include "lab/experiments.hpp"
 #include "lab/rows.hpp"
 #include "panonav/camera/camera.hpp"
 #include "panonav/core/random.hpp"
@@ -23,6 +23,7 @@
 #include "panonav/panorama/unwarper.hpp"
 #include "panonav/signature/signature_extractor.hpp"
 #include "panonav_simulation/make_each.hpp"
+#include "panonav_simulation/mapping_run.hpp"
 #include "panonav_simulation/recording.hpp"
 #include "panonav_simulation/scenes.hpp"
 #include "panonav_simulation/worlds.hpp"

@@ -215,42 +215,4 @@ std::span<const std::string_view> tracking_reproduction_parts() {
   return parts;
 }
 
-ReproductionPlan plan_m03(const Experiments& context) {
-  const ReproductionOptions& options = context.options;
-  require_minima({{"scenes", options.scenes, 1},
-                  {"variants", options.variants, 1},
-                  {"runs", options.runs, 2}});
-  const auto parts = tracking_reproduction_parts();
-  if (!options.only.empty() && std::ranges::find(parts, options.only) == parts.end()) {
-    throw ContractError("only", options.only,
-                        "office, corridor, garden, leaving, worlds, recordings");
-  }
-  const auto m03 = std::make_shared<TrackingExperiments>(context);
-  ReproductionPlan plan;
-  const auto add = [&](std::string_view part, double cost, std::function<void()> run) {
-    if (options.only.empty() || options.only == part) plan.push_back({cost, std::move(run)});
-  };
-  const double scenes = options.scenes;
-  for (int s = 0; s < options.scenes; ++s) add("office", 20.0, [=] { m03->record_office(s); });
-  add("office", 3.0 * scenes, [=] { m03->reproduce_global_localisation(); });
-  add("office", scenes, [=] { m03->reproduce_position_tracking(); });
-  add("office", scenes, [=] { m03->reproduce_kidnapping(); });
-  add("office", 10.0 * scenes, [=] { m03->reproduce_sweeps(); });
-  add("corridor", 10.0 * scenes, [=] { m03->reproduce_corridor(); });
-  add("garden", 10.0 * scenes, [=] { m03->reproduce_garden(); });
-  for (const char* const scene : {"hall", "loop"}) {
-    add("leaving", 5.0 * scenes, [=] { m03->reproduce_leaving(scene); });
-  }
-  for (const std::string& world : simulation::worlds_in(options.data)) {
-    add("worlds", 50.0, [=] { m03->reproduce_gazebo_world(world); });
-  }
-  if (simulation::has_data(options.data, "sussex_route")) {
-    add("recordings", 10.0, [=] { m03->reproduce_recorded_route(); });
-  }
-  if (simulation::has_data(options.data, "gantry_plants")) {
-    add("recordings", 10.0, [=] { m03->reproduce_gantry(); });
-  }
-  return plan;
-}
-
 }  // namespace panonav::lab

@@ -9,6 +9,7 @@
 #include "lab/statistics.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav_simulation/paths.hpp"
 
 namespace panonav::lab {
@@ -21,12 +22,6 @@ constexpr int images = 16;
 constexpr std::array<double, 7> lights{0.5, 0.7, 0.85, 1.0, 1.2, 1.5, 2.0};
 // A cloud comes and goes, then the sun: a step in each image.
 constexpr std::array<std::size_t, 12> changing{3, 2, 1, 0, 1, 2, 3, 4, 5, 6, 5, 4};
-
-std::string shown(double light) {
-  const auto hundredths = std::lround(100.0 * light);
-  const std::string digits = std::to_string(hundredths % 100);
-  return std::to_string(hundredths / 100) + "." + (digits.size() < 2 ? "0" : "") + digits;
-}
 
 struct GardenRuns {
   std::array<std::vector<RunSet>, lights.size()> constant;  ///< the same ways in each light
@@ -96,8 +91,8 @@ void TrackingExperiments::reproduce_garden() {
   viewer::Series needed{.label = "constant light"};
   for (std::size_t l = 0; l < lights.size(); ++l) {
     const auto runs =
-        add_rows("light_" + shown(lights[l]),
-                 "light " + shown(lights[l]) + " times that of the memory", gardens.constant[l]);
+        add_rows("light_" + format_fixed(lights[l], 2),
+                 "light " + format_fixed(lights[l], 2) + " times that of the memory", gardens.constant[l]);
     const SingleImages single = sum_single_images(gardens.constant[l]);
     add_point(right, lights[l], success_rate(single.right, single.asked));
     add_point(near, lights[l], success_rate(single.near, single.asked));

@@ -9,6 +9,7 @@
 #include "lab/m03/experiments.hpp"
 #include "lab/statistics.hpp"
 #include "panonav/core/statistics.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav_viewer/scene_drawing.hpp"
 
 namespace panonav::lab {
@@ -203,13 +204,6 @@ void draw_curves(const TrackingExperiments& m03, const std::string& file, const 
   add_plot(m03.result, file + "_images.svg", title + ": images.", images);
 }
 
-std::string shortest_text(double factor) {
-  std::string text = std::to_string(factor);
-  text.erase(text.find_last_not_of('0') + 1);
-  if (text.back() == '.') text.pop_back();
-  return text;
-}
-
 void scale_noise(OdometryNoise& noise, double factor) {
   noise.translation_from_translation *= factor;
   noise.translation_from_rotation *= factor;
@@ -386,7 +380,7 @@ void TrackingExperiments::reproduce_sweeps() {
     const auto try_out = [&](const std::string& id, const std::string& what, std::uint64_t seed,
                              const FilterSetting& setting, double x, SweepCurve& curve) {
       const auto runs = track(kind.sets, setting, seed);
-      const RunRows rows{result, "m03." + id + "." + kind.id + "." + shortest_text(x),
+      const RunRows rows{result, "m03." + id + "." + kind.id + "." + format_number(x),
                          what + ", " + kind.name, kind.sets, runs};
       rows.add_within(10);
       rows.add_images_mean();
@@ -396,7 +390,7 @@ void TrackingExperiments::reproduce_sweeps() {
     for (const double share : {0.1, 0.25, 0.5, 1.0, 2.0, 4.0}) {
       FilterSetting setting = kind.setting;
       setting.particles_per_reference = share;
-      try_out("particles", shortest_text(share) + " particles a reference", seed_of_particles,
+      try_out("particles", format_number(share) + " particles a reference", seed_of_particles,
               setting, share, particles.back());
     }
     odometry.emplace_back(kind.label);
@@ -404,7 +398,7 @@ void TrackingExperiments::reproduce_sweeps() {
       FilterSetting setting = kind.setting;
       scale_noise(setting.odometry, factor);
       scale_noise(setting.told_odometry, factor);
-      try_out("odometry", "odometry with " + shortest_text(factor) + " times the usual noise",
+      try_out("odometry", "odometry with " + format_number(factor) + " times the usual noise",
               seed_of_odometry, setting, factor, odometry.back());
     }
   }

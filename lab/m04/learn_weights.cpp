@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 
+#include "lab/m04/support.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/voronoi.hpp"
 #include "panonav/localisation/sample.hpp"
@@ -102,16 +103,6 @@ std::vector<double> best_weights(const Moments& moments, double penalty) {
   return weights;
 }
 
-// Dissimilarity of each component by itself; the terms of [M04 eq. 6] without their weights.
-std::vector<double> by_component(const FourierSignature& a, const FourierSignature& b) {
-  std::vector<double> sums(static_cast<std::size_t>(a.components()));
-  const auto rows = static_cast<std::size_t>(a.rows());
-  for (std::size_t i = 0; i < a.magnitudes().size(); ++i) {
-    sums[i / rows] += std::abs(static_cast<double>(a.magnitudes()[i]) - b.magnitudes()[i]);
-  }
-  return sums;
-}
-
 struct PosedView {
   ViewId view;
   Point2 position;
@@ -148,14 +139,14 @@ bool add_margins(const VisualMemory& memory, std::span<const PosedView> posed, d
   std::vector<std::vector<double>> to_near;
   double unit = 0.0;
   for (const PosedView& other : near) {
-    to_near.push_back(by_component(signature, memory.signature(other.view)));
+    to_near.push_back(dissimilarity_by_component(signature, memory.signature(other.view)));
     unit += std::accumulate(to_near.back().begin(), to_near.back().end(), 0.0) /
             static_cast<double>(near.size());
   }
   if (!(unit > 0.0)) return false;  // views that were never moved apart teach nothing
   std::vector<double> margin(to_near.front().size());
   for (const ViewId other : far) {
-    const auto to_far = by_component(signature, memory.signature(other));
+    const auto to_far = dissimilarity_by_component(signature, memory.signature(other));
     for (const auto& nearby : to_near) {
       for (std::size_t k = 0; k < margin.size(); ++k) margin[k] = (to_far[k] - nearby[k]) / unit;
       moments.add(margin);

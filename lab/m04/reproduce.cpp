@@ -2,7 +2,7 @@
 #include <vector>
 
 #include "lab/m04/experiment.hpp"
-#include "lab/navigation/experiments.hpp"
+#include "lab/experiments.hpp"
 
 namespace panonav::lab {
 

@@ -1,4 +1,4 @@
-#include "lab/navigation/experiments.hpp"
+#include "lab/experiments.hpp"
 #include "panonav_simulation/make_each.hpp"
 
 #include <algorithm>

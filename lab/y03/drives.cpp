@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "lab/rows.hpp"
-#include "lab/y03/experiments.hpp"
+#include "lab/experiments.hpp"
 #include "lab/y03/figures.hpp"
 #include "lab/y03/lab.hpp"
 #include "panonav/core/random.hpp"
@@ -137,7 +137,7 @@ Variant examine(const LabRoute& lab, bool sweeps) {
   }
   for (const double margin_m : margins_m) {
     variant.sweeps["margin"].push_back(
-        drive_by_contours(RouteContours(lab.route, {.margin_m = margin_m}), lab.across));
+        drive_by_contours(RouteContours(lab.route, margin_m), lab.across));
   }
   return variant;
 }

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "lab/rows.hpp"
-#include "lab/y03/experiments.hpp"
+#include "lab/experiments.hpp"
 #include "lab/y03/routes.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"

@@ -49,6 +49,18 @@ std::vector<int> edge_columns(std::span<const float> edges, int most) {
   return columns;
 }
 
+// Energies of the dual active contour models [Y03 eq. 6-11]. The paper prints no weights; these
+// were chosen on lab scenes of seeds 701 to 704 (docs/decisions.md). Lengths along the path are
+// counted in lines, azimuths in columns, intensities from 0 to 1.
+constexpr double tension = 0.002;        // w_alpha, eq. 7
+constexpr double rigidity = 0.002;       // w_beta, eq. 7
+constexpr double image_weight = 1.0;     // w_diff, eq. 8
+constexpr double contour_pull = 0.002;   // w_pull, eq. 10
+constexpr double stretch_weight = 0.5;   // w_const, eq. 11 squared
+constexpr double smoothing_deg = 1.0;    // of the lines before they are differentiated
+constexpr int max_control_points = 120;  // control points, at the strongest edges of the line
+constexpr int max_contour_moves = 200;   // moves of the contours
+
 // With fewer control points a pose is not worth asking for.
 constexpr std::size_t min_points = 8;
 
@@ -60,35 +72,18 @@ double wrap_columns(double columns, double size) {
 
 }  // namespace
 
-void visit_options(RouteContourOptions& options, OptionVisitor& visitor) {
-  using T = RouteContourOptions;
-  constexpr OptionTable table{
-      option<&T::margin_m>("both contours start so far from the prediction", 0.001, 10),
-      option<&T::tension>("w_alpha", 0, 1000),
-      option<&T::rigidity>("w_beta", 0, 1000),
-      option<&T::image>("w_diff", 0, 1000),
-      option<&T::pull>("w_pull", 0, 1000),
-      option<&T::constant>("w_const", 0, 1000),
-      option<&T::smoothing_deg>("of the lines before they are differentiated", 0, 45),
-      option<&T::max_points>("control points", 8, 10000),
-      option<&T::max_iterations>("until the contours stop", 1, 100000),
-  };
-  table.visit(options, visitor);
-}
-
-RouteContours::RouteContours(const RoutePanorama& route, const RouteContourOptions& options)
+RouteContours::RouteContours(const RoutePanorama& route, double margin_m)
     : columns_(route.columns()),
-      options_(options),
+      margin_m_(margin_m),
       poses_(route.poses().begin(), route.poses().end()),
       directions_(equal_directions(static_cast<std::size_t>(route.columns()))) {
-  validate(options);
+  require(margin_m > 0.0, "margin_m", margin_m, "> 0");
   if (route.size() < 2) {
     throw ContractError("lines of the route", static_cast<double>(route.size()), "2 or more");
   }
   spacing_m_ = route.length_m() / static_cast<double>(route.size() - 1);
   for (std::size_t i = 0; i < route.size(); ++i) {
-    const auto line =
-        slopes(smooth_line(world_line(route, i), options.smoothing_deg * columns_ / 360.0));
+    const auto line = slopes(smooth_line(world_line(route, i), smoothing_deg * columns_ / 360.0));
     edges_.insert(edges_.end(), line.begin(), line.end());
   }
 }
@@ -120,11 +115,11 @@ double RouteContours::pair_energy(const ContourPoint& before, const ContourPoint
                                   double interval, bool joined, double next_slope) const {
   const double slope = (at.along - before.along) / interval;
   const double stretch = wrap_columns(at.azimuth - before.azimuth, columns_) - interval;
-  double energy = options_.constant * stretch * stretch;
-  if (joined) energy += 0.5 * options_.tension * slope * slope * interval;
+  double energy = stretch_weight * stretch * stretch;
+  if (joined) energy += 0.5 * tension * slope * slope * interval;
   if (std::isfinite(next_slope)) {
     const double bend = next_slope - slope;
-    energy += 0.5 * options_.rigidity * bend * bend * interval;
+    energy += 0.5 * rigidity * bend * bend * interval;
   }
   return energy;
 }
@@ -151,8 +146,8 @@ void RouteContours::move(std::vector<ContourPoint>& contour, const std::vector<C
       const double off_azimuth = wrap_columns(other[i].azimuth - at.azimuth, columns_);
       const double off_along = other[i].along - at.along;
       cost[i][k] =
-          options_.image * static_cast<double>(std::abs(edge(at.along, at.azimuth) - target));
-      cost[i][k] += 0.5 * options_.pull * (off_azimuth * off_azimuth + off_along * off_along);
+          image_weight * static_cast<double>(std::abs(edge(at.along, at.azimuth) - target));
+      cost[i][k] += 0.5 * contour_pull * (off_azimuth * off_azimuth + off_along * off_along);
       if (i == 0) continue;
       const double next_slope =
           joined[i] && i + 1 < n && joined[i + 1]
@@ -299,7 +294,7 @@ std::optional<RouteContourFix> RouteContours::fit(std::span<const float> line,
     throw ContractError("values of the line", static_cast<double>(line.size()),
                         std::to_string(columns_));
   }
-  const auto edges = slopes(smooth_line(line, options_.smoothing_deg * columns_ / 360.0));
+  const auto edges = slopes(smooth_line(line, smoothing_deg * columns_ / 360.0));
   std::vector<bool> joined;
   RouteContourFix fix = start(edges, predicted, joined);
   if (fix.columns.size() < min_points) return std::nullopt;
@@ -322,9 +317,9 @@ RouteContourFix RouteContours::start(std::span<const float> edges, const Pose2& 
   const auto size = static_cast<long long>(columns_);
   RouteContourFix fix;
   fix.pose = predicted;
-  const double margin = options_.margin_m / spacing_m_;
+  const double margin = margin_m_ / spacing_m_;
   bool left = false;
-  for (const int column : edge_columns(edges, options_.max_points)) {
+  for (const int column : edge_columns(edges, max_control_points)) {
     const double azimuth = column + turn;
     const auto c = static_cast<std::size_t>(((std::llround(azimuth) % size) + size) % size);
     const RouteCrossing& crossing = crossings[c];
@@ -350,7 +345,7 @@ void RouteContours::converge(RouteContourFix& fix, std::span<const float> edges,
                              const std::vector<bool>& joined) const {
   // Steps of a line and a column first, then of half, until nothing moves.
   double step = 1.0;
-  for (; fix.iterations < options_.max_iterations; ++fix.iterations) {
+  for (; fix.iterations < max_contour_moves; ++fix.iterations) {
     const auto first = fix.first;
     const auto second = fix.second;
     move(fix.first, fix.second, fix.columns, edges, joined, step);

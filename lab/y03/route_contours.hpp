@@ -7,28 +7,13 @@
 #include <span>
 #include <vector>
 
-#include "panonav/core/options.hpp"
 #include "panonav/route/route_crossing.hpp"
 #include "panonav/route/route_panorama.hpp"
 
 namespace panonav::lab {
 
-/// The energies of the dual active contour models [Y03 eq. 6-11]. The paper prints no weights;
-/// these were chosen on lab scenes of seeds 701 to 704 (docs/decisions.md). Lengths along the path
-/// are counted in lines, azimuths in columns, intensities from 0 to 1.
-struct RouteContourOptions {
-  double margin_m = 0.14;      ///< Delta_ACM: both contours start so far from the prediction
-  double tension = 0.002;      ///< w_alpha, eq. 7
-  double rigidity = 0.002;     ///< w_beta, eq. 7
-  double image = 1.0;          ///< w_diff, eq. 8
-  double pull = 0.002;         ///< w_pull, eq. 10
-  double constant = 0.5;       ///< w_const, eq. 11 squared
-  double smoothing_deg = 1.0;  ///< of the lines before they are differentiated
-  int max_points = 120;        ///< control points, at the strongest edges of the line
-  int max_iterations = 200;    ///< moves of the contours at most, >= 1
-  friend bool operator==(const RouteContourOptions&, const RouteContourOptions&) = default;
-};
-void visit_options(RouteContourOptions& options, OptionVisitor& visitor);
+/// Delta_ACM [Y03 eq. 6]: both contours start at this distance from the prediction.
+inline constexpr double default_contour_margin_m = 0.14;
 
 /// A control point of a contour in the route panorama.
 struct ContourPoint {
@@ -51,8 +36,8 @@ struct RouteContourFix {
 /// A route panorama made ready for active contours.
 class RouteContours {
  public:
-  /// Throws OptionError, ContractError on a route of fewer than two lines.
-  explicit RouteContours(const RoutePanorama& route, const RouteContourOptions& options = {});
+  /// Throws ContractError on a route of fewer than two lines and unless margin_m > 0.
+  explicit RouteContours(const RoutePanorama& route, double margin_m = default_contour_margin_m);
 
   /// Two contours start `margin_m` before and behind the curve that eq. 5 predicts, move by dynamic
   /// programming over the eight neighbours and the place of each control point, and pull each other
@@ -84,7 +69,7 @@ class RouteContours {
   bool fit_pose(RouteContourFix& fix) const;
 
   int columns_;
-  RouteContourOptions options_;
+  double margin_m_;
   std::vector<Pose2> poses_;
   std::vector<Direction2> directions_;
   double spacing_m_;

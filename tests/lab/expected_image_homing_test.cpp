@@ -76,7 +76,7 @@ TEST(ExpectedImageHoming, FindsWhatTryingEveryPositionAndTurnFinds) {
   Random random(4);
   int trials = 0;
   for (const int columns : {36, 72, 90}) {
-    const ExpectedImageHoming homing(columns, {.positions = 60});
+    const ExpectedImageHoming homing(columns, 60);
     for (int trial = 0; trial < 6; ++trial, ++trials) {
       const ToyWorld around = surroundings(50 + trial);
       const auto home = seen_from(around, 0.0, 0.0, 0.4, columns);
@@ -97,7 +97,7 @@ TEST(ExpectedImageHoming, FindsWhatTryingEveryPositionAndTurnFinds) {
 TEST(ExpectedImageHoming, PointsHomeAndTellsDistanceAndHeadingWhereAllThingsAreEquallyFar) {
   Random random(8);
   constexpr int columns = 180;
-  const ExpectedImageHoming homing(columns, {.positions = 600});
+  const ExpectedImageHoming homing(columns, 600);
   for (int trial = 0; trial < 12; ++trial) {
     const ToyWorld around = surroundings(trial);
     const double angle = random.uniform(-std::numbers::pi, std::numbers::pi);
@@ -163,7 +163,7 @@ TEST(ExpectedImageHoming, HasThePublishedTable) {
 
 TEST(ExpectedImageHoming, RefusesWhatItCannotCompare) {
   EXPECT_THROW(ExpectedImageHoming(3), ContractError);
-  EXPECT_THROW(ExpectedImageHoming(72, {.reach = 1.5}), OptionError);
+  EXPECT_THROW(ExpectedImageHoming(72, 4), ContractError);
   const ExpectedImageHoming homing(8);
   std::vector<float> row(8, 0.5F);
   EXPECT_THROW((void)homing.home_vector(row, std::vector<float>(7)), ContractError);

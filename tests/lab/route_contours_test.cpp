@@ -61,7 +61,7 @@ TEST(RouteContours, NoAnswerWithoutEdgesOrOutOfReach) {
   const RouteContours contours(straight_route(room));
   EXPECT_FALSE(contours.fit(std::vector<float>(360, 0.4F), {0, 0.1, 0}).has_value());
   EXPECT_THROW((void)contours.fit(std::vector<float>(12, 0.4F), {0, 0.1, 0}), ContractError);
-  EXPECT_THROW((void)RouteContours(straight_route(room), {.margin_m = -1.0}), OptionError);
+  EXPECT_THROW((void)RouteContours(straight_route(room), -1.0), ContractError);
   RoutePanorama one;
   one.append({0, 0, 0}, room.line({0, 0, 0}));
   EXPECT_THROW((void)RouteContours(one), ContractError);

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "lab/reproduction.hpp"
-#include "lab/y03/experiments.hpp"
+#include "lab/experiments.hpp"
 #include "lab/y03/routes.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
