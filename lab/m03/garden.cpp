@@ -90,9 +90,9 @@ void TrackingExperiments::reproduce_garden() {
   viewer::Series first{.label = "filter, first image"};
   viewer::Series needed{.label = "constant light"};
   for (std::size_t l = 0; l < lights.size(); ++l) {
-    const auto runs =
-        add_rows("light_" + format_fixed(lights[l], 2),
-                 "light " + format_fixed(lights[l], 2) + " times that of the memory", gardens.constant[l]);
+    const auto runs = add_rows("light_" + format_fixed(lights[l], 2),
+                               "light " + format_fixed(lights[l], 2) + " times that of the memory",
+                               gardens.constant[l]);
     const SingleImages single = sum_single_images(gardens.constant[l]);
     add_point(right, lights[l], success_rate(single.right, single.asked));
     add_point(near, lights[l], success_rate(single.near, single.asked));

@@ -1,8 +1,8 @@
 #include <memory>
 #include <vector>
 
-#include "lab/m04/experiment.hpp"
 #include "lab/experiments.hpp"
+#include "lab/m04/experiment.hpp"
 
 namespace panonav::lab {
 

@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "lab/rows.hpp"
 #include "lab/experiments.hpp"
+#include "lab/rows.hpp"
 #include "lab/y03/figures.hpp"
 #include "lab/y03/lab.hpp"
 #include "panonav/core/random.hpp"

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "lab/rows.hpp"
 #include "lab/experiments.hpp"
+#include "lab/rows.hpp"
 #include "lab/y03/routes.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"

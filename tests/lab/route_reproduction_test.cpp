@@ -6,8 +6,8 @@
 #include <map>
 #include <string>
 
-#include "lab/reproduction.hpp"
 #include "lab/experiments.hpp"
+#include "lab/reproduction.hpp"
 #include "lab/y03/routes.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
