@@ -62,7 +62,7 @@ struct SketchCase {
   std::vector<std::uint8_t> sketches, values, mask;
   std::vector<std::uint64_t> steps;
   std::vector<std::int32_t> slacks;
-  SketchQuery query{};
+  DistanceKernels::SketchQuery query{};
 };
 
 SketchCase random_case(Random& random, std::size_t octets, std::size_t groups,

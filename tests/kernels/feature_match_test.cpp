@@ -62,10 +62,10 @@ TEST(NearestDescriptors, AgreeWithTheirDefinitionOnEveryInstructionSet) {
 TEST(CountExplained, CountsLandmarksAndNothingElseAlikeOnEveryInstructionSet) {
   Random random(2);
   constexpr std::size_t axis_count = motion_axes;
-  MotionAxes axes;
+  MotionHypotheses hypotheses{.tolerance_sine = 1e-3F, .tolerance_cosine = 1.0F, .max_ratio = 1e6F};
   for (std::size_t d = 0; d < axis_count; ++d) {
-    axes.cosine[d] = static_cast<float>(std::cos(0.19634954 * static_cast<double>(d)));
-    axes.sine[d] = static_cast<float>(std::sin(0.19634954 * static_cast<double>(d)));
+    hypotheses.cosine[d] = static_cast<float>(std::cos(0.19634954 * static_cast<double>(d)));
+    hypotheses.sine[d] = static_cast<float>(std::sin(0.19634954 * static_cast<double>(d)));
   }
   for (const std::size_t moved : {0, 5, 17, 31}) {
     for (const double turn_rad : {0.0, 1.3, -2.9}) {
@@ -94,15 +94,14 @@ TEST(CountExplained, CountsLandmarksAndNothingElseAlikeOnEveryInstructionSet) {
       const MatchedBearings matched{bearings[0].data(), bearings[1].data(), bearings[2].data(),
                                     bearings[3].data(), bearings[4].data(), bearings[5].data(),
                                     bearings[6].data(), bearings[7].data(), 45};
-      const ViewTurn turn{static_cast<float>(std::sin(turn_rad)),
-                          static_cast<float>(std::cos(turn_rad)),
-                          static_cast<float>(std::sin(0.5 * turn_rad)),
-                          static_cast<float>(std::cos(0.5 * turn_rad))};
-      const BearingTolerance tolerance{1e-3F, 1.0F, 1e6F};
+      const MatchedBearings::Turn turn{static_cast<float>(std::sin(turn_rad)),
+                                       static_cast<float>(std::cos(turn_rad)),
+                                       static_cast<float>(std::sin(0.5 * turn_rad)),
+                                       static_cast<float>(std::cos(0.5 * turn_rad))};
       std::vector<std::int32_t> first;
       for (const Instructions set : available_instructions()) {
         std::vector<std::int32_t> counts(2 * axis_count);
-        count_explained(matched, turn, axes, tolerance, counts, set);
+        count_explained(matched, turn, hypotheses, counts, set);
         if (first.empty()) first = counts;
         EXPECT_EQ(counts, first) << name(set);
       }
@@ -111,7 +110,7 @@ TEST(CountExplained, CountsLandmarksAndNothingElseAlikeOnEveryInstructionSet) {
     }
   }
   std::vector<std::int32_t> counts(3);
-  EXPECT_THROW(count_explained({}, {}, axes, {}, counts, Instructions::scalar), ContractError);
+  EXPECT_THROW(count_explained({}, {}, hypotheses, counts, Instructions::scalar), ContractError);
 }
 
 }  // namespace

@@ -28,7 +28,7 @@ TEST(Halve, IsTheRoundedMeanOfFourOnEveryInstructionSet) {
         // One byte more than promised, to notice writing beyond the end.
         std::vector<std::uint8_t> halved(static_cast<std::size_t>(width / 2) * (height / 2) + 1,
                                          77);
-        halve({bytes.data(), width, height, stride}, halved.data(), set);
+        halve({bytes.data(), width, height, 1, stride}, halved.data(), set);
         EXPECT_EQ(halved.back(), 77);
         for (int v = 0; v < height / 2; ++v) {
           for (int u = 0; u < width / 2; ++u) {
@@ -54,7 +54,7 @@ TEST(PairRows, PutsEachPixelBesideTheOneBelow) {
       const auto bytes = random_bytes(random, static_cast<std::size_t>(stride) * height);
       for (const Instructions set : available_instructions()) {
         std::vector<std::uint16_t> pairs(static_cast<std::size_t>(width) * (height - 1) + 1, 7);
-        pair_rows({bytes.data(), width, height, stride}, pairs.data(), set);
+        pair_rows({bytes.data(), width, height, 1, stride}, pairs.data(), set);
         EXPECT_EQ(pairs.back(), 7);
         for (int v = 0; v < height - 1; ++v) {
           for (int u = 0; u < width; ++u) {

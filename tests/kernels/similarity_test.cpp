@@ -29,8 +29,8 @@ SimilarityLanes random_lanes(Random& random) {
   return lanes;
 }
 
-double explained(const SimilarityLanes& lanes, const SimilarityFall& fall, double x, double y,
-                 double heading) {
+double explained(const SimilarityLanes& lanes, const SimilarityLanes::Fall& fall, double x,
+                 double y, double heading) {
   double product = 0.0;
   double square = 0.0;
   for (int i = 0; i < similarity_lanes; ++i) {
@@ -57,8 +57,8 @@ TEST(ExplainSimilarity, AgreesWithItsDefinitionOnEveryInstructionSet) {
   int checked = 0;
   for (int trial = 0; trial < 40; ++trial) {
     const SimilarityLanes lanes = random_lanes(random);
-    const SimilarityFall fall{static_cast<float>(random.uniform(0.5, 5.0)),
-                              trial % 2 == 0 ? 0.0F : 0.04F};
+    const SimilarityLanes::Fall fall{static_cast<float>(random.uniform(0.5, 5.0)),
+                                     trial % 2 == 0 ? 0.0F : 0.04F};
     std::vector<float> x, y, heading, found(17);
     for (std::size_t p = 0; p < found.size(); ++p) {
       x.push_back(static_cast<float>(random.uniform(-1.5, 1.5)));

@@ -22,13 +22,13 @@ void nearest_descriptors(std::span<const std::uint64_t> a, std::span<const std::
   });
 }
 
-void count_explained(const MatchedBearings& matched, const ViewTurn& turn, const MotionAxes& axes,
-                     const BearingTolerance& tolerance, std::span<std::int32_t> counts,
+void count_explained(const MatchedBearings& matched, const MatchedBearings::Turn& turn,
+                     const MotionHypotheses& hypotheses, std::span<std::int32_t> counts,
                      Instructions instructions) {
   require(counts.size() == 2 * motion_axes, "counts", static_cast<double>(counts.size()),
           "two for each axis");
   with_body<FeatureMatchBody>(instructions, [&](auto body) {
-    body.count_explained(matched, turn, axes, tolerance, counts.data());
+    body.count_explained(matched, turn, hypotheses, counts.data());
   });
 }
 

@@ -20,8 +20,8 @@ void nearest_descriptors(std::span<const std::uint64_t> a, std::span<const std::
 /// `counts[d + motion_axes]` for its opposite. Bearings that the turn leaves a right angle or more
 /// apart do not count. All instruction sets give the same numbers. Throws ContractError on sizes
 /// that do not fit.
-void count_explained(const MatchedBearings& matched, const ViewTurn& turn, const MotionAxes& axes,
-                     const BearingTolerance& tolerance, std::span<std::int32_t> counts,
+void count_explained(const MatchedBearings& matched, const MatchedBearings::Turn& turn,
+                     const MotionHypotheses& hypotheses, std::span<std::int32_t> counts,
                      Instructions instructions);
 
 }  // namespace panonav::kernels

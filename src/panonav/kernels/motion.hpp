@@ -16,23 +16,24 @@ void normal_pairs(std::span<const std::uint64_t> bits, std::span<float> first,
 
 /// Poses in a plane, coordinate by coordinate.
 struct PoseColumns {
+  /// Steps, one for each pose, in the frame of the robot before it.
+  struct Steps {
+    std::span<const double> forward_m,       ///< along the robot's heading
+        left_m;                              ///< to the left of it
+    std::span<const double> turn_error_rad;  ///< what the turn is more than `turn_rad`
+    double turn_rad;      ///< what each heading turns by before its error is added
+    double share_before;  ///< of the error of the turn, made before the travel
+  };
+
   std::span<double> x_m,  ///< along the frame's x axis
       y_m,                ///< along its y axis
       heading_rad;        ///< counter-clockwise, not wrapped
 };
 
-/// Steps, one for each pose, in the frame of the robot before it.
-struct StepColumns {
-  std::span<const double> forward_m,       ///< along the robot's heading
-      left_m;                              ///< to the left of it
-  std::span<const double> turn_error_rad;  ///< what the turn is more than `turn_rad`
-  double turn_rad;                         ///< what each heading turns by before its error is added
-  double share_before;                     ///< of the error of the turn, made before the travel
-};
-
 /// Moves each pose by its step; headings are not wrapped. Spans of one size; throws ContractError
 /// otherwise. Headings up to a million turns. All instruction sets give the same bits. Cost: 3 ns a
 /// pose with AVX-512.
-void move_poses(const PoseColumns& poses, const StepColumns& steps, Instructions instructions);
+void move_poses(const PoseColumns& poses, const PoseColumns::Steps& steps,
+                Instructions instructions);
 
 }  // namespace panonav::kernels

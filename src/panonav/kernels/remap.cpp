@@ -7,15 +7,15 @@
 
 namespace panonav::kernels {
 
-void halve(Pixels pixels, std::uint8_t* halved, Instructions instructions) {
+void halve(ImageView image, std::uint8_t* halved, Instructions instructions) {
   with_body<RemapBody>(instructions, [&](auto body) {
-    body.halve(pixels.data, pixels.stride, pixels.width / 2, pixels.height / 2, halved);
+    body.halve(image.data, image.stride, image.width / 2, image.height / 2, halved);
   });
 }
 
-void pair_rows(Pixels pixels, std::uint16_t* pairs, Instructions instructions) {
+void pair_rows(ImageView image, std::uint16_t* pairs, Instructions instructions) {
   with_body<RemapBody>(instructions, [&](auto body) {
-    body.pair_rows(pixels.data, pixels.stride, pixels.width, pixels.height - 1, pairs);
+    body.pair_rows(image.data, image.stride, image.width, image.height - 1, pairs);
   });
 }
 

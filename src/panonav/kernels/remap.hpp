@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 
+#include "panonav/core/image.hpp"
 #include "panonav/kernels/dispatch.hpp"
 
 // Looking up the pixels of an image by a table. All of it is integer arithmetic until the last
@@ -11,22 +12,15 @@
 
 namespace panonav::kernels {
 
-/// A rectangle of an 8-bit image of one channel.
-struct Pixels {
-  const std::uint8_t* data = nullptr;  ///< the pixel at the upper left
-  int width = 0;                       ///< pixels of a row, one byte each
-  int height = 0;                      ///< rows
-  std::ptrdiff_t stride = 0;           ///< bytes from a row to the next, >= width
-};
-
-/// Half the width and height (odd ones are rounded down): each new pixel is the mean of 2 x 2 old
-/// ones, halves rounded up. `halved` has room for (width / 2) * (height / 2) bytes, without gaps.
-void halve(Pixels pixels, std::uint8_t* halved, Instructions instructions);
+/// Halves width and height of an image of one channel (odd ones are rounded down): each new pixel
+/// is the mean of 2 x 2 old ones, halves rounded up. `halved` has room for (width / 2) * (height /
+/// 2) bytes, without gaps.
+void halve(ImageView image, std::uint8_t* halved, Instructions instructions);
 
 /// Puts every pixel beside the one below: pair v * width + u holds pixel (u, v) in the low byte and
 /// (u, v + 1) in the high one; v = 0 .. height - 2. Then the four pixels around any point lie in 32
 /// consecutive bits.
-void pair_rows(Pixels pixels, std::uint16_t* pairs, Instructions instructions);
+void pair_rows(ImageView image, std::uint16_t* pairs, Instructions instructions);
 
 /// The four weights of a tap: bytes for (u, v), (u, v + 1), (u + 1, v), (u + 1, v + 1), from the
 /// low byte on. They add up to this.

@@ -7,7 +7,7 @@
 
 namespace panonav::kernels {
 
-void explain_similarity(const SimilarityLanes& lanes, const SimilarityFall& fall,
+void explain_similarity(const SimilarityLanes& lanes, const SimilarityLanes::Fall& fall,
                         std::span<const float> x_m, std::span<const float> y_m,
                         std::span<const float> heading_rad, std::span<float> explained,
                         Instructions instructions) {

@@ -12,7 +12,7 @@ namespace panonav::kernels {
 /// heading is off from what the reference tells; of the two headings the one that counts more.
 /// Spans of one size; throws ContractError otherwise. All instruction sets give the same bits.
 /// Cost: about 5 ns a pose with AVX-512; sixteen poses cost as much as one.
-void explain_similarity(const SimilarityLanes& lanes, const SimilarityFall& fall,
+void explain_similarity(const SimilarityLanes& lanes, const SimilarityLanes::Fall& fall,
                         std::span<const float> x_m, std::span<const float> y_m,
                         std::span<const float> heading_rad, std::span<float> explained,
                         Instructions instructions);

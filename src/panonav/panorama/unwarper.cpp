@@ -101,14 +101,15 @@ void Unwarper::prepare(ImageView image, Workspace& workspace) const {
       const int width = level.right - level.left;
       const int height = level.bottom - level.top;
       std::uint8_t* const halved = workspace.halved.data() + level.halved_at;
-      kernels::halve({part.at(2 * level.left, 2 * level.top), 2 * width, 2 * height, part.stride},
-                     halved, instructions);
+      kernels::halve(
+          {part.at(2 * level.left, 2 * level.top), 2 * width, 2 * height, 1, part.stride}, halved,
+          instructions);
       part = {halved, width, level.left, level.top};
     }
     if (level.has_pairs()) {
       kernels::pair_rows(
           {part.at(level.pair_left, level.pair_top), level.pair_right - level.pair_left,
-           level.pair_bottom - level.pair_top + 1, part.stride},
+           level.pair_bottom - level.pair_top + 1, 1, part.stride},
           workspace.pairs.data() + level.pairs_at, instructions);
     }
   }

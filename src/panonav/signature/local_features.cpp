@@ -405,18 +405,17 @@ FeatureMatch match_features(const LocalFeatures& query, const LocalFeatures& ref
 
   static const Circle2 whole = circle_of(2.0 * std::numbers::pi / turns);
   static const Circle2 half = circle_of(std::numbers::pi / turns);
-  static const kernels::MotionAxes axes = [] {
-    kernels::MotionAxes made{};
+  static const kernels::MotionHypotheses hypotheses = [] {
+    kernels::MotionHypotheses made{};
     for (int d = 0; d < kernels::motion_axes; ++d) {
       made.cosine[d] = static_cast<float>(std::cos(std::numbers::pi * d / kernels::motion_axes));
       made.sine[d] = static_cast<float>(std::sin(std::numbers::pi * d / kernels::motion_axes));
     }
+    made.tolerance_sine = static_cast<float>(std::sin(tolerance_rad));
+    made.tolerance_cosine = static_cast<float>(std::cos(tolerance_rad));
+    made.max_ratio = max_ratio;
     return made;
   }();
-  static const kernels::BearingTolerance tolerance{static_cast<float>(std::sin(tolerance_rad)),
-                                                   static_cast<float>(std::cos(tolerance_rad)),
-                                                   max_ratio};
-
   // No turn explains more than the features that it brings within a right angle of each other.
   std::array<MutualMatches::Window, turns> windows;
   for (std::size_t t = 0; t < turns; ++t) {
@@ -433,7 +432,7 @@ FeatureMatch match_features(const LocalFeatures& query, const LocalFeatures& ref
     const auto t = static_cast<std::size_t>(turn);
     kernels::count_explained(matched.bearings(begin, bound),
                              {whole.sines[t], whole.cosines[t], half.sines[t], half.cosines[t]},
-                             axes, tolerance, explained, instructions);
+                             hypotheses, explained, instructions);
     const std::int32_t most = *std::ranges::max_element(explained);
     if (most > std::max(match.verified, more_than)) {
       match.verified = most;

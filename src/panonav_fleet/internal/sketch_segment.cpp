@@ -296,13 +296,13 @@ void SketchSegment::bounds_at(const SegmentLayout& layout, const kernels::Distan
     }
     slack += any * scale.max_missed[group];
   }
-  const kernels::SketchQuery encoded{room.values.data(),
-                                     room.mask.data(),
-                                     scale.steps.data(),
-                                     groups,
-                                     groups,
-                                     constant,
-                                     std::min(slack, scale.max_slack)};
+  const kernels::DistanceKernels::SketchQuery encoded{room.values.data(),
+                                                      room.mask.data(),
+                                                      scale.steps.data(),
+                                                      groups,
+                                                      groups,
+                                                      constant,
+                                                      std::min(slack, scale.max_slack)};
   kernels.sketch_bounds_at(codes_.data() + begins_[static_cast<std::size_t>(level)], nullptr,
                            rows.data(), rows.size(), encoded, bounds);
 }

@@ -19,14 +19,15 @@ struct DistanceBody {
   static uint32_t l1(const uint8_t* a, const uint8_t* b, size_t count);
   static uint32_t masked_l1(const uint8_t* a, const uint8_t* b, const uint8_t* mask, size_t count);
   static uint32_t sketch_bounds(const uint8_t* sketches, const int32_t* slacks, size_t octets,
-                                const SketchQuery& query, uint32_t* bounds);
+                                const DistanceKernels::SketchQuery& query, uint32_t* bounds);
   static void sketch_bounds_at(const uint8_t* sketches, const int32_t* slacks,
-                               const uint32_t* indices, size_t count, const SketchQuery& query,
-                               uint32_t* bounds);
+                               const uint32_t* indices, size_t count,
+                               const DistanceKernels::SketchQuery& query, uint32_t* bounds);
   static void cell_tables(const int32_t* low, const int32_t* high, const int32_t* sums,
                           const float* factors, size_t dimensions, uint8_t* tables);
-  static size_t cell_bounds(const uint8_t* codes, size_t blocks, const CellQuery& query,
-                            uint8_t* bounds, uint32_t* indices);
+  static size_t cell_bounds(const uint8_t* codes, size_t blocks,
+                            const DistanceKernels::CellQuery& query, uint8_t* bounds,
+                            uint32_t* indices);
   static size_t collect_at_most(const uint32_t* values, size_t count, uint32_t limit,
                                 uint32_t* indices);
 };
@@ -35,9 +36,8 @@ template <Instructions set>
 struct FeatureMatchBody {
   static void nearest_descriptors(const uint64_t* a, size_t a_count, const uint64_t* b,
                                   size_t b_count, uint16_t* nearest_of_a, uint16_t* nearest_of_b);
-  static void count_explained(const MatchedBearings& matched, const ViewTurn& turn,
-                              const MotionAxes& axes, const BearingTolerance& tolerance,
-                              int32_t* counts);
+  static void count_explained(const MatchedBearings& matched, const MatchedBearings::Turn& turn,
+                              const MotionHypotheses& hypotheses, int32_t* counts);
 };
 
 template <Instructions set>
@@ -100,7 +100,7 @@ struct RowTransformBody {
 
 template <Instructions set>
 struct SimilarityBody {
-  static void explain_similarity(const SimilarityLanes& lanes, const SimilarityFall& fall,
+  static void explain_similarity(const SimilarityLanes& lanes, const SimilarityLanes::Fall& fall,
                                  const float* x_m, const float* y_m, const float* heading_rad,
                                  float* explained, int count);
   static void exponentials(const float* logarithms, float scale, float* values, int count);

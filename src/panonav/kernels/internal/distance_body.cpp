@@ -40,7 +40,7 @@ uint32_t l1_of(const uint8_t* a, const uint8_t* b, const uint8_t* mask, size_t c
 /// `fixed_groups` > 0: that many groups, whose part of the query then stays in registers.
 template <Instructions set, size_t fixed_groups, bool masked>
 uint32_t interleaved_bounds(const uint8_t* sketches, const int32_t* slacks, size_t octets,
-                            const SketchQuery& query, uint32_t* bounds) {
+                            const DistanceKernels::SketchQuery& query, uint32_t* bounds) {
   using Vector = ByteVector<set>;
   using Register = typename Vector::Register;
   constexpr size_t registers = 64 / sizeof(Register);
@@ -86,7 +86,7 @@ uint32_t interleaved_bounds(const uint8_t* sketches, const int32_t* slacks, size
   return least;
 }
 
-bool counts_everywhere(const SketchQuery& query) {
+bool counts_everywhere(const DistanceKernels::SketchQuery& query) {
   for (size_t group = 0; group < query.groups; ++group) {
     if (load_group(query.mask + group * 8) != ~uint64_t{0}) return false;
   }
@@ -108,7 +108,7 @@ uint32_t DistanceBody<set>::masked_l1(const uint8_t* a, const uint8_t* b, const 
 
 template <Instructions set>
 uint32_t DistanceBody<set>::sketch_bounds(const uint8_t* sketches, const int32_t* slacks,
-                                          size_t octets, const SketchQuery& query,
+                                          size_t octets, const DistanceKernels::SketchQuery& query,
                                           uint32_t* bounds) {
   // 15 components make 5 groups; other shapes take the general body, and so do sets that have too
   // few registers to keep the query in them.
@@ -123,7 +123,8 @@ uint32_t DistanceBody<set>::sketch_bounds(const uint8_t* sketches, const int32_t
 template <Instructions set>
 void DistanceBody<set>::sketch_bounds_at(const uint8_t* sketches, const int32_t* slacks,
                                          const uint32_t* indices, size_t count,
-                                         const SketchQuery& query, uint32_t* bounds) {
+                                         const DistanceKernels::SketchQuery& query,
+                                         uint32_t* bounds) {
   using Vector = ByteVector<set>;
   using Register = typename Vector::Register;
   constexpr size_t ahead = 24;
@@ -164,8 +165,9 @@ void DistanceBody<set>::cell_tables(const int32_t* low, const int32_t* high, con
 }
 
 template <Instructions set>
-size_t DistanceBody<set>::cell_bounds(const uint8_t* codes, size_t blocks, const CellQuery& query,
-                                      uint8_t* bounds, uint32_t* indices) {
+size_t DistanceBody<set>::cell_bounds(const uint8_t* codes, size_t blocks,
+                                      const DistanceKernels::CellQuery& query, uint8_t* bounds,
+                                      uint32_t* indices) {
   size_t found = 0;
   for (size_t block = 0; block < blocks; ++block) {
     const auto first = static_cast<uint32_t>(block * cell_block);

@@ -31,10 +31,10 @@ void FeatureMatchBody<set>::nearest_descriptors(const uint64_t* a, size_t a_coun
 }
 
 template <Instructions set>
-void FeatureMatchBody<set>::count_explained(const MatchedBearings& matched, const ViewTurn& turn,
-                                            const MotionAxes& axes,
-                                            const BearingTolerance& tolerance, int32_t* counts) {
-  const float square_tolerance = tolerance.sine * tolerance.sine;
+void FeatureMatchBody<set>::count_explained(const MatchedBearings& matched,
+                                            const MatchedBearings::Turn& turn,
+                                            const MotionHypotheses& hypotheses, int32_t* counts) {
+  const float square_tolerance = hypotheses.tolerance_sine * hypotheses.tolerance_sine;
   int32_t along[motion_axes] = {};
   int32_t against[motion_axes] = {};
   for (size_t first = 0; first < matched.count; first += max_descriptors) {
@@ -61,8 +61,9 @@ void FeatureMatchBody<set>::count_explained(const MatchedBearings& matched, cons
                                   matched.reference_cosine[at] * turn.half_sine);
       reference_cosine[i] = sign * (matched.reference_cosine[at] * turn.half_cosine +
                                     matched.reference_sine[at] * turn.half_sine);
-      const float least = (size * tolerance.cosine - tolerance.sine) / tolerance.max_ratio;
-      const float needed = size <= tolerance.sine ? -2.0F : least;
+      const float least =
+          (size * hypotheses.tolerance_cosine - hypotheses.tolerance_sine) / hypotheses.max_ratio;
+      const float needed = size <= hypotheses.tolerance_sine ? -2.0F : least;
       min_sine[i] = within > 0.0F ? needed : 2.0F;
     }
     for (size_t i = 0; i < count; ++i) {
@@ -72,9 +73,10 @@ void FeatureMatchBody<set>::count_explained(const MatchedBearings& matched, cons
       const float reference_square = reference_tangent * reference_tangent;
       for (size_t d = 0; d < motion_axes; ++d) {
         // Of the angles between the direction of motion and both bearings.
-        const float of_query = query_sine[i] * axes.cosine[d] - query_cosine[i] * axes.sine[d];
+        const float of_query =
+            query_sine[i] * hypotheses.cosine[d] - query_cosine[i] * hypotheses.sine[d];
         const float of_reference =
-            reference_sine[i] * axes.cosine[d] - reference_cosine[i] * axes.sine[d];
+            reference_sine[i] * hypotheses.cosine[d] - reference_cosine[i] * hypotheses.sine[d];
         const float off = query_tangent * of_reference - reference_tangent * of_query;
         const float by_reference =
             (reference_square + of_reference * of_reference) * (1.0F + query_square);

@@ -31,7 +31,8 @@ inline float wrapped(float angle_rad) {
 // Poses whose sums stay in registers.
 constexpr int poses_together = 16;
 
-inline void explain_similarity_together(const SimilarityLanes& lanes, const SimilarityFall& fall,
+inline void explain_similarity_together(const SimilarityLanes& lanes,
+                                        const SimilarityLanes::Fall& fall,
                                         const float* __restrict x_m, const float* __restrict y_m,
                                         const float* __restrict heading_rad,
                                         float* __restrict explained) {
@@ -64,7 +65,7 @@ inline void explain_similarity_together(const SimilarityLanes& lanes, const Simi
 
 template <Instructions set>
 void SimilarityBody<set>::explain_similarity(const SimilarityLanes& lanes,
-                                             const SimilarityFall& fall,
+                                             const SimilarityLanes::Fall& fall,
                                              const float* __restrict x_m,
                                              const float* __restrict y_m,
                                              const float* __restrict heading_rad,

@@ -110,7 +110,7 @@ class ViewLikelihood {
   std::vector<std::uint32_t> compared_sites_;
   std::optional<ColumnProfiles> asked_;
   double max_similarity_ = 0.0;
-  kernels::SimilarityFall fall_{1.0F, 0.0F};
+  kernels::SimilarityLanes::Fall fall_{1.0F, 0.0F};
   std::uint32_t number_ = 0;
   double cell_m_ = 1.0;
   double cells_per_metre_ = 1.0;

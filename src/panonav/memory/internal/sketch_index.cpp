@@ -70,7 +70,7 @@ void set_scale(SketchScale& scale, std::vector<std::int32_t> lowest,
 /// Where all views lie within the scale, what the query lies outside of it is part of the distance.
 void encode_query(const SketchScale& scale, bool covers, std::span<const std::int32_t> sums,
                   std::span<const std::uint8_t> mask, std::size_t groups, std::uint8_t* values,
-                  kernels::SketchQuery& encoded) {
+                  kernels::DistanceKernels::SketchQuery& encoded) {
   std::int32_t constant = 0;
   std::int32_t max_slack = 0;
   groups = std::min(groups, scale.steps.size());
@@ -307,7 +307,7 @@ void SketchIndex::coarse_bounds(const kernels::DistanceKernels& kernels, const Q
                                 std::span<std::uint32_t> bounds,
                                 std::span<std::uint32_t> smallest) const {
   std::vector<std::uint8_t> values(layout_.coarse_groups * group_bytes, 0);
-  kernels::SketchQuery encoded{};
+  kernels::DistanceKernels::SketchQuery encoded{};
   encoded.values = values.data();
   encoded.mask = query.coarse_mask.data();
   encoded.stored_groups = layout_.coarse_groups;

@@ -122,7 +122,7 @@ class SketchIndex {
     const Query& query_;
     std::size_t segment_ = std::numeric_limits<std::size_t>::max();
     AlignedVector<std::uint8_t> values_, mask_;
-    kernels::SketchQuery encoded_{};
+    kernels::DistanceKernels::SketchQuery encoded_{};
   };
 
   [[nodiscard]] std::size_t blocks() const noexcept {
