@@ -1,7 +1,7 @@
 #!/bin/bash
-# What a robot waits for: pictures of a camera, 1280 x 640 JPEG at 30 a second, into `run --learn` with 10,000
+# What a robot waits for: pictures of a camera, 1280 x 640 JPEG at 30 a second, into `localise --add --update` with 10,000
 # references on one core; three walks, of known places, of half unknown ones and of unknown ones. The camera is
-# tests/support/v4l2_shim.cpp. Prints what `run` says of each. The references take some minutes and are kept in FOLDER.
+# tests/support/v4l2_shim.cpp. Prints what `localise` says of each. The references take some minutes and are kept in FOLDER.
 #   bench/live_run.sh BUILD FOLDER [WORDS OF run ...]
 set -euo pipefail
 build=$(realpath "$1") folder=$2
@@ -37,8 +37,8 @@ pictures hall/jpeg/000*.jpg office/jpeg/000*.jpg hall/jpeg/001*.jpg office/jpeg/
 pictures office/jpeg/*.jpg > unknown
 
 for walk in known half unknown; do
-  cp references.panonav learnt.panonav
+  cp references.panonav added.panonav
   echo "$walk:"
-  V4L2_SHIM_PICTURES=$walk V4L2_SHIM_RATE=30 LD_PRELOAD=$shim taskset -c 0 "$panonav" run /dev/video7 \
-    --memory learnt.panonav --learn --count 900 --threads 1 "$@" > /dev/null
+  V4L2_SHIM_PICTURES=$walk V4L2_SHIM_RATE=30 LD_PRELOAD=$shim taskset -c 0 "$panonav" localise added.panonav /dev/video7 \
+    --add --update --count 900 --threads 1 "$@" > /dev/null
 done

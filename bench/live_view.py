@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""What `run --view` costs a robot: live_view.py PANONAV [SECONDS] [--long]
+"""What `localise --view` costs a robot: live_view.py PANONAV [SECONDS] [--long]
 
-JPEG pictures of 1280 x 640 at 20 a second into `run`, watched by nobody and by viewers who fetch every picture. Prints
-the processor time of `run`, the pictures answered, and the time until a viewer has its first picture. --long: only the
+JPEG pictures of 1280 x 640 at 20 a second into `localise`, watched by nobody and by viewers who fetch every picture. Prints
+the processor time of `localise`, the pictures answered, and the time until a viewer has its first picture. --long: only the
 three viewers of whom one is stopped (it asks for the events and never reads), with the pictures given and answered, the
-resident memory and the processor time of `run` every tenth of the time, and the load of the machine.
+resident memory and the processor time of `localise` every tenth of the time, and the load of the machine.
 """
 import http.client
 import json
@@ -56,7 +56,7 @@ def seconds_used(process):
 
 
 def measure(folder, jpegs, viewers, stopped=0, view=True):
-    run = subprocess.Popen([PANONAV, "run", "-", "--memory", folder / "references.panonav", "--quiet", "--threads", "1",
+    run = subprocess.Popen([PANONAV, "localise", folder / "references.panonav", "-", "--quiet", "--threads", "1",
                             "--kind", "equirectangular", *(["--view", "0"] if view else [])],
                            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=False)
     lines, seen = [], [[] for _ in range(viewers)]

@@ -312,7 +312,7 @@ class Loop {
   // The robot is driven along the path while the node learns; the node makes its map of that.
   void teach_drive(const std::vector<Point2>& path) {
     auto learning = node_words_;
-    learning.insert(learning.end(), {"--learn", "--route", "drive", "--kind", "panorama",
+    learning.insert(learning.end(), {"--teach", "--route", "drive", "--kind", "panorama",
                                      "--elevation-deg", "-30", "40"});
     // The robot first stands where the drive begins.
     wait(2.0);

@@ -5,6 +5,7 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <shared_mutex>
@@ -27,23 +28,6 @@
 namespace panonav::python {
 
 namespace py = pybind11;
-
-// One for each source, in the order in which they are called.
-void bind_basics(py::module_& m);
-void bind_panoramas(py::module_& m);
-void bind_signatures(py::module_& m);
-void bind_memories(py::module_& m);
-void bind_recordings(py::module_& m);
-void bind_localisation(py::module_& m);
-void bind_homing(py::module_& m);
-void bind_mapping(py::module_& m);
-void bind_routes(py::module_& m);
-void bind_measures(py::module_& m);
-void bind_navigation(py::module_& m);
-void bind_calibration(py::module_& m);
-#ifdef PANONAV_PYTHON_SIMULATES
-void bind_simulation(py::module_& m);
-#endif
 
 // Arrays. A wrong dtype, shape or kind throws ContractError that names the argument `what`.
 

@@ -2,7 +2,7 @@
 #include "memories.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/localisation/hierarchical.hpp"
-#include "panonav/pipeline/memory_learner.hpp"
+#include "panonav/pipeline/memory_updater.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
 #include "panonav/pipeline/tracker.hpp"
@@ -356,9 +356,9 @@ void bind_tracker(py::module_& m) {
           "(n, 4) of x_m, y_m, heading_rad, weight.");
 }
 
-void bind_learner(py::module_& m) {
-  using Changes = MemoryLearner::Changes;
-  Record<Changes>(m, "MemoryLearnerChanges", "What a run did to its memory.")
+void bind_updater(py::module_& m) {
+  using Changes = MemoryUpdater::Changes;
+  Record<Changes>(m, "MemoryUpdaterChanges", "What a run did to its memory.")
       .field("seen", &Changes::seen, "Observations with odometry.")
       .field("certain", &Changes::certain, "Of these, whose place was certain and new.")
       .field("reinforced", &Changes::reinforced,
@@ -368,9 +368,9 @@ void bind_learner(py::module_& m) {
       .field("forgotten", &Changes::forgotten,
              "Views that were dropped because they had failed for long.")
       .field("views", &Changes::views, "Of the memory now.");
-  using SharedLearner = Shared<MemoryLearner>;
-  py::class_<SharedLearner>(
-      m, "MemoryLearner",
+  using SharedUpdater = Shared<MemoryUpdater>;
+  py::class_<SharedUpdater>(
+      m, "MemoryUpdater",
       "Keeps a memory file true while its places change: hears what a robot saw on a run and what "
       "the memory answered, and `finish` changes the file, in one step that MemoryFile.undo takes "
       "back. It is for one run; recognisers that were made before know the former views.")
@@ -378,7 +378,7 @@ void bind_learner(py::module_& m) {
              MemoryUpdateOptions options;
              Keywords(keywords).options(options).finish();
              const py::gil_scoped_release free;
-             return std::make_unique<SharedLearner>(memory, options);
+             return std::make_unique<SharedUpdater>(memory, options);
            }),
            py::arg("memory"),
            with_options("`memory`: the path of a memory file that can be written, or the address "
@@ -387,25 +387,25 @@ void bind_learner(py::module_& m) {
                .c_str())
       .def(
           "see",
-          [](SharedLearner& learner, const py::object& observation, const Panorama& panorama,
+          [](SharedUpdater& updater, const py::object& observation, const Panorama& panorama,
              const NamedPlace& place) {
             const Observation seen = observation_from(observation);
-            learner.change([&](MemoryLearner& l) { l.see(seen, panorama, place); });
+            updater.change([&](MemoryUpdater& u) { u.see(seen, panorama, place); });
           },
           py::arg("observation"), py::arg("panorama"), py::arg("place"),
           "The next observation of the run, which needs its odometry (another says nothing and is "
           "left out), with its panorama (PlaceRecogniser.panorama) and its answer.")
       .def_property_readonly(
           "near_known_places",
-          [](const SharedLearner& learner) {
-            return learner.read([](const MemoryLearner& l) { return l.is_near_known_place(); });
+          [](const SharedUpdater& updater) {
+            return updater.read([](const MemoryUpdater& u) { return u.is_near_known_place(); });
           },
           "Whether the observation seen last is so near to one whose place was surely known that "
           "it will be placed by odometry.")
       .def(
           "finish",
-          [](SharedLearner& learner, const std::string& what) {
-            return learner.change([&](MemoryLearner& l) { return l.finish(what); });
+          [](SharedUpdater& updater, const std::string& what) {
+            return updater.change([&](MemoryUpdater& u) { return u.finish(what); });
           },
           py::arg("what"),
           "Changes the file and learns its models anew. `what`: the run, for the file's history. "
@@ -418,7 +418,7 @@ void bind_localisation(py::module_& m) {
   bind_places(m);
   bind_recogniser(m);
   bind_tracker(m);
-  bind_learner(m);
+  bind_updater(m);
 }
 
 }  // namespace panonav::python

@@ -33,7 +33,8 @@ RouteFollowerOptions follower_options(const std::optional<std::string>& name, bo
 }
 
 void bind_following(py::module_& m) {
-  Record<RouteChanges::AzimuthRange>(m, "AzimuthRange", "Azimuths in the robot's frame.")
+  Record<RouteChanges::AzimuthRange>(m, "RouteChanges::AzimuthRange",
+                                     "Azimuths in the robot's frame.")
       .field("from_rad", &RouteChanges::AzimuthRange::from_rad, "In [-pi, pi).")
       .field("to_rad", &RouteChanges::AzimuthRange::to_rad, "Counter-clockwise from the first.");
   Record<NamedStep>(m, "RouteStep", "Where a robot is beside a route.")
@@ -196,9 +197,8 @@ void bind_recording(py::module_& m) {
       py::arg("horizon_rows") = py::none(), py::arg("odometry") = false, py::arg("threads") = 0,
       with_options(
           "Remembers a route as one line of pixels a step, as `panonav route record` does. "
-          "`horizon_rows`: (first, last) that show the horizon, of panoramas whose "
-          "elevations are not known. `odometry`: remember its poses, even where the "
-          "recording knows positions.",
+          "`horizon_rows`: (first, last) that show the horizon, of panoramas whose elevations are "
+          "not known. `odometry`: remember its poses, even where the recording knows positions.",
           {options_of<HorizonScanlineOptions>()})
           .c_str());
   m.def(

@@ -1,4 +1,3 @@
-#ifdef PANONAV_PYTHON_SIMULATES
 #include "panonav/core/error.hpp"
 #include "panonav_simulation/scenes.hpp"
 #include "panonav_simulation/simulated_base.hpp"
@@ -352,4 +351,3 @@ void bind_simulation(py::module_& m) {
 }
 
 }  // namespace panonav::python
-#endif

@@ -74,23 +74,23 @@ def test_track_office(office):
 
 
 def test_a_run_teaches_the_same(office, tmp_path):
-    """Views, history and what the memory answers afterwards; what a learner is refused changes nothing."""
+    """Views, history and what the memory answers afterwards; what a updater is refused changes nothing."""
     ours, printed, run = tmp_path / "ours.panonav", tmp_path / "printed.panonav", tmp_path / "run"
     shutil.copy(office / "office.panonav", ours)
     shutil.copy(office / "office.panonav", printed)
     run_command("simulate", "office", run, "--path", "walk", "--poses", 40, "--spacing-m", 0.2, "--seed", 5, "--kind",
                 "panorama", "--rows", 32, "--columns", 128, "--light", 0.7, "--moved-objects", 0.5, "--quiet")
-    run_command("localise", printed, run, "--learn", "--quiet")
-    recogniser, learner = panonav.PlaceRecogniser(ours), panonav.MemoryLearner(ours)
+    run_command("localise", printed, run, "--update", "--quiet")
+    recogniser, updater = panonav.PlaceRecogniser(ours), panonav.MemoryUpdater(ours)
     with pytest.raises(ValueError, match="appearances"):
-        panonav.MemoryLearner(ours, appearances=0)
+        panonav.MemoryUpdater(ours, appearances=0)
     for entry in panonav.Dataset(run).entries:
         seen = entry.observation()
-        learner.see(seen, recogniser.panorama(seen), recogniser.localise(seen))
-    changes = learner.finish(f"learn from {run}")
+        updater.see(seen, recogniser.panorama(seen), recogniser.localise(seen))
+    changes = updater.finish(f"update from {run}")
     assert changes.seen == 40 and changes.certain > 0 and changes.added + changes.reinforced > 0
     with pytest.raises(ValueError, match="finished"):
-        learner.finish("again")
+        updater.finish("again")
     one, other = panonav.MemoryFile(ours), panonav.MemoryFile(printed)
     assert one.names() == other.names() and len(one.names()) == changes.views
     assert [change.what for change in one.history()] == [change.what for change in other.history()]

@@ -37,7 +37,7 @@ std::optional<Mission> GoalDriver::load_interrupted_mission() {
 void GoalDriver::start(const Mission& mission) {
   end("another goal");
   try {
-    if (memory_ == nullptr) throw Error("the memory is being learnt; allowed: finish, then this");
+    if (memory_ == nullptr) throw Error("the memory is being taught; allowed: finish, then this");
     route_driver_.reset();
     if (mission.goal) {
       set_goal(mission.goal->position());

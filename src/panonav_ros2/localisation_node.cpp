@@ -163,10 +163,10 @@ struct LocalisationNode::Implementation {
   recordings::RunMoment teach(Observation observation) {
     observation.name = "view_" + std::to_string(pictures + 1);
     teacher->add(std::move(observation));
-    learnt = teacher->views();
+    taught = teacher->views();
     motion.set_map_from_path(teacher->map_from_odometry());
     recordings::RunMoment moment;
-    moment.state = "learning";
+    moment.state = "teaching";
     moment.values = {{"views", std::to_string(teacher->views())},
                      {"lines", std::to_string(teacher->lines())}};
     return moment;
@@ -183,19 +183,19 @@ struct LocalisationNode::Implementation {
       } else if (command == "cancel") {
         driver.end("cancelled");
       } else if (teacher) {
-        refuse(words, "finish, as the memory is being learnt");
+        refuse(words, "finish, as the memory is being taught");
       } else if (command == "relocalise") {
         localiser.start_globally();
       } else if (command == "repeat" && !argument.empty()) {
         driver.start({.route = argument});
-      } else if (command == "learn" && !argument.empty()) {
+      } else if (command == "add" && !argument.empty()) {
         localiser.add_view(argument);
       } else if (command == "forget" && !argument.empty()) {
         localiser.remove_view(argument);
       } else if (command == "load" && !argument.empty()) {
         localiser.load_neighbour(argument);
       } else {
-        refuse(words, "relocalise, cancel, repeat ROUTE, learn NAME, forget NAME, load FILE");
+        refuse(words, "relocalise, cancel, repeat ROUTE, add NAME, forget NAME, load FILE");
       }
     } catch (const Error& error) {
       return "refused: " + to_readable_line(error.what());
@@ -228,7 +228,7 @@ struct LocalisationNode::Implementation {
   Publisher<recordings::ros::DiagnosticArray> diagnostics;
   Publisher<recordings::ros::String> answers;
   std::optional<Teacher> teacher;  // of the thread that works: instead of the localiser
-  std::atomic<std::size_t> pictures = 0, localised = 0, learnt = 0;
+  std::atomic<std::size_t> pictures = 0, localised = 0, taught = 0;
   std::int64_t last_transform_ns = 0;
 };
 
@@ -250,7 +250,7 @@ LocalisationNode::Counts LocalisationNode::counts() const {
           .localised = self.localised,
           .dropped = self.queue.dropped(),
           .notes = self.log.count(),
-          .learnt = self.learnt};
+          .taught = self.taught};
 }
 
 }  // namespace panonav::ros2

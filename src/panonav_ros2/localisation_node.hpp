@@ -32,7 +32,7 @@ class LocalisationNode {
     std::size_t localised = 0;  ///< of these
     std::size_t dropped = 0;    ///< came while another one was worked on
     std::size_t notes = 0;
-    std::size_t learnt = 0;  ///< views of a first drive
+    std::size_t taught = 0;  ///< views of a first drive
   };
   [[nodiscard]] Counts counts() const;
 

@@ -80,7 +80,7 @@ void Teacher::store_lines(const TopologicalMap& map) {
 }
 
 Pose2 Teacher::finish() {
-  if (nodes_.empty()) throw ContractError("views that were learnt", 0.0, "1 or more");
+  if (nodes_.empty()) throw ContractError("views that were taught", 0.0, "1 or more");
   if (!mapper_) make_mapper();
   const TopologicalMap map = mapper_->finish().map;
   mapper_.reset();  // the file is another one's now

@@ -41,13 +41,12 @@ std::string content_of(const fs::path& memory) {
   EXPECT_EQ(sqlite3_exec(
                 database,
                 "SELECT id, name, quote(x_m), quote(y_m), quote(heading_rad), quote(stamp_s), "
-                "hex(signature), checksum FROM views ORDER BY id;"
-                "SELECT view, hex(picture), checksum FROM thumbnails ORDER BY view;"
-                "SELECT a, b, kind, checksum FROM links ORDER BY a, b;"
-                "SELECT name, hex(nodes), hex(edges), checksum FROM maps ORDER BY name;"
-                "SELECT name, columns, lines, checksum FROM routes ORDER BY name;"
-                "SELECT route, number, hex(lines), checksum FROM route_blocks ORDER BY 1, 2;"
-                "SELECT key, quote(value), checksum FROM settings WHERE key NOT IN ('created_s', "
+                "hex(signature), checksum FROM views ORDER BY id;SELECT view, hex(picture), "
+                "checksum FROM thumbnails ORDER BY view;SELECT a, b, kind, checksum FROM links "
+                "ORDER BY a, b;SELECT name, hex(nodes), hex(edges), checksum FROM maps ORDER BY "
+                "name;SELECT name, columns, lines, checksum FROM routes ORDER BY name;SELECT "
+                "route, number, hex(lines), checksum FROM route_blocks ORDER BY 1, 2;SELECT key, "
+                "quote(value), checksum FROM settings WHERE key NOT IN ('created_s', "
                 "'parameter.recordings') ORDER BY key",
                 append, &text, nullptr),
             SQLITE_OK)
@@ -234,7 +233,7 @@ TEST_F(Kill, Rename) {
   kill_at_random({"rename"}, {view_name(3), "door"}, mapped(), true);
 }
 
-TEST_F(Kill, LocaliseLearn) {
+TEST_F(Kill, LocaliseUpdate) {
   const fs::path base = folder_ / "base.panonav";
   write_dataset(folder_ / "grid", landmark_world(3), grid_poses(6));
   run_well({"memorise", folder_ / "grid", base});
@@ -250,7 +249,7 @@ TEST_F(Kill, LocaliseLearn) {
     csv += view_name(i) + "," + to_text(drive[i].x_m) + "," + to_text(drive[i].y_m) + ",0\n";
   }
   write_file(folder_ / "drive" / "poses.csv", std::string_view(csv));
-  kill_at_random({"localise"}, {folder_ / "drive", "--learn"}, base, true);
+  kill_at_random({"localise"}, {folder_ / "drive", "--update"}, base, true);
 }
 
 TEST_F(Kill, Prune) {

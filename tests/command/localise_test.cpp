@@ -55,8 +55,8 @@ class Localise : public ::testing::Test {
   inline static std::optional<std::vector<Pose2>> asked_;
 };
 
-TEST_F(Localise, LearnsWhatHasChangedAndUndoTakesItBack) {
-  const std::string file = *folder_ / "learning.panonav";
+TEST_F(Localise, UpdatesWhatHasChangedAndUndoTakesItBack) {
+  const std::string file = *folder_ / "updated.panonav";
   std::filesystem::copy_file(memory(), file);
   const ToyWorld changed = landmark_world(11);
   std::vector<Pose2> drive;
@@ -73,7 +73,7 @@ TEST_F(Localise, LearnsWhatHasChangedAndUndoTakesItBack) {
   const auto changes = [&] { return answers_of({"history", file, "--json"}).at(0).at("changes"); };
   const std::size_t before = views();
   EXPECT_TRUE(changes().empty());
-  run_well({"localise", file, drive_folder, "--learn"});
+  run_well({"localise", file, drive_folder, "--update"});
   EXPECT_GT(views(), before);
   ASSERT_EQ(changes().size(), 1U);
   EXPECT_TRUE(changes()[0].at("undoable"));
@@ -88,9 +88,9 @@ TEST_F(Localise, LearnsWhatHasChangedAndUndoTakesItBack) {
     EXPECT_EQ(result.exit_code, 2);
     EXPECT_NE(result.err.find(part), std::string::npos) << result.err;
   };
-  refused({drive_folder, "--appearances", "2"}, "without --learn");
-  refused({drive_folder, "--learn", "--turn-randomly", "1"}, "with --learn");
-  refused({drive_folder + "/" + view_name(0), drive_folder + "/" + view_name(1), "--learn"},
+  refused({drive_folder, "--appearances", "2"}, "without --update");
+  refused({drive_folder, "--update", "--turn-randomly", "1"}, "with --add, --update");
+  refused({drive_folder + "/" + view_name(0), drive_folder + "/" + view_name(1), "--update"},
           "one recording");
 }
 
@@ -257,8 +257,7 @@ TEST_F(Localise, SeveralPicturesAndATable) {
   ASSERT_EQ(rows.size(), 5U);
   EXPECT_EQ(rows[0],
             "file,answer,known_probability,x_m,y_m,radius_m,heading_deg,best,dissimilarity,column_"
-            "difference,"
-            "turn_deg,next,next_dissimilarity,next_column_difference,error");
+            "difference,turn_deg,next,next_dissimilarity,next_column_difference,error");
   EXPECT_EQ(rows[1].find(gone + ",unreadable,,,,,,,,,,,,,"), 0U) << rows[1];
   EXPECT_EQ(rows[2].find(pictures[1] + ",known," + format_fixed(one["known_probability"], 4) + "," +
                          to_text(one["position"]["x_m"].get<double>())),

@@ -1,4 +1,4 @@
-// Videos, streams and cameras as input, and `run`, which memorises and localises in one go.
+// Videos, streams and cameras as input, and `localise --add`.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -206,41 +206,41 @@ TEST_F(Walk, ALiveSourceIsReadWhileItIsOpen) {
   EXPECT_EQ(said_by_shell(command, folder.path()), "answered\n");
 }
 
-TEST_F(Walk, RunLearnsANewPlaceOnceAndKnowsItThen) {
+TEST_F(Walk, LocaliseAddsANewPlaceOnceAndKnowsItThen) {
   const std::string memory = path("new.panonav");
-  const auto first = answers_of({"run", path("walk"), "--memory", memory, "--learn", "--json"});
+  const auto first = answers_of({"localise", memory, path("walk"), "--add", "--json"});
   ASSERT_EQ(first.size(), count);
-  std::size_t learnt = 0;
-  for (const auto& answer : first) learnt += answer.at("learnt").get<bool>() ? 1 : 0;
-  EXPECT_GE(learnt, 32U);  // as many begin a memory
-  EXPECT_EQ(views(memory).size(), learnt);
-  const auto second = answers_of({"run", path("walk"), "--memory", memory, "--learn", "--json"});
+  std::size_t added = 0;
+  for (const auto& answer : first) added += answer.at("added").get<bool>() ? 1 : 0;
+  EXPECT_GE(added, 32U);  // as many begin a memory
+  EXPECT_EQ(views(memory).size(), added);
+  const auto second = answers_of({"localise", memory, path("walk"), "--add", "--json"});
   std::size_t known = 0;
   for (const auto& answer : second) {
-    EXPECT_FALSE(answer.at("learnt"));
+    EXPECT_FALSE(answer.at("added"));
     known += answer.at("known").get<bool>() ? 1 : 0;
   }
   EXPECT_GE(known, count - 2);
-  EXPECT_EQ(views(memory).size(), learnt);
+  EXPECT_EQ(views(memory).size(), added);
   // Another world is new.
   write_dataset(folder / "other", landmark_world(77), poses_);
   for (std::size_t i = 0; i < count; ++i) {
     fs::rename(folder / "other" / view_name(i), folder / "other" / ("o" + view_name(i)));
   }
   fs::remove(folder / "other/dataset.toml");
-  const auto third = answers_of({"run", path("other"), "--memory", memory, "--learn", "--json"});
-  EXPECT_TRUE(third.front().at("learnt"));
-  EXPECT_GT(views(memory).size(), learnt + 5);
+  const auto third = answers_of({"localise", memory, path("other"), "--add", "--json"});
+  EXPECT_TRUE(third.front().at("added"));
+  EXPECT_GT(views(memory).size(), added + 5);
   // The same observations give the same answers.
   fs::copy_file(memory, path("copy.panonav"));
-  EXPECT_EQ(run_panonav({"run", path("walk"), "--memory", memory, "--json"}).out,
-            run_panonav({"run", path("walk"), "--memory", path("copy.panonav"), "--json"}).out);
+  EXPECT_EQ(run_panonav({"localise", memory, path("walk"), "--json"}).out,
+            run_panonav({"localise", path("copy.panonav"), path("walk"), "--json"}).out);
 }
 
 TEST_F(Walk, ARecordOfAStreamHoldsItsJpegsToTheByte) {
   run_well({"memorise", path("walk"), path("a.panonav")});
-  said_by_shell(quote_for_shell(PANONAV_COMMAND) + " run - --memory " +
-                    quote_for_shell(path("a.panonav")) + " --record " +
+  said_by_shell(quote_for_shell(PANONAV_COMMAND) + " localise " +
+                    quote_for_shell(path("a.panonav")) + " - --record " +
                     quote_for_shell(path("run.mcap")) + " < " +
                     quote_for_shell(path("walk.mjpeg")) + " 2> /dev/null",
                 folder.path());
@@ -257,7 +257,7 @@ TEST_F(Walk, ARecordOfAStreamHoldsItsJpegsToTheByte) {
 TEST_F(Walk, ARecordHoldsWhatWasSeenAndAnswered) {
   run_well({"memorise", path("walk"), path("a.panonav")});
   const auto answers = answers_of(
-      {"run", path("walk"), "--memory", path("a.panonav"), "--json", "--record", path("run.mcap")});
+      {"localise", path("a.panonav"), path("walk"), "--json", "--record", path("run.mcap")});
   const auto topics = topics_of(path("run.mcap"));
   for (const char* topic : {"/camera/image/compressed", "/panorama/compressed",
                             "/best_match/compressed", "/tf", "/diagnostics", "/ground_truth"}) {
@@ -304,7 +304,7 @@ TEST_F(Walk, ARecordHoldsWhatWasSeenAndAnswered) {
       });
 }
 
-TEST_F(Walk, TheBestMatchOfARecordIsThatOfTheNamedViewAlsoWhereItWasJustLearnt) {
+TEST_F(Walk, TheBestMatchOfARecordIsThatOfTheNamedViewAlsoWhereItWasJustAdded) {
   run_well({"memorise", path("walk"), path("a.panonav")});
   run_well({"forget", path("a.panonav"), view_name(count - 1)});  // ids are not used twice
   write_dataset(folder / "other", landmark_world(77), poses_);
@@ -312,13 +312,13 @@ TEST_F(Walk, TheBestMatchOfARecordIsThatOfTheNamedViewAlsoWhereItWasJustLearnt) 
     fs::rename(folder / "other" / view_name(i), folder / "other" / ("o" + view_name(i)));
   }
   fs::remove(folder / "other/dataset.toml");
-  const auto answers = answers_of({"run", path("other"), "--memory", path("a.panonav"), "--learn",
-                                   "--json", "--record", path("run.mcap")});
-  std::size_t of_learnt = 0;
+  const auto answers = answers_of({"localise", path("a.panonav"), path("other"), "--add", "--json",
+                                   "--record", path("run.mcap")});
+  std::size_t of_added = 0;
   for (const auto& answer : answers) {
-    of_learnt += answer.at("matches").at(0).at("file").get<std::string>().starts_with("o") ? 1 : 0;
+    of_added += answer.at("matches").at(0).at("file").get<std::string>().starts_with("o") ? 1 : 0;
   }
-  EXPECT_GE(of_learnt, 5U);
+  EXPECT_GE(of_added, 5U);
   EXPECT_EQ(topics_of(path("run.mcap")).at("/best_match/compressed").second, count);
 }
 
@@ -370,12 +370,12 @@ TEST_F(Walk, AnswersAreRecordedAndARecordIsInputAgain) {
 
 TEST_F(Walk, ARecordThatCannotBeWrittenDoesNotEndTheRun) {
   run_well({"memorise", path("walk"), path("a.panonav")});
-  EXPECT_NE(refusal({"run", path("walk"), "--memory", path("a.panonav"), "--record",
-                     path("none/run.mcap")})
-                .find("none/run.mcap"),
-            std::string::npos);
-  const std::vector<std::string> ask{"run",    path("walk"), "--memory", path("a.panonav"),
-                                     "--json", "--record"};
+  EXPECT_NE(
+      refusal({"localise", path("a.panonav"), path("walk"), "--record", path("none/run.mcap")})
+          .find("none/run.mcap"),
+      std::string::npos);
+  const std::vector<std::string> ask{"localise", path("a.panonav"), path("walk"), "--json",
+                                     "--record"};
   EXPECT_NE(refusal(with(ask, {"/dev/full"})).find("/dev/full"), std::string::npos);
   const auto full = run_panonav(with(ask, {path("full.mcap")}), {.file_size_limit_bytes = 60'000});
   EXPECT_EQ(full.exit_code, 0);
@@ -386,10 +386,10 @@ TEST_F(Walk, ARecordThatCannotBeWrittenDoesNotEndTheRun) {
 TEST_F(Walk, RunRecordsARouteAndFollowsIt) {
   const std::string memory = path("a.panonav");
   run_well({"memorise", path("walk"), memory});
-  const std::vector<std::string> ask{"run", path("walk"), "--memory", memory, "--route", "round"};
+  const std::vector<std::string> ask{"localise", memory, path("walk"), "--route", "round"};
   EXPECT_NE(refusal(ask).find("route"), std::string::npos);  // there is none
-  const auto learnt = run_panonav(with(ask, {"--learn", "--quiet"}));
-  EXPECT_EQ(learnt.exit_code, 0) << learnt.err;
+  const auto added = run_panonav(with(ask, {"--add", "--quiet"}));
+  EXPECT_EQ(added.exit_code, 0) << added.err;
   const auto route = MemoryFile::open(memory, Access::read_only).route("round");
   ASSERT_TRUE(route);
   EXPECT_EQ(route->size(), count);
@@ -405,8 +405,8 @@ TEST_F(Walk, RunRecordsARouteAndFollowsIt) {
   }
   EXPECT_GE(right, count - 4);
   // Without poses motion is read from the pictures, in a frame that cannot go on.
-  const std::vector<std::string> film{"run",     path("walk.mp4"), "--memory", memory,
-                                      "--route", "film",           "--learn",  "--quiet"};
+  const std::vector<std::string> film{"localise", memory,  path("walk.mp4"), "--route",
+                                      "film",     "--add", "--quiet"};
   run_well(film);
   EXPECT_GE(MemoryFile::open(memory, Access::read_only).route("film").value().size(), 2U);
   EXPECT_NE(refusal(film).find("a new name"), std::string::npos);
@@ -419,7 +419,8 @@ TEST_F(Walk, PicturesThatCannotBeReadAreCountedAndDoNotFlood) {
     write_file(folder / "bad" / (std::to_string(i) + ".png"), std::string_view("no picture"));
   }
   fs::copy_file(folder / "walk" / view_name(0), folder / "bad" / "z.png");
-  const auto result = run_panonav({"run", path("bad"), "--memory", path("a.panonav"), "--json"});
+  const auto result = run_panonav(
+      {"localise", path("a.panonav"), path("bad"), "--json", "--record", path("bad.mcap")});
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_EQ(lines(result.out).size(), 1U);
   EXPECT_LE(lines(result.err).size(), 10U) << result.err;
@@ -428,12 +429,12 @@ TEST_F(Walk, PicturesThatCannotBeReadAreCountedAndDoNotFlood) {
 }
 
 TEST_F(Walk, RunRefusesWhatHasNoEffect) {
-  EXPECT_NE(refusal({"run", path("walk"), "--memory", path("none.panonav")}).find("--learn"),
-            std::string::npos);
+  EXPECT_NE(
+      refusal({"localise", path("none.panonav"), path("walk"), "--route", "round"}).find("--add"),
+      std::string::npos);
   run_well({"memorise", path("walk"), path("a.panonav")});
-  const std::vector<std::string> ask{"run", path("walk"), "--memory", path("a.panonav")};
-  EXPECT_NE(refusal(with(ask, {"--learn-interval-s", "1"})).find("without --learn"),
-            std::string::npos);
+  const std::vector<std::string> ask{"localise", path("a.panonav"), path("walk")};
+  EXPECT_NE(refusal(with(ask, {"--add-interval-s", "1"})).find("without --add"), std::string::npos);
   EXPECT_NE(
       refusal(with(ask, {"--camera-width", "96", "--camera-height", "12"})).find("no live source"),
       std::string::npos);
@@ -445,10 +446,10 @@ TEST_F(Walk, RunRefusesWhatHasNoEffect) {
         refusal({verb, path("a.panonav"), path("walk"), "--count", "3"}).find("no live source"),
         std::string::npos);
   }
-  EXPECT_NE(refusal({"run", "/dev/video99", "--memory", path("a.panonav"), "--image-topic", "/a"})
+  EXPECT_NE(refusal({"localise", path("a.panonav"), "/dev/video99", "--image-topic", "/a"})
                 .find("live source"),
             std::string::npos);
-  EXPECT_NE(refusal({"run", "/dev/video99", "--memory", path("a.panonav")}).find("/dev/video99"),
+  EXPECT_NE(refusal({"localise", path("a.panonav"), "/dev/video99"}).find("/dev/video99"),
             std::string::npos);
   EXPECT_NE(
       refusal({"map", "/dev/video99", path("b.panonav"), "--kind", "panorama"}).find("live source"),
@@ -477,9 +478,9 @@ TEST_F(Walk, RunFollowsACameraThatIsUnpluggedAndComesBack) {
                               quote_for_shell(path("pictures")) +
                               " ASAN_OPTIONS=verify_asan_link_order=0:detect_leaks=0 LD_PRELOAD=" +
                               quote_for_shell(PANONAV_V4L2_SHIM) + " timeout -s INT 20 " +
-                              quote_for_shell(PANONAV_COMMAND) + " run /dev/video7 --memory " +
-                              quote_for_shell(path("a.panonav")) + " --json --count 30 2> " +
-                              quote_for_shell(path("notes"));
+                              quote_for_shell(PANONAV_COMMAND) + " localise " +
+                              quote_for_shell(path("a.panonav")) +
+                              " /dev/video7 --json --count 30 2> " + quote_for_shell(path("notes"));
   const auto answers = objects(said_by_shell(command, folder.path()));
   ASSERT_EQ(answers.size(), 30U);
   std::size_t right = 0;
@@ -513,20 +514,19 @@ TEST_F(Walk, AnInterruptedMemoriseHasStoredWhatTheCameraSaw) {
   run_well({"verify", path("new.panonav")});
 }
 
-TEST_F(Walk, AnInterruptedRunHasStoredWhatItLearnt) {
+TEST_F(Walk, AnInterruptedRunHasStoredWhatItAdded) {
   write_camera_pictures();
   const std::string command =
       "V4L2_SHIM_RATE=50 V4L2_SHIM_PICTURES=" + quote_for_shell(path("pictures")) +
       " ASAN_OPTIONS=verify_asan_link_order=0:detect_leaks=0 LD_PRELOAD=" +
       quote_for_shell(PANONAV_V4L2_SHIM) + " timeout --preserve-status -s INT 3 " +
-      quote_for_shell(PANONAV_COMMAND) + " run /dev/video7 --memory " +
-      quote_for_shell(path("new.panonav")) +
-      " --learn --learn-interval-s 0.2 --json --kind panorama --elevation-deg -20 20";
+      quote_for_shell(PANONAV_COMMAND) + " localise " + quote_for_shell(path("new.panonav")) +
+      " /dev/video7 --add --add-interval-s 0.2 --json --kind panorama --elevation-deg -20 20";
   const auto answers = objects(said_by_shell(command, folder.path()));
-  std::size_t learnt = 0;
-  for (const auto& answer : answers) learnt += answer.at("learnt").get<bool>() ? 1 : 0;
-  EXPECT_GE(learnt, 5U);
-  EXPECT_EQ(views(path("new.panonav")).size(), learnt);
+  std::size_t added = 0;
+  for (const auto& answer : answers) added += answer.at("added").get<bool>() ? 1 : 0;
+  EXPECT_GE(added, 5U);
+  EXPECT_EQ(views(path("new.panonav")).size(), added);
   run_well({"verify", path("new.panonav")});
 }
 
@@ -544,15 +544,13 @@ TEST_F(Walk, ARunOutlivesLostCamerasAStalledReaderAndAClockThatIsSetBack) {
       std::to_string(seconds) +
       "; cat) < out > lines &\n"
       "V4L2_SHIM_RATE=" +
-      std::to_string(rate) +
-      " V4L2_SHIM_PICTURES=pictures"
-      " V4L2_SHIM_UNPLUG=" +
+      std::to_string(rate) + " V4L2_SHIM_PICTURES=pictures V4L2_SHIM_UNPLUG=" +
       std::to_string(seconds * rate / (2 * losses)) +
       " V4L2_SHIM_UNPLUGS=" + std::to_string(losses) +
       " V4L2_SHIM_CLOCK_BACK=" + std::to_string(seconds * rate / 3) +
       " V4L2_SHIM_TAKEN=taken LD_PRELOAD=" + quote_for_shell(PANONAV_V4L2_SHIM) + " " +
       quote_for_shell(PANONAV_COMMAND) +
-      " run /dev/video7 --memory a.panonav --learn --record run.mcap --json > out 2> notes &\n"
+      " localise a.panonav /dev/video7 --add --update --record run.mcap --json > out 2> notes &\n"
       "run=$!\n"
       "resident() { grep VmRSS /proc/$run/status | tr -dc 0-9; }\n"
       "sleep " +
@@ -582,7 +580,7 @@ TEST_F(Walk, ARunOutlivesLostCamerasAStalledReaderAndAClockThatIsSetBack) {
   EXPECT_EQ(counted("interruptions of the source"), losses) << said;
   std::uint64_t taken = 0;
   std::ifstream(path("taken"), std::ios::binary).read(reinterpret_cast<char*>(&taken), 8);
-  const std::uint64_t pictures = counted("pictures, ");
+  const std::uint64_t pictures = counted("images, ");
   const std::uint64_t accounted = pictures + counted("came too fast and were dropped");
   // The last picture of all may still wait, and so may one at each loss.
   EXPECT_LE(accounted, taken) << said;

@@ -20,10 +20,11 @@ Observation seen_at(const ToyWorld& world, const Pose2& pose, std::size_t number
   return seen;
 }
 
-/// Answers of a walk over the grid, `learn` on, and what a recorder of it left out.
+/// Answers of a walk over the grid, `add` on, and what a recorder of it left out.
 std::vector<bool> walk(const std::filesystem::path& memory, bool in_step, std::size_t& left_out,
                        const std::filesystem::path& record) {
-  LiveMemory live(memory, {.learn = true,
+  LiveMemory live(memory, {.add = true,
+                           .update = true,
                            .min_interval_s = 0.5,
                            .in_step = in_step,
                            .memoriser = {.source = landmark_panoramas()}});
@@ -39,17 +40,17 @@ std::vector<bool> walk(const std::filesystem::path& memory, bool in_step, std::s
       RunMoment moment{.stamp_s = *seen.stamp_s, .truth = seen.pose};
       if (answer.place) describe(moment, *answer.place);
       recorder.add(std::move(moment));
-      if (answer.is_new) live.learn(std::move(seen));
+      if (answer.is_new) live.add(std::move(seen));
     }
   }
   recorder.close();
   left_out = recorder.left_out();
   live.finish();
-  EXPECT_EQ(MemoryFile::open(memory, Access::read_only).info().views, live.learnt());
+  EXPECT_EQ(MemoryFile::open(memory, Access::read_only).info().views, live.added());
   return known;
 }
 
-TEST(LiveMemory, LearnsWhatIsNewAndKnowsItWhenItComesBack) {
+TEST(LiveMemory, AddsWhatIsNewAndKnowsItWhenItComesBack) {
   const TemporaryFolder folder;
   std::size_t left_out = 0;
   const auto known = walk(folder / "a.panonav", true, left_out, folder / "a.mcap");
@@ -63,7 +64,7 @@ TEST(LiveMemory, LearnsWhatIsNewAndKnowsItWhenItComesBack) {
   EXPECT_EQ(walk(folder / "b.panonav", true, left_out, folder / "b.mcap"), known);
 }
 
-TEST(LiveMemory, BesideTheAnswersItStoresAllThatItLearntAndLosesNoMoment) {
+TEST(LiveMemory, BesideTheAnswersItStoresAllThatItAddedAndLosesNoMoment) {
   const TemporaryFolder folder;
   std::size_t left_out = 0;
   const auto known = walk(folder / "a.panonav", false, left_out, folder / "a.mcap");
@@ -75,11 +76,12 @@ TEST(LiveMemory, BesideTheAnswersItStoresAllThatItLearntAndLosesNoMoment) {
   }
 }
 
-TEST(LiveMemory, TheAnsweredPanoramaIsKeptForWhoRecordsItAndIsWhatIsLearnt) {
+TEST(LiveMemory, TheAnsweredPanoramaIsKeptForWhoRecordsItAndIsWhatIsAdded) {
   const TemporaryFolder folder;
   std::size_t left_out = 0;
   walk(folder / "a.panonav", true, left_out, folder / "a.mcap");
-  LiveMemory live(folder / "a.panonav", {.learn = true,
+  LiveMemory live(folder / "a.panonav", {.add = true,
+                                         .update = true,
                                          .min_interval_s = 0.0,
                                          .in_step = false,
                                          .memoriser = {.source = landmark_panoramas()}});
@@ -89,7 +91,7 @@ TEST(LiveMemory, TheAnsweredPanoramaIsKeptForWhoRecordsItAndIsWhatIsLearnt) {
   EXPECT_TRUE(*live.panorama() == live.recogniser()->encoder().panorama(elsewhere));
   ASSERT_TRUE(answer.is_new);
   const PackedSignature signature = live.recogniser()->encoder().packed(elsewhere);
-  live.learn(elsewhere);
+  live.add(elsewhere);
   EXPECT_FALSE(live.panorama());
   live.finish();
   const auto file = MemoryFile::open(folder / "a.panonav", Access::read_only);
@@ -102,17 +104,18 @@ TEST(LiveMemory, AViewThatCannotBeStoredIsSaidAtTheLatestAtTheEnd) {
   const TemporaryFolder folder;
   std::size_t left_out = 0;
   walk(folder / "a.panonav", true, left_out, folder / "a.mcap");
-  LiveMemory live(folder / "a.panonav", {.learn = true,
+  LiveMemory live(folder / "a.panonav", {.add = true,
+                                         .update = true,
                                          .min_interval_s = 0.0,
                                          .in_step = false,
                                          .memoriser = {.source = landmark_panoramas()}});
   // Another program has stored another picture under the name.
   Memoriser(folder / "a.panonav").add(seen_at(landmark_world(98), {0.2, 0.1, 0.0}, 1000));
-  live.learn(seen_at(landmark_world(99), {0.3, 0.4, 0.5}, 1000));
+  live.add(seen_at(landmark_world(99), {0.3, 0.4, 0.5}, 1000));
   EXPECT_THROW(live.finish(), FileError);
 }
 
-TEST(LiveMemory, WithoutLearningThereMustBeAMemory) {
+TEST(LiveMemory, WithoutAddingThereMustBeAMemory) {
   const TemporaryFolder folder;
   EXPECT_THROW(LiveMemory(folder / "none.panonav"), FileError);
 }

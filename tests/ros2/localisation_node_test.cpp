@@ -543,7 +543,7 @@ TEST_F(LocalisationNodeOnTheWire, LearnsADriveRepeatsItAndGoesOnAfterItDied) {
   const Pose2 end = robot_is();
   EXPECT_GT(end.x_m, 2.0);
   EXPECT_EQ(ask("finish"), "finish done");
-  EXPECT_GE(node_->counts().learnt, 8U);
+  EXPECT_GE(node_->counts().taught, 8U);
 
   const auto carried_back = [&] {
     FastPeer::write(set_pose, recordings::ros::PoseStamped{
@@ -599,7 +599,7 @@ TEST_F(LocalisationNodeOnTheWire, DoesWhatUsersAskForAndSaysSo) {
   fs::create_symlink("/etc/hostname", *folder_ / "linked.panonav");
   ASSERT_TRUE(peer_.all_matched(10s));
   EXPECT_EQ(ask("dance").find("refused: command is 'dance'; allowed: relocalise, "), 0U);
-  EXPECT_NE(ask("learn here").find("refused: the robot is not localised"), std::string::npos);
+  EXPECT_NE(ask("add here").find("refused: the robot is not localised"), std::string::npos);
   for (const char* outside : {"/nowhere.panonav", "../own.panonav", "linked.panonav"}) {
     EXPECT_EQ(ask(std::string("load ") + outside).find("refused: file to load is '"), 0U);
   }
@@ -610,7 +610,7 @@ TEST_F(LocalisationNodeOnTheWire, DoesWhatUsersAskForAndSaysSo) {
   };
   drive(odom, see);
   ASSERT_TRUE(comes_true([&] { return node_->counts().localised >= 5; }));
-  EXPECT_EQ(ask("learn corner"), "learn done");
+  EXPECT_EQ(ask("add corner"), "add done");
   {
     const auto file = MemoryFile::open(own, Access::read_only);
     ASSERT_TRUE(file.find("corner"));

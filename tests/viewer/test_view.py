@@ -234,7 +234,6 @@ def watch_verbs(folder):
         "route follow": ([memory, drive], {"pose", "covariance"}, {"plan"}),
         "navigate": ([memory, "--goal", "view_00011.png", "--scene", "hall"], {"pose", "probability"},
                      {"references", "plan", "directions", "goal", "walls", "regions"}),
-        "run": ([drive, "--memory", memory], {"pose", "turn", "compared"}, {"references", "names"}),
     }
     for verb, (arguments, shown, staying) in verbs.items():
         events = watch([*verb.split(), *arguments])

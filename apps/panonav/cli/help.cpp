@@ -143,9 +143,8 @@ std::string help_text(const Description& description, bool all) {
 std::string overview(std::span<const Verb> verbs) {
   std::string text =
       wrapped(
-          "Image-based memory for robot navigation from omnidirectional images: it remembers "
-          "what places look like, and knows from that where the robot is and which way it "
-          "faces.",
+          "Image-based memory for robot navigation from omnidirectional images: it remembers what "
+          "places look like, and knows from that where the robot is and which way it faces.",
           0, 0) +
       "\n\nUsage: panonav VERB [OPTIONS] ARGUMENTS\n\nVerbs:\n";
   for (const auto& verb : verbs) text += row(std::string(verb.name), verb.summary, 17);

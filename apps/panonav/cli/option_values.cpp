@@ -39,6 +39,11 @@ std::string name_flags(std::string_view message) {
   return named.append(message);
 }
 
+bool looks_like_flag(std::string_view word) {
+  return word.size() > 1 && word.front() == '-' && word != "--" &&
+         std::string_view("0123456789.").find(word[1]) == std::string_view::npos;
+}
+
 double number_from_text(std::string_view flag, std::string_view text) {
   double value = 0.0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -77,15 +82,9 @@ void TextApplier::visit(const OptionInfo& info, std::span<const std::string_view
                         int& value) {
   const std::string* typed = text(info);
   if (typed == nullptr) return;
-  std::string all;
-  for (std::size_t i = 0; i < choices.size(); ++i) {
-    if (choices[i] == *typed) {
-      value = static_cast<int>(i);
-      return;
-    }
-    all += (all.empty() ? "" : ", ") + std::string(choices[i]);
-  }
-  refuse(info.name, *typed, all);
+  const auto found = std::ranges::find(choices, *typed);
+  if (found == choices.end()) refuse(info.name, *typed, listed(choices));
+  value = static_cast<int>(found - choices.begin());
 }
 
 namespace {

@@ -27,6 +27,19 @@ using OptionEntries = std::map<std::string, OptionEntry>;
 /// image_topic" becomes "--image-topic".
 [[nodiscard]] std::string name_flags(std::string_view message);
 
+/// The texts with commas between them.
+[[nodiscard]] std::string listed(const auto& texts) {
+  std::string all;
+  for (const auto& text : texts) {
+    if (!all.empty()) all += ", ";
+    all += text;
+  }
+  return all;
+}
+
+/// True for what is neither a positional nor a number below 0.
+[[nodiscard]] bool looks_like_flag(std::string_view word);
+
 /// Throws UsageError unless the whole text is one finite number.
 [[nodiscard]] double number_from_text(std::string_view flag, std::string_view text);
 

@@ -150,9 +150,8 @@ void show_answers(const VisualMemory& memory, const std::vector<viewer::MapLayer
   page.text("The robot took a view every " + spacing +
             " and remembered it. Then it was put down at " + std::to_string(asked.size()) +
             " random places between them, facing anywhere, and asked from one new picture each: "
-            "where are you, and which way do "
-            "you face? It was also put into another room, where the right answer is that it does "
-            "not know the place.");
+            "where are you, and which way do you face? It was also put into another room, where "
+            "the right answer is that it does not know the place.");
   page.figures({{std::to_string(memory.size()), "views remembered, " + spacing + " apart"},
                 {median_text(own.errors_m, 100.0, 1, "cm"), "median error of the position"},
                 {median_text(own.heading_errors_rad, degrees(1.0), 2, "degrees"),
@@ -161,9 +160,8 @@ void show_answers(const VisualMemory& memory, const std::vector<viewer::MapLayer
                 {percent(foreign.known), "of the views of another room taken for this one"}});
   page.text(
       "On the map, circles are the remembered views and green crosses the places where the robot "
-      "was put down. From each a "
-      "line runs to where its memory says it is; the shorter, the better. The nearest remembered "
-      "view alone would be " +
+      "was put down. From each a line runs to where its memory says it is; the shorter, the "
+      "better. The nearest remembered view alone would be " +
       median_text(own.nearest_errors_m, 100.0, 1, "cm") +
       " off (median): the position is interpolated between views.");
   page.plots({{map_of_answers(memory, scene, asked), "True places, and the error of each answer"}});
@@ -441,12 +439,9 @@ Run declare_demo(Arguments& arguments) {
 Verb demo_verb() {
   return {"demo", "The whole story on a simulated office, with a report to look at",
           "A robot sees, remembers, localises and tracks itself, arranges what it remembers, goes "
-          "home, repeats\n"
-          "a route and goes where it is told. It takes about a minute on two cores and needs "
-          "nothing but this program. What an earlier demo left in the folder is "
-          "written anew; a folder that holds "
-          "anything\n"
-          "else is refused.",
+          "home, repeats a route and goes where it is told. It takes about a minute on two cores "
+          "and needs nothing but this program. What an earlier demo left in the folder is written "
+          "anew; a folder that holds anything else is refused.",
           "  panonav demo\n  panonav demo --seed 5 -o other_office", declare_demo};
 }
 

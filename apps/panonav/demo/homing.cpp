@@ -114,8 +114,7 @@ DemoHoming show_homing(const simulation::Scene& office, int runs, std::uint64_t 
       "It was put down one metre away from " +
       std::to_string(runs) +
       " places, with random heading, and made step after step, each after a new picture. Its "
-      "wheels and "
-      "its camera are noisy.");
+      "wheels and its camera are noisy.");
   page.figures({{std::to_string(homing.arrived) + " of " + std::to_string(runs),
                  "runs that ended within 10 cm of home, and knew it"},
                 {format_fixed(100.0 * median(homing.distances_m), 1) + " cm",

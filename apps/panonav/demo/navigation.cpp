@@ -16,12 +16,12 @@
 #include "panonav/navigation/direction_field.hpp"
 #include "panonav/navigation/navigation_graph.hpp"
 #include "panonav/relative_pose/fourier_homing.hpp"
+#include "panonav_simulation/memory_mission.hpp"
 #include "panonav_simulation/screen.hpp"
 #include "panonav_viewer/mission_picture.hpp"
 #include "panonav_viewer/plot.hpp"
 #include "panonav_viewer/scene_drawing.hpp"
-#include "verbs/navigated_run.hpp"
-#include "verbs/shown_references.hpp"
+#include "runs/shown_references.hpp"
 
 namespace panonav::command {
 
@@ -49,8 +49,8 @@ simulation::RememberedPlace remembered_place(const VisualMemory& memory, const L
 void give_sight(simulation::MissionPlace& place, const DemoRecordings& recordings,
                 const Pipeline& pipeline) {
   const simulation::SimulatedWorldOptions& settled = recordings.office_world->options();
-  place.sight = sight_through(place.renderer, recordings.true_camera, settled.frame, settled.sensor,
-                              pipeline, nullptr);
+  place.sight = simulation::make_sight(place.renderer, recordings.true_camera, settled.frame,
+                                       settled.sensor, pipeline, nullptr);
 }
 
 /// A mission, and the office with a screen across the middle of its planned way.
@@ -167,7 +167,7 @@ viewer::RunPage played_run(const simulation::MissionPlace& place,
                            const simulation::MissionRun& run) {
   const simulation::SimulatedWorldOptions& settled = recordings.office_world->options();
   std::optional<Panorama> seen;
-  const auto look = sight_through(
+  const auto look = simulation::make_sight(
       place.renderer, recordings.true_camera, settled.frame, settled.sensor, pipeline, nullptr,
       [&](const Image& /*picture*/, const Panorama& panorama) { seen = panorama; });
   AreaPlanner planner(remembered.graph, options);
@@ -261,10 +261,9 @@ void add_part(const DemoNavigation& navigation, Shown shown, viewer::ReportPage&
       "The goal is a remembered view. The robot knows how the views arranged themselves (part 5), "
       "and what it sees now. It knows no positions, not where it starts, nor which way it faces, "
       "and it has no map of walls: it feels what stands in the way of its next step. Each "
-      "remembered view has a direction "
-      "towards the goal, read from the phases of the views on the way. The robot looks, finds the "
-      "view that it is at, takes its direction, drives a step and looks again; the last stretch is "
-      "the way home to the goal's view.");
+      "remembered view has a direction towards the goal, read from the phases of the views on the "
+      "way. The robot looks, finds the view that it is at, takes its direction, drives a step and "
+      "looks again; the last stretch is the way home to the goal's view.");
   page.text("It was sent from " + count + " random places to " + count +
             " random views. One more robot was kidnapped half way, and another one found a "
             "screen across its way that had not been there before. A mission counts when the robot "
@@ -308,7 +307,7 @@ DemoNavigation show_navigation(const DemoOptions& options, const DemoRecordings&
   Executor& executor = session.executor();
   const simulation::RememberedPlace remembered =
       remembered_place(memory, arranged, options.spacing_m());
-  simulation::MissionPlace place = mission_place(*recordings.office_world);
+  simulation::MissionPlace place = simulation::make_mission_place(*recordings.office_world);
   give_sight(place, recordings, pipeline);
   const auto random = [&](std::uint64_t stream, int count, bool kidnapped) {
     return simulation::random_missions(place, remembered, {.count = count, .kidnapped = kidnapped},

@@ -12,7 +12,7 @@
 #include "panonav/io/dataset.hpp"
 #include "panonav_simulation/renderer.hpp"
 #include "panonav_simulation/scene.hpp"
-#include "verbs/simulated_recording.hpp"
+#include "runs/simulated_recording.hpp"
 
 namespace panonav::command {
 

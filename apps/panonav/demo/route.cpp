@@ -11,7 +11,7 @@
 #include "panonav_viewer/picture_plot.hpp"
 #include "panonav_viewer/plot.hpp"
 #include "panonav_viewer/scene_drawing.hpp"
-#include "verbs/shown_references.hpp"
+#include "runs/shown_references.hpp"
 
 namespace panonav::command {
 
@@ -117,10 +117,8 @@ DemoRoute show_route(const simulation::Scene& office, double length_m, std::uint
              "is how far a robot strays from a route it was shown once (median)"});
   page.text(
       "Of a route the robot remembers one line of pixels every 10 cm: its horizon, a byte a "
-      "degree. "
-      "Light in the plane of the camera goes straight from place to place, so that these lines "
-      "also "
-      "tell what is seen from beside the route. The robot was shown a route of " +
+      "degree. Light in the plane of the camera goes straight from place to place, so that these "
+      "lines also tell what is seen from beside the route. The robot was shown a route of " +
       format_fixed(route.length_m, 0) +
       " m once, then put down 0.3 m off its start and told that it stands on it, with wheels that "
       "are wrong by 5 %; it drove the route to its end, and another robot drove it back.");

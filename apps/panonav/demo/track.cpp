@@ -8,8 +8,8 @@
 #include "panonav_viewer/scene_drawing.hpp"
 #include "reports/track_pictures.hpp"
 #include "reports/track_report.hpp"
-#include "verbs/shown_references.hpp"
-#include "verbs/tracked_run.hpp"
+#include "runs/shown_references.hpp"
+#include "runs/tracked_run.hpp"
 
 namespace panonav::command {
 

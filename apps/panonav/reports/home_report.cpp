@@ -115,8 +115,7 @@ void write_home_report(const std::filesystem::path& folder, const Goal& goal,
                         "as here; below, what it sees now. "
                       : "") +
       "Forward is in the middle (grey mark). Orange: the direction home, where things spread out "
-      "on the "
-      "way; blue: the opposite one, where they close up.");
+      "on the way; blue: the opposite one, where they close up.");
   for (const std::size_t i : shown_of(answers.size())) {
     page.views(views_of(goal.panorama, current(i), answers[i]));
   }

@@ -139,11 +139,10 @@ void write_localise_report(const std::filesystem::path& folder, const MemoryFile
           "same things in the same directions, the answer is right.");
   page.figures(summarise(queries, readable.size()));
   page.text(
-      "The difference compares the picture with a view column by column, both turned alike: "
-      "0 where they are the same. The probability that the place is known follows from how much "
-      "less the better half of the columns differs at the best match than at the tenth best and "
-      "at mirrored views, which show places that do not exist. Below one half the place is "
-      "unknown.");
+      "The difference compares the picture with a view column by column, both turned alike: 0 "
+      "where they are the same. The probability that the place is known follows from how much less "
+      "the better half of the columns differs at the best match than at the tenth best and at "
+      "mirrored views, which show places that do not exist. Below one half the place is unknown.");
   const std::size_t shown = std::min(max_shown, readable.size());
   page.section("Picture by picture");
   page.text(

@@ -5,7 +5,7 @@
 
 #include "lab/reporting/results_document.hpp"
 #include "lab/reproduction.hpp"
-#include "verbs/reproduced_paper.hpp"
+#include "runs/reproduced_paper.hpp"
 
 namespace panonav::command {
 

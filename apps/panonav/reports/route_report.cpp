@@ -196,9 +196,8 @@ void write_record_report(const std::filesystem::path& folder, const std::string&
   start.squares.push_back(route.poses().front().position());
   viewer::ReportPage page(
       "Route '" + name + "'",
-      "A robot drove this way once. From each place it keeps one line of pixels, what "
-      "its camera sees at its own height, and that is all it needs to follow the way "
-      "again.");
+      "A robot drove this way once. From each place it keeps one line of pixels, what its camera "
+      "sees at its own height, and that is all it needs to follow the way again.");
   page.figures(
       {{format_fixed(route.length_m(), 1) + " m", "long"},
        {std::to_string(route.size()), "lines of " + std::to_string(route.columns()) + " pixels"},

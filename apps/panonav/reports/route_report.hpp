@@ -6,7 +6,7 @@
 
 #include "panonav/route/route_panorama.hpp"
 #include "panonav_viewer/page.hpp"
-#include "verbs/followed_run.hpp"
+#include "runs/followed_run.hpp"
 
 namespace panonav::command {
 

@@ -6,7 +6,7 @@
 
 #include "panonav/memory/visual_memory.hpp"
 #include "panonav_viewer/page.hpp"
-#include "verbs/tracked_run.hpp"
+#include "runs/tracked_run.hpp"
 
 namespace panonav::command {
 

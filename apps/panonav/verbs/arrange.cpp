@@ -1,14 +1,7 @@
 #include <algorithm>
 #include <filesystem>
-#include <memory>
-#include <span>
-#include <string>
 
-#include "cli/arguments.hpp"
-#include "cli/json.hpp"
-#include "cli/session.hpp"
 #include "cli/verbs.hpp"
-#include "panonav/core/error.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/trajectory_file.hpp"
 #include "panonav/mapping/lattice_map.hpp"
@@ -19,7 +12,7 @@
 #include "reports/arrange_report.hpp"
 #include "reports/lattice_picture.hpp"
 #include "reports/report_page.hpp"
-#include "verbs/recording.hpp"
+#include "runs/recording.hpp"
 
 namespace panonav::command {
 
@@ -236,9 +229,8 @@ Verb arrange_verb() {
   return {
       "arrange", "Arrange the views of a memory as they lie in space, by their similarity alone",
       "Views may have been taken in any order; poses in the memory are only compared with. What "
-      "nothing\n"
-      "connects is kept as separate components. The map is stored in the memory under the name "
-      "lattice.",
+      "nothing connects is kept as separate components. The map is stored in the memory under the "
+      "name lattice.",
       "  panonav arrange office.panonav --report arranged\n"
       "  panonav arrange hall.panonav --odometry run --graphml hall.graphml --json",
       declare_arrange};

@@ -1,22 +1,15 @@
 #include <algorithm>
 #include <filesystem>
-#include <memory>
-#include <span>
 
-#include "cli/arguments.hpp"
-#include "cli/json.hpp"
-#include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/camera/calibrate_dual_fisheye.hpp"
 #include "panonav/camera/find_mirror.hpp"
 #include "panonav/camera/mirror_camera.hpp"
 #include "panonav/camera/mirror_overlay.hpp"
-#include "panonav/core/error.hpp"
-#include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/camera_file.hpp"
 #include "panonav/io/image_file.hpp"
-#include "verbs/recording.hpp"
+#include "runs/recording.hpp"
 
 namespace panonav::command {
 
@@ -47,8 +40,7 @@ void visit_options(MirrorOptions& options, OptionVisitor& visitor) {
       choice<&T::direction>(
           "How a turn to the left runs in the picture: clockwise where the camera looks up into "
           "the mirror, counter-clockwise where it looks down; dual-fisheye: counter-clockwise "
-          "where "
-          "the picture is mirrored",
+          "where the picture is mirrored",
           "clockwise", "counter-clockwise"),
       option<&T::forward_angle_deg>(
           "Where the robot's forward direction lies in the picture: 0 right, 90 up", -360, 360),

@@ -2,17 +2,14 @@
 #include <charconv>
 #include <cmath>
 #include <filesystem>
-#include <memory>
 
-#include "cli/json.hpp"
 #include "cli/verbs.hpp"
-#include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/pipeline/catchment_survey.hpp"
 #include "reports/catchment_report.hpp"
 #include "reports/report_page.hpp"
-#include "verbs/homing_pictures.hpp"
-#include "verbs/recording.hpp"
+#include "runs/homing_pictures.hpp"
+#include "runs/recording.hpp"
 
 namespace panonav::command {
 
@@ -315,10 +312,9 @@ Run declare_catchment(Arguments& arguments) {
 Verb catchment_verb() {
   return {"catchment", "Measure from how far the views of a recording lead home",
           "The verb computes home vectors between all pairs of views, and runs from place to place "
-          "[S06 section 4].\n"
-          "Where they are not given, the longest step is twice the spacing of the places, a step "
-          "must\n"
-          "end within 0.8 of it, and the typical distance of things is learnt from near pairs.",
+          "[S06 section 4]. Where they are not given, the longest step is twice the spacing of the "
+          "places, a step must end within 0.8 of it, and the typical distance of things is learnt "
+          "from near pairs.",
           "  panonav catchment grid_run --up-to-m 0.3 --turn-randomly 1 --report catchment\n"
           "  panonav catchment monday_run --current tuesday_run --published 5 --json\n"
           "  panonav catchment grid_run --published 10 --stages 2,4,10\n"

@@ -1,12 +1,9 @@
 #include <filesystem>
-#include <memory>
 
-#include "cli/json.hpp"
-#include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav_recordings/recording.hpp"
 #include "panonav_recordings/recording_conversion.hpp"
-#include "verbs/recording.hpp"
+#include "runs/recording.hpp"
 
 namespace panonav::command {
 
@@ -87,7 +84,7 @@ Run declare_convert(Arguments& arguments) {
 Verb convert_verb() {
   return {"convert", "Turn a data set into a recording of ROS 2 messages, or one into a data set",
           "Pictures keep their bytes, and stamps, odometry, poses, roll and pitch come along. A "
-          "data set needs\n--kind, as a recording does not say how its pictures lie.",
+          "data set needs --kind, as a recording does not say how its pictures lie.",
           "  panonav convert walk walk.mcap\n"
           "  panonav convert drive.bag drive --kind equirectangular --image-topic /camera/image",
           declare_convert};

@@ -1,8 +1,3 @@
-#include <memory>
-
-#include "cli/arguments.hpp"
-#include "cli/json.hpp"
-#include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/storage/memory_file.hpp"
 

@@ -1,8 +1,3 @@
-#include <memory>
-
-#include "cli/arguments.hpp"
-#include "cli/json.hpp"
-#include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/pipeline/memory_export.hpp"
 
@@ -99,8 +94,8 @@ Run declare_export(Arguments& arguments) {
 Verb export_verb() {
   return {
       "export", "Write views, poses, thumbnails and signatures of a memory as a data set",
-      "Thumbnails are all that a memory keeps of its pictures; they become panoramas of the\n"
-      "memory's size, which memorise takes back. views.csv and signatures.npy hold all views as\n"
+      "Thumbnails are all that a memory keeps of its pictures; they become panoramas of the "
+      "memory's size, which memorise takes back. views.csv and signatures.npy hold all views as "
       "they are. Links, maps and routes are not exported. The folder appears whole or not at all.",
       "  panonav export office.panonav -o office_views\n"
       "  panonav memorise office_views again.panonav --config office_views/memorise.toml",

@@ -1,12 +1,7 @@
 #include <algorithm>
-#include <memory>
 #include <set>
 
-#include "cli/arguments.hpp"
-#include "cli/json.hpp"
-#include "cli/session.hpp"
 #include "cli/verbs.hpp"
-#include "panonav/core/error.hpp"
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
 
@@ -84,8 +79,7 @@ Run declare_forget(Arguments& arguments) {
 Verb forget_verb() {
   return {"forget", "Drop views from a memory",
           "All the named views are dropped or, when one of them is not there, none. panonav undo "
-          "brings them "
-          "back.",
+          "brings them back.",
           "  panonav forget office.panonav view_0012.png view_0013.png\n"
           "  panonav forget office.panonav view_0012.png --dry-run",
           declare_forget};

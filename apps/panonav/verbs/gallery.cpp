@@ -2,18 +2,14 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <memory>
 
-#include "cli/json.hpp"
-#include "cli/session.hpp"
 #include "cli/verbs.hpp"
-#include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/storage/memory_address.hpp"
 #include "panonav_viewer/page.hpp"
 #include "reports/report_page.hpp"
-#include "verbs/view_selection.hpp"
+#include "runs/view_selection.hpp"
 
 namespace panonav::command {
 
@@ -123,10 +119,9 @@ ExitCode gallery(const GalleryArguments& wanted, Session& session) {
 
   viewer::ReportPage page(
       "What " + memory_name(wanted.memory) + " remembers",
-      "The reference views of the memory, each as the small picture that is stored "
-      "with it: all around the robot, straight ahead in the middle, left and right as "
-      "the robot sees them, the edges behind it. Below each: the view's id and name, where it was "
-      "taken and the heading.");
+      "The reference views of the memory, each as the small picture that is stored with it: all "
+      "around the robot, straight ahead in the middle, left and right as the robot sees them, the "
+      "edges behind it. Below each: the view's id and name, where it was taken and the heading.");
   const auto placed = std::ranges::count_if(
       views, [](const ViewRecord& view) { return view.info.pose.has_value(); });
   page.figures({{std::to_string(views.size()), "views"},

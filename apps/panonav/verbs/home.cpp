@@ -1,11 +1,7 @@
 #include <cmath>
 #include <filesystem>
-#include <memory>
 
-#include "cli/json.hpp"
-#include "cli/session.hpp"
 #include "cli/verbs.hpp"
-#include "panonav/core/error.hpp"
 #include "panonav/pipeline/homing_guide.hpp"
 #include "panonav/pipeline/named_view.hpp"
 #include "panonav/pipeline/observation_source.hpp"
@@ -13,9 +9,9 @@
 #include "reports/home_answer.hpp"
 #include "reports/home_report.hpp"
 #include "reports/report_page.hpp"
-#include "verbs/homing_pictures.hpp"
-#include "verbs/memorising.hpp"
-#include "verbs/recording.hpp"
+#include "runs/homing_pictures.hpp"
+#include "runs/memorising.hpp"
+#include "runs/recording.hpp"
 
 namespace panonav::command {
 
@@ -177,7 +173,7 @@ Run declare_home(Arguments& arguments) {
 Verb home_verb() {
   return {"home", "Tell the direction back to a place from one view of it",
           "Directions are seen from the robot as it stands now; the heading need not be known. The "
-          "distance is in units of R, the typical distance of the things around. A picture in the\n"
+          "distance is in units of R, the typical distance of the things around. A picture in the "
           "folder of a data set lies as its dataset.toml says. The exit code is 1 when no view "
           "tells the way: at home itself, or where the views match no better than chance.",
           "  panonav home door.png now.png --kind panorama --elevation-deg -30 40\n"

@@ -1,12 +1,6 @@
 #include <algorithm>
-#include <memory>
 
-#include "cli/arguments.hpp"
-#include "cli/json.hpp"
-#include "cli/session.hpp"
 #include "cli/verbs.hpp"
-#include "panonav/core/error.hpp"
-#include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/route/route_panorama.hpp"
 #include "panonav/storage/memory_file.hpp"

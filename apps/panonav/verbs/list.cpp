@@ -1,12 +1,9 @@
 #include <algorithm>
-#include <memory>
 #include <utility>
 
-#include "cli/json.hpp"
-#include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "verbs/view_selection.hpp"
+#include "runs/view_selection.hpp"
 
 namespace panonav::command {
 

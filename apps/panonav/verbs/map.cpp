@@ -2,13 +2,9 @@
 #include <array>
 #include <filesystem>
 #include <map>
-#include <memory>
 #include <utility>
 
-#include "cli/json.hpp"
-#include "cli/session.hpp"
 #include "cli/verbs.hpp"
-#include "panonav/core/error.hpp"
 #include "panonav/io/trajectory_file.hpp"
 #include "panonav/pipeline/graph_file.hpp"
 #include "panonav/pipeline/known_views.hpp"
@@ -17,11 +13,11 @@
 #include "panonav/storage/memory_address.hpp"
 #include "reports/map_picture.hpp"
 #include "reports/report_page.hpp"
-#include "verbs/memorising.hpp"
-#include "verbs/recording.hpp"
-#include "verbs/run_record.hpp"
-#include "verbs/shown_map.hpp"
-#include "verbs/shown_references.hpp"
+#include "runs/memorising.hpp"
+#include "runs/recording.hpp"
+#include "runs/run_record.hpp"
+#include "runs/shown_map.hpp"
+#include "runs/shown_references.hpp"
 
 namespace panonav::command {
 
@@ -384,12 +380,9 @@ Run declare_map(Arguments& arguments) {
 Verb map_verb() {
   return {"map", "Make a map from pictures in the order in which they were taken",
           "Each picture is placed by what its view shows of the step from the one before; places "
-          "that are\n"
-          "passed again close the loop. Where the data set has odometry, steps are its, with turns "
-          "that\n"
-          "the views steady. Without it, --camera-height-m makes metres of lengths. What nothing "
-          "connects\n"
-          "is kept as separate components.",
+          "that are passed again close the loop. Where the data set has odometry, steps are its, "
+          "with turns that the views steady. Without it, --camera-height-m makes metres of "
+          "lengths. What nothing connects is kept as separate components.",
           "  panonav map office_run office.panonav\n"
           "  panonav map office_run office.panonav --report mapped --graphml map.graphml\n"
           "  panonav map walk walk.panonav --camera-height-m 0.6\n"

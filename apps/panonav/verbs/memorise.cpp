@@ -1,20 +1,14 @@
 #include <exception>
 #include <filesystem>
-#include <memory>
-#include <vector>
 
-#include "cli/json.hpp"
-#include "cli/session.hpp"
 #include "cli/verbs.hpp"
-#include "panonav/core/error.hpp"
-#include "panonav/core/text.hpp"
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/storage/memory_address.hpp"
-#include "verbs/live_run.hpp"
-#include "verbs/memorising.hpp"
-#include "verbs/recording.hpp"
+#include "runs/live_run.hpp"
+#include "runs/memorising.hpp"
+#include "runs/recording.hpp"
 
 namespace panonav::command {
 
@@ -157,7 +151,7 @@ ExitCode memorise(const Arguments& arguments, const MemoriseArguments& wanted, S
   if (resumes) {
     const auto memory = MemoryFile::open(wanted.memory, Access::read_write);
     require_kept_options(arguments, wanted.signature, wanted.preprocessing, memory);
-    (void)checked_beside(wanted.pictures, memory);
+    require_kept_band(wanted.pictures, memory);
     remembered = memory.header().source;
   }
   if (live) return memorise_live(arguments, wanted, remembered, session);
@@ -215,11 +209,9 @@ Verb memorise_verb() {
       "memorise",
       "Remember what the places of a recording look like",
       "Views reach the disk in batches of 16, a new memory's first 32 together, each batch whole "
-      "or\n"
-      "not at all; after an interruption the same command goes on where it stopped. Views that "
-      "the\n"
-      "memory knows by name must be the same views: another pose, stamp or picture under a known\n"
-      "name is refused. A live source is memorised until Ctrl-C.",
+      "or not at all; after an interruption the same command goes on where it stopped. Views that "
+      "the memory knows by name must be the same views: another pose, stamp or picture under a "
+      "known name is refused. A live source is memorised until Ctrl-C.",
       "  panonav memorise office_run office.panonav\n"
       "  panonav memorise photos walk.panonav --kind equirectangular --elevation-deg -30 40\n"
       "  panonav memorise /dev/video0 walk.panonav --kind equirectangular --every 0.5s",

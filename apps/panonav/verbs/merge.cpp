@@ -1,10 +1,5 @@
 #include "panonav/pipeline/memory_merge.hpp"
 
-#include <memory>
-
-#include "cli/arguments.hpp"
-#include "cli/json.hpp"
-#include "cli/session.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/geometry/angles.hpp"
 
@@ -96,9 +91,9 @@ Run declare_merge(Arguments& arguments) {
 Verb merge_verb() {
   return {
       "merge", "Make one memory of two that have places in common",
-      "Places in common are found by what they look like. The maps of both are joined there and\n"
-      "optimised together, in the frame of FIRST. Where nothing in common is found, both stay\n"
-      "connected components of one map, and the verb ends with exit code 1. Views with one name\n"
+      "Places in common are found by what they look like. The maps of both are joined there and "
+      "optimised together, in the frame of FIRST. Where nothing in common is found, both stay "
+      "connected components of one map, and the verb ends with exit code 1. Views with one name "
       "and one picture are kept once; neither file is changed.",
       "  panonav merge monday.panonav tuesday.panonav -o both.panonav\n"
       "  panonav merge monday.panonav tuesday.panonav -o both.panonav --json",

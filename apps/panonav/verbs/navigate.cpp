@@ -1,31 +1,19 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
-#include <memory>
-#include <span>
-#include <string>
 #include <utility>
-#include <vector>
 
-#include "cli/json.hpp"
 #include "cli/option_values.hpp"
-#include "cli/session.hpp"
 #include "cli/verbs.hpp"
-#include "panonav/core/error.hpp"
-#include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/atomic_file.hpp"
-#include "panonav/navigation/direction_field.hpp"
-#include "panonav/relative_pose/fourier_homing.hpp"
 #include "panonav/storage/memory_file.hpp"
+#include "panonav_simulation/memory_mission.hpp"
 #include "panonav_viewer/mission_picture.hpp"
-#include "panonav_viewer/scene_drawing.hpp"
 #include "reports/navigate_report.hpp"
 #include "reports/report_page.hpp"
-#include "verbs/navigated_run.hpp"
-#include "verbs/run_record.hpp"
-#include "verbs/shown_references.hpp"
+#include "runs/mission_moments.hpp"
+#include "runs/run_record.hpp"
+#include "runs/simulated_recording.hpp"
 
 namespace panonav::command {
 
@@ -228,133 +216,6 @@ simulation::Mission mission_of(const NavigateArguments& wanted, ViewId goal,
   return mission;
 }
 
-/// What a record tells of a mission. Seconds are numbers of looks; no pose is estimated, so that
-/// the pose is the true one.
-class MissionMoments {
- public:
-  MissionMoments(const RobotNavigator& robot, const simulation::RememberedPlace& remembered,
-                 const FieldOptions& field)
-      : robot_(robot), remembered_(remembered), field_(field) {}
-
-  void saw(const Image& picture, const Panorama& panorama) {
-    clock_.stage("driving, picture");
-    picture_ = picture;
-    panorama_ = panorama;
-  }
-  void restart() { clock_.restart(); }
-  recordings::RunMoment of(const NavigationDecision& decision, const Pose2& pose,
-                           const simulation::Scene& scene) {
-    clock_.stage("signature, decision");
-    recordings::RunMoment moment{.stamp_s = static_cast<double>(number_++), .pose = pose};
-    if (decision.homing && panorama_) moment.homing = homing();
-    moment.picture = std::exchange(picture_, std::nullopt);
-    moment.panorama = std::exchange(panorama_, std::nullopt);
-    moment.truth = ReferencePose{pose.x_m, pose.y_m, pose.heading_rad};
-    moment.sure = decision.probability >= 0.5;
-    moment.state = name_of(decision.state);
-    moment.probability = decision.probability;
-    moment.values.emplace_back("probability", format_fixed(decision.probability, 4));
-    for (const NavigationEvent event : decision.events) {
-      moment.values.emplace_back("event", name_of(event));
-    }
-    if (decision.nearest) {
-      moment.values.emplace_back("nearest", robot_.info(*decision.nearest).name);
-      moment.best_match =
-          robot_.memory().thumbnail(*decision.nearest).value_or(std::vector<std::uint8_t>{});
-      const auto way = planned_from(*decision.nearest);
-      if (way != plan_) moment.plan = plan_ = way;
-    }
-    if (number_ == 1) moment.walls = viewer::scene_outlines(scene);
-    if (shown_goal_ != robot_.goal()) {
-      add_field(moment);
-      shown_goal_ = robot_.goal();
-    }
-    clock_.stage("for viewers");
-    clock_.put(moment);
-    return moment;
-  }
-
- private:
-  [[nodiscard]] static bool is_known(const Pose2& pose) { return std::isfinite(pose.x_m); }
-
-  [[nodiscard]] std::vector<Pose2> planned_from(ViewId view) const {
-    std::vector<Pose2> way;
-    const auto node = robot_.graph().node_of(view);
-    if (!node) return way;
-    for (const std::size_t next : robot_.planner().plan_path(*node)) {
-      const Pose2& pose = remembered_.truth[next];
-      if (is_known(pose)) way.push_back({pose.x_m, pose.y_m, 0.0});
-    }
-    for (std::size_t i = 0; i + 1 < way.size(); ++i) {
-      way[i].heading_rad = std::atan2(way[i + 1].y_m - way[i].y_m, way[i + 1].x_m - way[i].x_m);
-    }
-    return way;
-  }
-  /// From what is seen to where the goal's view was taken.
-  [[nodiscard]] recordings::RunHoming homing() {
-    const ViewId goal = robot_.goal();
-    const VisualMemory views = robot_.memory().load({&goal, 1});
-    const HomeVector home = home_vector(homing_view(views.signature(goal)),
-                                        homing_view(robot_.encoder().signature(*panorama_)));
-    return {home.direction_rad(), home.confidence};
-  }
-  /// The views with their areas, where each sends the robot, and the goal.
-  void add_field(recordings::RunMoment& moment) const {
-    const auto guides = direction_field(remembered_.graph, robot_.goal(), field_);
-    std::vector<std::size_t> areas;
-    for (std::size_t i = 0; i < guides.size(); ++i) {
-      const Pose2& pose = remembered_.truth[i];
-      if (!is_known(pose)) continue;
-      moment.references.push_back(pose.position());
-      moment.reference_views.push_back(
-          {robot_.info(remembered_.graph.view(i)).name,
-           std::isfinite(pose.heading_rad) ? std::optional(pose.heading_rad) : std::nullopt});
-      areas.push_back(robot_.planner().areas().area_of[i]);
-      if (!guides[i].direction_rad || !std::isfinite(pose.heading_rad)) continue;
-      moment.directions.push_back(
-          {pose.x_m, pose.y_m, wrap_angle(pose.heading_rad + *guides[i].direction_rad)});
-    }
-    moment.regions = regions_of(moment.references, areas);
-    Pose2 goal = remembered_.truth[*remembered_.graph.node_of(robot_.goal())];
-    if (!is_known(goal)) return;
-    if (!std::isfinite(goal.heading_rad)) goal.heading_rad = 0.0;
-    moment.goal = goal;
-  }
-
-  const RobotNavigator& robot_;
-  const simulation::RememberedPlace& remembered_;
-  FieldOptions field_;
-  std::optional<Image> picture_;
-  std::optional<Panorama> panorama_;
-  std::vector<Pose2> plan_;
-  std::size_t number_ = 0;
-  std::optional<ViewId> shown_goal_;
-  StageClock clock_;
-};
-
-/// The remembered view nearest to where a viewer has clicked; empty where none did, or no way leads
-/// there.
-std::optional<ViewId> goal_as_wished(RobotNavigator& robot,
-                                     const simulation::RememberedPlace& remembered,
-                                     RunRecord& record, Session& session) {
-  const auto wish = record.take_wish();
-  if (!wish) return std::nullopt;
-  std::optional<std::size_t> nearest;
-  double min_m = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < remembered.truth.size(); ++i) {
-    const double away_m = distance(remembered.truth[i].position(), wish->position());
-    if (robot.graph().exits(i).empty() || !(away_m < min_m)) continue;
-    nearest = i;
-    min_m = away_m;
-  }
-  if (!nearest) return std::nullopt;
-  const ViewId view = robot.graph().view(*nearest);
-  const std::string name = robot.info(view).name;
-  robot.set_goal(name);
-  session.note("a viewer sends the robot to " + to_readable_line(name));
-  return view;
-}
-
 // Writes the log, the picture and the report that were asked for.
 void write_results(const NavigateArguments& wanted, const simulation::MissionPlace& place,
                    const simulation::RememberedPlace& remembered, ViewId goal,
@@ -408,7 +269,7 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
   if (robot.memory().header().source.kind != PictureKind::mirror) {
     arguments.refuse_unused({"--vignetting"}, "on the panoramas of this memory");
   }
-  const simulation::RememberedPlace remembered = remembered_by(robot);
+  const simulation::RememberedPlace remembered = simulation::make_remembered_place(robot);
   if (wanted.kidnap) require_known_goal(wanted, robot, remembered);
   if (wanted.report) prepare_report_folder(*wanted.report, "navigate");
   viewer::RunPage played("", 100);
@@ -416,11 +277,15 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
                    {.memory = wanted.memory, .takes = viewer::ViewWish::goal});
   if (wanted.report) record.also_into(played);
   MissionMoments moments(robot, remembered, wanted.mission.planner.field);
-  const simulation::MissionPlace place = place_as_remembered(
-      wanted.scene, wanted.simulation, robot, typed_options(arguments), session,
-      record.wanted()
-          ? [&](const Image& picture, const Panorama& panorama) { moments.saw(picture, panorama); }
-          : SightReport());
+  simulation::ImageReport report;
+  if (record.wanted()) {
+    report = [&](const Image& image, const Panorama& panorama) {
+      moments.set_image(image, panorama);
+    };
+  }
+  const simulation::MissionPlace place = simulation::make_mission_place(
+      wanted.scene, wanted.simulation, robot, typed_options(arguments), session.executor(), report);
+  for (const auto& warning : place.scene.warnings) session.note("warning: " + warning);
   const auto seed = static_cast<std::uint64_t>(wanted.simulation.simulation.scene.seed);
   const simulation::Mission mission = mission_of(wanted, robot.goal(), place, seed);
   if (!session.json()) {
@@ -430,8 +295,8 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
       place, remembered, robot.navigator(), mission, wanted.mission, seed,
       [&](const NavigationDecision& decision, const Pose2& pose) {
         if (record.wanted()) {
-          record.add(moments.of(decision, pose, place.scene));
-          moments.restart();
+          record.add(moments.make(decision, pose, place.scene));
+          moments.restart_clock();
         }
         if (session.json()) {
           session.print(json_line(as_json(decision, pose, robot)));
@@ -439,7 +304,7 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
           session.print(as_text(decision, robot));
         }
       },
-      [&] { return goal_as_wished(robot, remembered, record, session); });
+      [&] { return set_goal_of_viewer(robot, remembered, record, session); });
   record.close();
   const std::string goal_file = robot.info(robot.goal()).name;  // a viewer may have changed it
   write_results(wanted, place, remembered, robot.goal(), goal_file, run, played);
@@ -513,9 +378,8 @@ Run declare_navigate(Arguments& arguments) {
 Verb navigate_verb() {
   return {"navigate", "Send a simulated robot to a remembered view, by what it sees alone",
           "The robot sees as the memory's views were seen. Poses in the memory only say how far "
-          "from the\n"
-          "goal it ended, and which views lie beside a --route. The exit code is 1 unless the "
-          "robot arrives: blocked, lost or unreachable.",
+          "from the goal it ended, and which views lie beside a --route. The exit code is 1 unless "
+          "the robot arrives: blocked, lost or unreachable.",
           "  panonav navigate office.panonav --goal view_00012.png --scene office --report "
           "mission\n"
           "  panonav navigate office.panonav --goal 3 --scene office --light 0.7 --moved-objects "

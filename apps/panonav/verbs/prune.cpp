@@ -1,12 +1,7 @@
 #include <algorithm>
 #include <map>
-#include <memory>
 
-#include "cli/arguments.hpp"
-#include "cli/json.hpp"
-#include "cli/session.hpp"
 #include "cli/verbs.hpp"
-#include "panonav/core/error.hpp"
 #include "panonav/mapping/sparse_memory.hpp"
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
@@ -142,13 +137,10 @@ Run declare_prune(Arguments& arguments) {
 
 Verb prune_verb() {
   return {"prune", "Keep one view of places where views hardly change",
-          "A view is dropped when a newer one that is kept differs from it by no more than\n"
+          "A view is dropped when a newer one that is kept differs from it by no more than "
           "--max-difference and was taken near it. The verb says by how much the memory shrinks "
-          "and how "
-          "far the\n"
-          "reference that is found for a dropped view is from it, before and after. panonav undo "
-          "brings\n"
-          "dropped views back.",
+          "and how far the reference that is found for a dropped view is from it, before and "
+          "after. panonav undo brings dropped views back.",
           "  panonav prune office.panonav --dry-run\n"
           "  panonav prune office.panonav --max-difference 0.02\n"
           "  panonav prune office.panonav --outdated-within-m 0.3",

@@ -1,10 +1,4 @@
-#include <memory>
-
-#include "cli/arguments.hpp"
-#include "cli/json.hpp"
-#include "cli/session.hpp"
 #include "cli/verbs.hpp"
-#include "panonav/core/error.hpp"
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/named_view.hpp"
 
@@ -65,7 +59,7 @@ Run declare_rename(Arguments& arguments) {
 
 Verb rename_verb() {
   return {"rename", "Give a view or a route of a memory another name",
-          "Its id, links and place in maps stay. A recording that holds the picture under the\n"
+          "Its id, links and place in maps stay. A recording that holds the picture under the "
           "former name would be memorised as another view. panonav undo takes it back.",
           "  panonav rename office.panonav view_00012.png door\n"
           "  panonav rename office.panonav route to_the_lab --route",

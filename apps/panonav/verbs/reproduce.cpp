@@ -1,13 +1,8 @@
 #include <algorithm>
-#include <memory>
-#include <string>
 
-#include "cli/arguments.hpp"
-#include "cli/session.hpp"
 #include "cli/verbs.hpp"
-#include "panonav/core/error.hpp"
-#include "verbs/reproduce_all.hpp"
-#include "verbs/reproduced_paper.hpp"
+#include "runs/reproduce_all.hpp"
+#include "runs/reproduced_paper.hpp"
 
 namespace panonav::command {
 
@@ -111,9 +106,8 @@ Run declare_reproduce(Arguments& arguments) {
                    "elsewhere, m03, m04: rows of the views" + fallback(m03.rows) + ")");
   arguments.option("--data FOLDER", wanted->data,
                    "elsewhere, f11, m03, navigation, s06, y03: folder with the recordings and "
-                   "Gazebo worlds (default: the "
-                   "environment's "
-                   "PANONAV_DATA; without it they are left out)");
+                   "Gazebo worlds (default: the environment's PANONAV_DATA; without it they are "
+                   "left out)");
   const auto parts = lab::tracking_reproduction_parts();
   arguments.choice("--only", wanted->only, {parts.begin(), parts.end()},
                    "m03: this part of the experiments (default: all)");

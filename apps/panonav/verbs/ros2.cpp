@@ -1,16 +1,11 @@
 #include <algorithm>
 #include <atomic>
-#include <memory>
 
-#include "cli/arguments.hpp"
-#include "cli/session.hpp"
 #include "cli/stop_signals.hpp"
 #include "cli/verbs.hpp"
-#include "panonav/core/error.hpp"
-#include "panonav/core/text.hpp"
 #include "panonav_ros2/localisation_node.hpp"
 #include "panonav_ros2/ros_arguments.hpp"
-#include "verbs/recording.hpp"
+#include "runs/recording.hpp"
 
 namespace panonav::command {
 
@@ -20,7 +15,7 @@ struct Ros2Arguments {
   std::vector<std::string> remappings;
   std::string memory;
   std::optional<int> domain;
-  bool learn = false;
+  bool teach = false;
   std::optional<std::string> route;
   PictureArguments pictures;
   ros2::TeacherOptions teacher;
@@ -101,7 +96,7 @@ ExitCode run_node(Ros2Arguments& wanted, Session& session) {
     const auto [from, to] = ros2::remapping_of(text);
     wanted.setup.participant.remappings.insert_or_assign(from, to);
   }
-  if (wanted.learn) {
+  if (wanted.teach) {
     const auto pictures = picture_source(wanted.pictures);
     if (!pictures) throw UsageError("say what the pictures show with --kind");
     wanted.setup.teacher = wanted.teacher;
@@ -117,14 +112,14 @@ ExitCode run_node(Ros2Arguments& wanted, Session& session) {
   ros2::LocalisationNode node(wanted.setup, [&](const std::string& line) { session.note(line); });
   running = &node;
   if (stopped) return ExitCode::done;
-  session.note("panonav ros2: " + wanted.memory + (wanted.learn ? " is learnt" : " is loaded") +
+  session.note("panonav ros2: " + wanted.memory + (wanted.teach ? " is taught" : " is loaded") +
                "; the node listens");
   node.run();
   running = nullptr;
   const auto counts = node.counts();
   session.note(std::to_string(counts.pictures) + " pictures, localised at " +
                std::to_string(counts.localised) + ", " +
-               (wanted.learn ? std::to_string(counts.learnt) + " views learnt, " : "") +
+               (wanted.teach ? std::to_string(counts.taught) + " views taught, " : "") +
                std::to_string(counts.dropped) + " came too fast and were dropped, " +
                std::to_string(counts.notes) + " warnings");
   return ExitCode::done;
@@ -136,9 +131,9 @@ Run declare_ros2(Arguments& arguments) {
   arguments.positional("MEMORY", wanted->memory, "Memory file");
   arguments.optional_positionals("REMAPPING", wanted->remappings,
                                  "Names of topics, FROM:=TO: image:=/camera/image_raw");
-  arguments.flag("--learn", wanted->learn,
+  arguments.flag("--teach", wanted->teach,
                  "Make MEMORY, a new file, of the first drive, until ~/command says finish");
-  arguments.option("--route NAME", wanted->route, "With --learn: record the drive as this route");
+  arguments.option("--route NAME", wanted->route, "With --teach: record the drive as this route");
   arguments.option("--node-name NAME", setup.participant.node, "Name of the node");
   arguments.option("--namespace NAME", setup.participant.name_space, "Namespace of the node");
   arguments.option("--domain-id", wanted->domain, 0,
@@ -158,7 +153,7 @@ Run declare_ros2(Arguments& arguments) {
   arguments.used_only(
       {"--route", "--kind", "--camera", "--columns-run", "--forward-column", "--elevation-deg",
        "[signature]", "[preprocessing]"},
-      [wanted] { return wanted->learn; }, "without --learn");
+      [wanted] { return wanted->teach; }, "without --teach");
   arguments.common({"--motion", "--pictures", "--use-sim-time"});
   arguments.uncommon({"--node-name", "--domain-id", "--map-frame", "--odom-frame", "--base-frame"});
   return [wanted](Session& session) { return run_node(*wanted, session); };
@@ -171,10 +166,9 @@ Verb ros2_verb() {
           "Localise a robot as a ROS 2 node, without an installed ROS",
           "Listens to image, odom, initialpose and goal_pose; sends map -> odom on /tf, and pose, "
           "particles, references, best match and diagnostics, on the way to a goal cmd_vel. Any "
-          "ROS 2 distribution on the network sees the "
-          "node (docs/ros2.md). Ends on Ctrl-C.",
+          "ROS 2 distribution on the network sees the node (docs/ros2.md). Ends on Ctrl-C.",
           "  panonav ros2 office.panonav image:=/camera/image_raw\n"
-          "  panonav ros2 new.panonav --learn --kind mirror --camera mirror.toml --elevation-deg "
+          "  panonav ros2 new.panonav --teach --kind mirror --camera mirror.toml --elevation-deg "
           "-25 35\n"
           "  panonav ros2 office.panonav --pictures compressed --use-sim-time true",
           declare_ros2,

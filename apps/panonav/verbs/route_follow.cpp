@@ -1,11 +1,7 @@
 #include <array>
 #include <filesystem>
-#include <memory>
 
-#include "cli/json.hpp"
-#include "cli/session.hpp"
 #include "cli/verbs.hpp"
-#include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/trajectory_file.hpp"
@@ -13,9 +9,9 @@
 #include "panonav_viewer/page.hpp"
 #include "reports/report_page.hpp"
 #include "reports/route_report.hpp"
-#include "verbs/followed_run.hpp"
-#include "verbs/recording.hpp"
-#include "verbs/run_record.hpp"
+#include "runs/followed_run.hpp"
+#include "runs/recording.hpp"
+#include "runs/run_record.hpp"
 
 namespace panonav::command {
 
@@ -233,13 +229,10 @@ Run declare_route_follow(Arguments& arguments) {
 Verb route_follow_verb() {
   return {"route follow", "Say where a robot is beside a remembered route, to the centimetre",
           "Position and heading come from what the route shows at the robot's place, also between "
-          "and\n"
-          "beside the remembered lines. Odometry predicts where the data set has it; where the "
-          "prediction\n"
-          "does not hold the robot is looked for around it, then on the whole route. Parts of the "
-          "scene\n"
-          "that are not as remembered are left out and named. The exit code is 1 when no picture "
-          "is on the route.",
+          "and beside the remembered lines. Odometry predicts where the data set has it; where the "
+          "prediction does not hold the robot is looked for around it, then on the whole route. "
+          "Parts of the scene that are not as remembered are left out and named. The exit code is "
+          "1 when no picture is on the route.",
           "  panonav route follow office.panonav repeat_run\n"
           "  panonav route follow office.panonav repeat_run --report followed\n"
           "  panonav route follow office.panonav repeat_run --no-odometry --json",

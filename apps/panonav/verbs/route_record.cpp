@@ -1,12 +1,8 @@
 #include <algorithm>
 #include <charconv>
 #include <filesystem>
-#include <memory>
 
-#include "cli/json.hpp"
-#include "cli/session.hpp"
 #include "cli/verbs.hpp"
-#include "panonav/core/error.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/pipeline/route_recorder.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
@@ -15,8 +11,8 @@
 #include "panonav_recordings/recording.hpp"
 #include "reports/report_page.hpp"
 #include "reports/route_report.hpp"
-#include "verbs/memorising.hpp"
-#include "verbs/recording.hpp"
+#include "runs/memorising.hpp"
+#include "runs/recording.hpp"
 
 namespace panonav::command {
 
@@ -200,10 +196,8 @@ Verb route_record_verb() {
       "route record", "Remember a route as one line of pixels a step",
       "The route holds what the camera sees at its own height, a byte a degree, from every place "
       "of the way: a few megabytes a kilometre. Lines are on the disk batch by batch; after an "
-      "interruption the "
-      "same\n"
-      "command goes on where it stopped, and a drive that goes on where the route ends makes it "
-      "longer.",
+      "interruption the same command goes on where it stopped, and a drive that goes on where the "
+      "route ends makes it longer.",
       "  panonav route record teach_run office.panonav\n"
       "  panonav route record teach_run office.panonav --name corridor --odometry --report "
       "corridor",

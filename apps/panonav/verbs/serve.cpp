@@ -2,20 +2,13 @@
 #include <condition_variable>
 #include <filesystem>
 #include <fstream>
-#include <memory>
 #include <mutex>
-#include <vector>
 
-#include "cli/arguments.hpp"
-#include "cli/json.hpp"
-#include "cli/session.hpp"
 #include "cli/stop_signals.hpp"
 #include "cli/verbs.hpp"
-#include "panonav/core/error.hpp"
-#include "panonav/core/text.hpp"
 #include "panonav/storage/memory_address.hpp"
 #include "panonav_server/localisation_server.hpp"
-#include "verbs/listening_place.hpp"
+#include "runs/listening_place.hpp"
 
 namespace panonav::command {
 
@@ -125,11 +118,10 @@ Run declare_serve(Arguments& arguments) {
 Verb serve_verb() {
   return {
       "serve", "Answer over HTTP where pictures were taken",
-      "Clients POST a PNG or JPEG to /v1/memories/NAME/localise and get the JSON of localise.\n"
-      "GET /v1/memories lists the memories, /health tells whether the server is ready, /metrics "
-      "is\n"
-      "for Prometheus. A memory whose file changes is read again. There is no encryption: put a\n"
-      "proxy that has it before a server that others than you can reach.",
+      "Clients POST a PNG or JPEG to /v1/memories/NAME/localise and get the JSON of localise. GET "
+      "/v1/memories lists the memories, /health tells whether the server is ready, /metrics is for "
+      "Prometheus. A memory whose file changes is read again. There is no encryption: put a proxy "
+      "that has it before a server that others than you can reach.",
       "  panonav serve office.panonav\n"
       "  panonav serve office.panonav hall=monday.panonav --listen 8090\n"
       "  panonav serve office.panonav --listen 0.0.0.0:8080 --token-file token.txt",

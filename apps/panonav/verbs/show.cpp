@@ -1,12 +1,7 @@
 #include <algorithm>
 #include <array>
-#include <memory>
 
-#include "cli/arguments.hpp"
-#include "cli/json.hpp"
-#include "cli/session.hpp"
 #include "cli/verbs.hpp"
-#include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/mapping/topological_map.hpp"

@@ -1,18 +1,13 @@
 #include <cmath>
 #include <filesystem>
-#include <memory>
 
-#include "cli/json.hpp"
-#include "cli/session.hpp"
 #include "cli/stop_signals.hpp"
 #include "cli/verbs.hpp"
-#include "panonav/core/error.hpp"
-#include "panonav/core/text.hpp"
 #include "panonav/io/panorama_reader.hpp"
 #include "panonav/io/trajectory_file.hpp"
 #include "runs/ros2_robot.hpp"
-#include "verbs/run_record.hpp"
-#include "verbs/simulated_recording.hpp"
+#include "runs/run_record.hpp"
+#include "runs/simulated_recording.hpp"
 
 namespace panonav::command {
 

@@ -1,14 +1,9 @@
 #include <algorithm>
 #include <array>
-#include <memory>
 #include <optional>
 #include <utility>
 
-#include "cli/arguments.hpp"
-#include "cli/json.hpp"
-#include "cli/session.hpp"
 #include "cli/verbs.hpp"
-#include "panonav/core/error.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
 #include "panonav_fleet/memory_synchronisation.hpp"
 
@@ -127,11 +122,11 @@ Run declare_synchronise(Arguments& arguments) {
 Verb synchronise_verb() {
   return {
       "synchronise", "Bring a robot's memory file and a memory on a server to the same views",
-      "Uploads what the file has and the server lacks, each view once, and takes what others\n"
-      "did since: views with pictures and features, poses, names, removals and links. What the\n"
-      "server acknowledged first holds; a removal wins over a change; two replacements of one\n"
-      "view stand beside each other; a name that another view has becomes ROBOT/NAME. Maps,\n"
-      "routes and what was learnt stay with the file. When the link breaks nothing is lost or\n"
+      "Uploads what the file has and the server lacks, each view once, and takes what others "
+      "did since: views with pictures and features, poses, names, removals and links. What the "
+      "server acknowledged first holds; a removal wins over a change; two replacements of one "
+      "view stand beside each other; a name that another view has becomes ROBOT/NAME. Maps, "
+      "routes and what was learnt stay with the file. When the link breaks nothing is lost or "
       "doubled: the same command goes on (docs/scale.md).",
       "  panonav synchronise robot.panonav 'postgresql://robots.example/panonav?memory=office'\n"
       "  panonav synchronise robot.panonav ADDRESS --around 12.5 40 --within-m 60 --json",

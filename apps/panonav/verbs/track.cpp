@@ -2,25 +2,18 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <memory>
-#include <span>
 #include <utility>
 
-#include "cli/arguments.hpp"
-#include "cli/json.hpp"
-#include "cli/session.hpp"
 #include "cli/verbs.hpp"
-#include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
-#include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/trajectory_file.hpp"
 #include "reports/report_page.hpp"
 #include "reports/track_report.hpp"
-#include "verbs/live_run.hpp"
-#include "verbs/recording.hpp"
-#include "verbs/run_record.hpp"
-#include "verbs/tracked_run.hpp"
+#include "runs/live_run.hpp"
+#include "runs/recording.hpp"
+#include "runs/run_record.hpp"
+#include "runs/tracked_run.hpp"
 
 namespace panonav::command {
 
@@ -427,10 +420,8 @@ Run declare_track(Arguments& arguments) {
 Verb track_verb() {
   return {
       "track", "Follow a moving robot through its pictures and odometry",
-      "Monte-Carlo localisation: the robot need not know where it starts, several places that "
-      "look\n"
-      "alike are kept until a picture tells them apart, and a robot that was kidnapped is "
-      "found\n"
+      "Monte-Carlo localisation: the robot need not know where it starts, several places that look "
+      "alike are kept until a picture tells them apart, and a robot that was kidnapped is found "
       "again. A live source is followed until Ctrl-C. The exit code is 1 when the robot was never "
       "localised.",
       "  panonav track office.panonav run\n"

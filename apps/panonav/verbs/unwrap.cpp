@@ -1,16 +1,12 @@
 #include <algorithm>
 #include <filesystem>
-#include <memory>
 
-#include "cli/json.hpp"
-#include "cli/session.hpp"
 #include "cli/verbs.hpp"
-#include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/io/panorama_reader.hpp"
 #include "panonav/pipeline/observation_source.hpp"
-#include "verbs/recording.hpp"
+#include "runs/recording.hpp"
 
 namespace panonav::command {
 

@@ -1,10 +1,4 @@
-#include <memory>
-
-#include "cli/arguments.hpp"
-#include "cli/json.hpp"
-#include "cli/session.hpp"
 #include "cli/verbs.hpp"
-#include "panonav/core/error.hpp"
 #include "panonav/storage/memory_file.hpp"
 
 namespace panonav::command {

@@ -109,19 +109,21 @@ struct LiveMemory::Implementation {
   Implementation(std::filesystem::path memory, const LiveMemoryOptions& wanted)
       : path(std::move(memory)), options(wanted) {
     const bool exists = memory_exists(path);
-    if (options.learn) {
+    if (options.add) {
+      if (options.areas) throw ContractError("areas", "given", "none of a memory that is added to");
       memoriser.emplace(path, options.memoriser);
       if (!options.in_step) storer.emplace(*memoriser);
-      if (exists && can_be_kept_true()) learner.emplace(path, options.update);
     } else if (!exists) {
-      throw FileError(without_passwords(path.string()),
-                      "is not there, and nothing is to be learnt");
+      throw FileError(without_passwords(path.string()), "is not there, and nothing is to be added");
+    }
+    if (options.update && exists && (!options.add || can_be_updated())) {
+      updater.emplace(path, options.update_options);
     }
     if (exists) recogniser = make_recogniser();
   }
 
   /// Other memories only grow.
-  [[nodiscard]] bool can_be_kept_true() {
+  [[nodiscard]] bool can_be_updated() {
     return memoriser->file()->info().views_with_heading >=
            static_cast<std::uint64_t>(ObservationModel::min_views);
   }
@@ -129,8 +131,10 @@ struct LiveMemory::Implementation {
   [[nodiscard]] std::unique_ptr<PlaceRecogniser> make_recogniser() const {
     PlaceRecogniserOptions wanted{.localiser = options.localiser,
                                   .source = options.memoriser.source};
-    if (options.learn || options.hold)
+    if (options.areas) wanted.areas = options.areas;
+    if (options.add || options.update || options.hold) {
       wanted.max_held_views = std::numeric_limits<std::size_t>::max();
+    }
     return std::make_unique<PlaceRecogniser>(path, wanted);
   }
 
@@ -162,14 +166,14 @@ struct LiveMemory::Implementation {
   LiveMemoryOptions options;
   std::optional<Memoriser> memoriser;  // the thread of `storer` uses it, where there is one
   std::optional<Storer> storer;
-  std::optional<MemoryLearner> learner;  // of the views that were there at first
+  std::optional<MemoryUpdater> updater;  // of the views that were there at first
   std::unique_ptr<PlaceRecogniser> recogniser;
   std::optional<Panorama> panorama;  // of the observation `answered`
   std::string answered;
   /// Views that the recogniser has not learnt from.
   std::vector<std::pair<ReferenceInfo, PackedSignature>> added;
   std::optional<double> last_added_s;
-  std::size_t learnt = 0;
+  std::size_t added_since_start = 0;
   std::future<std::unique_ptr<PlaceRecogniser>> next;  // its thread reads the members above
 };
 
@@ -181,7 +185,7 @@ LiveMemory& LiveMemory::operator=(LiveMemory&&) noexcept = default;
 
 LiveMemory::Answer LiveMemory::answer(const Observation& observation) {
   auto& self = *implementation_;
-  if (self.options.learn) self.refresh();
+  if (self.options.add) self.refresh();
   Answer answer;
   self.panorama.reset();
   if (self.recogniser) {
@@ -193,24 +197,24 @@ LiveMemory::Answer LiveMemory::answer(const Observation& observation) {
     answer.place = self.recogniser->localise(unwrapped(observation, *self.panorama));
   }
   bool is_placed_later = false;
-  if (self.learner && answer.place && observation.odometry) {
-    self.learner->see(observation, *self.panorama, *answer.place);
-    is_placed_later = self.learner->is_near_known_place();
+  if (self.updater && answer.place && observation.odometry) {
+    self.updater->see(observation, *self.panorama, *answer.place);
+    is_placed_later = self.updater->is_near_known_place();
   }
   const bool due = !self.last_added_s || !observation.stamp_s ||
                    *observation.stamp_s - *self.last_added_s >= self.options.min_interval_s ||
                    *observation.stamp_s < *self.last_added_s;  // the clock was set back
   const bool stored =
-      self.options.learn && self.recogniser && self.recogniser->memory().find(observation.name);
+      self.options.add && self.recogniser && self.recogniser->memory().find(observation.name);
   const bool full = self.storer && self.storer->waiting() >= max_waiting;
-  answer.is_new = self.options.learn && due && !stored && !full && !is_placed_later &&
+  answer.is_new = self.options.add && due && !stored && !full && !is_placed_later &&
                   !(answer.place && answer.place->known);
   return answer;
 }
 
-void LiveMemory::learn(Observation observation) {
+void LiveMemory::add(Observation observation) {
   auto& self = *implementation_;
-  if (!self.memoriser) throw ContractError("learn", "off", "on, to add views");
+  if (!self.memoriser) throw ContractError("add", "off", "on, to add views");
   self.last_added_s = observation.stamp_s;
   const auto store = [&](Observation view) {
     if (self.storer) {
@@ -232,7 +236,7 @@ void LiveMemory::learn(Observation observation) {
   } else {
     store(std::move(observation));
   }
-  ++self.learnt;
+  ++self.added_since_start;
 }
 
 const std::optional<Panorama>& LiveMemory::panorama() const noexcept {
@@ -247,18 +251,18 @@ std::size_t LiveMemory::views() const noexcept {
   return implementation_->recogniser ? implementation_->recogniser->size() : 0;
 }
 
-std::size_t LiveMemory::learnt() const noexcept {
-  return implementation_->learnt;
+std::size_t LiveMemory::added() const noexcept {
+  return implementation_->added_since_start;
 }
 
-std::optional<MemoryLearner::Changes> LiveMemory::finish(const std::string& what) {
+std::optional<MemoryUpdater::Changes> LiveMemory::finish(const std::string& what) {
   auto& self = *implementation_;
   if (self.next.valid()) self.next.wait();
   if (self.storer) self.storer->finish();
-  std::optional<MemoryLearner::Changes> changes;
-  if (self.learner) changes = self.learner->finish(what);
-  self.learner.reset();
-  if (self.learnt > 0) self.memoriser->finish();
+  std::optional<MemoryUpdater::Changes> changes;
+  if (self.updater) changes = self.updater->finish(what);
+  self.updater.reset();
+  if (self.added_since_start > 0) self.memoriser->finish();
   return changes;
 }
 

@@ -7,42 +7,45 @@
 #include <optional>
 
 #include "panonav/pipeline/memoriser.hpp"
-#include "panonav/pipeline/memory_learner.hpp"
+#include "panonav/pipeline/memory_updater.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
 
 namespace panonav {
 
-/// How a live memory answers and learns.
+/// How a live memory answers, and what it changes. Without `add` and `update` the file is only
+/// read.
 struct LiveMemoryOptions {
-  /// Add the views of places that the memory does not know, and keep those of known ones true
-  /// (`MemoryLearner`) where the memory has positions and headings and the observations odometry;
-  /// without it the file is only read.
-  bool learn = false;
-  MemoryUpdateOptions update;  ///< of views at known places
+  bool add = false;  ///< Add the views of places that the memory does not know.
+  /// Keep the views of known places true (`MemoryUpdater`) by observations with odometry. Where
+  /// views are added, too, a memory with few positions and headings only grows.
+  bool update = false;
+  MemoryUpdateOptions update_options;  ///< of views at known places
   /// Between two views that are added: until the memory has learnt from a view, those after it look
   /// as new as it did. Of observations with stamps.
   double min_interval_s = 0.5;
-  /// Store views, and learn from them, before the next observation is answered, so that the same
-  /// observations give the same bits; otherwise both happen beside the answers, on threads that
-  /// stand back for them.
+  /// Store views, and learn models from them, before the next observation is answered, so that the
+  /// same observations give the same bits; otherwise both happen beside the answers, on threads
+  /// that stand back for them.
   bool in_step = false;
   MemoriserOptions memoriser;  ///< of views that are added; its source serves for both
   LocaliserOptions localiser;  ///< of the answers
+  /// Also tell the area where the robot may be (`PlaceRecogniserOptions::areas`); not with `add`.
+  std::optional<LocalisationAccuracy> areas;
   /// Hold a large memory on a server, too (`PlaceRecogniserOptions::max_held_views`). A memory that
-  /// is learnt from is always held.
+  /// is added to or updated is always held.
   bool hold = false;
 };
 
 /// Memorises and localises in one go, for robots that come to new places:
-///   panonav::LiveMemory memory("walk.panonav", {.learn = true, .memoriser = {.source = source}});
+///   panonav::LiveMemory memory("walk.panonav", {.add = true, .memoriser = {.source = source}});
 ///   while (auto seen = source.next()) use(memory.answer(*seen));
 ///   memory.finish();
 /// A view that was added is found from the next observation on. What is learnt of all views (models
 /// of places and positions) is learnt anew whenever a quarter of them is new.
 class LiveMemory {
  public:
-  /// Throws as `Memoriser` and `PlaceRecogniser`; FileError when there is no file and nothing is to
-  /// be learnt.
+  /// Throws as `Memoriser`, `MemoryUpdater` and `PlaceRecogniser`; FileError when there is no file
+  /// and nothing is to be added; ContractError on areas of a memory that is added to.
   explicit LiveMemory(std::filesystem::path memory, const LiveMemoryOptions& options = {});
   ~LiveMemory();
   /// What is left of the other may only be destroyed or assigned to.
@@ -54,19 +57,19 @@ class LiveMemory {
     /// Empty as long as there is no memory to ask: a new one begins with
     /// `Memoriser::scale_views` views.
     std::optional<Place> place;
-    /// The place was new, and `learn` adds the observation as a view.
+    /// The place was new, and `add` adds the observation as a view.
     bool is_new = false;
     std::chrono::steady_clock::duration unwrapping{};  ///< how long it took
   };
-  /// Does not write: what is to be added waits for `learn`. Throws as `PlaceRecogniser::localise`.
+  /// Does not write: what is to be added waits for `add`. Throws as `PlaceRecogniser::localise`.
   [[nodiscard]] Answer answer(const Observation& observation);
   /// Adds the observation that was answered last where its place was new. With an own name; in step
   /// a view is on the disk when this returns, but for the first ones of a new file, and otherwise
   /// soon after: while `max_waiting` views wait for a slow disk, no observation is new. Throws as
   /// `Memoriser::add`, also about views of earlier calls.
-  void learn(Observation observation);
+  void add(Observation observation);
   static constexpr std::size_t max_waiting = 8;  ///< Views that wait for the disk at most.
-  /// Of the observation that was answered last, until it is learnt; empty as long as there is no
+  /// Of the observation that was answered last, until it is added; empty as long as there is no
   /// memory to ask.
   [[nodiscard]] const std::optional<Panorama>& panorama() const noexcept;
 
@@ -75,11 +78,11 @@ class LiveMemory {
   /// Views that can be found now, and those that were added.
   [[nodiscard]] std::size_t views() const noexcept;
   /// Views that were added since the start, those that wait included.
-  [[nodiscard]] std::size_t learnt() const noexcept;
+  [[nodiscard]] std::size_t added() const noexcept;
   /// Writes what still waits, changes what the run has shown to have changed, and keeps what is
   /// learnt in the file. Nothing where nothing was added and no place was certain. `what`: the run,
-  /// for the history. Throws as `learn`. Gives what was kept true; empty where nothing could be.
-  std::optional<MemoryLearner::Changes> finish(const std::string& what = "learn");
+  /// for the history. Throws as `add`. Gives what was kept true; empty where nothing could be.
+  std::optional<MemoryUpdater::Changes> finish(const std::string& what = "update");
 
  private:
   struct Implementation;

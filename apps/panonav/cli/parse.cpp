@@ -1,0 +1,186 @@
+#include <algorithm>
+
+#include "cli/option_values.hpp"
+#include "cli/texts.hpp"
+#include "cli/verbs.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+/// "route record": a verb of two words; the second one is empty where there is none.
+std::pair<std::string_view, std::string_view> words_of(std::string_view verb) {
+  const std::size_t blank = verb.find(' ');
+  if (blank == std::string_view::npos) return {verb, {}};
+  return {verb.substr(0, blank), verb.substr(blank + 1)};
+}
+
+/// All verbs of two words that begin with this one.
+std::vector<std::string_view> verbs_beginning_with(std::span<const Verb> verbs,
+                                                   std::string_view first) {
+  std::vector<std::string_view> found;
+  for (const auto& verb : verbs) {
+    const auto words = words_of(verb.name);
+    if (words.first == first && !words.second.empty()) found.push_back(verb.name);
+  }
+  return found;
+}
+
+bool asks_for_help(std::string_view word) {
+  return word == "-h" || word == "--help" || word == "--help-all";
+}
+
+}  // namespace
+
+const Verb* verb_in(std::span<const Verb> verbs, std::span<const std::string> words) {
+  for (const auto& verb : verbs) {
+    const auto [first, second] = words_of(verb.name);
+    if (words.empty() || (first != words[0] && (verb.alias.empty() || verb.alias != words[0]))) {
+      continue;
+    }
+    if (second.empty() || (words.size() > 1 && second == words[1])) return &verb;
+  }
+  return nullptr;
+}
+
+const Verb& required_verb(std::span<const Verb> verbs, std::span<const std::string> words) {
+  if (const Verb* verb = verb_in(verbs, words)) return *verb;
+  if (words.empty()) throw UsageError("a verb is missing");
+  const auto longer = verbs_beginning_with(verbs, words[0]);
+  if (!longer.empty() && words.size() == 1) {
+    throw UsageError("'" + words[0] + "' wants a second word: " + listed(longer));
+  }
+  const std::string typed = longer.empty() ? words[0] : words[0] + " " + words[1];
+  if (looks_like_flag(typed)) throw UsageError("no such option: " + typed + "; a verb is missing");
+  std::vector<std::string_view> names;
+  for (const auto& verb : verbs) {
+    names.push_back(verb.name);
+    if (!verb.alias.empty()) names.push_back(verb.alias);
+  }
+  if (words.size() > 1) {  // the second word is part of what was meant, or is an argument
+    const std::string both = words[0] + " " + words[1];
+    if (const auto meant = suggest_name(both, names); !meant.empty()) {
+      throw UsageError("'" + both + "' is no verb" + meant);
+    }
+  }
+  throw UsageError("'" + typed + "' is no verb" +
+                   (longer.empty() ? suggest_name(typed, names) : "; allowed: " + listed(longer)));
+}
+
+std::vector<std::string> verb_names() {
+  std::vector<std::string> names;
+  for (const auto& verb : all_verbs()) names.emplace_back(verb.name);
+  return names;
+}
+
+const Verb& named_verb(std::span<const Verb> verbs, const std::vector<std::string>& words) {
+  const Verb& verb = required_verb(verbs, words);
+  const std::size_t own = words_of(verb.name).second.empty() ? 1 : 2;
+  if (words.size() > own) throw UsageError("'" + words[own] + "' is one argument too many");
+  return verb;
+}
+
+ExitCode print_text(const std::string& text, Session& session) {
+  session.print(session.json() ? json_line(ordered_json{{"text", text}}) : text);
+  return ExitCode::done;
+}
+
+namespace {
+
+/// A verb with all that it takes; `run` refers to the arguments.
+struct Declared {
+  CommonArguments common;
+  Arguments arguments;
+  Run run;
+  std::size_t own = 0;   ///< arguments of this verb; those of every verb come behind them
+  bool ignored = false;  ///< --help is found before
+
+  [[nodiscard]] Description description(const Verb& verb) const {
+    Description description{verb, arguments.infos()};
+    for (std::size_t i = own; i < description.arguments.size(); ++i) {
+      description.arguments[i].of_every_verb = true;
+    }
+    return description;
+  }
+};
+
+std::shared_ptr<Declared> declare(const Verb& verb) {
+  auto declared = std::make_shared<Declared>();
+  auto& arguments = declared->arguments;
+  auto& common = declared->common;
+  declared->run = verb.declare(arguments);
+  declared->own = arguments.infos().size();
+  arguments.flag("--json", common.session.json, "Print results as JSON on standard output");
+  arguments.flag("-q,--quiet", common.session.quiet,
+                 "Print results and errors only: no progress, no notes, no \"Next:\"");
+  arguments.flag("-v,--verbose", common.session.verbose,
+                 "Say on standard error what is done, and how long it takes");
+  arguments.option("--threads", common.session.threads, 0, "Threads to use; 0 takes one per core");
+  arguments.option("--config FILE", common.config,
+                   "Read options from this TOML file; options typed here win over it");
+  arguments.flag("--config-template", common.config_template,
+                 "Print such a file with all options, their defaults and ranges, and stop");
+  arguments.flag("-h,--help", declared->ignored, "Print a short help and stop");
+  arguments.flag("--help-all", declared->ignored, "Print the help with all options and stop");
+  arguments.uncommon({"--threads", "--config", "--config-template"});
+  return declared;
+}
+
+ParsedCommand printing(std::string_view verb, std::string text) {
+  return {verb, {.threads = 1}, [text = std::move(text)](Session& session) {
+            session.print(text);
+            return ExitCode::done;
+          }};
+}
+
+}  // namespace
+
+Description describe(const Verb& verb) {
+  return declare(verb)->description(verb);
+}
+
+ParsedCommand parse(std::span<const Verb> verbs, std::span<const std::string> words) {
+  if (words.size() == 1 && words[0] == "--version") {
+    return printing({}, "panonav " PANONAV_VERSION);
+  }
+  if (!words.empty() && asks_for_help(words[0])) return printing({}, overview(verbs));
+  if (words.size() > 1 && asks_for_help(words[1])) {
+    const auto longer = verbs_beginning_with(verbs, words[0]);
+    if (!longer.empty()) return printing({}, "Verbs of two words: " + listed(longer));
+  }
+  const Verb& verb = required_verb(verbs, words);
+  const auto declared = declare(verb);
+  const std::size_t own_words = words_of(verb.name).second.empty() ? 1 : 2;
+  const auto behind = words.subspan(own_words);
+  const std::vector<std::string> rest = verb.translate == nullptr
+                                            ? std::vector<std::string>(behind.begin(), behind.end())
+                                            : verb.translate(behind, declared->arguments.infos());
+  for (const auto& word : rest) {
+    if (word == "--") break;
+    if (!asks_for_help(word)) continue;
+    return printing(verb.name, help_text(declared->description(verb), word == "--help-all"));
+  }
+  const bool wants_template = std::ranges::find(rest, "--config-template") != rest.end();
+  const auto& common = declared->common;
+  declared->arguments.read(rest, verb.name, wants_template);
+  if (common.session.quiet && common.session.verbose) {
+    throw UsageError("--quiet and --verbose exclude each other");
+  }
+  declared->arguments.resolve(common.config, [&] {
+    // One file may serve several verbs, so the sections of all of them are allowed in it.
+    std::vector<std::string> sections;
+    for (const auto& other : verbs) {
+      const auto more = declare(other)->arguments.sections();
+      sections.insert(sections.end(), more.begin(), more.end());
+    }
+    return sections;
+  });
+  if (wants_template) {
+    return printing(verb.name, declared->arguments.config_template(verb.name));
+  }
+  return {verb.name, common.session, [declared](Session& session) {
+            return declared->run(session);  // with its arguments still alive
+          }};
+}
+
+}  // namespace panonav::command

@@ -1,0 +1,145 @@
+#include "runs/followed_run.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "panonav/core/text.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/pipeline/observation_source.hpp"
+#include "runs/recording.hpp"
+#include "runs/shown_references.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+void describe(recordings::RunMoment& moment, const FollowedImage& image) {
+  moment.sure = image.fix.has_value();
+  moment.state = moment.sure ? "on the route" : "not on this route";
+  moment.truth.reset();  // a recording's poses may be in another frame than the route's
+  if (image.truth) {
+    moment.truth = {image.truth->x_m, image.truth->y_m, image.truth->heading_rad};
+  }
+  if (!image.fix) return;
+  moment.pose = image.fix->pose;
+  moment.covariance = image.fix->covariance;
+  moment.values = {{"origin", std::string(name_of(image.fix->origin))},
+                   {"along_m", format_fixed(image.fix->along_m, 3)},
+                   {"lateral_m", format_fixed(image.fix->lateral_m, 3)},
+                   {"correlation", format_fixed(image.fix->correlation, 4)},
+                   {"changed", std::to_string(image.changed.size())}};
+}
+
+}  // namespace
+
+void follow(RouteFollower& follower, const Dataset& run, const std::vector<Pose2>& truth,
+            int every_nth, const PanoramaReader* recorded, Executor& executor,
+            const std::function<void(FollowedImage&&)>& report) {
+  struct Seen {
+    std::vector<float> line;
+    std::optional<recordings::RunMoment> moment;
+  };
+  const auto every = static_cast<std::size_t>(every_nth);
+  make_in_order((run.entries.size() + every - 1) / every, executor,
+                [&](std::size_t i) {
+                  StageClock clock;
+                  const Observation observation = read_observation(run.entries[i * every]);
+                  clock.stage("reading");
+                  Seen seen{follower.encode(observation), std::nullopt};
+                  clock.stage("scanline");
+                  if (recorded == nullptr) return seen;
+                  seen.moment = recordings::moment_of(observation, i * every);
+                  seen.moment->panorama = recorded->convert(seen.moment->picture->view(),
+                                                            observation.tilt.value_or(Tilt{}));
+                  clock.stage("for viewers");
+                  clock.put(*seen.moment);
+                  return seen;
+                },
+                [&](std::size_t i, Seen&& seen) {
+                  const std::size_t index = i * every;
+                  const DatasetEntry& entry = run.entries[index];
+                  StageClock clock;
+                  RouteStep step = follower.step(std::move(seen.line), entry.odometry);
+                  clock.stage("matching");
+                  if (seen.moment) clock.put(*seen.moment);
+                  FollowedImage image{index,
+                                      entry.file,
+                                      entry.stamp_s,
+                                      std::move(step.line),
+                                      std::move(step.fix),
+                                      std::move(step.changed),
+                                      std::nullopt,
+                                      std::nullopt,
+                                      std::move(seen.moment)};
+                  const auto& route = follower.tracker().lines().poses();
+                  if (!truth.empty()) {
+                    image.truth = truth[index];
+                    image.true_place = project_onto_route(route, truth[index].position());
+                  }
+                  if (image.moment) {
+                    describe(*image.moment, image);
+                    if (i == 0) image.moment->plan.assign(route.begin(), route.end());
+                  }
+                  report(std::move(image));
+                });
+}
+
+FollowSummary summarise_follow(const std::vector<FollowedImage>& images, bool headings_known) {
+  FollowSummary summary;
+  summary.images = images.size();
+  for (const FollowedImage& image : images) {
+    if (!image.fix) continue;
+    ++summary.on_route;
+    switch (image.fix->origin) {
+      case RouteFix::Origin::prediction:
+        ++summary.predicted;
+        break;
+      case RouteFix::Origin::recovery:
+        ++summary.recovered;
+        break;
+      case RouteFix::Origin::search:
+        ++summary.searched;
+        break;
+    }
+    if (!image.truth) continue;
+    const Pose2& pose = image.fix->pose;
+    summary.position_m.push_back(distance(pose.position(), image.truth->position()));
+    summary.along_m.push_back(std::abs(image.fix->along_m - image.true_place->along_m));
+    summary.lateral_m.push_back(std::abs(image.fix->lateral_m - image.true_place->lateral_m));
+    if (headings_known) {
+      summary.heading_rad.push_back(
+          std::abs(angle_difference(pose.heading_rad, image.truth->heading_rad)));
+    }
+  }
+  return summary;
+}
+
+std::vector<std::pair<double, double>> changed_stretches(const std::vector<FollowedImage>& images) {
+  std::vector<std::pair<double, double>> stretches;
+  bool going_on = false;
+  for (const FollowedImage& image : images) {
+    const bool changed = image.fix && !image.changed.empty();
+    if (changed) {
+      const double along_m = image.fix->along_m;
+      if (!going_on) stretches.emplace_back(along_m, along_m);
+      stretches.back().first = std::min(stretches.back().first, along_m);
+      stretches.back().second = std::max(stretches.back().second, along_m);
+    }
+    going_on = changed;
+  }
+  return stretches;
+}
+
+std::string_view name_of(RouteFix::Origin origin) {
+  switch (origin) {
+    case RouteFix::Origin::prediction:
+      return "prediction";
+    case RouteFix::Origin::recovery:
+      return "recovery";
+    case RouteFix::Origin::search:
+      return "search";
+  }
+  return "search";
+}
+
+}  // namespace panonav::command

@@ -1,0 +1,29 @@
+#include "runs/listening_place.hpp"
+
+#include <arpa/inet.h>
+
+#include <charconv>
+
+#include "cli/arguments.hpp"
+#include "panonav/core/text.hpp"
+
+namespace panonav::command {
+
+ListeningPlace listening_place(std::string_view flag, const std::string& text) {
+  ListeningPlace place;
+  const std::size_t colon = text.rfind(':');
+  if (colon != std::string::npos) place.address = text.substr(0, colon);
+  const char* const from = text.data() + (colon == std::string::npos ? 0 : colon + 1);
+  const char* const to = text.data() + text.size();
+  const auto [end, error] = std::from_chars(from, to, place.port);
+  in_addr ignored{};
+  if (error != std::errc() || end != to || place.port < 0 || place.port > 65535 ||
+      inet_pton(AF_INET, place.address.c_str(), &ignored) != 1) {
+    throw UsageError(std::string(flag) + " is " + to_readable_line(text) +
+                     "; allowed: a port, 0 to 65535, or an IPv4 address of this machine with a " +
+                     "port, such as 192.168.1.5:8080");
+  }
+  return place;
+}
+
+}  // namespace panonav::command

@@ -1,0 +1,265 @@
+#include "runs/live_run.hpp"
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "cli/stop_signals.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/core/statistics.hpp"
+#include "panonav/core/text.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+/// Prints lines on a thread of its own. A reader that is slow does not hold up the robot: beyond
+/// `max_waiting` lines the oldest are left out and counted.
+class LinePrinter {
+ public:
+  LinePrinter(Session& session, bool wait)
+      : session_(session), wait_(wait), thread_([this] { work(); }) {}
+  ~LinePrinter() { finish(); }
+  LinePrinter(const LinePrinter&) = delete;
+  LinePrinter& operator=(const LinePrinter&) = delete;
+
+  void print(std::string line) {
+    std::unique_lock lock(mutex_);
+    if (wait_) printed_.wait(lock, [this] { return lines_.size() < max_waiting; });
+    if (lines_.size() == max_waiting) {
+      lines_.pop_front();
+      ++left_out_;
+    }
+    lines_.push_back(std::move(line));
+    came_.notify_one();
+  }
+  void finish() {
+    if (!thread_.joinable()) return;
+    {
+      const std::lock_guard lock(mutex_);
+      over_ = true;
+    }
+    came_.notify_one();
+    thread_.join();
+  }
+  [[nodiscard]] std::size_t left_out() const noexcept { return left_out_; }
+
+ private:
+  void work() {
+    std::unique_lock lock(mutex_);
+    while (true) {
+      came_.wait(lock, [this] { return over_ || !lines_.empty(); });
+      if (lines_.empty()) return;
+      const std::string line = std::move(lines_.front());
+      lines_.pop_front();
+      lock.unlock();
+      session_.print(line);
+      if (!wait_) session_.flush();
+      lock.lock();
+      printed_.notify_one();
+    }
+  }
+
+  static constexpr std::size_t max_waiting = 256;
+  Session& session_;
+  bool wait_;
+  std::mutex mutex_;
+  std::condition_variable came_;
+  std::condition_variable printed_;
+  std::deque<std::string> lines_;
+  std::size_t left_out_ = 0;
+  bool over_ = false;
+  std::thread thread_;
+};
+
+/// Says why pictures are skipped: of the first at once, of those after it at most a line a second.
+class SkipNotes {
+ public:
+  explicit SkipNotes(Session& session) : session_(session) {}
+  void add(const std::string& why) {
+    ++unsaid_;
+    const auto now = std::chrono::steady_clock::now();
+    if (now < next_) return;
+    next_ = now + std::chrono::seconds(1);
+    session_.note(
+        "skipped: " + (unsaid_ > 1 ? std::to_string(unsaid_) + " pictures, the last: " : "") +
+        to_readable_line(why));
+    unsaid_ = 0;
+  }
+
+ private:
+  Session& session_;
+  std::size_t unsaid_ = 0;
+  std::chrono::steady_clock::time_point next_;
+};
+
+/// Chooses pictures as `select_pictures` does, but one by one.
+class LiveSelection {
+ public:
+  explicit LiveSelection(const PictureSelection& wanted) : wanted_(wanted) {}
+  [[nodiscard]] bool takes(double stamp_s) {
+    if (!first_s_) first_s_ = stamp_s;
+    if (wanted_.from_s && stamp_s - *first_s_ < *wanted_.from_s) return false;
+    if (number_++ % static_cast<std::size_t>(wanted_.every) != 0) return false;
+    const bool near = taken_s_ && stamp_s >= *taken_s_ && wanted_.every_s &&
+                      stamp_s - *taken_s_ < *wanted_.every_s;
+    if (!near) taken_s_ = stamp_s;
+    return !near;
+  }
+  [[nodiscard]] bool ends(double stamp_s) const {
+    return wanted_.to_s && first_s_ && stamp_s - *first_s_ > *wanted_.to_s;
+  }
+
+ private:
+  PictureSelection wanted_;
+  std::optional<double> first_s_;
+  std::optional<double> taken_s_;
+  std::size_t number_ = 0;
+};
+
+double milliseconds(std::chrono::steady_clock::duration duration) {
+  return std::chrono::duration<double, std::milli>(duration).count();
+}
+
+}  // namespace
+
+void declare_live(Arguments& arguments, LiveArguments& live) {
+  arguments.option("--count N", live.count, 1, "End after this many pictures");
+  arguments.option("--camera-width", live.camera_width, 1, "Wanted width of a camera's pictures");
+  arguments.option("--camera-height", live.camera_height, 1,
+                   "Wanted height of a camera's pictures");
+  arguments.uncommon({"--count", "--camera-width", "--camera-height"});
+}
+
+std::unique_ptr<recordings::LiveObservations> open_live(
+    const Arguments& arguments, const std::string& input, const PictureArguments& pictures,
+    const std::optional<PictureSource>& remembered, const LiveArguments& live) {
+  arguments.refuse_unused(
+      {"--image-topic", "--odometry-topic", "--odometry-frames", "--imu-topic", "--recursive"},
+      "where " + input + " is a live source");
+  if (live.camera_width.has_value() != live.camera_height.has_value()) {
+    throw UsageError("--camera-width and --camera-height go together");
+  }
+  const auto stated = picture_source(pictures);
+  if (!stated && !remembered) {
+    throw UsageError("say what the pictures of " + input + " show with --kind");
+  }
+  recordings::LiveOptions options;
+  if (live.camera_width) options.size = ImageSize{*live.camera_width, *live.camera_height};
+  return std::make_unique<recordings::LiveObservations>(input, stated ? *stated : *remembered,
+                                                        options);
+}
+
+void refuse_live(const Arguments& arguments, const std::string& input, bool count) {
+  const std::string why = "where " + input + " is no live source";
+  arguments.refuse_unused({"--camera-width", "--camera-height"}, why);
+  if (count) arguments.refuse_unused({"--count"}, why);
+}
+
+std::string events_text(const LiveCounts& counts, std::size_t moments_left_out) {
+  std::string text;
+  const auto add = [&text](std::uint64_t count, const std::string& what) {
+    if (count > 0) text += ", " + std::to_string(count) + " " + what;
+  };
+  add(counts.skipped + counts.source.damaged, "could not be read");
+  add(counts.source.dropped, "came too fast and were dropped");
+  add(counts.source.interruptions, "interruptions of the source");
+  add(counts.lines_left_out, "lines were not printed for a slow reader");
+  add(moments_left_out, "moments were not recorded on a slow disk");
+  if (!counts.delays_ms.empty()) {
+    text += "; from arrival to answer " + format_fixed(quantile(counts.delays_ms, 0.5), 1) +
+            " ms median (decoding " + format_fixed(quantile(counts.decoding_ms, 0.5), 1) + "), " +
+            format_fixed(quantile(counts.delays_ms, 0.99), 1) + " ms in 99 %";
+  }
+  return text;
+}
+
+struct LiveRun::Implementation {
+  Implementation(ObservationSource& from, const PartArguments& part, const LiveArguments& wanted,
+                 Session& its_session)
+      : source(from),
+        live(dynamic_cast<recordings::LiveObservations*>(&from)),
+        selection(selection_of(part)),
+        count(wanted.count),
+        session(its_session),
+        printer(session, live == nullptr) {}
+
+  void add_delay() {
+    constexpr std::size_t max_kept = 100'000;
+    if (counts.delays_ms.size() < max_kept) {
+      counts.delays_ms.push_back(0.0);
+      counts.decoding_ms.push_back(0.0);
+    }
+    const std::size_t at = delays++ % max_kept;
+    const recordings::LiveObservations::Timing timing = live->timing();
+    counts.delays_ms[at] = milliseconds(std::chrono::steady_clock::now() - timing.arrived);
+    counts.decoding_ms[at] = milliseconds(timing.decoding);
+  }
+
+  ObservationSource& source;
+  recordings::LiveObservations* live;  // null: no live source
+  LiveSelection selection;
+  std::optional<int> count;
+  Session& session;
+  LiveCounts counts;
+  std::size_t delays = 0;
+  LinePrinter printer;
+};
+
+LiveRun::LiveRun(ObservationSource& source, const PartArguments& part, const LiveArguments& live,
+                 Session& session)
+    : implementation_(std::make_unique<Implementation>(source, part, live, session)) {}
+LiveRun::~LiveRun() = default;
+
+void LiveRun::take(const std::function<std::string(const Observation&)>& look,
+                   const std::function<void(Observation&&)>& keep) {
+  auto& self = *implementation_;
+  LiveCounts& counts = self.counts;
+  std::atomic<bool> stopped = false;
+  const StopSignals signals([&] {
+    stopped = true;
+    if (self.live != nullptr) self.live->live().stop();
+  });
+  SkipNotes notes(self.session);
+  while (!stopped && (!self.count || counts.pictures < static_cast<std::size_t>(*self.count))) {
+    std::optional<Observation> seen;
+    std::string line;
+    try {
+      seen = self.source.next();
+      if (!seen) break;
+      if (self.live != nullptr) {
+        if (self.selection.ends(*seen->stamp_s)) break;
+        if (!self.selection.takes(*seen->stamp_s)) continue;
+      }
+      ++counts.pictures;
+      line = look(*seen);
+    } catch (const Error& error) {
+      ++counts.skipped;
+      notes.add(error.what());
+      continue;
+    }
+    if (self.live != nullptr) self.add_delay();
+    if (!line.empty()) self.printer.print(std::move(line));
+    keep(std::move(*seen));
+  }
+  if (self.live != nullptr) self.live->live().stop();  // what comes from now on is not dropped
+}
+
+std::optional<double> LiveRun::decoding_ms() const {
+  if (implementation_->live == nullptr) return std::nullopt;
+  return milliseconds(implementation_->live->timing().decoding);
+}
+
+const LiveCounts& LiveRun::finish() {
+  auto& self = *implementation_;
+  self.printer.finish();
+  self.counts.lines_left_out = self.printer.left_out();
+  if (self.live != nullptr) self.counts.source = self.live->live().counts();
+  return self.counts;
+}
+
+}  // namespace panonav::command

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cli/arguments.hpp"
+#include "cli/session.hpp"
+#include "panonav_recordings/live_observations.hpp"
+#include "runs/recording.hpp"
+
+namespace panonav::command {
+
+/// What a user says of a live source.
+struct LiveArguments {
+  std::optional<int> camera_width;
+  std::optional<int> camera_height;
+  std::optional<int> count;  ///< pictures, then the run ends
+};
+
+/// Adds --count, --camera-width and --camera-height.
+void declare_live(Arguments& arguments, LiveArguments& live);
+
+/// A live source (`is_live`) whose pictures lie as the user says, or else as `remembered`: refuses
+/// what goes with recordings only. Throws UsageError, FileError.
+[[nodiscard]] std::unique_ptr<recordings::LiveObservations> open_live(
+    const Arguments& arguments, const std::string& input, const PictureArguments& pictures,
+    const std::optional<PictureSource>& remembered, const LiveArguments& live);
+/// Refuses what goes with live sources only; --count, too, where a verb ends with its input.
+void refuse_live(const Arguments& arguments, const std::string& input, bool count);
+
+/// What happened while observations were taken.
+struct LiveCounts {
+  std::size_t pictures = 0;
+  std::size_t skipped = 0;         ///< pictures that could not be read, or not be used
+  std::size_t lines_left_out = 0;  ///< for a slow reader
+  /// Of the last pictures of a live source, which may never end: from arrival to answer, and the
+  /// part of it that decoding took.
+  std::vector<double> delays_ms;
+  std::vector<double> decoding_ms;
+  recordings::LivePictures::Counts source;
+};
+
+/// ", 3 could not be read, 2 came too fast and were dropped": what was out of the ordinary.
+/// `moments_left_out`: of a record.
+[[nodiscard]] std::string events_text(const LiveCounts& counts, std::size_t moments_left_out);
+
+/// Takes observations one by one until their source ends, the user or the system asks the program
+/// to end (SIGINT, SIGTERM), or as many were taken as the user wants. What is printed of them never
+/// holds up a live source: a slow reader loses the oldest lines.
+class LiveRun {
+ public:
+  /// All must outlive *this. `part`: which pictures of a live source are taken; of others that is
+  /// already chosen.
+  LiveRun(ObservationSource& source, const PartArguments& part, const LiveArguments& live,
+          Session& session);
+  ~LiveRun();
+  LiveRun(const LiveRun&) = delete;
+  LiveRun& operator=(const LiveRun&) = delete;
+
+  /// Prints what `look` says of each observation, unless that is empty, then calls `keep`. An Error
+  /// of `look` skips the picture, one of `keep` ends the run.
+  void take(const std::function<std::string(const Observation&)>& look,
+            const std::function<void(Observation&&)>& keep);
+  /// Waits until all lines are printed: what is to be stored comes before.
+  const LiveCounts& finish();
+  /// How long the observation of now took to become pixels; empty where it is not a live one.
+  [[nodiscard]] std::optional<double> decoding_ms() const;
+
+ private:
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace panonav::command

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "cli/json.hpp"
+#include "cli/session.hpp"
+#include "reports/localise_report.hpp"
+
+namespace panonav::command {
+
+/// One object, as docs/formats.md describes it.
+[[nodiscard]] ordered_json as_json(const LocalisedQuery& answer, bool areas);
+/// The header of the CSV table (docs/formats.md).
+inline constexpr std::string_view csv_header =
+    "file,answer,known_probability,x_m,y_m,radius_m,heading_deg,best,dissimilarity,column_"
+    "difference,turn_deg,next,next_dissimilarity,next_column_difference,error\n";
+/// Returns its row; unknown values are empty.
+[[nodiscard]] std::string csv_row(const LocalisedQuery& answer);
+/// A line for people, and one for each area that was asked for.
+[[nodiscard]] std::string as_text(const LocalisedQuery& answer, Session& session);
+
+}  // namespace panonav::command

@@ -1,0 +1,403 @@
+#include "runs/localised_run.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <utility>
+
+#include "cli/json.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
+#include "panonav/io/atomic_file.hpp"
+#include "panonav/mapping/visual_odometry.hpp"
+#include "panonav/pipeline/live_memory.hpp"
+#include "panonav/pipeline/observation_source.hpp"
+#include "panonav/pipeline/route_follower.hpp"
+#include "panonav/pipeline/route_recorder.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
+#include "panonav/pipeline/visual_motion.hpp"
+#include "panonav/storage/memory_address.hpp"
+#include "panonav_recordings/recording.hpp"
+#include "reports/localise_report.hpp"
+#include "reports/report_page.hpp"
+#include "runs/localised_query.hpp"
+#include "runs/memorising.hpp"
+#include "runs/shown_references.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+/// Where the poses of a route's lines come from.
+enum class RoutePoses { known, odometry, images };
+
+/// Records a route beside the views that are added, once there is a memory.
+class RunRouteRecorder {
+ public:
+  RunRouteRecorder(std::string memory, PictureSource source, std::string name, RoutePoses poses)
+      : memory_(std::move(memory)), source_(std::move(source)), poses_(poses) {
+    options_.name = std::move(name);
+    options_.odometry = poses != RoutePoses::known;
+  }
+
+  void add(Observation observation, const LiveMemory& memory) {
+    const PlaceRecogniser* const recogniser = memory.recogniser();
+    if (recogniser == nullptr) return;
+    if (!recorder_) {
+      recorder_.emplace(MemoryFile::open(memory_, Access::read_write), source_, options_);
+    }
+    if (poses_ == RoutePoses::images) {
+      if (!odometry_) odometry_.emplace(visual_odometry(recogniser->memory()));
+      odometry_->add(OdometryView(recogniser->encoder().signature(observation)));
+      observation.odometry = odometry_->pose();
+    }
+    if (recorder_->add(observation)) ++lines_;
+  }
+  /// Returns the number of lines that were recorded.
+  std::size_t finish() {
+    if (lines_ > 0) (void)recorder_->finish();
+    return lines_;
+  }
+
+ private:
+  std::string memory_;
+  PictureSource source_;
+  RoutePoses poses_;
+  RouteRecorderOptions options_;
+  std::optional<RouteRecorder> recorder_;
+  std::optional<VisualOdometry> odometry_;
+  std::size_t lines_ = 0;
+};
+
+RoutePoses route_poses(const Dataset& recording) {
+  const auto all = [&](const auto& has) { return std::ranges::all_of(recording.entries, has); };
+  if (all([](const DatasetEntry& e) { return e.pose && e.pose->heading_rad; })) {
+    return RoutePoses::known;
+  }
+  return all([](const DatasetEntry& e) { return e.odometry.has_value(); }) ? RoutePoses::odometry
+                                                                           : RoutePoses::images;
+}
+
+/// Motion that is read from images begins again each time, and so does the frame of its poses.
+void refuse_to_continue_route(const LocaliseArguments& arguments, RoutePoses poses) {
+  if (poses != RoutePoses::images || !memory_exists(arguments.memory)) return;
+  if (!MemoryFile::open(arguments.memory, Access::read_only).route(*arguments.route)) return;
+  throw UsageError("--route is " + *arguments.route + ", which " + arguments.memory +
+                   " holds already; allowed without odometry: a new name");
+}
+
+ordered_json as_json(const RouteStep& step) {
+  if (!step.fix) return {{"on_route", false}};
+  return {{"on_route", true},
+          {"pose", pose_json(step.fix->pose)},
+          {"along_m", step.fix->along_m},
+          {"lateral_m", step.fix->lateral_m},
+          {"correlation", step.fix->correlation}};
+}
+
+std::string as_text(const RouteStep& step, Session& session) {
+  if (!step.fix) return session.bad("not on the route");
+  return session.good("on the route") + ", along " + format_fixed(step.fix->along_m, 2) +
+         " m  beside " + format_fixed(step.fix->lateral_m, 2) + " m";
+}
+
+/// Makes the moments of a run for its record.
+class RunMoments {
+ public:
+  RunMoments(const LiveMemory& memory, std::string path)
+      : memory_(memory), path_(std::move(path)) {}
+
+  recordings::RunMoment make(const Observation& observation, const LiveMemory::Answer& answer,
+                             const RunRecord& record, StageClock& stages) {
+    recordings::RunMoment moment = record.moment_of(observation, number_++);
+    stages.put(moment);
+    const PlaceRecogniser* const recogniser = memory_.recogniser();
+    if (record.wants_pictures()) moment.panorama = memory_.panorama();
+    if (!answer.place) {
+      moment.state = "no memory yet";
+      return moment;
+    }
+    describe(moment, *answer.place);
+    StageClock clock;
+    if (!file_) file_ = MemoryFile::open(path_, Access::read_only);
+    if (record.wants_pictures()) moment.best_match = best_match_of(*answer.place, *file_);
+    // Rarely: the cloud is that of all views. A memory that was read again has other ids.
+    if (memory_.views() > references_ + references_ / 8 || recogniser != shown_of_) {
+      references_ = memory_.views();
+      shown_of_ = recogniser;
+      shown_.emplace(recogniser->memory());
+      shown_->put(moment);
+    }
+    if (moment.panorama) {
+      shown_->compare(moment, recogniser->memory(), recogniser->encoder().packed(*moment.panorama));
+      clock.stage("for viewers");
+      clock.put(moment);
+    }
+    return moment;
+  }
+
+ private:
+  const LiveMemory& memory_;
+  std::string path_;
+  std::optional<MemoryFile> file_;  // none before a new memory's first views
+  std::size_t number_ = 0;
+  std::size_t references_ = 0;  // that are in the record
+  std::optional<ShownReferences> shown_;
+  const PlaceRecogniser* shown_of_ = nullptr;
+};
+
+/// How the memory's images lie, where there is a memory. Throws FileError where there is none and
+/// nothing is added; UsageError on options that it was not made with.
+std::optional<PictureSource> remembered_source(const Arguments& declared,
+                                               const LocaliseArguments& arguments) {
+  if (!memory_exists(arguments.memory)) {
+    if (arguments.add) return std::nullopt;
+    throw FileError(arguments.memory, "no such file; --add makes it");
+  }
+  const auto memory = MemoryFile::open(arguments.memory, Access::read_only);
+  require_components(declared, arguments, memory.header());
+  require_kept_options(declared, arguments.signature, arguments.preprocessing, memory);
+  require_kept_band(arguments.pictures, memory);
+  return memory.header().source;
+}
+
+LiveMemoryOptions memory_options(const LocaliseArguments& arguments, const PictureSource& source,
+                                 bool is_live) {
+  LiveMemoryOptions options{.add = arguments.add,
+                            .update = arguments.update,
+                            .update_options = arguments.update_options,
+                            .in_step = !is_live,
+                            .memoriser = {.source = source,
+                                          .signature = arguments.signature,
+                                          .preprocessing = arguments.preprocessing},
+                            .localiser = arguments.localiser,
+                            .hold = arguments.record.file || arguments.record.view};
+  if (arguments.areas) options.areas = arguments.accuracy;
+  if (arguments.add_interval_s) options.min_interval_s = *arguments.add_interval_s;
+  return options;
+}
+
+/// One run over a source whose images are answered in order.
+class LocalisedRun {
+ public:
+  LocalisedRun(const Arguments& declared, const LocaliseArguments& arguments, Session& session)
+      : arguments_(arguments), session_(session), live_(recordings::is_live(input())) {
+    open_source(declared);
+    memory_.emplace(arguments.memory, memory_options(arguments, pictures_, live_));
+    if (recording_) read_missing_motion();
+    if (arguments.route) open_route();
+    if (recording_) {
+      if (!arguments.report) recording_copy_.reset();
+      source_ = std::make_unique<DatasetObservations>(std::move(*recording_), session.executor());
+    }
+  }
+
+  ExitCode run() {
+    std::vector<std::string> read = arguments_.inputs;
+    read.push_back(arguments_.memory);
+    RunRecord record(arguments_.record, read, live_, session_, {.memory = arguments_.memory});
+    RunMoments moments(*memory_, arguments_.memory);
+    LiveRun taking(*source_, arguments_.pictures.part, arguments_.live, session_);
+    StageClock stages;
+    taking.take(
+        [&](const Observation& observation) {
+          stages = StageClock();
+          if (const auto ms = taking.decoding_ms()) stages.add("reading", *ms);
+          return answer(observation, stages);
+        },
+        [&](Observation&& observation) {
+          if (arguments_.out) table_ += csv_row(query_);
+          if (arguments_.report) queries_.push_back(query_);
+          if (route_) route_->add(observation, *memory_);
+          if (record.wanted()) record.add(moments.make(observation, answer_, record, stages));
+          if (answer_.is_new) memory_->add(std::move(observation));
+        });
+    const std::string changes = finish();
+    record.close();
+    const LiveCounts& counts = taking.finish();
+    if (arguments_.report) write_report();
+    session_.note(std::to_string(counts.pictures) + " images, " + std::to_string(known_) +
+                  " of places of " + arguments_.memory + changes +
+                  events_text(counts, record.left_out()) +
+                  (live_ ? ", unwrapping " +
+                               format_fixed(unwrapping_.count() /
+                                                std::max(1.0, static_cast<double>(counts.pictures)),
+                                            1) +
+                               " ms"
+                         : ""));
+    if (has_changed_) session_.suggest({"panonav", "undo", arguments_.memory}, "To take it back:");
+    return (arguments_.add ? counts.pictures : known_) > 0 ? ExitCode::done : ExitCode::no_answer;
+  }
+
+ private:
+  [[nodiscard]] const std::string& input() const { return arguments_.inputs.front(); }
+
+  void open_source(const Arguments& declared) {
+    const auto remembered = remembered_source(declared, arguments_);
+    if (live_) {
+      auto live = open_live(declared, input(), arguments_.pictures, remembered, arguments_.live);
+      pictures_ = live->pictures();
+      source_ = std::move(live);
+      return;
+    }
+    recording_ = open_queries(arguments_, remembered, session_);
+    recording_copy_ = recording_;
+    pictures_ = recording_->source;
+    poses_ = route_poses(*recording_);
+  }
+
+  /// Reads the motion between images without odometry from what they show; views are updated by it.
+  void read_missing_motion() {
+    const bool moves = std::ranges::all_of(
+        recording_->entries, [](const DatasetEntry& entry) { return entry.odometry.has_value(); });
+    const PlaceRecogniser* const recogniser = memory_->recogniser();
+    if (!arguments_.update || moves || recogniser == nullptr) return;
+    session_.note("motion is read from the images, as some have no odometry: " +
+                  add_visual_odometry(*recording_, recogniser->memory(), recogniser->encoder(),
+                                      session_.executor()));
+  }
+
+  void open_route() {
+    if (arguments_.add) {
+      refuse_to_continue_route(arguments_, poses_);
+      route_.emplace(arguments_.memory, pictures_, *arguments_.route, poses_);
+    } else {
+      follower_.emplace(MemoryFile::open(arguments_.memory, Access::read_only), pictures_,
+                        RouteFollowerOptions{.name = arguments_.route, .tracker = {}, .fit = {}});
+    }
+  }
+
+  /// Returns the line that is printed.
+  std::string answer(const Observation& observation, StageClock& stages) {
+    answer_ = memory_->answer(observation);
+    stages.part("unwarping", answer_.unwrapping);
+    stages.stage("signature, search, ranking");
+    unwrapping_ += answer_.unwrapping;
+    query_ = {observation.name, 0.0, answer_.place.value_or(Place{}), observation.pose, ""};
+    if (query_.place.known) ++known_;
+    std::optional<RouteStep> step;
+    if (follower_) {
+      step = follower_->step(observation);
+      stages.stage("route");
+    }
+    if (!session_.json()) {
+      return (answer_.place ? as_text(query_, session_) : query_.file + "  no memory yet") +
+             (answer_.is_new ? "  added" : "") + (step ? "  " + as_text(*step, session_) : "");
+    }
+    auto json = command::as_json(query_, arguments_.areas);
+    json["stamp_s"] = or_null(observation.stamp_s);
+    if (arguments_.add) json["added"] = answer_.is_new;
+    if (step) json["route"] = as_json(*step);
+    return json_line(json);
+  }
+
+  /// Stores what waits, and says what was changed. A reader of the lines may never go on.
+  std::string finish() {
+    std::string text;
+    const auto changes = memory_->finish("update from " + input());
+    if (arguments_.add) text += ", " + std::to_string(memory_->added()) + " views added";
+    if (changes) {
+      has_changed_ = changes->certain > 0;
+      text += "; " + as_text(*changes) + "; " + std::to_string(changes->certain) + " of " +
+              std::to_string(changes->seen) + " places certain";
+    }
+    if (route_) text += ", " + std::to_string(route_->finish()) + " lines of the route";
+    if (arguments_.out) write_file(*arguments_.out, std::string_view(table_));
+    return text;
+  }
+
+  void write_report() {
+    const auto& entries = recording_copy_->entries;
+    const auto file = MemoryFile::open(arguments_.memory, Access::read_only);
+    const PlaceRecogniser& recogniser = *memory_->recogniser();
+    write_localise_report(*arguments_.report, file, recogniser, queries_, [&](std::size_t i) {
+      const auto entry = std::ranges::find(entries, queries_[i].file, &DatasetEntry::file);
+      return recogniser.encoder().panorama(read_observation(*entry));
+    });
+    tell_report(*arguments_.report, session_);
+  }
+
+  const LocaliseArguments& arguments_;
+  Session& session_;
+  bool live_;
+  PictureSource pictures_;
+  RoutePoses poses_ = RoutePoses::images;
+  std::optional<Dataset> recording_;       // until it becomes the source
+  std::optional<Dataset> recording_copy_;  // for a report
+  std::unique_ptr<ObservationSource> source_;
+  std::optional<LiveMemory> memory_;
+  std::optional<RouteFollower> follower_;
+  std::optional<RunRouteRecorder> route_;
+  LiveMemory::Answer answer_;  // to the image of now
+  LocalisedQuery query_;       // the same for people and tables
+  std::vector<LocalisedQuery> queries_;
+  std::string table_{csv_header};
+  std::size_t known_ = 0;
+  bool has_changed_ = false;
+  std::chrono::duration<double, std::milli> unwrapping_{};
+};
+
+}  // namespace
+
+void require_components(const Arguments& declared, const LocaliseArguments& arguments,
+                        const MemoryHeader& header) {
+  const int components = arguments.localiser.components;
+  const bool zero = components == 0 && declared.given("localiser", "components");
+  if (zero || components > header.shape.components) {
+    throw ContractError("components", components,
+                        "1 to " + std::to_string(header.shape.components) + ", the memory's");
+  }
+}
+
+Dataset open_queries(const LocaliseArguments& arguments,
+                     const std::optional<PictureSource>& remembered, Session& session) {
+  const auto open = [&](const std::string& input) {
+    return open_recording(input, arguments.pictures, remembered, session);
+  };
+  if (arguments.inputs.size() == 1) return open(arguments.inputs.front());
+  const PartArguments& part = arguments.pictures.part;
+  if (part.from_s || part.to_s || part.every) {
+    throw UsageError("--from, --to and --every go with one recording, not with several images");
+  }
+  std::error_code ignored;
+  std::optional<Dataset> queries;
+  for (const std::string& input : arguments.inputs) {
+    if (std::filesystem::is_directory(input, ignored) || recordings::is_recording(input)) {
+      throw UsageError(input +
+                       " is a folder or recording; allowed: one of these, or several images");
+    }
+    if (!queries && std::filesystem::exists(input, ignored)) queries = open(input);
+  }
+  if (!queries) queries = open(arguments.inputs.front());  // says that it is missing
+  queries->entries.clear();
+  for (const std::string& input : arguments.inputs) {
+    DatasetEntry entry;
+    entry.file = input;
+    entry.path = input;
+    queries->entries.push_back(std::move(entry));
+  }
+  return std::move(*queries);
+}
+
+ExitCode localise_in_order(const Arguments& declared, const LocaliseArguments& arguments,
+                           Session& session) {
+  const std::string& input = arguments.inputs.front();
+  const bool live = recordings::is_live(input);
+  declared.refuse_unused({"--turn-randomly", "--exclude-same-file"},
+                         live ? "where " + input + " is a live source"
+                              : "with --add, --update, --route, --record and --view");
+  if (live) {
+    declared.refuse_unused({"--report"}, "where " + input + " is a live source");
+  } else {
+    refuse_live(declared, input, false);
+  }
+  if (arguments.inputs.size() > 1 && (arguments.add || arguments.update || arguments.route)) {
+    throw UsageError(
+        "--add, --update and --route go with one recording, whose images are in order");
+  }
+  if (arguments.report) prepare_report_folder(*arguments.report, "localise");
+  return LocalisedRun(declared, arguments, session).run();
+}
+
+}  // namespace panonav::command

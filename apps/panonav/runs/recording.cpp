@@ -1,0 +1,280 @@
+#include "runs/recording.hpp"
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <string_view>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
+#include "panonav/geometry/angles.hpp"
+#include "panonav/io/camera_file.hpp"
+#include "panonav/pipeline/open_input.hpp"
+#include "panonav_recordings/live_pictures.hpp"
+#include "panonav_recordings/recording.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Replaces the names of options that have flags of other names; `name_flags` knows the rest.
+std::string name_picture_flags(std::string text) {
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 4> flags{{
+      {"'source' (a PictureSource)", "--kind"},
+      {"'source'", "--kind and its companions"},
+      {"'from_s'", "--from"},
+      {"'to_s'", "--to"},
+  }};
+  for (const auto& [name, flag] : flags) {
+    for (auto at = text.find(name); at != text.npos; at = text.find(name, at + flag.size())) {
+      text.replace(at, name.size(), flag);
+    }
+  }
+  return text;
+}
+
+std::optional<ElevationBand> elevation_band(const PictureArguments& pictures) {
+  constexpr double min_band_deg = 5.0;  // pictures are higher; radians are mostly less
+  if (!pictures.elevation_deg) return std::nullopt;
+  const auto [low, high] = *pictures.elevation_deg;
+  if (low < -90.0 || high > 90.0 || high - low < min_band_deg) {
+    throw UsageError("--elevation-deg is " + to_text(low) + " " + to_text(high) +
+                     "; allowed: LOW HIGH in degrees, -90 <= LOW < HIGH <= 90, 5 degrees apart "
+                     "or more");
+  }
+  return ElevationBand{radians(low), radians(high)};
+}
+
+PictureSource mirror_source(const PictureArguments& pictures,
+                            const std::optional<ElevationBand>& band) {
+  if (!pictures.camera) {
+    throw UsageError(
+        "--camera is missing: pictures of a mirror need the file that panonav calibrate writes");
+  }
+  if (pictures.columns || pictures.forward_column) {
+    throw UsageError(
+        "--columns-run and --forward-column do not go with a mirror; the camera file says where "
+        "forward is");
+  }
+  PictureSource source{.kind = PictureKind::mirror};
+  auto camera = read_camera(*pictures.camera);
+  source.camera = std::move(camera.camera);
+  source.mask = std::move(camera.mask);
+  source.layout.kept_elevations = band;
+  return source;
+}
+
+}  // namespace
+
+void declare_layout(Arguments& arguments, PictureArguments& pictures) {
+  arguments.choice("--kind", pictures.kind, {"panorama", "equirectangular", "mirror"},
+                   "What the pictures show, where no dataset.toml says it");
+  arguments.option("--camera FILE", pictures.camera,
+                   "Calibration of a mirror camera (panonav calibrate)");
+  arguments.choice("--columns-run", pictures.columns, {"clockwise", "counter-clockwise"},
+                   "How columns run, seen from above; default clockwise");
+  arguments.option("--forward-column", pictures.forward_column,
+                   "Fraction of the width that looks along the heading; default 0.5");
+  arguments.option("--elevation-deg", pictures.elevation_deg,
+                   "Lower and upper edge of a panorama, or the band to keep of other pictures");
+  arguments.uncommon({"--columns-run", "--forward-column"});
+}
+
+void declare_topics(Arguments& arguments, RecordingTopics& topics) {
+  arguments.option(
+      "--image-topic NAME", topics.image,
+      "Pictures of a recording (MCAP, rosbag2, ROS 1 bag) with several topics of them");
+  arguments.option("--odometry-topic NAME", topics.odometry,
+                   "Its odometry (nav_msgs/Odometry) where there are several");
+  arguments.option("--odometry-frames", "ODOM BASE", topics.odometry_frames,
+                   "Odometry from its transforms (TF) instead; without a topic odom base_link");
+  arguments.option("--imu-topic NAME", topics.imu,
+                   "Its inertial sensor (roll and pitch) where there are several");
+  arguments.uncommon({"--image-topic", "--odometry-topic", "--odometry-frames", "--imu-topic"});
+}
+
+void declare_part(Arguments& arguments, PartArguments& part, bool every) {
+  arguments.option("--from SECONDS", part.from_s,
+                   "Begin this long after the first picture of a recording with stamps");
+  arguments.option("--to SECONDS", part.to_s, "End this long after its first picture");
+  if (every) {
+    arguments.option("--every N|TIME", part.every,
+                     "Take every N-th picture only, or one in this time, such as 0.5s");
+  }
+  arguments.uncommon({"--from", "--to"});
+  if (every) arguments.uncommon({"--every"});
+}
+
+void declare_pictures(Arguments& arguments, PictureArguments& pictures) {
+  declare_layout(arguments, pictures);
+  declare_topics(arguments, pictures.topics);
+  declare_part(arguments, pictures.part, true);
+}
+
+std::vector<std::string> recording_options() {
+  return {"--image-topic", "--odometry-topic", "--odometry-frames", "--imu-topic", "--from",
+          "--to",          "--every"};
+}
+
+bool is_one_picture(const std::string& input) {
+  std::error_code ignored;
+  return !fs::is_directory(input, ignored) && !find_dataset_reader(input) &&
+         !recordings::is_live(input);
+}
+
+PictureSelection selection_of(const PartArguments& part) {
+  PictureSelection selection{.from_s = part.from_s, .to_s = part.to_s};
+  for (const auto& [flag, value] : {std::pair{"--from", part.from_s}, {"--to", part.to_s}}) {
+    if (value && *value < 0.0) {
+      throw UsageError(std::string(flag) + " is " + to_text(*value) + "; allowed: 0 or more");
+    }
+  }
+  if (part.from_s && part.to_s && *part.from_s > *part.to_s) {
+    throw UsageError("--from is " + to_text(*part.from_s) + "; allowed: at most --to, which is " +
+                     to_text(*part.to_s));
+  }
+  if (!part.every) return selection;
+  std::string text = *part.every;
+  const bool is_time = text.ends_with('s');
+  if (is_time) text.pop_back();
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool number = error == std::errc() && end == text.data() + text.size();
+  constexpr double most = 1e9;
+  const bool fits = number && value > 0.0 && value <= most &&
+                    (is_time || (value >= 1.0 && value == std::floor(value)));
+  if (!fits) {
+    throw UsageError("--every is " + to_readable_line(*part.every) +
+                     "; allowed: a whole number from 1 on, or seconds such as 0.5s");
+  }
+  if (is_time) {
+    selection.every_s = value;
+  } else {
+    selection.every = static_cast<int>(value);
+  }
+  return selection;
+}
+
+std::optional<PictureSource> picture_source(const PictureArguments& pictures) {
+  const bool nothing = !pictures.kind && !pictures.camera && !pictures.columns &&
+                       !pictures.forward_column && !pictures.elevation_deg;
+  if (nothing) return std::nullopt;
+  const std::string kind = pictures.kind.value_or(pictures.camera ? "mirror" : "");
+  if (kind.empty()) throw UsageError("--kind is missing: panorama, equirectangular or mirror");
+
+  const std::optional<ElevationBand> band = elevation_band(pictures);
+  if (kind == "mirror") return mirror_source(pictures, band);
+  if (pictures.camera) throw UsageError("--camera goes only with --kind mirror");
+  PictureSource source;
+  if (pictures.columns == "counter-clockwise") {
+    source.layout.direction = ColumnDirection::counter_clockwise;
+  }
+  if (pictures.forward_column) {
+    if (*pictures.forward_column < 0.0 || *pictures.forward_column > 1.0) {
+      throw UsageError("--forward-column is " + to_text(*pictures.forward_column) +
+                       "; allowed: 0 to 1");
+    }
+    source.layout.forward_column = *pictures.forward_column;
+  }
+  if (kind == "equirectangular") {
+    source.kind = PictureKind::equirectangular;
+    source.layout.elevations = ElevationBand{radians(-90.0), radians(90.0)};
+    source.layout.kept_elevations = band;
+  } else {
+    source.layout.elevations = band;
+  }
+  return source;
+}
+
+Dataset open_recording(const std::string& input, const PictureArguments& pictures,
+                       const std::optional<PictureSource>& remembered, Session& session) {
+  const InputOptions options{.source = picture_source(pictures),
+                             .default_source = remembered,
+                             .topics = pictures.topics,
+                             .selection = selection_of(pictures.part),
+                             .recursive = pictures.recursive};
+  if (recordings::is_live(input) && input != "-") {
+    throw UsageError(input + " is a live source; allowed with localise, memorise and track");
+  }
+  try {
+    OpenedDataset opened = open_input(input, options);
+    for (const std::string& warning : opened.warnings) session.note(name_picture_flags(warning));
+    return std::move(opened.dataset);
+  } catch (const OptionError& error) {
+    throw UsageError(name_picture_flags(error.what()));
+  } catch (const FileError& error) {
+    const std::string_view text = error.what();
+    if (text.find("'source'") != text.npos) throw UsageError(name_picture_flags(error.what()));
+    throw Error(name_picture_flags(error.what()));
+  }
+}
+
+void require_kept_band(const PictureArguments& pictures, const MemoryFile& memory) {
+  const MemoryHeader& header = memory.header();
+  if (!pictures.elevation_deg) return;
+  const auto [low, high] = *pictures.elevation_deg;
+  const std::string typed =
+      "--elevation-deg is " + format_number(low) + " " + format_number(high) + "; allowed: ";
+  if (!header.elevations) {
+    throw UsageError(typed + "none, as " + memory.path().string() +
+                     " does not know the elevations of its views; leave it out or start a new "
+                     "memory");
+  }
+  const double kept_low = degrees(header.elevations->bottom_rad);
+  const double kept_high = degrees(header.elevations->top_rad);
+  constexpr double rounding_deg = 1e-4;
+  if (std::abs(low - kept_low) > rounding_deg || std::abs(high - kept_high) > rounding_deg) {
+    throw UsageError(typed + format_number(kept_low) + " " + format_number(kept_high) +
+                     ", the band of " + memory.path().string() +
+                     "; leave it out or start a new memory");
+  }
+}
+
+Dataset open_recording(const std::string& input, const PictureArguments& pictures,
+                       const MemoryFile& memory, Session& session) {
+  Dataset recording = open_recording(input, pictures, memory.header().source, session);
+  require_kept_band(pictures, memory);
+  return recording;
+}
+
+Dataset read_run(const std::string& input, const RecordingTopics& topics, const PartArguments& part,
+                 const MemoryFile& memory, Session& session) {
+  PictureArguments pictures;
+  pictures.topics = topics;
+  pictures.part = part;
+  return open_recording(input, pictures, memory, session);
+}
+
+std::string how_to_add(const std::string& folder, const std::string& columns,
+                       const std::string& values) {
+  if (recordings::is_recording(folder)) {
+    return "; of a recording odometry is nav_msgs/Odometry or TF, poses are those of /ground_truth";
+  }
+  const bool described = has_dataset_file(folder);
+  const Dataset recording = described ? read_dataset(folder) : read_picture_folder(folder, {});
+  const std::string table = "the columns file," + columns +
+                            " and a line for each picture, such as " +
+                            to_readable_line(recording.entries.front().file) + "," + values;
+  if (described) return "; its table needs " + table;
+  return "; write " + (fs::path(folder) / "dataset.toml").string() +
+         " with [images] kind = \"panorama\" (or equirectangular, mirror) and [poses] file = "
+         "\"poses.csv\", and poses.csv with " +
+         table;
+}
+
+Dataset read_described(const std::string& folder, const PictureArguments& pictures,
+                       const std::optional<PictureSource>& remembered, const std::string& columns,
+                       const std::string& values, Session& session) {
+  std::error_code ignored;
+  if (fs::is_directory(folder, ignored) && !has_dataset_file(folder) &&
+      !recordings::is_recording(folder) && !picture_source(pictures)) {
+    throw FileError(folder, "has no dataset.toml, so nothing tells where its pictures were taken" +
+                                how_to_add(folder, columns, values));
+  }
+  return open_recording(folder, pictures, remembered, session);
+}
+
+}  // namespace panonav::command

@@ -1,0 +1,89 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "cli/arguments.hpp"
+#include "cli/session.hpp"
+#include "panonav/core/executor.hpp"
+#include "panonav/io/dataset.hpp"
+#include "panonav/io/dataset_readers.hpp"
+#include "panonav/pipeline/observation_source.hpp"
+#include "panonav/storage/memory_file.hpp"
+
+namespace panonav::command {
+
+/// Which pictures of a recording a user wants.
+struct PartArguments {
+  std::optional<double> from_s;
+  std::optional<double> to_s;
+  std::optional<std::string> every;  ///< "5": each fifth picture; "0.5s": one in half a second
+};
+
+/// What a user says of pictures that come without a dataset.toml.
+struct PictureArguments {
+  std::optional<std::string> kind;
+  std::optional<std::string> camera;
+  std::optional<std::string> columns;
+  std::optional<double> forward_column;
+  std::optional<std::pair<double, double>> elevation_deg;
+  bool recursive = false;  ///< a folder of pictures: those of the folders within, too
+  RecordingTopics topics;  ///< of a recording of topics
+  PartArguments part;
+};
+
+/// Adds --kind, --camera, --columns-run, --forward-column and --elevation-deg.
+void declare_layout(Arguments& arguments, PictureArguments& pictures);
+/// Adds --image-topic, --odometry-topic, --odometry-frames and --imu-topic.
+void declare_topics(Arguments& arguments, RecordingTopics& topics);
+/// Adds --from and --to, and unless the verb has one of its own, --every.
+void declare_part(Arguments& arguments, PartArguments& part, bool every);
+/// All three.
+void declare_pictures(Arguments& arguments, PictureArguments& pictures);
+
+/// The flags of the last two, for verbs that also take single pictures.
+[[nodiscard]] std::vector<std::string> recording_options();
+/// Neither a folder nor a recording, a video or a live source.
+[[nodiscard]] bool is_one_picture(const std::string& input);
+
+/// Empty when the user said nothing. Throws UsageError on flags that do not fit together, FileError
+/// on the camera file.
+[[nodiscard]] std::optional<PictureSource> picture_source(const PictureArguments& pictures);
+
+/// The part that is wanted. Throws UsageError on values out of range.
+[[nodiscard]] PictureSelection selection_of(const PartArguments& part);
+
+/// Opens what `open_input` does, as the flags say, and notes its warnings. `remembered` is how the
+/// pictures lie that a memory was made from: so lie those that come without a description of their
+/// own. Throws UsageError on flags that do not fit the input and on live sources but standard
+/// input, which is read to its end; FileError.
+[[nodiscard]] Dataset open_recording(const std::string& input, const PictureArguments& pictures,
+                                     const std::optional<PictureSource>& remembered,
+                                     Session& session);
+/// Throws UsageError on a band (--elevation-deg) that is not that of the memory's views.
+void require_kept_band(const PictureArguments& pictures, const MemoryFile& memory);
+/// The same beside a memory, whose pictures lie as its header says. The memory's views keep their
+/// band: another --elevation-deg throws UsageError.
+[[nodiscard]] Dataset open_recording(const std::string& input, const PictureArguments& pictures,
+                                     const MemoryFile& memory, Session& session);
+
+/// The recording of a run: a data set, or a folder or recording of pictures that lie as those of
+/// the memory.
+[[nodiscard]] Dataset read_run(const std::string& input, const RecordingTopics& topics,
+                               const PartArguments& part, const MemoryFile& memory,
+                               Session& session);
+
+/// How to make a recording tell more, for the end of an error's line: the table of a data set gets
+/// these columns, a folder of pictures alone a dataset.toml first. `values`: of an example.
+[[nodiscard]] std::string how_to_add(const std::string& folder, const std::string& columns,
+                                     const std::string& values);
+/// A data set, or what the user says of other pictures, as `open_recording` does. A folder of
+/// pictures alone throws a FileError that says how to make it a data set with these columns.
+[[nodiscard]] Dataset read_described(const std::string& folder, const PictureArguments& pictures,
+                                     const std::optional<PictureSource>& remembered,
+                                     const std::string& columns, const std::string& values,
+                                     Session& session);
+
+}  // namespace panonav::command

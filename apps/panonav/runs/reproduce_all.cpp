@@ -1,0 +1,176 @@
+#include "runs/reproduce_all.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <system_error>
+#include <vector>
+
+#include "cli/json.hpp"
+#include "cli/session.hpp"
+#include "lab/reporting/results_document.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/io/atomic_file.hpp"
+#include "reports/results_page.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* results_file = "results.json";
+constexpr const char* run_file = "run.json";
+// More than any run writes.
+constexpr std::size_t max_file_bytes = 64 << 20;
+
+std::string text_of(const fs::path& path) {
+  const auto bytes = read_file(path, max_file_bytes);
+  return {bytes.begin(), bytes.end()};
+}
+
+// What results depend on.
+ordered_json run_record(const ReproduceArguments& wanted) {
+  const fs::path data = data_folder(wanted);
+  ordered_json record;
+  record["version"] = PANONAV_VERSION;
+  record["quick"] = wanted.quick;
+  record["seed"] = or_null(wanted.seed);
+  record["scenes"] = or_null(wanted.scenes);
+  record["queries"] = or_null(wanted.queries);
+  record["runs"] = or_null(wanted.runs);
+  record["rows"] = or_null(wanted.rows);
+  record["data"] =
+      data.empty() ? ordered_json(nullptr) : ordered_json(fs::weakly_canonical(data).string());
+  return record;
+}
+
+void require_same_run(const fs::path& out, const ordered_json& record) {
+  const std::string file = (out / run_file).string();
+  if (!fs::exists(out / run_file)) {
+    throw FileError(file, "is not there: no run to continue; leave --continue out");
+  }
+  const auto earlier = ordered_json::parse(text_of(out / run_file), nullptr, false);
+  if (!earlier.is_object()) throw FileError(file, "is no JSON object, or not all of it");
+  for (const auto& [field, value] : record.items()) {
+    if (!earlier.contains(field)) throw FileError(file, field + " is missing");
+    const ordered_json& before = earlier[field];
+    if (before.is_structured()) throw FileError(file, field + " is an " + before.type_name());
+    if (before == value) continue;
+    throw OptionError("--continue: the run in " + out.string() + " has " + field + " " +
+                      before.dump() + ", this one " + value.dump() + "; allowed: the same");
+  }
+}
+
+// As typed by a person elsewhere: no paths of this machine.
+std::string command_line(const ReproduceArguments& wanted) {
+  std::string line = "panonav reproduce all";
+  if (wanted.quick) line += " --quick";
+  const auto add = [&](const std::string& flag, const auto& value) {
+    if (value) line += " " + flag + " " + std::to_string(*value);
+  };
+  add("--seed", wanted.seed);
+  add("--scenes", wanted.scenes);
+  add("--queries", wanted.queries);
+  add("--runs", wanted.runs);
+  add("--rows", wanted.rows);
+  if (!data_folder(wanted).empty()) line += " --data DATA";
+  return line;
+}
+
+// What means nothing to the paper is left to those to which it does.
+ReproduceArguments wanted_of(const ReproducedPaper& paper, ReproduceArguments wanted) {
+  wanted.paper = paper.name;
+  if (!paper.queries) wanted.queries = std::nullopt;
+  if (!paper.runs) wanted.runs = std::nullopt;
+  if (!paper.rows) wanted.rows = std::nullopt;
+  return wanted;
+}
+
+void remove_file(const fs::path& path) {
+  std::error_code error;
+  fs::remove(path, error);
+  if (error) throw FileError(path.string(), "cannot be removed: " + error.message());
+}
+
+}  // namespace
+
+lab::Reproduction reproduce_paper(const ReproducedPaper& paper, const ReproduceArguments& wanted,
+                                  const fs::path& out, Session& session) {
+  Progress progress(session, "reproduce " + std::string(paper.name), 100);
+  std::size_t shown_percent = 0;
+  const lab::ReproductionProgress report = [&](double fraction) {
+    const auto percent = static_cast<std::size_t>(100.0 * fraction);
+    if (percent > shown_percent) progress.advance(percent - shown_percent);
+    shown_percent = std::max(shown_percent, percent);
+  };
+  remove_file(out / results_file);
+  const lab::ReproductionOptions options = reproduction_options(paper, wanted, out);
+  lab::Reproduction result = lab::reproduce(paper.name, options, session.executor(), report);
+  progress.clear();
+  const std::string name(paper.name);
+  write_file(out / "results.md",
+             lab::to_markdown({.version = PANONAV_VERSION,
+                               .command = "panonav reproduce " + name,
+                               .papers = {{name, std::string(paper.title), result.rows}}}));
+  write_paper_page(out, paper, paper.lead(options), result);
+  write_file(out / results_file, to_json(result.rows));
+  return result;
+}
+
+ExitCode reproduce_all(const ReproduceArguments& wanted, Session& session) {
+  if (wanted.only) throw OptionError("--only has no meaning for all");
+  check_scenes(wanted);  // before anything of an earlier run is removed
+  const fs::path out(wanted.out.value_or("reproduction"));
+  const ordered_json record = run_record(wanted);
+  const auto papers = reproduced_papers();
+  if (wanted.continues) {
+    require_same_run(out, record);
+  } else {
+    std::error_code error;
+    fs::create_directories(out, error);
+    if (error) throw FileError(out.string(), "cannot be made: " + error.message());
+    // Nothing of an earlier run may be taken for a part of this one.
+    for (const ReproducedPaper& paper : papers) remove_file(out / paper.name / results_file);
+    write_file(out / run_file, record.dump(1) + "\n");
+  }
+  remove_file(out / results_file);
+
+  const auto report = [&](const ReproducedPaper& paper, const std::vector<lab::ResultRow>& rows,
+                          std::string_view how) {
+    if (session.json()) return;
+    const lab::TargetCount count = lab::count_targets(rows);
+    session.print("  " + session.strong(paper.name) + ": " + std::to_string(count.held) + " of " +
+                  std::to_string(count.judged) + " targets hold" + std::string(how));
+  };
+  lab::ResultsDocument document{
+      .version = PANONAV_VERSION, .command = command_line(wanted), .papers = {}};
+  for (const ReproducedPaper& paper : papers) {
+    const fs::path file = out / paper.name / results_file;
+    const bool is_done = fs::exists(file);
+    if (!is_done) {
+      static_cast<void>(
+          reproduce_paper(paper, wanted_of(paper, wanted), out / paper.name, session));
+    }
+    lab::PaperResults results{std::string(paper.name), std::string(paper.title),
+                              lab::from_json(text_of(file), file.string())};
+    report(paper, results.rows, is_done ? " (finished by an earlier run)" : "");
+    document.papers.push_back(std::move(results));
+  }
+  const std::string json = to_json(document);
+  write_file(out / "results.md", lab::to_markdown(document));
+  write_results_page(out, document);
+  write_file(out / results_file, json);
+  if (session.json()) {
+    session.print(json.substr(0, json.size() - 1));
+    return ExitCode::done;
+  }
+  for (const std::string& line : lab::miss_lines(document)) {
+    session.print(session.bad("DOES NOT HOLD") + "  " + line);
+  }
+  const lab::TargetCount count = lab::count_targets(document);
+  session.print(session.strong(std::to_string(count.held) + " of " + std::to_string(count.judged)) +
+                " targets hold; the table: " + (out / "index.html").string());
+  return ExitCode::done;
+}
+
+}  // namespace panonav::command

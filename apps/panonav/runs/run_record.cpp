@@ -1,0 +1,119 @@
+#include "runs/run_record.hpp"
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <utility>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
+#include "runs/listening_place.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+/// The thumbnails of a memory that may not be there yet, for one thread.
+std::function<std::vector<std::uint8_t>(const std::string&)> thumbnails_of(std::string memory) {
+  return [memory = std::move(memory), file = std::shared_ptr<MemoryFile>()](
+             const std::string& name) mutable -> std::vector<std::uint8_t> {
+    try {
+      if (!file) {
+        file = std::make_shared<MemoryFile>(MemoryFile::open(memory, Access::read_only));
+      }
+      const auto view = file->find(name);
+      const auto picture = view ? file->thumbnail(*view) : std::nullopt;
+      return picture.value_or(std::vector<std::uint8_t>{});
+    } catch (const FileError&) {
+      return {};  // the viewer is told that there is none
+    }
+  };
+}
+
+}  // namespace
+
+void declare_record(Arguments& arguments, RunRecordArguments& record) {
+  arguments.option("--record FILE", record.file,
+                   "Write what is seen and answered as MCAP, for Rerun, Foxglove and Lichtblick");
+}
+
+void declare_view(Arguments& arguments, RunRecordArguments& record) {
+  arguments.option("--view PORT", record.view,
+                   "Show the run in browsers of this machine, at this port (0: a free one); "
+                   "ADDRESS:PORT shows it to the network of that address, too");
+}
+
+RunRecord::RunRecord(const RunRecordArguments& wanted, std::span<const std::string> read, bool live,
+                     Session& session, const Offers& offers)
+    : session_(session), live_(live) {
+  if (wanted.file) {
+    for (const std::string& other : read) {
+      std::error_code ignored;
+      if (std::filesystem::equivalent(*wanted.file, other, ignored)) {
+        throw UsageError("--record is " + *wanted.file +
+                         ", which the run reads; allowed: another file");
+      }
+    }
+    recorder_.emplace(*wanted.file, recordings::RunRecorderOptions{.wait = !live});
+  }
+  if (wanted.view) {
+    const ListeningPlace place = listening_place("--view", *wanted.view);
+    viewer::ViewServerOptions options;
+    options.address = place.address;
+    options.port = place.port;
+    options.title = "panonav: " + (read.empty() ? std::string() : read.front());
+    options.replay = !live;
+    options.takes = offers.takes;
+    if (!offers.memory.empty()) options.thumbnail = thumbnails_of(offers.memory);
+    viewer_.emplace(options);
+    session_.ask("Open " + viewer_->url() + " in a browser" +
+                 (live ? "" : "; the run waits for it"));
+  }
+}
+
+bool RunRecord::wants_pictures() const {
+  return recorder_ || page_ != nullptr || (viewer_ && (!live_ || viewer_->viewers() > 0));
+}
+
+recordings::RunMoment RunRecord::moment_of(const Observation& seen, std::size_t number) const {
+  if (wants_pictures()) return recordings::moment_of(seen, number);
+  return {.stamp_s = seen.stamp_s.value_or(static_cast<double>(number)),
+          .odometry = seen.odometry,
+          .tilt = seen.tilt,
+          .truth = seen.pose};
+}
+
+void RunRecord::add(recordings::RunMoment moment) {
+  if (page_ != nullptr) page_->add(moment);
+  if (!recorder_ || failed_) {
+    if (viewer_) viewer_->add(std::move(moment));
+    return;
+  }
+  if (viewer_) viewer_->add(moment);
+  try {
+    recorder_->add(std::move(moment));
+  } catch (const Error& error) {
+    failed_ = true;
+    session_.note("the recording ends here: " + to_readable_line(error.what()));
+  }
+}
+
+void RunRecord::close() {
+  viewer_.reset();
+  if (!recorder_ || failed_) return;
+  try {
+    recorder_->close();
+  } catch (const Error& error) {
+    failed_ = true;
+    session_.note("the recording is cut short: " + to_readable_line(error.what()));
+  }
+}
+
+std::vector<std::uint8_t> best_match_of(const Place& place, const MemoryFile& file) {
+  if (place.matches.empty()) return {};
+  const auto view = file.find(place.matches.front().name);
+  const auto picture = view ? file.thumbnail(*view) : std::nullopt;
+  return picture.value_or(std::vector<std::uint8_t>{});
+}
+
+}  // namespace panonav::command

@@ -1,0 +1,79 @@
+#include "runs/shown_map.hpp"
+
+#include <algorithm>
+
+#include "panonav/pipeline/mapper.hpp"
+
+namespace panonav::command {
+
+void put_component(recordings::RunMoment& moment, const TopologicalMap& map, std::size_t component,
+                   const std::vector<std::string>& names) {
+  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
+    const MapNode& node = map.nodes[i];
+    if (node.component != component) continue;
+    moment.references.push_back(node.pose.position());
+    moment.reference_views.push_back({names[i], node.pose.heading_rad});
+  }
+  const auto node_of = [&](ViewId view) -> const MapNode& {
+    return *std::ranges::lower_bound(map.nodes, view, {}, &MapNode::view);
+  };
+  for (const MapEdge& edge : map.edges) {
+    const MapNode& a = node_of(edge.a);
+    if (a.component != component) continue;
+    moment.edges.push_back({a.pose.position(), node_of(edge.b).pose.position(), edge.kind});
+  }
+}
+
+void GrowingMap::put(recordings::RunMoment& moment, const TopologicalMap& map, bool is_node,
+                     const std::string& name) {
+  truth_ = moment.truth;
+  last_is_node_ = is_node;
+  if (is_node) {
+    names_.push_back(name);
+    truths_.push_back(moment.truth);
+  }
+  moment.sure = is_node;
+  moment.state = is_node ? "place of the map" : "between places";
+  const auto closures =
+      static_cast<std::size_t>(std::ranges::count(map.edges, LinkKind::closure, &MapEdge::kind));
+  moment.values = {{"places", std::to_string(map.nodes.size())},
+                   {"closures", std::to_string(closures)}};
+  if (map.nodes.empty()) return;
+  if (closures > told_closures_) moment.values.emplace_back("event", "a loop is closed");
+  const std::size_t component = map.nodes.back().component;
+  place(moment, map, component);
+  if (closures == told_closures_ && map.nodes.size() <= told_nodes_ + told_nodes_ / 20) return;
+  told_closures_ = closures;
+  told_nodes_ = map.nodes.size();
+  put_component(moment, map, component, names_);
+}
+
+void GrowingMap::finish(recordings::RunMoment& moment, const TopologicalMap& map) const {
+  if (map.nodes.empty()) return;
+  const std::size_t component = largest_component(map);
+  moment.truth = truth_;
+  place(moment, map, component);
+  moment.values.emplace_back("event", "the map is finished");
+  put_component(moment, map, component, names_);
+}
+
+void GrowingMap::place(recordings::RunMoment& moment, const TopologicalMap& map,
+                       std::size_t component) const {
+  moment.pose.reset();
+  if (last_is_node_ && map.nodes.back().component == component) {
+    moment.pose = map.nodes.back().pose;
+  }
+  const auto first = std::ranges::find(map.nodes, component, &MapNode::component);
+  const auto& anchor = truths_[static_cast<std::size_t>(first - map.nodes.begin())];
+  if (!moment.truth || !moment.truth->heading_rad || !anchor || !anchor->heading_rad) {
+    moment.truth.reset();
+    return;
+  }
+  const auto full = [](const ReferencePose& pose) {
+    return Pose2{pose.x_m, pose.y_m, *pose.heading_rad};
+  };
+  const Pose2 moved = first->pose * inverse(full(*anchor)) * full(*moment.truth);
+  moment.truth = ReferencePose{moved.x_m, moved.y_m, moved.heading_rad};
+}
+
+}  // namespace panonav::command

@@ -1,0 +1,62 @@
+#include <array>
+#include <cmath>
+#include <ctime>
+
+#include "cli/verbs.hpp"
+#include "panonav/storage/memory_file.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+std::string as_text(const KeptChange& change) {
+  std::string when = "at an unknown time";
+  if (change.stamp_s) {
+    const auto whole_s = static_cast<std::time_t>(std::floor(*change.stamp_s));
+    std::tm utc{};
+    gmtime_r(&whole_s, &utc);
+    std::array<char, 32> text{};
+    std::strftime(text.data(), text.size(), "%Y-%m-%d %H:%M:%S UTC", &utc);
+    when = text.data();
+  }
+  return when + "  " + to_readable_line(change.what) +
+         (change.undoable ? "" : "  (too old to undo)");
+}
+
+ExitCode history(const std::string& path, Session& session) {
+  const auto changes = MemoryFile::open(path, Access::read_only).history();
+  if (session.json()) {
+    auto list = ordered_json::array();
+    for (const KeptChange& change : changes) {
+      list.push_back({{"what", change.what},
+                      {"stamp_s", or_null(change.stamp_s)},
+                      {"undoable", change.undoable},
+                      {"bytes", change.bytes}});
+    }
+    session.print(json_line(ordered_json{{"memory", path}, {"changes", std::move(list)}}));
+    return ExitCode::done;
+  }
+  for (const KeptChange& change : changes) session.print(as_text(change));
+  if (changes.empty()) session.note(path + " keeps no change");
+  return ExitCode::done;
+}
+
+Run declare_history(Arguments& arguments) {
+  auto memory = std::make_shared<std::string>();
+  arguments.positional("MEMORY", *memory, "Memory file");
+  return [memory](Session& session) { return history(*memory, session); };
+}
+
+}  // namespace
+
+Verb history_verb() {
+  return {"history", "List the changes that a memory keeps, the newest first",
+          "Each forget, prune and rename, and each localise --update that changed something. "
+          "panonav undo takes back the newest, then the one before it. Of changes "
+          "beyond the newest 100, or 64 MiB, the line alone is left, of 1000 at most.",
+          "  panonav history office.panonav\n"
+          "  panonav history office.panonav --json",
+          declare_history};
+}
+
+}  // namespace panonav::command

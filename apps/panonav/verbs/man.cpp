@@ -1,0 +1,63 @@
+#include <filesystem>
+#include <optional>
+
+#include "cli/texts.hpp"
+#include "cli/verbs.hpp"
+#include "panonav/io/atomic_file.hpp"
+
+namespace panonav::command {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ManArguments {
+  std::vector<std::string> words;
+  std::optional<std::string> out;
+};
+
+ExitCode man(const ManArguments& wanted, Session& session) {
+  const auto verbs = all_verbs();
+  if (wanted.out && !wanted.words.empty()) {
+    throw UsageError("--out writes the pages of all verbs; leave out '" + wanted.words[0] + "'");
+  }
+  if (!wanted.words.empty()) {
+    return print_text(manual_page(describe(named_verb(verbs, wanted.words))), session);
+  }
+  const auto descriptions = describe(verbs);
+  if (!wanted.out) return print_text(manual_overview(descriptions), session);
+  const fs::path folder(*wanted.out);
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw FileError(folder.string(), "cannot be made: " + error.message());
+  write_file(folder / "panonav.1", manual_overview(descriptions) + "\n");
+  for (const auto& description : descriptions) {
+    write_file(folder / (manual_name(description.verb) + ".1"), manual_page(description) + "\n");
+  }
+  if (session.json()) {
+    session.print(json_line(ordered_json{{"folder", *wanted.out}, {"pages", verbs.size() + 1}}));
+  } else {
+    session.print(std::to_string(verbs.size() + 1) + " manual pages in " + *wanted.out);
+  }
+  return ExitCode::done;
+}
+
+Run declare_man(Arguments& arguments) {
+  auto wanted = std::make_shared<ManArguments>();
+  arguments.optional_positionals("VERB", wanted->words, "Verb of the page; none: the overview",
+                                 verb_names());
+  arguments.option("-o,--out FOLDER", wanted->out,
+                   "Write the pages of all verbs as files into this folder instead");
+  return [wanted](Session& session) { return man(*wanted, session); };
+}
+
+}  // namespace
+
+Verb man_verb() {
+  return {"man", "Print the manual page of a verb as roff",
+          "An installed panonav has these pages: man panonav-localise. A page that is written to a "
+          "file is read with man -l FILE.",
+          "  panonav man localise\n  panonav man --out pages", declare_man};
+}
+
+}  // namespace panonav::command

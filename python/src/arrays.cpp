@@ -1,0 +1,222 @@
+#include <algorithm>
+#include <cstring>
+
+#include "bindings.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/geometry/pose2.hpp"
+#include "panonav/io/image_file.hpp"
+
+namespace panonav::python {
+
+namespace {
+
+std::string shape_text(const std::vector<py::ssize_t>& shape) {
+  std::string text;
+  for (const py::ssize_t size : shape) {
+    text += (text.empty() ? "" : ", ") + (size < 0 ? std::string("n") : std::to_string(size));
+  }
+  return "(" + text + (shape.size() == 1 ? ",)" : ")");
+}
+
+std::string shape_text(const py::array& array) {
+  return shape_text(std::vector<py::ssize_t>(array.shape(), array.shape() + array.ndim()));
+}
+
+py::array as_array(const py::handle& value, const char* what) {
+  if (!py::isinstance<py::array>(value)) {
+    throw ContractError(what, std::string(py::str(py::type::of(value).attr("__name__"))),
+                        "a numpy array");
+  }
+  return py::reinterpret_borrow<py::array>(value);
+}
+
+/// In the byte order of this machine.
+template <class Value>
+bool has_type(const py::array& array) {
+  return py::isinstance<py::array_t<Value>>(array);
+}
+
+std::string dtype_text(const py::array& array) {
+  return std::string(py::str(array.dtype()));
+}
+
+}  // namespace
+
+PictureArray::PictureArray(const py::handle& given, const char* what)
+    : array_(as_array(given, what)) {
+  if (!has_type<std::uint8_t>(array_)) {
+    throw ContractError(std::string("dtype of ") + what, dtype_text(array_), "uint8");
+  }
+  const auto dimensions = array_.ndim();
+  const bool fits = (dimensions == 2 || (dimensions == 3 && array_.shape(2) == 3)) &&
+                    std::all_of(array_.shape(), array_.shape() + dimensions,
+                                [](auto size) { return size >= 1 && size <= 1 << 24; });
+  if (!fits) {
+    throw ContractError(std::string("shape of ") + what, shape_text(array_),
+                        "(rows, columns) or (rows, columns, 3), no size 0");
+  }
+  const int channels = dimensions == 3 ? 3 : 1;
+  const bool whole_pixels =
+      array_.strides(1) == channels && (channels == 1 || array_.strides(2) == 1);
+  if (!whole_pixels) array_ = py::array_t<std::uint8_t, py::array::c_style>::ensure(array_);
+  view_ = {.data = static_cast<const std::uint8_t*>(array_.data()),
+           .width = static_cast<int>(array_.shape(1)),
+           .height = static_cast<int>(array_.shape(0)),
+           .channels = channels,
+           .stride = array_.strides(0)};
+}
+
+Image PictureArray::image() const {
+  Image image(view_.width, view_.height, view_.channels);
+  const auto bytes = static_cast<std::size_t>(view_.width) * view_.channels;
+  for (int v = 0; v < view_.height; ++v) {
+    std::memcpy(image.pixels().data() + v * bytes, view_.data + v * view_.stride, bytes);
+  }
+  return image;
+}
+
+Panorama panorama_from_array(const py::handle& given,
+                             const std::optional<ElevationBand>& elevations) {
+  const py::array array = as_array(given, "values");
+  if (array.ndim() != 2 || array.shape(0) > 1 << 24 || array.shape(1) > 1 << 24) {
+    throw ContractError("shape of values", shape_text(array), "(rows, columns)");
+  }
+  std::vector<float> values;
+  values.reserve(static_cast<std::size_t>(array.size()));
+  const auto take = [&](const auto& numbers, float unit) {
+    for (py::ssize_t y = 0; y < numbers.shape(0); ++y) {
+      for (py::ssize_t c = 0; c < numbers.shape(1); ++c) {
+        values.push_back(static_cast<float>(numbers(y, c)) / unit);
+      }
+    }
+  };
+  if (has_type<float>(array)) {
+    take(py::array_t<float>(array).unchecked<2>(), 1.0F);
+  } else if (has_type<std::uint8_t>(array)) {
+    take(py::array_t<std::uint8_t>(array).unchecked<2>(), 255.0F);
+  } else {
+    throw ContractError("dtype of values", dtype_text(array), "float32, or uint8 for 0 to 1");
+  }
+  return {static_cast<int>(array.shape(0)), static_cast<int>(array.shape(1)), elevations,
+          std::move(values)};
+}
+
+template <class Value>
+py::array_t<Value, py::array::c_style> exact_array(const py::handle& given, const char* what,
+                                                   std::vector<py::ssize_t> shape) {
+  const py::array array = as_array(given, what);
+  if (!has_type<Value>(array)) {
+    throw ContractError(std::string("dtype of ") + what, dtype_text(array),
+                        std::string(py::str(py::dtype::of<Value>())));
+  }
+  bool fits = array.ndim() == static_cast<py::ssize_t>(shape.size());
+  for (std::size_t i = 0; fits && i < shape.size(); ++i) {
+    fits = shape[i] < 0 || array.shape(static_cast<py::ssize_t>(i)) == shape[i];
+  }
+  if (!fits) {
+    throw ContractError(std::string("shape of ") + what, shape_text(array), shape_text(shape));
+  }
+  return py::array_t<Value, py::array::c_style>::ensure(array);
+}
+template py::array_t<std::uint8_t, py::array::c_style> exact_array(const py::handle&, const char*,
+                                                                   std::vector<py::ssize_t>);
+template py::array_t<float, py::array::c_style> exact_array(const py::handle&, const char*,
+                                                            std::vector<py::ssize_t>);
+
+namespace {
+
+/// Of structured poses, as many as columns: x_m, y_m, heading_rad, or stamp_s first.
+py::list field_names(py::ssize_t columns) {
+  py::list names;
+  if (columns == 4) names.append("stamp_s");
+  names.append("x_m");
+  names.append("y_m");
+  if (columns > 2) names.append("heading_rad");
+  return names;
+}
+
+/// The fields of structured poses side by side; another array is handed through.
+py::object without_structure(const py::handle& given, const char* what, py::ssize_t columns) {
+  auto array = py::reinterpret_borrow<py::object>(given);
+  if (!py::isinstance<py::array>(given) || array.attr("dtype").attr("names").is_none())
+    return array;
+  const py::list wanted = field_names(columns);
+  if (!py::list(array.attr("dtype").attr("names")).equal(wanted)) {
+    throw ContractError(std::string("fields of ") + what,
+                        std::string(py::str(array.attr("dtype").attr("names"))),
+                        std::string(py::str(py::tuple(wanted))));
+  }
+  py::list fields;
+  for (const auto& name : wanted) fields.append(array[name]);
+  return py::module_::import("numpy").attr("stack")(fields, py::arg("axis") = -1);
+}
+
+}  // namespace
+
+py::array_t<double, py::array::c_style> number_rows(const py::handle& given, const char* what,
+                                                    py::ssize_t columns) {
+  const auto numbers = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(
+      without_structure(given, what, columns));
+  if (!numbers) {
+    PyErr_Clear();
+    throw ContractError(what, std::string(py::str(py::type::of(given).attr("__name__"))),
+                        "an array of numbers");
+  }
+  if (numbers.ndim() != 2 || numbers.shape(1) != columns) {
+    throw ContractError(std::string("shape of ") + what, shape_text(numbers),
+                        shape_text({-1, columns}));
+  }
+  return numbers;
+}
+
+py::array_t<std::uint8_t> array_of(const Image& image) {
+  std::vector<py::ssize_t> shape{image.height(), image.width()};
+  if (image.channels() == 3) shape.push_back(3);
+  return py::array_t<std::uint8_t>(shape, image.pixels().data());
+}
+
+py::array_t<double> pose_rows(std::span<const Pose2> poses) {
+  py::array_t<double> rows({static_cast<py::ssize_t>(poses.size()), py::ssize_t{3}});
+  auto row = rows.mutable_unchecked<2>();
+  for (py::ssize_t i = 0; i < rows.shape(0); ++i) {
+    const Pose2& pose = poses[static_cast<std::size_t>(i)];
+    row(i, 0) = pose.x_m;
+    row(i, 1) = pose.y_m;
+    row(i, 2) = pose.heading_rad;
+  }
+  return rows;
+}
+
+Observation observation_from(const py::handle& seen) {
+  if (py::isinstance<Observation>(seen)) return seen.cast<const Observation&>();
+  if (py::isinstance<Panorama>(seen)) return Observation(seen.cast<const Panorama&>());
+  const bool is_path = py::isinstance<py::str>(seen) || py::hasattr(seen, "__fspath__");
+  if (!is_path) return Observation(PictureArray(seen, "picture").image());
+  const auto file = seen.cast<std::filesystem::path>();
+  const py::gil_scoped_release free;
+  Observation observation(read_image(file));
+  observation.name = file.filename().string();
+  observation.file = file;
+  return observation;
+}
+
+void bind_arrays(py::module_& m) {
+  m.def(
+      "structured_poses",
+      [](const py::array_t<double, py::array::c_style | py::array::forcecast>& rows) {
+        if (rows.ndim() != 2 || rows.shape(1) < 2 || rows.shape(1) > 4) {
+          throw ContractError("shape of rows", shape_text(rows), "(n, 2), (n, 3) or (n, 4)");
+        }
+        py::list fields;
+        for (const auto& name : field_names(rows.shape(1))) {
+          fields.append(py::make_tuple(name, "f8"));
+        }
+        return py::array(rows.attr("view")(fields).attr("reshape")(-1));
+      },
+      py::arg("rows"),
+      "An array of (n, 2), (n, 3) or (n, 4) as a structured one of n poses with the fields x_m, "
+      "y_m, heading_rad and, of four, stamp_s first; it looks at the same numbers where they are "
+      "float64 side by side. Functions that take rows of poses take such arrays, too.");
+}
+
+}  // namespace panonav::python

@@ -1,0 +1,196 @@
+#include "panonav/pipeline/memory_updater.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <map>
+#include <optional>
+#include <sstream>
+#include <utility>
+#include <vector>
+
+#include "panonav/core/error.hpp"
+#include "panonav/pipeline/known_views.hpp"
+#include "panonav/pipeline/learnt_models.hpp"
+#include "panonav/pipeline/view_encoder.hpp"
+#include "panonav/storage/memory_file.hpp"
+
+namespace panonav {
+
+namespace {
+
+constexpr const char* use_parameter = "use of views";
+constexpr const char* use_version = "1";
+
+std::string exact(double value) {
+  std::array<char, 40> text{};
+  std::snprintf(text.data(), text.size(), "%a", value);
+  return text.data();
+}
+
+std::string to_parameter(const MemoryUse& use) {
+  std::string text = std::string(use_version) + " " + std::to_string(use.runs) + " " +
+                     exact(use.spacing_m) + " " + exact(use.far_difference) + " " +
+                     exact(use.range_m) + " " + std::to_string(use.places) + " " +
+                     std::to_string(use.size) + "\n";
+  for (const auto& [view, one] : use.views) {
+    text += std::to_string(view.value) + " " + std::to_string(one.matched) + " " +
+            std::to_string(one.failed) + " " + std::to_string(one.last_run) +
+            (one.learnt ? " learnt\n" : " -\n");
+  }
+  return text;
+}
+
+// What an unknown version wrote counts as nothing.
+MemoryUse from_parameter(const std::optional<std::string>& text) {
+  MemoryUse use;
+  if (!text) return use;
+  std::istringstream words(*text);
+  std::string version, spacing, far, range;
+  if (!(words >> version >> use.runs >> spacing >> far >> range >> use.places >> use.size) ||
+      version != use_version) {
+    return {};
+  }
+  use.spacing_m = std::strtod(spacing.c_str(), nullptr);
+  use.far_difference = std::strtod(far.c_str(), nullptr);
+  use.range_m = std::strtod(range.c_str(), nullptr);
+  std::uint32_t view = 0;
+  MemoryUse::View one;
+  std::string learnt;
+  while (words >> view >> one.matched >> one.failed >> one.last_run >> learnt) {
+    one.learnt = learnt == "learnt";
+    use.views[ViewId{view}] = one;
+  }
+  return use;
+}
+
+ObservationModel model_for(const MemoryFile& file, const ColumnRanking& ranking) {
+  const VisualMemory& memory = ranking.memory();
+  const auto oriented = std::ranges::count_if(memory.views(), [&](ViewId view) {
+    const auto& pose = memory.info(view).pose;
+    return pose && pose->heading_rad;
+  });
+  if (oriented < ObservationModel::min_views) {
+    throw FileError(file.path().string(),
+                    "holds " + std::to_string(oriented) +
+                        " views with position and heading; allowed where views are updated: " +
+                        std::to_string(ObservationModel::min_views) + " or more");
+  }
+  const auto models = kept_models(file, memory);
+  if (models && models->observation) return *models->observation;
+  try {
+    return learn_observation_model(ranking);
+  } catch (const ContractError& error) {  // the views are all in one place
+    throw FileError(file.path().string(), error.what());
+  }
+}
+
+}  // namespace
+
+struct MemoryUpdater::Implementation {
+  Implementation(const std::filesystem::path& path, const MemoryUpdateOptions& options)
+      : file(MemoryFile::open(path, Access::read_write)),
+        memory(file.load()),
+        encoder(file.header(), file.header().source),
+        ranking(memory),
+        update(ranking, model_for(file, ranking), from_parameter(file.parameter(use_parameter)),
+               options) {}
+
+  MemoryFile file;
+  VisualMemory memory;
+  ViewEncoder encoder;
+  ColumnRanking ranking;
+  MemoryUpdate update;
+  std::map<std::size_t, NewView> kept;  // by their numbers in the run
+  std::size_t seen = 0;
+  bool finished = false;
+
+  void require_unfinished() const {
+    if (finished) throw ContractError("run", "finished", "one updater for each run");
+  }
+};
+
+MemoryUpdater::MemoryUpdater(const std::filesystem::path& memory,
+                             const MemoryUpdateOptions& options)
+    : implementation_(std::make_unique<Implementation>(memory, options)) {}
+MemoryUpdater::~MemoryUpdater() = default;
+MemoryUpdater::MemoryUpdater(MemoryUpdater&&) noexcept = default;
+MemoryUpdater& MemoryUpdater::operator=(MemoryUpdater&&) noexcept = default;
+
+void MemoryUpdater::see(const Observation& observation, const Panorama& panorama,
+                        const Place& place) {
+  auto& self = *implementation_;
+  self.require_unfinished();
+  if (!observation.odometry) return;
+  NewView view;
+  view.info.name = observation.name;
+  view.info.stamp_s = observation.stamp_s;
+  view.signature = self.encoder.packed(panorama);
+  MemoryUpdate::AnsweredView seen{
+      *observation.odometry, view.signature, place.known_probability, {}, {}};
+  if (place.position && place.heading_rad) {
+    seen.pose = Pose2{place.position->x_m, place.position->y_m, *place.heading_rad};
+    seen.radius_m = place.position->radius_m;
+  }
+  const std::size_t number = self.seen++;
+  self.update.add(std::move(seen));
+  std::erase_if(self.kept,
+                [&](const auto& one) { return !self.update.can_become_view(one.first); });
+  if (!self.update.can_become_view(number)) return;
+  view.thumbnail = thumbnail_png(panorama);
+  if (const auto features = self.encoder.features(panorama)) view.features = pack(*features);
+  self.kept.emplace(number, std::move(view));
+}
+
+bool MemoryUpdater::is_near_known_place() const {
+  return implementation_->update.is_near_known_place();
+}
+
+MemoryUpdater::Changes MemoryUpdater::finish(const std::string& what) {
+  auto& self = *implementation_;
+  self.require_unfinished();
+  self.finished = true;
+  MemoryUpdate::Changes planned = self.update.finish();
+  Changes changes{.seen = self.seen, .certain = planned.certain, .views = self.memory.size()};
+  if (planned.certain == 0) return changes;
+  changes.reinforced = planned.matched.size();
+  changes.added = planned.added.size();
+  changes.replaced = planned.replaced.size();
+  changes.forgotten = planned.forgotten.size();
+  std::vector<ViewId> dropped = planned.replaced;
+  dropped.insert(dropped.end(), planned.forgotten.begin(), planned.forgotten.end());
+  self.file.change(
+      [&] {
+        // Another process may have dropped some meanwhile.
+        const std::vector<ViewId> there = self.file.views();
+        std::erase_if(dropped,
+                      [&](ViewId view) { return !std::ranges::binary_search(there, view); });
+        if (!dropped.empty()) {
+          self.file.remove(dropped);
+          forget_recordings(self.file);
+        }
+        std::vector<NewView> added;
+        for (const auto& [number, pose] : planned.added) {
+          NewView& view = added.emplace_back(std::move(self.kept.at(number)));
+          view.info.name = "update " + std::to_string(planned.use.runs) + "/" + view.info.name;
+          view.info.pose = pose;
+        }
+        for (const ViewId view : self.file.append(added)) {
+          planned.use.views[view] = {.last_run = planned.use.runs, .learnt = true};
+        }
+        changes.views = there.size() - dropped.size() + added.size();
+        planned.use.size = static_cast<int>(changes.views);
+        self.file.set_parameter(use_parameter, to_parameter(planned.use));
+        if (!added.empty() || !dropped.empty()) keep_models(self.file);
+      },
+      what + ": " + as_text(changes));
+  return changes;
+}
+
+std::string as_text(const MemoryUpdater::Changes& changes) {
+  return std::to_string(changes.added) + " views added, " + std::to_string(changes.replaced) +
+         " replaced, " + std::to_string(changes.forgotten) + " forgotten, " +
+         std::to_string(changes.reinforced) + " reinforced";
+}
+
+}  // namespace panonav
