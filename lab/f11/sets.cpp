@@ -52,7 +52,7 @@ void add_published(const simulation::MappingRecording& recording, Grid& grid) {
     const FourierSignature& after = recording.views[i + 1];
     for (const int k1 : k1_values) lengths[k1].push_back(dissimilarity_l2(after, before, k1));
     for (const int k2 : k2_values) {
-      const auto reading = compass(after, before, {.components = k2});
+      const auto reading = compass(after, before, k2);
       turns[k2].push_back(reading ? reading->heading_rad : 0.0);
     }
   }

@@ -42,12 +42,14 @@ CameraModel mirror_model(const std::string& name, const py::dict& parameters,
 }
 
 void bind_mirrors(py::module_& m) {
-  Record<FoundCircle>(m, "FoundCircle", "A circle found in an image.")
+  Record<MirrorCircle::Circle>(m, "FoundCircle", "A circle found in an image.")
       .field(
-          "centre", [](const FoundCircle& c) { return pixel(c.centre); }, "(u, v)")
-      .field("radius_px", &FoundCircle::radius_px, "Of the circle, > 0.")
-      .field("quality", &FoundCircle::quality, "Part of the circumference with an edge, 0 to 1.")
-      .field("residual_px", &FoundCircle::residual_px, "Of the edge points, across the circle.");
+          "centre", [](const MirrorCircle::Circle& c) { return pixel(c.centre); }, "(u, v)")
+      .field("radius_px", &MirrorCircle::Circle::radius_px, "Of the circle, > 0.")
+      .field("quality", &MirrorCircle::Circle::quality,
+             "Part of the circumference with an edge, 0 to 1.")
+      .field("residual_px", &MirrorCircle::Circle::residual_px,
+             "Of the edge points, across the circle.");
   Record<MirrorCircle>(m, "MirrorCircle", "Where a mirror lies in the pictures of its camera.")
       .field(
           "image_size",
@@ -65,7 +67,7 @@ void bind_mirrors(py::module_& m) {
   m.def(
       "find_mirror",
       [](const py::iterable& pictures, const py::kwargs& keywords) {
-        MirrorSearchOptions options;
+        MirrorCircle::SearchOptions options;
         Keywords(keywords).options(options).finish();
         const Pictures all(pictures);
         const py::gil_scoped_release free;
@@ -74,7 +76,7 @@ void bind_mirrors(py::module_& m) {
       py::arg("pictures"),
       with_options("Finds the mirror in raw pictures of one camera, a list of uint8 arrays; more "
                    "are better. None where no rim stands out.",
-                   {options_of<MirrorSearchOptions>()})
+                   {options_of<MirrorCircle::SearchOptions>()})
           .c_str());
   m.def(
       "camera_from_mirror",
@@ -127,9 +129,9 @@ void bind_calibration(py::module_& m) {
       [](const py::iterable& pictures, double left_roll_rad, double right_roll_rad,
          double left_azimuth_rad, std::optional<double> field_of_view_rad,
          std::optional<double> turn_rad, const std::string& direction, int threads) {
-        const DualFisheyeKnowledge known{left_roll_rad,    right_roll_rad,
-                                         left_azimuth_rad, field_of_view_rad,
-                                         turn_rad,         direction_of(direction)};
+        const DualFisheyeCalibration::Knowledge known{left_roll_rad,    right_roll_rad,
+                                                      left_azimuth_rad, field_of_view_rad,
+                                                      turn_rad,         direction_of(direction)};
         const Pictures all(pictures);
         const py::gil_scoped_release free;
         InterruptibleExecutor executor(threads);

@@ -51,12 +51,12 @@ void bind_measures(py::module_& m) {
       .field("value", &ShapeDifference::value, "0 (same shape) to 1.")
       .field("with_reflection", &ShapeDifference::with_reflection,
              "When a mirror image is allowed.");
-  Record<ErrorSummary>(m, "ErrorSummary", "Statistics of errors.")
-      .field("rms", &ErrorSummary::rms, "Root mean square.")
-      .field("mean", &ErrorSummary::mean, "Arithmetic mean.")
-      .field("median", &ErrorSummary::median, "Half of the errors are at most this.")
-      .field("p95", &ErrorSummary::p95, "95 % are at most this.")
-      .field("largest", &ErrorSummary::largest, "The greatest error of all.");
+  Record<TrajectoryError::Summary>(m, "ErrorSummary", "Statistics of errors.")
+      .field("rms", &TrajectoryError::Summary::rms, "Root mean square.")
+      .field("mean", &TrajectoryError::Summary::mean, "Arithmetic mean.")
+      .field("median", &TrajectoryError::Summary::median, "Half of the errors are at most this.")
+      .field("p95", &TrajectoryError::Summary::p95, "95 % are at most this.")
+      .field("largest", &TrajectoryError::Summary::largest, "The greatest error of all.");
   Record<TrajectoryError>(m, "TrajectoryError",
                           "How far an estimated trajectory is from the truth: ATE and RPE.")
       .field("pairs", &TrajectoryError::pairs, "Estimates with a true pose at their stamp.")
@@ -92,7 +92,7 @@ void bind_measures(py::module_& m) {
   m.def(
       "trajectory_error",
       [](const py::object& estimate, const py::object& truth, const py::kwargs& keywords) {
-        TrajectoryErrorOptions options;
+        TrajectoryError::Options options;
         Keywords(keywords).options(options).finish();
         const auto a = trajectory_of(number_rows(estimate, "estimate", 4));
         const auto b = trajectory_of(number_rows(truth, "truth", 4));
@@ -102,7 +102,7 @@ void bind_measures(py::module_& m) {
       py::arg("estimate"), py::arg("truth"),
       with_options("ATE and RPE of two trajectories, (n, 4) of stamp_s, x_m, y_m, heading_rad. "
                    "None when fewer than two estimates have a true pose at their stamp.",
-                   {options_of<TrajectoryErrorOptions>()})
+                   {options_of<TrajectoryError::Options>()})
           .c_str());
   m.def(
       "read_trajectory",

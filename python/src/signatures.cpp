@@ -29,7 +29,7 @@ void bind_compass(py::module_& m, const char* doc) {
   m.def(
       "compass",
       [](const Signature& query, const Signature& reference, int components) {
-        return compass(query, reference, CompassOptions{components});
+        return compass(query, reference, components);
       },
       py::arg("query"), py::arg("reference"), py::arg("components") = 0,
       py::call_guard<py::gil_scoped_release>(), doc);

@@ -194,12 +194,12 @@ std::string shown(MessageBytes bytes, const RecordedTopic& topic) {
 }  // namespace
 
 OpenedDataset read_recording(const fs::path& path, PictureSource source,
-                             const RecordingTopics& topics) {
+                             const InputOptions::Topics& topics) {
   return read_recording(Recording::open(path), path, std::move(source), topics);
 }
 
 OpenedDataset read_recording(std::shared_ptr<const Recording> recording, const fs::path& path,
-                             PictureSource source, const RecordingTopics& topics) {
+                             PictureSource source, const InputOptions::Topics& topics) {
   RecordedMessages messages =
       collect_messages(path, *recording, choose_topics(*recording, path, topics, source));
   const bool by_log = messages.sort();

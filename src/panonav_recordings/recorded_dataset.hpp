@@ -36,11 +36,11 @@ namespace panonav::recordings {
 /// picture and 80 a message of the other topics, of which there may be 10 million; a million
 /// pictures.
 [[nodiscard]] OpenedDataset read_recording(const std::filesystem::path& path, PictureSource source,
-                                           const RecordingTopics& topics = {});
+                                           const InputOptions::Topics& topics = {});
 /// The same of a recording that is open; `path` stands in errors and entries.
 [[nodiscard]] OpenedDataset read_recording(std::shared_ptr<const Recording> recording,
                                            const std::filesystem::path& path, PictureSource source,
-                                           const RecordingTopics& topics = {});
+                                           const InputOptions::Topics& topics = {});
 
 /// One topic as `describe_recording` knows it.
 struct TopicSummary {

@@ -21,9 +21,9 @@ namespace fs = std::filesystem;
 
 }  // namespace
 
-DatasetFields convert_to_recording(const Dataset& dataset, const fs::path& file,
-                                   const std::function<void()>& advance) {
-  const DatasetFields shared = shared_fields(dataset);
+Dataset::Fields convert_to_recording(const Dataset& dataset, const fs::path& file,
+                                     const std::function<void()>& advance) {
+  const Dataset::Fields shared = shared_fields(dataset);
   TemporaryFile unfinished(file);
   // JPEG and PNG are packed already.
   McapWriter writer(unfinished.path(), {.compression = McapCompression::none});
@@ -52,11 +52,11 @@ DatasetFields convert_to_recording(const Dataset& dataset, const fs::path& file,
   return shared;
 }
 
-DatasetFields convert_to_dataset(const Dataset& recording, const fs::path& folder,
-                                 const std::function<void()>& advance) {
+Dataset::Fields convert_to_dataset(const Dataset& recording, const fs::path& folder,
+                                   const std::function<void()>& advance) {
   UnfinishedFolder unfinished(folder);
   Dataset dataset = recording;
-  const DatasetFields shared = drop_partial_fields(dataset);
+  const Dataset::Fields shared = drop_partial_fields(dataset);
   dataset.folder = unfinished.path();
   for (DatasetEntry& entry : dataset.entries) {
     const auto bytes = read_encoded_picture(entry);

@@ -13,13 +13,13 @@ namespace panonav::recordings {
 /// position has one; where not every picture has a stamp they are one second apart. Returns what
 /// every picture has. `advance` is called after each picture. Throws FileError, and ContractError
 /// on stamps below 0 or beyond 2038.
-DatasetFields convert_to_recording(const Dataset& dataset, const std::filesystem::path& file,
-                                   const std::function<void()>& advance = {});
+Dataset::Fields convert_to_recording(const Dataset& dataset, const std::filesystem::path& file,
+                                     const std::function<void()>& advance = {});
 
 /// Writes what a recording or a video became as a new folder with a data set, which appears whole
 /// or not at all. JPEG and PNG keep their bytes, other pictures become PNG. What only some pictures
 /// have is left out. Returns what every picture has. Throws FileError.
-DatasetFields convert_to_dataset(const Dataset& recording, const std::filesystem::path& folder,
-                                 const std::function<void()>& advance = {});
+Dataset::Fields convert_to_dataset(const Dataset& recording, const std::filesystem::path& folder,
+                                   const std::function<void()>& advance = {});
 
 }  // namespace panonav::recordings

@@ -11,7 +11,7 @@ namespace panonav::recordings {
 
 namespace {
 
-void select_if_needed(Dataset& dataset, const PictureSelection& selection) {
+void select_if_needed(Dataset& dataset, const Dataset::Selection& selection) {
   if (selection.by_time() || selection.every > 1) select_pictures(dataset, selection);
 }
 

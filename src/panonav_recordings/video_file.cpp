@@ -218,7 +218,7 @@ bool is_video(const fs::path& file) {
   return std::ranges::find(known, name) != known.end();
 }
 
-Dataset read_video(const fs::path& file, PictureSource source, const PictureSelection& selection,
+Dataset read_video(const fs::path& file, PictureSource source, const Dataset::Selection& selection,
                    const ImageLimits& limits) {
   std::error_code error;
   if (!fs::is_regular_file(file, error))

@@ -18,7 +18,7 @@ namespace panonav::recordings {
 /// beyond the limits. One that cannot be decoded throws when it is read. Cost: one pass over the
 /// file without decoding.
 [[nodiscard]] Dataset read_video(const std::filesystem::path& file, PictureSource source,
-                                 const PictureSelection& selection = {},
+                                 const Dataset::Selection& selection = {},
                                  const ImageLimits& limits = {});
 
 }  // namespace panonav::recordings

@@ -56,7 +56,7 @@ std::vector<Image> turned_pictures(const Camera& camera, std::uint64_t seed,
   return pictures;
 }
 
-auto calibrate(const std::vector<Image>& pictures, const DualFisheyeKnowledge& known,
+auto calibrate(const std::vector<Image>& pictures, const DualFisheyeCalibration::Knowledge& known,
                int threads = 2) {
   std::vector<ImageView> views;
   for (const Image& picture : pictures) views.push_back(picture.view());
@@ -90,7 +90,7 @@ TEST(CalibrateDualFisheye, RecoversTheLensesFromTurnedPictures) {
   for (const auto direction : {ColumnDirection::clockwise, ColumnDirection::counter_clockwise}) {
     camera.direction = direction;
     const auto pictures = turned_pictures(camera, 5, {0, 80, 170});
-    DualFisheyeKnowledge known;
+    DualFisheyeCalibration::Knowledge known;
     known.left_roll_rad = radians(90);
     known.right_roll_rad = radians(-90);
     known.direction = direction;
@@ -125,7 +125,7 @@ TEST(CalibrateDualFisheye, RecoversTheLensesFromTurnedPictures) {
 
 TEST(CalibrateDualFisheye, RefusesWhatDoesNotDetermineTheLenses) {
   const Camera camera = dual_fisheye_camera();
-  DualFisheyeKnowledge known;
+  DualFisheyeCalibration::Knowledge known;
   known.left_roll_rad = radians(90);
   known.right_roll_rad = radians(-90);
   const auto pictures = turned_pictures(camera, 5, {0, 90});
@@ -139,7 +139,7 @@ TEST(CalibrateDualFisheye, RefusesWhatDoesNotDetermineTheLenses) {
   // Circles, but nothing in them, or noise.
   const auto plain = render(
       camera, [](double, double) { return 0.5; }, 1);
-  DualFisheyeKnowledge turned = known;
+  DualFisheyeCalibration::Knowledge turned = known;
   turned.turn_rad = radians(90);
   EXPECT_TRUE(contains(reason(calibrate({plain, plain}, turned)), "too little structure"));
   std::vector<Image> noisy = turned_pictures(camera, 5, {0, 90}, 0.0);

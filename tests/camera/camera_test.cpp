@@ -61,11 +61,14 @@ std::vector<NamedCamera> all_cameras() {
       {"polynomial_mirror", mirror_camera(PolynomialModel{{220, 0, -2.6e-3, 1e-7}}, 15, 225)},
       {"polynomial_fisheye", mirror_camera(PolynomialModel{{-180, 0, 1.9e-3, 2e-6}}, 0, 230)},
       {"polynomial_linear", mirror_camera(PolynomialModel{{100, -0.7}}, 40, 200)},
-      {"unified_hyperboloid", mirror_camera(UnifiedModel{0.9, 260, ViewAxis::down}, 30, 229)},
-      {"unified_paraboloid", mirror_camera(UnifiedModel{1.0, 180, ViewAxis::down}, 0, 230)},
-      {"unified_fisheye", mirror_camera(UnifiedModel{0.7, 150, ViewAxis::up}, 0, 230)},
-      {"unified_large_xi", mirror_camera(UnifiedModel{1.8, 400, ViewAxis::down}, 10, 230)},
-      {"unified_pinhole", mirror_camera(UnifiedModel{0.0, 200, ViewAxis::up}, 0, 230)},
+      {"unified_hyperboloid",
+       mirror_camera(UnifiedModel{0.9, 260, UnifiedModel::Axis::down}, 30, 229)},
+      {"unified_paraboloid",
+       mirror_camera(UnifiedModel{1.0, 180, UnifiedModel::Axis::down}, 0, 230)},
+      {"unified_fisheye", mirror_camera(UnifiedModel{0.7, 150, UnifiedModel::Axis::up}, 0, 230)},
+      {"unified_large_xi",
+       mirror_camera(UnifiedModel{1.8, 400, UnifiedModel::Axis::down}, 10, 230)},
+      {"unified_pinhole", mirror_camera(UnifiedModel{0.0, 200, UnifiedModel::Axis::up}, 0, 230)},
       {"equiangular", mirror_camera(EquiangularModel{-1.2, 0.4}, 35, 220)},
       {"equiangular_looking_up", mirror_camera(EquiangularModel{1.5, -0.2}, 5, 220)},
       {"equirectangular", equirectangular_camera(-std::numbers::pi / 2, std::numbers::pi / 2)},
@@ -296,15 +299,15 @@ TEST(CameraValidation, NamesTheField) {
        }},
       {"xi",
        [](Camera& c) {
-         c.model = UnifiedModel{-0.1, 300, ViewAxis::down};
+         c.model = UnifiedModel{-0.1, 300, UnifiedModel::Axis::down};
        }},
       {"focal_length_px",
        [](Camera& c) {
-         c.model = UnifiedModel{1, 0, ViewAxis::down};
+         c.model = UnifiedModel{1, 0, UnifiedModel::Axis::down};
        }},
       {"rim_radius_px",
        [](Camera& c) {
-         c.model = UnifiedModel{2, 300, ViewAxis::down};
+         c.model = UnifiedModel{2, 300, UnifiedModel::Axis::down};
        }},
       {"elevation_at_inner_rad",
        [](Camera& c) {

@@ -18,7 +18,8 @@
 namespace panonav::testing {
 namespace {
 
-std::optional<MirrorCircle> find_in(const Image& image, const MirrorSearchOptions& options = {}) {
+std::optional<MirrorCircle> find_in(const Image& image,
+                                    const MirrorCircle::SearchOptions& options = {}) {
   const ImageView view = image.view();
   return find_mirror({&view, 1}, options);
 }
@@ -115,7 +116,7 @@ TEST_P(EveryMirrorPicture, RimAndCentreAreFoundToAFractionOfAPixel) {
   EXPECT_NEAR(mirror->centre.u_px, truth.centre.u_px, 0.5);
   EXPECT_NEAR(mirror->centre.v_px, truth.centre.v_px, 0.5);
   EXPECT_NEAR(mirror->rim_radius_px, truth.rim_px, 0.5);
-  EXPECT_GE(mirror->quality, MirrorSearchOptions{}.min_quality);
+  EXPECT_GE(mirror->quality, MirrorCircle::SearchOptions{}.min_quality);
   EXPECT_LE(mirror->quality, 1.0);
   if (truth.disc_px == 0) {
     // No disc was painted; a circle of the scene may stand out by chance, the centre must not be

@@ -107,7 +107,8 @@ TEST(HyperboloidalModel, IsAUnifiedModel) {
   const double b = mirror.b_mm;
   const double c = std::hypot(a, b);
   const UnifiedModel unified{2 * b * c / (b * b + c * c),
-                             mirror.focal_length_px * a * a / (b * b + c * c), ViewAxis::down};
+                             mirror.focal_length_px * a * a / (b * b + c * c),
+                             UnifiedModel::Axis::down};
   for (double radius_px = 0; radius_px < 590; radius_px += 5) {
     EXPECT_NEAR(*elevation_at(mirror, radius_px), *elevation_at(unified, radius_px), 1e-9);
   }

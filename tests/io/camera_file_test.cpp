@@ -37,7 +37,8 @@ TEST_F(CameraFiles, EveryModelReadsBackTheSame) {
   int models = 0;
   for (const CameraModel& model :
        {CameraModel{HyperboloidalModel{}}, CameraModel{PolynomialModel{{-180.0, 0.0, 0.002}}},
-        CameraModel{UnifiedModel{0.9, 280.0}}, CameraModel{UnifiedModel{0.9, 280.0, ViewAxis::up}},
+        CameraModel{UnifiedModel{0.9, 280.0}},
+        CameraModel{UnifiedModel{0.9, 280.0, UnifiedModel::Axis::up}},
         CameraModel{EquiangularModel{-1.0, 0.3}}}) {
     const CameraFile file{mirror_camera(model), std::nullopt};
     write_camera(path, file);

@@ -97,7 +97,7 @@ TEST_P(ExactSearch, HierarchyHoldsExactlyTheViewsWithinItsLimit) {
     double limit_before = levels.front().limit;
     std::uint64_t bytes_before = 0;
     for (std::size_t i = 0; i < levels.size(); ++i) {
-      const HierarchyLevel& level = levels[i];
+      const VisualMemory::HierarchyLevel& level = levels[i];
       EXPECT_EQ(level.components, static_cast<int>(i) + 1);
       EXPECT_GE(level.limit, (1.0 + tolerance) * nearest.dissimilarity);
       EXPECT_LE(level.limit, limit_before);
@@ -259,7 +259,8 @@ TEST(VisualMemorySearch, HierarchyStopsWhenTold) {
   const PackedSignature query = filled.maker.next();
   const auto all = filled.memory.hierarchy(query, 0.2);
   const auto some = filled.memory.hierarchy(
-      query, 0.2, 0, [](const HierarchyLevel& level) { return level.components == 4; });
+      query, 0.2, 0,
+      [](const VisualMemory::HierarchyLevel& level) { return level.components == 4; });
   ASSERT_EQ(some.size(), 4U);
   ASSERT_EQ(all.size(), 15U);
   for (std::size_t i = 0; i < some.size(); ++i) EXPECT_EQ(some[i].candidates, all[i].candidates);

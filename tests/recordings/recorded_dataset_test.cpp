@@ -61,11 +61,11 @@ class RecordedTopics : public ::testing::TestWithParam<MessageEncoding> {
     message.orientation = ros::pose_of({0.0, 0.0, 1.2}, tilt).orientation;
     recorded_->add(topic, start_ns + after_ns, message);
   }
-  [[nodiscard]] OpenedDataset read(const RecordingTopics& topics = {},
+  [[nodiscard]] OpenedDataset read(const InputOptions::Topics& topics = {},
                                    const PictureSource& source = sphere) const {
     return read_recording(recorded_, "drive.bag", source, topics);
   }
-  [[nodiscard]] std::string error(const RecordingTopics& topics = {}) const {
+  [[nodiscard]] std::string error(const InputOptions::Topics& topics = {}) const {
     return message_of<FileError>([&] { (void)read(topics); });
   }
   void expect_odometry(const DatasetEntry& entry, std::int64_t after_ns) {

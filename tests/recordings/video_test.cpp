@@ -88,7 +88,7 @@ TEST_F(Video, PicturesCanBeReadInAnyOrderAndFromSeveralThreads) {
 
 TEST_F(Video, ASelectionTakesTheSamePicturesAsOfAFolderWithStamps) {
   const fs::path file = make("walk.mp4", "-c:v libx264rgb -qp 0");
-  const auto numbers = [&](const PictureSelection& selection) {
+  const auto numbers = [&](const Dataset::Selection& selection) {
     std::vector<int> taken;
     for (const auto& entry : read_video(file, {}, selection).entries) {
       const Image picture = read_picture(entry);

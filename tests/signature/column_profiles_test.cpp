@@ -291,18 +291,18 @@ TEST(MatchColumnsTwice, FindsTheSecondTurnOnTheOtherSide) {
     }
   }
   const ColumnProfiles profiles(packed(view));
-  const ColumnMatches matches = match_columns_twice(profiles, profiles);
-  const ColumnMatch best = match_columns(profiles, profiles);
-  EXPECT_EQ(matches.best.difference, best.difference);
-  EXPECT_EQ(matches.best.heading_rad, best.heading_rad);
-  EXPECT_NEAR(std::abs(matches.other.heading_rad), std::numbers::pi, 1e-9);
-  EXPECT_GT(matches.other.difference, matches.best.difference);
+  const auto [best, other] = match_columns_twice(profiles, profiles);
+  const ColumnMatch alone = match_columns(profiles, profiles);
+  EXPECT_EQ(best.difference, alone.difference);
+  EXPECT_EQ(best.heading_rad, alone.heading_rad);
+  EXPECT_NEAR(std::abs(other.heading_rad), std::numbers::pi, 1e-9);
+  EXPECT_GT(other.difference, best.difference);
 
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-    const ColumnMatches found = match_columns_twice(ColumnProfiles(packed(smooth_view(seed))),
-                                                    ColumnProfiles(packed(smooth_view(seed + 50))));
-    EXPECT_GE(found.other.difference, found.best.difference);
-    EXPECT_GE(std::abs(angle_difference(found.other.heading_rad, found.best.heading_rad)),
+    const auto [nearest, farther] = match_columns_twice(
+        ColumnProfiles(packed(smooth_view(seed))), ColumnProfiles(packed(smooth_view(seed + 50))));
+    EXPECT_GE(farther.difference, nearest.difference);
+    EXPECT_GE(std::abs(angle_difference(farther.heading_rad, nearest.heading_rad)),
               std::numbers::pi / 3 - 1e-9);
   }
 }

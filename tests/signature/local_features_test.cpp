@@ -34,12 +34,12 @@ TEST(LocalFeatures, ATurnedViewHasTheTurnedFeatures) {
   for (const int turned : {1, 100, 359}) {
     const LocalFeatures there = extract_features(turn_columns(view, turned)).value();
     auto expected = here.features;
-    for (LocalFeature& feature : expected) {
+    for (LocalFeatures::Feature& feature : expected) {
       feature.column = static_cast<std::uint16_t>((feature.column + 360 - turned) % 360);
     }
     std::ranges::sort(expected, {}, [](const auto& f) { return std::pair(f.row, f.column); });
     EXPECT_EQ(there.features, expected);
-    const FeatureMatch match = match_features(there, here);
+    const LocalFeatures::Match match = match_features(there, here);
     EXPECT_EQ(match.verified, static_cast<int>(here.features.size()));
     EXPECT_NEAR(angle_difference(match.heading_rad, turned * 2.0 * std::numbers::pi / 360.0), 0.0,
                 radians(3.4));
@@ -50,7 +50,7 @@ TEST(LocalFeatures, OfUnrelatedViewsFewAreVerifiedEitherWay) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     const LocalFeatures a = extract_features(patches(seed)).value();
     const LocalFeatures b = extract_features(patches(seed + 100)).value();
-    const FeatureMatch match = match_features(a, b);
+    const LocalFeatures::Match match = match_features(a, b);
     EXPECT_LT(match.verified, static_cast<int>(a.features.size()) / 4);
     EXPECT_NEAR(match.verified, match_features(b, a).verified, 1);
     EXPECT_EQ(match_features(a, b, match.verified - 1).verified, match.verified);

@@ -34,7 +34,7 @@ TEST_F(MemoryFileContent, HeadersComeBack) {
   std::vector<MemoryHeader> headers{plain, picture, resampled, mirror_header()};
   for (const CameraModel& model :
        {CameraModel(HyperboloidalModel{}), CameraModel(UnifiedModel{0.9, 200.0}),
-        CameraModel(UnifiedModel{0.9, 200.0, ViewAxis::up}),
+        CameraModel(UnifiedModel{0.9, 200.0, UnifiedModel::Axis::up}),
         CameraModel(EquiangularModel{-0.9, 0.4})}) {
     headers.push_back(mirror_header());
     headers.back().source.camera->model = model;

@@ -100,7 +100,7 @@ class SkipNotes {
 /// Chooses pictures as `select_pictures` does, but one by one.
 class LiveSelection {
  public:
-  explicit LiveSelection(const PictureSelection& wanted) : wanted_(wanted) {}
+  explicit LiveSelection(const Dataset::Selection& wanted) : wanted_(wanted) {}
   [[nodiscard]] bool takes(double stamp_s) {
     if (!first_s_) first_s_ = stamp_s;
     if (wanted_.from_s && stamp_s - *first_s_ < *wanted_.from_s) return false;
@@ -115,7 +115,7 @@ class LiveSelection {
   }
 
  private:
-  PictureSelection wanted_;
+  Dataset::Selection wanted_;
   std::optional<double> first_s_;
   std::optional<double> taken_s_;
   std::size_t number_ = 0;

@@ -83,7 +83,7 @@ void declare_layout(Arguments& arguments, PictureArguments& pictures) {
   arguments.uncommon({"--columns-run", "--forward-column"});
 }
 
-void declare_topics(Arguments& arguments, RecordingTopics& topics) {
+void declare_topics(Arguments& arguments, InputOptions::Topics& topics) {
   arguments.option(
       "--image-topic NAME", topics.image,
       "Pictures of a recording (MCAP, rosbag2, ROS 1 bag) with several topics of them");
@@ -125,8 +125,8 @@ bool is_one_picture(const std::string& input) {
          !recordings::is_live(input);
 }
 
-PictureSelection selection_of(const PartArguments& part) {
-  PictureSelection selection{.from_s = part.from_s, .to_s = part.to_s};
+Dataset::Selection selection_of(const PartArguments& part) {
+  Dataset::Selection selection{.from_s = part.from_s, .to_s = part.to_s};
   for (const auto& [flag, value] : {std::pair{"--from", part.from_s}, {"--to", part.to_s}}) {
     if (value && *value < 0.0) {
       throw UsageError(std::string(flag) + " is " + to_text(*value) + "; allowed: 0 or more");
@@ -240,8 +240,8 @@ Dataset open_recording(const std::string& input, const PictureArguments& picture
   return recording;
 }
 
-Dataset read_run(const std::string& input, const RecordingTopics& topics, const PartArguments& part,
-                 const MemoryFile& memory, Session& session) {
+Dataset read_run(const std::string& input, const InputOptions::Topics& topics,
+                 const PartArguments& part, const MemoryFile& memory, Session& session) {
   PictureArguments pictures;
   pictures.topics = topics;
   pictures.part = part;

@@ -29,15 +29,15 @@ struct PictureArguments {
   std::optional<std::string> columns;
   std::optional<double> forward_column;
   std::optional<std::pair<double, double>> elevation_deg;
-  bool recursive = false;  ///< a folder of pictures: those of the folders within, too
-  RecordingTopics topics;  ///< of a recording of topics
+  bool recursive = false;       ///< a folder of pictures: those of the folders within, too
+  InputOptions::Topics topics;  ///< of a recording of topics
   PartArguments part;
 };
 
 /// Adds --kind, --camera, --columns-run, --forward-column and --elevation-deg.
 void declare_layout(Arguments& arguments, PictureArguments& pictures);
 /// Adds --image-topic, --odometry-topic, --odometry-frames and --imu-topic.
-void declare_topics(Arguments& arguments, RecordingTopics& topics);
+void declare_topics(Arguments& arguments, InputOptions::Topics& topics);
 /// Adds --from and --to, and unless the verb has one of its own, --every.
 void declare_part(Arguments& arguments, PartArguments& part, bool every);
 /// All three.
@@ -53,7 +53,7 @@ void declare_pictures(Arguments& arguments, PictureArguments& pictures);
 [[nodiscard]] std::optional<PictureSource> picture_source(const PictureArguments& pictures);
 
 /// The part that is wanted. Throws UsageError on values out of range.
-[[nodiscard]] PictureSelection selection_of(const PartArguments& part);
+[[nodiscard]] Dataset::Selection selection_of(const PartArguments& part);
 
 /// Opens what `open_input` does, as the flags say, and notes its warnings. `remembered` is how the
 /// pictures lie that a memory was made from: so lie those that come without a description of their
@@ -71,7 +71,7 @@ void require_kept_band(const PictureArguments& pictures, const MemoryFile& memor
 
 /// The recording of a run: a data set, or a folder or recording of pictures that lie as those of
 /// the memory.
-[[nodiscard]] Dataset read_run(const std::string& input, const RecordingTopics& topics,
+[[nodiscard]] Dataset read_run(const std::string& input, const InputOptions::Topics& topics,
                                const PartArguments& part, const MemoryFile& memory,
                                Session& session);
 

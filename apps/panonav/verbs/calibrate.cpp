@@ -83,7 +83,7 @@ struct CalibrateArguments {
   std::string out;
   std::optional<std::string> overlay;
   std::optional<double> inner_radius_px;
-  MirrorSearchOptions search;
+  MirrorCircle::SearchOptions search;
   MirrorOptions mirror;
   LensesOptions lenses;
 };
@@ -255,7 +255,7 @@ ExitCode calibrate_lenses(const CalibrateArguments& wanted, const std::vector<st
                      std::to_string(all.size()));
   }
   const LensesOptions& options = wanted.lenses;
-  DualFisheyeKnowledge known;
+  DualFisheyeCalibration::Knowledge known;
   known.left_roll_rad = radians(options.left_roll_deg);
   known.right_roll_rad = radians(options.right_roll_deg);
   known.left_azimuth_rad = radians(options.left_azimuth_deg);

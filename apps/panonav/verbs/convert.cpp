@@ -18,7 +18,7 @@ struct ConvertArguments {
 };
 
 /// What some pictures lack, and so none has in a data set.
-std::string parts(const DatasetFields& done) {
+std::string parts(const Dataset::Fields& done) {
   std::string text;
   for (const auto& [has, what] : {std::pair{done.odometry, "odometry"},
                                   {done.positions, "positions"},
@@ -46,9 +46,9 @@ ExitCode convert(const ConvertArguments& wanted, Session& session) {
                                          records ? std::optional(any) : std::nullopt, session);
   Progress progress(session, "converting", dataset.entries.size());
   const auto advance = [&] { progress.advance(); };
-  const DatasetFields done = records
-                                 ? recordings::convert_to_recording(dataset, wanted.output, advance)
-                                 : recordings::convert_to_dataset(dataset, wanted.output, advance);
+  const Dataset::Fields done =
+      records ? recordings::convert_to_recording(dataset, wanted.output, advance)
+              : recordings::convert_to_dataset(dataset, wanted.output, advance);
   progress.clear();
   if (session.json()) {
     session.print(json_line(ordered_json{{"input", wanted.input},

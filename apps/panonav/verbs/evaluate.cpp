@@ -18,10 +18,10 @@ namespace {
 struct EvaluateArguments {
   std::string estimate;
   std::string truth;
-  TrajectoryErrorOptions options;
+  TrajectoryError::Options options;
 };
 
-ordered_json as_json(const ErrorSummary& errors) {
+ordered_json as_json(const TrajectoryError::Summary& errors) {
   return {{"rmse", errors.rms},
           {"mean", errors.mean},
           {"median", errors.median},
@@ -91,7 +91,8 @@ ordered_json as_json(const TrajectoryError& error) {
   return json;
 }
 
-std::string line_of(const std::string& label, const ErrorSummary& errors, double unit, int digits) {
+std::string line_of(const std::string& label, const TrajectoryError::Summary& errors, double unit,
+                    int digits) {
   return label + "  RMSE " + format_fixed(errors.rms * unit, digits) + "  median " +
          format_fixed(errors.median * unit, digits) + "  95 % within " +
          format_fixed(errors.p95 * unit, digits) + "  maximum " +

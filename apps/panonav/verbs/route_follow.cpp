@@ -20,7 +20,7 @@ namespace {
 struct FollowArguments {
   std::string memory;
   std::string dataset;
-  RecordingTopics topics;
+  InputOptions::Topics topics;
   PartArguments part;
   std::optional<std::string> name;
   int every = 1;

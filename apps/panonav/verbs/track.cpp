@@ -40,7 +40,7 @@ constexpr double farthest_m = 1e9;
 struct TrackArguments {
   std::string memory;
   std::string dataset;
-  RecordingTopics topics;
+  InputOptions::Topics topics;
   PartArguments part;
   int every = 1;
   std::optional<double> start_x_m;

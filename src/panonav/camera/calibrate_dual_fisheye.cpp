@@ -105,7 +105,7 @@ std::optional<std::array<FieldCircle, 2>> find_circles(const std::vector<Image>&
 class Calibrator {
  public:
   Calibrator(const std::vector<Image>& grey, const std::array<FieldCircle, 2>& circles,
-             const DualFisheyeKnowledge& known, Executor& executor)
+             const DualFisheyeCalibration::Knowledge& known, Executor& executor)
       : grey_(grey),
         circles_(circles),
         known_(known),
@@ -137,7 +137,7 @@ class Calibrator {
 
   const std::vector<Image>& grey_;
   std::array<FieldCircle, 2> circles_;
-  DualFisheyeKnowledge known_;
+  DualFisheyeCalibration::Knowledge known_;
   double side_;
   double fine_rad_;    ///< about a pixel
   double coarse_rad_;  ///< between the values of the first fits
@@ -304,7 +304,8 @@ std::variant<DualFisheyeCalibration, std::string> Calibrator::run() {
 namespace panonav {
 
 std::variant<DualFisheyeCalibration, std::string> calibrate_dual_fisheye(
-    std::span<const ImageView> pictures, const DualFisheyeKnowledge& known, Executor& executor) {
+    std::span<const ImageView> pictures, const DualFisheyeCalibration::Knowledge& known,
+    Executor& executor) {
   require(!pictures.empty(), "number of pictures", 0, "at least 1");
   for (const ImageView& picture : pictures) {
     require(picture.size() == pictures[0].size(), "picture width", picture.width,

@@ -12,23 +12,23 @@
 
 namespace panonav {
 
-/// What a user knows of a dual fisheye camera beyond its pictures.
-struct DualFisheyeKnowledge {
-  /// How the circles lie in the picture, see `FisheyeLens::roll_rad`; to about 3 degrees.
-  double left_roll_rad = 0.0;
-  double right_roll_rad = 0.0;  ///< the same of the lens in the right half
-  /// Azimuth of the left lens's axis: no picture shows where the robot's forward direction is.
-  double left_azimuth_rad = 0.0;
-  /// Field of view of one lens; empty: found, between 185 and 220 degrees.
-  std::optional<double> field_of_view_rad;
-  /// How far the camera was turned from each picture to the next, counter-clockwise seen from
-  /// above, to some degrees; empty: found.
-  std::optional<double> turn_rad;
-  ColumnDirection direction = ColumnDirection::clockwise;  ///< see Camera
-};
-
 /// A camera found in pictures, and how well it fits them.
 struct DualFisheyeCalibration {
+  /// What a user knows of a dual fisheye camera beyond its pictures.
+  struct Knowledge {
+    /// How the circles lie in the picture, see `FisheyeLens::roll_rad`; to about 3 degrees.
+    double left_roll_rad = 0.0;
+    double right_roll_rad = 0.0;  ///< the same of the lens in the right half
+    /// Azimuth of the left lens's axis: no picture shows where the robot's forward direction is.
+    double left_azimuth_rad = 0.0;
+    /// Field of view of one lens; empty: found, between 185 and 220 degrees.
+    std::optional<double> field_of_view_rad;
+    /// How far the camera was turned from each picture to the next, counter-clockwise seen from
+    /// above, to some degrees; empty: found.
+    std::optional<double> turn_rad;
+    ColumnDirection direction = ColumnDirection::clockwise;  ///< see Camera
+  };
+
   Camera camera;              ///< with a DualFisheyeModel, valid; its axis of turns is the vertical
   int matches = 0;            ///< points found twice, outliers not counted
   double inlier_share = 0.0;  ///< of the textured places looked at; some 0.1 by chance
@@ -52,6 +52,7 @@ struct DualFisheyeCalibration {
 /// same bits on any number of threads. Cost: some seconds for four pictures of 1280 x 640 on one
 /// thread.
 [[nodiscard]] std::variant<DualFisheyeCalibration, std::string> calibrate_dual_fisheye(
-    std::span<const ImageView> pictures, const DualFisheyeKnowledge& known, Executor& executor);
+    std::span<const ImageView> pictures, const DualFisheyeCalibration::Knowledge& known,
+    Executor& executor);
 
 }  // namespace panonav

@@ -241,12 +241,13 @@ std::optional<Direction3> unproject(const Camera& camera, PixelPoint pixel) {
                                  *elevation_rad);
 }
 
-std::array<std::optional<WeightedPixel>, 2> project_all(const Camera& camera,
-                                                        const Direction3& direction) {
-  std::array<std::optional<WeightedPixel>, 2> result;
+std::array<std::optional<Camera::WeightedPixel>, 2> project_all(const Camera& camera,
+                                                                const Direction3& direction) {
+  std::array<std::optional<Camera::WeightedPixel>, 2> result;
   const auto* model = std::get_if<DualFisheyeModel>(&camera.model);
   if (model == nullptr) {
-    if (const auto pixel = project(camera, direction)) result[0] = WeightedPixel{*pixel, 1.0};
+    if (const auto pixel = project(camera, direction))
+      result[0] = Camera::WeightedPixel{*pixel, 1.0};
     return result;
   }
   const double length = std::hypot(direction.x, direction.y, direction.z);
@@ -256,8 +257,8 @@ std::array<std::optional<WeightedPixel>, 2> project_all(const Camera& camera,
   const double share = !second  ? 1.0
                        : !first ? 0.0
                                 : blend_share(first->margin_rad, second->margin_rad);
-  if (first) result[0] = WeightedPixel{first->pixel, share};
-  if (second) result[1] = WeightedPixel{second->pixel, 1.0 - share};
+  if (first) result[0] = Camera::WeightedPixel{first->pixel, share};
+  if (second) result[1] = Camera::WeightedPixel{second->pixel, 1.0 - share};
   return result;
 }
 

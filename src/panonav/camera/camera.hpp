@@ -43,6 +43,12 @@ enum class ColumnDirection {
 /// together. The axis of a mirror is vertical. Invariant checked by `validate(const Camera&)`; the
 /// functions below expect a valid camera.
 struct Camera {
+  /// Where a direction is seen, and how much it counts there in a blended picture.
+  struct WeightedPixel {
+    PixelPoint pixel;     ///< where the direction is seen
+    double weight = 1.0;  ///< shares of the lenses that see a direction; they add up to 1
+  };
+
   CameraModel model;     ///< how elevation, or direction, and place in the picture belong together
   ImageSize image_size;  ///< of every picture of this camera, in pixels
   // Mirror cameras (all models but equirectangular and dual fisheye):
@@ -77,15 +83,10 @@ void validate(const Camera& camera);
 /// The unit direction that a point of the image shows; empty outside the same domain.
 [[nodiscard]] std::optional<Direction3> unproject(const Camera& camera, PixelPoint pixel);
 
-/// Where a direction is seen, and how much it counts there in a blended picture.
-struct WeightedPixel {
-  PixelPoint pixel;     ///< where the direction is seen
-  double weight = 1.0;  ///< shares of the lenses that see a direction; they add up to 1
-};
 /// As `project`, for each lens: two of a dual fisheye camera, in order, one of any other (the
 /// second is empty). `project` gives the one that counts most. See `blend_share`.
-[[nodiscard]] std::array<std::optional<WeightedPixel>, 2> project_all(const Camera& camera,
-                                                                      const Direction3& direction);
+[[nodiscard]] std::array<std::optional<Camera::WeightedPixel>, 2> project_all(
+    const Camera& camera, const Direction3& direction);
 /// 2 for a dual fisheye camera, 1 for any other.
 [[nodiscard]] inline int lens_count(const Camera& camera) {
   return std::holds_alternative<DualFisheyeModel>(camera.model) ? 2 : 1;

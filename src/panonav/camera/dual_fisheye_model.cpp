@@ -99,7 +99,7 @@ Direction3 LensRotation::lens_from_robot(const Direction3& d) const {
   return {along(axes_[0]), along(axes_[1]), along(axes_[2])};
 }
 
-std::optional<LensPoint> project(const FisheyeLens& lens, const Direction3& in_lens) {
+std::optional<FisheyeLens::Point> project(const FisheyeLens& lens, const Direction3& in_lens) {
   const double across = std::hypot(in_lens.y, in_lens.z);
   double angle = std::atan2(across, in_lens.x);
   if (angle > lens.max_angle_rad) {
@@ -107,7 +107,7 @@ std::optional<LensPoint> project(const FisheyeLens& lens, const Direction3& in_l
     angle = lens.max_angle_rad;
   }
   const double scale = across > 0 ? radius_at(lens, angle) / across : 0.0;
-  return LensPoint{-in_lens.y * scale, in_lens.z * scale, lens.max_angle_rad - angle};
+  return FisheyeLens::Point{-in_lens.y * scale, in_lens.z * scale, lens.max_angle_rad - angle};
 }
 
 std::optional<Direction3> unproject(const FisheyeLens& lens, double right_px, double up_px) {

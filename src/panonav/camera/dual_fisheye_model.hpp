@@ -11,6 +11,14 @@ namespace panonav {
 /// r = f (theta + k3 theta^3 + k5 theta^5) from the centre (Kannala, Brandt 2006, two odd terms).
 /// Valid where r grows with theta, from 0 to `max_angle_rad`.
 struct FisheyeLens {
+  /// A direction as one lens sees it.
+  struct Point {
+    double right_px = 0.0;  ///< from the lens's centre
+    double up_px = 0.0;     ///< from the lens's centre, against v
+    /// How far within the lens's field of view, > 0; 0 on its border.
+    double margin_rad = 0.0;
+  };
+
   double centre_u_px = 0.0;        ///< of the optical axis, from the picture's left edge
   double centre_v_px = 0.0;        ///< of the optical axis, from the picture's upper edge
   double focal_length_px = 150.0;  ///< above 0, pixels for each radian at the centre
@@ -63,15 +71,9 @@ class LensRotation {
   std::array<Direction3, 3> axes_;  ///< of the lens, in the robot frame
 };
 
-/// A direction as one lens sees it.
-struct LensPoint {
-  double right_px = 0.0;  ///< from the lens's centre
-  double up_px = 0.0;     ///< from the lens's centre, against v
-  /// How far within the lens's field of view, > 0; 0 on its border.
-  double margin_rad = 0.0;
-};
 /// `in_lens` in the lens frame, of any length but 0. Empty beyond the field of view.
-[[nodiscard]] std::optional<LensPoint> project(const FisheyeLens& lens, const Direction3& in_lens);
+[[nodiscard]] std::optional<FisheyeLens::Point> project(const FisheyeLens& lens,
+                                                        const Direction3& in_lens);
 /// The unit direction in the lens frame; empty beyond the field of view.
 [[nodiscard]] std::optional<Direction3> unproject(const FisheyeLens& lens, double right_px,
                                                   double up_px);

@@ -86,11 +86,12 @@ CircleRange scaled(const CircleRange& range, double factor) {
 }
 
 /// A circle of the middle field, fitted to the edges in the image's pixels.
-std::optional<FoundCircle> refined(const Evidence& seen, std::span<const SmoothPlanes> planes,
-                                   const FieldCircle& on_middle) {
+std::optional<MirrorCircle::Circle> refined(const Evidence& seen,
+                                            std::span<const SmoothPlanes> planes,
+                                            const FieldCircle& on_middle) {
   const auto fit = fit_circle(planes, scaled(on_middle, seen.middle_reduction));
   if (!fit) return std::nullopt;
-  return FoundCircle{
+  return MirrorCircle::Circle{
       {fit->circle.u, fit->circle.v}, fit->circle.radius, fit->support, fit->residual};
 }
 
@@ -132,7 +133,7 @@ double structure(std::span<const SmoothPlanes> images, const PixelPoint& centre,
 }
 
 /// Of circles about one centre, ascending, the one where the mirrored scene ends.
-std::size_t rim_among(const std::vector<FoundCircle>& circles,
+std::size_t rim_among(const std::vector<MirrorCircle::Circle>& circles,
                       std::span<const SmoothPlanes> planes) {
   std::size_t rim = circles.size() - 1;
   for (std::size_t inner = rim; inner-- > 0;) {
@@ -153,7 +154,7 @@ std::size_t rim_among(const std::vector<FoundCircle>& circles,
 /// Radius about the rim's centre that covers the dark disc or the camera's reflection in the
 /// middle.
 std::optional<double> disc_within(const Evidence& seen, std::span<const SmoothPlanes> planes,
-                                  const FoundCircle& rim) {
+                                  const MirrorCircle::Circle& rim) {
   const double rim_radius = rim.radius_px / seen.middle_reduction;
   CircleRange range;
   range.lowest_radius = std::max(3.0, min_disc_radius * rim_radius);
@@ -228,19 +229,19 @@ std::vector<FieldCircle> best_circles(const Evidence& seen, const CircleRange& r
 }
 
 struct Search {
-  FoundCircle rim;
+  MirrorCircle::Circle rim;
   std::optional<double> inner_radius_px;
 };
 
 std::optional<Search> search(const Evidence& seen, std::span<const SmoothPlanes> planes,
-                             const ImageSize& size, const MirrorSearchOptions& options) {
+                             const ImageSize& size, const MirrorCircle::SearchOptions& options) {
   CircleRange range;
   range.lowest_radius = options.min_rim * std::min(size.width, size.height) / seen.middle_reduction;
   range.highest_radius =
       options.max_rim * std::max(size.width, size.height) / seen.middle_reduction;
   range.visible_fraction = options.visible_fraction;
 
-  std::optional<FoundCircle> clearest;
+  std::optional<MirrorCircle::Circle> clearest;
   double clearest_merit = 0;
   FieldCircle start;
   for (const FieldCircle& circle : best_circles(seen, range)) {
@@ -256,7 +257,7 @@ std::optional<Search> search(const Evidence& seen, std::span<const SmoothPlanes>
   }
   if (!clearest) return std::nullopt;
 
-  std::vector<FoundCircle> circles{*clearest};
+  std::vector<MirrorCircle::Circle> circles{*clearest};
   for (const FieldCircle& candidate : concentric_candidates(
            seen.middle, start.u, start.v, max_centre_distance * start.radius, range, 2.0)) {
     const auto found = refined(seen, planes, climb(seen.middle, candidate, range));
@@ -265,13 +266,17 @@ std::optional<Search> search(const Evidence& seen, std::span<const SmoothPlanes>
         distance_px(found->centre, clearest->centre) > max_centre_distance * found->radius_px) {
       continue;
     }
-    const bool known = std::any_of(circles.begin(), circles.end(), [&](const FoundCircle& other) {
-      return std::abs(other.radius_px - found->radius_px) < std::max(2.0, 0.01 * found->radius_px);
-    });
+    const bool known =
+        std::any_of(circles.begin(), circles.end(), [&](const MirrorCircle::Circle& other) {
+          return std::abs(other.radius_px - found->radius_px) <
+                 std::max(2.0, 0.01 * found->radius_px);
+        });
     if (!known) circles.push_back(*found);
   }
   std::sort(circles.begin(), circles.end(),
-            [](const FoundCircle& a, const FoundCircle& b) { return a.radius_px < b.radius_px; });
+            [](const MirrorCircle::Circle& a, const MirrorCircle::Circle& b) {
+              return a.radius_px < b.radius_px;
+            });
   Search result;
   result.rim = circles[rim_among(circles, planes)];
 
@@ -281,8 +286,8 @@ std::optional<Search> search(const Evidence& seen, std::span<const SmoothPlanes>
 
 }  // namespace
 
-void visit_options(MirrorSearchOptions& options, OptionVisitor& visitor) {
-  using T = MirrorSearchOptions;
+void visit_options(MirrorCircle::SearchOptions& options, OptionVisitor& visitor) {
+  using T = MirrorCircle::SearchOptions;
   constexpr OptionTable table{
       option<&T::min_rim>("smallest radius of the mirror's rim, in shorter sides of the image",
                           above(0), 2),
@@ -298,7 +303,7 @@ void visit_options(MirrorSearchOptions& options, OptionVisitor& visitor) {
 }
 
 std::optional<MirrorCircle> find_mirror(std::span<const ImageView> images,
-                                        const MirrorSearchOptions& options) {
+                                        const MirrorCircle::SearchOptions& options) {
   validate(options);
   require(!images.empty(), "number of images", 0, "at least 1");
   const ImageSize size = images[0].size();
@@ -337,8 +342,8 @@ std::optional<MirrorCircle> find_mirror(std::span<const ImageView> images,
   return mirror;
 }
 
-std::optional<MirrorAgreement> agreement(const MirrorCircle& mirror) {
-  std::vector<FoundCircle> rims;
+std::optional<MirrorCircle::Agreement> agreement(const MirrorCircle& mirror) {
+  std::vector<MirrorCircle::Circle> rims;
   for (const auto& rim : mirror.rim_per_image) {
     if (rim) rims.push_back(*rim);
   }
@@ -346,15 +351,17 @@ std::optional<MirrorAgreement> agreement(const MirrorCircle& mirror) {
   const auto deviation = [&](auto value) {
     const auto count = static_cast<double>(rims.size());
     double mean = 0;
-    for (const FoundCircle& rim : rims) mean += value(rim) / count;
+    for (const MirrorCircle::Circle& rim : rims) mean += value(rim) / count;
     double squares = 0;
-    for (const FoundCircle& rim : rims) squares += (value(rim) - mean) * (value(rim) - mean);
+    for (const MirrorCircle::Circle& rim : rims)
+      squares += (value(rim) - mean) * (value(rim) - mean);
     return std::sqrt(squares / (count - 1));
   };
-  return MirrorAgreement{static_cast<int>(rims.size()),
-                         deviation([](const FoundCircle& rim) { return rim.centre.u_px; }),
-                         deviation([](const FoundCircle& rim) { return rim.centre.v_px; }),
-                         deviation([](const FoundCircle& rim) { return rim.radius_px; })};
+  return MirrorCircle::Agreement{
+      static_cast<int>(rims.size()),
+      deviation([](const MirrorCircle::Circle& rim) { return rim.centre.u_px; }),
+      deviation([](const MirrorCircle::Circle& rim) { return rim.centre.v_px; }),
+      deviation([](const MirrorCircle::Circle& rim) { return rim.radius_px; })};
 }
 
 }  // namespace panonav

@@ -17,8 +17,8 @@ namespace panonav {
 inline constexpr std::array<std::string_view, std::variant_size_v<CameraModel>> camera_model_names{
     "hyperboloidal", "polynomial", "unified", "equiangular", "equirectangular", "dual-fisheye"};
 
-/// The name of each ViewAxis, in its order. Files name it where it is not `down`, beside the
-/// parameters.
+/// The name of each UnifiedModel::Axis, in its order. Files name it where it is not `down`, beside
+/// the parameters.
 inline constexpr std::array<std::string_view, 2> view_axis_names{"down", "up"};
 
 /// What files call the camera's model: one of `camera_model_names`.

@@ -22,14 +22,14 @@ std::optional<double> elevation_at(const UnifiedModel& model, double radius_px) 
   const double eta = (model.xi + std::sqrt(discriminant)) / (m * m + 1);
   const double psi = std::atan2(eta * m, eta - model.xi);
   const double below_horizon = psi - std::numbers::pi / 2;
-  return model.axis == ViewAxis::down ? below_horizon : -below_horizon;
+  return model.axis == UnifiedModel::Axis::down ? below_horizon : -below_horizon;
 }
 
 std::optional<double> radius_at(const UnifiedModel& model, double elevation_rad) {
   if (!(std::abs(elevation_rad) <= std::numbers::pi / 2)) return std::nullopt;
   // Along the axis: cos(psi); across it: sin(psi).
   const double along =
-      model.axis == ViewAxis::down ? -std::sin(elevation_rad) : std::sin(elevation_rad);
+      model.axis == UnifiedModel::Axis::down ? -std::sin(elevation_rad) : std::sin(elevation_rad);
   const double across = std::max(0.0, std::cos(elevation_rad));
   const double lowest = model.xi <= 1 ? -model.xi : -1 / model.xi;
   if (!(along > lowest)) return std::nullopt;

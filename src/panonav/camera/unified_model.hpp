@@ -4,21 +4,21 @@
 
 namespace panonav {
 
-/// Which way the middle of the picture looks.
-enum class ViewAxis {
-  down,  ///< a mirror above the camera: the middle shows the camera itself
-  up,    ///< a fisheye lens towards the ceiling
-};
-
 /// Unified central model (Geyer, Daniilidis 2000; Mei, Rives 2007): a direction is put on the unit
 /// sphere, then seen in perspective from a point xi behind its centre: r = f sin(psi) / (xi +
 /// cos(psi)), psi the angle to the axis. xi = 0 is a pinhole, 0 < xi < 1 a hyperboloidal mirror or
 /// a fisheye lens, xi = 1 a paraboloidal mirror. Valid: xi <= 1: cos(psi) > -xi, every r; xi > 1:
 /// cos(psi) > -1 / xi, and r < f / sqrt(xi^2 - 1).
 struct UnifiedModel {
+  /// Which way the middle of the picture looks.
+  enum class Axis {
+    down,  ///< a mirror above the camera: the middle shows the camera itself
+    up,    ///< a fisheye lens towards the ceiling
+  };
+
   double xi = 1.0;                 ///< >= 0
   double focal_length_px = 300.0;  ///< above 0
-  ViewAxis axis = ViewAxis::down;  ///< which way the middle of the picture looks
+  Axis axis = Axis::down;          ///< which way the middle of the picture looks
   friend bool operator==(const UnifiedModel&, const UnifiedModel&) = default;
 };
 

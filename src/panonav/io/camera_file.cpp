@@ -51,7 +51,8 @@ CameraFile read_camera(const std::filesystem::path& path) {
     }
   });
   if (auto* unified = std::get_if<UnifiedModel>(&camera.model)) {
-    unified->axis = static_cast<ViewAxis>(fields.choice("axis", view_axis_names).value_or(0));
+    unified->axis =
+        static_cast<UnifiedModel::Axis>(fields.choice("axis", view_axis_names).value_or(0));
   }
   camera.image_size = {whole(fields, "width_px"), whole(fields, "height_px")};
   if (std::holds_alternative<EquirectangularModel>(camera.model)) {
@@ -108,7 +109,7 @@ void write_camera(const std::filesystem::path& path, const CameraFile& file) {
     }
   });
   if (const auto* unified = std::get_if<UnifiedModel>(&camera.model);
-      unified != nullptr && unified->axis != ViewAxis::down) {
+      unified != nullptr && unified->axis != UnifiedModel::Axis::down) {
     text += "axis = \"" + std::string(view_axis_names[static_cast<std::size_t>(unified->axis)]) +
             "\"\n";
   }

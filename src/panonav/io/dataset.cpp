@@ -13,8 +13,8 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/atomic_file.hpp"
 #include "panonav/io/camera_file.hpp"
-#include "panonav/io/csv_table.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav/io/internal/csv_table.hpp"
 #include "panonav/io/internal/toml_fields.hpp"
 
 namespace panonav {
@@ -231,16 +231,16 @@ Dataset find_pictures(const fs::path& folder, PictureSource source, bool is_recu
 /// A value that entries may have, and its first column in the table.
 struct EntryField {
   std::string_view column;
-  bool DatasetFields::*shared;
+  bool Dataset::Fields::*shared;
   bool (*has)(const DatasetEntry& entry);
 };
 constexpr std::array<EntryField, 5> entry_fields{{
-    {"stamp_s", &DatasetFields::stamps, [](const auto& e) { return e.stamp_s.has_value(); }},
-    {"x_m", &DatasetFields::positions, [](const auto& e) { return e.pose.has_value(); }},
-    {"heading_deg", &DatasetFields::headings,
+    {"stamp_s", &Dataset::Fields::stamps, [](const auto& e) { return e.stamp_s.has_value(); }},
+    {"x_m", &Dataset::Fields::positions, [](const auto& e) { return e.pose.has_value(); }},
+    {"heading_deg", &Dataset::Fields::headings,
      [](const auto& e) { return e.pose && e.pose->heading_rad.has_value(); }},
-    {"odom_x_m", &DatasetFields::odometry, [](const auto& e) { return e.odometry.has_value(); }},
-    {"roll_deg", &DatasetFields::tilts, [](const auto& e) { return e.tilt.has_value(); }},
+    {"odom_x_m", &Dataset::Fields::odometry, [](const auto& e) { return e.odometry.has_value(); }},
+    {"roll_deg", &Dataset::Fields::tilts, [](const auto& e) { return e.tilt.has_value(); }},
 }};
 
 /// Throws ContractError where some entries have a value and others have not.
@@ -254,7 +254,7 @@ void require_whole_fields(const std::vector<DatasetEntry>& entries) {
   }
 }
 
-std::string table_text(const std::vector<DatasetEntry>& entries, const DatasetFields& columns) {
+std::string table_text(const std::vector<DatasetEntry>& entries, const Dataset::Fields& columns) {
   std::string table = "file";
   if (columns.stamps) table += ",stamp_s";
   if (columns.positions) table += ",x_m,y_m";
@@ -348,7 +348,7 @@ Dataset read_picture_tree(const fs::path& folder, PictureSource source) {
 }
 
 std::vector<std::size_t> selected_pictures(const std::vector<double>& stamps_s,
-                                           const PictureSelection& selection) {
+                                           const Dataset::Selection& selection) {
   constexpr double rounding_s = 1e-4;
   std::vector<std::size_t> selected;
   std::size_t passed = 0;
@@ -364,7 +364,7 @@ std::vector<std::size_t> selected_pictures(const std::vector<double>& stamps_s,
   return selected;
 }
 
-void select_pictures(Dataset& dataset, const PictureSelection& selection) {
+void select_pictures(Dataset& dataset, const Dataset::Selection& selection) {
   const std::string name = dataset.folder.string();
   std::vector<double> stamps_s(dataset.entries.size(), 0.0);
   if (selection.by_time()) {
@@ -417,16 +417,16 @@ Dataset single_picture(const fs::path& file, PictureSource source) {
   return dataset;
 }
 
-DatasetFields shared_fields(const Dataset& dataset) {
-  DatasetFields fields;
+Dataset::Fields shared_fields(const Dataset& dataset) {
+  Dataset::Fields fields;
   for (const EntryField& field : entry_fields) {
     fields.*field.shared = std::ranges::all_of(dataset.entries, field.has);
   }
   return fields;
 }
 
-DatasetFields drop_partial_fields(Dataset& dataset) {
-  const DatasetFields fields = shared_fields(dataset);
+Dataset::Fields drop_partial_fields(Dataset& dataset) {
+  const Dataset::Fields fields = shared_fields(dataset);
   for (DatasetEntry& entry : dataset.entries) {
     if (!fields.stamps) entry.stamp_s.reset();
     if (!fields.positions) entry.pose.reset();
@@ -439,7 +439,7 @@ DatasetFields drop_partial_fields(Dataset& dataset) {
 
 void write_dataset(const Dataset& dataset) {
   require_whole_fields(dataset.entries);
-  const DatasetFields columns = shared_fields(dataset);
+  const Dataset::Fields columns = shared_fields(dataset);
   std::string text = images_text(dataset);
   const bool with_poses = columns.positions || columns.odometry;
   const std::string name = with_poses ? "poses.csv" : "images.csv";

@@ -53,6 +53,27 @@ struct DatasetEntry {
 /// A recording: pictures in order, and how they become panoramic cylinders. Pictures are read when
 /// they are needed (PanoramaReader).
 struct Dataset {
+  /// Which pictures of a recording are taken. Times are seconds from its first picture.
+  struct Selection {
+    int every = 1;  ///< each n-th of those that the times leave
+    std::optional<double>
+        every_s;  ///< the first, then the next one that is at least this much later
+    std::optional<double> from_s;  ///< this moment included; empty: from the first
+    std::optional<double> to_s;    ///< this moment included
+
+    /// Whether pictures need stamps to be selected.
+    [[nodiscard]] bool by_time() const noexcept { return every_s || from_s || to_s; }
+  };
+
+  /// What all pictures of a data set have.
+  struct Fields {
+    bool stamps = false;     ///< `stamp_s`
+    bool positions = false;  ///< `pose`
+    bool headings = false;   ///< of `pose`; true only with `positions`
+    bool odometry = false;   ///< `odometry`
+    bool tilts = false;      ///< `tilt`
+  };
+
   std::filesystem::path folder;       ///< that `file` names are relative to
   PictureSource source;               ///< how all pictures lie
   std::vector<DatasetEntry> entries;  ///< in the order in which they were taken
@@ -66,25 +87,14 @@ struct Dataset {
 /// picture at all.
 [[nodiscard]] Dataset read_dataset(const std::filesystem::path& folder);
 
-/// Which pictures of a recording are taken. Times are seconds from its first picture.
-struct PictureSelection {
-  int every = 1;                  ///< each n-th of those that the times leave
-  std::optional<double> every_s;  ///< the first, then the next one that is at least this much later
-  std::optional<double> from_s;   ///< this moment included; empty: from the first
-  std::optional<double> to_s;     ///< this moment included
-
-  /// Whether pictures need stamps to be selected.
-  [[nodiscard]] bool by_time() const noexcept { return every_s || from_s || to_s; }
-};
-
 /// The numbers of the pictures with these ascending stamps that the selection takes. A tenth of a
 /// millisecond does not count.
 [[nodiscard]] std::vector<std::size_t> selected_pictures(const std::vector<double>& stamps_s,
-                                                         const PictureSelection& selection);
+                                                         const Dataset::Selection& selection);
 
 /// Drops the other entries. Throws FileError when times are asked for and an entry has no stamp or
 /// one before that of its predecessor, and when nothing is left.
-void select_pictures(Dataset& dataset, const PictureSelection& selection);
+void select_pictures(Dataset& dataset, const Dataset::Selection& selection);
 
 /// A folder of PNG and JPEG pictures without dataset.toml, in natural order of their names
 /// ("view_9" before "view_10"). Throws FileError when there is none.
@@ -96,18 +106,10 @@ void select_pictures(Dataset& dataset, const PictureSelection& selection);
 /// One picture as a data set.
 [[nodiscard]] Dataset single_picture(const std::filesystem::path& file, PictureSource source);
 
-/// What all pictures of a data set have.
-struct DatasetFields {
-  bool stamps = false;     ///< `stamp_s`
-  bool positions = false;  ///< `pose`
-  bool headings = false;   ///< of `pose`; true only with `positions`
-  bool odometry = false;   ///< `odometry`
-  bool tilts = false;      ///< `tilt`
-};
 /// Returns what all entries have, of which there must be one or more.
-[[nodiscard]] DatasetFields shared_fields(const Dataset& dataset);
+[[nodiscard]] Dataset::Fields shared_fields(const Dataset& dataset);
 /// Drops what only some of the entries have, so that `write_dataset` takes them. Returns the rest.
-DatasetFields drop_partial_fields(Dataset& dataset);
+Dataset::Fields drop_partial_fields(Dataset& dataset);
 
 /// Writes dataset.toml, the table (poses.csv, or images.csv when no position is known) and, for
 /// mirror pictures, camera.toml into `dataset.folder`; the pictures are the caller's. The table

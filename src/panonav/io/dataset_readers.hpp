@@ -10,24 +10,24 @@
 
 namespace panonav {
 
-/// Which topics of a recording become the data set. What is not named is found by its type.
-struct RecordingTopics {
-  std::optional<std::string> image;     ///< sensor_msgs/Image or CompressedImage
-  std::optional<std::string> odometry;  ///< nav_msgs/Odometry
-  std::optional<std::string> imu;       ///< sensor_msgs/Imu
-  /// Odometry from TF instead of a topic: the frame of the odometry, then that of the robot.
-  std::optional<std::pair<std::string, std::string>> odometry_frames;
-};
-
 /// What a caller says of an input, and which of its pictures are read.
 struct InputOptions {
+  /// Which topics of a recording become the data set. What is not named is found by its type.
+  struct Topics {
+    std::optional<std::string> image;     ///< sensor_msgs/Image or CompressedImage
+    std::optional<std::string> odometry;  ///< nav_msgs/Odometry
+    std::optional<std::string> imu;       ///< sensor_msgs/Imu
+    /// Odometry from TF instead of a topic: the frame of the odometry, then that of the robot.
+    std::optional<std::pair<std::string, std::string>> odometry_frames;
+  };
+
   /// How its pictures lie. A folder with a dataset.toml says so itself and refuses it.
   std::optional<PictureSource> source;
   /// How they lie where neither `source` nor a dataset.toml says it, such as those of a memory.
   std::optional<PictureSource> default_source;
-  RecordingTopics topics;      ///< of a recording of topics; other inputs refuse them
-  PictureSelection selection;  ///< which of its pictures
-  bool recursive = false;      ///< of a folder: pictures of the folders within, too
+  Topics topics;                 ///< of a recording of topics; other inputs refuse them
+  Dataset::Selection selection;  ///< which of its pictures
+  bool recursive = false;        ///< of a folder: pictures of the folders within, too
 };
 
 /// A data set that is ready to be used.

@@ -10,7 +10,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/atomic_file.hpp"
-#include "panonav/io/csv_table.hpp"
+#include "panonav/io/internal/csv_table.hpp"
 
 namespace panonav {
 

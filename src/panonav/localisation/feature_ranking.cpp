@@ -15,7 +15,8 @@ void rank_by_verified_features(const LocalFeatures& query, const FeatureSource& 
                                         std::min<std::size_t>(verified_candidates, ranked.size()));
   for (auto match = ranked.begin(); match != end; ++match) {
     const auto there = features(match->match.view);
-    const FeatureMatch found = there ? match_features(query, *there) : FeatureMatch{};
+    const LocalFeatures::Match found =
+        there ? match_features(query, *there) : LocalFeatures::Match{};
     match->verified_features = found.verified;
     if (found.verified > 0) match->columns.heading_rad = found.heading_rad;
   }

@@ -90,7 +90,7 @@ std::vector<LocalisationLevel> localise_hierarchically(const VisualMemory& memor
                                                        const SearchMask& mask) {
   validate(accuracy);
   std::vector<LocalisationLevel> levels;
-  const auto add = [&](const HierarchyLevel& level) {
+  const auto add = [&](const VisualMemory::HierarchyLevel& level) {
     levels.push_back({level.components, level.candidates, areas.area_m2(level.candidates),
                       areas.enclosing_circle(level.candidates), level.bytes_read});
     const auto& region = levels.back().region;

@@ -31,8 +31,9 @@ PackedSignature with_rows(PackedSignature signature, std::span<const std::uint8_
 std::optional<LocalFeatures> with_rows(std::optional<LocalFeatures> features,
                                        std::span<const std::uint8_t> allowed_rows) {
   if (features && !allowed_rows.empty()) {
-    std::erase_if(features->features,
-                  [&](const LocalFeature& feature) { return allowed_rows[feature.row] == 0; });
+    std::erase_if(features->features, [&](const LocalFeatures::Feature& feature) {
+      return allowed_rows[feature.row] == 0;
+    });
   }
   return features;
 }
@@ -298,8 +299,7 @@ class Localiser::Query {
       std::optional<CompassReading> reading;
       if (place_.components >= 2) {
         reading = compass_near(seen, with_rows(memory.packed(r.match.view), mask_.allowed_rows),
-                               r.columns.heading_rad, compass_window_rad,
-                               {.components = options_.components});
+                               r.columns.heading_rad, compass_window_rad, options_.components);
       }
       place_.matches.push_back({memory.info(r.match.view).name, r.match.view, r.match.dissimilarity,
                                 r.columns.difference, r.verified_features,

@@ -22,8 +22,7 @@ FourierHomingOptions vector_options(const VisualOdometryOptions& options) {
 
 std::optional<VisualStep> published_step(const OdometryView& before, const OdometryView& after,
                                          const VisualOdometryOptions& options) {
-  const auto reading =
-      compass(after.signature, before.signature, {.components = options.turn_components});
+  const auto reading = compass(after.signature, before.signature, options.turn_components);
   if (!reading) return std::nullopt;
   VisualStep step;
   step.length_in_views =

@@ -261,9 +261,10 @@ SearchResult VisualMemory::search(const PackedSignature& query, const SearchOpti
                       kernels::chosen_instructions());
 }
 
-std::vector<HierarchyLevel> VisualMemory::hierarchy(
+std::vector<VisualMemory::HierarchyLevel> VisualMemory::hierarchy(
     const PackedSignature& query, double tolerance, int components,
-    const std::function<bool(const HierarchyLevel&)>& stop, const SearchMask& mask) const {
+    const std::function<bool(const VisualMemory::HierarchyLevel&)>& stop,
+    const SearchMask& mask) const {
   return hierarchical_search(implementation_->searched(), query, tolerance, components, stop, mask,
                              kernels::chosen_instructions());
 }

@@ -75,21 +75,22 @@ struct SearchResult {
   std::uint64_t views_in_full = 0;  ///< views whose whole sum was computed
 };
 
-/// One level of hierarchical localisation [M04 section 2.3]: the views that may still be the place
-/// when `components` components have been compared.
-struct HierarchyLevel {
-  int components = 0;  ///< compared at this level, m of [M04]
-  /// Ascending (partial dissimilarity, view); nested in the level before.
-  std::vector<Match> candidates;
-  std::uint64_t bytes_read = 0;  ///< by all levels so far
-  double limit = 0.0;  ///< the candidates are all views whose partial dissimilarity is at most this
-};
-
 /// The reference views that a robot remembers. Views keep their id for ever; ids grow in the order
 /// of appending. Invariant: all signatures have one shape and one full scale. Reading from several
 /// threads at once is safe; changing is not.
 class VisualMemory {
  public:
+  /// One level of hierarchical localisation [M04 section 2.3]: the views that may still be the
+  /// place when `components` components have been compared.
+  struct HierarchyLevel {
+    int components = 0;  ///< compared at this level, m of [M04]
+    /// Ascending (partial dissimilarity, view); nested in the level before.
+    std::vector<Match> candidates;
+    std::uint64_t bytes_read = 0;  ///< by all levels so far
+    double limit =
+        0.0;  ///< the candidates are all views whose partial dissimilarity is at most this
+  };
+
   /// `full_scale`: magnitude that is packed as 255. Throws ContractError.
   VisualMemory(SignatureShape shape, float full_scale, std::optional<ElevationBand> elevations);
   ~VisualMemory();

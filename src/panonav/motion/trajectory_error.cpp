@@ -13,7 +13,7 @@ struct Pair {
   Pose2 truth;
 };
 
-ErrorSummary summary(const std::vector<double>& errors) {
+TrajectoryError::Summary summary(const std::vector<double>& errors) {
   double squares = 0;
   for (const double error : errors) squares += error * error;
   return {std::sqrt(squares / static_cast<double>(errors.size())), mean(errors), median(errors),
@@ -55,8 +55,8 @@ void relative_errors(const std::vector<Pair>& pairs, double distance_m, Trajecto
 
 }  // namespace
 
-void visit_options(TrajectoryErrorOptions& options, OptionVisitor& visitor) {
-  using T = TrajectoryErrorOptions;
+void visit_options(TrajectoryError::Options& options, OptionVisitor& visitor) {
+  using T = TrajectoryError::Options;
   constexpr OptionTable table{
       option<&T::max_gap_s>("longest gap of the truth over which it is interpolated", above(0)),
       option<&T::relative_distance_m>(
@@ -69,7 +69,7 @@ void visit_options(TrajectoryErrorOptions& options, OptionVisitor& visitor) {
 }
 
 std::optional<TrajectoryError> trajectory_error(const Trajectory& estimate, const Trajectory& truth,
-                                                const TrajectoryErrorOptions& options) {
+                                                const TrajectoryError::Options& options) {
   validate(options);
   std::vector<Pair> pairs;
   for (const StampedPose& stamped : estimate.poses()) {

@@ -9,48 +9,49 @@
 
 namespace panonav {
 
-/// How an estimate is compared with the truth.
-struct TrajectoryErrorOptions {
-  /// The truth is interpolated to the stamps of the estimate; estimates in a gap of the truth
-  /// longer than this are left out.
-  double max_gap_s = 1.0;
-  /// How far apart the poses of a relative error lie along the true path.
-  double relative_distance_m = 1.0;
-  bool align = true;              ///< false: both are in one frame already
-  bool align_scale = false;       ///< with `align`: the estimate's unit of length is free
-  bool align_reflection = false;  ///< with `align`: maps whose handedness nobody fixed
-  friend bool operator==(const TrajectoryErrorOptions&, const TrajectoryErrorOptions&) = default;
-};
-void visit_options(TrajectoryErrorOptions& options, OptionVisitor& visitor);
-
-/// Statistics of errors that are not negative.
-struct ErrorSummary {
-  double rms = 0.0;      ///< root mean square
-  double mean = 0.0;     ///< arithmetic mean
-  double median = 0.0;   ///< half of the errors are at most this
-  double p95 = 0.0;      ///< 95 % are at most this
-  double largest = 0.0;  ///< the greatest error of all
-};
-
 /// How far an estimated trajectory is from the truth (Sturm et al. 2012).
 struct TrajectoryError {
+  /// How an estimate is compared with the truth.
+  struct Options {
+    /// The truth is interpolated to the stamps of the estimate; estimates in a gap of the truth
+    /// longer than this are left out.
+    double max_gap_s = 1.0;
+    /// How far apart the poses of a relative error lie along the true path.
+    double relative_distance_m = 1.0;
+    bool align = true;              ///< false: both are in one frame already
+    bool align_scale = false;       ///< with `align`: the estimate's unit of length is free
+    bool align_reflection = false;  ///< with `align`: maps whose handedness nobody fixed
+    friend bool operator==(const Options&, const Options&) = default;
+  };
+
+  /// Statistics of errors that are not negative.
+  struct Summary {
+    double rms = 0.0;      ///< root mean square
+    double mean = 0.0;     ///< arithmetic mean
+    double median = 0.0;   ///< half of the errors are at most this
+    double p95 = 0.0;      ///< 95 % are at most this
+    double largest = 0.0;  ///< the greatest error of all
+  };
+
   std::size_t pairs = 0;     ///< estimates with a true pose at their stamp
   std::size_t left_out = 0;  ///< estimates without one
   /// Identity without `align`; its `rms_m` is that of `position_m`.
   Alignment ground_truth_from_estimate;
-  ErrorSummary position_m;   ///< absolute error of position, after alignment
-  ErrorSummary heading_rad;  ///< absolute error of heading, after alignment; a reflected alignment
-                             ///< turns headings round
+  Summary position_m;   ///< absolute error of position, after alignment
+  Summary heading_rad;  ///< absolute error of heading, after alignment; a reflected alignment
+                        ///< turns headings round
   std::size_t relative_pairs = 0;         ///< 0: the path is shorter than relative_distance_m
-  ErrorSummary relative_position_m;       ///< of the motion over relative_distance_m, scale applied
-  ErrorSummary relative_heading_rad;      ///< error of the turn over that distance, absolute
+  Summary relative_position_m;            ///< of the motion over relative_distance_m, scale applied
+  Summary relative_heading_rad;           ///< error of the turn over that distance, absolute
   std::vector<double> position_errors_m;  ///< one for each pair, in time
 };
+
+void visit_options(TrajectoryError::Options& options, OptionVisitor& visitor);
 
 /// Associates by stamp, aligns by least squares over the positions, and compares. Empty when fewer
 /// than two estimates have a true pose at their stamp. Throws OptionError.
 [[nodiscard]] std::optional<TrajectoryError> trajectory_error(
     const Trajectory& estimate, const Trajectory& truth,
-    const TrajectoryErrorOptions& options = {});
+    const TrajectoryError::Options& options = {});
 
 }  // namespace panonav

@@ -165,7 +165,7 @@ MemoryExport export_memory(const MemoryFile& memory, const fs::path& folder,
     write_camera(out / "camera.toml", {*header.source.camera, header.source.mask});
   }
   if (done.pictures > 0) {
-    const DatasetFields shared = drop_partial_fields(dataset);
+    const Dataset::Fields shared = drop_partial_fields(dataset);
     done.positions = shared.positions;
     done.headings = shared.headings;
     done.stamps = shared.stamps;

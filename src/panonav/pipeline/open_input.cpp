@@ -92,7 +92,7 @@ void warn_of_other_kind(OpenedDataset& opened) {
       "elevation band");
 }
 
-void refuse_topics(const fs::path& path, const RecordingTopics& topics) {
+void refuse_topics(const fs::path& path, const InputOptions::Topics& topics) {
   for (const auto& [is_set, option] :
        {std::pair{topics.image.has_value(), "the option image_topic"},
         {topics.odometry.has_value(), "the option odometry_topic"},

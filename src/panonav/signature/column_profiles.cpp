@@ -222,7 +222,8 @@ ColumnMatch match_columns(const ColumnProfiles& query, const ColumnProfiles& ref
   return match_at(query, costs, static_cast<std::size_t>(best));
 }
 
-ColumnMatches match_columns_twice(const ColumnProfiles& query, const ColumnProfiles& reference) {
+std::array<ColumnMatch, 2> match_columns_twice(const ColumnProfiles& query,
+                                               const ColumnProfiles& reference) {
   constexpr std::size_t apart = (columns + 5) / 6;
   const auto costs = costs_of_turns(query, reference);
   // With its turn as the last bits a cost is found together with it, and the first of equal ones.

@@ -52,22 +52,16 @@ struct ColumnMatch {
   double heading_rad = 0.0;
 };
 
-/// The same with a second turn, because a corridor looks much the same when turned by half a
-/// circle.
-struct ColumnMatches {
-  ColumnMatch best;   ///< the turn at which the views differ least
-  ColumnMatch other;  ///< the best turn at least 60 degrees from `best`
-};
-
 /// The turn at which the columns of two views differ least, among all 128 turns; every fourth
 /// column of the query is compared. Throws ContractError on profiles with other bands. Cost: 1
 /// microsecond with AVX2 or AVX-512, 9 without vectors.
 [[nodiscard]] ColumnMatch match_columns(const ColumnProfiles& query,
                                         const ColumnProfiles& reference);
 
-/// The same with a second turn, for a little more.
-[[nodiscard]] ColumnMatches match_columns_twice(const ColumnProfiles& query,
-                                                const ColumnProfiles& reference);
+/// The same, and the best turn at least 60 degrees from that one, because a corridor looks much the
+/// same when turned by half a circle. Costs a little more.
+[[nodiscard]] std::array<ColumnMatch, 2> match_columns_twice(const ColumnProfiles& query,
+                                                             const ColumnProfiles& reference);
 
 /// The mean absolute difference of each compared column in units of contrast, when the robot is
 /// turned by `heading_rad` relative to the reference: the minimum over the nearest turn and the two

@@ -58,9 +58,8 @@ inline SineCosine sine_cosine(float angle_rad) {
 }
 
 std::optional<CrossSpectrum> cross_spectrum(const FourierSignature& query,
-                                            const FourierSignature& reference,
-                                            const CompassOptions& options) {
-  const int components = components_used(query.shape(), reference.shape(), options.components);
+                                            const FourierSignature& reference, int components) {
+  components = components_used(query.shape(), reference.shape(), components);
   const auto rows = static_cast<std::size_t>(query.rows());
   CrossSpectrum spectrum(components);
   std::vector<float> cosines(rows);
@@ -99,9 +98,8 @@ std::optional<CrossSpectrum> cross_spectrum(const FourierSignature& query,
 }
 
 std::optional<CrossSpectrum> cross_spectrum(const PackedSignature& query,
-                                            const PackedSignature& reference,
-                                            const CompassOptions& options) {
-  const int components = components_used(query.shape, reference.shape, options.components);
+                                            const PackedSignature& reference, int components) {
+  components = components_used(query.shape, reference.shape, components);
   for (const PackedSignature* packed : {&query, &reference}) {
     require(packed->magnitudes.size() == packed->shape.size() &&
                 packed->phases.size() == packed->shape.size(),
@@ -253,23 +251,21 @@ std::optional<CompassReading> read_compass(const std::optional<CrossSpectrum>& s
 }  // namespace
 
 std::optional<CompassReading> compass(const FourierSignature& query,
-                                      const FourierSignature& reference,
-                                      const CompassOptions& options) {
-  return read_compass(cross_spectrum(query, reference, options));
+                                      const FourierSignature& reference, int components) {
+  return read_compass(cross_spectrum(query, reference, components));
 }
 
 std::optional<CompassReading> compass(const PackedSignature& query,
-                                      const PackedSignature& reference,
-                                      const CompassOptions& options) {
-  return read_compass(cross_spectrum(query, reference, options));
+                                      const PackedSignature& reference, int components) {
+  return read_compass(cross_spectrum(query, reference, components));
 }
 
 std::optional<CompassReading> compass_near(const PackedSignature& query,
                                            const PackedSignature& reference, double heading_rad,
-                                           double within_rad, const CompassOptions& options) {
+                                           double within_rad, int components) {
   require(within_rad > 0.0 && within_rad <= std::numbers::pi, "within_rad", within_rad,
           "above 0 .. pi");
-  const auto spectrum = cross_spectrum(query, reference, options);
+  const auto spectrum = cross_spectrum(query, reference, components);
   if (!spectrum) return {};
   // As fine as `highest_peaks` looks.
   const int steps =

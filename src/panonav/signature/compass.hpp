@@ -17,11 +17,6 @@ struct CompassReading {
   double distinctness = 0.0;
 };
 
-/// Which components the compass compares.
-struct CompassOptions {
-  int components = 0;  ///< k = 1 .. components - 1 are used; 0 takes all that both signatures have
-};
-
 /// Heading of `query` relative to `reference`: the global maximum of C(sigma) = sum_{y,k} A^q A^r
 /// cos(psi^q - psi^r - k sigma) [S06 eq. 33], exact to rounding between columns. The sum over rows
 /// is a trigonometric polynomial. It is evaluated at eight points per period of its highest
@@ -31,13 +26,13 @@ struct CompassOptions {
 /// or components outside 0, 2 .. those of both signatures. Cost: a few microseconds for 80 x 15.
 [[nodiscard]] std::optional<CompassReading> compass(const FourierSignature& query,
                                                     const FourierSignature& reference,
-                                                    const CompassOptions& options = {});
+                                                    int components = 0);
 
 /// The same from packed signatures, without unpacking; the full scale cancels. Phases in steps of 2
 /// pi / 256 change the heading by a few thousandths of a radian at most.
 [[nodiscard]] std::optional<CompassReading> compass(const PackedSignature& query,
                                                     const PackedSignature& reference,
-                                                    const CompassOptions& options = {});
+                                                    int components = 0);
 
 /// The same, but the maximum is searched only within `within_rad` of `heading_rad`, for a heading
 /// that is known coarsely from another source. `distinctness` is 1, as no other heading is
@@ -45,6 +40,6 @@ struct CompassOptions {
 [[nodiscard]] std::optional<CompassReading> compass_near(const PackedSignature& query,
                                                          const PackedSignature& reference,
                                                          double heading_rad, double within_rad,
-                                                         const CompassOptions& options = {});
+                                                         int components = 0);
 
 }  // namespace panonav

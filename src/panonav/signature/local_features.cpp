@@ -206,7 +206,7 @@ struct Bearings {
     const double column_rad = 2.0 * std::numbers::pi / view.shape.columns;
     const double row_rad = row_height(view.shape, view.elevations);
     words.reserve(4 * view.features.size());
-    for (const LocalFeature& feature : view.features) {
+    for (const LocalFeatures::Feature& feature : view.features) {
       const double azimuth = column_rad * feature.column;
       azimuths.push_back(azimuth);
       sines.push_back(static_cast<float>(std::sin(azimuth)));
@@ -338,7 +338,7 @@ std::optional<LocalFeatures> extract_features(const Panorama& panorama,
     offsets[i] = {std::ptrdiff_t{y0} * smooth.stride + x0, std::ptrdiff_t{y1} * smooth.stride + x1};
   }
   for (const Corner& corner : corners) {
-    LocalFeature& feature = view.features.emplace_back(LocalFeature{
+    LocalFeatures::Feature& feature = view.features.emplace_back(LocalFeatures::Feature{
         static_cast<std::uint16_t>(corner.column), static_cast<std::uint16_t>(corner.row), {}});
     const float* const here = smooth.row(corner.row) + corner.column;
     for (std::size_t i = 0; i < offsets.size(); ++i) {
@@ -355,7 +355,7 @@ std::vector<std::uint8_t> pack(const LocalFeatures& view) {
   const auto put = [&](std::uint64_t value, int count) {
     for (int i = 0; i < count; ++i) bytes.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
   };
-  for (const LocalFeature& feature : view.features) {
+  for (const LocalFeatures::Feature& feature : view.features) {
     put(feature.column, 2);
     put(feature.row, 2);
     for (const std::uint64_t word : feature.bits) put(word, 8);
@@ -376,7 +376,7 @@ LocalFeatures unpack_features(std::span<const std::uint8_t> bytes, PanoramaShape
     return value;
   };
   for (std::size_t at = 0; at < bytes.size(); at += size) {
-    LocalFeature feature{
+    LocalFeatures::Feature feature{
         static_cast<std::uint16_t>(get(at, 2)), static_cast<std::uint16_t>(get(at + 2, 2)), {}};
     require(feature.column < shape.columns, "column of a local feature", feature.column,
             "one of the panorama's");
@@ -388,8 +388,8 @@ LocalFeatures unpack_features(std::span<const std::uint8_t> bytes, PanoramaShape
   return view;
 }
 
-FeatureMatch match_features(const LocalFeatures& query, const LocalFeatures& reference,
-                            int more_than) {
+LocalFeatures::Match match_features(const LocalFeatures& query, const LocalFeatures& reference,
+                                    int more_than) {
   if (query.shape != reference.shape || query.elevations != reference.elevations) {
     throw ContractError("local features", "of another panorama", "of one shape and band");
   }
@@ -425,7 +425,7 @@ FeatureMatch match_features(const LocalFeatures& query, const LocalFeatures& ref
     return std::pair(-a.count, a.turn) < std::pair(-b.count, b.turn);
   });
 
-  FeatureMatch match;
+  LocalFeatures::Match match;
   std::array<std::int32_t, 2 * std::size_t{kernels::motion_axes}> explained{};
   for (const auto& [turn, begin, bound] : windows) {
     if (bound <= std::max(match.verified, more_than)) break;

@@ -11,26 +11,35 @@
 
 namespace panonav {
 
-/// A corner of a view and what its surroundings look like.
-struct LocalFeature {
-  std::uint16_t column = 0;  ///< of the panorama, where the corner is
-  std::uint16_t row = 0;     ///< of the panorama, 0 at the top
-  /// Bit i tells which of the i-th pair of places around the corner is brighter.
-  std::array<std::uint64_t, 4> bits{};
-  friend bool operator==(const LocalFeature&, const LocalFeature&) = default;
-};
-
 /// The local features of one panorama: corners that stand out among those within 6 degrees of
 /// azimuth, at most `max_count`, each with an upright binary descriptor. A turn of the robot by
 /// whole columns moves them and changes nothing else.
 struct LocalFeatures {
+  /// How many features two views share when a robot with a vertical axis has turned and moved on
+  /// level ground from one to the other.
+  struct Match {
+    int verified = 0;  ///< matched features that one turn and one direction of motion explain
+    /// Heading of the query minus heading of the reference, in [-pi, pi), in steps of 2 pi / 128; 0
+    /// where nothing is verified.
+    double heading_rad = 0.0;
+  };
+
+  /// A corner of a view and what its surroundings look like.
+  struct Feature {
+    std::uint16_t column = 0;  ///< of the panorama, where the corner is
+    std::uint16_t row = 0;     ///< of the panorama, 0 at the top
+    /// Bit i tells which of the i-th pair of places around the corner is brighter.
+    std::array<std::uint64_t, 4> bits{};
+    friend bool operator==(const Feature&, const Feature&) = default;
+  };
+
   static constexpr int max_count = 256;  ///< features kept of a view at most, the strongest ones
   /// Of the packed form: column, row, bits, all little-endian.
   static constexpr std::size_t packed_bytes = 36;
 
-  PanoramaShape shape;                 ///< of the panorama
-  ElevationBand elevations;            ///< of the panorama
-  std::vector<LocalFeature> features;  ///< by row, then column
+  PanoramaShape shape;            ///< of the panorama
+  ElevationBand elevations;       ///< of the panorama
+  std::vector<Feature> features;  ///< by row, then column
   friend bool operator==(const LocalFeatures&, const LocalFeatures&) = default;
 };
 
@@ -46,22 +55,14 @@ struct LocalFeatures {
 [[nodiscard]] LocalFeatures unpack_features(std::span<const std::uint8_t> bytes,
                                             PanoramaShape shape, ElevationBand elevations);
 
-/// How many features two views share when a robot with a vertical axis has turned and moved on
-/// level ground from one to the other.
-struct FeatureMatch {
-  int verified = 0;  ///< matched features that one turn and one direction of motion explain
-  /// Heading of the query minus heading of the reference, in [-pi, pi), in steps of 2 pi / 128; 0
-  /// where nothing is verified.
-  double heading_rad = 0.0;
-};
-
 /// Spatial verification (docs/equations.md, Local features): features that are each other's nearest
 /// by Hamming distance, and of these the largest set that one turn and one direction of motion
 /// explain, with nothing nearer than half the way. The number is the same when query and reference
 /// change places, but for rounding. Where `more_than` features or fewer are verified, the answer is
 /// that of none, and comes sooner. Throws ContractError on views of another shape or band. Cost:
 /// about 0.06 ms with AVX2 for 120 features each.
-[[nodiscard]] FeatureMatch match_features(const LocalFeatures& query,
-                                          const LocalFeatures& reference, int more_than = 0);
+[[nodiscard]] LocalFeatures::Match match_features(const LocalFeatures& query,
+                                                  const LocalFeatures& reference,
+                                                  int more_than = 0);
 
 }  // namespace panonav

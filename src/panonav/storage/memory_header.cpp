@@ -248,7 +248,7 @@ void visit_camera(Fields& fields, AnyCamera& camera) {
     fields.field(prefix + name, value);
   });
   if (auto* unified = std::get_if<UnifiedModel>(&camera.model)) {
-    fields.choice_or(prefix + "axis", view_axis_names, unified->axis, ViewAxis::down);
+    fields.choice_or(prefix + "axis", view_axis_names, unified->axis, UnifiedModel::Axis::down);
   }
   fields.field(prefix + "width_px", camera.image_size.width);
   fields.field(prefix + "height_px", camera.image_size.height);

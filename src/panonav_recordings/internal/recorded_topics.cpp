@@ -69,7 +69,7 @@ class TopicChooser {
                                         "; name one with the option image_topic");
   }
 
-  void choose_odometry(const RecordingTopics& wanted) {
+  void choose_odometry(const InputOptions::Topics& wanted) {
     if (wanted.odometry && wanted.odometry_frames) {
       throw ContractError("odometry", "a topic and frames", "one of the two");
     }
@@ -166,7 +166,7 @@ bool has_pictures(const RecordedTopic& topic) {
 }
 
 TopicChoice choose_topics(const Recording& recording, const std::filesystem::path& path,
-                          const RecordingTopics& names, const PictureSource& source) {
+                          const InputOptions::Topics& names, const PictureSource& source) {
   TopicChooser chooser(recording, path);
   chooser.choose_pictures(names.image);
   chooser.choose_odometry(names);

@@ -34,6 +34,7 @@ struct TopicChoice {
 /// Throws FileError, naming `path`, and ContractError on a topic of odometry beside frames.
 [[nodiscard]] TopicChoice choose_topics(const Recording& recording,
                                         const std::filesystem::path& path,
-                                        const RecordingTopics& names, const PictureSource& source);
+                                        const InputOptions::Topics& names,
+                                        const PictureSource& source);
 
 }  // namespace panonav::recordings

@@ -111,15 +111,14 @@ void ViewLikelihood::begin(const PackedSignature& view) {
 double ViewLikelihood::compare(std::uint32_t site) {
   Site& s = sites_[site];
   if (s.compared_at == number_) return differences_[site];
-  const ColumnMatches matches = match_columns_twice(*asked_, profiles_[site]);
-  const ColumnMatch& match = matches.best;
+  const auto [match, other] = match_columns_twice(*asked_, profiles_[site]);
   const double far = model_.far_difference;
   s.compared_at = number_;
   const auto similarity_of = [far](const ColumnMatch& m) {
     return static_cast<float>(std::max(0.0, far * far - m.difference * m.difference));
   };
   s.similarity = similarity_of(match);
-  s.other_similarity = similarity_of(matches.other);
+  s.other_similarity = similarity_of(other);
   s.log_similarity = std::log(s.similarity);
   s.other_log_similarity = std::log(s.other_similarity);
   if (static_cast<double>(s.similarity) > max_similarity_) {
@@ -130,8 +129,7 @@ double ViewLikelihood::compare(std::uint32_t site) {
         static_cast<float>(std::max(0.0, apart_m * apart_m - nearest_m * nearest_m));
   }
   s.heading_rad = s.reference_heading_rad + static_cast<float>(match.heading_rad);
-  s.other_heading_rad =
-      s.heading_rad + static_cast<float>(matches.other.heading_rad - match.heading_rad);
+  s.other_heading_rad = s.heading_rad + static_cast<float>(other.heading_rad - match.heading_rad);
   differences_[site] = match.difference;
   compared_sites_.push_back(site);
   lanes_.clear();

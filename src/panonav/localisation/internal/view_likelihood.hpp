@@ -35,7 +35,7 @@ class ViewLikelihood {
     float heading_rad;  ///< absolute, of the robot that took the view compared; NaN: not known
     float similarity;   ///< 0: unlike, or not compared
     float log_similarity;
-    float other_heading_rad;  ///< the second heading that fits (`ColumnMatches`), and
+    float other_heading_rad;  ///< the second heading that fits (`match_columns_twice`), and
     float other_similarity;   ///< the similarity then
     float other_log_similarity;
     std::uint32_t compared_at;  ///< number of the view that it was compared with

@@ -28,9 +28,9 @@ struct SearchedViews {
                                         kernels::Instructions instructions);
 
 /// The body of VisualMemory::hierarchy.
-[[nodiscard]] std::vector<HierarchyLevel> hierarchical_search(
+[[nodiscard]] std::vector<VisualMemory::HierarchyLevel> hierarchical_search(
     const SearchedViews& searched, const PackedSignature& query, double tolerance, int components,
-    const std::function<bool(const HierarchyLevel&)>& stop, const SearchMask& mask,
+    const std::function<bool(const VisualMemory::HierarchyLevel&)>& stop, const SearchMask& mask,
     kernels::Instructions instructions);
 
 }  // namespace panonav

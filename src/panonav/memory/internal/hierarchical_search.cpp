@@ -28,8 +28,9 @@ class Hierarchy {
         tolerance_(tolerance),
         kernels_(kernels) {}
 
-  std::vector<HierarchyLevel> run(const std::function<bool(const HierarchyLevel&)>& stop) {
-    std::vector<HierarchyLevel> levels;
+  std::vector<VisualMemory::HierarchyLevel> run(
+      const std::function<bool(const VisualMemory::HierarchyLevel&)>& stop) {
+    std::vector<VisualMemory::HierarchyLevel> levels;
     start();
     for (int m = 1; m <= comparison_.components() && !candidates_.empty(); ++m) {
       compare_component(m);
@@ -100,8 +101,8 @@ class Hierarchy {
                   [this](const Candidate& candidate) { return candidate.partial > limit(); });
   }
 
-  [[nodiscard]] HierarchyLevel level(int m) const {
-    HierarchyLevel result;
+  [[nodiscard]] VisualMemory::HierarchyLevel level(int m) const {
+    VisualMemory::HierarchyLevel result;
     result.components = m;
     result.limit = limit();
     result.bytes_read = bytes_read_;
@@ -125,9 +126,9 @@ class Hierarchy {
 
 }  // namespace
 
-std::vector<HierarchyLevel> hierarchical_search(
+std::vector<VisualMemory::HierarchyLevel> hierarchical_search(
     const SearchedViews& searched, const PackedSignature& query, double tolerance, int components,
-    const std::function<bool(const HierarchyLevel&)>& stop, const SearchMask& mask,
+    const std::function<bool(const VisualMemory::HierarchyLevel&)>& stop, const SearchMask& mask,
     kernels::Instructions instructions) {
   require(std::isfinite(tolerance) && tolerance >= 0.0, "tolerance", tolerance, "finite, >= 0");
   const kernels::DistanceKernels& kernels = kernels::distance_kernels(instructions);

@@ -71,7 +71,7 @@ std::optional<CompassReading> AreaViews::turn_against(ViewId view, const SeenVie
   const VisualMemory* const part = part_of(view);
   require(part != nullptr, "view", static_cast<double>(view.value), "one that is loaded");
   bytes_read_ += 2 * static_cast<std::uint64_t>(seen.packed.shape.rows) * seen.components;
-  return compass(seen.packed, part->packed(view), {.components = seen.components});
+  return compass(seen.packed, part->packed(view), seen.components);
 }
 
 const HomingView& AreaViews::view(ViewId view, int components) {

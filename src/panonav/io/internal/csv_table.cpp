@@ -1,4 +1,4 @@
-#include "panonav/io/csv_table.hpp"
+#include "panonav/io/internal/csv_table.hpp"
 
 #include <algorithm>
 #include <charconv>
