@@ -84,10 +84,10 @@ TEST_F(Evaluate, BrokenFilesAreNamedWithLineAndField) {
   (void)refused("empty.tum", "");
   (void)refused("back.tum", "1 0 0 0 0 0 0 1\n0 0 0 0 0 0 0 1\n");
   EXPECT_TRUE(contains(refused("columns.csv", "stamp_s,x_m,heading_deg\n0,1,0\n"), "y_m"));
-  EXPECT_TRUE(contains(refusal({"evaluate", folder_ / "no.tum", folder_ / "truth.tum"}), "no.tum"));
-  EXPECT_TRUE(contains(refusal({"evaluate", folder_ / "truth.tum", folder_ / "truth.tum",
-                                "--relative-distance-m", "-1"}),
-                       "relative_distance_m is -1"));
+  expect_refusal({"evaluate", folder_ / "no.tum", folder_ / "truth.tum"}, "no.tum");
+  expect_refusal(
+      {"evaluate", folder_ / "truth.tum", folder_ / "truth.tum", "--relative-distance-m", "-1"},
+      "relative_distance_m is -1");
 }
 
 }  // namespace

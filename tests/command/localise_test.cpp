@@ -266,8 +266,8 @@ TEST_F(Localise, SeveralPicturesAndATable) {
   EXPECT_TRUE(contains(rows[2], "," + one["matches"][1]["file"].get<std::string>() + ","));
   EXPECT_TRUE(contains(rows[3], "\"\"broken\"\".png\",unreadable"));
 
-  EXPECT_TRUE(contains(refusal({"localise", memory(), gone, broken}), gone));
-  EXPECT_TRUE(contains(refusal({"localise", memory(), gone, asked()}), "is a folder"));
+  expect_refusal({"localise", memory(), gone, broken}, gone);
+  expect_refusal({"localise", memory(), gone, asked()}, "is a folder");
 }
 
 TEST_F(Localise, TheReportShowsEachPictureAboveItsBestMatch) {
@@ -338,15 +338,12 @@ TEST_F(Localise, TextForPeopleNamesEachImage) {
 }
 
 TEST_F(Localise, WrongArgumentsAreRefused) {
-  EXPECT_TRUE(
-      contains(refusal({"localise", memory(), asked(), "--components", "0"}), "components"));
-  EXPECT_TRUE(
-      contains(refusal({"localise", memory(), asked(), "--components", "400"}), "components"));
-  EXPECT_TRUE(contains(refusal({"localise", memory(), asked(), "--top", "0"}), "top"));
-  EXPECT_TRUE(
-      contains(refusal({"localise", *folder_ / "nothing.panonav", asked()}), "nothing.panonav"));
-  EXPECT_TRUE(contains(refusal({"localise", memory(), *folder_ / "nowhere"}), "nowhere"));
-  EXPECT_TRUE(contains(refusal({"localise", memory()}), "INPUT"));
+  expect_refusal({"localise", memory(), asked(), "--components", "0"}, "components");
+  expect_refusal({"localise", memory(), asked(), "--components", "400"}, "components");
+  expect_refusal({"localise", memory(), asked(), "--top", "0"}, "top");
+  expect_refusal({"localise", *folder_ / "nothing.panonav", asked()}, "nothing.panonav");
+  expect_refusal({"localise", memory(), *folder_ / "nowhere"}, "nowhere");
+  expect_refusal({"localise", memory()}, "INPUT");
 }
 
 TEST_F(Localise, BadQueriesAreNamed) {

@@ -351,25 +351,25 @@ TEST_F(Recordings, OfSeveralCamerasOneIsNamed) {
   write_picture(*folder_ / "right.png", *world_, {0.5, 0.5, -0.5});
   const auto picture = answers_of({"localise", memory(), *folder_ / "right.png", "--json"});
   EXPECT_EQ(right.at(0)["matches"], picture.at(0)["matches"]);
-  EXPECT_TRUE(contains(refusal({"localise", memory(), both, "--image-topic", "/up"}),
-                       "has no topic /up of sensor_msgs/Image"));
+  expect_refusal({"localise", memory(), both, "--image-topic", "/up"},
+                 "has no topic /up of sensor_msgs/Image");
 }
 
 TEST_F(Recordings, OptionsThatDoNotFitAreRefused) {
-  EXPECT_TRUE(contains(refusal({"memorise", walk("_lz4.mcap"), *folder_ / "new.panonav"}),
-                       "does not say how its pictures lie; say what they show with --kind"));
-  EXPECT_TRUE(contains(refusal({"localise", memory(), walk(), "--imu-topic", "/imu"}),
-                       walk() + " has no topics; leave out --imu-topic"));
-  EXPECT_TRUE(contains(refusal({"track", memory(), walk(), "--odometry-frames", "odom", "base"}),
-                       "has no topics; leave out --odometry-frames"));
-  EXPECT_TRUE(contains(refusal({"track", memory(), walk("_lz4.mcap"), "--odometry-topic", "/odom",
-                                "--odometry-frames", "odom", "base"}),
-                       "--odometry-topic and --odometry-frames do not go together"));
-  EXPECT_TRUE(contains(refusal({"convert", walk(), *folder_ / "copy"}), "does not end in .mcap"));
-  EXPECT_TRUE(contains(refusal(with({"convert", walk("_lz4.mcap"), walk()}, kind)),
-                       "is there already and not empty; allowed: a new folder"));
+  expect_refusal({"memorise", walk("_lz4.mcap"), *folder_ / "new.panonav"},
+                 "does not say how its pictures lie; say what they show with --kind");
+  expect_refusal({"localise", memory(), walk(), "--imu-topic", "/imu"},
+                 walk() + " has no topics; leave out --imu-topic");
+  expect_refusal({"track", memory(), walk(), "--odometry-frames", "odom", "base"},
+                 "has no topics; leave out --odometry-frames");
+  expect_refusal({"track", memory(), walk("_lz4.mcap"), "--odometry-topic", "/odom",
+                  "--odometry-frames", "odom", "base"},
+                 "--odometry-topic and --odometry-frames do not go together");
+  expect_refusal({"convert", walk(), *folder_ / "copy"}, "does not end in .mcap");
+  expect_refusal(with({"convert", walk("_lz4.mcap"), walk()}, kind),
+                 "is there already and not empty; allowed: a new folder");
   std::ofstream(*folder_ / "empty.mcap") << "\x89MCAP0\r\n";
-  EXPECT_TRUE(contains(refusal({"localise", memory(), *folder_ / "empty.mcap"}), "empty.mcap: "));
+  expect_refusal({"localise", memory(), *folder_ / "empty.mcap"}, "empty.mcap: ");
 }
 
 TEST_F(Recordings, RoutesAndMotionComeFromThem) {

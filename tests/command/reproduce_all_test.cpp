@@ -106,7 +106,7 @@ TEST_F(ReproduceAll, RunsWhatIsNotFinishedAndKeepsTheRest) {
   std::ofstream(out_ / "results.json") << "of an earlier table";
   const std::string run = bytes_of(out_ / "run.json");
   const std::string kept = bytes_of(out_ / "y03/results.json");
-  EXPECT_TRUE(contains(refusal(continued()), "m03: cannot be made"));
+  expect_refusal(continued(), "m03: cannot be made");
   EXPECT_FALSE(fs::exists(out_ / "results.json")) << "an old table beside new rows";
   EXPECT_EQ(bytes_of(out_ / "y03/results.json"), kept);
   EXPECT_EQ(bytes_of(out_ / "run.json"), run);
@@ -114,7 +114,7 @@ TEST_F(ReproduceAll, RunsWhatIsNotFinishedAndKeepsTheRest) {
 
 TEST_F(ReproduceAll, BeginsAnewWithoutContinue) {
   cannot_be_run("f11");
-  EXPECT_TRUE(contains(refusal(command({"--seed", "8"})), "f11: cannot be made"));
+  expect_refusal(command({"--seed", "8"}), "f11: cannot be made");
   EXPECT_EQ(json::parse(bytes_of(out_ / "run.json"))["seed"], 8);
   for (const std::string& paper : papers) {
     EXPECT_FALSE(fs::exists(out_ / paper / "results.json")) << paper;
@@ -122,36 +122,32 @@ TEST_F(ReproduceAll, BeginsAnewWithoutContinue) {
 }
 
 TEST_F(ReproduceAll, KeepsAnEarlierRunWhenTheOptionsAreBad) {
-  EXPECT_TRUE(
-      contains(refusal(command({"--scenes", "1"})), "--scenes is '1'; allowed for all: from 2"));
-  EXPECT_TRUE(contains(refusal({"reproduce", "all", "-o", out_, "--data", folder_ / "nowhere"}),
-                       "no such folder"));
+  expect_refusal(command({"--scenes", "1"}), "--scenes is '1'; allowed for all: from 2");
+  expect_refusal({"reproduce", "all", "-o", out_, "--data", folder_ / "nowhere"}, "no such folder");
   EXPECT_EQ(json::parse(bytes_of(out_ / "run.json"))["seed"], 7);
   EXPECT_TRUE(fs::exists(out_ / "f11/results.json"));
 }
 
 TEST_F(ReproduceAll, RefusesToContinueARunOfOtherOptions) {
-  EXPECT_TRUE(
-      contains(refusal(command({"--continue"})), "has seed 7, this one null; allowed: the same"));
-  EXPECT_TRUE(
-      contains(refusal(command({"--seed", "7", "--runs", "4", "--continue"})), "has runs null"));
-  EXPECT_TRUE(contains(refusal({"reproduce", "all", "-o", out_, "--seed", "7", "--data",
-                                folder_.path(), "--continue"}),
-                       "has quick true, this one false"));
+  expect_refusal(command({"--continue"}), "has seed 7, this one null; allowed: the same");
+  expect_refusal(command({"--seed", "7", "--runs", "4", "--continue"}), "has runs null");
+  expect_refusal(
+      {"reproduce", "all", "-o", out_, "--seed", "7", "--data", folder_.path(), "--continue"},
+      "has quick true, this one false");
   json run = json::parse(bytes_of(out_ / "run.json"));
   run["version"] = "0.0.1";
   write(out_ / "run.json", run);
-  EXPECT_TRUE(contains(refusal(continued()), "has version \"0.0.1\""));
+  expect_refusal(continued(), "has version \"0.0.1\"");
   run["version"] = json::array();
   write(out_ / "run.json", run);
-  EXPECT_TRUE(contains(refusal(continued()), "run.json: version is an array"));
+  expect_refusal(continued(), "run.json: version is an array");
   run.erase("version");
   write(out_ / "run.json", run);
-  EXPECT_TRUE(contains(refusal(continued()), "run.json: version is missing"));
+  expect_refusal(continued(), "run.json: version is missing");
   std::ofstream(out_ / "run.json") << "{";
-  EXPECT_TRUE(contains(refusal(continued()), "run.json: is no JSON object"));
+  expect_refusal(continued(), "run.json: is no JSON object");
   fs::remove(out_ / "run.json");
-  EXPECT_TRUE(contains(refusal(continued()), "run.json: is not there"));
+  expect_refusal(continued(), "run.json: is not there");
   EXPECT_TRUE(fs::exists(out_ / "y03/results.json"));
 }
 
@@ -159,11 +155,10 @@ TEST_F(ReproduceAll, RefusesDamagedResultsAndWhatHasNoMeaning) {
   json rows = json::parse(bytes_of(out_ / "s06/results.json"));
   rows[1]["ours"] = "much";
   write(out_ / "s06/results.json", rows);
-  EXPECT_TRUE(
-      contains(refusal(continued()), "s06/results.json: row 2: ours is \"much\"; allowed: "));
-  EXPECT_TRUE(contains(refusal(command({"--only", "office"})), "--only has no meaning for all"));
-  EXPECT_TRUE(contains(refusal({"reproduce", "m04", "--quick", "-o", folder_ / "x", "--continue"}),
-                       "--continue has no meaning for m04"));
+  expect_refusal(continued(), "s06/results.json: row 2: ours is \"much\"; allowed: ");
+  expect_refusal(command({"--only", "office"}), "--only has no meaning for all");
+  expect_refusal({"reproduce", "m04", "--quick", "-o", folder_ / "x", "--continue"},
+                 "--continue has no meaning for m04");
 }
 
 }  // namespace

@@ -206,8 +206,8 @@ TEST_F(RouteVerbs, ARouteGrowsWhereItEndsAndNowhereElse) {
   EXPECT_EQ(grown["lines"], 47);
   EXPECT_NEAR(grown["length_m"].get<double>(), 4.6, 1e-6);
 
-  EXPECT_TRUE(contains(refusal({"route", "record", folder_ / "teach", folder_ / "m.panonav"}),
-                       "from the end of the route 'route'"));
+  expect_refusal({"route", "record", folder_ / "teach", folder_ / "m.panonav"},
+                 "from the end of the route 'route'");
   const auto other =
       refusal({"route", "record", folder_ / "on", folder_ / "m.panonav", "--columns", "180"});
   EXPECT_TRUE(contains(other, "--columns"));
@@ -217,11 +217,10 @@ TEST_F(RouteVerbs, ARouteGrowsWhereItEndsAndNowhereElse) {
 
   const auto second = record({"--name", "by wheels", "--odometry", "--every-m", "0.2"});
   EXPECT_EQ(second["lines"], 21);  // 4.08 m by the wheels, 0.204 m apart
-  EXPECT_TRUE(contains(refusal({"route", "follow", folder_ / "m.panonav", folder_ / "repeat"}),
-                       "say which with --name: by wheels, route"));
-  EXPECT_TRUE(contains(
-      refusal({"route", "follow", folder_ / "m.panonav", folder_ / "repeat", "--name", "other"}),
-      "holds no route 'other'"));
+  expect_refusal({"route", "follow", folder_ / "m.panonav", folder_ / "repeat"},
+                 "say which with --name: by wheels, route");
+  expect_refusal({"route", "follow", folder_ / "m.panonav", folder_ / "repeat", "--name", "other"},
+                 "holds no route 'other'");
   const auto by_wheels = answers_of({"route", "follow", folder_ / "m.panonav", folder_ / "repeat",
                                      "--name", "by wheels", "--json"});
   ASSERT_EQ(by_wheels.size(), 21U);
@@ -292,17 +291,16 @@ TEST_F(RouteVerbs, TheLibraryRecordsAndFollowsTheSameOnePictureAtATime) {
 }
 
 TEST_F(RouteVerbs, WrongUseIsRefused) {
-  EXPECT_TRUE(contains(refusal({"route"}), "route record, route follow"));
-  EXPECT_TRUE(contains(refusal({"route", "draw"}), "route record, route follow"));
+  expect_refusal({"route"}, "route record, route follow");
+  expect_refusal({"route", "draw"}, "route record, route follow");
   const std::string memory = folder_ / "m.panonav";
-  EXPECT_TRUE(contains(refusal({"route", "follow", memory, folder_ / "repeat"}), memory));
+  expect_refusal({"route", "follow", memory, folder_ / "repeat"}, memory);
   (void)record();
   const auto rows = refusal(
       {"route", "record", folder_ / "teach", memory, "--name", "b", "--horizon-rows", "1-2"});
   EXPECT_TRUE(contains(rows, "--horizon-rows goes with panoramas whose elevations are not known"));
-  EXPECT_TRUE(
-      contains(refusal({"route", "record", folder_ / "teach", memory, "--horizon-rows", "2-1"}),
-               "FIRST-LAST"));
+  expect_refusal({"route", "record", folder_ / "teach", memory, "--horizon-rows", "2-1"},
+                 "FIRST-LAST");
   const auto help = run_panonav({"route", "record", "--help-all"});
   EXPECT_EQ(help.exit_code, 0);
   EXPECT_TRUE(contains(help.out, "--half-band-rad"));

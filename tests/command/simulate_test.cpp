@@ -179,7 +179,7 @@ TEST_F(Simulate, WrongValuesAreNamedWithTheirRange) {
     more.insert(more.begin(), {"simulate", "office", out});
     return refusal(more);
   };
-  EXPECT_TRUE(contains(refusal({"simulate", "castle", out}), "office, "));
+  expect_refusal({"simulate", "castle", out}, "office, ");
   EXPECT_TRUE(contains(line_of({"--grid", "0"}), "--grid is 0; allowed: > 0"));
   EXPECT_TRUE(contains(line_of({"--grid", "nan"}), "--grid"));
   EXPECT_TRUE(contains(line_of({"--random", "0"}), "--random is 0; allowed: 1 to"));
@@ -195,7 +195,7 @@ TEST_F(Simulate, BrokenFilesAreNamed) {
   const std::string out = folder / "run";
   for (const std::string name : {"scene.obj", "scene.world", "scene.glb"}) {
     std::ofstream(folder / name) << "this is no scene <";
-    EXPECT_TRUE(contains(refusal({"simulate", folder / name, out}), name));
+    expect_refusal({"simulate", folder / name, out}, name);
   }
   std::ofstream(folder / "way.csv") << "stamp_s,x_m,y_m,heading_deg\n0,1,nan,0\n";
   const auto line = refusal({"simulate", "office", out, "--trajectory", folder / "way.csv"});
@@ -221,9 +221,8 @@ TEST_F(Simulate, WhatVariesBuiltInScenesIsRefusedForAFile) {
     }
   }
   std::ofstream(folder / "run.toml") << "[simulation]\nscene_seed = 2\n";
-  EXPECT_TRUE(
-      contains(refusal({"simulate", mesh, out, "--random", "1", "--config", folder / "run.toml"}),
-               "--scene-seed"));
+  expect_refusal({"simulate", mesh, out, "--random", "1", "--config", folder / "run.toml"},
+                 "--scene-seed");
   EXPECT_FALSE(fs::exists(out)) << "refused, but something was written";
   // The same file without such a flag is rendered.
   run_well(with_small({"simulate", mesh, out, "--random", "1"}));
@@ -231,11 +230,10 @@ TEST_F(Simulate, WhatVariesBuiltInScenesIsRefusedForAFile) {
 
 TEST_F(Simulate, WritesOnlyIntoANewOrEmptyFolder) {
   std::ofstream(folder / "precious.txt") << "mine";
-  EXPECT_TRUE(contains(refusal(with_small({"simulate", "office", folder.path(), "--random", "1"})),
-                       "not empty"));
+  expect_refusal(with_small({"simulate", "office", folder.path(), "--random", "1"}), "not empty");
   // A folder below a file cannot be made, not even by root.
   const std::string below = folder / "precious.txt/run";
-  EXPECT_TRUE(contains(refusal(with_small({"simulate", "office", below, "--random", "1"})), below));
+  expect_refusal(with_small({"simulate", "office", below, "--random", "1"}), below);
   EXPECT_EQ(bytes_of(folder / "precious.txt"), "mine");
 }
 

@@ -167,8 +167,7 @@ TEST_F(TrackOffice, TheReportHoldsPicturesAndARunToPlay) {
   const fs::path foreign = *folder_ / "mine";
   fs::create_directory(foreign);
   std::ofstream(foreign / "index.html") << "mine";
-  EXPECT_TRUE(contains(refusal({"track", memory(), run(), "--report", foreign}),
-                       "not made by panonav track"));
+  expect_refusal({"track", memory(), run(), "--report", foreign}, "not made by panonav track");
   EXPECT_EQ(bytes_of(foreign / "index.html"), "mine");
 }
 

@@ -95,6 +95,12 @@ std::string refusal(const std::vector<std::string>& arguments, const CommandOpti
   return said.empty() ? std::string() : said.front();
 }
 
+void expect_refusal(const std::vector<std::string>& arguments, std::string_view part,
+                    const std::source_location& caller) {
+  const ::testing::ScopedTrace trace(caller.file_name(), static_cast<int>(caller.line()), "");
+  EXPECT_TRUE(contains(refusal(arguments), part));
+}
+
 std::vector<std::string> lines(const std::string& text) {
   std::vector<std::string> found;
   std::istringstream stream(text);

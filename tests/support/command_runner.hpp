@@ -5,7 +5,9 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
+#include <source_location>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "support/skips.hpp"
@@ -34,6 +36,10 @@ struct CommandOptions {
 /// Runs, expects exit code 2 and exactly one line on standard error, and gives that line.
 [[nodiscard]] std::string refusal(const std::vector<std::string>& arguments,
                                   const CommandOptions& options = {});
+
+/// As `refusal`, and expects `part` in that line.
+void expect_refusal(const std::vector<std::string>& arguments, std::string_view part,
+                    const std::source_location& caller = std::source_location::current());
 
 /// Runs, expects the exit code and gives what the command printed, one JSON value.
 [[nodiscard]] nlohmann::json answer_of(const std::vector<std::string>& arguments,
