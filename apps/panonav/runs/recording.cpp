@@ -248,6 +248,25 @@ Dataset read_run(const std::string& input, const InputOptions::Topics& topics,
   return open_recording(input, pictures, memory, session);
 }
 
+std::vector<double> trajectory_stamps(const Dataset& run, const std::string& verb,
+                                      const std::string& dataset, const std::string& tum,
+                                      Session& session) {
+  std::vector<double> seconds;
+  for (std::size_t i = 0; i < run.entries.size(); ++i) {
+    seconds.push_back(run.entries[i].stamp_s.value_or(static_cast<double>(i)));
+    if (i > 0 && !(seconds[i] > seconds[i - 1])) {
+      throw FileError(dataset, "stamp_s of " + run.entries[i].file + " is " + to_text(seconds[i]) +
+                                   "; allowed for --tum: > " + to_text(seconds[i - 1]) +
+                                   ", the stamp before it");
+    }
+  }
+  if (!run.entries.front().stamp_s) {
+    session.note("panonav " + verb + ": " + dataset + " has no column 'stamp_s'; the seconds in " +
+                 tum + " count pictures from 0");
+  }
+  return seconds;
+}
+
 std::string how_to_add(const std::string& folder, const std::string& columns,
                        const std::string& values) {
   if (recordings::is_recording(folder)) {

@@ -75,6 +75,12 @@ void require_kept_band(const PictureArguments& pictures, const MemoryFile& memor
                                const PartArguments& part, const MemoryFile& memory,
                                Session& session);
 
+/// Returns the stamp of each entry for the trajectory file of a verb; the entries' numbers where
+/// there are no stamps, which is noted. Throws FileError on stamps that do not grow.
+[[nodiscard]] std::vector<double> trajectory_stamps(const Dataset& run, const std::string& verb,
+                                                    const std::string& dataset,
+                                                    const std::string& tum, Session& session);
+
 /// How to make a recording tell more, for the end of an error's line: the table of a data set gets
 /// these columns, a folder of pictures alone a dataset.toml first. `values`: of an example.
 [[nodiscard]] std::string how_to_add(const std::string& folder, const std::string& columns,

@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "cli/option_values.hpp"
 #include "cli/verbs.hpp"
 #include "runs/reproduce_all.hpp"
 #include "runs/reproduced_paper.hpp"
@@ -49,6 +50,27 @@ ExitCode reproduce(const ReproduceArguments& wanted, Session& session) {
   return ExitCode::done;
 }
 
+/// Returns " (default: 3 for elsewhere, 2 for f11, ...)".
+std::string defaults(const auto& option) {
+  std::vector<std::string> values;
+  for (const char* paper : {"elsewhere", "f11", "m03", "m04", "navigation", "s06", "y03"}) {
+    values.push_back(std::to_string(lab::default_options(paper).*option) + " for " + paper);
+  }
+  return " (default: " + listed(values) + ")";
+}
+
+/// Returns what an option means for the papers that have it, each with its default.
+std::string meanings(int lab::ReproductionOptions::*option,
+                     std::initializer_list<std::pair<std::string, std::string>> of_papers) {
+  std::string text;
+  for (const auto& [papers, meaning] : of_papers) {
+    const std::string last = papers.substr(papers.find_last_of(' ') + 1);
+    text += (text.empty() ? "" : "; ") + papers + ": " + meaning +
+            " (default: " + std::to_string(lab::default_options(last).*option) + ")";
+  }
+  return text;
+}
+
 Run declare_reproduce(Arguments& arguments) {
   auto wanted = std::make_shared<ReproduceArguments>();
   std::vector<std::string> papers;
@@ -65,45 +87,23 @@ Run declare_reproduce(Arguments& arguments) {
   arguments.flag("--continue", wanted->continues,
                  "all: continue a run of the same options that was stopped; papers that are "
                  "finished are not run again");
-  const auto m04 = lab::default_options("m04");
-  const auto m03 = lab::default_options("m03");
-  const auto s06 = lab::default_options("s06");
-  const auto f11 = lab::default_options("f11");
-  const auto y03 = lab::default_options("y03");
-  const auto navigation = lab::default_options("navigation");
-  const auto elsewhere = lab::default_options("elsewhere");
-  const auto defaults = [](auto elsewhere_value, auto f11_value, auto m03_value, auto m04_value,
-                           auto navigation_value, auto s06_value, auto y03_value) {
-    return " (default: " + std::to_string(elsewhere_value) + " for elsewhere, " +
-           std::to_string(f11_value) + " for f11, " + std::to_string(m03_value) + " for m03, " +
-           std::to_string(m04_value) + " for m04, " + std::to_string(navigation_value) +
-           " for navigation, " + std::to_string(s06_value) + " for s06, " +
-           std::to_string(y03_value) + " for y03";
-  };
-  const auto fallback = [](int value) { return " (default: " + std::to_string(value); };
-  arguments.option("--seed", wanted->seed,
-                   "First of the scene seeds" +
-                       defaults(elsewhere.seed, f11.seed, m03.seed, m04.seed, navigation.seed,
-                                s06.seed, y03.seed) +
-                       ")");
+  using Options = lab::ReproductionOptions;
+  arguments.option("--seed", wanted->seed, "First of the scene seeds" + defaults(&Options::seed));
   arguments.option("--scenes", wanted->scenes, 1,
-                   "Variants of the scene" +
-                       defaults(elsewhere.scenes, f11.scenes, m03.scenes, m04.scenes,
-                                navigation.scenes, s06.scenes, y03.scenes) +
-                       ")");
-  arguments.option("--queries", wanted->queries, 1,
-                   "m04: questions in each" + fallback(m04.queries) + "); elsewhere: the same" +
-                       fallback(elsewhere.queries) + ")");
-  arguments.option("--runs", wanted->runs, 2,
-                   "elsewhere: homing runs and missions in each place" + fallback(elsewhere.runs) +
-                       "); m04: missions of figure 18 in each kind of place" + fallback(m04.runs) +
-                       "); m03: runs in each variant of an office" + fallback(m03.runs) +
-                       "); f11: paths in each Gazebo world" + fallback(f11.runs) +
-                       "); navigation: missions in each kind of place" + fallback(navigation.runs) +
-                       "); y03: runs along routes of 60 m in each place" + fallback(y03.runs) +
-                       ")");
+                   "Variants of the scene" + defaults(&Options::scenes));
+  arguments.option(
+      "--queries", wanted->queries, 1,
+      meanings(&Options::queries, {{"m04", "questions in each"}, {"elsewhere", "the same"}}));
+  arguments.option(
+      "--runs", wanted->runs, 2,
+      meanings(&Options::runs, {{"elsewhere", "homing runs and missions in each place"},
+                                {"m04", "missions of figure 18 in each kind of place"},
+                                {"m03", "runs in each variant of an office"},
+                                {"f11", "paths in each Gazebo world"},
+                                {"navigation", "missions in each kind of place"},
+                                {"y03", "runs along routes of 60 m in each place"}}));
   arguments.option("--rows", wanted->rows, 1,
-                   "elsewhere, m03, m04: rows of the views" + fallback(m03.rows) + ")");
+                   meanings(&Options::rows, {{"elsewhere, m03, m04", "rows of the views"}}));
   arguments.option("--data FOLDER", wanted->data,
                    "elsewhere, f11, m03, navigation, s06, y03: folder with the recordings and "
                    "Gazebo worlds (default: the environment's PANONAV_DATA; without it they are "

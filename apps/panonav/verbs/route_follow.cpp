@@ -112,26 +112,6 @@ void print_summary(const FollowSummary& summary, const std::vector<FollowedImage
   }
 }
 
-/// Seconds of each entry: its stamp, or its number where there are no stamps.
-std::vector<double> seconds_of(const Dataset& run, const FollowArguments& wanted,
-                               Session& session) {
-  std::vector<double> seconds;
-  for (std::size_t i = 0; i < run.entries.size(); ++i) {
-    seconds.push_back(run.entries[i].stamp_s.value_or(static_cast<double>(i)));
-    if (i > 0 && !(seconds[i] > seconds[i - 1])) {
-      throw FileError(wanted.dataset, "stamp_s of " + run.entries[i].file + " is " +
-                                          to_text(seconds[i]) + "; allowed for --tum: > " +
-                                          to_text(seconds[i - 1]) + ", the stamp before it");
-    }
-  }
-  if (!run.entries.front().stamp_s) {
-    session.note("panonav route follow: " + wanted.dataset +
-                 " has no column 'stamp_s'; the seconds in " + *wanted.tum +
-                 " count pictures from 0");
-  }
-  return seconds;
-}
-
 ExitCode follow_run(const Arguments& arguments, const FollowArguments& wanted, Session& session) {
   const auto memory = MemoryFile::open(wanted.memory, Access::read_only);
   const Dataset run = read_run(wanted.dataset, wanted.topics, wanted.part, memory, session);
@@ -148,7 +128,8 @@ ExitCode follow_run(const Arguments& arguments, const FollowArguments& wanted, S
   const auto truth = follower.source().from_odometry ? std::vector<Pose2>{} : dataset_poses(run);
   const bool headings_known = !truth.empty() && run.entries.front().pose->heading_rad.has_value();
   std::vector<double> seconds;
-  if (wanted.tum) seconds = seconds_of(run, wanted, session);
+  if (wanted.tum)
+    seconds = trajectory_stamps(run, "route follow", wanted.dataset, *wanted.tum, session);
   if (wanted.report) prepare_report_folder(*wanted.report, "route follow");
   std::vector<FollowedImage> images;
   Progress progress(session, "following", (run.entries.size() - 1) / wanted.every + 1);

@@ -90,25 +90,6 @@ void check_odometry(const Dataset& run, const std::string& folder) {
   }
 }
 
-/// Seconds of each entry: its stamp, or its number where there are no stamps.
-std::vector<double> seconds_of(const Dataset& run, const TrackArguments& wanted, Session& session) {
-  std::vector<double> seconds;
-  for (std::size_t i = 0; i < run.entries.size(); ++i) {
-    const auto& stamp_s = run.entries[i].stamp_s;
-    seconds.push_back(stamp_s.value_or(static_cast<double>(i)));
-    if (i > 0 && !(seconds[i] > seconds[i - 1])) {
-      throw FileError(wanted.dataset, "stamp_s of " + run.entries[i].file + " is " +
-                                          to_text(seconds[i]) + "; allowed for --tum: > " +
-                                          to_text(seconds[i - 1]) + ", the stamp before it");
-    }
-  }
-  if (!run.entries.front().stamp_s) {
-    session.note("panonav track: " + wanted.dataset + " has no column 'stamp_s'; the seconds in " +
-                 *wanted.tum + " count pictures from 0");
-  }
-  return seconds;
-}
-
 void start(Tracker& tracker, const TrackArguments& wanted) {
   if (!wanted.start_heading_deg) return;
   const double heading_rad = wrap_angle(radians(*wanted.start_heading_deg));
@@ -118,10 +99,6 @@ void start(Tracker& tracker, const TrackArguments& wanted) {
   } else {
     tracker.start_globally(heading_rad);
   }
-}
-
-ordered_json as_json(const Pose2& pose) {
-  return {{"x_m", pose.x_m}, {"y_m", pose.y_m}, {"heading_rad", pose.heading_rad}};
 }
 
 ordered_json as_json(const PoseMode& mode) {
@@ -144,7 +121,7 @@ ordered_json as_json(const TrackedImage& image) {
   return {{"file", image.file},
           {"stamp_s", or_null(image.stamp_s)},
           {"state", name_of(estimate.state)},
-          {"pose", estimate.pose ? as_json(*estimate.pose) : ordered_json()},
+          {"pose", estimate.pose ? pose_json(*estimate.pose) : ordered_json()},
           {"inside", estimate.inside},
           {"probability", estimate.probability},
           {"modes", std::move(modes)},
@@ -234,78 +211,103 @@ bool start_as_wished(Tracker& tracker, RunRecord& record) {
   return true;
 }
 
-/// Follows a robot through pictures as they come, until the source ends or the user interrupts. A
-/// live source has no odometry: motion is read from the pictures.
+/// Follows a robot through images of a live source, which has no odometry: motion is read from the
+/// images.
+class LiveTrack {
+ public:
+  LiveTrack(const Arguments& declared, const TrackArguments& arguments, const MemoryFile& file,
+            const PictureSource& source, Session& session)
+      : arguments_(arguments),
+        session_(session),
+        tracker_(file, {arguments.filter,
+                        declared.given("odometry") ? arguments.odometry : visual_odometry_noise(),
+                        source}),
+        odometry_(visual_odometry(tracker_.memory())),
+        record_(arguments.record, std::span(&arguments.memory, 1), true, session,
+                {.memory = arguments.memory, .takes = viewer::ViewWish::pose}) {
+    session.note("panonav track: motion is read from the pictures; one unit of the views is " +
+                 format_number(odometry_.scale_m()) + " m, as in the memory");
+    start(tracker_, arguments);
+    if (record_.wanted()) shown_.emplace(tracker_.memory());
+    settings_ = {.recorded = &file, .shown = shown_ ? &*shown_ : nullptr};
+  }
+
+  /// Moves by what the image shows and looks at every N-th one; returns the line that is printed.
+  std::string observe(const Observation& seen, std::optional<double> decoding_ms) {
+    const std::size_t number = count_++;
+    const ViewEncoder& encoder = tracker_.encoder();
+    StageClock clock;
+    if (decoding_ms) clock.add("reading", *decoding_ms);
+    std::optional<Panorama> unwarped;
+    if (record_.wants_pictures()) unwarped = encoder.panorama(seen);
+    if (unwarped) clock.stage("unwarping");
+    const FourierSignature view = unwarped ? encoder.signature(*unwarped) : encoder.signature(seen);
+    clock.stage(unwarped ? "signature" : "unwarping and signature");
+    odometry_.add(OdometryView(view));
+    tracker_.move_to(odometry_.pose());
+    clock.stage("visual odometry");
+    const bool moved_by_hand = start_as_wished(tracker_, record_);
+    if (number % static_cast<std::size_t>(arguments_.every) != 0) return "";
+    if (record_.wanted()) {
+      moment_ = record_.moment_of(seen, number);
+      moment_->panorama = std::move(unwarped);
+      moment_->odometry = odometry_.pose();
+      if (number == 0) shown_->put(*moment_);
+      clock.put(*moment_);
+    }
+    TrackedImage image = track_image(tracker_, pack(view, encoder.header().full_scale), settings_,
+                                     std::move(moment_));
+    moment_ = std::move(image.moment);
+    if (moment_ && moved_by_hand) tell_wish(*moment_);
+    image.index = number;
+    image.file = seen.name;
+    image.stamp_s = seen.stamp_s;
+    add(summary_, image);
+    const bool later = trajectory_.empty() || trajectory_.back().stamp_s < *seen.stamp_s;
+    if (arguments_.tum && is_localised(image) && later) {
+      trajectory_.push_back({*seen.stamp_s, *image.estimate.pose});
+    }
+    return session_.json() ? json_line(as_json(image)) : as_text(image, session_);
+  }
+  /// Records the image that was observed last.
+  void record() {
+    if (moment_) record_.add(std::move(*moment_));
+    moment_.reset();
+  }
+  ExitCode finish(LiveRun& taking) {
+    if (arguments_.tum) write_trajectory(*arguments_.tum, trajectory_);
+    record_.close();
+    const LiveCounts& counts = taking.finish();
+    if (!session_.json()) print_summary(summary_, session_);
+    session_.note(std::to_string(counts.pictures) + " pictures, " +
+                  std::to_string(odometry_.breaks()) + " steps unread" +
+                  events_text(counts, record_.left_out()));
+    return exit_code_of(summary_);
+  }
+
+ private:
+  const TrackArguments& arguments_;
+  Session& session_;
+  Tracker tracker_;
+  VisualOdometry odometry_;
+  RunRecord record_;
+  std::optional<ShownReferences> shown_;
+  TrackSettings settings_;
+  std::optional<recordings::RunMoment> moment_;  // of the image observed last
+  std::size_t count_ = 0;
+  TrackSummary summary_;
+  std::vector<StampedPose> trajectory_;
+};
+
 ExitCode track_live(const Arguments& arguments, const TrackArguments& wanted,
                     const MemoryFile& file, Session& session) {
   arguments.refuse_unused({"--report"}, "where " + wanted.dataset + " is a live source");
   const auto source = open_live(arguments, wanted.dataset, {}, file.header().source, wanted.live);
-  Tracker tracker(
-      file, {wanted.filter, arguments.given("odometry") ? wanted.odometry : visual_odometry_noise(),
-             source->pictures()});
-  VisualOdometry odometry = visual_odometry(tracker.memory());
-  session.note("panonav track: motion is read from the pictures; one unit of the views is " +
-               format_number(odometry.scale_m()) + " m, as in the memory");
-  start(tracker, wanted);
-  RunRecord record(wanted.record, std::span(&wanted.memory, 1), true, session,
-                   {.memory = wanted.memory, .takes = viewer::ViewWish::pose});
-  std::optional<ShownReferences> shown;
-  if (record.wanted()) shown.emplace(tracker.memory());
-  const TrackSettings settings{.recorded = &file, .shown = shown ? &*shown : nullptr};
-  std::vector<StampedPose> trajectory;
-  TrackSummary summary;
-  std::size_t index = 0;
-  std::optional<recordings::RunMoment> moment;
+  LiveTrack track(arguments, wanted, file, source->pictures(), session);
   LiveRun taking(*source, wanted.part, wanted.live, session);
-  taking.take(
-      [&](const Observation& seen) -> std::string {
-        const std::size_t number = index++;
-        const ViewEncoder& encoder = tracker.encoder();
-        StageClock clock;
-        if (const auto ms = taking.decoding_ms()) clock.add("reading", *ms);
-        std::optional<Panorama> unwarped;
-        if (record.wants_pictures()) unwarped = encoder.panorama(seen);
-        if (unwarped) clock.stage("unwarping");
-        const FourierSignature view =
-            unwarped ? encoder.signature(*unwarped) : encoder.signature(seen);
-        clock.stage(unwarped ? "signature" : "unwarping and signature");
-        odometry.add(OdometryView(view));
-        tracker.move_to(odometry.pose());
-        clock.stage("visual odometry");
-        const bool moved_by_hand = start_as_wished(tracker, record);
-        if (number % static_cast<std::size_t>(wanted.every) != 0) return "";
-        if (record.wanted()) {
-          moment = record.moment_of(seen, number);
-          moment->panorama = std::move(unwarped);
-          moment->odometry = odometry.pose();
-          if (number == 0) shown->put(*moment);
-          clock.put(*moment);
-        }
-        TrackedImage image = track_image(tracker, pack(view, encoder.header().full_scale), settings,
-                                         std::move(moment));
-        moment = std::move(image.moment);
-        if (moment && moved_by_hand) tell_wish(*moment);
-        image.index = number;
-        image.file = seen.name;
-        image.stamp_s = seen.stamp_s;
-        add(summary, image);
-        const bool later = trajectory.empty() || trajectory.back().stamp_s < *seen.stamp_s;
-        if (wanted.tum && is_localised(image) && later) {
-          trajectory.push_back({*seen.stamp_s, *image.estimate.pose});
-        }
-        return session.json() ? json_line(as_json(image)) : as_text(image, session);
-      },
-      [&](Observation&&) {
-        if (moment) record.add(std::move(*moment));
-        moment.reset();
-      });
-  if (wanted.tum) write_trajectory(*wanted.tum, trajectory);
-  record.close();
-  const LiveCounts& counts = taking.finish();
-  if (!session.json()) print_summary(summary, session);
-  session.note(std::to_string(counts.pictures) + " pictures, " + std::to_string(odometry.breaks()) +
-               " steps unread" + events_text(counts, record.left_out()));
-  return exit_code_of(summary);
+  taking.take([&](const Observation& seen) { return track.observe(seen, taking.decoding_ms()); },
+              [&](Observation&&) { track.record(); });
+  return track.finish(taking);
 }
 
 /// Writes the poses of the images at which the robot was localised; `seconds` are stamps of all.
@@ -335,7 +337,7 @@ ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Ses
   const bool visual = odometry_poses(run).empty();
   if (!visual) check_odometry(run, wanted.dataset);
   std::vector<double> seconds;
-  if (wanted.tum) seconds = seconds_of(run, wanted, session);
+  if (wanted.tum) seconds = trajectory_stamps(run, "track", wanted.dataset, *wanted.tum, session);
   Tracker tracker(
       file, {wanted.filter,
              visual && !arguments.given("odometry") ? visual_odometry_noise() : wanted.odometry,
