@@ -16,7 +16,7 @@ std::string counted(std::size_t count, const std::string& one, const std::string
 std::string plain(const std::string& text) {
   std::string result;
   for (const char c : text) {
-    if (std::string_view("\\`*_[]<>").find(c) != std::string_view::npos) result += '\\';
+    if (std::string_view("\\`*_[]<>|").find(c) != std::string_view::npos) result += '\\';
     result += c;
   }
   return result;
@@ -39,12 +39,20 @@ std::string list_item(const std::string& text) {
   return result + "\n";
 }
 
-// "**what**: 0.02 (0.01 .. 0.03) m, median of 20; published 0.04; target at most 0.1: holds."
-std::string row_line(const ResultRow& row) {
-  std::string text = "**" + plain(row.what) + "**: " + shown_figure(row);
-  if (!row.over.empty()) text += ", " + plain(row.over);
-  if (row.published) text += "; published " + shown_published(row);
-  return text + "; target " + shown_target(row) + (row.holds() ? ": holds." : ": **missed**.");
+// One line of a table.
+std::string table_line(std::span<const std::string> cells) {
+  std::string line = "|";
+  for (const std::string& cell : cells) line += " " + plain(cell) + " |";
+  return line + "\n";
+}
+
+// The rows with a target.
+std::string target_table(std::span<const ResultRow> rows) {
+  std::string text = table_line(table_header()) + "|---|---|---|---|---|---|\n";
+  for (const ResultRow& row : rows) {
+    if (row.target) text += table_line(table_cells(row));
+  }
+  return text;
 }
 
 }  // namespace
@@ -112,10 +120,8 @@ std::string to_markdown(const ResultsDocument& document) {
   for (const PaperResults& paper : document.papers) {
     text += "\n<a name=\"" + paper.paper + "\"></a>\n\n## " + plain(paper.title) + "\n\n";
     text += "`panonav reproduce " + paper.paper + "`\n\n";
-    if (count_targets(paper.rows).judged == 0) text += "No row has a target.\n";
-    for (const ResultRow& row : paper.rows) {
-      if (row.target) text += list_item(row_line(row));
-    }
+    const bool is_judged = count_targets(paper.rows).judged > 0;
+    text += is_judged ? target_table(paper.rows) : "No row has a target.\n";
   }
   text +=
       "\n`results.json` holds " + counted(rows, "row", "rows") + ", those without a target too.\n";

@@ -34,8 +34,7 @@ std::size_t put_targets_first(std::vector<ResultRow>& rows);
 /// One object: `version`, `command`, `targets`, `held`, `papers` (by name, an array of rows each).
 [[nodiscard]] std::string to_json(const ResultsDocument& document);
 /// Markdown: title, command, counts, the rows that do not hold with their reasons, then for each
-/// paper its rows with a target, and how many rows the JSON document holds. Lines are at most 120
-/// bytes long where words allow it.
+/// paper a table of its rows with a target, and how many rows the JSON document holds.
 [[nodiscard]] std::string to_markdown(const ResultsDocument& document);
 
 }  // namespace panonav::lab

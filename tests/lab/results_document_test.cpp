@@ -59,7 +59,7 @@ TEST(ResultsDocument, JsonHasTheRowsOfEveryPaper) {
   EXPECT_EQ(to_json(read), to_json(made.papers[0].rows));
 }
 
-TEST(ResultsDocument, MarkdownTellsEveryMissAndThenAllRowsWithATarget) {
+TEST(ResultsDocument, MarkdownHasEveryMissAndThenAllRowsWithATarget) {
   const auto made = document();
   ASSERT_EQ(miss_lines(made).size(), 1U);
   EXPECT_EQ(miss_lines(made)[0],
@@ -71,8 +71,9 @@ TEST(ResultsDocument, MarkdownTellsEveryMissAndThenAllRowsWithATarget) {
        {"panonav 1.2.3", "    panonav reproduce all --quick", "1 of 2 targets hold",
         "Rows that do not hold",
         "- a01: far\\_off: 3 m, target at most 1: missed by 2; the floor is \\*wet\\*.",
-        "## Walking | running", "- **far\\_off**: 3 m; target at most 1: **missed**.\n",
-        "- **kept**: 0.5 m; target at most 1: holds.\n", "## Standing", "No row has a target.\n",
+        "## Walking \\| running", "| what | published | ours (95 % interval) | unit |",
+        "| far\\_off | - | 3 | m | at most 1 | no |\n",
+        "| kept | - | 0.5 | m | at most 1 | yes |\n", "## Standing", "No row has a target.\n",
         "`results.json` holds 4 rows, those without a target too.\n"}) {
     const std::size_t found = text.find(part, at);
     ASSERT_NE(found, std::string::npos) << part << " after\n" << text.substr(0, at);
@@ -81,18 +82,15 @@ TEST(ResultsDocument, MarkdownTellsEveryMissAndThenAllRowsWithATarget) {
   EXPECT_FALSE(contains(text, "reported")) << "it has no target";
 }
 
-TEST(ResultsDocument, MarkdownTellsAllOfARowOnShortLines) {
+TEST(ResultsDocument, MarkdownHoldsAllOfARow) {
   ResultsDocument made = document();
   ResultRow& kept = made.papers[0].rows[2];
   kept.published = std::pair{5.0, 6.0};
   kept.interval = std::pair{0.4, 0.6};
   kept.over = "median of 7";
-  kept.what += " over a way whose name is long enough for more than one line, as some names are";
   EXPECT_TRUE(
       contains(to_markdown(made),
-               "- **kept over a way whose name is long enough for more than one line, as some "
-               "names are**: 0.5 (0.4 .. 0.6) m, median of\n  7; published 5 .. 6; target at most "
-               "1: holds.\n"));
+               "| kept (median of 7) | 5 .. 6 | 0.5 (0.4 .. 0.6) | m | at most 1 | yes |\n"));
 }
 
 TEST(ResultsDocument, SaysSoWhenNothingIsMissed) {
