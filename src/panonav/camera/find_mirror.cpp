@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <numbers>
 
 #include "panonav/camera/internal/circle_search.hpp"
@@ -113,8 +114,7 @@ double structure(std::span<const SmoothPlanes> images, const PixelPoint& centre,
           last.clear();
           continue;
         }
-        const std::size_t at = static_cast<std::size_t>(v) * static_cast<std::size_t>(image.width) +
-                               static_cast<std::size_t>(u);
+        const std::size_t at = image.index(static_cast<int>(u), static_cast<int>(v));
         std::vector<float> here;
         for (const std::vector<float>& plane : image.channels) here.push_back(plane[at]);
         if (!last.empty()) {
@@ -212,11 +212,10 @@ std::vector<FieldCircle> best_circles(const Evidence& seen, const CircleRange& r
     if (found.visible < range.visible_fraction) continue;
     climbed.push_back({found.quality * std::sqrt(found.visible), circle});
   }
-  std::stable_sort(climbed.begin(), climbed.end(),
-                   [](const Scored& a, const Scored& b) { return a.merit > b.merit; });
+  std::ranges::stable_sort(climbed, std::greater<>(), &Scored::merit);
   std::vector<FieldCircle> result;
   for (const Scored& scored : climbed) {
-    const bool known = std::any_of(result.begin(), result.end(), [&](const FieldCircle& other) {
+    const bool known = std::ranges::any_of(result, [&](const FieldCircle& other) {
       return std::abs(other.u - scored.circle.u) + std::abs(other.v - scored.circle.v) +
                  std::abs(other.radius - scored.circle.radius) <
              same_circle_px;
@@ -266,11 +265,9 @@ std::optional<Search> search(const Evidence& seen, std::span<const SmoothPlanes>
         distance_px(found->centre, clearest->centre) > max_centre_distance * found->radius_px) {
       continue;
     }
-    const bool known =
-        std::any_of(circles.begin(), circles.end(), [&](const MirrorCircle::Circle& other) {
-          return std::abs(other.radius_px - found->radius_px) <
-                 std::max(2.0, 0.01 * found->radius_px);
-        });
+    const bool known = std::ranges::any_of(circles, [&](const MirrorCircle::Circle& other) {
+      return std::abs(other.radius_px - found->radius_px) < std::max(2.0, 0.01 * found->radius_px);
+    });
     if (!known) circles.push_back(*found);
   }
   std::sort(circles.begin(), circles.end(),

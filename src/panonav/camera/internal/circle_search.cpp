@@ -4,8 +4,10 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <numbers>
 #include <numeric>
+#include <ranges>
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
@@ -22,24 +24,20 @@ int samples_on(double radius, double spacing) {
   return std::clamp(static_cast<int>(2 * std::numbers::pi * radius / spacing), 48, 720);
 }
 
-std::size_t index(int width, int u, int v) {
-  return static_cast<std::size_t>(v) * static_cast<std::size_t>(width) +
-         static_cast<std::size_t>(u);
-}
-
 /// Bilinear; the point must lie inside [0.5, width - 0.5] x [0.5, height - 0.5] or is clamped to
 /// it.
-float sample(const std::vector<float>& plane, int width, int height, double u, double v) {
-  const double x = std::clamp(u - 0.5, 0.0, static_cast<double>(width - 1));
-  const double y = std::clamp(v - 0.5, 0.0, static_cast<double>(height - 1));
-  const int x0 = std::min(static_cast<int>(x), std::max(0, width - 2));
-  const int y0 = std::min(static_cast<int>(y), std::max(0, height - 2));
-  const int x1 = std::min(x0 + 1, width - 1);
-  const int y1 = std::min(y0 + 1, height - 1);
+template <class Planes>
+float sample(const Planes& image, const std::vector<float>& plane, double u, double v) {
+  const double x = std::clamp(u - 0.5, 0.0, image.width - 1.0);
+  const double y = std::clamp(v - 0.5, 0.0, image.height - 1.0);
+  const int x0 = std::min(static_cast<int>(x), std::max(0, image.width - 2));
+  const int y0 = std::min(static_cast<int>(y), std::max(0, image.height - 2));
+  const int x1 = std::min(x0 + 1, image.width - 1);
+  const int y1 = std::min(y0 + 1, image.height - 1);
   const auto fx = static_cast<float>(x - x0);
   const auto fy = static_cast<float>(y - y0);
-  const float top = plane[index(width, x0, y0)] * (1 - fx) + plane[index(width, x1, y0)] * fx;
-  const float bottom = plane[index(width, x0, y1)] * (1 - fx) + plane[index(width, x1, y1)] * fx;
+  const float top = plane[image.index(x0, y0)] * (1 - fx) + plane[image.index(x1, y0)] * fx;
+  const float bottom = plane[image.index(x0, y1)] * (1 - fx) + plane[image.index(x1, y1)] * fx;
   return top * (1 - fy) + bottom * fy;
 }
 
@@ -56,9 +54,8 @@ std::array<Direction, coarse_directions> directions() {
   std::array<Direction, coarse_directions> result{};
   for (int i = 0; i < coarse_directions; ++i) {
     const double angle = 2 * std::numbers::pi * i / coarse_directions;
-    result[static_cast<std::size_t>(i)] = {std::cos(angle), std::sin(angle),
-                                           static_cast<float>(std::cos(2 * angle)),
-                                           static_cast<float>(std::sin(2 * angle))};
+    result[i] = {std::cos(angle), std::sin(angle), static_cast<float>(std::cos(2 * angle)),
+                 static_cast<float>(std::sin(2 * angle))};
   }
   return result;
 }
@@ -103,11 +100,11 @@ double coarse_merit(const EdgeField& field, const std::array<Direction, coarse_d
                     const FieldCircle& circle, const CircleRange& range) {
   SectorScore total;
   for (int i = 0; i < coarse_directions; ++i) {
-    const Direction& ray = rays[static_cast<std::size_t>(i)];
+    const Direction& ray = rays[i];
     const double u = circle.u + circle.radius * ray.cosine;
     const double v = circle.v + circle.radius * ray.sine;
     if (u < 0 || v < 0 || u >= field.width || v >= field.height) continue;
-    const std::size_t at = index(field.width, static_cast<int>(u), static_cast<int>(v));
+    const std::size_t at = field.index(static_cast<int>(u), static_cast<int>(v));
     total.add(i, coarse_directions,
               field.cosine[at] * ray.double_cosine + field.sine[at] * ray.double_sine);
   }
@@ -120,7 +117,7 @@ class ShiftedSums {
  public:
   explicit ShiftedSums(const EdgeField& field) : width_(field.width), height_(field.height) {
     for (int i = 0; i < coarse_directions / 2; ++i) {
-      const Direction& ray = rays_[static_cast<std::size_t>(i)];
+      const Direction& ray = rays_[i];
       std::vector<float> plane(field.cosine.size());
       for (std::size_t k = 0; k < plane.size(); ++k) {
         plane[k] = field.cosine[k] * ray.double_cosine + field.sine[k] * ray.double_sine;
@@ -160,16 +157,15 @@ class ShiftedSums {
  private:
   void add_shifted(int direction, int radius, std::vector<float>& sum,
                    std::vector<float>& samples) const {
-    const Direction& ray = rays_[static_cast<std::size_t>(direction)];
-    const std::vector<float>& plane =
-        across_[static_cast<std::size_t>(direction % (coarse_directions / 2))];
+    const Direction& ray = rays_[direction];
+    const std::vector<float>& plane = across_[direction % (coarse_directions / 2)];
     const int du = static_cast<int>(std::lround(radius * ray.cosine));
     const int dv = static_cast<int>(std::lround(radius * ray.sine));
     const int from = std::max(0, -du);
     const int to = std::min(width_, width_ - du);
     for (int v = std::max(0, -dv); v < std::min(height_, height_ - dv); ++v) {
-      float* out = sum.data() + index(width_, 0, v);
-      float* seen = samples.data() + index(width_, 0, v);
+      float* out = sum.data() + static_cast<std::ptrdiff_t>(v) * width_;
+      float* seen = samples.data() + static_cast<std::ptrdiff_t>(v) * width_;
       const float* in = plane.data() + static_cast<std::ptrdiff_t>(v + dv) * width_ + du;
       for (int u = from; u < to; ++u) {
         out[u] += in[u];
@@ -196,7 +192,7 @@ std::optional<EdgePoint> edge_on_ray(std::span<const SmoothPlanes> images,
   constexpr double step = 0.5;
   const int half = static_cast<int>(reach / step);
   const int count = 2 * half + 1;
-  std::vector<double> strength(static_cast<std::size_t>(count), 0.0);
+  std::vector<double> strength(count, 0.0);
   for (const SmoothPlanes& image : images) {
     for (int i = 0; i < count; ++i) {
       const double r = circle.radius + (i - half) * step;
@@ -211,12 +207,11 @@ std::optional<EdgePoint> edge_on_ray(std::span<const SmoothPlanes> images,
       }
       double slope = 0;
       for (const std::vector<float>& plane : image.channels) {
-        const double rise = sample(plane, image.width, image.height, u1, v1) -
-                            sample(plane, image.width, image.height, u0, v0);
+        const double rise = sample(image, plane, u1, v1) - sample(image, plane, u0, v0);
         slope = std::max(slope, std::abs(rise));
       }
       const double scale = image.slope_scale;
-      strength[static_cast<std::size_t>(i)] += slope * slope / (slope * slope + scale * scale);
+      strength[i] += slope * slope / (slope * slope + scale * scale);
     }
   }
   const double share = 1.0 / static_cast<double>(images.size());
@@ -224,19 +219,19 @@ std::optional<EdgePoint> edge_on_ray(std::span<const SmoothPlanes> images,
   int best = -1;
   double best_merit = 0;
   for (int i = 1; i + 1 < count; ++i) {
-    const auto at = [&](int k) { return strength[static_cast<std::size_t>(k)]; };
-    if (at(i) < 0.15 || at(i) < at(i - 1) || at(i) < at(i + 1)) continue;
+    const double here = strength[i];
+    if (here < 0.15 || here < strength[i - 1] || here < strength[i + 1]) continue;
     const double off = static_cast<double>(i - half) / (half + 1);
-    const double merit = at(i) * (1 - off * off);
+    const double merit = here * (1 - off * off);
     if (merit > best_merit) {
       best_merit = merit;
       best = i;
     }
   }
   if (best < 0) return std::nullopt;
-  const double before = strength[static_cast<std::size_t>(best - 1)];
-  const double here = strength[static_cast<std::size_t>(best)];
-  const double after = strength[static_cast<std::size_t>(best + 1)];
+  const double before = strength[best - 1];
+  const double here = strength[best];
+  const double after = strength[best + 1];
   const double curvature = before - 2 * here + after;
   const double shift =
       curvature < 0 ? std::clamp(0.5 * (before - after) / curvature, -0.5, 0.5) : 0;
@@ -332,8 +327,7 @@ CircleScore score(const EdgeField& field, const FieldCircle& circle, Evenness ev
     const auto across = static_cast<float>(cosine * cosine - sine * sine);
     const auto along = static_cast<float>(2 * cosine * sine);
     total.add(i, count,
-              sample(field.cosine, field.width, field.height, u, v) * across +
-                  sample(field.sine, field.width, field.height, u, v) * along);
+              sample(field, field.cosine, u, v) * across + sample(field, field.sine, u, v) * along);
   }
   return total.result(count, evenness);
 }
@@ -343,16 +337,12 @@ std::vector<FieldCircle> circle_candidates(const EdgeField& field, const CircleR
   const int lowest = std::max(2, static_cast<int>(std::floor(range.lowest_radius)));
   const int highest = std::max(lowest, static_cast<int>(std::ceil(range.highest_radius)));
   const int radii = highest - lowest + 1;
-  const std::size_t area =
-      static_cast<std::size_t>(field.width) * static_cast<std::size_t>(field.height);
-  const auto at = [&](int u, int v, int r) {
-    return static_cast<std::size_t>(r) * area + index(field.width, u, v);
-  };
+  const std::size_t area = field.index(0, field.height);
+  const auto at = [&](int u, int v, int r) { return r * area + field.index(u, v); };
   const ShiftedSums sums(field);
-  std::vector<float> merit(area * static_cast<std::size_t>(radii));
+  std::vector<float> merit(area * radii);
   for (int r = 0; r < radii; ++r) {
-    sums.merits(lowest + r, range,
-                std::span(merit).subspan(static_cast<std::size_t>(r) * area, area));
+    sums.merits(lowest + r, range, std::span(merit).subspan(r * area, area));
   }
   struct Candidate {
     float merit;
@@ -374,7 +364,7 @@ std::vector<FieldCircle> circle_candidates(const EdgeField& field, const CircleR
   std::vector<float> about_centre(area, 0.0F);
   for (int r = 0; r < radii; ++r) {
     for (std::size_t k = 0; k < area; ++k) {
-      const float here = std::max(0.0F, merit[static_cast<std::size_t>(r) * area + k]);
+      const float here = std::max(0.0F, merit[r * area + k]);
       about_centre[k] += here * here;
     }
   }
@@ -384,16 +374,14 @@ std::vector<FieldCircle> circle_candidates(const EdgeField& field, const CircleR
       for (int u = 0; u < field.width; ++u) {
         const float here = merit[at(u, v, r)];
         if (here <= 0 || !highest_around(u, v, r)) continue;
-        const float total = here + 0.5F * std::sqrt(about_centre[index(field.width, u, v)]);
+        const float total = here + 0.5F * std::sqrt(about_centre[field.index(u, v)]);
         candidates.push_back({total, {u + 0.5, v + 0.5, static_cast<double>(lowest + r)}});
       }
     }
   }
-  std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const Candidate& a, const Candidate& b) { return a.merit > b.merit; });
+  std::ranges::stable_sort(candidates, std::greater<>(), &Candidate::merit);
   std::vector<FieldCircle> result;
-  for (const Candidate& candidate : candidates) {
-    if (static_cast<int>(result.size()) == count) break;
+  for (const Candidate& candidate : candidates | std::views::take(count)) {
     result.push_back(candidate.circle);
   }
   return result;

@@ -17,12 +17,12 @@ struct Slope {
 
 std::vector<float> gaussian(double sigma_px) {
   const int reach = std::max(1, static_cast<int>(std::ceil(3 * sigma_px)));
-  std::vector<float> kernel(static_cast<std::size_t>(2 * reach + 1));
+  std::vector<float> kernel(2 * reach + 1);
   float sum = 0;
   for (int i = -reach; i <= reach; ++i) {
     const double x = i / sigma_px;
-    kernel[static_cast<std::size_t>(i + reach)] = static_cast<float>(std::exp(-0.5 * x * x));
-    sum += kernel[static_cast<std::size_t>(i + reach)];
+    kernel[i + reach] = static_cast<float>(std::exp(-0.5 * x * x));
+    sum += kernel[i + reach];
   }
   for (float& weight : kernel) weight /= sum;
   return kernel;
@@ -39,7 +39,7 @@ std::vector<float> smoothed(const std::vector<float>& plane, int width, int heig
     for (int u = 0; u < width; ++u) {
       float sum = 0;
       for (int i = -reach; i <= reach; ++i) {
-        sum += kernel[static_cast<std::size_t>(i + reach)] * line[std::clamp(u + i, 0, width - 1)];
+        sum += kernel[i + reach] * line[std::clamp(u + i, 0, width - 1)];
       }
       out[u] = sum;
     }
@@ -47,7 +47,7 @@ std::vector<float> smoothed(const std::vector<float>& plane, int width, int heig
   for (int v = 0; v < height; ++v) {
     float* out = result.data() + static_cast<std::ptrdiff_t>(v) * width;
     for (int i = -reach; i <= reach; ++i) {
-      const float weight = kernel[static_cast<std::size_t>(i + reach)];
+      const float weight = kernel[i + reach];
       const float* line =
           rows.data() + static_cast<std::ptrdiff_t>(std::clamp(v + i, 0, height - 1)) * width;
       for (int u = 0; u < width; ++u) out[u] += weight * line[u];
@@ -64,10 +64,7 @@ Slope steepest(const SmoothPlanes& planes, int u, int v) {
   const int below = std::min(planes.height - 1, v + 1);
   Slope best;
   for (const std::vector<float>& plane : planes.channels) {
-    const auto at = [&](int x, int y) {
-      return plane[static_cast<std::size_t>(y) * static_cast<std::size_t>(planes.width) +
-                   static_cast<std::size_t>(x)];
-    };
+    const auto at = [&](int x, int y) { return plane[planes.index(x, y)]; };
     Slope slope;
     slope.u = (at(right, v) - at(left, v)) / static_cast<float>(std::max(1, right - left));
     slope.v = (at(u, below) - at(u, above)) / static_cast<float>(std::max(1, below - above));
@@ -88,8 +85,7 @@ SmoothPlanes smooth_planes(ImageView image, int reduction, double sigma_px) {
   SmoothPlanes planes;
   planes.width = image.width / reduction;
   planes.height = image.height / reduction;
-  const std::size_t size =
-      static_cast<std::size_t>(planes.width) * static_cast<std::size_t>(planes.height);
+  const std::size_t size = planes.index(0, planes.height);
   const std::vector<float> kernel = gaussian(sigma_px);
   const float area = static_cast<float>(reduction) * static_cast<float>(reduction);
   for (int channel = 0; channel < image.channels; ++channel) {
@@ -102,8 +98,7 @@ SmoothPlanes smooth_planes(ImageView image, int reduction, double sigma_px) {
             sum += image.at(u * reduction + x, v * reduction + y, channel);
           }
         }
-        plane[static_cast<std::size_t>(v) * static_cast<std::size_t>(planes.width) +
-              static_cast<std::size_t>(u)] = static_cast<float>(sum) / area;
+        plane[planes.index(u, v)] = static_cast<float>(sum) / area;
       }
     }
     planes.channels.push_back(smoothed(plane, planes.width, planes.height, kernel));
@@ -123,8 +118,7 @@ EdgeField edge_field(const SmoothPlanes& planes) {
   EdgeField field;
   field.width = planes.width;
   field.height = planes.height;
-  const std::size_t size =
-      static_cast<std::size_t>(field.width) * static_cast<std::size_t>(field.height);
+  const std::size_t size = field.index(0, field.height);
   field.cosine.reserve(size);
   field.sine.reserve(size);
   const float scale = planes.slope_scale * planes.slope_scale;
@@ -163,18 +157,14 @@ EdgeField reduced(const EdgeField& field, int reduction) {
   EdgeField result;
   result.width = field.width / reduction;
   result.height = field.height / reduction;
-  const std::size_t size =
-      static_cast<std::size_t>(result.width) * static_cast<std::size_t>(result.height);
+  const std::size_t size = result.index(0, result.height);
   result.cosine.assign(size, 0.0F);
   result.sine.assign(size, 0.0F);
   const float share = 1.0F / static_cast<float>(reduction * reduction);
   for (int v = 0; v < result.height * reduction; ++v) {
     for (int u = 0; u < result.width * reduction; ++u) {
-      const std::size_t from = static_cast<std::size_t>(v) * static_cast<std::size_t>(field.width) +
-                               static_cast<std::size_t>(u);
-      const std::size_t to =
-          static_cast<std::size_t>(v / reduction) * static_cast<std::size_t>(result.width) +
-          static_cast<std::size_t>(u / reduction);
+      const std::size_t from = field.index(u, v);
+      const std::size_t to = result.index(u / reduction, v / reduction);
       result.cosine[to] += share * field.cosine[from];
       result.sine[to] += share * field.sine[from];
     }

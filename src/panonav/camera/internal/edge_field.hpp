@@ -15,6 +15,10 @@ struct SmoothPlanes {
   /// Edges weaker than about this slope, in grey levels per pixel, count little: the slope that
   /// four fifths of the pixels do not reach, at least 1 (8-bit rounding).
   float slope_scale = 1.0F;
+  /// Returns the index of pixel (u, v) in each channel.
+  [[nodiscard]] std::size_t index(int u, int v) const noexcept {
+    return static_cast<std::size_t>(v) * width + u;
+  }
 };
 
 /// Averages blocks of `reduction` x `reduction` pixels, then smooths with a Gaussian of `sigma_px`
@@ -32,6 +36,10 @@ struct EdgeField {
   int height = 0;
   std::vector<float> cosine;
   std::vector<float> sine;
+  /// Returns the index of pixel (u, v) in both planes.
+  [[nodiscard]] std::size_t index(int u, int v) const noexcept {
+    return static_cast<std::size_t>(v) * width + u;
+  }
 };
 
 [[nodiscard]] EdgeField edge_field(const SmoothPlanes& planes);

@@ -9,6 +9,7 @@
 #include <span>
 
 #include "panonav/core/statistics.hpp"
+#include "panonav/geometry/least_squares.hpp"
 
 namespace panonav::dual_fisheye {
 
@@ -152,32 +153,32 @@ void LensFit::update_deviation(const std::vector<Match>& matches) {
       std::max(0.02 * fine_rad_, upper_median_in_place(std::span(lengths)) / median_length);
 }
 
+/// The fit as `minimise` sees it.
+class LensFit::Problem {
+ public:
+  Problem(LensFit& fit, const std::vector<Match>& matches) : fit_(fit), matches_(matches) {}
+  bool linearise(DenseEquations<Eigen::Dynamic>& equations) {
+    fit_.update_deviation(matches_);
+    equations.matrix = fit_.normal(fit_.state(), matches_, equations.right);
+    before_ = fit_.at_.offset;
+    return true;
+  }
+  [[nodiscard]] double cost() const { return fit_.cost(fit_.at_.offset, matches_); }
+  void move(const VectorXd& change) { fit_.at_.offset = before_ + change; }
+  void undo() { fit_.at_.offset = before_; }
+  void accept() {}
+
+ private:
+  LensFit& fit_;
+  const std::vector<Match>& matches_;
+  VectorXd before_;
+};
+
 void LensFit::solve(const std::vector<Match>& matches) {
   if (matches.empty()) return;
-  double damping = 1e-3;
-  for (int round = 0; round < 20; ++round) {
-    update_deviation(matches);
-    VectorXd right;
-    const MatrixXd matrix = normal(state(), matches, right);
-    const double before = cost(at_.offset, matches);
-    bool better = false;
-    double fallen = 0;
-    for (int trial = 0; trial < 8 && !better; ++trial) {
-      MatrixXd damped = matrix;
-      damped.diagonal() *= 1 + damping;
-      const VectorXd next = at_.offset + damped.ldlt().solve(right);
-      const double after = next.allFinite() ? cost(next, matches) : before;
-      better = after < before;
-      if (better) {
-        fallen = before - after;
-        at_.offset = next;
-        damping = std::max(1e-9, 0.1 * damping);
-      } else {
-        damping *= 10;
-      }
-    }
-    if (!better || fallen < 0.01) return;
-  }
+  Problem problem(*this, matches);
+  DenseEquations<Eigen::Dynamic> equations;
+  minimise(problem, equations, {.max_steps = 20, .damping = 1e-3, .min_decrease = 0.01});
 }
 
 bool LensFit::close_lenses(const std::array<double, 2>& radii_px) {

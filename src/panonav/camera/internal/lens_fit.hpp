@@ -45,6 +45,7 @@ class LensFit {
  private:
   using Slopes = Eigen::Matrix<double, 2, 2 * (lens_size + stand_size)>;
   class Linearised;
+  class Problem;
   /// Returns the information of the matches about all parameters; `right`: where the cost falls.
   [[nodiscard]] Eigen::MatrixXd normal(const State& state, const std::vector<Match>& matches,
                                        Eigen::VectorXd& right) const;
