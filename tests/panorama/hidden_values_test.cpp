@@ -93,12 +93,12 @@ void hide(Panorama& seen, const Hidden& hidden, Rule rule) {
     double sum = 0.0;
     int count = 0;
     for (int c = 0; c < seen.columns(); ++c) {
-      if (hidden[static_cast<std::size_t>(c)] != 0) continue;
+      if (hidden[c] != 0) continue;
       sum += static_cast<double>(seen.at(y, c));
       ++count;
     }
     for (int c = 0; c < seen.columns(); ++c) {
-      if (hidden[static_cast<std::size_t>(c)] == 0) continue;
+      if (hidden[c] == 0) continue;
       seen.at(y, c) = rule == Rule::black ? 0.0F : static_cast<float>(sum / count);
     }
   }

@@ -240,7 +240,7 @@ TEST(ColumnDistances, OfTheSameViewTurnedByWholeStepsAreZero) {
 TEST(ColumnProfiles, MaskedRowsDoNotCount) {
   Panorama view = smooth_view(7);
   std::vector<std::uint8_t> allowed(40, 1);
-  for (int y = 0; y < 10; ++y) allowed[static_cast<std::size_t>(y)] = 0;
+  for (int y = 0; y < 10; ++y) allowed[y] = 0;
   const ColumnProfiles clean(packed(view), 0, allowed);
   for (int y = 0; y < 10; ++y) {
     for (int c = 0; c < view.columns(); ++c) view.at(y, c) = 0.1F * static_cast<float>(c % 7);

@@ -205,7 +205,7 @@ class PackedOracle {
         const auto i = static_cast<std::size_t>(k * query.shape.rows + y);
         const double a = query.magnitudes[i];
         const double b = reference.magnitudes[i];
-        terms_[static_cast<std::size_t>(k)] +=
+        terms_[k] +=
             std::polar(a * b, std::numbers::pi / 128.0 * (query.phases[i] - reference.phases[i]));
         query_energy += a * a;
         reference_energy += b * b;

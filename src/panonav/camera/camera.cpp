@@ -108,7 +108,7 @@ void validate_dual(const Camera& camera, const DualFisheyeModel& model) {
   validate(model);
   const auto [width, height] = camera.image_size;
   for (int i = 0; i < 2; ++i) {
-    const FisheyeLens& lens = model.lenses[static_cast<std::size_t>(i)];
+    const FisheyeLens& lens = model.lenses[i];
     const double left = 0.5 * width * i;
     const std::string name = "lens" + std::to_string(i);
     require(lens.centre_u_px >= left && lens.centre_u_px <= left + 0.5 * width,
@@ -130,7 +130,7 @@ struct SeenByLens {
 };
 std::optional<SeenByLens> see(const Camera& camera, const DualFisheyeModel& model, int index,
                               const Direction3& direction) {
-  const FisheyeLens& lens = model.lenses[static_cast<std::size_t>(index)];
+  const FisheyeLens& lens = model.lenses[index];
   const auto point = project(lens, LensRotation(lens).lens_from_robot(direction));
   if (!point) return std::nullopt;
   const auto pixel = within_image(camera, {lens.centre_u_px + mirror_sign(camera) * point->right_px,
@@ -265,7 +265,7 @@ std::array<std::optional<Camera::WeightedPixel>, 2> project_all(const Camera& ca
 ImageCircle image_circle(const Camera& camera, int lens) {
   if (std::holds_alternative<EquirectangularModel>(camera.model)) return {};
   if (const auto* model = std::get_if<DualFisheyeModel>(&camera.model)) {
-    const FisheyeLens& seen_by = model->lenses[static_cast<std::size_t>(lens)];
+    const FisheyeLens& seen_by = model->lenses[lens];
     return {
         {seen_by.centre_u_px, seen_by.centre_v_px}, 0.0, radius_at(seen_by, seen_by.max_angle_rad)};
   }

@@ -21,8 +21,7 @@ void blend(Image& image, int u, int v, const Colour& colour, double distance_px,
   const double cover = std::clamp(half_width_px + 0.5 - distance_px, 0.0, 1.0);
   if (cover == 0) return;
   for (int c = 0; c < 3; ++c) {
-    const double mixed =
-        (1 - cover) * image.at(u, v, c) + cover * colour[static_cast<std::size_t>(c)];
+    const double mixed = (1 - cover) * image.at(u, v, c) + cover * colour[c];
     image.at(u, v, c) = static_cast<std::uint8_t>(std::lround(mixed));
   }
 }

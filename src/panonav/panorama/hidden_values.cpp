@@ -12,7 +12,7 @@ namespace {
 // Between two seen columns, `from` and the next one round the cylinder.
 void fill_gap(std::span<float> row, int from, int length) {
   const int columns = static_cast<int>(row.size());
-  const float first = row[static_cast<std::size_t>(from)];
+  const float first = row[from];
   const float last = row[static_cast<std::size_t>((from + length) % columns)];
   for (int i = 1; i < length; ++i) {
     const float share = static_cast<float>(i) / static_cast<float>(length);

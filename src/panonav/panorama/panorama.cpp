@@ -16,7 +16,7 @@ namespace {
 std::size_t checked_size(int rows, int columns) {
   require(rows >= 1, "panorama rows", rows, ">= 1");
   require(columns >= 4, "panorama columns", columns, ">= 4");
-  return static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns);
+  return static_cast<std::size_t>(rows) * columns;
 }
 
 }  // namespace

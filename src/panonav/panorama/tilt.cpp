@@ -77,9 +77,8 @@ void look_up_row(const Panorama& seen, const std::vector<Shift>& nodes, int step
   const float* const from = seen.values().data();
   for (int c = 0; c < columns; ++c) {
     const int node = c / step;
-    const Shift shift =
-        between(nodes[static_cast<std::size_t>(node)], nodes[static_cast<std::size_t>(node) + 1],
-                static_cast<float>(c - node * step) / static_cast<float>(step));
+    const Shift shift = between(nodes[node], nodes[static_cast<std::size_t>(node) + 1],
+                                static_cast<float>(c - node * step) / static_cast<float>(step));
     const float row = std::clamp(shift.row, 0.0F, last_row);
     const int above = static_cast<int>(row);
     const int below = std::min(above + 1, seen.rows() - 1);
@@ -93,7 +92,7 @@ void look_up_row(const Panorama& seen, const std::vector<Shift>& nodes, int step
     const float* const lower = from + static_cast<std::ptrdiff_t>(below) * columns;
     const float high = upper[left_column] + right * (upper[right_column] - upper[left_column]);
     const float low = lower[left_column] + right * (lower[right_column] - lower[left_column]);
-    values[static_cast<std::size_t>(c)] = high + down * (low - high);
+    values[c] = high + down * (low - high);
   }
 }
 

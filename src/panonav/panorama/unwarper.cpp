@@ -117,7 +117,7 @@ void Unwarper::prepare(ImageView image, Workspace& workspace) const {
 
 void Unwarper::look_up(std::span<const std::uint16_t> pairs, int row,
                        std::span<float> values) const {
-  const UnwarpTable::Row& entry = table_->rows[static_cast<std::size_t>(row)];
+  const UnwarpTable::Row& entry = table_->rows[row];
   const std::size_t count = static_cast<std::size_t>(entry.taps) * columns_;
   // The taps of two lenses share the weight of one.
   const int full_taps = entry.taps / lens_count(camera_);

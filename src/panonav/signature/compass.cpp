@@ -286,7 +286,7 @@ std::optional<CompassReading> compass_near(const PackedSignature& query,
   for (int k = 1; k <= spectrum->highest(); ++k) bound += std::abs(spectrum->term(k));
   const double least = best.value - 0.08 * bound;
   for (int i = 0; i < steps; ++i) {
-    const Point& low = points[static_cast<std::size_t>(i)];
+    const Point& low = points[i];
     const Point& high = points[static_cast<std::size_t>(i) + 1];
     if (!(low.slope > 0.0 && high.slope < 0.0 && std::max(low.value, high.value) >= least)) {
       continue;

@@ -17,7 +17,7 @@ struct SignatureShape {
 
   /// Coefficients of a view: rows * components.
   [[nodiscard]] std::size_t size() const noexcept {
-    return static_cast<std::size_t>(rows) * static_cast<std::size_t>(components);
+    return static_cast<std::size_t>(rows) * components;
   }
   friend bool operator==(const SignatureShape&, const SignatureShape&) = default;
 };

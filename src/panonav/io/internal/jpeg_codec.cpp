@@ -228,7 +228,7 @@ Image decode_jpeg(std::span<const std::uint8_t> bytes, std::string_view name,
   }
   Image image(size.width, size.height, channels);
   if (!pixel_steps(reader, image.pixels().data(),
-                   static_cast<std::size_t>(size.width) * static_cast<std::size_t>(channels))) {
+                   static_cast<std::size_t>(size.width) * channels)) {
     fail(reader, name);
   }
   return upright(std::move(image), exif_orientation(exif_of(bytes)));

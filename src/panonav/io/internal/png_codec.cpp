@@ -190,7 +190,7 @@ Image decode_png(std::span<const std::uint8_t> bytes, std::string_view name,
 
   Image image(size.width, size.height, channels);
   std::vector<png_bytep> rows(static_cast<std::size_t>(size.height));
-  for (int v = 0; v < size.height; ++v) rows[static_cast<std::size_t>(v)] = &image.at(0, v);
+  for (int v = 0; v < size.height; ++v) rows[v] = &image.at(0, v);
   if (!pixel_steps(reader, rows.data())) fail(reader, name);
   return upright(std::move(image), exif_orientation(reader.exif));
 }

@@ -293,7 +293,7 @@ void place_levels(const std::vector<Taps>& rows, UnwarpTable& table) {
   }
   for (const Taps& taps : rows) {
     for (const Tap& tap : taps) {
-      UnwarpTable::Level& level = table.levels[static_cast<std::size_t>(tap.level)];
+      UnwarpTable::Level& level = table.levels[tap.level];
       level.pair_left = std::min(level.pair_left, tap.u);
       level.pair_top = std::min(level.pair_top, tap.v);
       level.pair_right = std::max(level.pair_right, tap.u + 2);
@@ -301,7 +301,7 @@ void place_levels(const std::vector<Taps>& rows, UnwarpTable& table) {
     }
   }
   for (int i = highest; i >= 0; --i) {
-    UnwarpTable::Level& level = table.levels[static_cast<std::size_t>(i)];
+    UnwarpTable::Level& level = table.levels[i];
     if (level.has_pairs()) {
       level.left = std::min(level.left, level.pair_left);
       level.top = std::min(level.top, level.pair_top);
@@ -341,7 +341,7 @@ UnwarpTable make_unwarp_table(const Camera& camera, int rows, int columns,
   for (const Taps& taps : taps_of_rows) {
     table.rows.push_back({static_cast<int>(taps.size()) / columns, table.positions.size()});
     for (const Tap& tap : taps) {
-      const UnwarpTable::Level& level = table.levels[static_cast<std::size_t>(tap.level)];
+      const UnwarpTable::Level& level = table.levels[tap.level];
       const auto width = static_cast<std::size_t>(level.pair_right - level.pair_left);
       table.positions.push_back(static_cast<std::uint32_t>(
           level.pairs_at + (tap.v - level.pair_top) * width + (tap.u - level.pair_left)));
