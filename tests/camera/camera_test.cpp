@@ -61,13 +61,10 @@ std::vector<NamedCamera> all_cameras() {
       {"polynomial_mirror", mirror_camera(PolynomialModel{{220, 0, -2.6e-3, 1e-7}}, 15, 225)},
       {"polynomial_fisheye", mirror_camera(PolynomialModel{{-180, 0, 1.9e-3, 2e-6}}, 0, 230)},
       {"polynomial_linear", mirror_camera(PolynomialModel{{100, -0.7}}, 40, 200)},
-      {"unified_hyperboloid",
-       mirror_camera(UnifiedModel{0.9, 260, UnifiedModel::Axis::down}, 30, 229)},
-      {"unified_paraboloid",
-       mirror_camera(UnifiedModel{1.0, 180, UnifiedModel::Axis::down}, 0, 230)},
+      {"unified_hyperboloid", mirror_camera(UnifiedModel{0.9, 260}, 30, 229)},
+      {"unified_paraboloid", mirror_camera(UnifiedModel{1.0, 180}, 0, 230)},
       {"unified_fisheye", mirror_camera(UnifiedModel{0.7, 150, UnifiedModel::Axis::up}, 0, 230)},
-      {"unified_large_xi",
-       mirror_camera(UnifiedModel{1.8, 400, UnifiedModel::Axis::down}, 10, 230)},
+      {"unified_large_xi", mirror_camera(UnifiedModel{1.8, 400}, 10, 230)},
       {"unified_pinhole", mirror_camera(UnifiedModel{0.0, 200, UnifiedModel::Axis::up}, 0, 230)},
       {"equiangular", mirror_camera(EquiangularModel{-1.2, 0.4}, 35, 220)},
       {"equiangular_looking_up", mirror_camera(EquiangularModel{1.5, -0.2}, 5, 220)},
@@ -276,66 +273,35 @@ TEST(CameraValidation, NamesTheField) {
       {"rim_radius_px", [](Camera& c) { c.rim_radius_px = 10; }},
       {"rim_radius_px", [](Camera& c) { c.rim_radius_px = 601; }},  // f a / b = 600
       {"forward_angle_rad", [&](Camera& c) { c.forward_angle_rad = nan; }},
-      {"a_mm",
-       [](Camera& c) {
-         c.model = HyperboloidalModel{0, 1, 1};
-       }},
-      {"b_mm",
-       [&](Camera& c) {
-         c.model = HyperboloidalModel{1, nan, 1};
-       }},
-      {"focal_length_px",
-       [](Camera& c) {
-         c.model = HyperboloidalModel{1, 1, -500};
-       }},
-      {"coefficients", [](Camera& c) { c.model = PolynomialModel{}; }},
-      {"coefficients",
-       [&](Camera& c) {
-         c.model = PolynomialModel{{100, nan}};
-       }},
-      {"coefficients",
-       [](Camera& c) {
-         c.model = PolynomialModel{{100, 0, 0.02}};
-       }},
-      {"xi",
-       [](Camera& c) {
-         c.model = UnifiedModel{-0.1, 300, UnifiedModel::Axis::down};
-       }},
-      {"focal_length_px",
-       [](Camera& c) {
-         c.model = UnifiedModel{1, 0, UnifiedModel::Axis::down};
-       }},
-      {"rim_radius_px",
-       [](Camera& c) {
-         c.model = UnifiedModel{2, 300, UnifiedModel::Axis::down};
-       }},
-      {"elevation_at_inner_rad",
-       [](Camera& c) {
-         c.model = EquiangularModel{-2, 0};
-       }},
-      {"elevation_at_rim_rad",
-       [](Camera& c) {
-         c.model = EquiangularModel{0.1, 0.1};
-       }},
-      {"elevation_bottom_rad",
-       [](Camera& c) {
-         c.model = EquirectangularModel{-1.6, 1};
-       }},
-      {"elevation_top_rad",
-       [](Camera& c) {
-         c.model = EquirectangularModel{0.2, 0.1};
-       }},
-      {"forward_column",
-       [](Camera& c) {
-         c.model = EquirectangularModel{};
-         c.forward_column = 1.5;
-       }},
   };
   for (const Fault& fault : faults) {
     Camera camera = good;
     fault.make(camera);
     EXPECT_TRUE(contains(message_of<ContractError>([&] { validate(camera); }), fault.field));
   }
+  const std::vector<std::pair<std::string, CameraModel>> models{
+      {"a_mm", HyperboloidalModel{0, 1, 1}},
+      {"b_mm", HyperboloidalModel{1, nan, 1}},
+      {"focal_length_px", HyperboloidalModel{1, 1, -500}},
+      {"coefficients", PolynomialModel{}},
+      {"coefficients", PolynomialModel{{100, nan}}},
+      {"coefficients", PolynomialModel{{100, 0, 0.02}}},
+      {"xi", UnifiedModel{-0.1, 300}},
+      {"focal_length_px", UnifiedModel{1, 0}},
+      {"rim_radius_px", UnifiedModel{2, 300}},
+      {"elevation_at_inner_rad", EquiangularModel{-2, 0}},
+      {"elevation_at_rim_rad", EquiangularModel{0.1, 0.1}},
+      {"elevation_bottom_rad", EquirectangularModel{-1.6, 1}},
+      {"elevation_top_rad", EquirectangularModel{0.2, 0.1}},
+  };
+  for (const auto& [field, model] : models) {
+    Camera camera = good;
+    camera.model = model;
+    EXPECT_TRUE(contains(message_of<ContractError>([&] { validate(camera); }), field));
+  }
+  Camera camera = equirectangular_camera(-0.5, 0.8);
+  camera.forward_column = 1.5;
+  EXPECT_TRUE(contains(message_of<ContractError>([&] { validate(camera); }), "forward_column"));
 }
 
 TEST(PolynomialModel, MonotonicOnlyInPartOfTheRangeIsRefused) {

@@ -29,7 +29,7 @@ class DatasetFolder : public ::testing::Test {
     }
     write_png(folder / "a.png", picture.view());
     write_png(folder / "b.png", picture.view());
-    write("dataset.toml", kToml);
+    write("dataset.toml", dataset_toml);
     write("poses.csv", "file,x_m,y_m,heading_deg\na.png,1,2,90\nb.png,3,4,-180\n");
   }
   void write(const std::string& name, const std::string& text) const {
@@ -45,7 +45,7 @@ class DatasetFolder : public ::testing::Test {
     EXPECT_EQ(message.find('\n'), std::string::npos) << "more than one line: " << message;
   }
 
-  static constexpr const char* kToml =
+  static constexpr const char* dataset_toml =
       "[images]\nkind = \"panorama\"\ncolumns = \"clockwise\"\nforward_column = 0.5\n"
       "[poses]\nfile = \"poses.csv\"\n";
   const TemporaryFolder temporary;
@@ -96,28 +96,24 @@ TEST(WrittenDegrees, AreRoundWhereThatReadsBackTheSame) {
 }
 
 TEST_F(DatasetFolder, EveryFaultHasItsLine) {
-  write("poses.csv", "file,x_m,y_m\na.png,1,nan\n");
-  expect_error("line 2: y_m is 'nan'");
-  write("poses.csv", "file,x_m,y_m\na.png,1,\n");
-  expect_error("line 2: y_m is empty");
-  write("poses.csv", "file,x_m\na.png,1\n");
-  expect_error("no column 'y_m'");
-  write("poses.csv", "file,x_m,y_m\na.png,1,2\na.png,1,2\n");
-  expect_error("'a.png' for the second time");
-  write("poses.csv", "file,x_m,y_m\nc.png,1,2\n");
-  expect_error("'c.png', which is not there");
-  write("poses.csv", "file,x_m,y_m,roll_deg\na.png,1,2,3\n");
-  expect_error("no column 'pitch_deg'");
-  write("poses.csv", "file,x_m,y_m,roll_deg,pitch_deg\na.png,1,2,3,-31\n");
-  expect_error("line 2: pitch_deg is -31; allowed: -30 to 30");
-  write("poses.csv", "file,x_m,y_m\n");
-  expect_error("names no picture");
-  write("poses.csv", "file,x_m,y_m,colour\na.png,1,2,3\n");
-  expect_error("'colour' is not known");
-  write("poses.csv", "");
-  expect_error("no header");
-  write("poses.csv", "file,x_m,y_m\na.png,1\n");
-  expect_error("line 2 has 2 fields");
+  const std::pair<const char*, const char*> tables[] = {
+      {"file,x_m,y_m\na.png,1,nan\n", "line 2: y_m is 'nan'"},
+      {"file,x_m,y_m\na.png,1,\n", "line 2: y_m is empty"},
+      {"file,x_m\na.png,1\n", "no column 'y_m'"},
+      {"file,x_m,y_m\na.png,1,2\na.png,1,2\n", "'a.png' for the second time"},
+      {"file,x_m,y_m\nc.png,1,2\n", "'c.png', which is not there"},
+      {"file,x_m,y_m,roll_deg\na.png,1,2,3\n", "no column 'pitch_deg'"},
+      {"file,x_m,y_m,roll_deg,pitch_deg\na.png,1,2,3,-31\n",
+       "line 2: pitch_deg is -31; allowed: -30 to 30"},
+      {"file,x_m,y_m\n", "names no picture"},
+      {"file,x_m,y_m,colour\na.png,1,2,3\n", "'colour' is not known"},
+      {"", "no header"},
+      {"file,x_m,y_m\na.png,1\n", "line 2 has 2 fields"},
+  };
+  for (const auto& [table, part] : tables) {
+    write("poses.csv", table);
+    expect_error(part);
+  }
   fs::remove(folder / "poses.csv");
   expect_error("poses.csv");
   write("dataset.toml", "[images]\nkind = \"film\"\n[list]\nfile = \"poses.csv\"\n");

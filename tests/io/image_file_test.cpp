@@ -203,38 +203,19 @@ TEST_F(ImageFile, TheScansOfAJpegAreBoundedByItsSize) {
 Image turned_for(int orientation, const Image& upright) {
   const int w = upright.width();
   const int h = upright.height();
-  Image stored =
-      orientation >= 5 ? Image(h, w, upright.channels()) : Image(w, h, upright.channels());
+  const bool is_turned = orientation >= 5;
+  // Row 0 and column 0 of the stored picture lie at other sides of the upright one [EXIF 2.32].
+  const bool mirrors_u =
+      orientation == 2 || orientation == 3 || orientation == 6 || orientation == 7;
+  const bool mirrors_v =
+      orientation == 3 || orientation == 4 || orientation == 7 || orientation == 8;
+  Image stored(is_turned ? h : w, is_turned ? w : h, upright.channels());
   for (int v = 0; v < h; ++v) {
     for (int u = 0; u < w; ++u) {
       for (int c = 0; c < upright.channels(); ++c) {
-        // Where row 0 and column 0 of the stored picture are on the upright one [EXIF 2.32].
-        const std::uint8_t value = upright.at(u, v, c);
-        switch (orientation) {
-          case 1:
-            stored.at(u, v, c) = value;
-            break;  // top, left
-          case 2:
-            stored.at(w - 1 - u, v, c) = value;
-            break;  // top, right
-          case 3:
-            stored.at(w - 1 - u, h - 1 - v, c) = value;
-            break;  // bottom, right
-          case 4:
-            stored.at(u, h - 1 - v, c) = value;
-            break;  // bottom, left
-          case 5:
-            stored.at(v, u, c) = value;
-            break;  // left, top
-          case 6:
-            stored.at(v, w - 1 - u, c) = value;
-            break;  // right, top
-          case 7:
-            stored.at(h - 1 - v, w - 1 - u, c) = value;
-            break;  // right, bottom
-          default:
-            stored.at(h - 1 - v, u, c) = value;  // left, bottom
-        }
+        const int across = mirrors_u ? w - 1 - u : u;
+        const int down = mirrors_v ? h - 1 - v : v;
+        stored.at(is_turned ? down : across, is_turned ? across : down, c) = upright.at(u, v, c);
       }
     }
   }
