@@ -14,7 +14,7 @@
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/geometry/positions.hpp"
+#include "panonav/geometry/pose2.hpp"
 #include "panonav/signature/compass.hpp"
 #include "panonav/signature/dissimilarity.hpp"
 #include "panonav_simulation/mapping_run.hpp"

@@ -11,7 +11,7 @@
 #include "panonav/core/statistics.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/geometry/positions.hpp"
+#include "panonav/geometry/pose2.hpp"
 #include "panonav/signature/dissimilarity.hpp"
 #include "panonav_simulation/mapping_run.hpp"
 #include "panonav_simulation/scenes.hpp"

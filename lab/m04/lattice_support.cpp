@@ -8,7 +8,7 @@
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/geometry/nearest_points.hpp"
-#include "panonav/geometry/positions.hpp"
+#include "panonav/geometry/pose2.hpp"
 #include "panonav_simulation/furniture.hpp"
 #include "panonav_simulation/recording.hpp"
 

@@ -10,7 +10,7 @@
 
 #include "lab/experiments.hpp"
 #include "panonav/core/statistics.hpp"
-#include "panonav/geometry/positions.hpp"
+#include "panonav/geometry/pose2.hpp"
 #include "panonav_simulation/scenes.hpp"
 #include "panonav_simulation/worlds.hpp"
 #include "panonav_viewer/plot.hpp"

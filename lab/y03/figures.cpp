@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "panonav/geometry/angles.hpp"
-#include "panonav/geometry/positions.hpp"
+#include "panonav/geometry/pose2.hpp"
 #include "panonav/route/route_crossing.hpp"
 #include "panonav_simulation/scenes.hpp"
 #include "panonav_viewer/picture_plot.hpp"

@@ -15,7 +15,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
-#include "panonav/geometry/positions.hpp"
+#include "panonav/geometry/pose2.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/panorama_reader.hpp"
 #include "panonav/motion/path.hpp"

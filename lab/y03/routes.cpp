@@ -12,7 +12,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/geometry/positions.hpp"
+#include "panonav/geometry/pose2.hpp"
 #include "panonav/motion/path_follower.hpp"
 #include "panonav_simulation/paths.hpp"
 #include "panonav_simulation/recording.hpp"

@@ -2,7 +2,6 @@
 #include "panonav/camera/calibrate_dual_fisheye.hpp"
 #include "panonav/camera/find_mirror.hpp"
 #include "panonav/camera/mirror_camera.hpp"
-#include "panonav/camera/mirror_overlay.hpp"
 #include "panonav/core/error.hpp"
 
 namespace panonav::python {

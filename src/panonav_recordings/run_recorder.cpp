@@ -15,7 +15,7 @@
 #include "panonav/core/text.hpp"
 #include "panonav/core/thread_priority.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/geometry/positions.hpp"
+#include "panonav/geometry/pose2.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav_recordings/internal/topic_writer.hpp"
 #include "panonav_recordings/run_messages.hpp"

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "panonav/camera/mirror_camera.hpp"
-#include "panonav/camera/mirror_overlay.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/io/image_file.hpp"
 #include "support/mirror_pictures.hpp"

@@ -11,7 +11,7 @@
 
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/alignment.hpp"
-#include "panonav/geometry/positions.hpp"
+#include "panonav/geometry/pose2.hpp"
 #include "panonav/mapping/lattice.hpp"
 #include "panonav/pipeline/arrangement.hpp"
 #include "panonav_simulation/scenes.hpp"

@@ -10,7 +10,7 @@
 #include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/geometry/positions.hpp"
+#include "panonav/geometry/pose2.hpp"
 #include "panonav/io/atomic_file.hpp"
 #include "panonav/motion/path.hpp"
 #include "panonav/navigation/direction_field.hpp"

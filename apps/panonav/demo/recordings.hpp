@@ -8,7 +8,6 @@
 
 #include "cli/session.hpp"
 #include "panonav/camera/mirror_camera.hpp"
-#include "panonav/camera/mirror_overlay.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav_simulation/renderer.hpp"
 #include "panonav_simulation/scene.hpp"

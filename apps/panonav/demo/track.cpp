@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "panonav/core/statistics.hpp"
-#include "panonav/geometry/positions.hpp"
+#include "panonav/geometry/pose2.hpp"
 #include "panonav_viewer/scene_drawing.hpp"
 #include "reports/track_pictures.hpp"
 #include "reports/track_report.hpp"

@@ -8,7 +8,7 @@
 #include "cli/session.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/geometry/positions.hpp"
+#include "panonav/geometry/pose2.hpp"
 #include "panonav_viewer/picture_plot.hpp"
 #include "panonav_viewer/plot.hpp"
 #include "panonav_viewer/report_page.hpp"

@@ -5,7 +5,6 @@
 #include "panonav/camera/calibrate_dual_fisheye.hpp"
 #include "panonav/camera/find_mirror.hpp"
 #include "panonav/camera/mirror_camera.hpp"
-#include "panonav/camera/mirror_overlay.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/camera_file.hpp"
 #include "panonav/io/image_file.hpp"

@@ -1,5 +1,8 @@
 #include "panonav/camera/mirror_camera.hpp"
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include "panonav/core/error.hpp"
 
 namespace panonav {
@@ -43,6 +46,64 @@ HyperboloidalModel with_elevation_at(HyperboloidalModel model, double radius_px,
 
 UnifiedModel with_elevation_at(UnifiedModel model, double radius_px, double elevation_rad) {
   return scaled_to(model, radius_px, elevation_rad);
+}
+
+namespace {
+
+using Colour = std::array<double, 3>;
+constexpr Colour green{0, 230, 60};
+constexpr Colour orange{255, 140, 0};
+constexpr Colour red{255, 30, 30};
+constexpr Colour yellow{255, 230, 0};
+
+/// Mixes a colour into a pixel by how much of a line of this half width covers it.
+void blend(Image& image, int u, int v, const Colour& colour, double distance_px,
+           double half_width_px) {
+  const double cover = std::clamp(half_width_px + 0.5 - distance_px, 0.0, 1.0);
+  if (cover == 0) return;
+  for (int c = 0; c < 3; ++c) {
+    const double mixed = (1 - cover) * image.at(u, v, c) + cover * colour[c];
+    image.at(u, v, c) = static_cast<std::uint8_t>(std::lround(mixed));
+  }
+}
+
+}  // namespace
+
+Image draw_mirror(ImageView image, const MirrorCircle& mirror,
+                  std::optional<double> forward_angle_rad) {
+  require(image.width == mirror.image_size.width, "image width", image.width,
+          to_text(mirror.image_size.width));
+  require(image.height == mirror.image_size.height, "image height", image.height,
+          to_text(mirror.image_size.height));
+  Image picture(image.width, image.height, 3);
+  // Lines stay visible when the picture of a large sensor is scaled down to a screen.
+  const double half_width_px = std::max(0.5, std::max(image.width, image.height) / 1600.0);
+  const double cross_px = std::max(4.0, 0.06 * mirror.rim_radius_px);
+  const double inner_px = mirror.inner_radius_px.value_or(0.0);
+  for (int v = 0; v < image.height; ++v) {
+    for (int u = 0; u < image.width; ++u) {
+      for (int c = 0; c < 3; ++c)
+        picture.at(u, v, c) = image.at(u, v, std::min(c, image.channels - 1));
+      const double x = u + 0.5 - mirror.centre.u_px;
+      const double y = v + 0.5 - mirror.centre.v_px;
+      const double r = std::hypot(x, y);
+      blend(picture, u, v, green, std::abs(r - mirror.rim_radius_px), half_width_px);
+      if (mirror.inner_radius_px) {
+        blend(picture, u, v, orange, std::abs(r - inner_px), half_width_px);
+      }
+      if (std::max(std::abs(x), std::abs(y)) <= cross_px) {
+        blend(picture, u, v, red, std::min(std::abs(x), std::abs(y)), half_width_px);
+      }
+      if (forward_angle_rad) {
+        const double along = x * std::cos(*forward_angle_rad) - y * std::sin(*forward_angle_rad);
+        const double across = x * std::sin(*forward_angle_rad) + y * std::cos(*forward_angle_rad);
+        if (along >= inner_px && along <= mirror.rim_radius_px) {
+          blend(picture, u, v, yellow, std::abs(across), half_width_px);
+        }
+      }
+    }
+  }
+  return picture;
 }
 
 }  // namespace panonav

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cmath>
+#include <span>
+#include <vector>
 
 #include "panonav/geometry/angles.hpp"
 
@@ -29,7 +31,15 @@ struct Pose2 {
   friend bool operator==(const Pose2&, const Pose2&) = default;
 };
 
-/// Whether none of the three numbers is NaN or infinite.
+/// Returns the positions of poses, in their order.
+[[nodiscard]] inline std::vector<Point2> positions_of(std::span<const Pose2> poses) {
+  std::vector<Point2> positions;
+  positions.reserve(poses.size());
+  for (const Pose2& pose : poses) positions.push_back(pose.position());
+  return positions;
+}
+
+/// True if none of the three numbers is NaN or infinite.
 [[nodiscard]] inline bool is_finite(const Pose2& pose) {
   return std::isfinite(pose.x_m) && std::isfinite(pose.y_m) && std::isfinite(pose.heading_rad);
 }

@@ -16,34 +16,6 @@ constexpr std::size_t image_limit_bytes = std::size_t{1} << 30U;
 
 using Bytes = std::span<const std::uint8_t>;
 
-// Which source pixel an upright picture shows at (u, v); EXIF 2.32, tag 0x0112.
-struct Source {
-  int u;
-  int v;
-};
-Source source_of(int orientation, ImageSize stored, int u, int v) {
-  const int right = stored.width - 1;
-  const int bottom = stored.height - 1;
-  switch (orientation) {
-    case 2:
-      return {right - u, v};
-    case 3:
-      return {right - u, bottom - v};
-    case 4:
-      return {u, bottom - v};
-    case 5:
-      return {v, u};
-    case 6:
-      return {v, bottom - u};
-    case 7:
-      return {right - v, bottom - u};
-    case 8:
-      return {right - v, u};
-    default:
-      return {u, v};
-  }
-}
-
 }  // namespace
 
 ImageFormat image_format(Bytes bytes, std::string_view name) {
@@ -141,12 +113,21 @@ ImageSize upright_size(ImageSize stored, int orientation) {
 
 Image upright(Image stored, int orientation) {
   if (orientation == 1) return stored;
+  // The stored pixel that the upright picture shows at (u, v) [EXIF 2.32, tag 0x0112].
+  const bool is_transposed = orientation >= 5;
+  const bool from_right =
+      orientation == 2 || orientation == 3 || orientation == 7 || orientation == 8;
+  const bool from_bottom =
+      orientation == 3 || orientation == 4 || orientation == 6 || orientation == 7;
   const ImageSize size = upright_size(stored.size(), orientation);
   Image image(size.width, size.height, stored.channels());
   for (int v = 0; v < size.height; ++v) {
     for (int u = 0; u < size.width; ++u) {
-      const Source from = source_of(orientation, stored.size(), u, v);
-      std::copy_n(&stored.at(from.u, from.v), stored.channels(), &image.at(u, v));
+      const int x = is_transposed ? v : u;
+      const int y = is_transposed ? u : v;
+      std::copy_n(&stored.at(from_right ? stored.width() - 1 - x : x,
+                             from_bottom ? stored.height() - 1 - y : y),
+                  stored.channels(), &image.at(u, v));
     }
   }
   return image;

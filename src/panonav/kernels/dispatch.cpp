@@ -51,17 +51,8 @@ Instructions choose() {
 }  // namespace
 
 std::string_view name(Instructions instructions) noexcept {
-  switch (instructions) {
-    case Instructions::avx2:
-      return "avx2";
-    case Instructions::avx512:
-      return "avx512";
-    case Instructions::neon:
-      return "neon";
-    case Instructions::scalar:
-      break;
-  }
-  return "scalar";
+  constexpr std::array<std::string_view, 4> names{"scalar", "avx2", "avx512", "neon"};
+  return names[static_cast<std::size_t>(instructions)];
 }
 
 std::span<const Instructions> available_instructions() noexcept {

@@ -8,7 +8,7 @@
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/nearest_points.hpp"
-#include "panonav/geometry/positions.hpp"
+#include "panonav/geometry/pose2.hpp"
 #include "panonav/mapping/internal/lattice_curve.hpp"
 #include "panonav/mapping/internal/lattice_graph.hpp"
 #include "panonav/mapping/internal/lattice_growth.hpp"

@@ -9,7 +9,7 @@
 #include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/geometry/positions.hpp"
+#include "panonav/geometry/pose2.hpp"
 #include "panonav/geometry/voronoi.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 

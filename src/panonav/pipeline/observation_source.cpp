@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
-#include "panonav/geometry/positions.hpp"
+#include "panonav/geometry/pose2.hpp"
 #include "panonav/motion/path.hpp"
 
 namespace panonav {

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -32,31 +33,12 @@ Matrix3d rig_from_lens(const FisheyeLens& lens) {
 }  // namespace
 
 void add_to(FisheyeLens& lens, int parameter, double change) {
-  switch (parameter) {
-    case 0:
-      lens.centre_u_px += change;
-      break;
-    case 1:
-      lens.centre_v_px += change;
-      break;
-    case 2:
-      lens.focal_length_px *= std::exp(change);
-      break;
-    case 3:
-      lens.k3 += change;
-      break;
-    case 4:
-      lens.k5 += change;
-      break;
-    case 5:
-      lens.azimuth_rad += change;
-      break;
-    case 6:
-      lens.elevation_rad += change;
-      break;
-    default:
-      lens.roll_rad += change;
-  }
+  using L = FisheyeLens;
+  constexpr std::array<double L::*, lens_size> members{
+      &L::centre_u_px, &L::centre_v_px, &L::focal_length_px, &L::k3,
+      &L::k5,          &L::azimuth_rad, &L::elevation_rad,   &L::roll_rad};
+  double& value = lens.*members[parameter];
+  value = parameter == 2 ? value * std::exp(change) : value + change;
 }
 
 void add_to(Stand& stand, int parameter, double change) {

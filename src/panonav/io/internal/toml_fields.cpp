@@ -113,7 +113,7 @@ TomlFields::TomlFields(std::filesystem::path path, std::string section, const To
     : path_(std::move(path)), section_(std::move(section)), table_(&table) {}
 
 const TomlValue* TomlFields::get(std::string_view field) {
-  asked_.emplace(field);
+  queried_.emplace(field);
   const auto found = std::ranges::find(*table_, field, &TomlField::name);
   return found == table_->end() ? nullptr : &found->value;
 }
@@ -126,28 +126,31 @@ std::optional<double> TomlFields::number(std::string_view field) {
   return number;
 }
 
-std::optional<std::int64_t> TomlFields::integer(std::string_view field) {
+template <class Value>
+const Value* TomlFields::get(std::string_view field, std::string_view allowed) {
   const TomlValue* value = get(field);
-  if (value == nullptr) return std::nullopt;
-  const auto* integer = std::get_if<std::int64_t>(&value->content);
-  if (integer == nullptr) fail(field, value->shown, "a whole number");
-  return *integer;
+  if (value == nullptr) return nullptr;
+  const auto* content = std::get_if<Value>(&value->content);
+  if (content == nullptr) fail(field, value->shown, allowed);
+  return content;
+}
+
+template <class Value>
+std::optional<Value> TomlFields::copy(std::string_view field, std::string_view allowed) {
+  const Value* value = get<Value>(field, allowed);
+  return value == nullptr ? std::nullopt : std::optional(*value);
+}
+
+std::optional<std::int64_t> TomlFields::integer(std::string_view field) {
+  return copy<std::int64_t>(field, "a whole number");
 }
 
 std::optional<bool> TomlFields::boolean(std::string_view field) {
-  const TomlValue* value = get(field);
-  if (value == nullptr) return std::nullopt;
-  const auto* boolean = std::get_if<bool>(&value->content);
-  if (boolean == nullptr) fail(field, value->shown, "true, false");
-  return *boolean;
+  return copy<bool>(field, "true, false");
 }
 
 std::optional<std::string> TomlFields::text(std::string_view field) {
-  const TomlValue* value = get(field);
-  if (value == nullptr) return std::nullopt;
-  const auto* text = std::get_if<std::string>(&value->content);
-  if (text == nullptr) fail(field, value->shown, "a text in quotation marks");
-  return *text;
+  return copy<std::string>(field, "a text in quotation marks");
 }
 
 std::optional<std::vector<double>> TomlFields::numbers(std::string_view field) {
@@ -165,10 +168,8 @@ std::optional<std::vector<double>> TomlFields::numbers(std::string_view field) {
 }
 
 std::optional<TomlFields> TomlFields::section(std::string_view field) {
-  const TomlValue* value = get(field);
-  if (value == nullptr) return std::nullopt;
-  const auto* table = std::get_if<TomlTable>(&value->content);
-  if (table == nullptr) fail(field, value->shown, "a section in square brackets");
+  const auto* table = get<TomlTable>(field, "a section in square brackets");
+  if (table == nullptr) return std::nullopt;
   std::string name = section_.empty() ? "" : section_ + ".";
   name += field;
   return TomlFields(path_, std::move(name), *table);
@@ -208,10 +209,10 @@ void TomlFields::fail(std::string_view field, std::string_view found,
 
 void TomlFields::finish() const {
   for (const TomlField& field : *table_) {
-    if (asked_.contains(field.name)) continue;
+    if (queried_.contains(field.name)) continue;
     std::string known;
-    for (const auto& name : asked_) known += (known.empty() ? "" : ", ") + name;
-    const std::vector<std::string_view> names(asked_.begin(), asked_.end());
+    for (const auto& name : queried_) known += (known.empty() ? "" : ", ") + name;
+    const std::vector<std::string_view> names(queried_.begin(), queried_.end());
     throw FileError(path_.string(), (section_.empty() ? "" : "[" + section_ + "] ") +
                                         to_readable_line(field.name) + " is not a known field" +
                                         suggest_name(field.name, names) + "; known: " + known);

@@ -69,10 +69,15 @@ class TomlFields {
 
  private:
   const TomlValue* get(std::string_view field);
+  /// Returns the content of a field; null when it is absent. Throws FileError on another type.
+  template <class Value>
+  const Value* get(std::string_view field, std::string_view allowed);
+  template <class Value>
+  std::optional<Value> copy(std::string_view field, std::string_view allowed);
   std::filesystem::path path_;
   std::string section_;
   const TomlTable* table_;
-  std::set<std::string, std::less<>> asked_;
+  std::set<std::string, std::less<>> queried_;
 };
 
 }  // namespace panonav
