@@ -20,8 +20,6 @@ namespace panonav::recordings {
 
 namespace {
 
-using TextMap = std::map<std::string, std::string>;
-
 // Bytes that grow by little-endian fields.
 struct Bytes : std::vector<std::uint8_t> {
   template <class Number>
@@ -42,11 +40,6 @@ struct Bytes : std::vector<std::uint8_t> {
   }
   Bytes& prefixed(const Bytes& bytes) {
     return number(static_cast<std::uint32_t>(bytes.size())).raw(bytes);
-  }
-  Bytes& texts(const TextMap& map) {
-    Bytes fields;
-    for (const auto& [key, value] : map) fields.text(key).text(value);
-    return prefixed(fields);
   }
   Bytes& record(McapRecord kind, const Bytes& body) {
     return number(kind).number(std::uint64_t{body.size()}).raw(body);
@@ -91,9 +84,9 @@ struct McapWriter::State {
   std::vector<Channel> channels;
   std::vector<std::uint16_t> used_in_chunk;
   std::vector<std::uint8_t> packed;
-  std::uint32_t schemas = 0, chunks = 0, attachments = 0, metadata = 0;
+  std::uint32_t schemas = 0, chunks = 0;
   // Records of the summary, by kind.
-  Bytes schema_records, channel_records, chunk_indexes, attachment_indexes, metadata_indexes;
+  Bytes schema_records, channel_records, chunk_indexes;
 
   void require_open() const {
     if (has_failed) throw FileError(path.string(), "was not written to its end");
@@ -188,17 +181,16 @@ struct McapWriter::State {
                                                 .number(messages)
                                                 .number(static_cast<std::uint16_t>(schemas))
                                                 .number(static_cast<std::uint32_t>(channels.size()))
-                                                .number(attachments)
-                                                .number(metadata)
+                                                .number(std::uint32_t{0})  // attachments
+                                                .number(std::uint32_t{0})  // metadata
                                                 .number(chunks)
                                                 .number(time.begin)
                                                 .number(time.end)
                                                 .prefixed(counts));
     const std::uint64_t start = written;
     Bytes end, offsets;
-    for (const Bytes* group : std::initializer_list<const Bytes*>{
-             &schema_records, &channel_records, &statistics, &chunk_indexes, &attachment_indexes,
-             &metadata_indexes}) {
+    for (const Bytes* group : std::initializer_list<const Bytes*>{&schema_records, &channel_records,
+                                                                  &statistics, &chunk_indexes}) {
       if (group->empty()) continue;
       offsets.record(McapRecord::summary_offset, Bytes()
                                                      .number(group->front())
@@ -258,7 +250,7 @@ std::uint16_t McapWriter::add_schema(std::string_view name, std::string_view enc
 }
 
 std::uint16_t McapWriter::add_channel(std::string_view topic, std::string_view message_encoding,
-                                      std::uint16_t schema, const TextMap& metadata) {
+                                      std::uint16_t schema) {
   State& s = *state_;
   s.require_open();
   require(schema <= s.schemas, "schema", schema, "up to " + std::to_string(s.schemas));
@@ -266,9 +258,13 @@ std::uint16_t McapWriter::add_channel(std::string_view topic, std::string_view m
           "up to 65535");
   const auto number = static_cast<std::uint16_t>(s.channels.size());
   s.channels.emplace_back();
-  const Bytes record = Bytes().record(
-      McapRecord::channel,
-      Bytes().number(number).number(schema).text(topic).text(message_encoding).texts(metadata));
+  constexpr std::uint32_t metadata_bytes = 0;
+  const Bytes record = Bytes().record(McapRecord::channel, Bytes()
+                                                               .number(number)
+                                                               .number(schema)
+                                                               .text(topic)
+                                                               .text(message_encoding)
+                                                               .number(metadata_bytes));
   s.chunk.raw(record);
   s.channel_records.raw(record);
   return number;
@@ -297,38 +293,6 @@ void McapWriter::write(std::uint16_t channel, std::int64_t log_time_ns,
   ++used.messages;
   ++s.messages;
   if (s.chunk.size() >= s.options.chunk_bytes) s.put_chunk();
-}
-
-void McapWriter::attach(std::string_view name, std::string_view media_type,
-                        std::int64_t log_time_ns, std::span<const std::uint8_t> data) {
-  State& s = *state_;
-  s.require_open();
-  const std::uint64_t time = checked_time(log_time_ns);
-  Bytes body;
-  body.number(time).number(time).text(name).text(media_type).number(std::uint64_t{data.size()});
-  body.raw(data);
-  body.number(sum_of(body));
-  const std::uint64_t at = s.written;
-  s.put(Bytes().record(McapRecord::attachment, body));
-  s.attachment_indexes.record(McapRecord::attachment_index, Bytes()
-                                                                .number(at)
-                                                                .number(s.written - at)
-                                                                .number(time)
-                                                                .number(time)
-                                                                .number(std::uint64_t{data.size()})
-                                                                .text(name)
-                                                                .text(media_type));
-  ++s.attachments;
-}
-
-void McapWriter::add_metadata(std::string_view name, const TextMap& metadata) {
-  State& s = *state_;
-  s.require_open();
-  const std::uint64_t at = s.written;
-  s.put(Bytes().record(McapRecord::metadata, Bytes().text(name).texts(metadata)));
-  s.metadata_indexes.record(McapRecord::metadata_index,
-                            Bytes().number(at).number(s.written - at).text(name));
-  ++s.metadata;
 }
 
 void McapWriter::flush() {

@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -47,17 +46,11 @@ class McapWriter {
   /// A topic, whose messages are encoded as "cdr", say. `schema`: 0 for none. Returns its number,
   /// from 0 on. At most 65535.
   std::uint16_t add_channel(std::string_view topic, std::string_view message_encoding,
-                            std::uint16_t schema,
-                            const std::map<std::string, std::string>& metadata = {});
+                            std::uint16_t schema);
   /// Appends a message to the chunk in memory, which is written when it is large enough. Times are
   /// >= 0. Throws ContractError on a channel that is none. Cost: a copy of the bytes, and packing.
   void write(std::uint16_t channel, std::int64_t log_time_ns, std::int64_t publish_time_ns,
              std::span<const std::uint8_t> message);
-  /// A file within the file.
-  void attach(std::string_view name, std::string_view media_type, std::int64_t log_time_ns,
-              std::span<const std::uint8_t> data);
-  /// Names and values that stand in the file beside the messages.
-  void add_metadata(std::string_view name, const std::map<std::string, std::string>& metadata);
   /// Writes the messages in memory as a chunk of their own, so that a reader finds them.
   void flush();
   /// The last chunk, summary and footer; all is on the disk when it returns. Nothing more can be
