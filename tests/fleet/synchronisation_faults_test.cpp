@@ -1,0 +1,308 @@
+// Synchronisation while processes are killed, answers are lost, disks are full and memories are
+// other ones.
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <iostream>
+
+#include "fleet/synchronised_memory.hpp"
+#include "panonav/core/error.hpp"
+#include "panonav/storage/checksum.hpp"
+#include "support/child_process.hpp"
+
+namespace panonav::fleet {
+namespace {
+
+TEST_F(SynchronisedMemory, AKillAtAnyMomentLosesAndDoublesNothing) {
+  share({"a", "b"}, 10);
+  Random random(8);
+  int next = 100;
+  int kills = 0;
+  double longest_s = 0.02;
+  std::set<std::string> expected = names(folder / "a");
+  for (int round = 0; round < 24; ++round) {
+    {
+      MemoryFile file = open("a");
+      for (const NewView& view : numbered(next, 30)) expected.insert(view.info.name);
+      file.append(numbered(next, 30));
+      next += 30;
+      const auto views = file.views();
+      file.set_pose(views[random.index(views.size())],
+                    ReferencePose{0.1 * round, 0.0, std::nullopt});
+      const ViewId gone = views[random.index(views.size())];
+      expected.erase(file.load(std::vector{gone}).info(gone).name);
+      file.remove(std::vector{gone});
+    }
+    const pid_t child = start_child([&] {
+      (void)sync("a");
+      return 0;
+    });
+    ASSERT_GT(child, 0);
+    ::usleep(static_cast<useconds_t>(1e6 * random.uniform(0.0, 1.5 * longest_s)));
+    ::kill(child, SIGKILL);
+    int status = 0;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    kills += WIFSIGNALED(status) ? 1 : 0;
+    if (WIFEXITED(status)) {
+      ASSERT_EQ(WEXITSTATUS(status), 0);
+    }
+    if (round % 4 == 3) {
+      const SynchronisationReport whole = sync("a");
+      longest_s = std::max(longest_s, whole.seconds);
+      ASSERT_EQ(whole.conflicts, 0U);
+      ASSERT_EQ(names(folder / "a"), expected);
+    }
+  }
+  EXPECT_GT(kills, 6);
+  (void)sync("b");
+  EXPECT_EQ(names(server("x")), expected);
+  EXPECT_TRUE(is_same(content(folder / "a"), content(folder / "b")));
+}
+
+// The acknowledgement was lost, and the view changed, or was removed, before the next time.
+TEST_F(SynchronisedMemory, WhatChangedAfterALostAnswerIsNoConflict) {
+  share({"a"}, 10);
+  {
+    MemoryFile file = open("a");
+    file.set_pose(ViewId{2}, ReferencePose{1.0, 0.0, 0.0});
+    file.append(std::vector{numbered(50), numbered(51)});
+  }
+  // The file as it was when the views were sent: with the marks, without the answer.
+  std::filesystem::path kept = folder / "kept";
+  const int calls_before = static_cast<int>(on_server().views().size());
+  bool stopped = false;
+  try {
+    (void)synchronise_memory(folder / "a", server("a"), {}, [&](std::size_t) {
+      // The first view is acknowledged: what the file holds now is what a kill would leave.
+      if (stopped) return;
+      stopped = true;
+      throw std::runtime_error("killed");
+    });
+  } catch (const std::runtime_error&) {
+  }
+  ASSERT_TRUE(stopped);
+  ASSERT_EQ(on_server().views().size(), static_cast<std::size_t>(calls_before) + 2);
+  std::filesystem::copy_file(folder / "a", kept);
+  {
+    MemoryFile file = open("a");
+    file.set_pose(file.find("view_50.png").value(), ReferencePose{8.0, 8.0, 0.0});
+    file.remove(std::vector{file.find("view_51.png").value()});
+  }
+  const SynchronisationReport next = sync("a");
+  EXPECT_EQ(next.conflicts, 0U);
+  EXPECT_EQ(next.uploaded, 0U);
+  EXPECT_EQ(next.updated_on_server, 2U);  // views 2 and 50
+  EXPECT_EQ(next.removed_on_server, 1U);
+  const auto there = content(server("x"));
+  EXPECT_EQ(there.at("view_50.png").info.pose->x_m, 8.0);
+  EXPECT_FALSE(there.contains("view_51.png"));
+  EXPECT_TRUE(is_same(content(folder / "a"), there));
+  // The same robot with the file of before: nothing is doubled or brought back.
+  std::filesystem::rename(kept, folder / "a");
+  const SynchronisationReport old = sync("a");
+  EXPECT_EQ(old.uploaded, 0U);
+  EXPECT_TRUE(is_same(content(folder / "a"), there));
+}
+
+TEST_F(SynchronisedMemory, OthersRemoveWhatWasNotAcknowledged) {
+  share({"a", "b"}, 4);
+  open("a").append(numbered(60));
+  bool stopped = false;
+  EXPECT_THROW((void)synchronise_memory(folder / "a", server("a"), {},
+                                        [&](std::size_t) {
+                                          stopped = true;
+                                          throw std::runtime_error("killed");
+                                        }),
+               std::runtime_error);
+  ASSERT_TRUE(stopped);
+  (void)sync("b");
+  {
+    MemoryFile file = open("b");
+    file.remove(std::vector{file.find("view_60.png").value()});
+  }
+  (void)sync("b");
+  const SynchronisationReport next = sync("a");
+  EXPECT_EQ(next.uploaded, 0U);
+  EXPECT_EQ(next.removed_in_file, 1U);
+  EXPECT_FALSE(names(server("x")).contains("view_60.png"));
+}
+
+TEST_F(SynchronisedMemory, OtherMemoriesAndHeadersAreRefused) {
+  share({"a"}, 4);
+  const std::string before = bytes_of(folder / "a");
+  const auto refused = [&](const std::string& robot, const std::string& address,
+                           const std::string& saying) {
+    const std::string message =
+        message_of<Error>([&] { (void)synchronise_memory(folder / robot, address); });
+    EXPECT_TRUE(contains(message, saying)) << message;
+    EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+  };
+  const std::string other = std::string(std::getenv("PANONAV_TEST_SERVER")) +
+                            "&memory=" + folder.path().filename().string() + "other";
+  (void)MemoryFile::create(other, small_header());
+  refused("a", other, "is synchronised with another memory");
+  EXPECT_EQ(MemoryFile::open(other, Access::read_only).views().size(), 0U);
+  EXPECT_EQ(open("a").views().size(), 4U);
+  MemoryHeader coarser = small_header();
+  coarser.full_scale = 0.25F;
+  (void)MemoryFile::create(folder / "scale", coarser);
+  refused("scale", server("x"), "full scale");
+  MemoryHeader shorter = small_header();
+  shorter.shape.rows = 5;
+  (void)MemoryFile::create(folder / "shape", shorter);
+  refused("shape", server("x"), "rows and components");
+  MemoryHeader other_steps = small_header();
+  other_steps.preprocessing.normalise_gain = false;
+  (void)MemoryFile::create(folder / "steps", other_steps);
+  refused("steps", server("x"), "preprocessing");
+  folder.write("noise", std::string(5000, 'x'));
+  refused("noise", server("x"), "is no memory file");
+  refused("absent", server("x") + "&memory=nothing", "no memory 'nothing'");
+  EXPECT_FALSE(std::filesystem::exists(folder / "absent"));
+  EXPECT_EQ(on_server().views().size(), 4U);
+}
+
+TEST_F(SynchronisedMemory, AFullDiskOfTheFileLosesNothing) {
+  share({"a"}, 10);
+  (void)sync("b");
+  open("a").append(numbered(100, 600));
+  (void)sync("a");
+  const auto all = content(folder / "a");
+  const pid_t child = start_child([&] {
+    ::signal(SIGXFSZ, SIG_IGN);
+    constexpr rlim_t limit_bytes = 120000;
+    const rlimit limit{limit_bytes, limit_bytes};
+    if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) return 250;
+    const std::string message = message_of<FileError>([&] { (void)sync("b"); });
+    return message.find((folder / "b").string() + ": cannot be ") == 0 ? 7 : 251;
+  });
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 7);
+  EXPECT_TRUE(open("b").verify().empty());
+  (void)sync("b");
+  EXPECT_TRUE(is_same(content(folder / "b"), all));
+}
+
+/// What bench/synchronise_faults.py starts, kills and counts: a robot that changes its file, tells
+/// each change before and after it was made, and synchronises now and then, for ever or for
+/// PANONAV_TEST_STEPS steps; with -1 it synchronises once.
+TEST_F(SynchronisedMemory, ARobotWorksUntilItIsKilled) {
+  const char* file_path = std::getenv("PANONAV_TEST_ROBOT");
+  if (file_path == nullptr) GTEST_SKIP() << "no PANONAV_TEST_ROBOT";
+  const auto setting = [](const char* name) { return std::string(std::getenv(name)); };
+  const std::string address = setting("PANONAV_TEST_SERVER");
+  const std::string robot = setting("PANONAV_TEST_NAME");
+  int next = std::stoi(setting("PANONAV_TEST_FIRST"));  // numbers of views that nobody had
+  const int steps = std::stoi(setting("PANONAV_TEST_STEPS"));
+  Random random(static_cast<std::uint64_t>(next));
+  const auto say = [](const auto&... words) {
+    ((std::cout << words << ' '), ...);
+    std::cout << std::endl;
+  };
+  const auto name_of = [](const PackedSignature& signature) {
+    return checksum(signature.magnitudes, checksum(signature.phases));
+  };
+  const auto synchronise = [&] {
+    try {
+      const auto report = synchronise_memory(file_path, address);
+      const std::size_t others = report.adopted + report.updated_on_server +
+                                 report.updated_in_file + report.removed_on_server +
+                                 report.removed_in_file + report.renamed + report.links_uploaded +
+                                 report.links_downloaded;
+      say("synchronised", report.seconds, report.uploaded, report.downloaded, report.conflicts,
+          others);
+    } catch (const FileError& error) {
+      say("refused", error.what());
+    }
+  };
+  if (!std::filesystem::exists(file_path)) synchronise();
+  if (!std::filesystem::exists(file_path) && robot == "0") {
+    (void)MemoryFile::create(file_path, small_header());
+  }
+  if (steps < 0) synchronise();
+  for (int step = 0; steps == 0 || step < steps; ++step) {
+    try {
+      MemoryFile file = MemoryFile::open(file_path, Access::read_write);
+      const auto add = [&] {
+        const int number = next++;
+        NewView view = named("r" + robot + "_" + std::to_string(number), number);
+        if (random.index(10) == 0) view.info.name = "door_" + std::to_string(random.index(10));
+        if (file.find(view.info.name)) view.info.name += "_" + std::to_string(number);
+        // The clock may be wrong: only people look at it.
+        view.info.stamp_s =
+            std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch())
+                .count();
+        say("adding", name_of(view.signature));
+        file.append(view);
+        return name_of(view.signature);
+      };
+      const std::vector<ViewId> views = file.views();
+      const auto any = [&] { return views[random.index(views.size())]; };
+      const auto told = [&](ViewId view) {
+        return name_of(file.load(std::vector{view}).packed(view));
+      };
+      const std::uint64_t kind = views.size() < 5 ? 0 : random.index(20);
+      if (kind < 12) {
+        for (std::uint64_t i = random.index(3) + 1; i > 0; --i) say("added", add());
+      } else if (kind < 15) {
+        const ViewId view = any();
+        const auto which = told(view);
+        const double x_m = next++;
+        say("moving", which, x_m);
+        file.set_pose(view, ReferencePose{x_m, 0.0, std::nullopt});
+        say("moved", which, x_m);
+      } else if (kind == 15) {
+        const ViewId view = any();
+        const auto which = told(view);
+        say("removing", which);
+        file.remove(std::vector{view});
+        say("removed", which);
+      } else if (kind == 16) {
+        const ViewId view = any();
+        const auto which = told(view);
+        say("removing", which);
+        std::uint64_t instead = 0;
+        file.change(
+            [&] {
+              file.remove(std::vector{view});
+              instead = add();
+            },
+            "learnt");
+        say("removed", which);
+        say("added", instead);
+      } else {
+        const ViewId a = any();
+        const ViewId b = any();
+        if (a != b) file.link(std::vector<Link>{{a, b, LinkKind(random.index(3))}});
+      }
+    } catch (const FileError& error) {
+      say("refused", error.what());
+    }
+    if (random.index(3) == 0 || step + 1 == steps) synchronise();
+    ::usleep(static_cast<useconds_t>(random.uniform(0.0, 4e5)));
+  }
+}
+
+/// Tells bench/synchronise_faults.py what a memory holds.
+TEST_F(SynchronisedMemory, AMemoryIsTold) {
+  const char* memory = std::getenv("PANONAV_TEST_TOLD");
+  if (memory == nullptr) GTEST_SKIP() << "no PANONAV_TEST_TOLD";
+  for (const auto& [name, seen] : content(memory)) {
+    std::cout << "view\t" << name << '\t'
+              << checksum(seen.signature.magnitudes, checksum(seen.signature.phases)) << '\t'
+              << (seen.info.pose ? seen.info.pose->x_m : -1.0) << '\t'
+              << seen.info.stamp_s.value_or(-1.0) << '\t' << seen.thumbnail.has_value()
+              << seen.features.has_value();
+    for (const auto& [other, kind] : seen.links) std::cout << '\t' << other << ':' << kind;
+    std::cout << '\n';
+  }
+}
+
+}  // namespace
+}  // namespace panonav::fleet

@@ -1,0 +1,185 @@
+#include <cmath>
+
+#include "panonav/geometry/angles.hpp"
+#include "panonav/io/atomic_file.hpp"
+#include "panonav_ros2/simulated_robot.hpp"
+#include "ros2/node_on_the_wire.hpp"
+
+namespace panonav::ros2 {
+namespace {
+
+/// In the first of the two rooms, faster than life.
+class DrivenRobot {
+ public:
+  explicit DrivenRobot(const testing::ToyWorld& world,
+                       std::function<Image(const Pose2& pose)> picture, double time_factor)
+      : robot_({.node = "robot"}, {.time_factor = time_factor},
+               {{0.8, 0.8, 0.3},
+                [&world](Point2 place) { return testing::robot_fits(world, place); },
+                [picture](const Pose2& pose, std::uint64_t) { return picture(pose); }},
+               {}, 1, [](const std::string& line) { ADD_FAILURE() << line; }),
+        thread_([this] { robot_.run(); }) {}
+  ~DrivenRobot() {
+    robot_.stop();
+    thread_.join();
+  }
+
+ private:
+  SimulatedRobot robot_;
+  std::thread thread_;
+};
+
+TEST_F(LocalisationNodeOnTheWire, DrivesASimulatedRobotToAGoalFindsItKidnappedAndStopsIt) {
+  start({.use_sim_time = true});
+  auto& goal = peer_.talk<recordings::ros::PoseStamped>("goal_pose");
+  auto& set_pose = peer_.talk<recordings::ros::PoseStamped>("set_pose");
+  auto& result = peer_.listen<recordings::ros::DiagnosticArray>("panonav/goal/result");
+  auto& feedback = peer_.listen<recordings::ros::DiagnosticArray>("panonav/goal/feedback");
+  auto& velocity = peer_.listen<recordings::ros::Twist>("cmd_vel");
+  auto& truth = peer_.listen<recordings::ros::PoseStamped>("ground_truth", false);
+  auto& pose = peer_.listen<recordings::ros::PoseWithCovarianceStamped>("panonav/pose");
+  std::optional<DrivenRobot> robot;
+  robot.emplace(world_, picture, 6.0);
+  ASSERT_TRUE(peer_.all_matched(10s));
+  const auto robot_is = [&] { return newest_pose(truth); };
+  const auto state_of = [](const FastPeer::Bytes& cdr) {
+    return cdr.empty() ? std::string("nothing")
+                       : read<recordings::ros::DiagnosticArray>(cdr).status.at(0).message;
+  };
+  ASSERT_TRUE(comes_true([&] { return node_->counts().localised >= 3; }));
+
+  // Who writes before both sides know of each other may not be heard: a goal in another frame,
+  // which is refused, tells that the node hears.
+  ASSERT_TRUE(comes_true([&] {
+    FastPeer::write(goal, recordings::ros::PoseStamped{{0, "moon"}, {}});
+    return notes_with("moon") > 0;
+  }));
+  const auto send_to = [&](Point2 place) {
+    FastPeer::write(goal, recordings::ros::PoseStamped{
+                              {0, "map"}, recordings::ros::pose_of({place.x_m, place.y_m, 0.0})});
+    return state_of(FastPeer::next(feedback, 20s));
+  };
+  const Point2 there{2.8, 2.8};
+  EXPECT_EQ(send_to(there), "moving");
+  EXPECT_EQ(state_of(FastPeer::next(result, 60s)), "arrived");
+  EXPECT_LT(distance(robot_is().position(), there), 0.3);
+
+  Point2 elsewhere{5.2, 2.0};
+  while (world_.clearance_m(elsewhere) < 0.5) elsewhere.x_m += 0.1;
+  // Carried to the other room, it is found there, and sent back it comes.
+  const std::size_t before = node_->counts().pictures;
+  while (FastPeer::waiting(pose) > 0) (void)FastPeer::next(pose, 1s);
+  FastPeer::write(set_pose,
+                  recordings::ros::PoseStamped{
+                      {0, "map"}, recordings::ros::pose_of({elsewhere.x_m, elsewhere.y_m, 2.0})});
+  EXPECT_TRUE(comes_true([&] {
+    const auto told = FastPeer::next(pose, 1s);
+    return !told.empty() && node_->counts().pictures > before &&
+           distance(recordings::ros::planar(
+                        read<recordings::ros::PoseWithCovarianceStamped>(told).pose.pose)
+                        .position(),
+                    elsewhere) < 0.3;
+  }));
+
+  // Its pictures end in the middle of the way: so does its motion.
+  while (FastPeer::waiting(velocity) > 0) (void)FastPeer::next(velocity, 1s);
+  while (FastPeer::waiting(feedback) > 0) (void)FastPeer::next(feedback, 1s);
+  EXPECT_EQ(send_to({elsewhere.x_m + 1.5, elsewhere.y_m}), "moving");
+  bool moved = false;
+  for (int i = 0; i < 200 && !moved; ++i) {
+    const auto cdr = FastPeer::next(velocity, 5s);
+    ASSERT_FALSE(cdr.empty()) << state_of(FastPeer::next(result, 100ms));
+    const auto twist = read<recordings::ros::Twist>(cdr);
+    moved = twist.linear.x != 0.0 || twist.angular.z != 0.0;
+  }
+  EXPECT_TRUE(moved);
+  robot.reset();
+  bool stands = false;
+  for (int i = 0; i < 200 && !stands; ++i) {
+    const auto cdr = FastPeer::next(velocity, 5s);
+    ASSERT_FALSE(cdr.empty());
+    const auto twist = read<recordings::ros::Twist>(cdr);
+    stands = twist.linear.x == 0.0 && twist.angular.z == 0.0;
+  }
+  EXPECT_TRUE(stands);
+  EXPECT_TRUE(comes_true([&] { return notes_with("the robot is stopped") == 1; }));
+  stop();
+  EXPECT_EQ(state_of(FastPeer::next(result, 5s)), "the node ends");
+}
+
+TEST_F(LocalisationNodeOnTheWire, LearnsADriveRepeatsItAndGoesOnAfterItDied) {
+  const fs::path drive = *folder_ / "drive.panonav";
+  const fs::path mission = drive.string() + ".mission";
+  constexpr double time_factor = 4.0;
+  DrivenRobot robot(world_, picture, time_factor);
+  LocalisationNodeSetup setup{.memory = drive, .node = {.use_sim_time = true}};
+  setup.teacher =
+      TeacherOptions{.pictures = source(), .route = "drive", .signature = {}, .preprocessing = {}};
+  start(setup);
+  auto& velocity = peer_.talk<recordings::ros::Twist>("cmd_vel");
+  auto& set_pose = peer_.talk<recordings::ros::PoseStamped>("set_pose");
+  auto& truth = peer_.listen<recordings::ros::PoseStamped>("ground_truth", false);
+  auto& result = peer_.listen<recordings::ros::DiagnosticArray>("panonav/goal/result");
+  ASSERT_TRUE(peer_.all_matched(10s));
+  const auto robot_is = [&] { return newest_pose(truth); };
+  ASSERT_TRUE(comes_true([&] { return node_->counts().pictures >= 3; }));
+  EXPECT_EQ(ask("repeat drive").find("refused: "), 0U);
+  for (int i = 0; i < 70; ++i) {  // a bend of 2.3 m
+    FastPeer::write(velocity,
+                    recordings::ros::Twist{{0.3, 0.0, 0.0}, {0.0, 0.0, i < 35 ? -0.05 : 0.3}});
+    std::this_thread::sleep_for(28ms);
+  }
+  FastPeer::write(velocity, recordings::ros::Twist{});
+  std::this_thread::sleep_for(200ms);
+  const Pose2 end = robot_is();
+  EXPECT_GT(end.x_m, 2.0);
+  EXPECT_EQ(ask("finish"), "finish done");
+  EXPECT_GE(node_->counts().taught, 8U);
+
+  const auto carried_back = [&] {
+    FastPeer::write(set_pose, recordings::ros::PoseStamped{
+                                  {0, "map"}, recordings::ros::pose_of({0.8, 0.8, 0.2})});
+    std::this_thread::sleep_for(100ms);
+  };
+  const auto arrives = [&] {
+    const auto cdr = FastPeer::next(result, 30s);
+    EXPECT_FALSE(cdr.empty()) << (notes_.empty() ? "" : notes_.back());
+    if (cdr.empty()) return false;
+    EXPECT_EQ(read<recordings::ros::DiagnosticArray>(cdr).status.at(0).message, "arrived");
+    EXPECT_LT(distance(robot_is().position(), end.position()), 0.25);
+    return true;
+  };
+  carried_back();
+  EXPECT_EQ(ask("repeat drive"), "repeat done");
+  EXPECT_TRUE(arrives());
+  EXPECT_FALSE(fs::exists(mission));
+
+  // What a node leaves that is killed on its way is there when another one starts.
+  carried_back();
+  EXPECT_EQ(ask("repeat drive"), "repeat done");
+  ASSERT_TRUE(comes_true([&] { return fs::exists(mission) && robot_is().x_m > 1.3; }));
+  const auto left = read_file(mission, 1000);
+  stop();
+  EXPECT_FALSE(fs::exists(mission));
+  EXPECT_EQ(read<recordings::ros::DiagnosticArray>(FastPeer::next(result, 5s)).status.at(0).message,
+            "the node ends");
+  write_file(mission, left);
+  setup.teacher.reset();
+  start(setup);
+  EXPECT_TRUE(arrives());
+  stop();
+
+  // One of a node that died long ago, or half of one, sends no robot anywhere.
+  write_file(mission, left);
+  fs::last_write_time(mission, fs::file_time_type::clock::now() - 60s);
+  start(setup);
+  EXPECT_EQ(notes_with("the robot is not sent on"), 1U);
+  EXPECT_FALSE(fs::exists(mission));
+  stop();
+  write_file(mission, std::string_view("1 2 3 repeat"));
+  start(setup);
+  EXPECT_EQ(notes_with("is damaged"), 1U);
+}
+
+}  // namespace
+}  // namespace panonav::ros2
