@@ -17,7 +17,7 @@ using Numbers = std::span<const std::int64_t>;
 // The rows of a memory that a file keeps, as v; $1 is the memory, $2 and $3 are the areas' columns
 // and rows. Bare columns are compared with bare numbers: row-level security lets an index be used
 // only where nothing but such comparisons, which cannot fail, sees the rows.
-std::string kept_views(const KeptAreas& areas) {
+std::string kept_views_sql(const KeptAreas& areas) {
   if (!areas) return "panonav.views v WHERE v.memory = $1";
   return "(SELECT (10 * c)::float8 left_m, (10 * c + 10)::float8 right_m, (10 * r)::float8 "
          "bottom_m, (10 * r + 10)::float8 top_m FROM unnest($2, $3) u(c, r) OFFSET 0) q JOIN "
@@ -25,7 +25,7 @@ std::string kept_views(const KeptAreas& areas) {
          "q.right_m AND v.y_m >= q.bottom_m AND v.y_m < q.top_m WHERE true";
 }
 
-std::string kept_links(const KeptAreas& areas) {
+std::string kept_links_sql(const KeptAreas& areas) {
   if (!areas) return "panonav.links l WHERE l.memory = $1";
   return "panonav.links l WHERE l.memory = $1 AND l.a IN (SELECT id FROM kept) AND l.b IN (SELECT "
          "id FROM kept)";
@@ -41,7 +41,7 @@ void add_areas(PostgresqlValues& values, const KeptAreas& areas) {
   values.add(Numbers(columns)).add(Numbers(rows));
 }
 
-Blocks blocks_in(const PostgresqlRows& rows) {
+Blocks to_blocks(const PostgresqlRows& rows) {
   Blocks blocks;
   for (int i = 0; i < rows.size(); ++i) {
     blocks[rows.integer(i, 0)] = {rows.integer(i, 1), rows.integer(i, 2)};
@@ -104,7 +104,7 @@ void ServerExchange::refuse_removed() const {
                   "was removed from its server, or belongs to another fleet now");
 }
 
-ServerExchange::State ServerExchange::state() {
+ServerExchange::State ServerExchange::read_state() {
   const PostgresqlRows rows =
       connection().run("SELECT identity, last_view FROM panonav.memories WHERE id = $1", values());
   if (rows.size() == 0) refuse_removed();
@@ -123,8 +123,8 @@ std::vector<Upload> ServerExchange::uploads_in(const PostgresqlRows& rows) const
   return uploads;
 }
 
-std::vector<Upload> ServerExchange::uploads(const std::string& file,
-                                            std::span<const ViewId> views) {
+std::vector<Upload> ServerExchange::read_uploads(const std::string& file,
+                                                 std::span<const ViewId> views) {
   if (views.empty()) return {};
   const auto numbers = numbers_of(views);
   return uploads_in(connection().run(
@@ -133,8 +133,8 @@ std::vector<Upload> ServerExchange::uploads(const std::string& file,
       values().add(std::string_view(file)).add(Numbers(numbers))));
 }
 
-std::vector<Upload> ServerExchange::settled_uploads(const std::string& file,
-                                                    std::span<const ViewId> views) {
+std::vector<Upload> ServerExchange::read_settled_uploads(const std::string& file,
+                                                         std::span<const ViewId> views) {
   const auto numbers = numbers_of(views);
   return uploads_in(
       connection().run(upload_fields + std::string("panonav.uploads_of($1, $2, $3) u"),
@@ -144,7 +144,7 @@ std::vector<Upload> ServerExchange::settled_uploads(const std::string& file,
 constexpr const char* server_view_fields =
     "SELECT v.id, v.name, v.x_m, v.y_m, v.heading_rad, v.stamp_s, v.checksum";
 
-std::vector<ServerView> ServerExchange::named(std::span<const std::string> names) {
+std::vector<ServerView> ServerExchange::find_views_by_name(std::span<const std::string> names) {
   if (names.empty()) return {};
   return views_in(
       connection().run(std::string(server_view_fields) +
@@ -152,7 +152,7 @@ std::vector<ServerView> ServerExchange::named(std::span<const std::string> names
                        values().add(names)));
 }
 
-std::vector<ServerView> ServerExchange::infos(std::span<const ViewId> ids) {
+std::vector<ServerView> ServerExchange::read_infos(std::span<const ViewId> ids) {
   if (ids.empty()) return {};
   const auto numbers = numbers_of(ids);
   return views_in(connection().run(
@@ -161,7 +161,7 @@ std::vector<ServerView> ServerExchange::infos(std::span<const ViewId> ids) {
       values().add(Numbers(numbers))));
 }
 
-std::map<ViewId, std::int64_t> ServerExchange::checksums(std::span<const ViewId> views) {
+std::map<ViewId, std::int64_t> ServerExchange::read_checksums(std::span<const ViewId> views) {
   if (views.empty()) return {};
   const auto numbers = numbers_of(views);
   return checksums_in(
@@ -169,47 +169,47 @@ std::map<ViewId, std::int64_t> ServerExchange::checksums(std::span<const ViewId>
                        values().add(Numbers(numbers))));
 }
 
-Blocks ServerExchange::view_blocks(const KeptAreas& areas) {
-  PostgresqlValues given = values();
-  add_areas(given, areas);
-  return blocks_in(connection().run("SELECT " + block_of_v +
+Blocks ServerExchange::compute_view_blocks(const KeptAreas& areas) {
+  PostgresqlValues bound = values();
+  add_areas(bound, areas);
+  return to_blocks(connection().run("SELECT " + block_of_v +
                                         ", count(*), bit_xor(v.checksum) FROM " +
-                                        kept_views(areas) + " GROUP BY 1",
-                                    given));
+                                        kept_views_sql(areas) + " GROUP BY 1",
+                                    bound));
 }
 
-std::map<ViewId, std::int64_t> ServerExchange::checksums_in(const KeptAreas& areas,
-                                                            std::span<const std::int64_t> blocks) {
+std::map<ViewId, std::int64_t> ServerExchange::read_checksums_in_blocks(
+    const KeptAreas& areas, std::span<const std::int64_t> blocks) {
   if (blocks.empty()) return {};
-  PostgresqlValues given = values();
-  add_areas(given, areas);
-  return checksums_in(connection().run("SELECT v.id, v.checksum FROM " + kept_views(areas) +
+  PostgresqlValues bound = values();
+  add_areas(bound, areas);
+  return checksums_in(connection().run("SELECT v.id, v.checksum FROM " + kept_views_sql(areas) +
                                            " AND " + block_of_v + " = ANY(" +
                                            (areas ? "$4)" : "$2)"),
-                                       given.add(blocks)));
+                                       bound.add(blocks)));
 }
 
-Blocks ServerExchange::link_blocks(const KeptAreas& areas) {
-  PostgresqlValues given = values();
-  add_areas(given, areas);
-  return blocks_in(connection().run(
-      (areas ? "WITH kept AS MATERIALIZED (SELECT v.id FROM " + kept_views(areas) + ") " : "") +
-          "SELECT " + block_of_l + ", count(*), bit_xor(l.checksum) FROM " + kept_links(areas) +
+Blocks ServerExchange::compute_link_blocks(const KeptAreas& areas) {
+  PostgresqlValues bound = values();
+  add_areas(bound, areas);
+  return to_blocks(connection().run(
+      (areas ? "WITH kept AS MATERIALIZED (SELECT v.id FROM " + kept_views_sql(areas) + ") " : "") +
+          "SELECT " + block_of_l + ", count(*), bit_xor(l.checksum) FROM " + kept_links_sql(areas) +
           " GROUP BY 1",
-      given));
+      bound));
 }
 
-std::vector<Link> ServerExchange::links_in(const KeptAreas& areas,
-                                           std::span<const std::int64_t> blocks) {
+std::vector<Link> ServerExchange::read_links_in_blocks(const KeptAreas& areas,
+                                                       std::span<const std::int64_t> blocks) {
   std::vector<Link> links;
   if (blocks.empty()) return links;
-  PostgresqlValues given = values();
-  add_areas(given, areas);
+  PostgresqlValues bound = values();
+  add_areas(bound, areas);
   const PostgresqlRows rows = connection().run(
-      (areas ? "WITH kept AS MATERIALIZED (SELECT v.id FROM " + kept_views(areas) + ") " : "") +
-          "SELECT l.a, l.b, l.kind, l.checksum FROM " + kept_links(areas) + " AND " + block_of_l +
-          " = ANY(" + (areas ? "$4)" : "$2)"),
-      given.add(blocks));
+      (areas ? "WITH kept AS MATERIALIZED (SELECT v.id FROM " + kept_views_sql(areas) + ") " : "") +
+          "SELECT l.a, l.b, l.kind, l.checksum FROM " + kept_links_sql(areas) + " AND " +
+          block_of_l + " = ANY(" + (areas ? "$4)" : "$2)"),
+      bound.add(blocks));
   for (int i = 0; i < rows.size(); ++i) {
     links.push_back(tables_.checked(
         LinkRow{id_in(rows, i, 0), id_in(rows, i, 1), rows.integer(i, 2), rows.integer(i, 3)}));
@@ -217,7 +217,8 @@ std::vector<Link> ServerExchange::links_in(const KeptAreas& areas,
   return links;
 }
 
-std::map<ViewId, std::int64_t> ServerExchange::signatures(std::span<const ViewId> views) {
+std::map<ViewId, std::int64_t> ServerExchange::read_signature_checksums(
+    std::span<const ViewId> views) {
   std::map<ViewId, std::int64_t> signatures;
   if (views.empty()) return signatures;
   const auto numbers = numbers_of(views);
@@ -228,8 +229,8 @@ std::map<ViewId, std::int64_t> ServerExchange::signatures(std::span<const ViewId
   return signatures;
 }
 
-std::vector<WholeServerView> ServerExchange::whole(std::span<const ViewId> ids) {
-  std::vector<WholeServerView> views;
+std::vector<FullServerView> ServerExchange::read_full_views(std::span<const ViewId> ids) {
+  std::vector<FullServerView> views;
   if (ids.empty()) return views;
   const auto numbers = numbers_of(ids);
   RecordBytes scratch;
@@ -250,7 +251,7 @@ std::vector<WholeServerView> ServerExchange::whole(std::span<const ViewId> ids) 
             found.checksum != view_checksum(scratch, found.id, found.info, signature)) {
           fail("view ");
         }
-        WholeServerView whole{found.id, {std::move(found.info), {}, {}, {}}, found.checksum};
+        FullServerView whole{found.id, {std::move(found.info), {}, {}, {}}, found.checksum};
         const std::size_t half = signature.size() / 2;
         whole.view.signature.magnitudes.assign(signature.begin(), signature.begin() + half);
         whole.view.signature.phases.assign(signature.begin() + half, signature.end());
@@ -266,7 +267,7 @@ std::vector<WholeServerView> ServerExchange::whole(std::span<const ViewId> ids) 
   return views;
 }
 
-void ServerExchange::stage(std::span<const NewView> views) {
+void ServerExchange::stage_views(std::span<const NewView> views) {
   connection().execute(
       "CREATE TEMPORARY TABLE IF NOT EXISTS panonav_staged(number bigint, name text COLLATE \"C\", "
       "x_m double precision, y_m double precision, heading_rad double precision, stamp_s double "
@@ -313,8 +314,8 @@ std::uint32_t ServerExchange::reserve_ids(std::size_t count) {
   return static_cast<std::uint32_t>(last);
 }
 
-std::vector<Upload> ServerExchange::take_views(const std::string& file, std::int64_t sent,
-                                               std::span<const Staged> staged) {
+std::vector<Upload> ServerExchange::submit_views(const std::string& file, std::int64_t sent,
+                                                 std::span<const Staged> staged) {
   std::vector<std::int64_t> views, signatures, ids, local_checksums, server_checksums, numbers,
       thumbnails, features;
   for (const Staged& view : staged) {
@@ -348,8 +349,8 @@ std::vector<Upload> ServerExchange::take_views(const std::string& file, std::int
           .add(Numbers(features))));
 }
 
-std::vector<Upload> ServerExchange::take_changes(const std::string& file, std::int64_t sent,
-                                                 std::span<const ChangedView> changes) {
+std::vector<Upload> ServerExchange::submit_changes(const std::string& file, std::int64_t sent,
+                                                   std::span<const ChangedView> changes) {
   std::vector<std::int64_t> views, signatures, ids, local_checksums, former, server_checksums;
   CopyRows rows;
   for (const ChangedView& view : changes) {
@@ -391,7 +392,8 @@ std::vector<Upload> ServerExchange::take_changes(const std::string& file, std::i
           .add(Numbers(server_checksums))));
 }
 
-std::vector<ViewId> ServerExchange::take_removals(const std::map<ViewId, std::int64_t>& checksums) {
+std::vector<ViewId> ServerExchange::submit_removals(
+    const std::map<ViewId, std::int64_t>& checksums) {
   std::vector<std::int64_t> ids, sums;
   for (const auto& [id, checksum] : checksums) {
     ids.push_back(id.value);
@@ -413,8 +415,8 @@ std::vector<ViewId> ServerExchange::take_removals(const std::map<ViewId, std::in
   return removed;
 }
 
-std::size_t ServerExchange::take_links(std::span<const Link> added,
-                                       std::span<const ChangedLink> changed) {
+std::size_t ServerExchange::submit_links(std::span<const Link> added,
+                                         std::span<const ChangedLink> changed) {
   // a, b, kind, checksum; a, b, former kind, kind, checksum; a, b
   std::array<std::vector<std::int64_t>, 11> columns;
   const auto kind_of = [](LinkKind kind) { return std::int64_t{static_cast<int>(kind)}; };
@@ -426,18 +428,18 @@ std::size_t ServerExchange::take_links(std::span<const Link> added,
   }
   for (const ChangedLink& link : changed) {
     const Link& former = link.former;
-    const std::size_t first = link.wanted ? 4 : 9;
+    const std::size_t first = link.new_kind ? 4 : 9;
     columns[first].push_back(former.a.value);
     columns[first + 1].push_back(former.b.value);
-    if (!link.wanted) continue;
+    if (!link.new_kind) continue;
     columns[6].push_back(kind_of(former.kind));
-    columns[7].push_back(kind_of(*link.wanted));
-    columns[8].push_back(link_checksum({former.a, former.b, *link.wanted}));
+    columns[7].push_back(kind_of(*link.new_kind));
+    columns[8].push_back(link_checksum({former.a, former.b, *link.new_kind}));
   }
-  PostgresqlValues given = values();
-  for (const auto& column : columns) given.add(Numbers(column));
+  PostgresqlValues bound = values();
+  for (const auto& column : columns) bound.add(Numbers(column));
   const PostgresqlRows rows = connection().run(
-      "SELECT panonav.take_links($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12)", given);
+      "SELECT panonav.take_links($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12)", bound);
   return static_cast<std::size_t>(rows.integer(0, 0));
 }
 

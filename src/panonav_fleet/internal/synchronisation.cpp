@@ -46,13 +46,13 @@ Synchronisation::Synchronisation(SqliteTables& file, MemoryHeader header, Server
 }
 
 SynchronisationReport Synchronisation::run() {
-  join();
+  match_with_server();
   constexpr int max_rounds = 2;  // the second uploads what a restored server had lost
   for (int round = 0; round < max_rounds; ++round) {
-    lost_ = false;
-    read_file();
-    ask_for_answers();
-    prepare();
+    needs_reupload_ = false;
+    load_file_state();
+    resolve_unacknowledged_uploads();
+    prepare_upload();
     if (server_.may_add()) {
       upload_views();
       upload_changes();
@@ -60,14 +60,14 @@ SynchronisationReport Synchronisation::run() {
       upload_links();
     }
     download();
-    if (!lost_ || !server_.may_add()) break;
+    if (!needs_reupload_ || !server_.may_add()) break;
   }
   return report_;
 }
 
-void Synchronisation::join() {
+void Synchronisation::match_with_server() {
   stored_state_ = state_ = read_synchronised_state(file_);
-  const ServerExchange::State there = server_.state();
+  const ServerExchange::State there = server_.read_state();
   if (state_.memory.empty()) {
     const auto reading = server_.tables().transaction(Kind::reading);
     require_comparable(header_, header_from(server_.tables().settings()), server_.tables().path());
@@ -79,46 +79,46 @@ void Synchronisation::join() {
   }
   if (state_.file.empty()) state_.file = random_identity(file_);
   state_.memory = there.identity;
-  sent_ = random_number(file_);
-  restored_ = there.last_view < state_.last_view;
+  upload_number_ = random_number(file_);
+  is_server_older_ = there.last_view < state_.last_view;
 }
 
-void Synchronisation::read_file() {
+void Synchronisation::load_file_state() {
   const auto reading = file_.transaction(Kind::reading);
-  views_ = read_synchronised_views(file_);
+  synchronised_ = read_synchronised_views(file_);
   stored_links_ = links_ = read_synchronised_links(file_);
-  local_ = read_view_checksums(file_);
-  by_server_.clear();
-  for (const auto& [view, row] : views_) {
-    if (row.server_view) by_server_[*row.server_view] = view;
+  local_checksums_ = read_view_checksums(file_);
+  local_by_server_id_.clear();
+  for (const auto& [view, row] : synchronised_) {
+    if (row.server_view) local_by_server_id_[*row.server_view] = view;
   }
-  changed_.clear();
+  unsaved_.clear();
 }
 
-void Synchronisation::put(ViewId view, const SynchronisedView& row) {
-  views_[view] = row;
-  if (row.server_view) by_server_[*row.server_view] = view;
-  changed_.insert(view);
+void Synchronisation::set_row(ViewId view, const SynchronisedView& row) {
+  synchronised_[view] = row;
+  if (row.server_view) local_by_server_id_[*row.server_view] = view;
+  unsaved_.insert(view);
 }
 
-void Synchronisation::drop(ViewId view) {
-  const auto found = views_.find(view);
-  if (found == views_.end()) return;
-  if (found->second.server_view) by_server_.erase(*found->second.server_view);
-  views_.erase(found);
-  changed_.insert(view);
+void Synchronisation::drop_row(ViewId view) {
+  const auto found = synchronised_.find(view);
+  if (found == synchronised_.end()) return;
+  if (found->second.server_view) local_by_server_id_.erase(*found->second.server_view);
+  synchronised_.erase(found);
+  unsaved_.insert(view);
 }
 
-bool Synchronisation::is_written() const {
-  return changed_.empty() && links_ == stored_links_ && state_ == stored_state_;
+bool Synchronisation::is_stored() const {
+  return unsaved_.empty() && links_ == stored_links_ && state_ == stored_state_;
 }
 
-void Synchronisation::commit(MemoryTables::Transaction& writing) {
+void Synchronisation::store_and_commit(MemoryTables::Transaction& writing) {
   state_.number = random_number(file_);
   write_synchronised_state(file_, state_);
-  for (const ViewId view : std::exchange(changed_, {})) {
-    const auto found = views_.find(view);
-    if (found == views_.end()) {
+  for (const ViewId view : std::exchange(unsaved_, {})) {
+    const auto found = synchronised_.find(view);
+    if (found == synchronised_.end()) {
       erase_synchronised_view(file_, view);
     } else {
       write_synchronised_view(file_, view, found->second);
@@ -137,17 +137,17 @@ void Synchronisation::commit(MemoryTables::Transaction& writing) {
   stored_state_ = state_;
 }
 
-std::unique_ptr<MemoryTables::Transaction> Synchronisation::change_file() {
+std::unique_ptr<MemoryTables::Transaction> Synchronisation::begin_file_change() {
   auto writing = file_.transaction(Kind::writing);
   if (read_synchronised_state(file_).number != stored_state_.number) {
     throw FileError(file_.path().string(), "is being synchronised by another program, too");
   }
-  local_ = read_view_checksums(file_);
+  local_checksums_ = read_view_checksums(file_);
   return writing;
 }
 
-std::optional<Synchronisation::LocalRow> Synchronisation::read_row(ViewId view) {
-  if (!local_.contains(view)) return std::nullopt;
+std::optional<Synchronisation::LocalRow> Synchronisation::read_local_row(ViewId view) {
+  if (!local_checksums_.contains(view)) return std::nullopt;
   LocalRow read;
   file_.read_views(std::span(&view, 1), [&](const ViewRow& found) {
     const ViewRow& row = file_.checked(found, header_.shape, scratch_);
@@ -156,10 +156,11 @@ std::optional<Synchronisation::LocalRow> Synchronisation::read_row(ViewId view) 
   return read;
 }
 
-void Synchronisation::write_info(ViewId view, const ReferenceInfo& info, const Bytes& signature) {
+void Synchronisation::write_local_info(ViewId view, const ReferenceInfo& info,
+                                       const Bytes& signature) {
   const std::int64_t checksum = view_checksum(scratch_, view, info, signature);
   file_.write_info(view, info, checksum);
-  local_[view] = checksum;
+  local_checksums_[view] = checksum;
 }
 
 void Synchronisation::clear_recordings() {
@@ -168,13 +169,13 @@ void Synchronisation::clear_recordings() {
   if (settings.contains(key)) file_.write_setting(key, std::string());
 }
 
-std::string Synchronisation::own_name(const std::string& name, int count) const {
+std::string Synchronisation::robot_prefixed_name(const std::string& name, int count) const {
   return server_.robot() + "/" + name +
          (count == 1 ? std::string() : " (" + std::to_string(count) + ")");
 }
 
-std::uint32_t Synchronisation::require_same_memory() {
-  const ServerExchange::State there = server_.state();
+std::uint32_t Synchronisation::read_last_view_id() {
+  const ServerExchange::State there = server_.read_state();
   if (there.identity != state_.memory) {
     throw FileError(server_.tables().path().string(), "was replaced by another memory meanwhile");
   }
@@ -184,13 +185,13 @@ std::uint32_t Synchronisation::require_same_memory() {
   return static_cast<std::uint32_t>(there.last_view);
 }
 
-SynchronisedLinks Synchronisation::local_links() {
+SynchronisedLinks Synchronisation::read_local_links() {
   SynchronisedLinks links;
   file_.read_links([&](const LinkRow& row) {
     const Link link = file_.checked(row);
-    const auto a = views_.find(link.a);
-    const auto b = views_.find(link.b);
-    if (a == views_.end() || b == views_.end()) return;
+    const auto a = synchronised_.find(link.a);
+    const auto b = synchronised_.find(link.b);
+    if (a == synchronised_.end() || b == synchronised_.end()) return;
     if (!a->second.server_view || !b->second.server_view) return;
     links[std::minmax(*a->second.server_view, *b->second.server_view)] = link.kind;
   });
@@ -198,12 +199,12 @@ SynchronisedLinks Synchronisation::local_links() {
 }
 
 bool Synchronisation::is_in_file(ViewId server_view) const {
-  const auto found = by_server_.find(server_view);
-  return found != by_server_.end() && local_.contains(found->second);
+  const auto found = local_by_server_id_.find(server_view);
+  return found != local_by_server_id_.end() && local_checksums_.contains(found->second);
 }
 
-void Synchronisation::forget(ViewId server_view) {
-  drop(by_server_.at(server_view));
+void Synchronisation::forget_server_view(ViewId server_view) {
+  drop_row(local_by_server_id_.at(server_view));
   std::erase_if(links_, [&](const auto& link) {
     return link.first.first == server_view || link.first.second == server_view;
   });

@@ -17,9 +17,9 @@
 
 namespace panonav::fleet {
 
-/// One synchronisation of an open file with an open memory. What the members hold is what is in the
-/// file or about to be written there; `changed_` and `stored_links_` tell which. Members are in
-/// three sources: what both directions need, the upload, and the download.
+/// Synchronises an open file with an open memory on a server, once. The members hold what is stored
+/// in the file or about to be; `unsaved_` and `stored_links_` tell which. Functions are in three
+/// sources: what both directions need, the upload, and the download.
 class Synchronisation {
  public:
   Synchronisation(SqliteTables& file, MemoryHeader header, ServerExchange& server,
@@ -30,8 +30,8 @@ class Synchronisation {
  private:
   using Bytes = std::vector<std::uint8_t>;
   using Kind = MemoryTables::Kind;
-  static constexpr std::size_t views_at_once = 256;  // some megabytes on their way
-  static constexpr std::size_t rows_at_once = 2000;
+  static constexpr std::size_t views_per_batch = 256;  ///< chosen: some megabytes in a message
+  static constexpr std::size_t rows_per_query = 2000;  ///< chosen: some 100 kB in a message
   struct LocalRow {
     ReferenceInfo info;
     std::int64_t checksum = 0;
@@ -40,122 +40,134 @@ class Synchronisation {
 
   // synchronisation.cpp
 
-  /// Which memory the file belongs to.
-  void join();
-  void read_file();
-  void put(ViewId view, const SynchronisedView& row);
-  void drop(ViewId view);
-  [[nodiscard]] bool is_written() const;
-  /// What is known now goes into the file, with what else the transaction holds.
-  void commit(MemoryTables::Transaction& writing);
-  /// A writing transaction of the file that nobody else's synchronisation came before.
-  std::unique_ptr<MemoryTables::Transaction> change_file();
-  /// Empty where the view is not there any more.
-  std::optional<LocalRow> read_row(ViewId view);
-  void write_info(ViewId view, const ReferenceInfo& info, const Bytes& signature);
+  /// Throws FileError if the file belongs to another memory, ContractError if its views cannot be
+  /// compared with the server's.
+  void match_with_server();
+  /// Reads what the file knows of the server, and the checksums of its views.
+  void load_file_state();
+  void set_row(ViewId view, const SynchronisedView& row);
+  void drop_row(ViewId view);
+  /// True if the file holds all that is known.
+  [[nodiscard]] bool is_stored() const;
+  /// Stores what is known, with what else the transaction holds.
+  void store_and_commit(MemoryTables::Transaction& writing);
+  /// Begins a writing transaction of the file. Throws FileError if another program synchronised the
+  /// file meanwhile.
+  std::unique_ptr<MemoryTables::Transaction> begin_file_change();
+  /// Returns nullopt if the file no longer has the view.
+  std::optional<LocalRow> read_local_row(ViewId view);
+  void write_local_info(ViewId view, const ReferenceInfo& info, const Bytes& signature);
+  /// Empties the parameter with the marks of memorised recordings.
   void clear_recordings();
-  [[nodiscard]] std::string own_name(const std::string& name, int count) const;
-  /// The memory is still the same. Returns the last id that was given.
-  std::uint32_t require_same_memory();
-  /// The file's links whose ends the server has, by its ids.
-  SynchronisedLinks local_links();
+  /// Returns "ROBOT/NAME", with " (COUNT)" from the second on.
+  [[nodiscard]] std::string robot_prefixed_name(const std::string& name, int count) const;
+  /// Returns the last id that the server gave to a view. Throws FileError if another memory has
+  /// replaced the one of `match_with_server`.
+  std::uint32_t read_last_view_id();
+  /// Returns the file's links whose ends the server has, by the server's ids.
+  SynchronisedLinks read_local_links();
   [[nodiscard]] bool is_in_file(ViewId server_view) const;
-  void forget(ViewId server_view);
+  void forget_server_view(ViewId server_view);
 
   // synchronisation_upload.cpp
 
-  /// What was sent before and not answered: whether the server took it. Under the lock, as what a
-  /// killed process sent may be on its way still.
-  void ask_for_answers();
-  /// The server has the view. `of_this_sending`: what it took is what was sent then; otherwise the
-  /// file is older than what it once sent, and the server's holds, as if it had changed since.
-  static void take_answer(SynchronisedView& row, const Upload& upload, bool of_this_sending);
-  /// What there is to upload, under names that are free on the server; noted in the file before it
-  /// is sent.
-  void prepare();
+  /// Finds out whether the server accepted what was sent before without an answer. The server
+  /// answers under its lock, as messages of a killed process may still arrive.
+  void resolve_unacknowledged_uploads();
+  /// Notes that the server has the view. `is_current_upload`: it accepted what was sent last;
+  /// otherwise the file is older than what it once sent, and the server's row counts as changed
+  /// since.
+  static void acknowledge(SynchronisedView& row, const Upload& upload, bool is_current_upload);
+  /// Decides what is uploaded, gives it names that are free on the server, and notes it in the file
+  /// before it is sent.
+  void prepare_upload();
   /// Finds what has changed in the file and this login may upload: the views with their names. Sets
-  /// `removed_`.
+  /// `removed_locally_`.
   std::map<ViewId, std::string> find_local_changes();
-  /// Views of the server that have one of these names, by name.
-  std::map<std::string, ServerView> views_with_names(const std::map<ViewId, std::string>& names);
+  /// Returns the server's views that have one of these names, by name.
+  std::map<std::string, ServerView> find_server_views(const std::map<ViewId, std::string>& names);
   /// Notes in the file that the view is being sent, or that the server already has it as `same`.
-  void note_as_sent(ViewId view, const LocalRow& row, const ServerView* same);
-  [[nodiscard]] bool is_at(ViewId view, ViewId server_view) const;
-  /// Whether the view of that name on the server is this one, which nothing is known of yet: their
-  /// signatures are the same.
-  bool adopts(ViewId view, const ServerView& other);
-  SynchronisedView adopted(ViewId view, const LocalRow& row, ViewId server_view,
-                           const ReferenceInfo& info, std::int64_t checksum);
-  /// "ROBOT/NAME", which neither side has.
-  std::map<ViewId, std::string> free_names(std::vector<std::pair<ViewId, std::string>> nameless);
-  /// Views of this synchronisation: new ones, or changed ones.
-  std::vector<ViewId> sent_views(bool are_new) const;
+  void mark_as_sent(ViewId view, const LocalRow& row, const ServerView* same);
+  [[nodiscard]] bool is_synchronised_as(ViewId view, ViewId server_view) const;
+  /// True if neither view is known to the other side yet and their signatures are the same.
+  bool is_same_view(ViewId view, const ServerView& other);
+  /// Makes the row of a view that both sides had before they knew of each other.
+  SynchronisedView make_adopted_row(ViewId view, const LocalRow& row, ViewId server_view,
+                                    const ReferenceInfo& info, std::int64_t checksum);
+  /// Finds names "ROBOT/NAME" that neither side has.
+  std::map<ViewId, std::string> find_free_names(
+      std::vector<std::pair<ViewId, std::string>> without_name);
+  /// Returns the views that this synchronisation sends: new ones, or changed ones.
+  std::vector<ViewId> find_sent_views(bool are_new) const;
   void upload_views();
-  NewView whole(ViewId view, LocalRow row);
-  void upload_part(const std::vector<ViewId>& ids, const std::vector<NewView>& views);
+  NewView to_new_view(ViewId view, LocalRow row);
+  void upload_batch(const std::vector<ViewId>& ids, const std::vector<NewView>& views);
   void upload_changes();
   void upload_removals();
-  /// Ascending.
-  std::vector<ViewId> remove_there(const std::map<ViewId, std::int64_t>& checksums);
+  /// Removes views that still have these checksums. Returns which, ascending.
+  std::vector<ViewId> remove_on_server(const std::map<ViewId, std::int64_t>& checksums);
   void upload_links();
 
   // synchronisation_download.cpp
 
-  static std::vector<std::int64_t> differing(const Blocks& a, const Blocks& b);
-  /// What others did, as one snapshot of the server shows it.
+  static std::vector<std::int64_t> find_differing_blocks(const Blocks& a, const Blocks& b);
+  /// Applies what others did, as one snapshot of the server shows it.
   void download();
-  /// Of views whose rows on the server are others now: what is known of them there, and ids that a
-  /// restored server has given to another view.
-  void find_changes(const std::vector<ViewId>& changed, std::vector<ServerView>& changes,
-                    std::vector<ViewId>& reused);
-  /// Of views that are gone: those that the server has lost, instead of somebody having removed
-  /// them.
-  std::set<ViewId> lost_by_server(const std::vector<ViewId>& gone);
-  void take_changes(const std::vector<ViewId>& gone, const std::set<ViewId>& lost,
-                    const std::vector<ServerView>& changes, const std::vector<ViewId>& reused);
-  /// Removes views that are gone on the server, and forgets ids that it gave again or lost. Returns
-  /// whether the file lost any.
-  bool remove_from_file(const std::vector<ViewId>& gone, const std::set<ViewId>& lost,
+  /// Sorts views whose rows on the server have changed into changed views (`changes`) and ids that
+  /// a restored server has given to another view (`reused`).
+  void classify_changed_views(const std::vector<ViewId>& changed, std::vector<ServerView>& changes,
+                              std::vector<ViewId>& reused);
+  /// Returns which of the views that the server does not have it has lost, as after a restored
+  /// backup; the others were removed by somebody.
+  std::set<ViewId> find_lost_views(const std::vector<ViewId>& removed);
+  void apply_server_changes(const std::vector<ViewId>& removed, const std::set<ViewId>& lost,
+                            const std::vector<ServerView>& changes,
+                            const std::vector<ViewId>& reused);
+  /// Removes views that were removed on the server, and forgets ids that it lost or gave again.
+  /// Returns true if the file lost any.
+  bool remove_from_file(const std::vector<ViewId>& removed_ids, const std::set<ViewId>& lost,
                         const std::vector<ViewId>& reused);
-  /// Gives views of the file the names, poses and stamps of the server. Returns whether there were
+  /// Gives views of the file the names, poses and stamps of the server. Returns true if there were
   /// any.
   bool update_in_file(const std::vector<ServerView>& changes);
-  /// A view of the file that has a name of the server's gets another one, which is none of those
-  /// that are to come; the next synchronisation uploads it.
-  void make_way(const std::string& name, std::optional<ViewId> but,
-                const std::set<std::string>& to_come);
-  void add_views(std::vector<WholeServerView> views);
-  void finish(const std::vector<std::int64_t>& blocks, const std::vector<Link>& there,
-              std::int64_t last_view);
-  /// Changes of the file that the login may not make on the server.
-  std::size_t withheld();
-  /// Whether the links of a view were asked for: only of views that lie in the areas.
-  [[nodiscard]] std::function<bool(ViewId)> server_links_asked();
-  [[nodiscard]] Link local_link(const Link& link) const;
-  /// Views that the server has and that lie outside of the areas: dropped from the file, and their
-  /// rows with them, so that they do not count as removed.
-  void leave_areas();
-  /// By the same comparisons as the server's.
-  [[nodiscard]] bool keeps(const std::pair<double, double>& position) const;
+  /// Renames the view of the file that has this name, unless it is `except`, to one that is not in
+  /// `incoming_names` either; the next synchronisation uploads the new name.
+  void free_local_name(const std::string& name, std::optional<ViewId> except,
+                       const std::set<std::string>& incoming_names);
+  void add_downloaded_views(std::vector<FullServerView> views);
+  /// Applies the links of the compared blocks, and stores the rest.
+  void finish_download(const std::vector<std::int64_t>& blocks,
+                       const std::vector<Link>& server_view_links, std::int64_t last_view);
+  /// Counts changes of the file that the login may not make on the server.
+  std::size_t count_withheld_changes();
+  /// Returns a condition for server ids: true if the links of the view were compared, which is so
+  /// of views within the areas.
+  [[nodiscard]] std::function<bool(ViewId)> make_link_scope_filter();
+  [[nodiscard]] Link to_local_link(const Link& link) const;
+  /// Drops views outside of the areas that the server has, with their rows, so that they do not
+  /// count as removed.
+  void drop_views_outside_areas();
+  /// True if the position is within the areas, by the same comparisons as the server's.
+  [[nodiscard]] bool is_in_kept_areas(const std::pair<double, double>& position) const;
 
   SqliteTables& file_;
   MemoryHeader header_;
   ServerExchange& server_;
   const std::function<void(std::size_t)>& advance_;
-  KeptAreas areas_;  // ascending
+  KeptAreas areas_;  ///< ascending
 
   SynchronisedState state_, stored_state_;
-  std::int64_t sent_ = 0;  // number of this synchronisation
-  SynchronisedViews views_;
+  std::int64_t upload_number_ = 0;  ///< random number of this synchronisation
+  SynchronisedViews synchronised_;  ///< by the file's ids
   SynchronisedLinks links_;
-  std::map<ViewId, ViewId> by_server_;  // of the rows that have one
-  std::map<ViewId, std::int64_t> local_;
-  std::set<ViewId> changed_;        // rows that are not in the file yet
-  SynchronisedLinks stored_links_;  // those that are
-  std::vector<ViewId> removed_;     // from the file
-  bool restored_ = false;           // the server is older than what it acknowledged
-  bool lost_ = false;               // views of the file are to be uploaded again
-  std::size_t expected_ = 0;        // views that are on their way
+  std::map<ViewId, ViewId> local_by_server_id_;     ///< of rows with a server id
+  std::map<ViewId, std::int64_t> local_checksums_;  ///< of the file's views
+  std::set<ViewId> unsaved_;                        ///< rows that are not stored in the file yet
+  SynchronisedLinks stored_links_;                  ///< those that are
+  std::vector<ViewId> removed_locally_;             ///< from the file, since the last time
+  bool is_server_older_ = false;    ///< the server is older than what it acknowledged
+  bool needs_reupload_ = false;     ///< the server lost views that the file still has
+  std::size_t transfer_total_ = 0;  ///< views of this upload or download, for `advance_`
   RecordBytes scratch_;
   SynchronisationReport report_;
 };

@@ -10,7 +10,7 @@
 
 namespace panonav::fleet {
 
-std::vector<std::int64_t> Synchronisation::differing(const Blocks& a, const Blocks& b) {
+std::vector<std::int64_t> Synchronisation::find_differing_blocks(const Blocks& a, const Blocks& b) {
   std::vector<std::int64_t> blocks;
   for (const auto& [number, block] : a) {
     const auto other = b.find(number);
@@ -24,64 +24,67 @@ std::vector<std::int64_t> Synchronisation::differing(const Blocks& a, const Bloc
 
 void Synchronisation::download() {
   const auto snapshot = server_.tables().transaction(Kind::reading);
-  const std::int64_t last_view = require_same_memory();
-  restored_ = restored_ || last_view < state_.last_view;
+  const std::int64_t last_view = read_last_view_id();
+  is_server_older_ = is_server_older_ || last_view < state_.last_view;
 
-  Blocks own;
-  for (const auto& [view, row] : views_) {
-    if (row.server_view) add_to_block(own, *row.server_view, row.server_checksum);
+  Blocks local_blocks;
+  for (const auto& [view, row] : synchronised_) {
+    if (row.server_view) add_to_block(local_blocks, *row.server_view, row.server_checksum);
   }
-  const auto blocks = differing(own, server_.view_blocks(areas_));
+  const auto blocks = find_differing_blocks(local_blocks, server_.compute_view_blocks(areas_));
   const std::set<std::int64_t> is_differing(blocks.begin(), blocks.end());
-  auto there = server_.checksums_in(areas_, blocks);
-  std::vector<ViewId> elsewhere;
-  for (const auto& [id, view] : by_server_) {
-    if (is_differing.contains(id.value >> block_bits) && !there.contains(id)) {
-      elsewhere.push_back(id);
+  auto server_checksums = server_.read_checksums_in_blocks(areas_, blocks);
+  std::vector<ViewId> missing;
+  for (const auto& [id, view] : local_by_server_id_) {
+    if (is_differing.contains(id.value >> block_bits) && !server_checksums.contains(id)) {
+      missing.push_back(id);
     }
   }
-  if (areas_) there.merge(server_.checksums(elsewhere));
+  if (areas_) server_checksums.merge(server_.read_checksums(missing));
 
-  std::vector<ViewId> gone, changed, fresh;  // by the server's ids
-  for (const ViewId id : elsewhere) {
-    if (!there.contains(id)) gone.push_back(id);
+  std::vector<ViewId> removed, changed, added;  // by the server's ids
+  for (const ViewId id : missing) {
+    if (!server_checksums.contains(id)) removed.push_back(id);
   }
-  for (const auto& [id, checksum] : there) {
-    const auto known = by_server_.find(id);
-    if (known == by_server_.end()) {
-      fresh.push_back(id);
-    } else if (views_.at(known->second).server_checksum != checksum) {
+  for (const auto& [id, checksum] : server_checksums) {
+    const auto known = local_by_server_id_.find(id);
+    if (known == local_by_server_id_.end()) {
+      added.push_back(id);
+    } else if (synchronised_.at(known->second).server_checksum != checksum) {
       changed.push_back(id);
     }
   }
   std::vector<ServerView> changes;
   std::vector<ViewId> reused;
-  find_changes(changed, changes, reused);
+  classify_changed_views(changed, changes, reused);
   // Damage is found before anything is taken for another view.
-  static_cast<void>(server_.whole(reused));
-  fresh.insert(fresh.end(), reused.begin(), reused.end());
-  std::ranges::sort(fresh);
-  take_changes(gone, lost_by_server(gone), changes, reused);
+  static_cast<void>(server_.read_full_views(reused));
+  added.insert(added.end(), reused.begin(), reused.end());
+  std::ranges::sort(added);
+  apply_server_changes(removed, find_lost_views(removed), changes, reused);
 
-  expected_ = fresh.size();
-  in_parts(fresh, views_at_once,
-           [&](std::span<const ViewId> part) { add_views(server_.whole(part)); });
+  transfer_total_ = added.size();
+  in_parts(added, views_per_batch, [&](std::span<const ViewId> part) {
+    add_downloaded_views(server_.read_full_views(part));
+  });
 
-  Blocks own_links;
+  Blocks local_link_blocks;
   for (const auto& [ends, kind] : links_) {
-    add_to_block(own_links, ends.first, link_checksum({ends.first, ends.second, kind}));
+    add_to_block(local_link_blocks, ends.first, link_checksum({ends.first, ends.second, kind}));
   }
-  const auto link_blocks = differing(own_links, server_.link_blocks(areas_));
-  finish(link_blocks, server_.links_in(areas_, link_blocks), last_view);
+  const auto link_blocks =
+      find_differing_blocks(local_link_blocks, server_.compute_link_blocks(areas_));
+  finish_download(link_blocks, server_.read_links_in_blocks(areas_, link_blocks), last_view);
 }
 
-void Synchronisation::find_changes(const std::vector<ViewId>& changed,
-                                   std::vector<ServerView>& changes, std::vector<ViewId>& reused) {
+void Synchronisation::classify_changed_views(const std::vector<ViewId>& changed,
+                                             std::vector<ServerView>& changes,
+                                             std::vector<ViewId>& reused) {
   const auto reading = file_.transaction(Kind::reading);
-  local_ = read_view_checksums(file_);
-  in_parts(changed, rows_at_once, [&](std::span<const ViewId> part) {
-    for (ServerView& view : server_.infos(part)) {
-      const auto row = read_row(by_server_.at(view.id));
+  local_checksums_ = read_view_checksums(file_);
+  in_parts(changed, rows_per_query, [&](std::span<const ViewId> part) {
+    for (ServerView& view : server_.read_infos(part)) {
+      const auto row = read_local_row(local_by_server_id_.at(view.id));
       if (!row) continue;  // removed from the file
       if (view_checksum(scratch_, view.id, view.info, row->signature) == view.checksum) {
         changes.push_back(std::move(view));
@@ -92,19 +95,19 @@ void Synchronisation::find_changes(const std::vector<ViewId>& changed,
   });
 }
 
-std::set<ViewId> Synchronisation::lost_by_server(const std::vector<ViewId>& gone) {
-  if (restored_) return {gone.begin(), gone.end()};
+std::set<ViewId> Synchronisation::find_lost_views(const std::vector<ViewId>& removed) {
+  if (is_server_older_) return {removed.begin(), removed.end()};
   std::set<ViewId> lost;
-  std::vector<ViewId> asked;
-  for (const ViewId id : gone) {
-    const ViewId view = by_server_.at(id);
-    if (!views_.at(view).uploaded) continue;
-    asked.push_back(view);
+  std::vector<ViewId> uploaded;
+  for (const ViewId id : removed) {
+    const ViewId view = local_by_server_id_.at(id);
+    if (!synchronised_.at(view).uploaded) continue;
+    uploaded.push_back(view);
     lost.insert(id);
   }
-  in_parts(asked, rows_at_once, [&](std::span<const ViewId> part) {
-    for (const Upload& upload : server_.uploads(state_.file, part)) {
-      const SynchronisedView& row = views_.at(upload.view);
+  in_parts(uploaded, rows_per_query, [&](std::span<const ViewId> part) {
+    for (const Upload& upload : server_.read_uploads(state_.file, part)) {
+      const SynchronisedView& row = synchronised_.at(upload.view);
       if (upload.signature == row.signature && upload.server_view == row.server_view) {
         lost.erase(upload.server_view);
       }
@@ -113,41 +116,42 @@ std::set<ViewId> Synchronisation::lost_by_server(const std::vector<ViewId>& gone
   return lost;
 }
 
-void Synchronisation::take_changes(const std::vector<ViewId>& gone, const std::set<ViewId>& lost,
-                                   const std::vector<ServerView>& changes,
-                                   const std::vector<ViewId>& reused) {
-  if (gone.empty() && changes.empty() && reused.empty()) return;
-  const auto writing = change_file();
-  const bool removed = remove_from_file(gone, lost, reused);
-  const bool updated = update_in_file(changes);
-  if (removed || updated) clear_recordings();
-  commit(*writing);
+void Synchronisation::apply_server_changes(const std::vector<ViewId>& removed,
+                                           const std::set<ViewId>& lost,
+                                           const std::vector<ServerView>& changes,
+                                           const std::vector<ViewId>& reused) {
+  if (removed.empty() && changes.empty() && reused.empty()) return;
+  const auto writing = begin_file_change();
+  const bool has_removed = remove_from_file(removed, lost, reused);
+  const bool has_updated = update_in_file(changes);
+  if (has_removed || has_updated) clear_recordings();
+  store_and_commit(*writing);
 }
 
-bool Synchronisation::remove_from_file(const std::vector<ViewId>& gone,
+bool Synchronisation::remove_from_file(const std::vector<ViewId>& removed_ids,
                                        const std::set<ViewId>& lost,
                                        const std::vector<ViewId>& reused) {
   std::vector<ViewId> removed;
-  for (const ViewId id : gone) {
-    const ViewId view = by_server_.at(id);
-    if (local_.contains(view)) {
+  for (const ViewId id : removed_ids) {
+    const ViewId view = local_by_server_id_.at(id);
+    if (local_checksums_.contains(view)) {
       if (lost.contains(id)) {
-        lost_ = true;
+        needs_reupload_ = true;
       } else {
         removed.push_back(view);
-        if (local_.at(view) != views_.at(view).local_checksum) ++report_.conflicts;
+        if (local_checksums_.at(view) != synchronised_.at(view).local_checksum) ++report_.conflicts;
       }
     }
-    forget(id);
+    forget_server_view(id);
   }
   for (const ViewId id : reused) {
-    lost_ = true;
-    forget(id);
+    needs_reupload_ = true;
+    forget_server_view(id);
   }
-  report_.restored = report_.restored || restored_ || lost_;
+  report_.restored = report_.restored || is_server_older_ || needs_reupload_;
   file_.remove(removed);
   forget_in_maps(file_, removed);
-  for (const ViewId view : removed) local_.erase(view);
+  for (const ViewId view : removed) local_checksums_.erase(view);
   report_.removed_in_file += removed.size();
   return !removed.empty();
 }
@@ -155,63 +159,63 @@ bool Synchronisation::remove_from_file(const std::vector<ViewId>& gone,
 bool Synchronisation::update_in_file(const std::vector<ServerView>& changes) {
   struct Change {
     ViewId view;
-    const ServerView* there;
+    const ServerView* target;
     LocalRow row;
   };
-  std::vector<Change> taken;
+  std::vector<Change> accepted;
   for (const ServerView& there : changes) {
-    const ViewId view = by_server_.at(there.id);
-    auto row = read_row(view);
+    const ViewId view = local_by_server_id_.at(there.id);
+    auto row = read_local_row(view);
     if (!row) continue;
     if (row->info != there.info) {
-      if (row->checksum != views_.at(view).local_checksum) ++report_.conflicts;
+      if (row->checksum != synchronised_.at(view).local_checksum) ++report_.conflicts;
       ++report_.updated_in_file;
     }
-    taken.push_back({view, &there, std::move(*row)});
+    accepted.push_back({view, &there, std::move(*row)});
   }
   // Names that views give each other are free in between.
-  for (const Change& change : taken) {
-    if (change.row.info.name == change.there->info.name) continue;
+  for (const Change& change : accepted) {
+    if (change.row.info.name == change.target->info.name) continue;
     ReferenceInfo between = change.row.info;
     between.name = "\x01" + std::to_string(change.view.value);
     file_.write_info(change.view, between, 0);
   }
   std::set<std::string> names;
-  for (const Change& change : taken) names.insert(change.there->info.name);
-  for (const Change& change : taken) {
-    make_way(change.there->info.name, change.view, names);
-    write_info(change.view, change.there->info, change.row.signature);
-    SynchronisedView next = views_.at(change.view);
-    next.local_checksum = local_.at(change.view);
-    next.server_checksum = change.there->checksum;
+  for (const Change& change : accepted) names.insert(change.target->info.name);
+  for (const Change& change : accepted) {
+    free_local_name(change.target->info.name, change.view, names);
+    write_local_info(change.view, change.target->info, change.row.signature);
+    SynchronisedView next = synchronised_.at(change.view);
+    next.local_checksum = local_checksums_.at(change.view);
+    next.server_checksum = change.target->checksum;
     next.sent.reset();
-    put(change.view, next);
+    set_row(change.view, next);
   }
-  return !taken.empty();
+  return !accepted.empty();
 }
 
-void Synchronisation::make_way(const std::string& name, std::optional<ViewId> but,
-                               const std::set<std::string>& to_come) {
-  const auto other = file_.find(name);
-  if (!other || other == but) return;
-  auto row = read_row(*other).value();
+void Synchronisation::free_local_name(const std::string& name, std::optional<ViewId> except,
+                                      const std::set<std::string>& incoming_names) {
+  const auto owner = file_.find(name);
+  if (!owner || owner == except) return;
+  auto row = read_local_row(*owner).value();
   for (int count = 1;; ++count) {
-    row.info.name = own_name(name, count);
-    if (!file_.find(row.info.name) && !to_come.contains(row.info.name)) break;
+    row.info.name = robot_prefixed_name(name, count);
+    if (!file_.find(row.info.name) && !incoming_names.contains(row.info.name)) break;
   }
-  write_info(*other, row.info, row.signature);
+  write_local_info(*owner, row.info, row.signature);
   clear_recordings();
   ++report_.renamed;
 }
 
-void Synchronisation::add_views(std::vector<WholeServerView> views) {
-  const auto writing = change_file();
+void Synchronisation::add_downloaded_views(std::vector<FullServerView> views) {
+  const auto writing = begin_file_change();
   std::vector<ViewId> ids;
   std::vector<NewView> added;
   std::uint32_t last = file_.last_id();
   std::set<std::string> names;
-  for (const WholeServerView& whole : views) names.insert(whole.view.info.name);
-  for (WholeServerView& whole : views) {
+  for (const FullServerView& whole : views) names.insert(whole.view.info.name);
+  for (FullServerView& whole : views) {
     NewView& view = whole.view;
     if (view.signature.magnitudes.size() != header_.shape.size()) {
       server_.tables().fail_damaged("view " + std::to_string(whole.id.value) +
@@ -224,84 +228,87 @@ void Synchronisation::add_views(std::vector<WholeServerView> views) {
     next.server_view = whole.id;
     next.server_checksum = whole.checksum;
     next.signature = signature_checksum(signature);
-    if (advance_) advance_(expected_);
+    if (advance_) advance_(transfer_total_);
     const auto same = file_.find(view.info.name);
-    if (same && (!views_.contains(*same) || !views_.at(*same).server_view) &&
-        read_row(*same).value().signature == signature) {
-      write_info(*same, view.info, signature);
-      next.local_checksum = local_.at(*same);
-      put(*same, next);
+    if (same && (!synchronised_.contains(*same) || !synchronised_.at(*same).server_view) &&
+        read_local_row(*same).value().signature == signature) {
+      write_local_info(*same, view.info, signature);
+      next.local_checksum = local_checksums_.at(*same);
+      set_row(*same, next);
       ++report_.adopted;
       continue;
     }
-    make_way(view.info.name, std::nullopt, names);
+    free_local_name(view.info.name, std::nullopt, names);
     if (last >= UINT32_MAX - 1) file_.fail_damaged("there is no id left for another view");
     const ViewId id{++last};
     next.local_checksum = view_checksum(scratch_, id, view.info, signature);
-    put(id, next);
+    set_row(id, next);
     ids.push_back(id);
     added.push_back(std::move(view));
   }
   file_.insert(ids, added);
-  commit(*writing);
+  store_and_commit(*writing);
   report_.downloaded += added.size();
 }
 
-void Synchronisation::finish(const std::vector<std::int64_t>& blocks,
-                             const std::vector<Link>& there, std::int64_t last_view) {
-  const auto writing = change_file();
-  const SynchronisedLinks own = local_links();
+void Synchronisation::finish_download(const std::vector<std::int64_t>& blocks,
+                                      const std::vector<Link>& server_view_links,
+                                      std::int64_t last_view) {
+  const auto writing = begin_file_change();
+  const SynchronisedLinks local = read_local_links();
   SynchronisedLinks server_links;
-  std::vector<Link> wanted;
-  for (const Link& link : there) {
+  std::vector<Link> changed_links;
+  for (const Link& link : server_view_links) {
     const std::pair ends(link.a, link.b);
     server_links[ends] = link.kind;
     if (!is_in_file(link.a) || !is_in_file(link.b)) continue;
     const auto before = links_.find(ends);
     if (before != links_.end() && before->second == link.kind) continue;
     links_[ends] = link.kind;
-    const auto known = own.find(ends);
-    if (known != own.end() && known->second == link.kind) continue;
-    wanted.push_back(local_link(link));
+    const auto known = local.find(ends);
+    if (known != local.end() && known->second == link.kind) continue;
+    changed_links.push_back(to_local_link(link));
   }
-  file_.write_links(wanted);
-  report_.links_downloaded += wanted.size();
-  bool changes_anything = !wanted.empty();
+  file_.write_links(changed_links);
+  report_.links_downloaded += changed_links.size();
+  bool changes_anything = !changed_links.empty();
   const std::set<std::int64_t> is_differing(blocks.begin(), blocks.end());
-  const auto was_asked = server_links_asked();
+  const auto is_in_scope = make_link_scope_filter();
   std::erase_if(links_, [&](const auto& entry) {
     const auto& ends = entry.first;
     if (!is_differing.contains(ends.first.value >> block_bits) || server_links.contains(ends) ||
-        !was_asked(ends.first) || !was_asked(ends.second)) {
+        !is_in_scope(ends.first) || !is_in_scope(ends.second)) {
       return false;
     }
-    if (own.contains(ends)) {
-      const Link link = local_link({ends.first, ends.second, entry.second});
+    if (local.contains(ends)) {
+      const Link link = to_local_link({ends.first, ends.second, entry.second});
       file_.erase_link(link.a, link.b);
       ++report_.links_downloaded;
       changes_anything = true;
     }
     return true;
   });
-  leave_areas();
-  state_.last_view = lost_ || restored_ ? last_view : std::max(state_.last_view, last_view);
-  restored_ = false;
-  if (changes_anything || !is_written()) commit(*writing);
-  report_.views = local_.size();
-  report_.withheld = withheld();
+  drop_views_outside_areas();
+  state_.last_view =
+      needs_reupload_ || is_server_older_ ? last_view : std::max(state_.last_view, last_view);
+  is_server_older_ = false;
+  if (changes_anything || !is_stored()) store_and_commit(*writing);
+  report_.views = local_checksums_.size();
+  report_.withheld = count_withheld_changes();
 }
 
-std::size_t Synchronisation::withheld() {
+std::size_t Synchronisation::count_withheld_changes() {
   std::size_t count = 0;
   if (!server_.may_add()) {
-    for (const auto& [view, checksum] : local_) count += views_.contains(view) ? 0 : 1;
+    for (const auto& [view, checksum] : local_checksums_)
+      count += synchronised_.contains(view) ? 0 : 1;
   }
   if (server_.may_change()) return count;
-  for (const auto& [view, row] : views_) {
-    const auto found = local_.find(view);
-    count += found == local_.end() || found->second != row.local_checksum ? 1 : 0;
+  for (const auto& [view, row] : synchronised_) {
+    const auto found = local_checksums_.find(view);
+    count += found == local_checksums_.end() || found->second != row.local_checksum ? 1 : 0;
   }
-  const SynchronisedLinks own = local_links();
+  const SynchronisedLinks own = read_local_links();
   for (const auto& [ends, kind] : links_) {
     const bool is_there = is_in_file(ends.first) && is_in_file(ends.second);
     count += is_there && !own.contains(ends) ? 1 : 0;
@@ -309,43 +316,43 @@ std::size_t Synchronisation::withheld() {
   return count;
 }
 
-std::function<bool(ViewId)> Synchronisation::server_links_asked() {
+std::function<bool(ViewId)> Synchronisation::make_link_scope_filter() {
   if (!areas_) return [](ViewId) { return true; };
   return [this, positions = read_positions(file_)](ViewId server_view) {
-    const ViewId view = by_server_.at(server_view);
+    const ViewId view = local_by_server_id_.at(server_view);
     const auto position = positions.find(view);
-    return position != positions.end() && keeps(position->second) &&
-           local_.at(view) == views_.at(view).local_checksum;
+    return position != positions.end() && is_in_kept_areas(position->second) &&
+           local_checksums_.at(view) == synchronised_.at(view).local_checksum;
   };
 }
 
-Link Synchronisation::local_link(const Link& link) const {
-  const auto [a, b] = std::minmax(by_server_.at(link.a), by_server_.at(link.b));
+Link Synchronisation::to_local_link(const Link& link) const {
+  const auto [a, b] = std::minmax(local_by_server_id_.at(link.a), local_by_server_id_.at(link.b));
   return {a, b, link.kind};
 }
 
-void Synchronisation::leave_areas() {
+void Synchronisation::drop_views_outside_areas() {
   if (!areas_) return;
-  std::vector<ViewId> left;
+  std::vector<ViewId> outside;
   for (const auto& [view, position] : read_positions(file_)) {
-    const auto row = views_.find(view);
-    if (row == views_.end() || !row->second.server_view || row->second.sent ||
-        row->second.local_checksum != local_.at(view) || keeps(position)) {
+    const auto row = synchronised_.find(view);
+    if (row == synchronised_.end() || !row->second.server_view || row->second.sent ||
+        row->second.local_checksum != local_checksums_.at(view) || is_in_kept_areas(position)) {
       continue;
     }
-    left.push_back(view);
+    outside.push_back(view);
   }
-  file_.remove(left);
-  forget_in_maps(file_, left);
-  for (const ViewId view : left) {
-    forget(*views_.at(view).server_view);
-    local_.erase(view);
+  file_.remove(outside);
+  forget_in_maps(file_, outside);
+  for (const ViewId view : outside) {
+    forget_server_view(*synchronised_.at(view).server_view);
+    local_checksums_.erase(view);
   }
-  if (!left.empty()) clear_recordings();
-  report_.left += left.size();
+  if (!outside.empty()) clear_recordings();
+  report_.left += outside.size();
 }
 
-bool Synchronisation::keeps(const std::pair<double, double>& position) const {
+bool Synchronisation::is_in_kept_areas(const std::pair<double, double>& position) const {
   const auto cell = [](double value) {
     double number = std::floor(value / memory_area_side_m);
     while (value < memory_area_side_m * number) --number;
