@@ -143,17 +143,17 @@ NamedSurvey survey(const Dataset& homes, const std::optional<Dataset>& current,
 }
 
 void bind_catchment(py::module_& m) {
-  Record<CatchmentBin>(m, "CatchmentBin", "Pairs of a range of distances.")
+  Record<CatchmentResult::Bin>(m, "CatchmentBin", "Pairs of a range of distances.")
       .field(
-          "distance_m", [](const CatchmentBin& b) { return b.homeward.distance_m; },
+          "distance_m", [](const CatchmentResult::Bin& b) { return b.homeward.distance_m; },
           "Middle of the range.")
       .field(
-          "pairs", [](const CatchmentBin& b) { return b.homeward.pairs; },
+          "pairs", [](const CatchmentResult::Bin& b) { return b.homeward.pairs; },
           "Of a place and a home in the range.")
       .field(
-          "homeward_component", [](const CatchmentBin& b) { return b.homeward.component; },
+          "homeward_component", [](const CatchmentResult::Bin& b) { return b.homeward.component; },
           "Mean cosine between home vector and true direction; nan without pairs.")
-      .field("orientation_error_rad", &CatchmentBin::orientation_error_rad,
+      .field("orientation_error_rad", &CatchmentResult::Bin::orientation_error_rad,
              "Circular standard deviation.");
   Record<NamedSurvey>(m, "CatchmentSurvey", "From how far the views of a recording lead home.")
       .field("goal_names", &NamedSurvey::goal_names, "Of the views that are homes.")

@@ -37,8 +37,9 @@ MapperOptions mapper_options(const py::kwargs& keywords, SignatureOptions* signa
 }
 
 /// As the verb `map`: views that the file does not know are appended to it.
-MappedRun make_map(const Dataset& recording, const std::filesystem::path& path,
-                   const SignatureOptions& signature, const MapperOptions& options, int threads) {
+Mapper::Result make_map(const Dataset& recording, const std::filesystem::path& path,
+                        const SignatureOptions& signature, const MapperOptions& options,
+                        int threads) {
   InterruptibleExecutor executor(threads);
   const bool there = memory_exists(path);
   Mapper mapper(
@@ -70,13 +71,13 @@ void bind_maps(py::module_& m) {
       .def(
           "poses", [](const TopologicalMap& map) { return poses_of(map.nodes); },
           "(n, 3) of x_m, y_m, heading_rad, a row a node.");
-  Record<MappedRun>(m, "MappedRun", "What a Mapper made of its observations.")
-      .field("map", &MappedRun::map, "All nodes and edges.")
-      .field("observations", &MappedRun::observations, "By node: its number, from 0.")
-      .field("skipped", &MappedRun::skipped, "Observations that differed too little.")
-      .field("scale_m", &MappedRun::scale_m, "Metres for a unit of length of the views.")
-      .field("wheels", &MappedRun::wheels, "Steps come from odometry.")
-      .field("mapping_s", &MappedRun::mapping_s, "Time of the mapping itself.");
+  Record<Mapper::Result>(m, "MappedRun", "What a Mapper made of its observations.")
+      .field("map", &Mapper::Result::map, "All nodes and edges.")
+      .field("observations", &Mapper::Result::observations, "By node: its number, from 0.")
+      .field("skipped", &Mapper::Result::skipped, "Observations that differed too little.")
+      .field("scale_m", &Mapper::Result::scale_m, "Metres for a unit of length of the views.")
+      .field("wheels", &Mapper::Result::wheels, "Steps come from odometry.")
+      .field("mapping_s", &Mapper::Result::mapping_s, "Time of the mapping itself.");
   const std::string options = with_options(
       "", {options_of<MappingOptions>(), options_of<VisualOdometryOptions>(),
            options_of<LoopClosureOptions>("closure"), options_of<PoseGraphOptions>("graph")});
@@ -219,12 +220,13 @@ void bind_merging(py::module_& m) {
       "merge_memories",
       [](const std::filesystem::path& first, const std::filesystem::path& second,
          const std::filesystem::path& memory, const py::kwargs& keywords) {
-        MemoryMergeOptions options;
+        SessionAlignmentOptions alignment;
+        PoseGraphOptions graph;
         Keywords taken(keywords);
-        taken.options(options.alignment).options(options.graph, "graph");
+        taken.options(alignment).options(graph, "graph");
         taken.finish();
         const py::gil_scoped_release free;
-        return merge_memories(first, second, memory, options, check_signals);
+        return merge_memories(first, second, memory, alignment, graph, check_signals);
       },
       py::arg("first"), py::arg("second"), py::arg("memory"),
       with_options("Makes one memory file of two, as `panonav merge` does: places in common are "

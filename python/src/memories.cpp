@@ -3,7 +3,7 @@
 #include "bindings.hpp"
 #include "memories.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
-#include "panonav/pipeline/named_view.hpp"
+#include "panonav/pipeline/view_list.hpp"
 #include "panonav_fleet/memory_synchronisation.hpp"
 
 namespace panonav::python {
@@ -238,28 +238,32 @@ void bind_visual_memory(py::module_& m) {
 }
 
 void bind_memory_file(py::module_& m) {
-  Record<MemoryFileInfo>(m, "MemoryFileInfo", "Counts and sizes of a memory file.")
-      .field("views", &MemoryFileInfo::views, "Reference views.")
-      .field("views_with_position", &MemoryFileInfo::views_with_position, "Of these, with x and y.")
-      .field("views_with_heading", &MemoryFileInfo::views_with_heading, "Of these, with a heading.")
-      .field("links", &MemoryFileInfo::links, "Between two views.")
-      .field("thumbnails", &MemoryFileInfo::thumbnails, "Views stored with a picture file.")
-      .field("views_with_features", &MemoryFileInfo::views_with_features,
+  Record<MemoryFile::Info>(m, "MemoryFileInfo", "Counts and sizes of a memory file.")
+      .field("views", &MemoryFile::Info::views, "Reference views.")
+      .field("views_with_position", &MemoryFile::Info::views_with_position,
+             "Of these, with x and y.")
+      .field("views_with_heading", &MemoryFile::Info::views_with_heading,
+             "Of these, with a heading.")
+      .field("links", &MemoryFile::Info::links, "Between two views.")
+      .field("thumbnails", &MemoryFile::Info::thumbnails, "Views stored with a picture file.")
+      .field("views_with_features", &MemoryFile::Info::views_with_features,
              "Views stored with local features.")
-      .field("feature_bytes", &MemoryFileInfo::feature_bytes, "Packed local features of all views.")
-      .field("maps", &MemoryFileInfo::maps, "Kept by name.")
-      .field("routes", &MemoryFileInfo::routes, "Kept by name.")
-      .field("file_bytes", &MemoryFileInfo::file_bytes,
+      .field("feature_bytes", &MemoryFile::Info::feature_bytes,
+             "Packed local features of all views.")
+      .field("maps", &MemoryFile::Info::maps, "Kept by name.")
+      .field("routes", &MemoryFile::Info::routes, "Kept by name.")
+      .field("file_bytes", &MemoryFile::Info::file_bytes,
              "With what is still in the write-ahead log.")
-      .field("format_version", &MemoryFileInfo::format_version, "Of the file, >= 1.");
-  Record<MemoryFault>(m, "MemoryFault", "What is wrong in a memory file.")
-      .field("view", &MemoryFault::view, "Where it concerns one.")
-      .field("what", &MemoryFault::what, "One line.");
-  Record<KeptChange>(m, "KeptChange", "A change of a memory that was kept for `undo`.")
-      .field("what", &KeptChange::what, "For people.")
-      .field("stamp_s", &KeptChange::stamp_s, "Seconds since 1970, or None.")
-      .field("bytes", &KeptChange::bytes, "That are kept for taking it back.")
-      .field("undoable", &KeptChange::undoable, "False: too old, only its description is left.");
+      .field("format_version", &MemoryFile::Info::format_version, "Of the file, >= 1.");
+  Record<MemoryFile::Fault>(m, "MemoryFault", "What is wrong in a memory file.")
+      .field("view", &MemoryFile::Fault::view, "Where it concerns one.")
+      .field("what", &MemoryFile::Fault::what, "One line.");
+  Record<MemoryFile::KeptChange>(m, "KeptChange", "A change of a memory that was kept for `undo`.")
+      .field("what", &MemoryFile::KeptChange::what, "For people.")
+      .field("stamp_s", &MemoryFile::KeptChange::stamp_s, "Seconds since 1970, or None.")
+      .field("bytes", &MemoryFile::KeptChange::bytes, "That are kept for taking it back.")
+      .field("undoable", &MemoryFile::KeptChange::undoable,
+             "False: too old, only its description is left.");
   Record<MemoryHeader>(m, "MemoryHeader",
                        "What a memory file says of all its views: how pictures become signatures.")
       .field(

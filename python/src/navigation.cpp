@@ -57,10 +57,10 @@ void bind_navigation(py::module_& m) {
             return names;
           },
           "What made it differ from going on, such as 'kidnapped' or 'closed'.");
-  Record<NavigationStep>(m, "NavigationStep", "What a robot is to do after an observation.")
-      .field("decision", &NavigationStep::decision, "The last one.")
-      .field("velocity", &NavigationStep::velocity, "For the next period of the base.")
-      .field("decided", &NavigationStep::decided,
+  Record<RobotNavigator::Step>(m, "NavigationStep", "What a robot is to do after an observation.")
+      .field("decision", &RobotNavigator::Step::decision, "The last one.")
+      .field("velocity", &RobotNavigator::Step::velocity, "For the next period of the base.")
+      .field("decided", &RobotNavigator::Step::decided,
              "By this observation; else the step decided before goes on.");
   using SharedNavigator = Shared<RobotNavigator>;
   const auto view_name = [](SharedNavigator& navigator, std::uint32_t view) {

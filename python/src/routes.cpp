@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::array<const char*, 3> origin_names{"prediction", "recovery", "search"};
 
-struct NamedStep : RouteStep {
+struct NamedStep : RouteFollower::Step {
   std::string name;
 };
 
@@ -129,8 +129,8 @@ void bind_following(py::module_& m) {
           .c_str());
 }
 
-RecordedRoute record_route(const Dataset& dataset, const std::filesystem::path& memory,
-                           RouteRecorderOptions options, int threads) {
+RouteRecorder::Recorded record_route(const Dataset& dataset, const std::filesystem::path& memory,
+                                     RouteRecorderOptions options, int threads) {
   InterruptibleExecutor executor(threads);
   std::vector<Pose2> poses = options.odometry ? std::vector<Pose2>{} : dataset_poses(dataset);
   if (poses.empty()) {
@@ -171,11 +171,12 @@ void bind_recording(py::module_& m) {
         return "RoutePanorama(" + std::to_string(route.size()) + " lines, " +
                std::to_string(route.columns()) + " columns)";
       });
-  Record<RecordedRoute>(m, "RecordedRoute", "What a memory file has of a route.")
-      .field("route", &RecordedRoute::route, "All of its lines, those of earlier drives included.")
-      .field("appended", &RecordedRoute::appended, "Lines.")
-      .field("bytes", &RecordedRoute::bytes, "Of its lines and poses as they are kept.")
-      .field("bytes_per_km", &RecordedRoute::bytes_per_km,
+  Record<RouteRecorder::Recorded>(m, "RecordedRoute", "What a memory file has of a route.")
+      .field("route", &RouteRecorder::Recorded::route,
+             "All of its lines, those of earlier drives included.")
+      .field("appended", &RouteRecorder::Recorded::appended, "Lines.")
+      .field("bytes", &RouteRecorder::Recorded::bytes, "Of its lines and poses as they are kept.")
+      .field("bytes_per_km", &RouteRecorder::Recorded::bytes_per_km,
              "Bytes for each kilometre; 0 for a route without length.");
   m.def(
       "record_route",

@@ -3,8 +3,7 @@
 namespace panonav::fleet {
 
 /// Makes memories on PostgreSQL servers available wherever this process takes the path of a memory
-/// file (`register_memory_scheme`), and lets large memories be searched where they lie
-/// (`register_indexed_memories`). Call it once, before memories are opened. Their addresses:
+/// file (`register_memory_scheme`). Call it once, before memories are opened. Their addresses:
 ///
 ///     postgresql://[USER[:PASSWORD]@][HOST][:PORT]/DATABASE?memory=NAME
 ///

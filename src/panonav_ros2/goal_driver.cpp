@@ -101,7 +101,7 @@ void GoalDriver::drive(const Observation& observation, const std::optional<Pose2
 void GoalDriver::drive_to_goal(const Observation& observation, const std::optional<Pose2>& pose) {
   RobotReport report;
   if (pose) report.estimate = find_nearest_view(pose->position());
-  const NavigationStep step = navigator_->step(observation, report);
+  const RobotNavigator::Step step = navigator_->step(observation, report);
   const NavigationDecision& decision = step.decision;
   const std::string state(name_of(decision.state));
   if (decision.state != NavigationState::moving) {
@@ -119,11 +119,11 @@ void GoalDriver::drive_to_goal(const Observation& observation, const std::option
 
 void GoalDriver::drive_along_route(const Observation& observation,
                                    const std::optional<Pose2>& pose) {
-  const RouteDriveStep step = route_driver_->step(observation, pose);
+  const RouteDriver::Step step = route_driver_->step(observation, pose);
   mission_.along_m = step.along_m;
   const std::string state(name_of(step.state));
-  if (step.state == RouteDriveState::arrived || step.state == RouteDriveState::lost) {
-    end(state, step.state == RouteDriveState::arrived ? fine : error);
+  if (step.state == RouteDriver::State::arrived || step.state == RouteDriver::State::lost) {
+    end(state, step.state == RouteDriver::State::arrived ? fine : error);
     return;
   }
   send(step.velocity);

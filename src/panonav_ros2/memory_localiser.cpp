@@ -7,7 +7,7 @@
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/pipeline/memoriser.hpp"
-#include "panonav/pipeline/named_view.hpp"
+#include "panonav/pipeline/view_list.hpp"
 
 namespace panonav::ros2 {
 

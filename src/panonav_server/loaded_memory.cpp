@@ -10,7 +10,7 @@ MemoryWatch::MemoryWatch(std::filesystem::path memory)
     : memory_(std::move(memory)),
       state_(read_state(memory_)),
       scheme_(find_memory_scheme(memory_)),
-      listener_(scheme_ ? scheme_->listen(memory_) : nullptr) {}
+      poll_changes_(scheme_ ? scheme_->listen(memory_) : nullptr) {}
 
 MemoryWatch::FileState MemoryWatch::read_state(const std::filesystem::path& path) {
   FileState state;
@@ -31,11 +31,11 @@ bool MemoryWatch::has_changed() {
     return state_ != before;
   }
   try {
-    const bool was_away = !listener_;
-    if (was_away) listener_ = scheme_->listen(memory_);
-    return listener_->has_changed() || was_away;
+    const bool was_away = !poll_changes_;
+    if (was_away) poll_changes_ = scheme_->listen(memory_);
+    return poll_changes_() || was_away;
   } catch (const FileError&) {
-    listener_.reset();
+    poll_changes_ = nullptr;
     return false;
   }
 }

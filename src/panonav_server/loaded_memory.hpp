@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -33,7 +34,7 @@ class MemoryWatch {
   std::filesystem::path memory_;
   FileState state_;
   std::shared_ptr<const MemoryScheme> scheme_;  // null: a file
-  std::unique_ptr<MemoryListener> listener_;    // null while what keeps the memory is away
+  std::function<bool()> poll_changes_;          // empty while what keeps the memory is away
 };
 
 /// A memory as it was read: held, or searched where it lies.

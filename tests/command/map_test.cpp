@@ -131,7 +131,7 @@ TEST_F(Map, TheLibraryMakesTheSameMapOnePictureAtATime) {
     seen.stamp_s = entry.stamp_s;
     mapper.add(seen);
   }
-  const MappedRun run = mapper.finish();
+  const Mapper::Result run = mapper.finish();
   EXPECT_EQ(run.map.nodes.size(), 100U);
   EXPECT_EQ(run.map, *by_verb.map(map_name));
   EXPECT_EQ(mapper.memory().links(), by_verb.links());

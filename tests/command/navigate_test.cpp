@@ -302,7 +302,7 @@ TEST(NavigateByLibrary, APictureInAndAVelocityOutWithOneAreaAtHand) {
   EXPECT_GE(navigator.navigator().planner().areas().nodes.size(), 4U);
 
   Pose2 robot{-3.4, 1.4, 1.0};
-  NavigationStep step;
+  RobotNavigator::Step step;
   std::size_t max_loaded = 0;
   int decisions = 0;
   int periods = 0;

@@ -282,7 +282,7 @@ TEST_F(RouteVerbs, TheLibraryRecordsAndFollowsTheSameOnePictureAtATime) {
   ASSERT_EQ(said.size(), repeat.entries.size());
   RouteFollower follower(own);
   for (std::size_t i = 0; i < said.size(); ++i) {
-    const RouteStep step = follower.step(read_observation(repeat.entries[i]));
+    const RouteFollower::Step step = follower.step(read_observation(repeat.entries[i]));
     ASSERT_TRUE(step.fix);
     EXPECT_EQ(said[i]["pose"]["x_m"].get<double>(), step.fix->pose.x_m);
     EXPECT_EQ(said[i]["pose"]["y_m"].get<double>(), step.fix->pose.y_m);

@@ -1,4 +1,5 @@
 #include "panonav/pipeline/learnt_models.hpp"
+#include "panonav/pipeline/internal/learnt_models.hpp"
 
 #include <gtest/gtest.h>
 

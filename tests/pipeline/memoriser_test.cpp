@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "panonav/core/error.hpp"
-#include "panonav/pipeline/learnt_models.hpp"
+#include "panonav/pipeline/internal/learnt_models.hpp"
 #include "support/temporary_folder.hpp"
 
 namespace panonav {

@@ -67,7 +67,7 @@ TEST_F(Merge, TwoDrivesInOneRoomBecomeOneMemoryInTheFrameOfTheFirst) {
   const fs::path first = remember("first.panonav", 5, first_truth);
   const fs::path second = remember("second.panonav", 5, second_truth);
   std::size_t advanced = 0;
-  const MergedMemory result = merge_memories(first, second, merged, {}, [&] { ++advanced; });
+  const MergedMemory result = merge_memories(first, second, merged, {}, {}, [&] { ++advanced; });
   ASSERT_TRUE(result.alignment);
   EXPECT_EQ(result.views, 220U);
   EXPECT_EQ(advanced, 220U);
@@ -154,8 +154,7 @@ TEST_F(Merge, WhatCannotBeMergedIsRefusedAndLeavesNothing) {
   { const MemoryFile made = MemoryFile::create(other, header); }
   EXPECT_THROW((void)merge_memories(first, other, merged), ContractError);
   EXPECT_THROW((void)merge_memories(first, folder / "none.panonav", merged), FileError);
-  EXPECT_THROW((void)merge_memories(first, first, merged, {.alignment = {.min_places = 0}}),
-               OptionError);
+  EXPECT_THROW((void)merge_memories(first, first, merged, {.min_places = 0}), OptionError);
   EXPECT_THROW((void)merge_memories(first, first, first), FileError);
   std::size_t files = 0;
   for (const auto& entry : fs::directory_iterator(folder.path())) {

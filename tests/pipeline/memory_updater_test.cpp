@@ -21,7 +21,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
-#include "panonav/pipeline/learnt_models.hpp"
+#include "panonav/pipeline/internal/learnt_models.hpp"
 #include "panonav/pipeline/live_memory.hpp"
 #include "panonav/pipeline/place_recogniser.hpp"
 #include "panonav/pipeline/view_encoder.hpp"

@@ -49,7 +49,7 @@ class RouteDriving : public ::testing::Test {
   }
 
   /// Where the robot is in the end; `carry` may put it elsewhere at each step.
-  Pose2 drive(Pose2 robot, std::uint64_t seed, RouteDriveState& state,
+  Pose2 drive(Pose2 robot, std::uint64_t seed, RouteDriver::State& state,
               const std::function<void(int, Pose2&)>& carry = {}) {
     RouteDriver driver(MemoryFile::open(memory, Access::read_only), std::nullopt);
     simulation::SimulatedOdometry wheels({}, seed);
@@ -57,9 +57,9 @@ class RouteDriving : public ::testing::Test {
     for (int i = 0; i < 2000; ++i) {
       Observation seen(picture(robot));
       seen.odometry = read;
-      const RouteDriveStep step = driver.step(seen);
+      const RouteDriver::Step step = driver.step(seen);
       state = step.state;
-      if (state == RouteDriveState::arrived || state == RouteDriveState::lost) {
+      if (state == RouteDriver::State::arrived || state == RouteDriver::State::lost) {
         EXPECT_EQ(step.velocity, Velocity{});
         break;
       }
@@ -84,19 +84,19 @@ class RouteDriving : public ::testing::Test {
 };
 
 TEST_F(RouteDriving, RepeatsARoundFromItsBeginningToItsEnd) {
-  RouteDriveState state{};
+  RouteDriver::State state{};
   const Pose2 robot = drive(start * Pose2{0.0, 0.1, 0.3}, 9, state);
-  EXPECT_EQ(state, RouteDriveState::arrived);
+  EXPECT_EQ(state, RouteDriver::State::arrived);
   EXPECT_LT(distance(robot.position(), end.position()), 0.1);
   EXPECT_GT(way_m, 8.0);  // not at its end from the beginning
   EXPECT_LT(beside_m, 0.15);
 }
 
 TEST_F(RouteDriving, ARobotThatIsNowhereOnItStands) {
-  RouteDriveState state{};
+  RouteDriver::State state{};
   const Pose2 away{6.8, 1.0, 0.5};
   EXPECT_EQ(drive(away, 9, state), away);
-  EXPECT_EQ(state, RouteDriveState::lost);
+  EXPECT_EQ(state, RouteDriver::State::lost);
 
   // Carried into the other room on its way, it does not go on for long.
   way_m = 0.0;
@@ -106,7 +106,7 @@ TEST_F(RouteDriving, ARobotThatIsNowhereOnItStands) {
       way_m = 0.0;
     }
   });
-  EXPECT_EQ(state, RouteDriveState::lost);
+  EXPECT_EQ(state, RouteDriver::State::lost);
   EXPECT_LT(way_m, RouteDriver::max_blind_m + 0.1);
 
   RouteDriver driver(MemoryFile::open(memory, Access::read_only), std::nullopt);
@@ -120,21 +120,21 @@ TEST_F(RouteDriving, GoesOnWhereItWasAndBelievesAWitness) {
     RouteDriverOptions options;
     if (resumed) options.resume_m = 100.0;
     RouteDriver driver(MemoryFile::open(memory, Access::read_only), std::nullopt, options);
-    const RouteDriveStep step = driver.step(first);
+    const RouteDriver::Step step = driver.step(first);
     EXPECT_EQ(step.along_m > 0.5 * step.length_m, resumed) << step.along_m;
   }
   for (const bool witness : {false, true}) {
     RouteDriver driver(MemoryFile::open(memory, Access::read_only), std::nullopt);
-    RouteDriveStep step = driver.step(first);
+    RouteDriver::Step step = driver.step(first);
     for (int i = 1; i < 30; ++i) {  // 1.5 m without a line that fits
       Observation blind(picture({6.8, 1.0, 0.5}));
       blind.odometry = Pose2{0.05 * i, 0.0, 0.0};
       const auto robot = driver.follower().tracker().pose();
-      if (step.state != RouteDriveState::lost) {
+      if (step.state != RouteDriver::State::lost) {
         step = driver.step(blind, witness ? robot : std::nullopt);
       }
     }
-    EXPECT_EQ(step.state, witness ? RouteDriveState::driving : RouteDriveState::lost);
+    EXPECT_EQ(step.state, witness ? RouteDriver::State::driving : RouteDriver::State::lost);
   }
 }
 

@@ -35,9 +35,9 @@ bool reads_the_same(const std::filesystem::path& path, const VisualMemory& expec
   bool verified = false;
   try {
     const MemoryFile file = MemoryFile::open(path, Access::read_only);
-    const std::vector<MemoryFault> faults = file.verify();
+    const std::vector<MemoryFile::Fault> faults = file.verify();
     verified = faults.empty();
-    for (const MemoryFault& fault : faults) {
+    for (const MemoryFile::Fault& fault : faults) {
       EXPECT_FALSE(fault.what.empty());
       EXPECT_EQ(fault.what.find('\n'), std::string::npos) << fault.what;
     }

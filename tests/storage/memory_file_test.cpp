@@ -98,7 +98,7 @@ TEST_F(MemoryFileContent, ContentComesBack) {
   EXPECT_EQ(file.find("view_7.png"), std::nullopt);
   EXPECT_EQ(file.names().size(), 48U);
   EXPECT_EQ(file.names().front(), "view_0.png");
-  const MemoryFileInfo info = file.info();
+  const MemoryFile::Info info = file.info();
   EXPECT_EQ(info.views, 48U);
   EXPECT_EQ(info.links, 1U);
   EXPECT_EQ(info.thumbnails, 13U);

@@ -74,7 +74,7 @@ TEST_F(MemoryFileUndo, HistoryIsBoundedAndToldNewestFirst) {
   const auto history = file->history();
   ASSERT_EQ(history.size(), MemoryFile::max_history);
   for (int i = 0; i < lines; ++i) {
-    const KeptChange& kept = history[static_cast<std::size_t>(i)];
+    const MemoryFile::KeptChange& kept = history[static_cast<std::size_t>(i)];
     EXPECT_EQ(kept.what, std::to_string(lines + 4 - i));
     EXPECT_EQ(kept.undoable, i < levels);
     EXPECT_EQ(kept.bytes > 0, i < levels);

@@ -47,7 +47,7 @@ viewer::HeatMap raster(const std::vector<Pose2>& places, double spacing_m,
 std::vector<viewer::ReportPlot> curves(const CatchmentResult& result) {
   viewer::Series homeward{.label = "", .style = viewer::SeriesStyle::lines_and_points};
   viewer::Series orientation{.label = "", .style = viewer::SeriesStyle::lines_and_points};
-  for (const CatchmentBin& bin : result.bins) {
+  for (const CatchmentResult::Bin& bin : result.bins) {
     if (bin.homeward.distance_m <= 0.0) continue;
     homeward.add(bin.homeward.distance_m, bin.homeward.component);
     orientation.add(bin.homeward.distance_m, degrees(bin.orientation_error_rad));
@@ -161,7 +161,7 @@ void write_catchment_report(const std::filesystem::path& folder, const RecordedV
               {ends, "How far from home runs end [S06 figure 14]"}});
   page.section("Numbers");
   std::vector<std::vector<std::string>> rows;
-  for (const CatchmentBin& bin : result.bins) {
+  for (const CatchmentResult::Bin& bin : result.bins) {
     rows.push_back({format_fixed(bin.homeward.distance_m, 3), std::to_string(bin.homeward.pairs),
                     format_fixed(bin.homeward.component, 3),
                     format_fixed(degrees(bin.orientation_error_rad), 1)});

@@ -26,7 +26,7 @@ struct Nodes {
   std::unordered_map<ViewId, std::size_t> number;
 };
 
-Nodes nodes_of(const Dataset& recording, const MappedRun& run) {
+Nodes nodes_of(const Dataset& recording, const Mapper::Result& run) {
   Nodes nodes;
   const std::size_t component = largest_component(run.map);
   for (std::size_t i = 0; i < run.map.nodes.size(); ++i) {
@@ -52,7 +52,7 @@ std::vector<Point2> moved(const std::vector<Point2>& points, const Alignment& al
 }  // namespace
 
 std::optional<MapComparison> compare_with_ground_truth(const Dataset& recording,
-                                                       const MappedRun& run) {
+                                                       const Mapper::Result& run) {
   const Nodes nodes = nodes_of(recording, run);
   if (!is_comparable(nodes.map, nodes.truth)) return std::nullopt;
   MapComparison comparison;
@@ -83,7 +83,7 @@ std::optional<MapComparison> compare_with_ground_truth(const Dataset& recording,
   return comparison;
 }
 
-viewer::MapPlot map_plot(const Dataset& recording, const MappedRun& run) {
+viewer::MapPlot map_plot(const Dataset& recording, const Mapper::Result& run) {
   const Nodes nodes = nodes_of(recording, run);
   viewer::MapPlot plot{.title = "map", .layers = {}};
   std::vector<Point2> map = nodes.map;
@@ -114,12 +114,12 @@ viewer::MapPlot map_plot(const Dataset& recording, const MappedRun& run) {
 }
 
 void write_map_picture(const std::filesystem::path& path, const Dataset& recording,
-                       const MappedRun& run) {
+                       const Mapper::Result& run) {
   viewer::write_plot(path, map_plot(recording, run));
 }
 
 void write_map_report(const std::filesystem::path& folder, const std::string& name,
-                      const Dataset& recording, const MappedRun& run,
+                      const Dataset& recording, const Mapper::Result& run,
                       const viewer::RunPage& played) {
   viewer::ReportPage page(
       "The map of " + name,

@@ -13,10 +13,10 @@ namespace panonav::command {
 
 /// The largest component of the map with its closures; where the recording knows positions, the map
 /// is laid over them, and so is the odometry of its wheels.
-[[nodiscard]] viewer::MapPlot map_plot(const Dataset& recording, const MappedRun& run);
+[[nodiscard]] viewer::MapPlot map_plot(const Dataset& recording, const Mapper::Result& run);
 /// The same as a PNG or SVG file. Throws what `write_plot` throws.
 void write_map_picture(const std::filesystem::path& path, const Dataset& recording,
-                       const MappedRun& run);
+                       const Mapper::Result& run);
 
 /// How the map compares with the positions that the recording knows.
 struct MapComparison {
@@ -33,12 +33,12 @@ struct MapComparison {
 };
 /// Empty where fewer than three nodes have a position, or all are at one place.
 [[nodiscard]] std::optional<MapComparison> compare_with_ground_truth(const Dataset& recording,
-                                                                     const MappedRun& run);
+                                                                     const Mapper::Result& run);
 
 /// Writes index.html: the drive, picture by picture on its map, and the map beside the truth where
 /// it is known. Throws FileError.
 void write_map_report(const std::filesystem::path& folder, const std::string& name,
-                      const Dataset& recording, const MappedRun& run,
+                      const Dataset& recording, const Mapper::Result& run,
                       const viewer::RunPage& played);
 
 }  // namespace panonav::command

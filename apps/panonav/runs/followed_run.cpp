@@ -59,7 +59,7 @@ void follow(RouteFollower& follower, const Dataset& run, const std::vector<Pose2
                   const std::size_t index = i * every;
                   const DatasetEntry& entry = run.entries[index];
                   StageClock clock;
-                  RouteStep step = follower.step(std::move(seen.line), entry.odometry);
+                  RouteFollower::Step step = follower.step(std::move(seen.line), entry.odometry);
                   clock.stage("matching");
                   if (seen.moment) clock.put(*seen.moment);
                   FollowedImage image{index,

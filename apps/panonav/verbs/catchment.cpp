@@ -59,7 +59,7 @@ ordered_json as_json(const CatchmentArguments& wanted, const RecordedViews& goal
                     {"homeward_component", or_null(result.component)},
                     {"orientation_error_rad", or_null(result.orientation_error_rad)}};
   auto bins = ordered_json::array();
-  for (const CatchmentBin& bin : result.bins) {
+  for (const CatchmentResult::Bin& bin : result.bins) {
     bins.push_back({{"distance_m", bin.homeward.distance_m},
                     {"pairs", bin.homeward.pairs},
                     {"homeward_component", or_null(bin.homeward.component)},
@@ -93,7 +93,7 @@ void print_text(const CatchmentArguments& wanted, const CatchmentResult& result,
                 " degrees (circular standard deviation); a home vector of length 1 is worth " +
                 format_fixed(result.typical_distance_m, 2) + " m");
   session.print("  distance [m]  pairs     homeward  heading error [degrees]");
-  for (const CatchmentBin& bin : result.bins) {
+  for (const CatchmentResult::Bin& bin : result.bins) {
     // Rounding of a distance must not take its bin away.
     if (wanted.settings.up_to_m && bin.homeward.distance_m > 1.001 * *wanted.settings.up_to_m)
       break;

@@ -13,7 +13,7 @@ struct CopyArguments {
 ExitCode copy(const CopyArguments& wanted, Session& session) {
   const MemoryFile memory = MemoryFile::open(wanted.memory, Access::read_only);
   memory.copy_to(wanted.copy);
-  const MemoryFileInfo info = MemoryFile::open(wanted.copy, Access::read_only).info();
+  const MemoryFile::Info info = MemoryFile::open(wanted.copy, Access::read_only).info();
   if (session.json()) {
     session.print(json_line(ordered_json{{"memory", wanted.memory},
                                          {"copy", wanted.copy},

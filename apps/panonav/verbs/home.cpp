@@ -3,8 +3,8 @@
 
 #include "cli/verbs.hpp"
 #include "panonav/pipeline/homing_guide.hpp"
-#include "panonav/pipeline/named_view.hpp"
 #include "panonav/pipeline/observation_source.hpp"
+#include "panonav/pipeline/view_list.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "reports/home_answer.hpp"
 #include "reports/home_report.hpp"

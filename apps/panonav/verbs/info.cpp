@@ -42,7 +42,7 @@ std::vector<NamedRoute> routes_of(const MemoryFile& memory) {
   return routes;
 }
 
-ordered_json as_json(const MemoryFile& memory, const MemoryFileInfo& info) {
+ordered_json as_json(const MemoryFile& memory, const MemoryFile::Info& info) {
   const auto& header = memory.header();
   const auto& steps = header.preprocessing;
   ordered_json json{{"memory", memory.path().string()},

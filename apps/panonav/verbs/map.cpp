@@ -41,7 +41,7 @@ struct MapArguments {
 
 /// Poses of the largest component over time. The stamp is the number of the picture where the
 /// recording has none.
-std::vector<StampedPose> trajectory_of(const Dataset& recording, const MappedRun& run,
+std::vector<StampedPose> trajectory_of(const Dataset& recording, const Mapper::Result& run,
                                        const std::string& dataset) {
   std::vector<StampedPose> trajectory;
   const std::size_t component = largest_component(run.map);
@@ -85,7 +85,8 @@ ordered_json as_json(const MapComparison& comparison) {
   return json;
 }
 
-void print_comparison(const MapComparison& comparison, const MappedRun& run, Session& session) {
+void print_comparison(const MapComparison& comparison, const Mapper::Result& run,
+                      Session& session) {
   session.print("beside the ground truth: Procrustes disparity (shape difference) " +
                 session.strong(format_fixed(comparison.shape_difference, 4)) + ", " +
                 format_fixed(comparison.rms_m, 2) + " m rms" +
@@ -103,7 +104,7 @@ void print_comparison(const MapComparison& comparison, const MappedRun& run, Ses
                 std::to_string(comparison.wrong_closures));
 }
 
-void print_result(const MapArguments& wanted, const Dataset& recording, const MappedRun& run,
+void print_result(const MapArguments& wanted, const Dataset& recording, const Mapper::Result& run,
                   Session& session) {
   const std::size_t nodes = run.map.nodes.size();
   const double step_ms =
@@ -163,14 +164,14 @@ void print_result(const MapArguments& wanted, const Dataset& recording, const Ma
   if (wanted.graph) session.print(*wanted.graph + " holds the map as a graph.");
 }
 
-MappedRun map_recording(const Dataset& recording, Mapper& mapper, Session& session) {
+Mapper::Result map_recording(const Dataset& recording, Mapper& mapper, Session& session) {
   Progress progress(session, "mapping", recording.entries.size());
   return mapper.map(recording, session.executor(), [&] { progress.advance(); });
 }
 
 /// As `map_recording`, and viewers see how it grows.
-MappedRun map_in_view(const MapArguments& wanted, const Dataset& recording, Mapper& mapper,
-                      Session& session) {
+Mapper::Result map_in_view(const MapArguments& wanted, const Dataset& recording, Mapper& mapper,
+                           Session& session) {
   RunRecord record({.file = std::nullopt, .view = wanted.record.view},
                    std::array{wanted.dataset, wanted.memory}, false, session,
                    {.memory = wanted.memory});
@@ -206,7 +207,7 @@ MappedRun map_in_view(const MapArguments& wanted, const Dataset& recording, Mapp
         last = std::move(seen.moment);
         progress.advance();
       });
-  MappedRun run = mapper.finish();
+  Mapper::Result run = mapper.finish();
   if (last) {
     shown.finish(*last, run.map);
     record.add(std::move(*last));
@@ -217,7 +218,7 @@ MappedRun map_in_view(const MapArguments& wanted, const Dataset& recording, Mapp
 
 /// Writes the finished map, then each picture with the pose that it got: of the largest connected
 /// component, as components have no common frame.
-void record_map(const MapArguments& wanted, const Dataset& recording, const MappedRun& run,
+void record_map(const MapArguments& wanted, const Dataset& recording, const Mapper::Result& run,
                 const ViewEncoder& encoder, viewer::RunPage& played, Session& session) {
   RunRecord record({.file = wanted.record.file, .view = std::nullopt},
                    std::array{wanted.dataset, wanted.memory}, false, session, {});
@@ -307,8 +308,8 @@ ExitCode map(const Arguments& arguments, const MapArguments& wanted, Session& se
   options.thumbnails = !wanted.no_thumbnails;
   Mapper mapper(std::move(*memory), recording.source, options);
   if (there) check_known_views(recording, mapper.memory(), mapper.encoder(), session.executor());
-  const MappedRun run = wanted.record.view ? map_in_view(wanted, recording, mapper, session)
-                                           : map_recording(recording, mapper, session);
+  const Mapper::Result run = wanted.record.view ? map_in_view(wanted, recording, mapper, session)
+                                                : map_recording(recording, mapper, session);
   if (wanted.tum) write_trajectory(*wanted.tum, trajectory_of(recording, run, wanted.dataset));
   if (wanted.graph) {
     write_graph(*wanted.graph, run.map, [&](ViewId view) {

@@ -11,7 +11,7 @@ struct MergeArguments {
   std::string first;
   std::string second;
   std::string memory;
-  MemoryMergeOptions options;
+  SessionAlignmentOptions alignment;
 };
 
 ordered_json as_json(const std::optional<SessionAlignment>& alignment) {
@@ -34,7 +34,7 @@ ExitCode merge(const MergeArguments& wanted, Session& session) {
       return MemoryFile::open(path, Access::read_only).info().views;
     };
     Progress progress(session, "merging", views(wanted.first) + views(wanted.second));
-    return merge_memories(wanted.first, wanted.second, wanted.memory, wanted.options,
+    return merge_memories(wanted.first, wanted.second, wanted.memory, wanted.alignment, {},
                           [&] { progress.advance(); });
   }();
   if (session.json()) {
@@ -81,7 +81,7 @@ Run declare_merge(Arguments& arguments) {
   arguments.positional("FIRST", wanted->first, "Memory file whose frame is kept");
   arguments.positional("SECOND", wanted->second, "Memory file that is added to it");
   arguments.required_option("-o,--out MEMORY", wanted->memory, "New memory file");
-  arguments.options("merge", wanted->options.alignment);
+  arguments.options("merge", wanted->alignment);
   arguments.common({"--min-places"});
   return [wanted](Session& session) { return merge(*wanted, session); };
 }

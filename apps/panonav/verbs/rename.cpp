@@ -1,6 +1,6 @@
 #include "cli/verbs.hpp"
 #include "panonav/pipeline/known_views.hpp"
-#include "panonav/pipeline/named_view.hpp"
+#include "panonav/pipeline/view_list.hpp"
 
 namespace panonav::command {
 

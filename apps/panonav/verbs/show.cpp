@@ -5,7 +5,7 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/mapping/topological_map.hpp"
-#include "panonav/pipeline/named_view.hpp"
+#include "panonav/pipeline/view_list.hpp"
 
 namespace panonav::command {
 

@@ -48,15 +48,15 @@ struct CatchmentSettings {
   std::optional<double> up_to_m;        ///< pairs farther apart do not count in averages
 };
 
-/// Pairs of a range of distances.
-struct CatchmentBin {
-  HomingSurvey::Bin homeward;  ///< pairs of these distances and their mean cosine
-  /// Circular standard deviation of the error of the heading; NaN without pairs.
-  double orientation_error_rad = 0.0;
-};
-
 /// What all home vectors between two recordings come to.
 struct CatchmentResult {
+  /// Pairs of a range of distances.
+  struct Bin {
+    HomingSurvey::Bin homeward;  ///< pairs of these distances and their mean cosine
+    /// Circular standard deviation of the error of the heading; NaN without pairs.
+    double orientation_error_rad = 0.0;
+  };
+
   double spacing_m = 0.0;           ///< of the places
   double typical_distance_m = 0.0;  ///< metres that a home vector of length 1 is worth
   HomingSurveyOptions run;          ///< as the runs were made, with what was learnt
@@ -67,7 +67,7 @@ struct CatchmentResult {
   double component = 0.0;
   /// Circular standard deviation of the error of the heading over these pairs.
   double orientation_error_rad = 0.0;
-  std::vector<CatchmentBin> bins;  ///< of all distances
+  std::vector<Bin> bins;           ///< of all distances
   std::vector<float> final_m;      ///< where runs end: goal after goal, one per place
   std::vector<double> accepted_m;  ///< distances of `areas`: 0 to 5 spacings
   std::vector<double> areas;       ///< mean number of places from which runs end so near

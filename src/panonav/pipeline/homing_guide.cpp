@@ -4,7 +4,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/pipeline/named_view.hpp"
+#include "panonav/pipeline/view_list.hpp"
 #include "panonav/relative_pose/chance_match.hpp"
 
 namespace panonav {

@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <iomanip>
 #include <optional>
-#include <span>
 #include <sstream>
 #include <variant>
 #include <vector>
@@ -21,43 +20,23 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void add_optional(RecordBytes& bytes, const std::optional<double>& value) {
-  if (value) {
-    bytes.add(*value);
-  } else {
-    bytes.add_null();
-  }
-}
-
-void add_setting(RecordBytes& bytes, const std::string& value) {
-  bytes.add(std::string_view(value));
-}
-void add_setting(RecordBytes& bytes, const std::vector<std::uint8_t>& value) {
-  bytes.add(std::span<const std::uint8_t>(value));
-}
-void add_setting(RecordBytes& bytes, std::int64_t value) {
-  bytes.add(value);
-}
-void add_setting(RecordBytes& bytes, double value) {
-  bytes.add(value);
-}
-
-/// Changes with every change of a name, a pose, a file's size or time, or of how the pictures lie.
+/// Returns a text that changes with every change of a name, a pose, a file's size or time, or of
+/// how the pictures lie.
 std::string fingerprint(const Dataset& recording, const MemoryFile& memory) {
   RecordBytes bytes;
   MemoryHeader read_as = memory.header();
   read_as.source = recording.source;
   for (const auto& [key, value] : settings_of(read_as)) {
-    bytes.add(std::string_view(key));
-    std::visit([&](const auto& typed) { add_setting(bytes, typed); }, value);
+    bytes.add(key);
+    std::visit([&](const auto& typed) { bytes.add(typed); }, value);
   }
   for (const auto& entry : recording.entries) {
-    bytes.add(std::string_view(entry.file));
-    add_optional(bytes, entry.stamp_s);
+    bytes.add(entry.file);
+    bytes.add(entry.stamp_s);
     if (entry.pose) {
       bytes.add(entry.pose->x_m);
       bytes.add(entry.pose->y_m);
-      add_optional(bytes, entry.pose->heading_rad);
+      bytes.add(entry.pose->heading_rad);
     } else {
       bytes.add_null();
     }

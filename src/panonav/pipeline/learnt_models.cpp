@@ -11,6 +11,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/localisation/neighbour_support.hpp"
+#include "panonav/pipeline/internal/learnt_models.hpp"
 #include "panonav/storage/checksum.hpp"
 
 namespace panonav {

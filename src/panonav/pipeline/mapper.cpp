@@ -83,8 +83,8 @@ bool Mapper::add(EncodedView seen) {
   return true;
 }
 
-MappedRun Mapper::map(const Dataset& recording, Executor& executor,
-                      const std::function<void()>& mapped) {
+Mapper::Result Mapper::map(const Dataset& recording, Executor& executor,
+                           const std::function<void()>& mapped) {
   make_in_order(
       recording.entries.size(), executor,
       [&](std::size_t i) { return encode(read_observation(recording.entries[i])); },
@@ -95,7 +95,7 @@ MappedRun Mapper::map(const Dataset& recording, Executor& executor,
   return finish();
 }
 
-MappedRun Mapper::finish() {
+Mapper::Result Mapper::finish() {
   const auto start = Clock::now();
   mapper_.finish();
   run_.mapping_s += seconds_since(start);

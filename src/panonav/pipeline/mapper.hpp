@@ -28,16 +28,6 @@ struct MapperOptions {
   bool thumbnails = true;          ///< keep small pictures of the views
 };
 
-/// What a `Mapper` made of its observations.
-struct MappedRun {
-  TopologicalMap map;                     ///< all nodes and edges
-  std::vector<std::size_t> observations;  ///< by node: its number, counted from 0
-  std::size_t skipped = 0;                ///< observations that differed too little from a node
-  double scale_m = 0.0;                   ///< metres for each unit of length of the views
-  bool wheels = false;                    ///< all observations had odometry, and steps come from it
-  double mapping_s = 0.0;  ///< time of the mapping itself, without pictures and files
-};
-
 /// Makes a map of observations in the order in which they were taken: the views that become nodes
 /// are appended to a memory file, and the map is stored there as "map". Views that the file knows
 /// by name are not appended again; their ids must ascend in the order of the observations. What was
@@ -45,6 +35,16 @@ struct MappedRun {
 /// method. One thread at a time, except `encode`.
 class Mapper {
  public:
+  /// What a `Mapper` made of its observations.
+  struct Result {
+    TopologicalMap map;                     ///< all nodes and edges
+    std::vector<std::size_t> observations;  ///< by node: its number, counted from 0
+    std::size_t skipped = 0;                ///< observations that differed too little from a node
+    double scale_m = 0.0;                   ///< metres for each unit of length of the views
+    bool wheels = false;     ///< all observations had odometry, and steps come from it
+    double mapping_s = 0.0;  ///< time of the mapping itself, without pictures and files
+  };
+
   /// An observation on its way into the map.
   struct EncodedView {
     FourierSignature signature;           ///< not packed, for the odometry
@@ -73,13 +73,13 @@ class Mapper {
 
   /// All of a recording, then `finish`. Calls `mapped` after each picture. Throws as `add`, and
   /// FileError on a picture that cannot be read.
-  MappedRun map(const Dataset& recording, Executor& executor,
-                const std::function<void()>& mapped = {});
+  Result map(const Dataset& recording, Executor& executor,
+             const std::function<void()>& mapped = {});
 
   /// Optimises what is not yet, and stores the map and a link for each of its edges. Where no
   /// observation had a pose, the views of the largest component get those of the map. More
   /// observations may follow. Throws FileError.
-  MappedRun finish();
+  Result finish();
 
   /// As far as it is made, for people to look at: `finish` still moves nodes. Cost: a copy.
   [[nodiscard]] TopologicalMap map_so_far() const { return mapper_.map(); }
@@ -94,7 +94,7 @@ class Mapper {
   ViewEncoder encoder_;
   VisualMemory seen_;  // the nodes so far
   TopologicalMapper mapper_;
-  MappedRun run_;
+  Result run_;
   std::size_t count_ = 0;
   std::optional<Pose2> odometry_of_node_;
   bool all_odometry_ = true;

@@ -23,6 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+using Bytes = std::vector<std::uint8_t>;
 using NewIds = std::map<ViewId, ViewId>;  // in the new memory, by that in the old
 
 std::optional<Pose2> whole_pose(const ReferenceInfo& info) {
@@ -143,10 +144,6 @@ void require_comparable(const MemoryFile& first, const MemoryFile& second) {
   require_same("preprocessing", a.preprocessing == b.preprocessing);
 }
 
-std::vector<std::uint8_t> value_or_empty(std::optional<std::vector<std::uint8_t>> bytes) {
-  return bytes ? std::move(*bytes) : std::vector<std::uint8_t>{};
-}
-
 /// A name that is not taken: as it is, or after the file that it comes from.
 template <class IsTaken>
 std::string free_name(const std::string& name, const MemoryFile& from, const IsTaken& is_taken) {
@@ -159,8 +156,12 @@ std::string free_name(const std::string& name, const MemoryFile& from, const IsT
 
 class Merge {
  public:
-  Merge(const MemoryFile& first, const MemoryFile& second, const MemoryMergeOptions& options)
-      : files_{&first, &second}, views_{first.load(), second.load()}, options_(options) {}
+  Merge(const MemoryFile& first, const MemoryFile& second, const SessionAlignmentOptions& alignment,
+        const PoseGraphOptions& graph)
+      : files_{&first, &second},
+        views_{first.load(), second.load()},
+        alignment_(alignment),
+        graph_(graph) {}
 
   MergedMemory write(MemoryFile& file, const std::function<void()>& advance) {
     for (std::size_t i = 0; i < 2; ++i) add_views(file, i, advance);
@@ -204,8 +205,9 @@ class Merge {
         if (name != info.name) ++result_.renamed;
         info.name = name;
       }
-      waiting.push_back({std::move(info), signature, value_or_empty(files_[from]->thumbnail(view)),
-                         value_or_empty(files_[from]->features(view))});
+      waiting.push_back({std::move(info), signature,
+                         files_[from]->thumbnail(view).value_or(Bytes{}),
+                         files_[from]->features(view).value_or(Bytes{})});
       ids.push_back(view);
       if (waiting.size() == batch) append();
     }
@@ -216,10 +218,10 @@ class Merge {
     const std::array own{map_of(*files_[0], views_[0]), map_of(*files_[1], views_[1])};
     const std::array maps{renamed(own[0], ids_[0]), renamed(own[1], ids_[1])};
     const std::array largest{part_of(maps[0], true), part_of(maps[1], true)};
-    result_.alignment = align_sessions(all, largest[0], largest[1], options_.alignment);
+    result_.alignment = align_sessions(all, largest[0], largest[1], alignment_);
     TopologicalMap map = largest[0];
     if (result_.alignment) {
-      map = join_sessions(largest[0], largest[1], *result_.alignment, options_.graph);
+      map = join_sessions(largest[0], largest[1], *result_.alignment, graph_);
     } else {
       add_apart(map, largest[1]);
     }
@@ -285,7 +287,8 @@ class Merge {
 
   std::array<const MemoryFile*, 2> files_;
   std::array<VisualMemory, 2> views_;
-  MemoryMergeOptions options_;
+  const SessionAlignmentOptions& alignment_;
+  const PoseGraphOptions& graph_;
   std::array<NewIds, 2> ids_;
   MergedMemory result_;
 };
@@ -293,7 +296,8 @@ class Merge {
 }  // namespace
 
 MergedMemory merge_memories(const std::filesystem::path& first, const std::filesystem::path& second,
-                            const std::filesystem::path& memory, const MemoryMergeOptions& options,
+                            const std::filesystem::path& memory,
+                            const SessionAlignmentOptions& alignment, const PoseGraphOptions& graph,
                             const std::function<void()>& advance) {
   const MemoryFile a = MemoryFile::open(first, Access::read_only);
   const MemoryFile b = MemoryFile::open(second, Access::read_only);
@@ -308,7 +312,7 @@ MergedMemory merge_memories(const std::filesystem::path& first, const std::files
   MergedMemory result;
   {
     MemoryFile file = MemoryFile::create(unfinished.path(), a.header());
-    Merge merge(a, b, options);
+    Merge merge(a, b, alignment, graph);
     file.change([&] { result = merge.write(file, advance); });
     keep_models(file);
     if (on_server) file.copy_to(memory);

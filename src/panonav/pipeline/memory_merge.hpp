@@ -10,12 +10,6 @@
 
 namespace panonav {
 
-/// When two memories are joined, and how their maps give way.
-struct MemoryMergeOptions {
-  SessionAlignmentOptions alignment;  ///< when places are taken to be in common
-  PoseGraphOptions graph;             ///< how the joined map is optimised
-};
-
 /// What `merge_memories` made.
 struct MergedMemory {
   std::size_t views = 0;    ///< of the new memory
@@ -40,6 +34,7 @@ struct MergedMemory {
 /// of them; others of the second whose name is taken are called "STEM/NAME", after its file.
 /// Nothing else is dropped: `select_references` finds what has become redundant.
 ///
+/// `alignment` decides which places are in common, `graph` how the joined map is optimised.
 /// `memory` appears whole or not at all. `advance` is called for each view that was written. Throws
 /// FileError: a file that cannot be read or written, something at `memory`, a memory whose views of
 /// the map have positions and not all of them headings, as these are in another frame than the map;
@@ -48,7 +43,8 @@ struct MergedMemory {
 /// writing all views.
 MergedMemory merge_memories(const std::filesystem::path& first, const std::filesystem::path& second,
                             const std::filesystem::path& memory,
-                            const MemoryMergeOptions& options = {},
+                            const SessionAlignmentOptions& alignment = {},
+                            const PoseGraphOptions& graph = {},
                             const std::function<void()>& advance = {});
 
 }  // namespace panonav

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "panonav/core/error.hpp"
+#include "panonav/pipeline/internal/learnt_models.hpp"
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
 #include "panonav/pipeline/view_encoder.hpp"

@@ -11,18 +11,45 @@
 #include "panonav/localisation/hierarchical.hpp"
 #include "panonav/localisation/localiser.hpp"
 #include "panonav/memory/view_index.hpp"
-#include "panonav/pipeline/internal/asked_view.hpp"
 #include "panonav/pipeline/internal/feature_cache.hpp"
 #include "panonav/pipeline/internal/learning_sample.hpp"
-#include "panonav/pipeline/learnt_models.hpp"
+#include "panonav/pipeline/internal/learnt_models.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
-#include "panonav/storage/indexed_memory.hpp"
 #include "panonav/storage/memory_address.hpp"
 #include "panonav/storage/memory_file.hpp"
+#include "panonav/storage/memory_scheme.hpp"
 
 namespace panonav {
 
 namespace {
+
+/// What a localisation makes of one observation, each part where it is needed and once. Both
+/// arguments must outlive it.
+class ObservationQuery {
+ public:
+  ObservationQuery(const ViewEncoder& encoder, const Observation& observation)
+      : encoder_(encoder), observation_(observation) {}
+
+  /// `by_features`: the panorama is needed in any case.
+  [[nodiscard]] PackedSignature signature(bool by_features) {
+    return by_features ? encoder_.packed(panorama()) : encoder_.packed(observation_);
+  }
+  [[nodiscard]] QueryFeatures features() {
+    return [this](Handedness handedness) {
+      return encoder_.features(handedness == Handedness::as_seen ? panorama()
+                                                                 : mirrored(panorama()));
+    };
+  }
+
+ private:
+  const Panorama& panorama() {
+    if (!panorama_) panorama_ = encoder_.panorama(observation_);
+    return *panorama_;
+  }
+  const ViewEncoder& encoder_;
+  const Observation& observation_;
+  std::optional<Panorama> panorama_;
+};
 
 void check_options(const PlaceRecogniserOptions& options, const MemoryHeader& header,
                    bool is_held) {
@@ -151,9 +178,10 @@ PlaceRecogniser::PlaceRecogniser(const std::filesystem::path& memory,
   const MemoryFile file = MemoryFile::open(memory, Access::read_only);
   const bool is_held =
       options.areas || !is_server_address(memory) || file.views().size() <= options.max_held_views;
-  implementation_ = is_held ? std::make_unique<Implementation>(file, options)
-                            : std::make_unique<Implementation>(open_indexed_memory(memory), file,
-                                                               memory, options);
+  implementation_ =
+      is_held ? std::make_unique<Implementation>(file, options)
+              : std::make_unique<Implementation>(find_memory_scheme(memory)->open_index(memory),
+                                                 file, memory, options);
 }
 PlaceRecogniser::PlaceRecogniser(const MemoryFile& file, const PlaceRecogniserOptions& options)
     : implementation_(std::make_unique<Implementation>(file, options)) {}
@@ -170,17 +198,18 @@ Place PlaceRecogniser::localise(const Observation& observation,
                                 std::span<const std::string> excluded_names) const {
   const Implementation& own = *implementation_;
   const std::shared_ptr<const Localiser> localiser = own.localiser();
-  AskedView asked(own.encoder, observation);
-  const PackedSignature query = asked.query(localiser->ranks_by_features());
+  ObservationQuery query(own.encoder, observation);
+  const PackedSignature signature = query.signature(localiser->ranks_by_features());
   const std::unique_ptr<ViewIndex> index = own.index();
   std::vector<ViewId> excluded;
   for (const std::string& name : excluded_names) {
     if (const auto view = index->find(name)) excluded.push_back(*view);
   }
   const SearchMask mask{excluded, {}};
-  Place place = localiser->localise(*index, query, mask, asked.features());
+  Place place = localiser->localise(*index, signature, mask, query.features());
   if (own.areas) {
-    place.areas = localise_hierarchically(*own.memory, *own.areas, query, *own.options.areas, mask);
+    place.areas =
+        localise_hierarchically(*own.memory, *own.areas, signature, *own.options.areas, mask);
   }
   return place;
 }

@@ -10,7 +10,7 @@
 #include "panonav/core/text.hpp"
 #include "panonav/mapping/lattice.hpp"
 #include "panonav/pipeline/mapper.hpp"
-#include "panonav/pipeline/named_view.hpp"
+#include "panonav/pipeline/view_list.hpp"
 
 namespace panonav {
 
@@ -163,7 +163,7 @@ NavigationDecision RobotNavigator::observe(const Observation& observation, Robot
   return navigator_->observe(encoder_.signature(observation), report);
 }
 
-NavigationStep RobotNavigator::step(const Observation& observation, RobotReport report) {
+RobotNavigator::Step RobotNavigator::step(const Observation& observation, RobotReport report) {
   constexpr double near_m = 0.003;
   const BaseOptions& base = options_.base;
   const Pose2 moved = odometry_ && observation.odometry

@@ -41,19 +41,19 @@ struct RobotNavigatorOptions {
   KnownRouteOptions known_route;  ///< how the route is followed
 };
 
-/// What a robot is to do after an observation.
-struct NavigationStep {
-  NavigationDecision decision;  ///< the last one
-  Velocity velocity;            ///< for the next period of the base (`BaseOptions::period_s`)
-  bool decided = false;         ///< by this observation; else the step decided before goes on
-};
-
 /// Sends a robot to a remembered view by what it sees: a picture in, a velocity out. The views are
 /// read from the memory file when they are needed: those of one area and around it are held, of
 /// the rest the graph. While the graph is made, a map needs the views of its nodes and an
 /// arrangement all views at once; these are let go then. One thread at a time.
 class RobotNavigator {
  public:
+  /// What a robot is to do after an observation.
+  struct Step {
+    NavigationDecision decision;  ///< the last one
+    Velocity velocity;            ///< for the next period of the base (`BaseOptions::period_s`)
+    bool decided = false;         ///< by this observation; else the step decided before goes on
+  };
+
   /// `goal`: name or id of a view. Pictures lie as `source` says; empty: as the memory's own.
   /// Throws FileError when the memory holds no views, not what is asked for, or no edge leads to
   /// the goal; OptionError.
@@ -71,7 +71,7 @@ class RobotNavigator {
   /// before is done, by odometry or else as commanded, and when `report` says that something
   /// stopped it; only then the picture is looked at. Throws as `ViewEncoder::signature` and
   /// `Navigator::observe`.
-  [[nodiscard]] NavigationStep step(const Observation& observation, RobotReport report = {});
+  [[nodiscard]] Step step(const Observation& observation, RobotReport report = {});
 
   /// What the edges were taken from.
   [[nodiscard]] GraphOrigin origin() const noexcept { return origin_; }
@@ -106,7 +106,7 @@ class RobotNavigator {
   std::optional<LineEncoder> line_encoder_;
   std::optional<Navigator> navigator_;
   // The step that is under way.
-  NavigationStep last_;
+  Step last_;
   Point2 target_;                  // in the current robot frame
   double time_left_s_ = 0.0;       // after which it counts as done
   Pose2 moved_;                    // since the decision

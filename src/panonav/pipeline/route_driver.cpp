@@ -9,7 +9,7 @@
 
 namespace panonav {
 
-std::string_view name_of(RouteDriveState state) {
+std::string_view name_of(RouteDriver::State state) {
   constexpr std::array<std::string_view, 4> names{"searching", "driving", "arrived", "lost"};
   return names.at(static_cast<std::size_t>(state));
 }
@@ -37,14 +37,14 @@ void RouteDriver::start_at(Point2 place) {
   path_.emplace(route_segment(poses(), from_m, length_m_), options_.path);
 }
 
-RouteDriveStep RouteDriver::step(const Observation& observation,
-                                 const std::optional<Pose2>& other_estimate) {
+RouteDriver::Step RouteDriver::step(const Observation& observation,
+                                    const std::optional<Pose2>& other_estimate) {
   if (!observation.odometry) {
     throw ContractError("odometry of the observation", "unknown", "known, to repeat a route");
   }
   const Pose2 moved = inverse(odometry_.value_or(*observation.odometry)) * *observation.odometry;
   odometry_ = observation.odometry;
-  RouteDriveStep step;
+  RouteDriver::Step step;
   step.length_m = length_m_;
   step.fix = follower_.step(observation).fix;
   const auto& robot = follower_.tracker().pose();
@@ -54,17 +54,17 @@ RouteDriveStep RouteDriver::step(const Observation& observation,
   blind_m_ = step.fix || confirmed ? 0.0 : blind_m_ + std::hypot(moved.x_m, moved.y_m);
   if (!path_) {
     if (!step.fix) {
-      if (++searches_ >= max_searches) step.state = RouteDriveState::lost;
+      if (++searches_ >= max_searches) step.state = RouteDriver::State::lost;
       return step;
     }
     start_at(step.fix->pose.position());
   }
   step.along_m = start_m_ + path_->along_m();
-  step.state = RouteDriveState::lost;
+  step.state = RouteDriver::State::lost;
   if (!robot || blind_m_ > max_blind_m) return step;
   const auto aim = path_->next_target(robot->position());
   step.along_m = start_m_ + path_->along_m();
-  step.state = aim ? RouteDriveState::driving : RouteDriveState::arrived;
+  step.state = aim ? RouteDriver::State::driving : RouteDriver::State::arrived;
   if (!aim) return step;
   const Point2 ahead = inverse(*robot) * *aim;
   step.velocity = compute_command_towards(std::atan2(ahead.y_m, ahead.x_m),

@@ -20,30 +20,28 @@ struct RouteDriverOptions {
   std::optional<double> resume_m;
 };
 
-/// How far a repeated route has come.
-enum class RouteDriveState {
-  searching,  ///< the robot stands: no line has told yet where it is
-  driving,    ///< the robot is on its way to the end of the route
-  arrived,    ///< at the end of the route
-  lost,       ///< not found on the route, or not for so long that odometry alone is no guide
-};
-/// "searching", "driving", "arrived", "lost".
-[[nodiscard]] std::string_view name_of(RouteDriveState state);
-
-/// What a robot is to do after an observation, and where it is beside the route.
-struct RouteDriveStep {
-  RouteDriveState state = RouteDriveState::searching;  ///< after this observation
-  Velocity velocity;            ///< for the next period of the base; 0 unless driving
-  std::optional<RouteFix> fix;  ///< empty: odometry carries the robot on
-  double along_m = 0.0;         ///< way along the route
-  double length_m = 0.0;        ///< of the route
-};
-
 /// Repeats a recorded route [Y03]: a picture with its odometry in, a velocity out. It drives from
 /// the place where the robot is, of several the first on the way, to the end of the route, by pure
 /// pursuit of the positions of its lines (`PathFollower`). One thread at a time.
 class RouteDriver {
  public:
+  /// How far a repeated route has come.
+  enum class State {
+    searching,  ///< the robot stands: no line has told yet where it is
+    driving,    ///< the robot is on its way to the end of the route
+    arrived,    ///< at the end of the route
+    lost,       ///< not found on the route, or not for so long that odometry alone is no guide
+  };
+
+  /// What a robot is to do after an observation, and where it is beside the route.
+  struct Step {
+    State state = State::searching;  ///< after this observation
+    Velocity velocity;               ///< for the next period of the base; 0 unless driving
+    std::optional<RouteFix> fix;     ///< empty: odometry carries the robot on
+    double along_m = 0.0;            ///< way along the route
+    double length_m = 0.0;           ///< of the route
+  };
+
   /// Without a fix it drives no farther by odometry that nobody confirms.
   static constexpr double max_blind_m = 1.0;
   /// Pictures after which a robot that stands is not on the route.
@@ -57,8 +55,8 @@ class RouteDriver {
   /// pose of the robot in the frame of the route by another method (`Tracker`); as long as it
   /// agrees with the odometry since the last fix, the robot is not lost. Throws as
   /// `LineEncoder::line`, ContractError on an observation without odometry.
-  [[nodiscard]] RouteDriveStep step(const Observation& observation,
-                                    const std::optional<Pose2>& other_estimate = std::nullopt);
+  [[nodiscard]] Step step(const Observation& observation,
+                          const std::optional<Pose2>& other_estimate = std::nullopt);
 
   /// What finds the robot beside the route.
   [[nodiscard]] const RouteFollower& follower() const noexcept { return follower_; }
@@ -76,5 +74,8 @@ class RouteDriver {
   double blind_m_ = 0.0;           // driven since the last fix
   int searches_ = 0;
 };
+
+/// Returns "searching", "driving", "arrived" or "lost".
+[[nodiscard]] std::string_view name_of(RouteDriver::State state);
 
 }  // namespace panonav

@@ -19,8 +19,9 @@ RouteFollower::RouteFollower(const MemoryFile& memory, const std::optional<Pictu
       tracker_(route_to_follow(memory, name_), options.tracker, options.fit),
       changes_(tracker_.lines().poses()) {}
 
-RouteStep RouteFollower::step(std::vector<float> line, const std::optional<Pose2>& odometry) {
-  RouteStep step{std::move(line), std::nullopt, {}};
+RouteFollower::Step RouteFollower::step(std::vector<float> line,
+                                        const std::optional<Pose2>& odometry) {
+  RouteFollower::Step step{std::move(line), std::nullopt, {}};
   if (options_.use_odometry && odometry) {
     step.fix = tracker_.track(step.line, inverse(odometry_.value_or(*odometry)) * *odometry);
   } else {

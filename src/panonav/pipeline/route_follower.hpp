@@ -21,18 +21,18 @@ struct RouteFollowerOptions {
   bool use_odometry = true;         ///< where observations have it; else each one alone
 };
 
-/// Where the robot is beside the route.
-struct RouteStep {
-  std::vector<float> line;                          ///< what was seen
-  std::optional<RouteFix> fix;                      ///< empty: not on this route
-  std::vector<RouteChanges::AzimuthRange> changed;  ///< where the scene is not as remembered
-};
-
 /// Says where a robot is beside a recorded route [Y03], observation by observation. Odometry
 /// predicts where the last observation and this one have it; where the prediction does not hold the
 /// robot is looked for around it, then on the whole route. One thread at a time, except `encode`.
 class RouteFollower {
  public:
+  /// Where the robot is beside the route.
+  struct Step {
+    std::vector<float> line;            ///< what was seen
+    std::optional<RouteFix> fix;        ///< empty: not on this route
+    std::vector<RouteChanges::AzimuthRange> changed;  ///< where the scene is not as remembered
+  };
+
   /// The memory's own camera takes the pictures. Throws FileError, also when there is no such
   /// route, several and none is named, or it has fewer than two lines; OptionError.
   explicit RouteFollower(const std::filesystem::path& memory,
@@ -47,9 +47,9 @@ class RouteFollower {
     return encoder_.line(observation);
   }
   /// The next line, as `encode` gave it, with the odometry of its observation where it had one.
-  [[nodiscard]] RouteStep step(std::vector<float> line, const std::optional<Pose2>& odometry);
+  [[nodiscard]] Step step(std::vector<float> line, const std::optional<Pose2>& odometry);
   /// The next observation. Throws as `encode`.
-  [[nodiscard]] RouteStep step(const Observation& observation) {
+  [[nodiscard]] Step step(const Observation& observation) {
     return step(encode(observation), observation.odometry);
   }
 

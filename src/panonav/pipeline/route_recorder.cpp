@@ -50,7 +50,7 @@ std::optional<Pose2> end_of(const MemoryFile& file, const std::string& name) {
 
 }  // namespace
 
-double RecordedRoute::bytes_per_km() const {
+double RouteRecorder::Recorded::bytes_per_km() const {
   const double length_m = route.length_m();
   return length_m > 0.0 ? 1000.0 * static_cast<double>(bytes) / length_m : 0.0;
 }
@@ -144,9 +144,9 @@ void RouteRecorder::flush() {
   source_kept_ = true;
 }
 
-RecordedRoute RouteRecorder::record(const Dataset& drive, std::span<const Pose2> poses,
-                                    Executor& executor,
-                                    const std::function<void(std::size_t lines)>& recorded) {
+RouteRecorder::Recorded RouteRecorder::record(
+    const Dataset& drive, std::span<const Pose2> poses, Executor& executor,
+    const std::function<void(std::size_t lines)>& recorded) {
   std::vector<std::size_t> chosen;
   std::vector<Pose2> way;
   for (std::size_t i = 0; i < poses.size(); ++i) {
@@ -173,7 +173,7 @@ RecordedRoute RouteRecorder::record(const Dataset& drive, std::span<const Pose2>
   return finish();
 }
 
-RecordedRoute RouteRecorder::finish() {
+RouteRecorder::Recorded RouteRecorder::finish() {
   flush();
   auto route = file_.route(options_.name);
   if (!route) throw ContractError("lines of the route", 0.0, "1 or more");

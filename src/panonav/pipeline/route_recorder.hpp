@@ -31,20 +31,20 @@ struct RouteRecorderOptions {
   bool odometry = false;  ///< remember the odometry's poses, even where observations have poses
 };
 
-/// What a memory file has of a route, and what a recorder added to it.
-struct RecordedRoute {
-  RoutePanorama route;       ///< all of its lines, those of earlier drives included
-  std::size_t appended = 0;  ///< lines
-  std::uint64_t bytes = 0;   ///< of the route's lines and poses as they are kept
-  /// Bytes for each kilometre of the route; 0 for a route without length.
-  [[nodiscard]] double bytes_per_km() const;
-};
-
 /// Remembers a route as a line of pixels a step [Y03] in a memory file, where it is on the disk 64
 /// lines at a time. Poses are those of the observations, which must know their headings, or of
 /// their odometry, as the options say. One thread at a time, except `encode`.
 class RouteRecorder {
  public:
+  /// What a memory file has of a route, and what a recorder added to it.
+  struct Recorded {
+    RoutePanorama route;       ///< all of its lines, those of earlier drives included
+    std::size_t appended = 0;  ///< lines
+    std::uint64_t bytes = 0;   ///< of the route's lines and poses as they are kept
+    /// Bytes for each kilometre of the route; 0 for a route without length.
+    [[nodiscard]] double bytes_per_km() const;
+  };
+
   /// A line on its way into the route.
   struct EncodedLine {
     Pose2 pose;               ///< in the route's frame
@@ -76,10 +76,10 @@ class RouteRecorder {
   /// A whole drive: those entries at which a line is due, at these poses, one for each entry; what
   /// the route holds of it is skipped. Calls `recorded` with their number after each line. Throws
   /// as `add` and `finish`; those before a picture that cannot be read are kept.
-  RecordedRoute record(const Dataset& drive, std::span<const Pose2> poses, Executor& executor,
-                       const std::function<void(std::size_t lines)>& recorded = {});
+  Recorded record(const Dataset& drive, std::span<const Pose2> poses, Executor& executor,
+                  const std::function<void(std::size_t lines)>& recorded = {});
   /// What was added is on the disk. Throws FileError; ContractError when nothing ever was added.
-  RecordedRoute finish();
+  Recorded finish();
 
   /// The file that the route is in.
   [[nodiscard]] const MemoryFile& memory() const noexcept { return file_; }

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
-#include "panonav/pipeline/learnt_models.hpp"
+#include "panonav/pipeline/internal/learnt_models.hpp"
 
 namespace panonav {
 

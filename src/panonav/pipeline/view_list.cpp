@@ -1,6 +1,7 @@
 #include "panonav/pipeline/view_list.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <map>
 
 #include "panonav/core/error.hpp"
@@ -71,6 +72,16 @@ std::string view_table(std::span<const ViewRecord> views, std::span<const std::s
     table += '\n';
   }
   return table;
+}
+
+ViewId named_view(const MemoryFile& file, const std::string& name_or_id) {
+  if (const auto named = file.find(name_or_id)) return *named;
+  std::uint32_t id = 0;
+  const auto [end, error] =
+      std::from_chars(name_or_id.data(), name_or_id.data() + name_or_id.size(), id);
+  const bool number = error == std::errc() && end == name_or_id.data() + name_or_id.size();
+  if (number && std::ranges::binary_search(file.views(), ViewId{id})) return ViewId{id};
+  throw FileError(file.path().string(), "has no view of the name or id '" + name_or_id + "'");
 }
 
 }  // namespace panonav

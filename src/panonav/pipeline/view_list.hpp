@@ -30,4 +30,8 @@ struct ViewRecord {
 [[nodiscard]] std::string view_table(std::span<const ViewRecord> views,
                                      std::span<const std::string> pictures = {});
 
+/// Returns the view that a user means: a name first; a number that is no name is an id. Throws
+/// FileError that names the file when there is no such view.
+[[nodiscard]] ViewId named_view(const MemoryFile& file, const std::string& name_or_id);
+
 }  // namespace panonav

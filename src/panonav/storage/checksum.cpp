@@ -1,7 +1,8 @@
 #include "panonav/storage/checksum.hpp"
 
 #include <bit>
-#include <cstring>
+
+#include "panonav/storage/internal/little_endian.hpp"
 
 namespace panonav {
 
@@ -12,19 +13,6 @@ constexpr std::uint64_t prime_2 = 0xC2B2AE3D27D4EB4FULL;
 constexpr std::uint64_t prime_3 = 0x165667B19E3779F9ULL;
 constexpr std::uint64_t prime_4 = 0x85EBCA77C2B2AE63ULL;
 constexpr std::uint64_t prime_5 = 0x27D4EB2F165667C5ULL;
-
-template <class Word>
-std::uint64_t read_little_endian(const std::uint8_t* from) {
-  if constexpr (std::endian::native == std::endian::little) {
-    Word word = 0;
-    std::memcpy(&word, from, sizeof(Word));
-    return word;
-  } else {
-    std::uint64_t word = 0;
-    for (std::size_t i = 0; i < sizeof(Word); ++i) word |= std::uint64_t{from[i]} << (8 * i);
-    return word;
-  }
-}
 
 std::uint64_t round(std::uint64_t lane, std::uint64_t input) {
   return std::rotl(lane + input * prime_2, 31) * prime_1;
@@ -54,8 +42,8 @@ std::uint64_t checksum(std::span<const std::uint8_t> bytes, std::uint64_t seed) 
         std::rotl(hash ^ round(0, read_little_endian<std::uint64_t>(at)), 27) * prime_1 + prime_4;
   }
   if (left >= 4) {
-    hash =
-        std::rotl(hash ^ (read_little_endian<std::uint32_t>(at) * prime_1), 23) * prime_2 + prime_3;
+    const std::uint64_t word = read_little_endian<std::uint32_t>(at);
+    hash = std::rotl(hash ^ (word * prime_1), 23) * prime_2 + prime_3;
     at += 4;
     left -= 4;
   }
@@ -65,36 +53,30 @@ std::uint64_t checksum(std::span<const std::uint8_t> bytes, std::uint64_t seed) 
   return hash ^ (hash >> 32U);
 }
 
-void RecordBytes::add_word(std::uint64_t word) {
-  for (unsigned shift = 0; shift < 64; shift += 8) {
-    bytes_.push_back(static_cast<std::uint8_t>(word >> shift));
-  }
-}
-
 void RecordBytes::add_null() {
   bytes_.push_back('n');
 }
 
 void RecordBytes::add(std::int64_t value) {
   bytes_.push_back('i');
-  add_word(static_cast<std::uint64_t>(value));
+  append_little_endian(bytes_, static_cast<std::uint64_t>(value));
 }
 
 void RecordBytes::add(double value) {
   bytes_.push_back('r');
   // The database does not keep the sign of zero.
-  add_word(std::bit_cast<std::uint64_t>(value == 0.0 ? 0.0 : value));
+  append_little_endian(bytes_, std::bit_cast<std::uint64_t>(value == 0.0 ? 0.0 : value));
 }
 
 void RecordBytes::add(std::string_view text) {
   bytes_.push_back('t');
-  add_word(text.size());
+  append_little_endian(bytes_, std::uint64_t{text.size()});
   bytes_.insert(bytes_.end(), text.begin(), text.end());
 }
 
 void RecordBytes::add(std::span<const std::uint8_t> blob) {
   bytes_.push_back('b');
-  add_word(blob.size());
+  append_little_endian(bytes_, std::uint64_t{blob.size()});
   bytes_.insert(bytes_.end(), blob.begin(), blob.end());
 }
 

@@ -1,14 +1,15 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
 
 namespace panonav {
 
-/// XXH64 of bytes: a fast 64-bit hash that finds accidental damage; no protection against forgery.
-/// The same on every platform.
+/// Computes the XXH64 of bytes: a fast 64-bit hash that finds accidental damage and does not
+/// protect against forgery. The same on every platform.
 [[nodiscard]] std::uint64_t checksum(std::span<const std::uint8_t> bytes, std::uint64_t seed = 0);
 
 /// Gathers the fields of a record for its checksum. Every field is preceded by its kind, texts and
@@ -20,14 +21,22 @@ class RecordBytes {
   void add(double value);           ///< A real number, by its bits; both zeros are the same.
   void add(std::string_view text);  ///< A text, by its bytes.
   void add(std::span<const std::uint8_t> blob);  ///< Bytes as they are.
-  /// All that was added since the last `clear`; valid until the next `add` or `clear`.
+  /// The value, or a field without one.
+  template <class Value>
+  void add(const std::optional<Value>& value) {
+    if (value) {
+      add(*value);
+    } else {
+      add_null();
+    }
+  }
+  /// Returns all that was added since the last `clear`; valid until the next `add` or `clear`.
   [[nodiscard]] std::span<const std::uint8_t> bytes() const& noexcept { return bytes_; }
   std::span<const std::uint8_t> bytes() const&& = delete;  // would dangle
   /// Forgets all fields; the memory is kept for the next record.
   void clear() noexcept { bytes_.clear(); }
 
  private:
-  void add_word(std::uint64_t word);
   std::vector<std::uint8_t> bytes_;
 };
 

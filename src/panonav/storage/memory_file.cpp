@@ -9,17 +9,19 @@
 #include "panonav/core/error.hpp"
 #include "panonav/storage/internal/map_tables.hpp"
 #include "panonav/storage/internal/memory_file_access.hpp"
-#include "panonav/storage/internal/memory_file_implementation.hpp"
 #include "panonav/storage/internal/memory_rows.hpp"
 #include "panonav/storage/internal/memory_verification.hpp"
+#include "panonav/storage/internal/route_tables.hpp"
 #include "panonav/storage/memory_header.hpp"
 
 namespace panonav {
 
 namespace {
 
+using Bytes = std::vector<std::uint8_t>;
+
 // Links have no direction; a < b makes a pair unique.
-Link ordered(Link link) {
+Link order_ends(Link link) {
   if (link.b < link.a) std::swap(link.a, link.b);
   return link;
 }
@@ -49,37 +51,70 @@ void require_view(const NewView& view, SignatureShape shape) {
   }
 }
 
+// Throws the ContractError for a `kind` ("map", "route") of a name that the file does not have.
+[[noreturn]] void refuse_unknown(const char* kind, std::string_view name) {
+  throw ContractError(kind, std::string(name), "a " + std::string(kind) + " of the memory file");
+}
+
+std::string parameter_key(std::string_view name) {
+  return "parameter." + std::string(name);
+}
+
 }  // namespace
 
-MemoryFile::Implementation::Implementation(std::filesystem::path address_,
-                                           std::unique_ptr<MemoryTables> tables_,
-                                           MemoryHeader header_)
-    : address(std::move(address_)), tables(std::move(tables_)), header(std::move(header_)) {}
+struct MemoryFile::Implementation {
+  /// Returns what `work(tables)` returns, within a transaction that is committed when it is done.
+  template <class Work>
+  auto write(const Work& work) {
+    const auto transaction = tables->transaction(MemoryTables::Kind::writing);
+    if constexpr (std::is_void_v<decltype(work(*tables))>) {
+      work(*tables);
+      transaction->commit();
+    } else {
+      auto result = work(*tables);
+      transaction->commit();
+      return result;
+    }
+  }
+  /// The same for work that changes nothing: it reads one state of the memory.
+  template <class Work>
+  auto read(const Work& work) {
+    const auto transaction = tables->transaction(MemoryTables::Kind::reading);
+    return work(*tables);
+  }
 
-const ViewRow& MemoryFile::Implementation::checked(const ViewRow& row) {
-  return tables->checked(row, header.shape, scratch);
-}
+  [[nodiscard]] VisualMemory empty_memory() const {
+    return {header.shape, header.full_scale, header.elevations};
+  }
+  /// Appends a row to a memory. Throws FileError when it does not match its checksum.
+  void append_row(const ViewRow& row, VisualMemory& memory) {
+    const auto signature = tables->checked(row, header.shape, scratch).signature;
+    const auto half = static_cast<std::ptrdiff_t>(header.shape.size());
+    packed.shape = header.shape;
+    packed.magnitudes.assign(signature.begin(), signature.begin() + half);
+    packed.phases.assign(signature.begin() + half, signature.end());
+    memory.append_as(row.id, packed, row.info);
+  }
+  /// Throws as `refuse_view`.
+  void change_info(ViewId view, const std::function<void(ReferenceInfo&)>& change) {
+    write([&](MemoryTables&) {
+      std::optional<ReferenceInfo> info;
+      std::int64_t new_checksum = 0;
+      tables->read_views(std::span(&view, 1), [&](const ViewRow& row) {
+        info = tables->checked(row, header.shape, scratch).info;
+        change(*info);
+        new_checksum = view_checksum(scratch, view, *info, row.signature);
+      });
+      tables->write_info(view, info.value(), new_checksum);
+    });
+  }
 
-void MemoryFile::Implementation::append_row(const ViewRow& row, VisualMemory& memory) {
-  const auto signature = checked(row).signature;
-  const auto half = static_cast<std::ptrdiff_t>(header.shape.size());
-  packed.shape = header.shape;
-  packed.magnitudes.assign(signature.begin(), signature.begin() + half);
-  packed.phases.assign(signature.begin() + half, signature.end());
-  memory.append_as(row.id, packed, row.info);
-}
-
-void MemoryFile::Implementation::change_info(ViewId view,
-                                             const std::function<void(ReferenceInfo&)>& change) {
-  std::optional<ReferenceInfo> info;
-  std::int64_t new_checksum = 0;
-  tables->read_views(std::span(&view, 1), [&](const ViewRow& row) {
-    info = checked(row).info;
-    change(*info);
-    new_checksum = view_checksum(scratch, view, *info, row.signature);
-  });
-  tables->write_info(view, info.value(), new_checksum);
-}
+  std::filesystem::path address;  ///< as it was opened; it may hold a password
+  std::unique_ptr<MemoryTables> tables;
+  MemoryHeader header;
+  RecordBytes scratch = {};     ///< kept, as every view needs it
+  PackedSignature packed = {};  ///< likewise
+};
 
 MemoryFile::MemoryFile(std::unique_ptr<Implementation> implementation)
     : implementation_(std::move(implementation)) {}
@@ -98,7 +133,33 @@ MemoryFile MemoryFile::reopen(Access access) const {
 
 MemoryFile MemoryFile::open(const std::filesystem::path& path, Access access) {
   auto [tables, header] = open_memory_tables(path, access);
-  return MemoryFile(std::make_unique<Implementation>(path, std::move(tables), std::move(header)));
+  return MemoryFile(std::unique_ptr<Implementation>(
+      new Implementation{path, std::move(tables), std::move(header)}));
+}
+
+void MemoryFile::copy_to(const std::filesystem::path& path) const {
+  implementation_->read([&](MemoryTables& from) {
+    make_memory_tables(path, header(), [&](MemoryTables& to) {
+      for (const auto& [key, value] : from.settings()) {
+        if (key.starts_with("parameter.")) to.write_setting(key, value);
+      }
+      constexpr std::size_t views_per_part = 1000;  // some megabytes
+      in_parts(views(), views_per_part, [&](std::span<const ViewId> ids) {
+        const VisualMemory memory = load(ids);
+        std::vector<NewView> part;
+        for (const ViewId id : ids) {
+          part.push_back({memory.info(id), memory.packed(id), thumbnail(id).value_or(Bytes{}),
+                          features(id).value_or(Bytes{})});
+        }
+        to.insert(ids, part);
+      });
+      to.write_links(links());
+      for (const std::string& name : map_names()) write_map(to, name, read_map(from, name).value());
+      for (const std::string& name : route_names()) {
+        append_to_route(to, name, read_route(from, name).value());
+      }
+    });
+  });
 }
 
 const MemoryHeader& MemoryFile::header() const noexcept {
@@ -110,34 +171,32 @@ const std::filesystem::path& MemoryFile::path() const noexcept {
 
 void MemoryFile::change(const std::function<void()>& changes,
                         const std::optional<std::string>& undo) {
-  MemoryTables& tables = *implementation_->tables;
-  const auto transaction = tables.transaction(MemoryTables::Kind::writing);
-  if (undo) {
-    tables.keep_for_undo(changes, *undo);
-  } else {
-    changes();
-  }
-  transaction->commit();
+  implementation_->write([&](MemoryTables& tables) {
+    if (undo) {
+      tables.keep_for_undo(changes, *undo);
+    } else {
+      changes();
+    }
+  });
 }
 
-std::vector<KeptChange> MemoryFile::history() const {
+std::vector<MemoryFile::KeptChange> MemoryFile::history() const {
   return implementation_->tables->history();
 }
 
 std::optional<std::string> MemoryFile::undoable() const {
-  const std::vector<KeptChange> kept = history();
+  const std::vector<MemoryFile::KeptChange> kept = history();
   if (kept.empty() || !kept.front().undoable) return std::nullopt;
   return kept.front().what;
 }
 
 void MemoryFile::undo() {
-  MemoryTables& tables = *implementation_->tables;
-  const auto transaction = tables.transaction(MemoryTables::Kind::writing);
-  if (!undoable()) {
-    throw ContractError("undo", "not possible", "after a change that was kept for it");
-  }
-  tables.undo();
-  transaction->commit();
+  implementation_->write([&](MemoryTables& tables) {
+    if (!undoable()) {
+      throw ContractError("undo", "not possible", "after a change that was kept for it");
+    }
+    tables.undo();
+  });
 }
 
 ViewId MemoryFile::append(const NewView& view) {
@@ -146,69 +205,60 @@ ViewId MemoryFile::append(const NewView& view) {
 
 std::vector<ViewId> MemoryFile::append(std::span<const NewView> views) {
   for (const NewView& view : views) require_view(view, implementation_->header.shape);
-  MemoryTables& tables = *implementation_->tables;
-  const auto transaction = tables.transaction(MemoryTables::Kind::writing);
-  const std::uint32_t last = tables.last_id();
-  if (views.size() >= UINT32_MAX - last) {
-    tables.fail_damaged("there is no id left for another view");
-  }
-  std::vector<ViewId> ids(views.size());
-  for (std::size_t i = 0; i < ids.size(); ++i) ids[i].value = last + 1 + std::uint32_t(i);
-  tables.insert(ids, views);
-  transaction->commit();
-  return ids;
+  return implementation_->write([&](MemoryTables& tables) {
+    const std::uint32_t last = tables.last_id();
+    if (views.size() >= UINT32_MAX - last) {
+      tables.fail_damaged("there is no id left for another view");
+    }
+    std::vector<ViewId> ids(views.size());
+    for (std::size_t i = 0; i < ids.size(); ++i) ids[i].value = last + 1 + std::uint32_t(i);
+    tables.insert(ids, views);
+    return ids;
+  });
 }
 
 void MemoryFile::remove(std::span<const ViewId> views) {
-  MemoryTables& tables = *implementation_->tables;
-  const auto transaction = tables.transaction(MemoryTables::Kind::writing);
-  tables.require_views(views);
-  std::set<ViewId> removed;
-  for (const ViewId view : views) {
-    if (!removed.insert(view).second) refuse_view(view);
-  }
-  tables.remove(views);
-  forget_in_maps(tables, views);
-  transaction->commit();
+  implementation_->write([&](MemoryTables& tables) {
+    tables.require_views(views);
+    std::set<ViewId> removed;
+    for (const ViewId view : views) {
+      if (!removed.insert(view).second) refuse_view(view);
+    }
+    tables.remove(views);
+    forget_in_maps(tables, views);
+  });
 }
 
 void MemoryFile::set_pose(ViewId view, const std::optional<ReferencePose>& pose) {
   require_finite(pose);
-  const auto transaction = implementation_->tables->transaction(MemoryTables::Kind::writing);
   implementation_->change_info(view, [&](ReferenceInfo& info) { info.pose = pose; });
-  transaction->commit();
 }
 
 void MemoryFile::rename(ViewId view, std::string_view name) {
   require_name("view", name);
-  const auto transaction = implementation_->tables->transaction(MemoryTables::Kind::writing);
   implementation_->change_info(view, [&](ReferenceInfo& info) { info.name = name; });
-  transaction->commit();
 }
 
 void MemoryFile::link(std::span<const Link> links) {
-  std::vector<Link> wanted;
+  std::vector<Link> ordered;
   std::vector<ViewId> ends;
-  for (const Link& given : links) {
-    const Link link = wanted.emplace_back(ordered(given));
+  for (const Link& unordered : links) {
+    const Link link = ordered.emplace_back(order_ends(unordered));
     if (link.a == link.b) {
       throw ContractError("link", "of view " + std::to_string(link.a.value) + " to itself",
                           "two different views");
     }
     ends.insert(ends.end(), {link.a, link.b});
   }
-  MemoryTables& tables = *implementation_->tables;
-  const auto transaction = tables.transaction(MemoryTables::Kind::writing);
-  tables.require_views(ends);
-  tables.write_links(wanted);
-  transaction->commit();
+  implementation_->write([&](MemoryTables& tables) {
+    tables.require_views(ends);
+    tables.write_links(ordered);
+  });
 }
 
 void MemoryFile::unlink(ViewId a, ViewId b) {
-  const Link pair = ordered({a, b, LinkKind::sequence});
-  const auto transaction = implementation_->tables->transaction(MemoryTables::Kind::writing);
-  implementation_->tables->erase_link(pair.a, pair.b);
-  transaction->commit();
+  const Link pair = order_ends({a, b, LinkKind::sequence});
+  implementation_->write([&](MemoryTables& tables) { tables.erase_link(pair.a, pair.b); });
 }
 
 std::optional<ViewId> MemoryFile::find(std::string_view name) const {
@@ -223,7 +273,7 @@ std::vector<ViewId> MemoryFile::views_with_thumbnail() const {
   return implementation_->tables->views_with(BesideViews::thumbnails);
 }
 
-std::optional<std::vector<std::uint8_t>> MemoryFile::thumbnail(ViewId view) const {
+std::optional<Bytes> MemoryFile::thumbnail(ViewId view) const {
   return implementation_->tables->checked_bytes(BesideViews::thumbnails, view);
 }
 
@@ -231,55 +281,119 @@ bool MemoryFile::has_features() const {
   return implementation_->tables->has_any(BesideViews::features);
 }
 
-std::optional<std::vector<std::uint8_t>> MemoryFile::features(ViewId view) const {
+std::optional<Bytes> MemoryFile::features(ViewId view) const {
   return implementation_->tables->checked_bytes(BesideViews::features, view);
 }
 
 void MemoryFile::set_parameter(std::string_view name, std::string_view value) {
-  const auto transaction = implementation_->tables->transaction(MemoryTables::Kind::writing);
-  implementation_->tables->write_setting("parameter." + std::string(name), std::string(value));
-  transaction->commit();
+  implementation_->write(
+      [&](MemoryTables& tables) { tables.write_setting(parameter_key(name), std::string(value)); });
 }
 
 std::optional<std::string> MemoryFile::parameter(std::string_view name) const {
   const Settings settings = implementation_->tables->settings();
-  const auto found = settings.find("parameter." + std::string(name));
+  const auto found = settings.find(parameter_key(name));
   if (found == settings.end()) return std::nullopt;
   const auto* text = std::get_if<std::string>(&found->second);
   if (text == nullptr) implementation_->tables->fail_damaged("parameter " + std::string(name));
   return *text;
 }
 
+void MemoryFile::save_map(std::string_view name, const TopologicalMap& map) {
+  implementation_->write([&](MemoryTables& tables) {
+    std::vector<ViewId> views;
+    for (const MapNode& node : map.nodes) views.push_back(node.view);
+    tables.require_views(views);
+    write_map(tables, name, map);
+  });
+}
+
+std::optional<TopologicalMap> MemoryFile::map(std::string_view name) const {
+  return implementation_->read([&](MemoryTables& tables) { return read_map(tables, name); });
+}
+
+void MemoryFile::remove_map(std::string_view name) {
+  implementation_->write([&](MemoryTables& tables) {
+    if (!erase_map(tables, name)) refuse_unknown("map", name);
+  });
+}
+
+std::vector<std::string> MemoryFile::map_names() const {
+  return implementation_->read([](MemoryTables& tables) { return tables.map_names(); });
+}
+
+std::size_t MemoryFile::append_route(std::string_view name, const RoutePanorama& more) {
+  return implementation_->write(
+      [&](MemoryTables& tables) { return append_to_route(tables, name, more); });
+}
+
+std::optional<RoutePanorama> MemoryFile::route(std::string_view name) const {
+  return implementation_->read([&](MemoryTables& tables) { return read_route(tables, name); });
+}
+
+std::uint64_t MemoryFile::route_bytes(std::string_view name) const {
+  const std::int64_t bytes =
+      implementation_->read([&](MemoryTables& tables) { return tables.route_bytes(name); });
+  if (bytes == 0) refuse_unknown("route", name);
+  return static_cast<std::uint64_t>(bytes);
+}
+
+void MemoryFile::remove_route(std::string_view name) {
+  implementation_->write([&](MemoryTables& tables) {
+    if (!erase_route(tables, name)) refuse_unknown("route", name);
+  });
+}
+
+void MemoryFile::rename_route(std::string_view name, std::string_view new_name) {
+  require_name("route", new_name);
+  implementation_->write([&](MemoryTables& tables) {
+    const auto names = route_names();
+    if (std::ranges::find(names, name) == names.end()) refuse_unknown("route", name);
+    if (std::ranges::find(names, new_name) != names.end()) {
+      refuse_taken_name("route", new_name, path());
+    }
+    panonav::rename_route(tables, name, new_name);
+    // How its pictures became lines goes with it.
+    const std::string from = "route." + std::string(name);
+    if (const auto lines = parameter(from)) {
+      set_parameter("route." + std::string(new_name), *lines);
+      tables.erase_setting(parameter_key(from));
+    }
+  });
+}
+
+std::vector<std::string> MemoryFile::route_names() const {
+  return implementation_->read([](MemoryTables& tables) { return tables.route_names(); });
+}
+
 VisualMemory MemoryFile::load() const {
-  MemoryTables& tables = *implementation_->tables;
-  const MemoryHeader& header = implementation_->header;
-  VisualMemory memory(header.shape, header.full_scale, header.elevations);
-  const auto reading = tables.transaction(MemoryTables::Kind::reading);
-  try {
-    tables.read_views([&](const ViewRow& row) { implementation_->append_row(row, memory); });
-    tables.read_links([&](const LinkRow& row) { memory.link(tables.checked(row)); });
-  } catch (const ContractError& error) {
-    tables.fail_damaged(error.what());
-  }
-  return memory;
+  return implementation_->read([&](MemoryTables& tables) {
+    VisualMemory memory = implementation_->empty_memory();
+    try {
+      tables.read_views([&](const ViewRow& row) { implementation_->append_row(row, memory); });
+      tables.read_links([&](const LinkRow& row) { memory.link(tables.checked(row)); });
+    } catch (const ContractError& error) {
+      tables.fail_damaged(error.what());
+    }
+    return memory;
+  });
 }
 
 VisualMemory MemoryFile::load(std::span<const ViewId> views) const {
   for (std::size_t i = 1; i < views.size(); ++i) {
     require(views[i - 1] < views[i], "views", static_cast<double>(views[i].value), "ascending");
   }
-  MemoryTables& tables = *implementation_->tables;
-  const MemoryHeader& header = implementation_->header;
-  VisualMemory memory(header.shape, header.full_scale, header.elevations);
-  const auto reading = tables.transaction(MemoryTables::Kind::reading);
-  tables.read_views(views, [&](const ViewRow& row) {
-    try {
-      implementation_->append_row(row, memory);
-    } catch (const ContractError& error) {
-      tables.fail_damaged(error.what());
-    }
+  return implementation_->read([&](MemoryTables& tables) {
+    VisualMemory memory = implementation_->empty_memory();
+    tables.read_views(views, [&](const ViewRow& row) {
+      try {
+        implementation_->append_row(row, memory);
+      } catch (const ContractError& error) {
+        tables.fail_damaged(error.what());
+      }
+    });
+    return memory;
   });
-  return memory;
 }
 
 std::vector<ViewId> MemoryFile::views() const {
@@ -295,20 +409,19 @@ std::vector<ViewId> MemoryFile::views_within(const PositionBounds& bounds) const
 }
 
 std::vector<Link> MemoryFile::links() const {
-  std::vector<Link> links;
-  MemoryTables& tables = *implementation_->tables;
-  const auto reading = tables.transaction(MemoryTables::Kind::reading);
-  tables.read_links([&](const LinkRow& row) { links.push_back(tables.checked(row)); });
-  return links;
+  return implementation_->read([](MemoryTables& tables) {
+    std::vector<Link> links;
+    tables.read_links([&](const LinkRow& row) { links.push_back(tables.checked(row)); });
+    return links;
+  });
 }
 
-std::vector<MemoryFault> MemoryFile::verify() const {
+std::vector<MemoryFile::Fault> MemoryFile::verify() const {
   return verify_memory(*implementation_->tables, implementation_->header);
 }
 
-MemoryFileInfo MemoryFile::info() const {
-  const auto reading = implementation_->tables->transaction(MemoryTables::Kind::reading);
-  return implementation_->tables->info();
+MemoryFile::Info MemoryFile::info() const {
+  return implementation_->read([](MemoryTables& tables) { return tables.info(); });
 }
 
 }  // namespace panonav

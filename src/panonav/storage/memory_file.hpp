@@ -52,39 +52,6 @@ enum class Access {
   read_write  ///< one process at a time
 };
 
-/// What is wrong in a memory file; `view` where it concerns one.
-struct MemoryFault {
-  std::optional<ViewId> view;  ///< empty: the fault is the file's as a whole
-  std::string what;            ///< one line
-  friend bool operator==(const MemoryFault&, const MemoryFault&) = default;
-};
-
-/// A change of a memory that was kept so that it can be taken back.
-struct KeptChange {
-  std::string what;  ///< for people
-  std::optional<double>
-      stamp_s;              ///< seconds since 1970-01-01 UTC; empty: on a server, which keeps none
-  std::uint64_t bytes = 0;  ///< that are kept for taking it back
-  bool undoable = false;    ///< false: too old, only its description is left
-  friend bool operator==(const KeptChange&, const KeptChange&) = default;
-};
-
-/// Counts and sizes of a memory file.
-struct MemoryFileInfo {
-  std::uint64_t views = 0;                ///< reference views
-  std::uint64_t views_with_position = 0;  ///< of these, with x and y
-  std::uint64_t views_with_heading = 0;   ///< of these, with a heading
-  std::uint64_t links = 0;                ///< between two views
-  std::uint64_t thumbnails = 0;           ///< views stored with a picture file
-  std::uint64_t views_with_features = 0;  ///< views stored with local features
-  std::uint64_t feature_bytes = 0;        ///< packed local features of all views
-  std::uint64_t maps = 0;                 ///< kept by name
-  std::uint64_t routes = 0;               ///< kept by name
-  std::uint64_t file_bytes = 0;           ///< with what is still in the write-ahead log
-  int format_version = 0;                 ///< of docs/formats.md
-  friend bool operator==(const MemoryFileInfo&, const MemoryFileInfo&) = default;
-};
-
 /// A visual memory on disk: an SQLite file (docs/formats.md), or with the address of a server
 /// (memory_address.hpp) the same on PostgreSQL (docs/scale.md), where `path` is the address without
 /// a password and a lost connection is a FileError. What a changing member function returned for is
@@ -95,6 +62,36 @@ struct MemoryFileInfo {
 /// file as it was when they throw.
 class MemoryFile {
  public:
+  /// A fault that `verify` found.
+  struct Fault {
+    std::optional<ViewId> view;  ///< nullopt: the fault concerns the file as a whole
+    std::string what;            ///< one line
+    friend bool operator==(const Fault&, const Fault&) = default;
+  };
+  /// A change that was kept so that it can be undone.
+  struct KeptChange {
+    std::string what;               ///< description for people
+    std::optional<double> stamp_s;  ///< seconds since 1970-01-01 UTC; nullopt on a server
+    std::uint64_t bytes = 0;        ///< kept for undoing it
+    bool undoable = false;          ///< false: too old, only its description is left
+    friend bool operator==(const KeptChange&, const KeptChange&) = default;
+  };
+  /// Counts and sizes.
+  struct Info {
+    std::uint64_t views = 0;                ///< reference views
+    std::uint64_t views_with_position = 0;  ///< of these, with x and y
+    std::uint64_t views_with_heading = 0;   ///< of these, with a heading
+    std::uint64_t links = 0;                ///< between two views
+    std::uint64_t thumbnails = 0;           ///< views stored with a picture file
+    std::uint64_t views_with_features = 0;  ///< views stored with local features
+    std::uint64_t feature_bytes = 0;        ///< packed local features of all views
+    std::uint64_t maps = 0;                 ///< kept by name
+    std::uint64_t routes = 0;               ///< kept by name
+    std::uint64_t file_bytes = 0;           ///< including the write-ahead log
+    int format_version = 0;                 ///< of docs/formats.md
+    friend bool operator==(const Info&, const Info&) = default;
+  };
+
   /// Makes an empty memory file, whole or not at all. Throws FileError when something is at `path`
   /// already, ContractError on a header out of range.
   static MemoryFile create(const std::filesystem::path& path, const MemoryHeader& header);
@@ -224,9 +221,9 @@ class MemoryFile {
   /// All links, ascending.
   [[nodiscard]] std::vector<Link> links() const;
   /// Everything that is wrong with the file, in full: structure, then view by view. Empty: intact.
-  [[nodiscard]] std::vector<MemoryFault> verify() const;
+  [[nodiscard]] std::vector<Fault> verify() const;
   /// Counts rows and sizes; nothing is checked. Cost: a pass over the rows of the tables.
-  [[nodiscard]] MemoryFileInfo info() const;
+  [[nodiscard]] Info info() const;
 
  private:
   struct Implementation;

@@ -9,20 +9,23 @@
 
 namespace panonav {
 
-/// Views of a memory file, read when they are asked for: a robot holds the part of a large memory
-/// that it needs. The file is opened for reading only; while others change it, each `load` sees it
-/// as it is then. A view whose bytes are damaged is refused when it is loaded, not before. One
-/// object belongs to one thread at a time.
+/// Reads views of a memory file when they are needed: a robot holds a part of a large memory. The
+/// file is opened for reading only; while others change it, each `load` reads it as it is then. A
+/// view whose bytes are damaged is refused when it is loaded, not before. One object belongs to one
+/// thread at a time.
 class MemoryFileViews final : public ViewSource {
  public:
   /// Throws FileError as `MemoryFile::open`. Holds the ids, no view.
-  explicit MemoryFileViews(const std::filesystem::path& path);
+  explicit MemoryFileViews(const std::filesystem::path& path)
+      : file_(MemoryFile::open(path, Access::read_only)), views_(file_.views()) {}
 
-  /// Those that there were when the file was opened.
+  /// Returns the views that there were when the file was opened.
   [[nodiscard]] std::span<const ViewId> views() const override { return views_; }
   /// Throws FileError, ContractError as `MemoryFile::load`.
-  [[nodiscard]] VisualMemory load(std::span<const ViewId> views) const override;
-  /// The open file, for what it tells besides views.
+  [[nodiscard]] VisualMemory load(std::span<const ViewId> views) const override {
+    return file_.load(views);
+  }
+  /// Returns the open file, for what it holds besides views.
   [[nodiscard]] const MemoryFile& file() const noexcept { return file_; }
 
  private:

@@ -12,6 +12,7 @@
 
 #include "panonav/camera/model_parameters.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/storage/internal/little_endian.hpp"
 
 namespace panonav {
 
@@ -49,10 +50,7 @@ void require_picture(int rows, int columns, std::string_view rows_name,
 std::vector<std::uint8_t> bytes_of(const std::vector<double>& values) {
   std::vector<std::uint8_t> bytes;
   for (const double value : values) {
-    const auto word = std::bit_cast<std::uint64_t>(value);
-    for (unsigned shift = 0; shift < 64; shift += 8) {
-      bytes.push_back(static_cast<std::uint8_t>(word >> shift));
-    }
+    append_little_endian(bytes, std::bit_cast<std::uint64_t>(value));
   }
   return bytes;
 }
@@ -60,9 +58,7 @@ std::vector<std::uint8_t> bytes_of(const std::vector<double>& values) {
 std::vector<double> doubles_of(const std::vector<std::uint8_t>& bytes) {
   std::vector<double> values;
   for (std::size_t i = 0; i + 8 <= bytes.size(); i += 8) {
-    std::uint64_t word = 0;
-    for (unsigned j = 0; j < 8; ++j) word |= std::uint64_t{bytes[i + j]} << (8 * j);
-    values.push_back(std::bit_cast<double>(word));
+    values.push_back(std::bit_cast<double>(read_little_endian<std::uint64_t>(&bytes[i])));
   }
   return values;
 }

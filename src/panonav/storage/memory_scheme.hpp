@@ -12,21 +12,12 @@ namespace panonav {
 
 class MemoryTables;
 
-/// Notices when others change a memory.
-class MemoryListener {
- public:
-  virtual ~MemoryListener() = default;
-  /// True if the memory was changed since the last call. Does not wait. Throws FileError when what
-  /// keeps the memory cannot be reached.
-  [[nodiscard]] virtual bool has_changed() = 0;
-};
-
 /// Memories that do not lie in files: they have addresses "SCHEME://...". All functions throw
 /// FileError when what keeps the memories cannot be reached or refuses.
 class MemoryScheme {
  public:
   virtual ~MemoryScheme() = default;
-  /// Whether there is a memory at the address.
+  /// True if there is a memory at the address.
   [[nodiscard]] virtual bool exists(const std::filesystem::path& address) const = 0;
   /// Returns what people call the memory. Throws FileError on an address that names none.
   [[nodiscard]] virtual std::string name_memory(const std::filesystem::path& address) const = 0;
@@ -38,8 +29,14 @@ class MemoryScheme {
   /// the user may not change it.
   [[nodiscard]] virtual std::unique_ptr<MemoryTables> open(const std::filesystem::path& address,
                                                            Access access) const = 0;
-  /// Listens to changes of a memory from here on. Throws FileError when there is none.
-  [[nodiscard]] virtual std::unique_ptr<MemoryListener> listen(
+  /// Listens to changes of a memory from here on. The function that it returns does not wait; it
+  /// returns true if the memory was changed since its last call, and throws FileError when what
+  /// keeps the memory cannot be reached. Throws FileError when there is no such memory.
+  [[nodiscard]] virtual std::function<bool()> listen(
+      const std::filesystem::path& address) const = 0;
+  /// Opens the index of a memory that is searched where it lies. Throws FileError when there is
+  /// none.
+  [[nodiscard]] virtual std::unique_ptr<IndexedMemory> open_index(
       const std::filesystem::path& address) const = 0;
 };
 

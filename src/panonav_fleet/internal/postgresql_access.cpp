@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
-#include "panonav/storage/indexed_memory.hpp"
 #include "panonav/storage/memory_header.hpp"
 #include "panonav/storage/memory_scheme.hpp"
 #include "panonav_fleet/internal/postgresql_memory.hpp"
@@ -73,19 +72,6 @@ void make_postgresql_memory(const ServerAddress& address, const MemoryHeader& he
 
 namespace {
 
-class PostgresqlListener final : public MemoryListener {
- public:
-  explicit PostgresqlListener(const std::filesystem::path& address) : changes_(address) {}
-  [[nodiscard]] bool has_changed() override {
-    bool changed = false;
-    while (changes_.wait(std::chrono::milliseconds(0))) changed = true;
-    return changed;
-  }
-
- private:
-  MemoryChanges changes_;
-};
-
 class PostgresqlScheme final : public MemoryScheme {
  public:
   [[nodiscard]] bool exists(const std::filesystem::path& address) const override {
@@ -108,9 +94,17 @@ class PostgresqlScheme final : public MemoryScheme {
     return open_tables(parse_server_address(address), access);
   }
 
-  [[nodiscard]] std::unique_ptr<MemoryListener> listen(
+  [[nodiscard]] std::function<bool()> listen(const std::filesystem::path& address) const override {
+    return [changes = std::make_shared<MemoryChanges>(address)] {
+      bool changed = false;
+      while (changes->wait(std::chrono::milliseconds(0))) changed = true;
+      return changed;
+    };
+  }
+
+  [[nodiscard]] std::unique_ptr<IndexedMemory> open_index(
       const std::filesystem::path& address) const override {
-    return std::make_unique<PostgresqlListener>(address);
+    return std::make_unique<PlaceSearch>(address);
   }
 
  private:
@@ -135,8 +129,6 @@ class PostgresqlScheme final : public MemoryScheme {
 void register_postgresql_memories() {
   const auto scheme = std::make_shared<const PostgresqlScheme>();
   for (const char* const name : {"postgresql", "postgres"}) register_memory_scheme(name, scheme);
-  register_indexed_memories(
-      [](const std::filesystem::path& memory) { return std::make_unique<PlaceSearch>(memory); });
 }
 
 }  // namespace panonav::fleet

@@ -100,11 +100,11 @@ class PostgresqlTables final : public MemoryTables {
 
   void keep_for_undo(const std::function<void()>& changes, const std::string& what) override;
   /// One change at most.
-  [[nodiscard]] std::vector<KeptChange> history() override;
+  [[nodiscard]] std::vector<MemoryFile::KeptChange> history() override;
   void undo() override;
 
   [[nodiscard]] std::set<ViewId> verify_structure(const Check& check) override;
-  [[nodiscard]] MemoryFileInfo info() override;
+  [[nodiscard]] MemoryFile::Info info() override;
 
   /// Ends the transaction in which the memory was made.
   void commit_made() { connection_.execute("COMMIT"); }

@@ -111,7 +111,7 @@ void PostgresqlTables::keep_for_undo(const std::function<void()>& changes,
       what);
 }
 
-std::vector<KeptChange> PostgresqlTables::history() {
+std::vector<MemoryFile::KeptChange> PostgresqlTables::history() {
   const Rows rows = run(
       "SELECT what, (SELECT coalesce(sum(coalesce(length(before), 0) + coalesce(length(after), "
       "0)), 0)::int8 FROM panonav.undo_rows WHERE memory = $1) FROM panonav.undo WHERE memory = "
@@ -143,7 +143,7 @@ std::set<ViewId> PostgresqlTables::verify_structure(const Check& check) {
   return views;
 }
 
-MemoryFileInfo PostgresqlTables::info() {
+MemoryFile::Info PostgresqlTables::info() {
   const Rows rows =
       run("SELECT (SELECT count(*) FROM panonav.views WHERE memory = $1),"
           "(SELECT count(x_m) FROM panonav.views WHERE memory = $1),"
@@ -162,7 +162,7 @@ MemoryFileInfo PostgresqlTables::info() {
   const auto count = [&](int column) {
     return static_cast<std::uint64_t>(rows.integer(0, column));
   };
-  MemoryFileInfo info;
+  MemoryFile::Info info;
   info.views = count(0);
   info.views_with_position = count(1);
   info.views_with_heading = count(2);

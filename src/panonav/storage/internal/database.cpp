@@ -13,8 +13,8 @@ namespace panonav {
 
 namespace {
 
-// As an SQLite URI, in which some characters mean something.
-std::string uri_of(const std::filesystem::path& path) {
+// An SQLite URI, in which some characters must be escaped.
+std::string immutable_uri(const std::filesystem::path& path) {
   constexpr char digits[] = "0123456789ABCDEF";
   std::string uri = "file:";
   for (const char c : std::filesystem::absolute(path).string()) {
@@ -30,9 +30,9 @@ std::string uri_of(const std::filesystem::path& path) {
   return uri + "?immutable=1";
 }
 
-constexpr int steps_between_looks = 20000;  // some 0.2 ms
+constexpr int steps_between_checks = 20000;  // chosen: some 0.2 ms
 
-std::string one_line(std::string text) {
+std::string to_one_line(std::string text) {
   std::ranges::replace(text, '\n', ' ');
   return text;
 }
@@ -59,7 +59,7 @@ Database::Database(std::filesystem::path path, DatabaseMode mode) : path_(std::m
       break;
     case DatabaseMode::immutable:
       flags |= SQLITE_OPEN_READONLY | SQLITE_OPEN_URI;
-      name = uri_of(path_);
+      name = immutable_uri(path_);
       break;
   }
   sqlite3* handle = nullptr;
@@ -67,29 +67,26 @@ Database::Database(std::filesystem::path path, DatabaseMode mode) : path_(std::m
   handle_.reset(handle);
   if (code != SQLITE_OK) fail(code);
   // A foreign or damaged file must not make SQLite run code, take much memory or never end.
-  constexpr int busy_milliseconds = 10000;
-  constexpr int longest_field = 1 << 28;
+  constexpr int busy_timeout_ms = 10000;
+  constexpr int max_field_bytes = 1 << 28;
   steps_left_ = std::make_unique<std::int64_t>(0);
-  allow_steps();
+  set_step_limit();
   sqlite3_progress_handler(
-      handle, steps_between_looks,
+      handle, steps_between_checks,
       [](void* left) {
         auto& steps = *static_cast<std::int64_t*>(left);
-        steps -= steps_between_looks;
+        steps -= steps_between_checks;
         return steps < 0 ? 1 : 0;
       },
       steps_left_.get());
   sqlite3_db_config(handle, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
   sqlite3_db_config(handle, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
-  sqlite3_limit(handle, SQLITE_LIMIT_LENGTH, longest_field);
-  sqlite3_busy_timeout(handle, busy_milliseconds);
+  sqlite3_limit(handle, SQLITE_LIMIT_LENGTH, max_field_bytes);
+  sqlite3_busy_timeout(handle, busy_timeout_ms);
   execute("PRAGMA cell_size_check=ON");
 }
 
-void Database::allow_steps() noexcept {
-  // The largest query, SQLite's own check, takes some 2 steps a byte of the table of links.
-  constexpr std::int64_t at_least = 10'000'000;  // some 0.1 s
-  constexpr std::int64_t for_each_byte = 12;
+std::int64_t Database::file_bytes() const {
   std::int64_t bytes = 0;
   for (const char* suffix : {"", "-wal"}) {
     std::filesystem::path file = path_;
@@ -98,16 +95,23 @@ void Database::allow_steps() noexcept {
     const auto size = std::filesystem::file_size(file, missing);
     if (!missing) bytes += static_cast<std::int64_t>(size);
   }
-  steps_allowed_ = at_least + for_each_byte * bytes;
-  refill_steps();
+  return bytes;
 }
 
-void Database::refill_steps() const noexcept {
-  *steps_left_ = steps_allowed_;
+void Database::set_step_limit() {
+  // The largest query, SQLite's own check, takes some 2 steps a byte of the table of links.
+  constexpr std::int64_t min_steps = 10'000'000;  // some 0.1 s
+  constexpr std::int64_t steps_per_byte = 12;
+  step_limit_ = min_steps + steps_per_byte * file_bytes();
+  reset_step_count();
 }
 
-void Database::require_name() const {
-  if (!watches_name_) return;
+void Database::reset_step_count() const noexcept {
+  *steps_left_ = step_limit_;
+}
+
+void Database::require_unmoved() const {
+  if (!watches_for_moves_) return;
   int moved = 0;
   sqlite3_file_control(handle_.get(), "main", SQLITE_FCNTL_HAS_MOVED, &moved);
   if (moved == 0) return;
@@ -117,7 +121,7 @@ void Database::require_name() const {
 }
 
 void Database::execute(const char* sql) {
-  refill_steps();
+  reset_step_count();
   const int code = sqlite3_exec(handle_.get(), sql, nullptr, nullptr, nullptr);
   if (code != SQLITE_OK) fail(code);
 }
@@ -142,7 +146,8 @@ void Database::fail_damaged(std::string_view what) const {
 
 void Database::fail(int code) const {
   // The message must be taken before another call changes it.
-  const std::string text = one_line(handle_ ? sqlite3_errmsg(handle_.get()) : sqlite3_errstr(code));
+  const std::string text =
+      to_one_line(handle_ ? sqlite3_errmsg(handle_.get()) : sqlite3_errstr(code));
   const int system_error = handle_ ? sqlite3_system_errno(handle_.get()) : 0;
   std::string cause = text;
   if (system_error != 0) cause += " (" + std::generic_category().message(system_error) + ")";
@@ -180,8 +185,8 @@ void Statement::Finalise::operator()(sqlite3_stmt* statement) const noexcept {
   sqlite3_finalize(statement);
 }
 
-Statement::Statement(Database& database, const char* sql) : database_(&database) {
-  database.refill_steps();
+Statement::Statement(Database& database, const char* sql, std::nullptr_t) : database_(&database) {
+  database.reset_step_count();
   sqlite3_stmt* statement = nullptr;
   const int code = sqlite3_prepare_v3(database.handle(), sql, -1, SQLITE_PREPARE_PERSISTENT,
                                       &statement, nullptr);
@@ -251,7 +256,7 @@ int Statement::run() {
 
 void Statement::reset() noexcept {
   sqlite3_reset(statement_.get());
-  database_->refill_steps();
+  database_->reset_step_count();
 }
 
 int Statement::type(int column) const {
@@ -262,8 +267,8 @@ bool Statement::is_null(int column) const {
   return type(column) == SQLITE_NULL;
 }
 
-void Statement::require_type(int column, int wanted) const {
-  if (type(column) != wanted) {
+void Statement::require_type(int column, int expected) const {
+  if (type(column) != expected) {
     database_->fail_damaged(std::string("column ") + sqlite3_column_name(statement_.get(), column) +
                             " holds a value of a wrong type");
   }
@@ -297,37 +302,37 @@ std::span<const std::uint8_t> Statement::blob(int column) const {
   return {data, data == nullptr ? 0 : size};
 }
 
-Transaction::Transaction(Database& database, Kind kind)
+DatabaseTransaction::DatabaseTransaction(Database& database, MemoryTables::Kind kind)
     : database_(database), within_another_(database.in_transaction()) {
   if (within_another_) {
-    open_ = kind == Kind::writing;
+    open_ = kind == MemoryTables::Kind::writing;
     if (open_) database_.execute("SAVEPOINT part");
     return;
   }
-  database_.allow_steps();
-  database_.execute(kind == Kind::writing ? "BEGIN IMMEDIATE" : "BEGIN");
+  database_.set_step_limit();
+  database_.execute(kind == MemoryTables::Kind::writing ? "BEGIN IMMEDIATE" : "BEGIN");
   try {
-    database_.require_name();
+    database_.require_unmoved();
   } catch (...) {
     sqlite3_exec(database_.handle(), "ROLLBACK", nullptr, nullptr, nullptr);
     throw;
   }
 }
 
-Transaction::~Transaction() {
+DatabaseTransaction::~DatabaseTransaction() {
   if (!open_ || !database_.in_transaction()) return;  // SQLite rolls back by itself when it fails
   sqlite3_exec(database_.handle(), within_another_ ? "ROLLBACK TO part; RELEASE part" : "ROLLBACK",
                nullptr, nullptr, nullptr);
 }
 
-void Transaction::commit() {
+void DatabaseTransaction::commit() {
   if (within_another_) {
     database_.execute("RELEASE part");
   } else {
     database_.execute("UPDATE log SET before = now, now = randomblob(16)");
-    database_.require_name();
+    database_.require_unmoved();
     database_.execute("COMMIT");
-    database_.require_name();
+    database_.require_unmoved();
   }
   open_ = false;
 }

@@ -3,9 +3,13 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+
+#include "panonav/core/ids.hpp"
+#include "panonav/storage/internal/memory_tables.hpp"
 
 struct sqlite3;
 struct sqlite3_stmt;
@@ -28,24 +32,25 @@ class Database {
   void execute(const char* sql);
   [[nodiscard]] std::int64_t integer(const char* sql);
   [[nodiscard]] bool in_transaction() const noexcept;
-  /// From now on every transaction asks whether the file still has its name, and throws when it was
-  /// deleted, moved or replaced.
-  void watch_name() noexcept { watches_name_ = true; }
-  void require_name() const;
+  /// From now on every transaction throws when the file was deleted, moved or replaced.
+  void watch_for_moves() noexcept { watches_for_moves_ = true; }
+  void require_unmoved() const;
+  /// Returns the size of the file and of its write-ahead log.
+  [[nodiscard]] std::int64_t file_bytes() const;
   /// Closing will leave the write-ahead log as it is instead of bringing it into the file.
   void leave_log_on_close() noexcept;
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
   [[nodiscard]] sqlite3* handle() const noexcept { return handle_.get(); }
 
-  /// Throws the FileError for what SQLite answered last.
+  /// Throws the FileError for an error code of SQLite, with the message of its last call.
   [[noreturn]] void fail(int code) const;
   [[noreturn]] void fail_damaged(std::string_view what) const;
 
-  /// From now on a statement may take a number of steps in proportion to the size that the file has
-  /// now, since tables whose pages refer to each other would be read without end.
-  void allow_steps() noexcept;
-  /// A statement begins.
-  void refill_steps() const noexcept;
+  /// Limits the steps of each statement in proportion to the present size of the file, since tables
+  /// whose pages refer to each other would be read without end.
+  void set_step_limit();
+  /// Grants the steps of the limit to the statement that begins.
+  void reset_step_count() const noexcept;
 
  private:
   struct Close {
@@ -53,32 +58,48 @@ class Database {
   };
   std::filesystem::path path_;
   std::unique_ptr<std::int64_t> steps_left_;  // has an address that stays when this is moved
-  std::int64_t steps_allowed_ = 0;
+  std::int64_t step_limit_ = 0;
   std::unique_ptr<sqlite3, Close> handle_;
-  bool watches_name_ = false;
+  bool watches_for_moves_ = false;
 };
 
 /// A prepared statement. Bound texts and blobs must live until the statement is reset.
 class Statement {
  public:
-  Statement(Database& database, const char* sql);
+  /// Binds the values to the parameters ?1, ?2, ...
+  template <class... Values>
+  explicit Statement(Database& database, const char* sql, const Values&... values)
+      : Statement(database, sql, nullptr) {
+    bind_all(values...);
+  }
 
+  template <class... Values>
+  Statement& bind_all(const Values&... values) {
+    int parameter = 0;
+    (bind(++parameter, values), ...);
+    return *this;
+  }
   Statement& bind_null(int parameter);
+  template <class Value>
+  Statement& bind(int parameter, const std::optional<Value>& value) {
+    return value ? bind(parameter, *value) : bind_null(parameter);
+  }
+  Statement& bind(int parameter, ViewId view) { return bind(parameter, std::int64_t{view.value}); }
   Statement& bind(int parameter, std::int64_t value);
   Statement& bind(int parameter, double value);
   Statement& bind(int parameter, std::string_view text);
   Statement& bind(int parameter, std::span<const std::uint8_t> blob);
 
-  /// True: a row is there. False: done, and the statement is reset.
+  /// True if there is a row; otherwise the statement is done and reset.
   bool step();
-  /// For statements without rows. Returns SQLite's extended code when a constraint forbids it
+  /// Runs a statement without rows. Returns SQLite's extended code when a constraint forbids it
   /// (nothing has then changed), 0 when it is done.
   int run();
   void reset() noexcept;
 
   [[nodiscard]] bool is_null(int column) const;
   [[nodiscard]] int type(int column) const;
-  /// These throw FileError ("damaged") when the column holds another type.
+  // These throw FileError ("damaged") when the column holds another type.
   [[nodiscard]] std::int64_t integer(int column) const;
   [[nodiscard]] double real(int column) const;
   [[nodiscard]] std::string_view text(int column) const;               ///< until the next step
@@ -88,24 +109,26 @@ class Statement {
   struct Finalise {
     void operator()(sqlite3_stmt* statement) const noexcept;
   };
+  Statement(Database& database, const char* sql, std::nullptr_t);
   void check_bind(int code) const;
-  void require_type(int column, int wanted) const;
+  void require_type(int column, int expected) const;
   Database* database_;
   std::unique_ptr<sqlite3_stmt, Finalise> statement_;
 };
 
-/// Rolls back unless committed. Within a writing transaction it is a part of that one, which is
-/// taken back alone or committed with the whole.
-class Transaction {
+/// Runs a statement without rows. Returns as `Statement::run`.
+template <class... Values>
+int run_statement(Database& database, const char* sql, const Values&... values) {
+  return Statement(database, sql, values...).run();
+}
+
+class DatabaseTransaction final : public MemoryTables::Transaction {
  public:
-  enum class Kind { reading, writing };
-  Transaction(Database& database, Kind kind);
-  ~Transaction();
-  Transaction(const Transaction&) = delete;
-  Transaction& operator=(const Transaction&) = delete;
+  DatabaseTransaction(Database& database, MemoryTables::Kind kind);
+  ~DatabaseTransaction() override;
   /// Returns once everything is on the disk, with a new mark in the table `log`. Throws FileError
   /// when the file is no longer where it was opened.
-  void commit();
+  void commit() override;
 
  private:
   Database& database_;

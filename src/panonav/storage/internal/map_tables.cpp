@@ -8,6 +8,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/storage/checksum.hpp"
+#include "panonav/storage/internal/little_endian.hpp"
 
 namespace panonav {
 
@@ -18,29 +19,20 @@ namespace {
 constexpr std::size_t node_bytes = 2 * 4 + 3 * 8;
 constexpr std::size_t edge_bytes = 3 * 4 + 4 * 8;
 
-template <class Word>
-void append_word(std::vector<std::uint8_t>& bytes, Word word) {
-  for (std::size_t shift = 0; shift < 8 * sizeof(Word); shift += 8) {
-    bytes.push_back(static_cast<std::uint8_t>((word >> shift) & 255U));
-  }
-}
-
 void append_real(std::vector<std::uint8_t>& bytes, double value) {
-  append_word(bytes, std::bit_cast<std::uint64_t>(value));
+  append_little_endian(bytes, std::bit_cast<std::uint64_t>(value));
 }
 
 void append_pose(std::vector<std::uint8_t>& bytes, const Pose2& pose) {
-  append_real(bytes, pose.x_m);
-  append_real(bytes, pose.y_m);
-  append_real(bytes, pose.heading_rad);
+  for (const double value : {pose.x_m, pose.y_m, pose.heading_rad}) append_real(bytes, value);
 }
 
-/// Reads what `append_*` wrote.
-class Reader {
+/// Reads the fields of records one after the other; the caller has checked the size.
+class RecordReader {
  public:
-  explicit Reader(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
-  [[nodiscard]] std::uint32_t number() { return static_cast<std::uint32_t>(word(4)); }
-  [[nodiscard]] double real() { return std::bit_cast<double>(word(8)); }
+  explicit RecordReader(std::span<const std::uint8_t> bytes) : at_(bytes.data()) {}
+  [[nodiscard]] std::uint32_t number() { return next<std::uint32_t>(); }
+  [[nodiscard]] double real() { return std::bit_cast<double>(next<std::uint64_t>()); }
   [[nodiscard]] Pose2 pose() {
     const double x_m = real();
     const double y_m = real();
@@ -48,14 +40,13 @@ class Reader {
   }
 
  private:
-  std::uint64_t word(std::size_t size) {
-    std::uint64_t value = 0;
-    for (std::size_t i = 0; i < size; ++i) value |= std::uint64_t{bytes_[at_ + i]} << (8 * i);
-    at_ += size;
-    return value;
+  template <class Word>
+  Word next() {
+    const auto word = read_little_endian<Word>(at_);
+    at_ += sizeof(Word);
+    return word;
   }
-  std::span<const std::uint8_t> bytes_;
-  std::size_t at_ = 0;
+  const std::uint8_t* at_;
 };
 
 std::int64_t map_checksum(std::string_view name, std::span<const std::uint8_t> nodes,
@@ -79,15 +70,15 @@ void write_map(MemoryTables& tables, std::string_view name, const TopologicalMap
   validate(map);
   std::vector<std::uint8_t> nodes;
   for (const MapNode& node : map.nodes) {
-    append_word(nodes, node.view.value);
-    append_word(nodes, static_cast<std::uint32_t>(node.component));
+    append_little_endian(nodes, node.view.value);
+    append_little_endian(nodes, static_cast<std::uint32_t>(node.component));
     append_pose(nodes, node.pose);
   }
   std::vector<std::uint8_t> edges;
   for (const MapEdge& edge : map.edges) {
-    append_word(edges, edge.a.value);
-    append_word(edges, edge.b.value);
-    append_word(edges, static_cast<std::uint32_t>(edge.kind));
+    append_little_endian(edges, edge.a.value);
+    append_little_endian(edges, edge.b.value);
+    append_little_endian(edges, static_cast<std::uint32_t>(edge.kind));
     append_pose(edges, edge.a_from_b);
     append_real(edges, edge.weight);
   }
@@ -104,7 +95,7 @@ std::optional<TopologicalMap> read_map(MemoryTables& tables, std::string_view na
     fail_map(tables, name, "does not match its checksum");
   }
   TopologicalMap map;
-  Reader node_reader(nodes);
+  RecordReader node_reader(nodes);
   for (std::size_t i = 0; i < nodes.size() / node_bytes; ++i) {
     MapNode node;
     node.view.value = node_reader.number();
@@ -112,7 +103,7 @@ std::optional<TopologicalMap> read_map(MemoryTables& tables, std::string_view na
     node.pose = node_reader.pose();
     map.nodes.push_back(node);
   }
-  Reader edge_reader(edges);
+  RecordReader edge_reader(edges);
   for (std::size_t i = 0; i < edges.size() / edge_bytes; ++i) {
     MapEdge edge;
     edge.a.value = edge_reader.number();

@@ -111,7 +111,7 @@ void prepare_for_changes(Database& database) {
                     "is being used by another program; its first change needs it alone");
   }
   mode.reset();
-  database.watch_name();
+  database.watch_for_moves();
 }
 
 [[noreturn]] void refuse_existing(const fs::path& path) {
@@ -165,7 +165,7 @@ void make_memory_tables(const fs::path& path, const MemoryHeader& header,
     database.execute("PRAGMA synchronous=FULL");
     // Three views of 80 x 15 fit on a page; larger pages cost more bytes per append.
     database.execute("PRAGMA page_size=8192");
-    Transaction transaction(database, Transaction::Kind::writing);
+    DatabaseTransaction transaction(database, MemoryTables::Kind::writing);
     create_schema(database);
     for (const auto& [key, value] : settings_of(header)) write_setting(database, key, value);
     transaction.commit();
@@ -196,7 +196,7 @@ OpenedMemory open_memory_tables(const fs::path& path, Access access) {
   }
   Database database = open_memory_database(path, access);
   try {
-    const Transaction reading(database, Transaction::Kind::reading);
+    const DatabaseTransaction reading(database, MemoryTables::Kind::reading);
     require_schema(database);
     header = header_from(read_settings(database));
   } catch (const FileError&) {

@@ -2,23 +2,10 @@
 
 #include <algorithm>
 #include <string>
-#include <type_traits>
 
 #include "panonav/core/error.hpp"
 
 namespace panonav {
-
-namespace {
-
-void add_optional(RecordBytes& record, const std::optional<double>& value) {
-  if (value) {
-    record.add(*value);
-  } else {
-    record.add_null();
-  }
-}
-
-}  // namespace
 
 void pack_signature(const PackedSignature& signature, std::vector<std::uint8_t>& bytes) {
   bytes.assign(signature.magnitudes.begin(), signature.magnitudes.end());
@@ -34,11 +21,11 @@ std::int64_t view_checksum(RecordBytes& scratch, ViewId id, const ReferenceInfo&
   if (info.pose) {
     scratch.add(info.pose->x_m);
     scratch.add(info.pose->y_m);
-    add_optional(scratch, info.pose->heading_rad);
+    scratch.add(info.pose->heading_rad);
   } else {
     for (int i = 0; i < 3; ++i) scratch.add_null();
   }
-  add_optional(scratch, info.stamp_s);
+  scratch.add(info.stamp_s);
   return static_cast<std::int64_t>(checksum(signature, checksum(scratch.bytes())));
 }
 
@@ -59,18 +46,7 @@ std::int64_t link_checksum(const Link& link) {
 std::int64_t setting_checksum(std::string_view key, const SettingValue& value) {
   RecordBytes record;
   record.add(key);
-  std::visit(
-      [&](const auto& v) {
-        using Value = std::remove_cvref_t<decltype(v)>;
-        if constexpr (std::is_same_v<Value, std::string>) {
-          record.add(std::string_view(v));
-        } else if constexpr (std::is_same_v<Value, std::vector<std::uint8_t>>) {
-          record.add(std::span<const std::uint8_t>(v));
-        } else {
-          record.add(v);
-        }
-      },
-      value);
+  std::visit([&](const auto& typed) { record.add(typed); }, value);
   return static_cast<std::int64_t>(checksum(record.bytes()));
 }
 

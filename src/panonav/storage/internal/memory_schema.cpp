@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <map>
 #include <set>
@@ -76,10 +77,9 @@ constexpr std::string_view names_index = "sqlite_autoindex_views_1";
 constexpr const char* links_index = "CREATE INDEX links_b ON links(b)";
 
 std::string hexadecimal(std::uint32_t value) {
-  constexpr char digits[] = "0123456789abcdef";
-  std::string text = "0x";
-  for (int shift = 28; shift >= 0; shift -= 4) text += digits[(value >> shift) & 15U];
-  return text;
+  std::array<char, 16> text{};
+  std::snprintf(text.data(), text.size(), "0x%08x", static_cast<unsigned>(value));
+  return text.data();
 }
 
 SettingValue value_in(const Statement& row, int column) {
@@ -196,19 +196,8 @@ void write_setting(Database& database, const std::string& key, const SettingValu
   Statement insert(database,
                    "INSERT INTO settings(key, value, checksum) VALUES(?, ?, ?) ON CONFLICT(key) DO "
                    "UPDATE SET value = excluded.value, checksum = excluded.checksum");
-  insert.bind(1, std::string_view(key)).bind(3, setting_checksum(key, value));
-  std::visit(
-      [&](const auto& v) {
-        using Value = std::remove_cvref_t<decltype(v)>;
-        if constexpr (std::is_same_v<Value, std::string>) {
-          insert.bind(2, std::string_view(v));
-        } else if constexpr (std::is_same_v<Value, std::vector<std::uint8_t>>) {
-          insert.bind(2, std::span<const std::uint8_t>(v));
-        } else {
-          insert.bind(2, v);
-        }
-      },
-      value);
+  insert.bind(1, key).bind(3, setting_checksum(key, value));
+  std::visit([&](const auto& typed) { insert.bind(2, typed); }, value);
   if (insert.run() != 0) throw ContractError("setting " + key, "not a number", "finite numbers");
 }
 

@@ -178,14 +178,14 @@ class MemoryTables {
   /// Within a writing transaction: runs `changes` and keeps what they replace or drop.
   virtual void keep_for_undo(const std::function<void()>& changes, const std::string& what) = 0;
   /// The newest first.
-  [[nodiscard]] virtual std::vector<KeptChange> history() = 0;
+  [[nodiscard]] virtual std::vector<MemoryFile::KeptChange> history() = 0;
   /// Within a writing transaction; takes back the newest, which can be undone.
   virtual void undo() = 0;
 
   /// Passes every part of the check of the tables themselves to `check`; nothing after it is safe
   /// to read where that found faults. Returns the ids of all views that are found by any way.
   [[nodiscard]] virtual std::set<ViewId> verify_structure(const Check& check) = 0;
-  [[nodiscard]] virtual MemoryFileInfo info() = 0;
+  [[nodiscard]] virtual MemoryFile::Info info() = 0;
 };
 
 }  // namespace panonav

@@ -18,7 +18,7 @@ class MemoryVerification {
   MemoryVerification(MemoryTables& tables, const MemoryHeader& header)
       : tables_(tables), header_(header) {}
 
-  std::vector<MemoryFault> run() {
+  std::vector<MemoryFile::Fault> run() {
     const auto reading = tables_.transaction(MemoryTables::Kind::reading);
     const MemoryTables::Check check_part = [this](const auto& part) { check(part); };
     views_ = tables_.verify_structure(check_part);
@@ -91,12 +91,12 @@ class MemoryVerification {
   MemoryTables& tables_;
   const MemoryHeader& header_;
   std::set<ViewId> views_;
-  std::vector<MemoryFault> faults_;
+  std::vector<MemoryFile::Fault> faults_;
 };
 
 }  // namespace
 
-std::vector<MemoryFault> verify_memory(MemoryTables& tables, const MemoryHeader& header) {
+std::vector<MemoryFile::Fault> verify_memory(MemoryTables& tables, const MemoryHeader& header) {
   return MemoryVerification(tables, header).run();
 }
 

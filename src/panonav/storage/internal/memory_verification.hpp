@@ -8,7 +8,7 @@ namespace panonav {
 
 /// Everything that is wrong with a memory: structure, then view by view, then what belongs to the
 /// views. Empty: intact.
-[[nodiscard]] std::vector<MemoryFault> verify_memory(MemoryTables& tables,
-                                                     const MemoryHeader& header);
+[[nodiscard]] std::vector<MemoryFile::Fault> verify_memory(MemoryTables& tables,
+                                                           const MemoryHeader& header);
 
 }  // namespace panonav

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <string>
-#include <system_error>
 #include <utility>
 
 #include "panonav/core/error.hpp"
@@ -22,37 +21,19 @@ std::optional<double> optional_real(const Statement& row, int column) {
   return row.real(column);
 }
 
-void bind_optional(Statement& statement, int parameter, const std::optional<double>& value) {
-  if (value) {
-    statement.bind(parameter, *value);
-  } else {
-    statement.bind_null(parameter);
-  }
-}
-
-// name, x_m, y_m, heading_rad, stamp_s from parameter `first` on.
+// Binds name, x_m, y_m, heading_rad, stamp_s from parameter `first` on.
 void bind_info(Statement& statement, int first, const ReferenceInfo& info) {
   const auto& pose = info.pose;
-  statement.bind(first, std::string_view(info.name));
-  bind_optional(statement, first + 1, pose ? std::optional(pose->x_m) : std::nullopt);
-  bind_optional(statement, first + 2, pose ? std::optional(pose->y_m) : std::nullopt);
-  bind_optional(statement, first + 3, pose ? pose->heading_rad : std::nullopt);
-  bind_optional(statement, first + 4, info.stamp_s);
+  statement.bind(first, info.name)
+      .bind(first + 1, pose ? std::optional(pose->x_m) : std::nullopt)
+      .bind(first + 2, pose ? std::optional(pose->y_m) : std::nullopt)
+      .bind(first + 3, pose ? pose->heading_rad : std::nullopt)
+      .bind(first + 4, info.stamp_s);
 }
 
-std::vector<std::uint8_t> copy_of(std::span<const std::uint8_t> bytes) {
+std::vector<std::uint8_t> copy_bytes(std::span<const std::uint8_t> bytes) {
   return {bytes.begin(), bytes.end()};
 }
-
-class SqliteTransaction final : public MemoryTables::Transaction {
- public:
-  SqliteTransaction(Database& database, panonav::Transaction::Kind kind)
-      : transaction_(database, kind) {}
-  void commit() override { transaction_.commit(); }
-
- private:
-  panonav::Transaction transaction_;
-};
 
 const char* name_of(BesideViews table) {
   return table == BesideViews::thumbnails ? "thumbnails" : "features";
@@ -72,9 +53,7 @@ SqliteTables::SqliteTables(std::filesystem::path path, Database database)
                  "WHERE id = ?") {}
 
 std::unique_ptr<MemoryTables::Transaction> SqliteTables::transaction(Kind kind) {
-  return std::make_unique<SqliteTransaction>(database_, kind == Kind::writing
-                                                            ? panonav::Transaction::Kind::writing
-                                                            : panonav::Transaction::Kind::reading);
+  return std::make_unique<DatabaseTransaction>(database_, kind);
 }
 
 ViewId SqliteTables::id_in(const Statement& row, int column) const {
@@ -110,8 +89,7 @@ void SqliteTables::write_setting(const std::string& key, const SettingValue& val
 }
 
 void SqliteTables::erase_setting(const std::string& key) {
-  Statement erase(database_, "DELETE FROM settings WHERE key = ?");
-  static_cast<void>(erase.bind(1, std::string_view(key)).run());
+  run_statement(database_, "DELETE FROM settings WHERE key = ?", key);
 }
 
 std::uint32_t SqliteTables::last_id() {
@@ -139,10 +117,9 @@ void SqliteTables::insert(std::span<const ViewId> ids, std::span<const NewView> 
     const ViewId id = ids[i];
     const NewView& view = views[i];
     pack_signature(view.signature, signature_);
-    insert_view_.bind(1, std::int64_t{id.value});
+    insert_view_.bind(1, id);
     bind_info(insert_view_, 2, view.info);
-    insert_view_.bind(7, std::span<const std::uint8_t>(signature_))
-        .bind(8, view_checksum(scratch_, id, view.info, signature_));
+    insert_view_.bind(7, signature_).bind(8, view_checksum(scratch_, id, view.info, signature_));
     const int constraint = insert_view_.run();
     if (constraint == SQLITE_CONSTRAINT_UNIQUE) refuse_taken_name("view", view.info.name, path_);
     if (constraint != 0) fail_damaged("the id of a new view is taken");
@@ -154,12 +131,10 @@ void SqliteTables::insert(std::span<const ViewId> ids, std::span<const NewView> 
 void SqliteTables::insert_beside(BesideViews table, ViewId view,
                                  std::span<const std::uint8_t> bytes) {
   if (bytes.empty()) return;
-  Statement insert(database_,
-                   table == BesideViews::thumbnails
-                       ? "INSERT INTO thumbnails(view, picture, checksum) VALUES(?, ?, ?)"
-                       : "INSERT INTO features(view, features, checksum) VALUES(?, ?, ?)");
-  insert.bind(1, std::int64_t{view.value}).bind(2, bytes).bind(3, bytes_checksum(view, bytes));
-  if (insert.run() != 0) {
+  const char* const sql = table == BesideViews::thumbnails
+                              ? "INSERT INTO thumbnails(view, picture, checksum) VALUES(?, ?, ?)"
+                              : "INSERT INTO features(view, features, checksum) VALUES(?, ?, ?)";
+  if (run_statement(database_, sql, view, bytes, bytes_checksum(view, bytes)) != 0) {
     fail_damaged("an entry of " + std::string(name_of(table)) + " without a view");
   }
 }
@@ -167,7 +142,7 @@ void SqliteTables::insert_beside(BesideViews table, ViewId view,
 void SqliteTables::require_views(std::span<const ViewId> views) {
   Statement statement(database_, "SELECT 1 FROM views WHERE id = ?");
   for (const ViewId view : views) {
-    if (!statement.bind(1, std::int64_t{view.value}).step()) refuse_view(view);
+    if (!statement.bind(1, view).step()) refuse_view(view);
     statement.reset();
   }
 }
@@ -180,9 +155,7 @@ void SqliteTables::remove(std::span<const ViewId> views) {
     statements.emplace_back(database_, sql);
   }
   for (const ViewId view : views) {
-    for (Statement& statement : statements) {
-      static_cast<void>(statement.bind(1, std::int64_t{view.value}).run());
-    }
+    for (Statement& statement : statements) statement.bind(1, view).run();
   }
 }
 
@@ -191,7 +164,7 @@ void SqliteTables::write_info(ViewId view, const ReferenceInfo& info, std::int64
                   "UPDATE views SET name = ?, x_m = ?, y_m = ?, heading_rad = ?, stamp_s = ?, "
                   "checksum = ? WHERE id = ?");
   bind_info(write, 1, info);
-  write.bind(6, checksum).bind(7, std::int64_t{view.value});
+  write.bind(6, checksum).bind(7, view);
   if (write.run() != 0) refuse_taken_name("view", info.name, path_);
 }
 
@@ -213,11 +186,11 @@ void SqliteTables::read_views(const Take<ViewRow>& take) {
 void SqliteTables::read_views(std::span<const ViewId> views, const Take<ViewRow>& take) {
   for (const ViewId view : views) {
     find_view_.reset();  // what was taken last may have thrown
-    if (!find_view_.bind(1, std::int64_t{view.value}).step()) {
+    if (!find_view_.bind(1, view).step()) {
       // The index of the names lies on other pages: it still knows what the table has lost.
       Statement named(database_,
-                      "SELECT 1 FROM views INDEXED BY sqlite_autoindex_views_1 WHERE id = ?");
-      if (!named.bind(1, std::int64_t{view.value}).step()) refuse_view(view);
+                      "SELECT 1 FROM views INDEXED BY sqlite_autoindex_views_1 WHERE id = ?", view);
+      if (!named.step()) refuse_view(view);
       fail_damaged("view " + std::to_string(view.value) + " is missing");
     }
     take(view_in(find_view_));
@@ -228,7 +201,7 @@ void SqliteTables::read_views(std::span<const ViewId> views, const Take<ViewRow>
 void SqliteTables::read_views_there(std::span<const ViewId> views, const Take<ViewRow>& take) {
   for (const ViewId view : views) {
     find_view_.reset();
-    if (find_view_.bind(1, std::int64_t{view.value}).step()) take(view_in(find_view_));
+    if (find_view_.bind(1, view).step()) take(view_in(find_view_));
   }
   find_view_.reset();
 }
@@ -236,8 +209,8 @@ void SqliteTables::read_views_there(std::span<const ViewId> views, const Take<Vi
 void SqliteTables::read_magnitudes(ViewId first, ViewId last, std::size_t bytes,
                                    const Take<MagnitudesRow>& take) {
   Statement rows(database_,
-                 "SELECT id, x_m, y_m, signature FROM views WHERE id BETWEEN ? AND ? ORDER BY id");
-  rows.bind(1, std::int64_t{first.value}).bind(2, std::int64_t{last.value});
+                 "SELECT id, x_m, y_m, signature FROM views WHERE id BETWEEN ? AND ? ORDER BY id",
+                 first, last);
   while (rows.step()) {
     const auto x_m = optional_real(rows, 1);
     const auto y_m = optional_real(rows, 2);
@@ -279,9 +252,8 @@ std::vector<PositionRow> SqliteTables::views_within(const PositionBounds& bounds
   std::vector<PositionRow> views;
   Statement rows(database_,
                  "SELECT id, x_m, y_m, heading_rad FROM views WHERE x_m BETWEEN ? AND ? AND y_m "
-                 "BETWEEN ? AND ? ORDER BY id");
-  rows.bind(1, bounds.min_x_m).bind(2, bounds.max_x_m);
-  rows.bind(3, bounds.min_y_m).bind(4, bounds.max_y_m);
+                 "BETWEEN ? AND ? ORDER BY id",
+                 bounds.min_x_m, bounds.max_x_m, bounds.min_y_m, bounds.max_y_m);
   while (rows.step()) {
     views.push_back({id_in(rows, 0),
                      {optional_real(rows, 1).value_or(0.0), optional_real(rows, 2).value_or(0.0),
@@ -310,11 +282,13 @@ std::vector<ViewId> SqliteTables::views_with(BesideViews table) {
 }
 
 std::optional<StoredBytes> SqliteTables::bytes(BesideViews table, ViewId view) {
-  Statement row(database_, table == BesideViews::thumbnails
-                               ? "SELECT picture, checksum FROM thumbnails WHERE view = ?"
-                               : "SELECT features, checksum FROM features WHERE view = ?");
-  if (!row.bind(1, std::int64_t{view.value}).step()) return std::nullopt;
-  return StoredBytes{copy_of(row.blob(0)), row.integer(1)};
+  Statement row(database_,
+                table == BesideViews::thumbnails
+                    ? "SELECT picture, checksum FROM thumbnails WHERE view = ?"
+                    : "SELECT features, checksum FROM features WHERE view = ?",
+                view);
+  if (!row.step()) return std::nullopt;
+  return StoredBytes{copy_bytes(row.blob(0)), row.integer(1)};
 }
 
 void SqliteTables::write_links(std::span<const Link> links) {
@@ -322,17 +296,13 @@ void SqliteTables::write_links(std::span<const Link> links) {
                    "INSERT INTO links(a, b, kind, checksum) VALUES(?, ?, ?, ?) ON CONFLICT(a, b) "
                    "DO UPDATE SET kind = excluded.kind, checksum = excluded.checksum");
   for (const Link& link : links) {
-    insert.bind(1, std::int64_t{link.a.value})
-        .bind(2, std::int64_t{link.b.value})
-        .bind(3, std::int64_t{static_cast<int>(link.kind)})
-        .bind(4, link_checksum(link));
-    static_cast<void>(insert.run());
+    insert.bind_all(link.a, link.b, static_cast<std::int64_t>(link.kind), link_checksum(link))
+        .run();
   }
 }
 
 void SqliteTables::erase_link(ViewId a, ViewId b) {
-  Statement erase(database_, "DELETE FROM links WHERE a = ? AND b = ?");
-  static_cast<void>(erase.bind(1, std::int64_t{a.value}).bind(2, std::int64_t{b.value}).run());
+  run_statement(database_, "DELETE FROM links WHERE a = ? AND b = ?", a, b);
 }
 
 void SqliteTables::read_links(const Take<LinkRow>& take) {
@@ -344,26 +314,22 @@ void SqliteTables::read_links(const Take<LinkRow>& take) {
 }
 
 void SqliteTables::write_map(std::string_view name, const MapRow& row) {
-  Statement insert(database_,
-                   "INSERT INTO maps(name, nodes, edges, checksum) VALUES(?, ?, ?, ?) ON "
-                   "CONFLICT(name) DO UPDATE SET nodes = excluded.nodes, edges = excluded.edges, "
-                   "checksum = excluded.checksum");
-  insert.bind(1, name)
-      .bind(2, std::span<const std::uint8_t>(row.nodes))
-      .bind(3, std::span<const std::uint8_t>(row.edges))
-      .bind(4, row.checksum);
-  if (insert.run() != 0) fail_damaged("map " + std::string(name) + ": cannot be replaced");
+  const char* const sql =
+      "INSERT INTO maps(name, nodes, edges, checksum) VALUES(?, ?, ?, ?) ON CONFLICT(name) DO "
+      "UPDATE SET nodes = excluded.nodes, edges = excluded.edges, checksum = excluded.checksum";
+  if (run_statement(database_, sql, name, row.nodes, row.edges, row.checksum) != 0) {
+    fail_damaged("map " + std::string(name) + ": cannot be replaced");
+  }
 }
 
 std::optional<MapRow> SqliteTables::map(std::string_view name) {
-  Statement row(database_, "SELECT nodes, edges, checksum FROM maps WHERE name = ?");
-  if (!row.bind(1, name).step()) return std::nullopt;
-  return MapRow{copy_of(row.blob(0)), copy_of(row.blob(1)), row.integer(2)};
+  Statement row(database_, "SELECT nodes, edges, checksum FROM maps WHERE name = ?", name);
+  if (!row.step()) return std::nullopt;
+  return MapRow{copy_bytes(row.blob(0)), copy_bytes(row.blob(1)), row.integer(2)};
 }
 
 void SqliteTables::erase_map(std::string_view name) {
-  Statement erase(database_, "DELETE FROM maps WHERE name = ?");
-  static_cast<void>(erase.bind(1, name).run());
+  run_statement(database_, "DELETE FROM maps WHERE name = ?", name);
 }
 
 std::vector<std::string> SqliteTables::map_names() {
@@ -371,26 +337,23 @@ std::vector<std::string> SqliteTables::map_names() {
 }
 
 void SqliteTables::write_route(std::string_view name, const RouteRow& row) {
-  Statement head(database_,
-                 "INSERT INTO routes(name, columns, lines, checksum) VALUES(?, ?, ?, ?) ON "
-                 "CONFLICT(name) DO UPDATE SET lines = excluded.lines, checksum = "
-                 "excluded.checksum");
-  head.bind(1, name).bind(2, row.columns).bind(3, row.lines).bind(4, row.checksum);
-  if (head.run() != 0) fail_damaged("route " + std::string(name) + ": cannot be written");
+  const char* const sql =
+      "INSERT INTO routes(name, columns, lines, checksum) VALUES(?, ?, ?, ?) ON CONFLICT(name) DO "
+      "UPDATE SET lines = excluded.lines, checksum = excluded.checksum";
+  if (run_statement(database_, sql, name, row.columns, row.lines, row.checksum) != 0) {
+    fail_damaged("route " + std::string(name) + ": cannot be written");
+  }
 }
 
 std::optional<RouteRow> SqliteTables::route(std::string_view name) {
-  Statement row(database_, "SELECT columns, lines, checksum FROM routes WHERE name = ?");
-  if (!row.bind(1, name).step()) return std::nullopt;
+  Statement row(database_, "SELECT columns, lines, checksum FROM routes WHERE name = ?", name);
+  if (!row.step()) return std::nullopt;
   return RouteRow{row.integer(0), row.integer(1), row.integer(2)};
 }
 
 void SqliteTables::erase_route(std::string_view name) {
-  for (const char* sql :
-       {"DELETE FROM route_blocks WHERE route = ?", "DELETE FROM routes WHERE name = ?"}) {
-    Statement erase(database_, sql);
-    static_cast<void>(erase.bind(1, name).run());
-  }
+  run_statement(database_, "DELETE FROM route_blocks WHERE route = ?", name);
+  run_statement(database_, "DELETE FROM routes WHERE name = ?", name);
 }
 
 std::vector<std::string> SqliteTables::route_names() {
@@ -399,32 +362,31 @@ std::vector<std::string> SqliteTables::route_names() {
 
 void SqliteTables::write_block(std::string_view route, std::int64_t number,
                                std::span<const std::uint8_t> lines, std::int64_t checksum) {
-  Statement insert(database_,
-                   "INSERT INTO route_blocks(route, number, lines, checksum) VALUES(?, ?, ?, ?) ON "
-                   "CONFLICT(route, number) DO UPDATE SET lines = excluded.lines, checksum = "
-                   "excluded.checksum");
-  insert.bind(1, route).bind(2, number).bind(3, lines).bind(4, checksum);
-  if (insert.run() != 0) {
+  const char* const sql =
+      "INSERT INTO route_blocks(route, number, lines, checksum) VALUES(?, ?, ?, ?) ON "
+      "CONFLICT(route, number) DO UPDATE SET lines = excluded.lines, checksum = excluded.checksum";
+  if (run_statement(database_, sql, route, number, lines, checksum) != 0) {
     fail_damaged("route " + std::string(route) + ": a block cannot be written");
   }
 }
 
 std::optional<StoredBytes> SqliteTables::block(std::string_view route, std::int64_t number) {
   Statement rows(database_,
-                 "SELECT lines, checksum FROM route_blocks WHERE route = ? AND number = ?");
-  if (!rows.bind(1, route).bind(2, number).step()) return std::nullopt;
-  return StoredBytes{copy_of(rows.blob(0)), rows.integer(1)};
+                 "SELECT lines, checksum FROM route_blocks WHERE route = ? AND number = ?", route,
+                 number);
+  if (!rows.step()) return std::nullopt;
+  return StoredBytes{copy_bytes(rows.blob(0)), rows.integer(1)};
 }
 
 std::int64_t SqliteTables::blocks(std::string_view route) {
-  Statement count(database_, "SELECT count(*) FROM route_blocks WHERE route = ?");
-  return count.bind(1, route).step() ? count.integer(0) : 0;
+  Statement count(database_, "SELECT count(*) FROM route_blocks WHERE route = ?", route);
+  return count.step() ? count.integer(0) : 0;
 }
 
 std::int64_t SqliteTables::route_bytes(std::string_view route) {
   Statement sum(database_,
-                "SELECT coalesce(sum(length(lines)), 0) FROM route_blocks WHERE route = ?");
-  return sum.bind(1, route).step() ? sum.integer(0) : 0;
+                "SELECT coalesce(sum(length(lines)), 0) FROM route_blocks WHERE route = ?", route);
+  return sum.step() ? sum.integer(0) : 0;
 }
 
 std::vector<std::string> SqliteTables::routes_with_blocks() {
@@ -463,11 +425,11 @@ std::set<ViewId> SqliteTables::verify_structure(const Check& check) {
   return views;
 }
 
-MemoryFileInfo SqliteTables::info() {
+MemoryFile::Info SqliteTables::info() {
   const auto count = [&](const char* sql) {
     return static_cast<std::uint64_t>(database_.integer(sql));
   };
-  MemoryFileInfo info;
+  MemoryFile::Info info;
   // A condition makes SQLite step through the rows, which is bounded, instead of counting the
   // entries of pages, which is not.
   info.views = count("SELECT count(*) FROM views WHERE id > 0");
@@ -481,13 +443,7 @@ MemoryFileInfo SqliteTables::info() {
   info.maps = count("SELECT count(*) FROM maps WHERE name > ''");
   info.routes = count("SELECT count(*) FROM routes WHERE name > ''");
   info.format_version = memory_format_version;
-  for (const char* suffix : {"", "-wal"}) {
-    std::filesystem::path file = database_.path();
-    file += suffix;
-    std::error_code missing;
-    const auto size = std::filesystem::file_size(file, missing);
-    if (!missing) info.file_bytes += size;
-  }
+  info.file_bytes = static_cast<std::uint64_t>(database_.file_bytes());
   return info;
 }
 

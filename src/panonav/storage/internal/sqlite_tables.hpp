@@ -64,11 +64,11 @@ class SqliteTables final : public MemoryTables {
   [[nodiscard]] std::vector<std::string> routes_with_blocks() override;
 
   void keep_for_undo(const std::function<void()>& changes, const std::string& what) override;
-  [[nodiscard]] std::vector<KeptChange> history() override;
+  [[nodiscard]] std::vector<MemoryFile::KeptChange> history() override;
   void undo() override;
 
   [[nodiscard]] std::set<ViewId> verify_structure(const Check& check) override;
-  [[nodiscard]] MemoryFileInfo info() override;
+  [[nodiscard]] MemoryFile::Info info() override;
 
   /// For the tables that only a file has (synchronised_tables.hpp).
   [[nodiscard]] Database& database() noexcept { return database_; }

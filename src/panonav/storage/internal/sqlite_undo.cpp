@@ -99,14 +99,10 @@ void SqliteTables::keep_for_undo(const std::function<void()>& changes, const std
   session.reset();
   require_undo_bytes(path_, made.size);
   const double stamp_s = now_s();
-  {
-    Statement keep(database_,
-                   "INSERT INTO history(what, stamp_s, changes, checksum) VALUES(?, ?, ?, ?)");
-    keep.bind(1, std::string_view(what))
-        .bind(2, stamp_s)
-        .bind(3, made.bytes())
-        .bind(4, undo_checksum(what, stamp_s, made.bytes()));
-    if (keep.run() != 0) fail_damaged("table history");
+  if (run_statement(database_,
+                    "INSERT INTO history(what, stamp_s, changes, checksum) VALUES(?, ?, ?, ?)",
+                    what, stamp_s, made.bytes(), undo_checksum(what, stamp_s, made.bytes())) != 0) {
+    fail_damaged("table history");
   }
   shorten_history();
 }
@@ -137,15 +133,14 @@ void SqliteTables::shorten_history() {
   }
   Statement forget(database_, "UPDATE history SET changes = NULL, checksum = ? WHERE id = ?");
   for (const Old& change : old) {
-    static_cast<void>(
-        forget.bind(1, undo_checksum(change.what, change.stamp_s, {})).bind(2, change.id).run());
+    forget.bind_all(undo_checksum(change.what, change.stamp_s, {}), change.id).run();
   }
   Statement erase(database_, "DELETE FROM history WHERE id = ?");
-  for (const std::int64_t id : gone) static_cast<void>(erase.bind(1, id).run());
+  for (const std::int64_t id : gone) erase.bind(1, id).run();
 }
 
-std::vector<KeptChange> SqliteTables::history() {
-  std::vector<KeptChange> changes;
+std::vector<MemoryFile::KeptChange> SqliteTables::history() {
+  std::vector<MemoryFile::KeptChange> changes;
   Statement row(database_, select_history);
   while (step_checked(database_, row)) {
     changes.push_back(
@@ -178,8 +173,7 @@ void SqliteTables::undo() {
     }
     if (code != SQLITE_OK) database_.fail(code);
   }
-  Statement erase(database_, "DELETE FROM history WHERE id = ?");
-  static_cast<void>(erase.bind(1, id).run());
+  run_statement(database_, "DELETE FROM history WHERE id = ?", id);
 }
 
 }  // namespace panonav

@@ -15,24 +15,19 @@ constexpr const char* memory_key = "synchronised.memory";
 constexpr const char* last_view_key = "synchronised.last_view";
 constexpr const char* number_key = "synchronised.number";
 
-void add_optional(RecordBytes& record, const std::optional<std::int64_t>& value) {
-  if (value) {
-    record.add(*value);
-  } else {
-    record.add_null();
-  }
-}
-
 std::int64_t row_checksum(ViewId view, const SynchronisedView& row) {
   RecordBytes record;
   record.add(std::int64_t{view.value});
-  add_optional(
-      record, row.server_view ? std::optional<std::int64_t>(row.server_view->value) : std::nullopt);
+  if (row.server_view) {
+    record.add(std::int64_t{row.server_view->value});
+  } else {
+    record.add_null();
+  }
   record.add(row.local_checksum);
   record.add(row.server_checksum);
   record.add(row.signature);
   record.add(std::int64_t{row.uploaded ? 1 : 0});
-  add_optional(record, row.sent);
+  record.add(row.sent);
   return static_cast<std::int64_t>(checksum(record.bytes()));
 }
 
@@ -66,30 +61,16 @@ SynchronisedViews read_synchronised_views(SqliteTables& file) {
 }
 
 void write_synchronised_view(SqliteTables& file, ViewId view, const SynchronisedView& row) {
-  Statement insert(file.database(),
-                   "INSERT OR REPLACE INTO synchronised(view, server_view, local_checksum, "
-                   "server_checksum, signature, uploaded, sent, checksum) VALUES(?, ?, ?, ?, ?, ?, "
-                   "?, ?)");
-  const auto bind_optional = [&](int parameter, const std::optional<std::int64_t>& value) {
-    if (value) {
-      insert.bind(parameter, *value);
-    } else {
-      insert.bind_null(parameter);
-    }
-  };
-  insert.bind(1, std::int64_t{view.value});
-  bind_optional(
-      2, row.server_view ? std::optional<std::int64_t>(row.server_view->value) : std::nullopt);
-  insert.bind(3, row.local_checksum).bind(4, row.server_checksum).bind(5, row.signature);
-  insert.bind(6, std::int64_t{row.uploaded ? 1 : 0});
-  bind_optional(7, row.sent);
-  insert.bind(8, row_checksum(view, row));
-  static_cast<void>(insert.run());
+  run_statement(
+      file.database(),
+      "INSERT OR REPLACE INTO synchronised(view, server_view, local_checksum, server_checksum, "
+      "signature, uploaded, sent, checksum) VALUES(?, ?, ?, ?, ?, ?, ?, ?)",
+      view, row.server_view, row.local_checksum, row.server_checksum, row.signature,
+      std::int64_t{row.uploaded ? 1 : 0}, row.sent, row_checksum(view, row));
 }
 
 void erase_synchronised_view(SqliteTables& file, ViewId view) {
-  Statement erase(file.database(), "DELETE FROM synchronised WHERE view = ?");
-  static_cast<void>(erase.bind(1, std::int64_t{view.value}).run());
+  run_statement(file.database(), "DELETE FROM synchronised WHERE view = ?", view);
 }
 
 SynchronisedLinks read_synchronised_links(SqliteTables& file) {
@@ -109,17 +90,14 @@ SynchronisedLinks read_synchronised_links(SqliteTables& file) {
 }
 
 void write_synchronised_link(SqliteTables& file, const Link& link) {
-  Statement insert(
+  run_statement(
       file.database(),
-      "INSERT OR REPLACE INTO synchronised_links(a, b, kind, checksum) VALUES(?, ?, ?, ?)");
-  insert.bind(1, std::int64_t{link.a.value}).bind(2, std::int64_t{link.b.value});
-  insert.bind(3, std::int64_t{static_cast<int>(link.kind)}).bind(4, link_checksum(link));
-  static_cast<void>(insert.run());
+      "INSERT OR REPLACE INTO synchronised_links(a, b, kind, checksum) VALUES(?, ?, ?, ?)", link.a,
+      link.b, static_cast<std::int64_t>(link.kind), link_checksum(link));
 }
 
 void erase_synchronised_link(SqliteTables& file, ViewId a, ViewId b) {
-  Statement erase(file.database(), "DELETE FROM synchronised_links WHERE a = ? AND b = ?");
-  static_cast<void>(erase.bind(1, std::int64_t{a.value}).bind(2, std::int64_t{b.value}).run());
+  run_statement(file.database(), "DELETE FROM synchronised_links WHERE a = ? AND b = ?", a, b);
 }
 
 std::map<ViewId, std::int64_t> read_view_checksums(SqliteTables& file) {

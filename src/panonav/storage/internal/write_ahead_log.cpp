@@ -16,6 +16,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/storage/internal/database.hpp"
+#include "panonav/storage/internal/little_endian.hpp"
 
 namespace panonav {
 
@@ -35,11 +36,6 @@ struct FileMark {
   std::uint32_t page = 0;
   Mark now{};
 };
-
-std::uint32_t little_endian(const std::uint8_t* from) {
-  return (std::uint32_t{from[3]} << 24U) | (std::uint32_t{from[2]} << 16U) |
-         (std::uint32_t{from[1]} << 8U) | from[0];
-}
 
 // The only row of the table `log` in its only page (SQLite's file format, section 1.6): a leaf with
 // one cell of 36 bytes and row id 1, whose record of 4 bytes says: id, two blobs of 16 bytes.
@@ -133,7 +129,8 @@ class LogReader {
   void add_to_sums(std::span<const std::uint8_t> bytes) {
     for (std::size_t i = 0; i + 8 <= bytes.size(); i += 8) {
       const auto word = [&](std::size_t at) {
-        return big_endian_sums_ ? big_endian(&bytes[at]) : little_endian(&bytes[at]);
+        return big_endian_sums_ ? big_endian(&bytes[at])
+                                : read_little_endian<std::uint32_t>(&bytes[at]);
       };
       sums_[0] += word(i) + sums_[1];
       sums_[1] += word(i + 4) + sums_[0];
