@@ -22,7 +22,7 @@ inline constexpr double memory_area_side_m = 10.0;
 /// The area that a position lies in.
 [[nodiscard]] MemoryArea area_of(double x_m, double y_m);
 
-/// What somebody changed in a memory on a server.
+/// A change that somebody made in a memory on a server.
 struct MemoryChange {
   /// Areas in which views were added, removed or changed; empty: something else, views without a
   /// position among them, or many areas.
@@ -33,16 +33,17 @@ struct MemoryChange {
 /// Waits for changes of a memory on a server, whoever makes them. It holds a connection of its own.
 class MemoryChanges {
  public:
-  /// From now on no change is missed. Throws FileError as `MemoryFile::open`, and for the path of a
-  /// memory file, which tells nobody.
+  /// Begins to listen: no later change is missed. Throws FileError as `MemoryFile::open`, and for
+  /// the path of a memory file, which tells nobody.
   explicit MemoryChanges(const std::filesystem::path& memory);
   ~MemoryChanges();
-  /// What is left of the other may only be destroyed or assigned to.
+  /// A moved-from object may only be destroyed or assigned to.
   MemoryChanges(MemoryChanges&&) noexcept;
   MemoryChanges& operator=(MemoryChanges&&) noexcept;
 
-  /// The next change, as soon as its transaction is on the server's disk; empty when there was none
-  /// within `longest`. Throws FileError when the connection is lost: changes may then be missed.
+  /// Returns the next change, as soon as its transaction is on the server's disk; empty when there
+  /// was none within `longest`. Throws FileError when the connection is lost: changes may then be
+  /// missed.
   [[nodiscard]] std::optional<MemoryChange> wait(std::chrono::milliseconds longest);
 
  private:

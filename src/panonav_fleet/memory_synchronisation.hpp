@@ -17,7 +17,7 @@ struct SynchronisationOptions {
   std::optional<std::vector<MemoryArea>> areas;
 };
 
-/// What `synchronise_memory` did.
+/// Counts of what `synchronise_memory` did.
 struct SynchronisationReport {
   std::size_t views = 0;              ///< of the file, afterwards
   std::size_t uploaded = 0;           ///< views that the server got
@@ -46,29 +46,20 @@ struct SynchronisationReport {
 /// ContractError on numbers that are not finite, and on more than a million areas.
 [[nodiscard]] std::vector<MemoryArea> areas_around(double x_m, double y_m, double radius_m);
 
-/// Brings a robot's memory file and a memory on a server to the same views, links, names and poses:
-/// uploads what the file has and the server lacks, and takes what others did since. Where one of
-/// the two is not there, it is made like the other. The file may be cut off from the server for
-/// any time before, and used meanwhile by this and other programs.
+/// Brings a robot's memory file and a memory on a server to the same views, links, names and poses.
+/// Where one of the two is missing, it is made like the other. The file may be used without the
+/// server for any time before, also by other programs. Maps, routes, parameters and `undo` are not
+/// synchronised; no clock is used.
 ///
-/// What the server acknowledged first holds: of two changes of one view the second is dropped, a
-/// removal wins over a change, and a name that another view has becomes "ROBOT/NAME", ROBOT being
-/// the address's `robot` or the login. A signature never changes, so two robots that replaced one
-/// view by new ones have both of them afterwards. Maps, routes, parameters and `undo` stay with the
-/// file and with the server. No clock is asked.
+/// The change that the server acknowledged first holds, a removal wins over a change, and a name
+/// that another view has becomes "ROBOT/NAME" (the address's `robot`, or the login). Each step is
+/// one transaction on its side: after any failure nothing is lost or doubled, and the next call
+/// continues. What the login may not change stays in the file.
 ///
-/// When the link, this process, the server or the power fails, nothing is lost and nothing doubled:
-/// each step is one transaction on its side, and the next call goes on. A login that may only read
-/// takes alone; one that may only add uploads new views and links alone. A server that was restored
-/// from a backup gets back what it lost of what this file holds.
-///
-/// `advance` is called for each view that was uploaded or downloaded, with the number of those that
-/// are to be uploaded or downloaded in all. Throws FileError: a file or
-/// memory that cannot be read or written, a lost connection, a damaged row, a file that is
-/// synchronised with another memory; ContractError when views of the two cannot be compared
-/// (another shape, scale, preprocessing, elevations), or `file` is an address or `server` a path.
-/// Cost: in both a look at the checksums of all views, a few messages, and the bytes of what
-/// changed; holds the new views of 256 at a time.
+/// `advance` is called for each transferred view, with the number of all. Throws FileError: a file
+/// or memory that cannot be read or written, a damaged row, a file that belongs to another memory;
+/// ContractError when views cannot be compared, or `file` is an address or `server` a path. Cost: a
+/// comparison of all checksums on both sides, a few messages, and the bytes of what changed.
 SynchronisationReport synchronise_memory(const std::filesystem::path& file,
                                          const std::filesystem::path& server,
                                          const SynchronisationOptions& options = {},

@@ -35,7 +35,7 @@ std::optional<MemoryArea> area_at(const std::optional<Point2>& position) {
 class Sketcher {
  public:
   explicit Sketcher(SignatureShape shape) : sketches(shape) {}
-  /// Whether a good number of them was sketched just then.
+  /// Returns true if a batch of them was just sketched.
   bool add(MemoryTables& tables, const MagnitudesRow& row) {
     if (row.magnitudes.size() != sketches.shape().size()) {
       tables.fail_damaged("view " + std::to_string(row.id.value) + " has another shape");
@@ -68,7 +68,7 @@ class Sketcher {
 }  // namespace
 
 struct PlaceSearch::Implementation {
-  /// What searches read: swapped when views come or go.
+  /// State that searches read; replaced when views are added or removed.
   struct Sketched {
     ViewSketches sketches;
     std::uint64_t bytes = 0;
@@ -104,7 +104,8 @@ struct PlaceSearch::Implementation {
         const std::lock_guard lock(mutex);
         sketchers[part].note_areas(areas);
       };
-      // Of so many ids at a time, so that a server goes by its index and does not sort them all.
+      // A limited number of ids at a time, so that a server uses its index and does not sort them
+      // all.
       constexpr std::uint32_t at_a_time = 20000;
       for (std::uint32_t before = border(part); before < border(part + 1);) {
         const std::uint32_t end = before + std::min(at_a_time, border(part + 1) - before);
@@ -168,7 +169,7 @@ struct PlaceSearch::Implementation {
     const std::lock_guard lock(mutex);
     idle.push_back(std::move(tables));
   }
-  /// Those of a server that was away are of no use.
+  /// Connections of a server that was away cannot be used again.
   void drop_idle() const {
     std::vector<std::unique_ptr<MemoryTables>> dropped;
     const std::lock_guard lock(mutex);
@@ -187,7 +188,7 @@ struct PlaceSearch::Implementation {
   bool refresh() {
     const std::lock_guard only_one(refreshing);
     try {
-      std::set<MemoryArea> told;
+      std::set<MemoryArea> changed_areas;
       bool all = compare_all || !is_postgresql_address(path);
       bool any = all;
       if (is_postgresql_address(path) && !changes) {
@@ -199,12 +200,12 @@ struct PlaceSearch::Implementation {
         if (!change) break;
         any = true;
         all = all || change->areas.empty();
-        told.insert(change->areas.begin(), change->areas.end());
+        changed_areas.insert(change->areas.begin(), change->areas.end());
       }
       if (!any) return false;
       if (!own) own = connect();
       compare_all = true;  // until it is done
-      const bool found = compare(told, all || told.size() > max_areas);
+      const bool found = compare(changed_areas, all || changed_areas.size() > max_areas);
       compare_all = false;
       return found || is_postgresql_address(path);
     } catch (const FileError&) {
@@ -215,8 +216,8 @@ struct PlaceSearch::Implementation {
     }
   }
 
-  /// Whether views came or went.
-  bool compare(const std::set<MemoryArea>& told, bool all) {
+  /// Returns true if views were added or removed.
+  bool compare(const std::set<MemoryArea>& changed_areas, bool all) {
     const auto reading = own->transaction(MemoryTables::Kind::reading);
     std::vector<ViewId> there;
     std::vector<ViewId> before;
@@ -225,7 +226,7 @@ struct PlaceSearch::Implementation {
       there = own->views();
       before = areas.all();
     } else {
-      for (const MemoryArea& area : told) {
+      for (const MemoryArea& area : changed_areas) {
         const double x_m = area.column * memory_area_side_m;
         const double y_m = area.row * memory_area_side_m;
         for (const PositionRow& row :
@@ -236,7 +237,7 @@ struct PlaceSearch::Implementation {
         }
       }
       std::ranges::sort(there);
-      before = areas.within(told);
+      before = areas.within(changed_areas);
     }
     std::vector<ViewId> came;
     for (const ViewId view : there) {
@@ -313,9 +314,9 @@ struct PlaceSearch::Snapshot::Implementation {
     if (!failed) search->give_back(std::move(tables));
   }
 
-  /// What `read` throws leaves the connection where it is.
+  /// Runs `read_some`. After an exception the connection is not used again.
   template <class Read>
-  void guarded(const Read& read_some) {
+  void mark_failed_on_throw(const Read& read_some) {
     try {
       read_some();
     } catch (...) {
@@ -325,7 +326,7 @@ struct PlaceSearch::Snapshot::Implementation {
   }
 
   void read(std::span<const ViewId> views) {
-    guarded([&] {
+    mark_failed_on_throw([&] {
       tables->read_views_there(views, [&](const ViewRow& row) {
         const auto bytes = tables->checked(row, search->header.shape, scratch).signature;
         const auto half = static_cast<std::ptrdiff_t>(search->header.shape.size());
@@ -379,11 +380,11 @@ SearchResult PlaceSearch::Snapshot::search(const PackedSignature& query,
   SearchResult result = own.sketched->sketches.search(
       query, options, mask,
       [&own](std::span<const ViewId> views, const ViewSketches::TakeView& take) {
-        std::vector<ViewId> wanted;
+        std::vector<ViewId> unread;
         for (const ViewId view : views) {
-          if (!own.kept.contains(view)) wanted.push_back(view);
+          if (!own.kept.contains(view)) unread.push_back(view);
         }
-        if (!wanted.empty()) own.read(wanted);
+        if (!unread.empty()) own.read(unread);
         for (const ViewId view : views) {
           const auto found = own.kept.find(view);
           if (found != own.kept.end()) take(view, found->second.signature.magnitudes);
@@ -399,11 +400,11 @@ VisualMemory PlaceSearch::Snapshot::load(std::span<const ViewId> views) {
   std::vector<ViewId> ascending(views.begin(), views.end());
   std::ranges::sort(ascending);
   ascending.erase(std::unique(ascending.begin(), ascending.end()), ascending.end());
-  std::vector<ViewId> wanted;
+  std::vector<ViewId> unread;
   for (const ViewId view : ascending) {
-    if (!own.kept.contains(view)) wanted.push_back(view);
+    if (!own.kept.contains(view)) unread.push_back(view);
   }
-  if (!wanted.empty()) own.read(wanted);
+  if (!unread.empty()) own.read(unread);
   const MemoryHeader& header = own.search->header;
   VisualMemory memory(header.shape, header.full_scale, header.elevations);
   for (const ViewId view : ascending) {
@@ -420,14 +421,14 @@ VisualMemory PlaceSearch::Snapshot::load(std::span<const ViewId> views) {
 
 std::optional<ViewId> PlaceSearch::Snapshot::find(std::string_view name) {
   std::optional<ViewId> found;
-  implementation_->guarded([&] { found = implementation_->tables->find(name); });
+  implementation_->mark_failed_on_throw([&] { found = implementation_->tables->find(name); });
   return found;
 }
 
 std::vector<ViewId> PlaceSearch::Snapshot::views_within(std::span<const PositionBounds> bounds) {
   Implementation& own = *implementation_;
   std::vector<ViewId> views;
-  own.guarded([&] {
+  own.mark_failed_on_throw([&] {
     for (const PositionBounds& each : bounds) {
       for (const PositionRow& row : own.tables->views_within(each)) views.push_back(row.id);
     }

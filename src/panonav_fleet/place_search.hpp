@@ -26,11 +26,11 @@ class PlaceSearch final : public IndexedMemory {
   /// rows, and only what a search reads in full is checked.
   explicit PlaceSearch(const std::filesystem::path& memory);
   ~PlaceSearch() override;
-  /// What is left of the other may only be destroyed or assigned to.
+  /// A moved-from object may only be destroyed or assigned to.
   PlaceSearch(PlaceSearch&&) noexcept;
   PlaceSearch& operator=(PlaceSearch&&) noexcept;
 
-  [[nodiscard]] const MemoryHeader& header() const noexcept;  ///< As the memory was made.
+  [[nodiscard]] const MemoryHeader& header() const noexcept;  ///< Fixed when the memory was made.
   [[nodiscard]] std::size_t size() const override;            ///< Views that are sketched.
   [[nodiscard]] std::vector<ViewId> views() const override;
   [[nodiscard]] std::uint64_t bytes() const override;  ///< That sketches and ids take.
@@ -43,7 +43,7 @@ class PlaceSearch final : public IndexedMemory {
   class Snapshot final : public ViewIndex {
    public:
     ~Snapshot() override;
-    /// What is left of the other may only be destroyed or assigned to.
+    /// A moved-from object may only be destroyed or assigned to.
     Snapshot(Snapshot&&) noexcept;
     Snapshot& operator=(Snapshot&&) noexcept;
 

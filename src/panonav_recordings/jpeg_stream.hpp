@@ -16,7 +16,7 @@ namespace panonav::recordings {
 /// as the heads of a multipart stream, are left out. Memory: one picture, at most `max_bytes`.
 class JpegStream {
  public:
-  /// Of one picture; longer ones are refused.
+  /// Largest size of a picture; larger ones are refused.
   static constexpr std::size_t max_bytes = std::size_t{64} << 20;
 
   /// Takes the next bytes of the stream. Throws FileError on `name` when one picture is longer than

@@ -29,7 +29,7 @@ class LiveObservations final : public ObservationSource {
     std::chrono::steady_clock::time_point arrived{};  ///< by the clock that is never set
     std::chrono::steady_clock::duration decoding{};   ///< how long decoding took, where we do it
   };
-  /// Of the last picture of `next`.
+  /// Times of the last picture of `next`.
   [[nodiscard]] const Timing& timing() const noexcept { return timing_; }
 
  private:

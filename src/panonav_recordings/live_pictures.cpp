@@ -38,7 +38,7 @@ double now_s() {
 }
 
 /// A picture as it came.
-struct Taken {
+struct RawPicture {
   std::variant<std::vector<std::uint8_t>, Image> picture;
   double stamp_s = 0.0;
   Steady::time_point arrived{};
@@ -50,7 +50,7 @@ class Input {
  public:
   virtual ~Input() = default;
   /// Waits. Empty at the end, and after `stop`. Throws Error when the source has gone.
-  virtual std::optional<Taken> take() = 0;
+  virtual std::optional<RawPicture> take() = 0;
   virtual Image decode(std::span<const std::uint8_t> bytes, const ImageLimits& limits) const {
     return decode_image(bytes, "the picture", limits);
   }
@@ -62,10 +62,10 @@ class StandardInput final : public Input {
  public:
   explicit StandardInput(int stop) : stop_(stop) {}
 
-  std::optional<Taken> take() override {
+  std::optional<RawPicture> take() override {
     while (true) {
       if (auto picture = stream_.next())
-        return Taken{std::move(*picture), now_s(), Steady::now(), 0};
+        return RawPicture{std::move(*picture), now_s(), Steady::now(), 0};
       std::array<pollfd, 2> waits{pollfd{STDIN_FILENO, POLLIN, 0}, pollfd{stop_, POLLIN, 0}};
       if (poll(waits.data(), waits.size(), -1) < 0) continue;
       if (waits[1].revents != 0) return std::nullopt;
@@ -85,10 +85,10 @@ class CameraInput final : public Input {
  public:
   CameraInput(const std::string& device, const std::optional<ImageSize>& size, int stop)
       : camera_(device, size), stop_(stop) {}
-  std::optional<Taken> take() override {
+  std::optional<RawPicture> take() override {
     auto frame = camera_.next(stop_);
     if (!frame) return std::nullopt;
-    return Taken{std::move(frame->bytes), frame->stamp_s, frame->arrived, frame->lost};
+    return RawPicture{std::move(frame->bytes), frame->stamp_s, frame->arrived, frame->lost};
   }
   Image decode(std::span<const std::uint8_t> bytes, const ImageLimits& limits) const override {
     return camera_.decode(bytes, limits);
@@ -106,9 +106,9 @@ class AddressInput final : public Input {
         video_({"-fflags", "nobuffer", "-flags", "low_delay", "-protocol_whitelist",
                 "rtsp,rtp,rtmp,http,https,tls,tcp,udp,crypto", "-i", address},
                "", address, limits) {}
-  std::optional<Taken> take() override {
+  std::optional<RawPicture> take() override {
     auto frame = video_.next();
-    if (frame) return Taken{std::move(frame->picture), now_s(), Steady::now(), 0};
+    if (frame) return RawPicture{std::move(frame->picture), now_s(), Steady::now(), 0};
     throw FileError(address_,
                     "has broken off" + (video_.trouble().empty() ? "" : ": " + video_.trouble()));
   }
@@ -144,8 +144,8 @@ bool is_live(const std::string& address) {
 }
 
 struct LivePictures::Implementation {
-  Implementation(std::string where, const LiveOptions& wanted)
-      : address(std::move(where)), options(wanted) {}
+  Implementation(std::string where, const LiveOptions& live_options)
+      : address(std::move(where)), options(live_options) {}
 
   [[nodiscard]] std::shared_ptr<Input> open() const {
     if (address == "-") return std::make_shared<StandardInput>(stop_event);
@@ -155,13 +155,13 @@ struct LivePictures::Implementation {
 
   /// Takes pictures until the input ends.
   void take_all() {
-    while (auto taken = input->take()) {
+    while (auto picture = input->take()) {
       std::unique_lock lock(mutex);
-      counts.dropped += taken->lost;
+      counts.dropped += picture->lost;
       if (address == "-") taken_away.wait(lock, [&] { return !newest || stopped; });
       if (stopped) return;
       if (newest) ++counts.dropped;
-      newest = std::pair(std::move(*taken), input);
+      newest = std::pair(std::move(*picture), input);
       came.notify_one();
     }
   }
@@ -203,7 +203,7 @@ struct LivePictures::Implementation {
   std::condition_variable came;
   std::condition_variable taken_away;
   std::shared_ptr<Input> input;
-  std::optional<std::pair<Taken, std::shared_ptr<Input>>> newest;
+  std::optional<std::pair<RawPicture, std::shared_ptr<Input>>> newest;
   Counts counts;
   bool asked = false;  // for the first picture
   std::atomic<bool> stopped = false;
@@ -254,16 +254,16 @@ void LivePictures::stop() noexcept {
 std::optional<LivePicture> LivePictures::next() {
   auto& self = *implementation_;
   while (true) {
-    std::optional<std::pair<Taken, std::shared_ptr<Input>>> taken;
+    std::optional<std::pair<RawPicture, std::shared_ptr<Input>>> newest;
     {
       std::unique_lock lock(self.mutex);
       if (!std::exchange(self.asked, true)) self.counts.dropped = 0;
       self.came.wait(lock, [&] { return self.newest || self.ended || self.stopped; });
       if (self.stopped || !self.newest) return std::nullopt;
-      taken = std::exchange(self.newest, std::nullopt);
+      newest = std::exchange(self.newest, std::nullopt);
       self.taken_away.notify_one();
     }
-    auto& [came, input] = *taken;
+    auto& [came, input] = *newest;
     if (auto* const picture = std::get_if<Image>(&came.picture)) {
       return LivePicture{std::move(*picture), {}, came.stamp_s, came.arrived, {}};
     }

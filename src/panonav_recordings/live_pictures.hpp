@@ -13,9 +13,9 @@
 
 namespace panonav::recordings {
 
-/// Whether it names pictures that come as they are taken: "-" (JPEG pictures that follow each other
-/// on standard input), a camera (/dev/video0), or an address that the program ffmpeg opens:
-/// rtsp://, rtmp://, http://, https://, tcp:// or udp://.
+/// True if it names a live source of pictures: "-" (JPEG pictures that follow each other on
+/// standard input), a camera (/dev/video0), or an address that the program ffmpeg opens: rtsp://,
+/// rtmp://, http://, https://, tcp:// or udp://.
 [[nodiscard]] bool is_live(const std::string& address);
 
 /// A picture as it came, and when.
@@ -29,7 +29,7 @@ struct LivePicture {
   std::chrono::steady_clock::duration decoding{};  ///< how long it took, where we do it
 };
 
-/// How a live source is read.
+/// Options for reading a live source.
 struct LiveOptions {
   /// Of a camera: wanted width and height; it may give the nearest that it has. Empty: as it is
   /// set.
@@ -57,14 +57,14 @@ class LivePictures {
   /// `next` gives nothing more. Any thread may call.
   void stop() noexcept;
 
-  /// What did not reach the caller.
+  /// Numbers of pictures that did not reach the caller.
   struct Counts {
     std::uint64_t dropped = 0;        ///< since the first `next`
     std::uint64_t damaged = 0;        ///< pictures that could not be decoded
     std::uint64_t interruptions = 0;  ///< times that the source broke off and was opened again
     friend bool operator==(const Counts&, const Counts&) = default;
   };
-  /// What was lost so far. Any thread may call.
+  /// Returns the losses so far. Any thread may call.
   [[nodiscard]] Counts counts() const;
 
  private:
@@ -79,7 +79,7 @@ struct CameraFormat {
   std::vector<ImageSize> sizes;  ///< empty: the driver does not list them
 };
 
-/// What a camera (V4L2) offers. Throws FileError when there is none.
+/// Lists the formats and sizes that a camera (V4L2) offers. Throws FileError when there is none.
 [[nodiscard]] std::vector<CameraFormat> camera_formats(const std::filesystem::path& device);
 
 }  // namespace panonav::recordings

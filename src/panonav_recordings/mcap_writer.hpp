@@ -10,14 +10,14 @@
 
 namespace panonav::recordings {
 
-/// How chunks are packed.
+/// Compression of chunks.
 enum class McapCompression {
   none,  ///< as they are
   lz4,   ///< fast, larger
   zstd   ///< slower, smaller
 };
 
-/// How an MCAP file is written.
+/// Options for writing an MCAP file.
 struct McapWriterOptions {
   McapCompression compression = McapCompression::zstd;  ///< of each chunk
   std::size_t chunk_bytes = 1U << 20U;  ///< a chunk ends with the message that reaches this
@@ -36,7 +36,7 @@ class McapWriter {
   /// Creates the file, or empties the one that is there, and writes its header.
   explicit McapWriter(const std::filesystem::path& path, const McapWriterOptions& options = {});
   ~McapWriter();  ///< Finishes the file as `close` does, but says nothing when that fails.
-  /// What is left of the other may only be destroyed or assigned to.
+  /// A moved-from object may only be destroyed or assigned to.
   McapWriter(McapWriter&&) noexcept;
   McapWriter& operator=(McapWriter&&) noexcept;
 

@@ -181,7 +181,7 @@ class EntryMaker {
   std::size_t too_tilted_ = 0;
 };
 
-/// What a picture's message says of itself.
+/// Size and encoding of a picture message.
 std::string shown(MessageBytes bytes, const RecordedTopic& topic) {
   if (topic.type == ros::CompressedImage::type) {
     return ros::read_message<ros::CompressedImage>(bytes, topic.encoding).format;

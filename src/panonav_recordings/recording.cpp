@@ -72,9 +72,9 @@ class FilesRecording : public Recording {
 
   [[nodiscard]] std::vector<MessagePlace> places(std::span<const std::uint32_t> topics,
                                                  std::optional<TimeSpan> within) const override {
-    const Wanted wanted = wanted_of(topics, within);
+    const Filter filter = make_filter(topics, within);
     std::vector<MessagePlace> places;
-    for (const Block& block : blocks_) list(block, wanted, places);
+    for (const Block& block : blocks_) list(block, filter, places);
     std::ranges::sort(places, is_earlier);
     return places;
   }
@@ -87,7 +87,7 @@ class FilesRecording : public Recording {
   void for_each(std::span<const std::uint32_t> topics, std::optional<TimeSpan> within,
                 const std::function<void(const MessagePlace&, std::span<const std::uint8_t>)>& use)
       const override {
-    const Wanted wanted = wanted_of(topics, within);
+    const Filter filter = make_filter(topics, within);
     // The messages of a block that are still to come. Blocks are opened as time reaches them.
     struct Open {
       std::vector<MessagePlace> places;
@@ -105,7 +105,7 @@ class FilesRecording : public Recording {
              (open.empty() ||
               blocks_[next].time.begin_ns <= open.front().places[open.front().next].time_ns)) {
         Open block;
-        list(blocks_[next++], wanted, block.places, listed);
+        list(blocks_[next++], filter, block.places, listed);
         if (block.places.empty()) continue;
         listed += block.places.size();
         std::ranges::sort(block.places, is_earlier);
@@ -141,13 +141,13 @@ class FilesRecording : public Recording {
     std::uint32_t file;
     std::uint64_t block;
   };
-  struct Wanted {
+  struct Filter {
     std::vector<std::vector<bool>> topics;  ///< of each file
     TimeSpan within;
   };
 
-  [[nodiscard]] Wanted wanted_of(std::span<const std::uint32_t> topics,
-                                 std::optional<TimeSpan> within) const {
+  [[nodiscard]] Filter make_filter(std::span<const std::uint32_t> topics,
+                                   std::optional<TimeSpan> within) const {
     constexpr TimeSpan always{std::numeric_limits<std::int64_t>::min(),
                               std::numeric_limits<std::int64_t>::max()};
     std::vector<bool> chosen(topics_.size());
@@ -156,23 +156,23 @@ class FilesRecording : public Recording {
               "less than " + std::to_string(topics_.size()));
       chosen[topic] = true;
     }
-    Wanted wanted{{}, within.value_or(always)};
+    Filter filter{{}, within.value_or(always)};
     for (const auto& of_file : topics_of_files_) {
-      auto& flags = wanted.topics.emplace_back();
+      auto& flags = filter.topics.emplace_back();
       for (const std::uint32_t topic : of_file) flags.push_back(chosen[topic]);
     }
-    return wanted;
+    return filter;
   }
 
   // Appends; `listed`: beside what is in `places`.
-  void list(const Block& block, const Wanted& wanted, std::vector<MessagePlace>& places,
+  void list(const Block& block, const Filter& filter, std::vector<MessagePlace>& places,
             std::size_t listed = 0) const {
-    if (block.time.begin_ns > wanted.within.end_ns || block.time.end_ns < wanted.within.begin_ns) {
+    if (block.time.begin_ns > filter.within.end_ns || block.time.end_ns < filter.within.begin_ns) {
       return;
     }
     const std::size_t before = places.size();
     try {
-      files_[block.file]->list(block.block, wanted.topics[block.file], wanted.within,
+      files_[block.file]->list(block.block, filter.topics[block.file], filter.within,
                                limits_.messages - std::min(listed, limits_.messages), places);
     } catch (const FileError& error) {
       if (places.size() + listed > limits_.messages) throw;
@@ -245,11 +245,11 @@ std::unique_ptr<RecordingFile> open_file(const fs::path& path, const RecordingLi
 /// A new empty file in the folder for temporary ones.
 class UnnamedFile {
  public:
-  explicit UnnamedFile(const std::string& wanted_for) {
+  explicit UnnamedFile(const std::string& packed_file) {
     std::error_code error;
     std::string name = (fs::temp_directory_path(error) / "panonav_XXXXXX").string();
     const int descriptor = error ? -1 : mkstemp(name.data());
-    if (descriptor < 0) throw FileError(wanted_for, "cannot be unpacked: no temporary file");
+    if (descriptor < 0) throw FileError(packed_file, "cannot be unpacked: no temporary file");
     close(descriptor);
     path_ = name;
   }
@@ -265,16 +265,16 @@ class UnnamedFile {
   fs::path path_;
 };
 
-/// What is open stays there when its name is gone, until it is closed.
+/// The unpacked copy stays readable after its name is removed, until it is closed.
 std::unique_ptr<RecordingFile> open_packed(const fs::path& path, const RecordingLimits& limits) {
   const UnnamedFile copy(path.string());
   std::error_code unknown;
   const auto space = fs::space(copy.path().parent_path(), unknown);
-  const std::uint64_t most =
+  const std::uint64_t max_bytes =
       unknown ? limits.file_bytes : std::min<std::uint64_t>(limits.file_bytes, space.available / 2);
-  const UnpackedFile unpacked = unpack_file(path, copy.path(), most);
+  const UnpackedFile unpacked = unpack_file(path, copy.path(), max_bytes);
   if (unpacked.too_long) {
-    throw FileError(path.string(), "unpacks to more than " + std::to_string(most) +
+    throw FileError(path.string(), "unpacks to more than " + std::to_string(max_bytes) +
                                        " bytes, as many as are allowed and half of what is free "
                                        "in the folder for temporary files (TMPDIR)");
   }

@@ -12,7 +12,7 @@
 
 namespace panonav::recordings {
 
-/// How the bytes of a message are laid out.
+/// Serialisation of a message.
 enum class MessageEncoding {
   ros1,  ///< of ROS 1 bags
   cdr,   ///< of ROS 2, little or big endian (XCDR1)
@@ -29,7 +29,7 @@ struct RecordedTopic {
   std::uint64_t messages = 0;                         ///< how many the recording has
 };
 
-/// Where a message lies in its recording.
+/// Position of a message in its recording.
 struct MessagePlace {
   std::int64_t time_ns = 0;  ///< when it was recorded (log time)
   std::uint32_t topic = 0;   ///< index into `Recording::topics()`
@@ -46,8 +46,8 @@ struct TimeSpan {
   friend bool operator==(const TimeSpan&, const TimeSpan&) = default;
 };
 
-/// What a file may make its reader do. Beside one list of places (32 bytes a message) a reader
-/// keeps one chunk, packed and unpacked, and up to 16 MiB of others.
+/// Limits of what a file may make its reader do. Beside one list of places (32 bytes a message) a
+/// reader keeps one chunk, packed and unpacked, and up to 16 MiB of others.
 struct RecordingLimits {
   std::size_t chunk_bytes = 256U << 20U;  ///< of a chunk or message unpacked; at most 4 GiB
   std::size_t messages = 50'000'000;      ///< that are listed at a time
@@ -74,9 +74,9 @@ class Recording {
 
   /// In order of their first appearance.
   [[nodiscard]] virtual const std::vector<RecordedTopic>& topics() const noexcept = 0;
-  /// From the first message to the last. Empty without messages.
+  /// Returns the times of the first and the last message; nullopt without messages.
   [[nodiscard]] virtual std::optional<TimeSpan> time() const noexcept = 0;
-  /// What was damaged or left out, a line each. Reading can find more.
+  /// Returns warnings about what was damaged or left out, a line each. Reading can find more.
   [[nodiscard]] virtual std::vector<std::string> warnings() const = 0;
 
   /// Places of the messages of these topics within the span in order of time; of one time, in the
@@ -98,7 +98,7 @@ class Recording {
           use) const = 0;
 };
 
-/// Whether `Recording::open` would take it: looks at the first bytes of a file, or at the
+/// True if `Recording::open` would accept it: looks at the first bytes of a file, or at the
 /// metadata.yaml of a folder. Never throws; false for what cannot be read.
 [[nodiscard]] bool is_recording(const std::filesystem::path& path) noexcept;
 

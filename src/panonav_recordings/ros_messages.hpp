@@ -47,7 +47,7 @@ struct Pose {
   Quaternion orientation;  ///< of unit length
 };
 
-/// How far the length of a quaternion that is read may be from 1; as tf2's.
+/// Tolerance of the length of a quaternion that is read; the same as tf2's.
 inline constexpr double quaternion_tolerance = 0.1;
 
 /// A pose, or a transform parent_from_child: q_parent = position + orientation * q_child.
@@ -55,7 +55,7 @@ inline constexpr double quaternion_tolerance = 0.1;
 /// The pose of a in the frame of b. The orientation must be of unit length.
 [[nodiscard]] Pose inverse(const Pose& a_from_b);
 /// On the line between the positions and on the great circle between the orientations; `share` 0
-/// gives the bits of `a`, 1 those of `b`; beyond them the motion goes on.
+/// gives the bits of `a`, 1 those of `b`; beyond them the motion continues.
 [[nodiscard]] Pose between(const Pose& a, const Pose& b, double share);
 /// Heading about the vertical, then roll and pitch as in `Tilt`: R_z(heading) R_y R_x.
 [[nodiscard]] Pose pose_of(const Pose2& pose, const Tilt& tilt = {});
@@ -88,7 +88,7 @@ struct CompressedImage {
   std::span<const std::uint8_t> data;  ///< the bytes of the file
 };
 
-/// What an inertial sensor measures.
+/// Measurements of an inertial sensor.
 struct Imu {
   static constexpr std::string_view type = "sensor_msgs/Imu";  ///< ROS 1's name of the type
   Header header;                                 ///< when it was measured; frame of the sensor
@@ -117,7 +117,7 @@ struct Odometry {
   Covariance6 twist_covariance{};  ///< of both velocities, linear first
 };
 
-/// How one frame lies in another at a time.
+/// Pose of one frame in another at a time.
 struct TransformStamped {
   Header header;               ///< frame_id: the parent
   std::string child_frame_id;  ///< of the child
@@ -212,7 +212,7 @@ struct KeyValue {
   std::string value;  ///< as text
 };
 
-/// How one part of a robot fares.
+/// State of one part of a robot.
 struct DiagnosticStatus {
   std::uint8_t level = 0;        ///< 0 fine, 1 warning, 2 error, 3 stale
   std::string name;              ///< of the part
@@ -221,7 +221,7 @@ struct DiagnosticStatus {
   std::vector<KeyValue> values;  ///< figures behind the message
 };
 
-/// How the parts of a robot fare.
+/// States of the parts of a robot.
 struct DiagnosticArray {
   /// ROS 1's name of the type.
   static constexpr std::string_view type = "diagnostic_msgs/DiagnosticArray";
@@ -248,7 +248,7 @@ struct String {
   std::string data;                                            ///< UTF-8
 };
 
-/// What ROS 2 calls the `type` of a message: "sensor_msgs/msg/Image".
+/// Returns ROS 2's name of the `type` of a message: "sensor_msgs/msg/Image".
 [[nodiscard]] std::string ros2_type_name(std::string_view type);
 
 /// The message that the bytes are, in ROS 1's serialisation or as CDR of either byte order (XCDR1,
@@ -265,8 +265,8 @@ template <class Message>
 [[nodiscard]] std::vector<std::uint8_t> write_message(
     const Message& message, MessageEncoding encoding = MessageEncoding::cdr);
 
-/// What MCAP wants as "ros2msg" of a type above: its definition, then those of all types that it
-/// is made of. Throws ContractError on another type.
+/// Returns the "ros2msg" schema of a type above for MCAP: its definition, then those of all types
+/// that it is made of. Throws ContractError on another type.
 [[nodiscard]] std::string ros2_schema(std::string_view type);
 
 /// The pixels as `read_image` gives them: one channel for grey, three for colour.

@@ -133,15 +133,15 @@ void describe(RunMoment& moment, const Place& place) {
     // 95 % of a circular normal distribution lie within 2.4477 standard deviations.
     const double deviation_m = *place.position->radius_m / 2.4477;
     const double variance = deviation_m * deviation_m;
-    // Of the heading nothing is stated: the variance of a turn that may be any.
+    // The heading has no stated accuracy: the variance of a uniform turn.
     constexpr double any_turn = std::numbers::pi * std::numbers::pi / 3.0;
     moment.covariance = {variance, 0, 0, 0, variance, 0, 0, 0, any_turn};
   }
 }
 
 struct RunRecorder::Implementation {
-  Implementation(const std::filesystem::path& file, const RunRecorderOptions& wanted)
-      : options(wanted),
+  Implementation(const std::filesystem::path& file, const RunRecorderOptions& recorder_options)
+      : options(recorder_options),
         writer(file, {.compression = McapCompression::lz4}),
         pictures(writer, "/camera/image/compressed"),
         panoramas(writer, "/panorama/compressed"),
@@ -238,16 +238,16 @@ struct RunRecorder::Implementation {
   void write_path(std::int64_t ns, const Pose2& pose) {
     constexpr std::size_t max_poses = 1024;
     if (moments_on_path++ % path_every == 0) {
-      taken.push_back({ns, pose});
-      if (taken.size() == max_poses) {
-        for (std::size_t i = 0; 2 * i < taken.size(); ++i) taken[i] = taken[2 * i];
-        taken.resize(max_poses / 2);
+      path_poses.push_back({ns, pose});
+      if (path_poses.size() == max_poses) {
+        for (std::size_t i = 0; 2 * i < path_poses.size(); ++i) path_poses[i] = path_poses[2 * i];
+        path_poses.resize(max_poses / 2);
         path_every *= 2;
       }
     }
     PointValues cloud;
     ros::Path message{{ns, "map"}, {}};
-    for (const auto& [stamp_ns, at] : taken) {
+    for (const auto& [stamp_ns, at] : path_poses) {
       cloud.add(at.position(), at.heading_rad);
       message.poses.push_back({{stamp_ns, "map"}, ros::pose_of(at)});
     }
@@ -270,20 +270,20 @@ struct RunRecorder::Implementation {
     if (failure) std::rethrow_exception(failure);
     if (closed) throw ContractError("recording", "closed", "open, to be written to");
     if (options.wait) {
-      taken_away.wait(lock, [this] { return waiting.size() < options.max_waiting; });
+      has_room.wait(lock, [this] { return waiting.size() < options.max_waiting; });
     } else if (waiting.size() >= options.max_waiting) {
       ++left_out;
       return;
     }
     waiting.push_back(std::move(moment));
-    came.notify_one();
+    has_work.notify_one();
   }
 
   void work() {
     if (!options.wait) lower_thread_priority();
     std::unique_lock lock(mutex);
     while (true) {
-      came.wait(lock, [this] { return closed || !waiting.empty(); });
+      has_work.wait(lock, [this] { return closed || !waiting.empty(); });
       if (waiting.empty()) return;
       const RunMoment moment = std::move(waiting.front());
       waiting.pop_front();
@@ -297,7 +297,7 @@ struct RunRecorder::Implementation {
       }
       lock.lock();
       if (thrown && !failure) failure = thrown;
-      taken_away.notify_one();
+      has_room.notify_one();
     }
   }
 
@@ -306,7 +306,7 @@ struct RunRecorder::Implementation {
       const std::lock_guard lock(mutex);
       if (closed) return;
       closed = true;
-      came.notify_one();
+      has_work.notify_one();
     }
     thread.join();
     if (failure) std::rethrow_exception(failure);
@@ -325,14 +325,14 @@ struct RunRecorder::Implementation {
   TopicWriter<ros::PoseStamped> goals;
   TopicWriter<ros::DiagnosticArray> diagnostics;
   RobotTopics robot;
-  std::vector<std::pair<std::int64_t, Pose2>> taken;
+  std::vector<std::pair<std::int64_t, Pose2>> path_poses;
   std::size_t moments_on_path = 0;
   std::size_t path_every = 1;
   std::int64_t log_ns = 0;
   bool failed = false;  // to here
   std::mutex mutex;
-  std::condition_variable came;
-  std::condition_variable taken_away;
+  std::condition_variable has_work;
+  std::condition_variable has_room;
   std::deque<RunMoment> waiting;
   std::exception_ptr failure;
   std::size_t left_out = 0;

@@ -29,7 +29,7 @@ struct RunEdge {
   LinkKind kind = LinkKind::sequence;  ///< why they are joined
 };
 
-/// What is known of a reference besides its position.
+/// Data of a reference besides its position.
 struct RunReference {
   std::string name;                   ///< of the view
   std::optional<double> heading_rad;  ///< at which it was taken; empty: unknown
@@ -53,9 +53,9 @@ struct RunHoming {
   double confidence = 0.0;     ///< 0 .. 1, as `HomeVector`
 };
 
-/// What is known at one moment of a run, for people to look at. What is empty is not written.
-/// Positions and poses are in the frame "map" unless said otherwise. Records (`RunRecorder`) leave
-/// out what is marked so.
+/// State of a run at one moment, for people to look at. Empty members are not written. Positions
+/// and poses are in the frame "map" unless said otherwise. Records (`RunRecorder`) leave out what
+/// is marked so.
 struct RunMoment {
   double stamp_s = 0.0;                       ///< seconds, ascending
   std::optional<Image> picture;               ///< as the camera delivered it
@@ -75,7 +75,7 @@ struct RunMoment {
   std::optional<Pose2> odometry;       ///< absolute, in a frame of its own
   std::optional<Tilt> tilt;            ///< roll and pitch, measured
   std::optional<ReferencePose> truth;  ///< where the robot truly is, for comparison
-  // What stays until it is given anew.
+  // Members that stay valid until a later moment replaces them.
   std::vector<Point2> references;             ///< positions of the reference views
   std::vector<RunReference> reference_views;  ///< of each, or empty; not in records
   std::vector<RunRegion> regions;             ///< not in records
@@ -93,7 +93,7 @@ struct RunMoment {
 
 /// The picture of an observation and what is known of it. Where it has no stamp, `number` seconds.
 [[nodiscard]] RunMoment moment_of(const Observation& seen, std::size_t number);
-/// Of the views with a pose.
+/// Returns the positions of the views with a pose.
 [[nodiscard]] std::vector<Point2> reference_positions(const VisualMemory& memory);
 
 /// The part that a tracked estimate tells, and that a recognised place does.
@@ -101,7 +101,7 @@ void describe(RunMoment& moment, const MonteCarloEstimate& estimate);
 /// A place has a pose where it is known, with its position and heading.
 void describe(RunMoment& moment, const Place& place);
 
-/// What a recorder does where the disk is slow.
+/// Options of a recorder for slow disks.
 struct RunRecorderOptions {
   /// Wait for the disk instead of leaving moments out: of runs that are not live.
   bool wait = false;

@@ -128,24 +128,24 @@ class VideoStore final : public PictureStore {
 
   [[nodiscard]] Image read(std::size_t number) const override {
     const std::lock_guard lock(mutex_);
-    const std::int64_t wanted = chosen_.stamps.at(number);
-    if (const auto held = held_.find(wanted); held != held_.end()) {
+    const std::int64_t stamp_to_find = chosen_.stamps.at(number);
+    if (const auto held = held_.find(stamp_to_find); held != held_.end()) {
       Image picture = std::move(held->second);
       held_.erase(held);
       return picture;
     }
-    if (frames_ && wanted > last_) {
-      if (auto picture = decode_up_to(wanted)) return std::move(*picture);
+    if (frames_ && stamp_to_find > last_) {
+      if (auto picture = decode_up_to(stamp_to_find)) return std::move(*picture);
     }
     // Files that were cut cannot be sought in.
     for (const bool sought : {true, false}) {
       if (!sought && number == 0) continue;
       start(number, sought);
-      if (auto picture = decode_up_to(wanted)) return std::move(*picture);
+      if (auto picture = decode_up_to(stamp_to_find)) return std::move(*picture);
     }
     const std::string why = frames_->trouble();
     frames_.reset();
-    throw FileError(file_, "the picture at " + format_number(seconds(wanted)) +
+    throw FileError(file_, "the picture at " + format_number(seconds(stamp_to_find)) +
                                " s cannot be decoded" +
                                (why.empty() ? "" : ": " + to_readable_line(why)));
   }
@@ -155,11 +155,11 @@ class VideoStore final : public PictureStore {
     return static_cast<double>(stamp) * chosen_.unit_s;
   }
 
-  [[nodiscard]] std::optional<Image> decode_up_to(std::int64_t wanted) const {
+  [[nodiscard]] std::optional<Image> decode_up_to(std::int64_t stamp_to_find) const {
     while (auto frame = frames_->next()) {
       last_ = frame->stamp;
-      if (frame->stamp == wanted) return std::move(frame->picture);
-      if (frame->stamp > wanted) break;
+      if (frame->stamp == stamp_to_find) return std::move(frame->picture);
+      if (frame->stamp > stamp_to_find) break;
       if (std::ranges::binary_search(chosen_.stamps, frame->stamp)) hold(std::move(*frame));
     }
     return std::nullopt;
@@ -194,10 +194,10 @@ class VideoStore final : public PictureStore {
   void hold(DecodedFrame&& frame) const {
     constexpr std::size_t max_bytes = std::size_t{256} << 20;
     constexpr std::size_t max_pictures = 32;
-    const std::size_t most =
+    const std::size_t max_held =
         std::clamp<std::size_t>(max_bytes / frame.picture.pixels().size(), 2, max_pictures);
     held_.emplace(frame.stamp, std::move(frame.picture));
-    while (held_.size() > most) held_.erase(held_.begin());
+    while (held_.size() > max_held) held_.erase(held_.begin());
   }
 
   std::string file_;

@@ -7,7 +7,7 @@
 
 namespace panonav::recordings {
 
-/// Whether the name says that the file is a video: mp4, m4v, mov, mkv, webm or avi.
+/// True if the name says that the file is a video: mp4, m4v, mov, mkv, webm or avi.
 [[nodiscard]] bool is_video(const std::filesystem::path& file);
 
 /// The pictures of a video as a data set: stamps in seconds as the file has them, names

@@ -22,9 +22,9 @@ class LocalisationNode {
   LocalisationNode(const LocalisationNode&) = delete;
   LocalisationNode& operator=(const LocalisationNode&) = delete;
 
-  /// Until `stop` is called.
+  /// Runs until `stop` is called.
   void run();
-  /// From any thread.
+  /// May be called from any thread.
   void stop();
 
   struct Counts {

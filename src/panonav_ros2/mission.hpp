@@ -10,7 +10,7 @@
 
 namespace panonav::ros2 {
 
-/// Where a robot is sent: to a place of the map, or along a route.
+/// Destination of a robot: a place of the map, or a route.
 struct Mission {
   std::optional<Pose2> goal;
   std::string route;

@@ -14,9 +14,9 @@ void visit_options(LocalisationNodeOptions& options, OptionVisitor& visitor) {
       option<&T::transform_rate_hz>("how often the transform is sent", above(0), 1000),
       option<&T::use_sim_time>("time is what the topic /clock says"),
       option<&T::tilt_from_imu>("level pictures by the orientation on the topic imu"),
-      option<&T::command_timeout_s>("without a picture for so long a robot that is driven stops",
+      option<&T::command_timeout_s>("a driven robot stops after this time without a picture",
                                     above(0), 60),
-      option<&T::resume_s>("a node that died and is started again within so long goes on with the "
+      option<&T::resume_s>("a node that died and is started again within this time continues the "
                            "goal it had; 0: never",
                            0, 86400),
       option<&T::camera_x_m>("camera in front of the base frame's origin", -10, 10),

@@ -14,9 +14,10 @@
 
 namespace panonav::ros2 {
 
-/// Where the motion of the robot is read.
+/// Source of the robot's motion.
 enum class MotionInput { odometry, tf };
-/// How pictures come: "image" as sensor_msgs/Image, or "image/compressed" as CompressedImage.
+/// Message type of the pictures: "image" as sensor_msgs/Image, or "image/compressed" as
+/// CompressedImage.
 enum class PictureInput { raw, compressed };
 
 struct LocalisationNodeOptions {
@@ -36,7 +37,7 @@ struct LocalisationNodeOptions {
 };
 void visit_options(LocalisationNodeOptions& options, OptionVisitor& visitor);
 
-/// As REP 105 names them.
+/// Names of frames, by REP 105.
 struct FrameNames {
   std::string map = "map";
   std::string odom = "odom";

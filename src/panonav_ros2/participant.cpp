@@ -154,9 +154,9 @@ std::shared_ptr<const Domain> get_or_create_domain(int number,
 }  // namespace
 
 std::string full_name(std::string_view name, const ParticipantOptions& options) {
-  const auto absolute = [&](std::string_view given) {
+  const auto absolute = [&](std::string_view topic) {
     const std::string inside = options.name_space == "/" ? "" : options.name_space;
-    std::string full(given);
+    std::string full(topic);
     if (full.starts_with('~')) {
       full = inside + "/" + options.node + full.substr(1);
     } else if (!full.starts_with('/')) {
@@ -173,7 +173,7 @@ std::string full_name(std::string_view name, const ParticipantOptions& options) 
       after_slash = c == '/';
     }
     if (!well_formed) {
-      throw ContractError("name of a topic", to_readable_line(given),
+      throw ContractError("name of a topic", to_readable_line(topic),
                           "letters, digits, _ and /, as camera/image or /camera/image");
     }
     return full;

@@ -19,7 +19,7 @@
 
 namespace panonav::ros2 {
 
-/// How messages are delivered, in the words of ROS 2. Histories are keep-last.
+/// Quality of service of a topic, in the terms of ROS 2. Histories are keep-last.
 struct Qos {
   int depth = 5;
   bool reliable = true;
@@ -79,7 +79,7 @@ class Participant {
   void wait(std::chrono::nanoseconds longest);
   /// Waits for messages until `stop` is called, and calls `tick` once in each period.
   void run(std::chrono::duration<double> period_s, const std::function<void()>& tick);
-  /// From any thread; for good.
+  /// Stops for good. May be called from any thread.
   void stop() noexcept;
 
  private:

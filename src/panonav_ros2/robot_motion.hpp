@@ -12,7 +12,7 @@
 
 namespace panonav::ros2 {
 
-/// Where the robot is: by its odometry, and by the last pose that was found in the map. For several
+/// Combines the odometry of the robot with the last pose that was found in the map. For several
 /// threads.
 class RobotMotion {
  public:

@@ -42,9 +42,9 @@ class SimulatedRobot {
   SimulatedRobot(const SimulatedRobot&) = delete;
   SimulatedRobot& operator=(const SimulatedRobot&) = delete;
 
-  /// Until `stop` is called.
+  /// Runs until `stop` is called.
   void run();
-  /// From any thread.
+  /// May be called from any thread.
   void stop();
 
  private:

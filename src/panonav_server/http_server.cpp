@@ -33,9 +33,10 @@ using std::chrono::milliseconds;
 
 constexpr std::size_t max_head_bytes = 8192;
 constexpr std::size_t max_connections = 64;
-/// Of one connection, for the head and pieces of its answer: libmicrohttpd takes no more.
+/// Memory of one connection, for the head and pieces of its answer: libmicrohttpd allocates no
+/// more.
 constexpr std::size_t connection_bytes = 4 * max_head_bytes;
-/// Of the system, for a slow reader: what waits longer is old when it arrives.
+/// Send buffer of the system for a slow reader: longer queues arrive too late to be of use.
 constexpr int send_buffer_bytes = 256 * 1024;
 constexpr unsigned request_timeout_s = 5;
 constexpr unsigned idle_timeout_s = 30;  ///< between two requests of a trusted client
@@ -347,7 +348,7 @@ struct HttpServer::Implementation {
   }
 
   /// Is called with the head, with each piece of the body, at its end, and again when a connection
-  /// that was suspended goes on.
+  /// that was suspended continues.
   static MHD_Result take(void* self, MHD_Connection* handle, const char* path, const char* method,
                          const char* /*version*/, const char* data, std::size_t* size,
                          void** /*request*/) {

@@ -24,13 +24,13 @@ struct HttpAnswer {
   int status = 200;
   std::string type = "text/plain; charset=utf-8";  ///< of the content
   std::string content;
-  /// Where it is set the answer has no end of its own: it is called whenever all was sent, and at
-  /// least twice a second, for what to send next (nothing when empty), until it gives nullopt. It
-  /// is destroyed with the connection.
+  /// If set, the answer has no end of its own: it is called whenever all was sent, and at least
+  /// twice a second, for what to send next (nothing when empty), until it gives nullopt. It is
+  /// destroyed with the connection.
   std::function<std::optional<std::string>()> more;
-  /// Where it is set the answer is not there yet: it is called after each `poke`, and at least
-  /// twice a second, until it gives the answer, which has no `later` of its own. It is destroyed
-  /// with the connection: who waits no more needs no answer.
+  /// If set, the answer is not ready yet: it is called after each `poke`, and at least twice a
+  /// second, until it gives the answer, which has no `later` of its own. It is destroyed with the
+  /// connection: who waits no more needs no answer.
   std::function<std::optional<HttpAnswer>()> later;
 };
 
@@ -41,7 +41,7 @@ struct HttpServerOptions {
   std::size_t max_body = 1024;        ///< bytes of a request behind its head
   /// Bytes of all bodies that are on their way at a time; who comes on top gets status 503.
   std::size_t max_bodies = std::size_t{64} * 1024;
-  /// How long the destructor waits for answers that are not sent yet.
+  /// Time that the destructor waits for answers that are not sent yet.
   std::chrono::milliseconds last_answers{0};
 };
 

@@ -95,8 +95,9 @@ struct LocalisationServer::Implementation {
     HttpAnswer answer;
   };
 
-  Implementation(std::span<const ServedMemory> memories, const LocalisationServerOptions& wanted)
-      : options(wanted) {
+  Implementation(std::span<const ServedMemory> memories,
+                 const LocalisationServerOptions& server_options)
+      : options(server_options) {
     require(!memories.empty(), "memories", 0, "at least one");
     require(options.threads >= 0 && options.threads <= 1024, "threads", options.threads,
             "0 .. 1024");
@@ -308,7 +309,7 @@ struct LocalisationServer::Implementation {
     return {.type = "text/plain; version=0.0.4; charset=utf-8", .content = std::move(text)};
   }
 
-  /// Of memories that are searched where they lie.
+  /// Metrics of memories that are searched where they lie.
   [[nodiscard]] std::string search_metrics() const {
     const auto of_each = [this](const std::string& name, const std::string& type,
                                 const std::string& help, const auto& value) {
@@ -350,16 +351,16 @@ struct LocalisationServer::Implementation {
       const std::shared_ptr<LoadedMemory> memory = served.at(job->memory).loaded;
       lock.unlock();
       bool known = false;
-      HttpAnswer given = localise(*job, *memory, known);
+      HttpAnswer answer = localise(*job, *memory, known);
       lock.lock();
-      if (given.status == 200) {
+      if (answer.status == 200) {
         answering.add(Clock::now() - from);
         Served& one = served.at(job->memory);
         ++(known ? one.known : one.unknown);
       } else {
-        ++refused[given.status];
+        ++refused[answer.status];
       }
-      job->answer = std::move(given);
+      job->answer = std::move(answer);
       job->answered = true;
       server->poke();
     }
@@ -437,8 +438,8 @@ struct LocalisationServer::Implementation {
     }
   }
 
-  /// Whether the memory was changed, or its server lost; then `fault` says why. A fault is told
-  /// once, until the server is back.
+  /// Returns true if the memory was changed, or its server lost; then `fault` says why. A fault is
+  /// reported once, until the server is back.
   bool refresh(const std::string& name, PlaceRecogniser& searched, std::string& fault) {
     bool changed = false;
     try {
@@ -446,9 +447,9 @@ struct LocalisationServer::Implementation {
     } catch (const std::exception& error) {
       fault = to_readable_line(error.what());
     }
-    const bool told = !fault.empty() && !lost.insert(name).second;
+    const bool was_reported = !fault.empty() && !lost.insert(name).second;
     if (fault.empty()) lost.erase(name);
-    if (!changed && (fault.empty() || told)) return false;
+    if (!changed && (fault.empty() || was_reported)) return false;
     if (options.note) {
       options.note(name + ": " +
                    (changed

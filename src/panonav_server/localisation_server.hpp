@@ -28,7 +28,7 @@ struct LocalisationServerOptions {
   /// Memories on a server with more views are not held but searched where they lie
   /// (`PlaceRecogniserOptions::max_held_views`), which takes longer for each picture.
   std::size_t max_held_views = 200'000;
-  /// How often memory files are looked at for changes.
+  /// Poll interval of memory files for changes.
   std::chrono::milliseconds look_every{1000};
   /// Is told in one line what happens to a memory while it is served; called on another thread.
   std::function<void(const std::string& line)> note;
@@ -36,15 +36,12 @@ struct LocalisationServerOptions {
 
 /// Answers where pictures were taken, over HTTP (docs/formats.md, "HTTP"): pictures as PNG or JPEG
 /// in, JSON out, as `PlaceRecogniser` answers, to the bit. Pictures wait in a bounded queue; a
-/// picture has at most 16 MiB and 33,554,432 pixels, and those that wait have 128 MiB together. A
-/// memory whose file was changed is read again while the old one answers, and stays as it was where
-/// the file cannot be read any more. Holds every memory but those of more than `max_held_views`
-/// views on a server, whose pictures get 503 while it is away; one thread speaks HTTP, one reads
-/// memories again.
+/// picture has at most 16 MiB and 33,554,432 pixels, waiting ones 128 MiB together. A memory whose
+/// file was changed is read again while the old one answers.
 ///
-/// Without a token, a page of another origin gets nothing, nor one that reached this machine by a
-/// name that is not "localhost" (DNS rebinding); every program that reaches the port is answered.
-/// There is no encryption: behind other machines than one's own belongs a proxy that has it.
+/// Without a token every program that reaches the port is answered, but no page of another origin
+/// or one that used a name other than "localhost" (DNS rebinding). There is no encryption: use a
+/// proxy outside of trusted networks.
 class LocalisationServer {
  public:
   /// Reads the memories and listens from here on. Throws FileError as `PlaceRecogniser`, Error

@@ -39,7 +39,7 @@ Json numbers(const std::vector<Point2>& points) {
   return all;
 }
 
-/// Of x and y: what is drawn. Not rounded: it may be small.
+/// Appends the covariance of x and y, which is drawn. Not rounded, as it may be small.
 void add_covariance(Json& to, const std::array<double, 9>& covariance) {
   for (const std::size_t i : {0U, 1U, 4U}) to.push_back(covariance[i]);
 }
@@ -61,15 +61,15 @@ std::string moment_json(const recordings::RunMoment& moment, std::size_t count) 
   if (moment.pose) json["pose"] = numbers(*moment.pose);
   if (moment.covariance) add_covariance(json["covariance"] = Json::array(), *moment.covariance);
   for (const PoseMode& mode : moment.modes) {
-    Json& told = json["modes"].emplace_back(Json::array({number(mode.weight)}));
-    for (Json& value : numbers(mode.mean)) told.push_back(std::move(value));
-    add_covariance(told, mode.covariance);
+    Json& entry = json["modes"].emplace_back(Json::array({number(mode.weight)}));
+    for (Json& value : numbers(mode.mean)) entry.push_back(std::move(value));
+    add_covariance(entry, mode.covariance);
   }
   if (!moment.comparisons.empty()) {
-    Json& told = json["compared"] = Json::array();
+    Json& entry = json["compared"] = Json::array();
     for (const recordings::RunComparison& one : moment.comparisons) {
-      told.push_back(one.reference);
-      told.push_back(one.dissimilarity);
+      entry.push_back(one.reference);
+      entry.push_back(one.dissimilarity);
     }
   }
   if (moment.homing) {
@@ -94,8 +94,8 @@ std::string moment_json(const recordings::RunMoment& moment, std::size_t count) 
   if (!moment.values.empty()) {
     Json& values = json["values"] = Json::object();
     for (const auto& [name, value] : moment.values) {  // several events have one name
-      Json& told = values[name];
-      told = told.is_null() ? value : told.get<std::string>() + ", " + value;
+      Json& entry = values[name];
+      entry = entry.is_null() ? value : entry.get<std::string>() + ", " + value;
     }
   }
   return text_of(json);
@@ -111,8 +111,8 @@ std::string staying_json(const recordings::RunMoment& moment) {
     }
   }
   for (const recordings::RunRegion& region : moment.regions) {
-    Json& told = json["regions"].emplace_back(Json::array({region.area}));
-    for (Json& value : numbers(region.outline)) told.push_back(std::move(value));
+    Json& entry = json["regions"].emplace_back(Json::array({region.area}));
+    for (Json& value : numbers(region.outline)) entry.push_back(std::move(value));
   }
   for (const auto& wall : moment.walls) json["walls"].push_back(numbers(wall));
   if (!moment.edges.empty()) {
@@ -131,9 +131,9 @@ std::string staying_json(const recordings::RunMoment& moment) {
 }
 
 void StayingParts::take(const recordings::RunMoment& from) {
-  const auto replace = [this](auto& kept, const auto& given) {
-    if (given.empty()) return;
-    kept = given;
+  const auto replace = [this](auto& kept, const auto& update) {
+    if (update.empty()) return;
+    kept = update;
     ++times;
   };
   if (!from.references.empty()) moment.reference_views = from.reference_views;

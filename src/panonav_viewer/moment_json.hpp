@@ -7,19 +7,19 @@
 
 #include "panonav_recordings/run_recorder.hpp"
 
-/// What the page reads of a run; live and in reports. Metres to 0.1 mm, radians to 1e-4.
+/// Writes the moments of a run as JSON for the page, live and in reports. Metres to 0.1 mm, radians
+/// to 1e-4.
 namespace panonav::viewer {
 
 /// One moment as JSON, without what stays. `number` counts moments from 0.
 [[nodiscard]] std::string moment_json(const recordings::RunMoment& moment, std::size_t number);
 
-/// "references": [x, y, ...]; "names" and "headings" of
-/// these; "regions": [[area, x, y, ...], ...]; "walls":
-/// [[x, y, ...], ...]; "edges": [x, y, x, y, kind, ...]; "plan" and "directions": [x, y, heading,
-/// ...]; "goal": [x, y, heading]: what of these the moment gives anew. Empty: nothing.
+/// "references": [x, y, ...]; "names" and "headings" of these; "regions": [[area, x, y, ...], ...];
+/// "walls": [[x, y, ...], ...]; "edges": [x, y, x, y, kind, ...]; "plan" and "directions": [x, y,
+/// heading, ...]; "goal": [x, y, heading]: those of these that the moment replaces. Empty: none.
 [[nodiscard]] std::string staying_json(const recordings::RunMoment& moment);
 
-/// What a run told once, the newest of each part, and how often it did.
+/// The newest of each part of a run that stays until it is replaced, and how often it was replaced.
 struct StayingParts {
   recordings::RunMoment moment;
   std::size_t times = 0;
@@ -27,7 +27,7 @@ struct StayingParts {
   void take(const recordings::RunMoment& from);
 };
 
-/// What of a moment stays in the page's memory: for path and timeline.
+/// Part of a moment that stays in the page's memory, for path and timeline.
 struct PastMoment {
   double stamp_s = 0.0;
   std::optional<Pose2> pose;

@@ -17,7 +17,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// What an address that holds text must not hold as it is.
+/// Escapes the characters that an address with text must not contain.
 std::string percent_encoded(std::string_view text) {
   std::string encoded;
   for (const char c : text) {
@@ -142,14 +142,14 @@ void RunPage::add(const recordings::RunMoment& moment) {
   moments_.push_back(moment_json(moment, number));
   pictures_.emplace_back();
   staying_.take(moment);
-  // What changes on the way is told where it does.
-  recordings::RunMoment anew;
-  anew.plan = moment.plan;
-  anew.directions = moment.directions;
-  anew.goal = moment.goal;
-  if (const std::string told = staying_json(anew); !told.empty()) {
+  // Changes during the run are stored with their moment.
+  recordings::RunMoment changed;
+  changed.plan = moment.plan;
+  changed.directions = moment.directions;
+  changed.goal = moment.goal;
+  if (const std::string changes = staying_json(changed); !changes.empty()) {
     moments_.back().back() = ',';
-    moments_.back() += "\"told\":" + told + "}";
+    moments_.back() += "\"told\":" + changes + "}";
   }
   if (number % every_ != 0) return;
   if (number / every_ >= 600) {  // more came than were expected

@@ -22,7 +22,7 @@ namespace panonav::viewer {
 [[nodiscard]] std::string live_page(std::string_view title, bool replay,
                                     std::string_view takes = "");
 
-/// Where a robot was along a remembered route at one moment.
+/// A robot's position along a remembered route at one moment.
 struct RouteMark {
   std::optional<double> along_m;       ///< of the matched line; empty: not on the route
   std::optional<double> true_along_m;  ///< where it is known
@@ -41,7 +41,7 @@ class RunPage {
   void add(const recordings::RunMoment& moment);
   /// Its pictures follow no path: none is drawn.
   void unordered() noexcept { unordered_ = true; }
-  /// What the remembered route looks like over azimuth and way, and a mark for each moment.
+  /// Picture of the remembered route over azimuth and path length, with a mark for each moment.
   void route(const PicturePlot& panorama, const std::vector<RouteMark>& marks);
 
   /// Moments that were added.

@@ -27,7 +27,7 @@ struct PicturePlot {
 /// columns * rows >= 1 values.
 [[nodiscard]] Image paint_pixels(const PicturePlot& plot);
 
-/// As the other `write_plot` (plot.hpp). Throws as `paint_pixels`.
+/// Writes a plot like the other `write_plot` (plot.hpp). Throws as `paint_pixels`.
 void write_plot(const std::filesystem::path& path, const PicturePlot& plot);
 
 }  // namespace panonav::viewer

@@ -18,10 +18,10 @@ constexpr double legend_row_px = 18.0;
 constexpr double symbol_px = 24.0;
 
 double find_step(double range, double max_count) {
-  const double least = range / std::max(1.0, max_count);
-  const double power = std::pow(10.0, std::floor(std::log10(least)));
+  const double min_step = range / std::max(1.0, max_count);
+  const double power = std::pow(10.0, std::floor(std::log10(min_step)));
   for (const double factor : {1.0, 2.0, 5.0}) {
-    if (factor * power >= least * (1.0 - 1e-9)) return factor * power;
+    if (factor * power >= min_step * (1.0 - 1e-9)) return factor * power;
   }
   return 10.0 * power;
 }
@@ -163,7 +163,7 @@ void PlotArea::draw_axes(SvgDrawing& drawing, const std::string& title) const {
 void PlotArea::draw_names(SvgDrawing& drawing) const {
   constexpr std::size_t max_characters = 47;
   const bool is_turned = has_turned_names();
-  // Only every so many where even turned ones are too wide.
+  // Only every n-th name where even turned ones are too wide.
   const auto every = static_cast<std::size_t>(1.0 + static_cast<double>(x.names.size()) *
                                                         min_turned_px / box.width);
   for (std::size_t i = 0; i < x.names.size(); i += every) {

@@ -8,7 +8,7 @@
 
 #include "panonav_viewer/svg_drawing.hpp"
 
-/// What all plots share: axes, titles, legends.
+/// Parts that all plots share: axes, titles, legends.
 namespace panonav::viewer {
 
 struct PlotAxis {
@@ -45,7 +45,7 @@ struct PlotArea {
   [[nodiscard]] std::vector<Point2> to_px(std::span<const Point2> points) const;
   /// Height of the turned names of x below the area, beyond the usual margin.
   [[nodiscard]] double extra_margin_px() const;
-  /// What lies behind the values.
+  /// Draws what lies behind the values.
   void draw_grid(SvgDrawing& drawing) const;
   /// Frame, numbers, labels and title.
   void draw_axes(SvgDrawing& drawing, const std::string& title) const;
@@ -55,7 +55,7 @@ struct PlotArea {
   void draw_names(SvgDrawing& drawing) const;
 };
 
-/// How a legend shows one kind of line, mark or area.
+/// Symbol of one kind of line, mark or area in a legend.
 struct LegendSymbol {
   PlotColour colour = PlotColour::blue;
   std::optional<LineStyle> line = {};

@@ -39,19 +39,19 @@ Json pair(const std::pair<double, double>& values) {
 }
 
 /// Metres to a tenth of a millimetre; other units are as large.
-Json points(const std::vector<Point2>& given) {
+Json points(const std::vector<Point2>& source) {
   Json all = Json::array();
   const auto rounded = [](double value) { return std::round(value * 1e4) / 1e4; };
-  for (const Point2& point : given) {
+  for (const Point2& point : source) {
     all.push_back(rounded(point.x_m));
     all.push_back(rounded(point.y_m));
   }
   return all;
 }
 
-Json lists(const std::vector<std::vector<Point2>>& given) {
+Json lists(const std::vector<std::vector<Point2>>& source) {
   Json all = Json::array();
-  for (const auto& list : given) all.push_back(points(list));
+  for (const auto& list : source) all.push_back(points(list));
   return all;
 }
 

@@ -11,7 +11,7 @@
 /// `write_plot`.
 namespace panonav::viewer {
 
-/// Of the style's variable: "vermilion" for --vermilion.
+/// Name of the style's variable: "vermilion" for --vermilion.
 [[nodiscard]] std::string_view name_of(PlotColour colour);
 
 /// Series of different length in x and y are refused.

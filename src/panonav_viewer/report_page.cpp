@@ -39,22 +39,22 @@ std::string command_block(const std::vector<std::string>& command_lines) {
   return html + "</pre>\n";
 }
 
-std::string plot_element(const ReportPlot& given) {
+std::string plot_element(const ReportPlot& report_plot) {
   return std::visit(
       [&](const auto& plot) {
         using Plot = std::decay_t<decltype(plot)>;
         if constexpr (std::is_same_v<Plot, UnfoldingMap>) {
           return panel("plan", plot.title, plot_json(plot.title, plot.frames, plot.backdrop),
-                       given.caption);
+                       report_plot.caption);
         } else if constexpr (std::is_same_v<Plot, MapPlot>) {
-          return panel("plan", plot.title, plot_json(plot.title, {plot}), given.caption);
+          return panel("plan", plot.title, plot_json(plot.title, {plot}), report_plot.caption);
         } else if constexpr (std::is_same_v<Plot, HeatMap>) {
-          return panel("plan", plot.title, plot_json(plot), given.caption);
+          return panel("plan", plot.title, plot_json(plot), report_plot.caption);
         } else {
-          return panel("chart", plot.title, plot_json(plot), given.caption);
+          return panel("chart", plot.title, plot_json(plot), report_plot.caption);
         }
       },
-      given.plot);
+      report_plot.plot);
 }
 
 /// The picture itself: as it is where it is PNG or JPEG, as SVG otherwise.

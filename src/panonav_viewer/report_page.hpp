@@ -28,7 +28,7 @@ struct UnfoldingMap {
   std::vector<MapLayer> backdrop = {};  ///< what stays, behind all frames
 };
 
-/// What the page draws from numbers, and what a person should see in it.
+/// A plot that the page draws from numbers, with its caption.
 struct ReportPlot {
   std::variant<LinePlot, HeatMap, MapPlot, PicturePlot, UnfoldingMap> plot;
   std::string caption;
@@ -65,7 +65,7 @@ class ReportPage {
  public:
   ReportPage(std::string title, std::string lead);
 
-  /// What the page is about, before anybody scrolls: pictures with their figures, and how to begin.
+  /// Begins the page with its subject: pictures with their figures, and how to begin.
   void story(const std::vector<StoryCard>& cards, std::string_view commands_title,
              const std::vector<std::string>& command_lines);
   void section(std::string_view title);

@@ -66,7 +66,7 @@ std::vector<Point2> convex_hull(std::vector<Point2> points) {
   return hull;
 }
 
-/// Where a horizontal plane cuts it: both ends, or fewer points.
+/// Intersects it with a horizontal plane: both ends, or fewer points.
 std::vector<Point2> cut(const Triangle& triangle, double height_m) {
   std::vector<Point2> ends;
   for (std::size_t i = 0; i < 3; ++i) {

@@ -56,7 +56,7 @@ class SvgDrawing {
   void add_text(Point2 at, std::string_view text, const TextStyle& style = {});
   /// Fills the box with the pixels, whose edges stay sharp.
   void add_image(const SvgBox& box, ImageView image);
-  /// What is drawn until `end_clip` is shown within the box alone.
+  /// Shows what is drawn until `end_clip` only within the box.
   void begin_clip(const SvgBox& box);
   void end_clip();
 

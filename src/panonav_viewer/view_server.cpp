@@ -45,7 +45,7 @@ std::string random_token() {
   return text;
 }
 
-/// Of a file of somebody's: a browser gets nothing of it but its pixels.
+/// Encodes the pixels of a foreign file again, so that a browser receives nothing else of it.
 std::string safe_picture(std::span<const std::uint8_t> stored) {
   const Image picture = decode_image(stored, "picture of a view", {.side_px = 4096});
   const std::vector<std::uint8_t> bytes = encode_jpeg(picture.view());
@@ -80,7 +80,7 @@ class Frame {
       : moment_(std::move(moment)), number_(number) {}
 
   [[nodiscard]] std::size_t number() const noexcept { return number_; }
-  /// Of its pictures.
+  /// Bytes of its pictures.
   [[nodiscard]] std::size_t bytes() const noexcept {
     return moment_.encoded_picture.size() +
            (moment_.picture ? moment_.picture->pixels().size() : 0) +
@@ -125,8 +125,8 @@ std::string event(const std::string& name, const std::string& data) {
 }  // namespace
 
 struct ViewServer::Implementation {
-  explicit Implementation(const ViewServerOptions& wanted)
-      : options(wanted),
+  explicit Implementation(const ViewServerOptions& number)
+      : options(number),
         token(random_token()),
         page(live_page(options.title, options.replay, name_of(options.takes))),
         server({.address = options.address, .port = options.port, .headers = answer_headers},
@@ -159,26 +159,26 @@ struct ViewServer::Implementation {
     if (asked == "/events") return events();
     constexpr std::string_view views = "/view/";
     if (asked.starts_with(views)) {
-      const auto wanted = number_in(asked.substr(views.size()));
-      return wanted ? reference(*wanted) : only(404);
+      const auto number = number_in(asked.substr(views.size()));
+      return number ? reference(*number) : only(404);
     }
     constexpr std::string_view pictures = "/picture/";
     if (!asked.starts_with(pictures)) return only(404);
     const std::string_view rest = asked.substr(pictures.size());
     const std::size_t slash = rest.find('/');
-    const auto wanted = number_in(rest.substr(0, slash));
-    if (slash == std::string_view::npos || !wanted) return only(404);
-    return picture(*wanted, std::string(rest.substr(slash + 1)));
+    const auto number = number_in(rest.substr(0, slash));
+    if (slash == std::string_view::npos || !number) return only(404);
+    return picture(*number, std::string(rest.substr(slash + 1)));
   }
 
   /// The picture of a reference, by its place among those that were told.
-  [[nodiscard]] server::HttpAnswer reference(std::size_t wanted) {
+  [[nodiscard]] server::HttpAnswer reference(std::size_t number) {
     std::string name;
     {
       const std::lock_guard lock(mutex);
       const auto& known = staying.moment.reference_views;
-      if (!options.thumbnail || wanted >= known.size()) return {.status = 404};
-      name = known[wanted].name;
+      if (!options.thumbnail || number >= known.size()) return {.status = 404};
+      name = known[number].name;
     }
     const std::vector<std::uint8_t> stored = options.thumbnail(name);
     if (stored.empty()) return {.status = 404};
@@ -186,12 +186,12 @@ struct ViewServer::Implementation {
     return {.type = "image/jpeg", .content = bytes};
   }
 
-  [[nodiscard]] server::HttpAnswer picture(std::size_t wanted, const std::string& which) {
+  [[nodiscard]] server::HttpAnswer picture(std::size_t number, const std::string& which) {
     std::shared_ptr<Frame> frame;
     {
       const std::lock_guard lock(mutex);
       const auto found = std::ranges::find_if(
-          frames, [wanted](const auto& kept) { return kept->number() == wanted; });
+          frames, [number](const auto& kept) { return kept->number() == number; });
       if (found != frames.end()) frame = *found;
     }
     const std::string* const bytes = frame ? &frame->picture(which) : nullptr;
@@ -293,9 +293,9 @@ struct ViewServer::Implementation {
 
   /// A wish of a viewer, alone in its message.
   bool take(const nlohmann::json& json) {
-    const std::string wanted(name_of(options.takes));
-    if (wanted.empty() || json.size() != 1 || !json.contains(wanted)) return false;
-    const auto& values = json[wanted];
+    const std::string key(name_of(options.takes));
+    if (key.empty() || json.size() != 1 || !json.contains(key)) return false;
+    const auto& values = json[key];
     const std::size_t size = options.takes == ViewWish::pose ? 3 : 2;
     if (!values.is_array() || values.size() != size) return false;
     ReferencePose pose;
@@ -354,7 +354,7 @@ struct ViewServer::Implementation {
       past.push_back({moment.stamp_s, moment.pose,
                       moment.truth ? std::optional(moment.truth->position()) : std::nullopt,
                       moment.probability, moment.sure, moment.state});
-      // Of a long run every second moment is dropped, again and again.
+      // Every second moment of a long run is dropped, repeatedly.
       constexpr std::size_t max_past = 4096;
       if (past.size() == max_past) {
         for (std::size_t i = 1; 2 * i < past.size(); ++i) past[i] = std::move(past[2 * i]);

@@ -12,7 +12,7 @@
 
 namespace panonav::viewer {
 
-/// What a viewer may tell the run by a click on the map.
+/// Wishes that a viewer may send to the run by a click on the map.
 enum class ViewWish {
   none,
   goal,  ///< where to go; without a heading
@@ -24,9 +24,9 @@ struct ViewServerOptions {
   int port = 0;                       ///< 0 .. 65535; 0: one that is free
   std::string title = "panonav";      ///< of the page
   std::size_t max_viewers = 8;        ///< at a time; further ones are told to come later
-  /// The run is one of a recording: it waits for the first viewer, goes on at the pace of its
+  /// The run is one of a recording: it waits for the first viewer, continues at the pace of its
   /// stamps, and viewers may hold it, take it step by step, and change its pace. Two seconds after
-  /// the last viewer has left it goes on without waiting.
+  /// the last viewer has left it continues without waiting.
   bool replay = false;
   ViewWish takes = ViewWish::none;  ///< anything else is refused
   /// The picture (PNG or JPEG) of a reference by its name, empty where there is none; the server's
@@ -34,15 +34,14 @@ struct ViewServerOptions {
   std::function<std::vector<std::uint8_t>(const std::string& name)> thumbnail;
 };
 
-/// Shows a run in browsers while it goes on: a page over HTTP, moments as server-sent events,
-/// pictures on request. A thread of its own makes what viewers ask for: a moment is turned into
-/// text, and a picture into JPEG, once, when the first viewer asks for it. A viewer that is slow
-/// misses moments, and never holds up a live run or other viewers. What a run tells once
-/// (references, edges, plan) and the path so far are kept for those who come later.
+/// Shows a run in browsers while it runs: a page over HTTP, moments as server-sent events, pictures
+/// on request. A thread encodes a moment or picture once, when the first viewer requests it. A slow
+/// viewer misses moments and never delays a live run or other viewers. References, edges, plan and
+/// the path so far are kept for viewers who come later.
 ///
-/// The address of the page holds a random token of 128 bits. Whoever does not know it gets nothing,
-/// and neither does a page of another origin, or one that reached this machine by a name that is
-/// not "localhost" (DNS rebinding).
+/// The address of the page holds a random token of 128 bits. Requests without it get nothing, and
+/// neither does a page of another origin, or one that used a name other than "localhost" (DNS
+/// rebinding).
 class ViewServer {
  public:
   /// Listens from here on. Throws Error where address and port are not to be had, ContractError
@@ -55,12 +54,12 @@ class ViewServer {
 
   /// "http://127.0.0.1:41234/6f3a.../": to open in a browser.
   [[nodiscard]] std::string url() const;
-  /// Of a live run never waits. Cost: that of moving the moment, and of noting its pose. Of a
+  /// A live run never waits here. Cost: that of moving the moment, and of noting its pose. Of a
   /// replay waits until it is the moment's turn.
   void add(recordings::RunMoment moment);
   [[nodiscard]] std::size_t viewers() const;
-  /// What a viewer wished last, once: of what the run takes, finite, and at most 10 m beside the
-  /// references that it has told.
+  /// Returns the last wish of a viewer once: of the kind that the run accepts, finite, and at most
+  /// 10 m beside the references that it has told.
   [[nodiscard]] std::optional<ReferencePose> take_wish();
 
  private:

@@ -87,7 +87,7 @@ void refuse_to_continue_route(const LocaliseArguments& arguments, RoutePoses pos
                    " holds already; allowed without odometry: a new name");
 }
 
-ordered_json as_json(const RouteStep& step) {
+ordered_json as_json(const RouteFollower::Step& step) {
   if (!step.fix) return {{"on_route", false}};
   return {{"on_route", true},
           {"pose", pose_json(step.fix->pose)},
@@ -96,7 +96,7 @@ ordered_json as_json(const RouteStep& step) {
           {"correlation", step.fix->correlation}};
 }
 
-std::string as_text(const RouteStep& step, Session& session) {
+std::string as_text(const RouteFollower::Step& step, Session& session) {
   if (!step.fix) return session.bad("not on the route");
   return session.good("on the route") + ", along " + format_fixed(step.fix->along_m, 2) +
          " m  beside " + format_fixed(step.fix->lateral_m, 2) + " m";
@@ -276,7 +276,7 @@ class LocalisedRun {
     unwrapping_ += answer_.unwrapping;
     query_ = {observation.name, 0.0, answer_.place.value_or(Place{}), observation.pose, ""};
     if (query_.place.known) ++known_;
-    std::optional<RouteStep> step;
+    std::optional<RouteFollower::Step> step;
     if (follower_) {
       step = follower_->step(observation);
       stages.stage("route");

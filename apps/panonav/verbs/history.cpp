@@ -9,7 +9,7 @@ namespace panonav::command {
 
 namespace {
 
-std::string as_text(const KeptChange& change) {
+std::string as_text(const MemoryFile::KeptChange& change) {
   std::string when = "at an unknown time";
   if (change.stamp_s) {
     const auto whole_s = static_cast<std::time_t>(std::floor(*change.stamp_s));
@@ -27,7 +27,7 @@ ExitCode history(const std::string& path, Session& session) {
   const auto changes = MemoryFile::open(path, Access::read_only).history();
   if (session.json()) {
     auto list = ordered_json::array();
-    for (const KeptChange& change : changes) {
+    for (const MemoryFile::KeptChange& change : changes) {
       list.push_back({{"what", change.what},
                       {"stamp_s", or_null(change.stamp_s)},
                       {"undoable", change.undoable},
@@ -36,7 +36,7 @@ ExitCode history(const std::string& path, Session& session) {
     session.print(json_line(ordered_json{{"memory", path}, {"changes", std::move(list)}}));
     return ExitCode::done;
   }
-  for (const KeptChange& change : changes) session.print(as_text(change));
+  for (const MemoryFile::KeptChange& change : changes) session.print(as_text(change));
   if (changes.empty()) session.note(path + " keeps no change");
   return ExitCode::done;
 }

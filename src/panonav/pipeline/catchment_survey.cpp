@@ -20,7 +20,7 @@ namespace {
 // Rounding of coordinates must not decide whether a distance counts.
 constexpr double rounding_m = 1e-6;
 
-/// What is kept of a home vector: there are as many as pairs.
+/// The part of a home vector that is kept for each pair.
 struct PairVector {
   float xi = 0.0F;
   float eta = 0.0F;
@@ -129,10 +129,10 @@ void count_pairs(const std::vector<PairVector>& vectors, const CatchmentSettings
 
 }  // namespace
 
-RecordedViews read_views(const Dataset& recording, const HomingViewOptions& wanted,
+RecordedViews read_views(const Dataset& recording, const HomingViewOptions& options,
                          const std::optional<std::uint64_t>& turn_seed, Executor& executor,
                          const WorkProgress& progress) {
-  const HomingEncoder encoder(recording.source, wanted);
+  const HomingEncoder encoder(recording.source, options);
   const std::size_t total = recording.entries.size();
   RecordedViews result;
   result.turned_rad.resize(total);

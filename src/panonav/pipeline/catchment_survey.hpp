@@ -23,22 +23,22 @@ struct RecordedViews {
   std::vector<HomingView> views;   ///< of the pictures as the robot, turned, sees them
 };
 
-/// Hears on the caller's thread of the work that goes on: its name, how many of its steps were done
-/// since the last call (at first none), and how many there are.
+/// Receives, on the caller's thread, the name of the current work, the number of its steps since
+/// the last call (0 at first), and the number of all its steps.
 using WorkProgress =
     std::function<void(const std::string& work, std::size_t steps, std::size_t total)>;
 
 /// Reads all pictures on all threads. With a seed the robot turns by a random number of whole
 /// columns before each. Throws FileError, also when the pictures differ in rows.
-[[nodiscard]] RecordedViews read_views(const Dataset& recording, const HomingViewOptions& wanted,
+[[nodiscard]] RecordedViews read_views(const Dataset& recording, const HomingViewOptions& options,
                                        const std::optional<std::uint64_t>& turn_seed,
                                        Executor& executor, const WorkProgress& progress = {});
 
-/// What is asked of two recordings.
+/// Options of a survey of two recordings.
 struct CatchmentSettings {
   FourierHomingOptions homing;  ///< of all home vectors
-  /// Highest frequency of each stage of a run, which goes on with the next where one stops [S06
-  /// section 5]; empty: one stage, as `homing` says. Averages are always those of `homing`.
+  /// Highest frequency of each stage of a run, which continues with the next stage where one stops
+  /// [S06 section 5]; empty: one stage, as `homing` says. Averages are always those of `homing`.
   std::vector<int> stages;
   HomingSurveyOptions run;              ///< steps and obstacles; what was not given is learnt
   bool typical_distance_given = false;  ///< else learnt from the pairs
@@ -48,7 +48,7 @@ struct CatchmentSettings {
   std::optional<double> up_to_m;        ///< pairs farther apart do not count in averages
 };
 
-/// What all home vectors between two recordings come to.
+/// Results of all home vectors between two recordings.
 struct CatchmentResult {
   /// Pairs of a range of distances.
   struct Bin {

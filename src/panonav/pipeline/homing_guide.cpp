@@ -11,13 +11,13 @@ namespace panonav {
 
 namespace {
 
-int components_for(const SignatureShape& shape, int wanted) {
-  if (wanted == 0) return shape.components;
-  if (wanted < 3 || wanted > shape.components) {
-    throw ContractError("components", wanted,
+int components_for(const SignatureShape& shape, int requested) {
+  if (requested == 0) return shape.components;
+  if (requested < 3 || requested > shape.components) {
+    throw ContractError("components", requested,
                         "3 to " + std::to_string(shape.components) + ", the memory's");
   }
-  return wanted;
+  return requested;
 }
 
 /// That view alone.
@@ -45,10 +45,11 @@ Panorama HomingEncoder::own_panorama(const OwnPictures& own, const Observation& 
   const auto* ready = std::get_if<Panorama>(&observation.picture);
   Panorama panorama = ready ? level_panorama(*ready, tilt)
                             : own.reader.convert(std::get<Image>(observation.picture).view(), tilt);
-  const int most = panorama.columns() / 2;
-  if (components_ > most) {
-    throw ContractError("components", components_,
-                        "3 to " + std::to_string(most) + ", half the columns of the picture");
+  const int max_components = panorama.columns() / 2;
+  if (components_ > max_components) {
+    throw ContractError(
+        "components", components_,
+        "3 to " + std::to_string(max_components) + ", half the columns of the picture");
   }
   if (own.preprocessing.masked_rows_top + own.preprocessing.masked_rows_bottom >= panorama.rows()) {
     throw ContractError("has " + std::to_string(panorama.rows()) +

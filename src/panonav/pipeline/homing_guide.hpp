@@ -15,7 +15,7 @@
 
 namespace panonav {
 
-/// How observations become views to home with where no memory says it.
+/// Options for making homing views of observations without a memory.
 struct HomingViewOptions {
   SignatureOptions signature;          ///< size of the cylinders, and components
   PreprocessingOptions preprocessing;  ///< steps before the transform
@@ -24,7 +24,7 @@ struct HomingViewOptions {
   bool horizon = false;
 };
 
-/// From observations to views to home with. Several threads may use one at a time.
+/// Makes homing views of observations. Several threads may use one object at a time.
 class HomingEncoder {
  public:
   /// Without a memory; ready-made panoramas keep their size unless the options say otherwise.
@@ -37,10 +37,10 @@ class HomingEncoder {
   /// Throws ContractError (FileError where the observation has a file) on a picture that is too
   /// small for the components wanted or that the masks cover; else as `ViewEncoder::panorama`.
   [[nodiscard]] Panorama panorama(const Observation& observation) const;
-  /// What homing compares of a panorama that `panorama` made.
+  /// Returns what homing compares of a panorama that `panorama` made.
   [[nodiscard]] HomingView view(const Panorama& panorama) const;
-  /// The same of a signature that is at hand: all of its rows or the horizon alone, as the encoder
-  /// was made.
+  /// The same of an existing signature: all of its rows or the horizon alone, as the encoder was
+  /// made.
   [[nodiscard]] HomingView view(const FourierSignature& signature) const;
 
  private:
@@ -55,17 +55,17 @@ class HomingEncoder {
   bool horizon_;
 };
 
-/// Whether there is a direction home at all: the vector stands out of what its residual alone would
-/// make of it, as its length is at least its own standard deviation.
+/// True if the vector has a direction: its length is at least its own standard deviation, so that
+/// it is more than its residual alone would make of it.
 [[nodiscard]] inline bool points_home(const HomeVector& found) noexcept {
   return found.length() > 0.0 && found.confidence >= 0.5;
 }
 
-/// What an observation tells of the way home.
+/// Result of comparing an observation with a homing goal.
 struct WayHome {
-  /// Whether the observation and the goal have more in common than chance gives (`chance_match`);
-  /// noise and other places do not. If not, nothing is said: no direction, and distance and turn
-  /// mean nothing.
+  /// True if the observation and the goal have more in common than chance gives (`chance_match`);
+  /// noise and other places do not. If false, there is no direction, and distance and turn mean
+  /// nothing.
   bool known = false;
   /// In the frame of the robot as it stands now, counter-clockwise from straight ahead. Empty where
   /// nothing is known, and at home itself (`points_home`).
@@ -102,9 +102,9 @@ class HomingGuide {
   /// rows than the goal.
   [[nodiscard]] WayHome home(const Observation& observation) const;
 
-  /// What makes views of observations.
+  /// Returns the encoder that makes views of observations.
   [[nodiscard]] const HomingEncoder& encoder() const noexcept { return encoder_; }
-  /// What messages call the goal: the name of its view or observation.
+  /// Returns the goal's name in messages: the name of its view or observation.
   [[nodiscard]] const std::string& goal_name() const noexcept { return goal_name_; }
   /// The goal's view, with which observations are compared.
   [[nodiscard]] const HomingView& goal() const noexcept { return goal_; }

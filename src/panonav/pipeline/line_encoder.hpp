@@ -13,8 +13,8 @@
 
 namespace panonav {
 
-/// What a route says of its lines beyond their bytes: how pictures became lines, and where the
-/// poses came from. Kept in the memory beside it.
+/// Describes how the lines of a route were made of pictures, and the source of its poses. The
+/// memory keeps it beside the route.
 struct RouteSource {
   HorizonScanlineOptions line;  ///< columns and band of the lines
   /// First and last row that show the horizon, counted from 0 at the top; for panoramas whose
@@ -24,14 +24,15 @@ struct RouteSource {
   friend bool operator==(const RouteSource&, const RouteSource&) = default;
 };
 
-/// Of the route `name`. Throws FileError when the memory says something else than
+/// Reads the source of the route `name`. Throws FileError when the memory says something else than
 /// `remember_route_source` wrote.
 [[nodiscard]] RouteSource route_source(const MemoryFile& memory, const std::string& name,
                                        int columns);
-/// Keeps it in the memory, under the route's name. Throws FileError.
+/// Stores the source in the memory, under the route's name. Throws FileError.
 void remember_route_source(MemoryFile& memory, const std::string& name, const RouteSource& source);
 
-/// From observations to horizon scanlines, as a route has them. Several threads may use one.
+/// Makes horizon scanlines of observations, as a route has them. Several threads may use one
+/// object.
 class LineEncoder {
  public:
   /// Throws ContractError on horizon rows for pictures whose elevations are known.
@@ -47,12 +48,13 @@ class LineEncoder {
   PanoramaReader reader_;
 };
 
-/// The route's name, the only route where none is named. Throws FileError when there is no such
-/// route, or several and none is named.
+/// Returns the route's name, that of the only route where none is named. Throws FileError when
+/// there is no such route, or several and none is named.
 [[nodiscard]] std::string route_named(const MemoryFile& memory,
                                       const std::optional<std::string>& name);
 
-/// The route itself. Throws FileError when it has fewer than two lines: nothing can be followed.
+/// Returns the route itself. Throws FileError when it has fewer than two lines: nothing can be
+/// followed.
 [[nodiscard]] RoutePanorama route_to_follow(const MemoryFile& memory, const std::string& name);
 
 }  // namespace panonav

@@ -41,7 +41,7 @@ class Storer {
     const std::lock_guard lock(mutex_);
     return waiting_.size();
   }
-  /// Whether the memory has a file by now.
+  /// True if the memory has a file by now.
   [[nodiscard]] bool has_file() const {
     const std::lock_guard lock(mutex_);
     return has_file_;
@@ -106,8 +106,8 @@ Observation unwrapped(const Observation& observation, Panorama panorama) {
 }  // namespace
 
 struct LiveMemory::Implementation {
-  Implementation(std::filesystem::path memory, const LiveMemoryOptions& wanted)
-      : path(std::move(memory)), options(wanted) {
+  Implementation(std::filesystem::path memory, const LiveMemoryOptions& memory_options)
+      : path(std::move(memory)), options(memory_options) {
     const bool exists = memory_exists(path);
     if (options.add) {
       if (options.areas) throw ContractError("areas", "given", "none of a memory that is added to");
@@ -129,13 +129,13 @@ struct LiveMemory::Implementation {
   }
 
   [[nodiscard]] std::unique_ptr<PlaceRecogniser> make_recogniser() const {
-    PlaceRecogniserOptions wanted{.localiser = options.localiser,
-                                  .source = options.memoriser.source};
-    if (options.areas) wanted.areas = options.areas;
+    PlaceRecogniserOptions recogniser_options{.localiser = options.localiser,
+                                              .source = options.memoriser.source};
+    if (options.areas) recogniser_options.areas = options.areas;
     if (options.add || options.update || options.hold) {
-      wanted.max_held_views = std::numeric_limits<std::size_t>::max();
+      recogniser_options.max_held_views = std::numeric_limits<std::size_t>::max();
     }
-    return std::make_unique<PlaceRecogniser>(path, wanted);
+    return std::make_unique<PlaceRecogniser>(path, recogniser_options);
   }
 
   /// Learns from all views when a quarter of them is new, and takes over what was learnt beside.

@@ -12,20 +12,20 @@
 
 namespace panonav {
 
-/// How a live memory answers, and what it changes. Without `add` and `update` the file is only
-/// read.
+/// Options for the answers and changes of a live memory. Without `add` and `update` the file is
+/// only read.
 struct LiveMemoryOptions {
   bool add = false;  ///< Add the views of places that the memory does not know.
   /// Keep the views of known places true (`MemoryUpdater`) by observations with odometry. Where
   /// views are added, too, a memory with few positions and headings only grows.
   bool update = false;
   MemoryUpdateOptions update_options;  ///< of views at known places
-  /// Between two views that are added: until the memory has learnt from a view, those after it look
-  /// as new as it did. Of observations with stamps.
+  /// Between two views that are added: until the memory has learnt from a view, the following ones
+  /// look as new as it did. Applies to observations with stamps.
   double min_interval_s = 0.5;
   /// Store views, and learn models from them, before the next observation is answered, so that the
-  /// same observations give the same bits; otherwise both happen beside the answers, on threads
-  /// that stand back for them.
+  /// same observations give the same bits; otherwise both happen concurrently on threads of lower
+  /// priority.
   bool in_step = false;
   MemoriserOptions memoriser;  ///< of views that are added; its source serves for both
   LocaliserOptions localiser;  ///< of the answers
@@ -41,18 +41,18 @@ struct LiveMemoryOptions {
 ///   while (auto seen = source.next()) use(memory.answer(*seen));
 ///   memory.finish();
 /// A view that was added is found from the next observation on. What is learnt of all views (models
-/// of places and positions) is learnt anew whenever a quarter of them is new.
+/// of places and positions) is learnt again whenever a quarter of them is new.
 class LiveMemory {
  public:
   /// Throws as `Memoriser`, `MemoryUpdater` and `PlaceRecogniser`; FileError when there is no file
   /// and nothing is to be added; ContractError on areas of a memory that is added to.
   explicit LiveMemory(std::filesystem::path memory, const LiveMemoryOptions& options = {});
   ~LiveMemory();
-  /// What is left of the other may only be destroyed or assigned to.
+  /// A moved-from object may only be destroyed or assigned to.
   LiveMemory(LiveMemory&&) noexcept;
   LiveMemory& operator=(LiveMemory&&) noexcept;
 
-  /// What an observation tells.
+  /// Answer to an observation.
   struct Answer {
     /// Empty as long as there is no memory to ask: a new one begins with
     /// `Memoriser::scale_views` views.
@@ -69,11 +69,12 @@ class LiveMemory {
   /// `Memoriser::add`, also about views of earlier calls.
   void add(Observation observation);
   static constexpr std::size_t max_waiting = 8;  ///< Views that wait for the disk at most.
-  /// Of the observation that was answered last, until it is added; empty as long as there is no
-  /// memory to ask.
+  /// Returns the panorama of the observation that was answered last, until it is added; empty as
+  /// long as there is no memory to ask.
   [[nodiscard]] const std::optional<Panorama>& panorama() const noexcept;
 
-  /// What answers now; null as long as there is no memory to ask. Valid until the next `answer`.
+  /// Returns what answers now; null as long as there is no memory to ask. Valid until the next
+  /// `answer`.
   [[nodiscard]] const PlaceRecogniser* recogniser() const noexcept;
   /// Views that can be found now, and those that were added.
   [[nodiscard]] std::size_t views() const noexcept;

@@ -19,7 +19,7 @@ namespace panonav {
 /// The name under which a memory file keeps the map of a `Mapper`.
 inline constexpr const char* map_name = "map";
 
-/// How a map is made of observations.
+/// Options for making a map of observations.
 struct MapperOptions {
   MappingOptions mapping;          ///< what becomes a node, and how nodes are joined
   VisualOdometryOptions odometry;  ///< how steps are read from views
@@ -35,7 +35,7 @@ struct MapperOptions {
 /// method. One thread at a time, except `encode`.
 class Mapper {
  public:
-  /// What a `Mapper` made of its observations.
+  /// Result of mapping.
   struct Result {
     TopologicalMap map;                     ///< all nodes and edges
     std::vector<std::size_t> observations;  ///< by node: its number, counted from 0
@@ -85,7 +85,7 @@ class Mapper {
   [[nodiscard]] TopologicalMap map_so_far() const { return mapper_.map(); }
   /// The file that views are appended to.
   [[nodiscard]] const MemoryFile& memory() const noexcept { return file_; }
-  /// What makes views of pictures.
+  /// Returns the encoder that makes views of pictures.
   [[nodiscard]] const ViewEncoder& encoder() const noexcept { return encoder_; }
 
  private:

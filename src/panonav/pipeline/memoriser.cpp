@@ -80,14 +80,14 @@ MemoryHeader header_from_first(std::span<const Observation> first, const Picture
   return header;
 }
 
-MemoryHeader header_from_first_views(const Dataset& recording, const SignatureOptions& wanted,
+MemoryHeader header_from_first_views(const Dataset& recording, const SignatureOptions& signature,
                                      const PreprocessingOptions& preprocessing,
                                      Executor& executor) {
   const std::size_t count = std::min(Memoriser::scale_views, recording.entries.size());
   std::vector<Observation> first(count, Observation(Image(1, 1)));
   for_each_entry(executor, count,
                  [&](std::size_t i) { first[i] = read_observation(recording.entries[i]); });
-  return header_from_first(first, recording.source, wanted, preprocessing, executor);
+  return header_from_first(first, recording.source, signature, preprocessing, executor);
 }
 
 Memoriser::Memoriser(const std::filesystem::path& memory, MemoriserOptions options)

@@ -14,9 +14,9 @@
 
 namespace panonav {
 
-/// How observations are memorised, and what a new file is like.
+/// Options for memorising observations, and for new files.
 struct MemoriserOptions {
-  /// How pictures lie. Empty: as those of the file; a new file needs it.
+  /// Kind and layout of the pictures. Empty: as those of the file; a new file needs it.
   std::optional<PictureSource> source;
   SignatureOptions signature;          ///< of a new file
   PreprocessingOptions preprocessing;  ///< of a new file
@@ -42,7 +42,7 @@ struct MemoriserOptions {
 /// about light or scene need be known beforehand. Throws FileError also on pictures that cannot be
 /// read.
 [[nodiscard]] MemoryHeader header_from_first_views(const Dataset& recording,
-                                                   const SignatureOptions& wanted,
+                                                   const SignatureOptions& signature,
                                                    const PreprocessingOptions& preprocessing,
                                                    Executor& executor);
 
@@ -70,7 +70,7 @@ class Memoriser {
   /// refused are stored.
   void add(std::vector<Observation> observations, Executor& executor);
 
-  /// What became of the observations.
+  /// Numbers of observations by what became of them.
   struct Counts {
     std::size_t appended = 0;      ///< views that the file got
     std::size_t known_before = 0;  ///< observations whose views were there
@@ -83,7 +83,7 @@ class Memoriser {
 
   /// Null as long as a new file waits for its full scale, as `encoder()`.
   [[nodiscard]] MemoryFile* file() noexcept { return file_ ? &*file_ : nullptr; }
-  /// What makes views of pictures; null as `file()`.
+  /// Returns the encoder that makes views of pictures; null as `file()`.
   [[nodiscard]] const ViewEncoder* encoder() const noexcept {
     return encoder_ ? &*encoder_ : nullptr;
   }

@@ -8,15 +8,15 @@
 
 namespace panonav {
 
-/// What an export holds of a memory.
+/// Contents of an export of a memory.
 struct MemoryExport {
   std::size_t views = 0;  ///< in views.csv and signatures.npy
   /// Views whose thumbnail is a picture of the data set; 0: there is no data set.
   std::size_t pictures = 0;
-  /// Of these, views whose name cannot be that of a file: their pictures have other names.
+  /// Number of these whose name cannot be that of a file: their pictures have other names.
   std::size_t renamed = 0;
-  /// Whether poses, headings and stamps are in the data set. A data set has them for all of its
-  /// pictures or for none; where some views have none they are in views.csv alone.
+  /// True if positions are in the data set. A data set has them for all of its pictures or for
+  /// none; where some views have none they are in views.csv alone.
   bool positions = false;
   bool headings = false;  ///< see `positions`; not without them
   bool stamps = false;    ///< see `positions`

@@ -149,9 +149,9 @@ template <class IsTaken>
 std::string free_name(const std::string& name, const MemoryFile& from, const IsTaken& is_taken) {
   if (!is_taken(name)) return name;
   const std::string base = fs::path(memory_name(from.path())).stem().string() + "/" + name;
-  std::string wanted = base;
-  for (int i = 2; is_taken(wanted); ++i) wanted = base + " (" + std::to_string(i) + ")";
-  return wanted;
+  std::string new_name = base;
+  for (int i = 2; is_taken(new_name); ++i) new_name = base + " (" + std::to_string(i) + ")";
+  return new_name;
 }
 
 class Merge {
@@ -199,8 +199,8 @@ class Merge {
           ++result_.shared;
           continue;
         }
-        const std::string name = free_name(info.name, *files_[1], [&](const std::string& wanted) {
-          return views_[0].find(wanted) || (wanted != info.name && views.find(wanted));
+        const std::string name = free_name(info.name, *files_[1], [&](const std::string& new_name) {
+          return views_[0].find(new_name) || (new_name != info.name && views.find(new_name));
         });
         if (name != info.name) ++result_.renamed;
         info.name = name;
@@ -258,7 +258,7 @@ class Merge {
       file.set_pose(view, there);
     }
     if (!result_.alignment) return;
-    // What the pose graph moved.
+    // Poses that the pose graph moved.
     const std::size_t joined = map.nodes.front().component;
     for (const MapNode& node : map.nodes) {
       if (node.component != joined) continue;
@@ -276,12 +276,12 @@ class Merge {
         }
         route = std::move(moved);
       }
-      const auto taken = file.route_names();
-      const std::string wanted = free_name(name, *files_[from], [&](const std::string& other) {
-        return std::ranges::find(taken, other) != taken.end();
+      const auto used_names = file.route_names();
+      const std::string new_name = free_name(name, *files_[from], [&](const std::string& other) {
+        return std::ranges::find(used_names, other) != used_names.end();
       });
-      if (wanted != name) ++result_.renamed;
-      file.append_route(wanted, route);
+      if (new_name != name) ++result_.renamed;
+      file.append_route(new_name, route);
     }
   }
 

@@ -42,7 +42,7 @@ std::string to_parameter(const MemoryUse& use) {
   return text;
 }
 
-// What an unknown version wrote counts as nothing.
+// A text of an unknown version counts as none.
 MemoryUse from_parameter(const std::optional<std::string>& text) {
   MemoryUse use;
   if (!text) return use;

@@ -26,7 +26,7 @@ class MemoryUpdater {
   explicit MemoryUpdater(const std::filesystem::path& memory,
                          const MemoryUpdateOptions& options = {});
   ~MemoryUpdater();
-  /// What is left of the other may only be destroyed or assigned to.
+  /// A moved-from object may only be destroyed or assigned to.
   MemoryUpdater(MemoryUpdater&&) noexcept;
   MemoryUpdater& operator=(MemoryUpdater&&) noexcept;
 
@@ -38,7 +38,7 @@ class MemoryUpdater {
   /// place it by odometry.
   [[nodiscard]] bool is_near_known_place() const;
 
-  /// What a run did to its memory.
+  /// Changes that a run made to its memory.
   struct Changes {
     std::size_t seen = 0;        ///< observations with odometry
     std::size_t certain = 0;     ///< of these, whose place was certain and new
@@ -48,7 +48,7 @@ class MemoryUpdater {
     std::size_t forgotten = 0;   ///< views that were dropped because they had failed for long
     std::size_t views = 0;       ///< of the memory now
   };
-  /// Changes the file and learns its models anew, in one transaction. `what`: the run, for the
+  /// Changes the file and learns its models again, in one transaction. `what`: the run, for the
   /// history. Once. Throws FileError; the file is as it was then. Throws ContractError the second
   /// time.
   Changes finish(const std::string& what);

@@ -47,7 +47,7 @@ struct Observation {
   std::optional<Tilt> tilt;
 };
 
-/// What `make` makes of the picture. Where that was read from a file, a ContractError becomes a
+/// Returns what `make()` returns. Where the picture was read from a file, a ContractError becomes a
 /// FileError that names it.
 template <class Make>
 auto about_picture(const Observation& observation, const Make& make) {

@@ -52,10 +52,10 @@ void make_in_order(std::size_t count, Executor& executor, const Make& make, cons
 class ObservationSource {
  public:
   virtual ~ObservationSource() = default;
-  /// How all its pictures lie.
+  /// Returns the kind and layout of all its pictures.
   [[nodiscard]] virtual const PictureSource& pictures() const noexcept = 0;
   /// Empty when there is none left. Throws FileError on a picture that cannot be read; the next
-  /// call goes on behind it.
+  /// call continues after it.
   [[nodiscard]] virtual std::optional<Observation> next() = 0;
 };
 

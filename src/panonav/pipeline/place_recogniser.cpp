@@ -23,7 +23,7 @@ namespace panonav {
 
 namespace {
 
-/// What a localisation makes of one observation, each part where it is needed and once. Both
+/// The parts of a query for one observation, each computed at most once, when it is needed. Both
 /// arguments must outlive it.
 class ObservationQuery {
  public:
@@ -54,14 +54,14 @@ class ObservationQuery {
 void check_options(const PlaceRecogniserOptions& options, const MemoryHeader& header,
                    bool is_held) {
   validate(options.localiser);
-  const int most = header.shape.components;
+  const int max_components = header.shape.components;
   if (options.areas && !is_held) {
     throw ContractError("areas", "asked for",
                         "none in a memory that is not held: they take the positions of all views");
   }
-  if (options.localiser.components > most) {
+  if (options.localiser.components > max_components) {
     throw ContractError("components", options.localiser.components,
-                        "1 to " + std::to_string(most) + ", the memory's");
+                        "1 to " + std::to_string(max_components) + ", the memory's");
   }
 }
 
@@ -93,7 +93,7 @@ struct PlaceRecogniser::Implementation {
     learn_indexed(file);
   }
 
-  // What the file keeps was learnt over all components.
+  // Kept models were learnt over all components.
   [[nodiscard]] bool takes_kept_models() const { return options.localiser.components == 0; }
 
   /// Empty where the memory has no features.
@@ -124,8 +124,8 @@ struct PlaceRecogniser::Implementation {
     publish(std::move(localiser), source);
   }
 
-  /// Of a memory that is not held: of a small one as of one that is held, of a large one those that
-  /// the file keeps, those before, or those of a part.
+  /// Finds the models of a memory that is not held: of a small one as of a held one; of a large one
+  /// those that the file keeps, else the current ones, else those learnt from a part of the views.
   [[nodiscard]] LearntModels find_models(const MemoryFile& file, ViewIndex& index,
                                          std::span<const ViewId> views,
                                          std::span<const ViewId> drawn,

@@ -21,7 +21,7 @@ class MemoryFile;
 class ViewEncoder;
 struct SearchCounters;
 
-/// What a recogniser compares, tells and holds.
+/// Options of a place recogniser.
 struct PlaceRecogniserOptions {
   LocaliserOptions localiser;  ///< how many views are compared and listed
   /// How pictures lie; empty: as those that the memory was made from.
@@ -41,17 +41,12 @@ struct PlaceRecogniserOptions {
 ///   auto place = recogniser.localise(panonav::read_image("view.jpg"));
 ///   if (place.known) std::cout << place.position->x_m << ' ' << place.position->y_m << '\n';
 /// (`position` is empty only for memories whose views have no poses.) Pictures become signatures as
-/// the file says, and what is learnt of its views comes from the file, too (`keep_models`); models
-/// that do not fit the views any more are learnt anew, which takes seconds in a large memory.
-/// Several threads may ask at a time.
+/// the file says; models that no longer fit its views (`keep_models`) are learnt again, which takes
+/// seconds in a large memory. Several threads may use one object.
 ///
-/// The whole memory is held, and the file is not needed afterwards; or, of a large memory on a
-/// server, only an index of its views, and each picture reads those that its answer takes. The
-/// answers are the same bits but for `bytes_read`. What is learnt takes views of all the memory: a
-/// memory that is not held and has more than `max_learnt_views` takes the models that were kept
-/// last (`keep_models`), whichever views came since; where none were kept it learns from whole
-/// areas with that many views in all, and places elsewhere that look alike count less than they
-/// should.
+/// The whole memory is held, or of a large one on a server only an index: the answers are the same
+/// bits but for `bytes_read`. A memory that is not held and has more than `max_learnt_views` uses
+/// the models that were kept last, or else learns from whole areas with that many views.
 class PlaceRecogniser {
  public:
   /// Throws FileError on a file that is missing, damaged or without views, ContractError on options
@@ -64,7 +59,7 @@ class PlaceRecogniser {
   PlaceRecogniser(std::unique_ptr<IndexedMemory> index, const std::filesystem::path& memory,
                   const PlaceRecogniserOptions& options = {});
   ~PlaceRecogniser();
-  /// What is left of the other may only be destroyed or assigned to.
+  /// A moved-from object may only be destroyed or assigned to.
   PlaceRecogniser(PlaceRecogniser&&) noexcept;
   PlaceRecogniser& operator=(PlaceRecogniser&&) noexcept;
 
@@ -76,7 +71,7 @@ class PlaceRecogniser {
 
   [[nodiscard]] bool is_held() const noexcept;  ///< False: the memory is searched where it lies.
   [[nodiscard]] std::size_t size() const;       ///< Views that can be found.
-  [[nodiscard]] const ViewEncoder& encoder() const noexcept;  ///< What makes queries of pictures.
+  [[nodiscard]] const ViewEncoder& encoder() const noexcept;  ///< Makes queries of pictures.
 
   /// Adds a view that can be found from now on; it takes part in what is learnt of all views only
   /// in a new PlaceRecogniser. The file is not touched. Not while another thread asks. Throws
@@ -84,15 +79,16 @@ class PlaceRecogniser {
   void append(const ReferenceInfo& info, const PackedSignature& signature);
   /// The views that are held. Throws ContractError where the memory is not.
   [[nodiscard]] const VisualMemory& memory() const;
-  /// What compares views; `localise` adds areas. Throws ContractError where the memory is not held.
+  /// Returns what compares views; `localise` adds areas. Throws ContractError where the memory is
+  /// not held.
   [[nodiscard]] const Localiser& localiser() const;
 
   /// Where the memory is not held, takes over which views came and went since, and what was learnt
   /// of them (`IndexedMemory::refresh`). Pictures are answered meanwhile. Not from two threads at a
   /// time. Returns whether anything changed.
   bool refresh();
-  [[nodiscard]] std::uint64_t index_bytes() const;       ///< Of the index; 0: the memory is held.
-  [[nodiscard]] SearchCounters search_counters() const;  ///< Where the memory is not held.
+  [[nodiscard]] std::uint64_t index_bytes() const;       ///< 0: the memory is held.
+  [[nodiscard]] SearchCounters search_counters() const;  ///< Zeros where the memory is held.
 
  private:
   struct Implementation;

@@ -46,12 +46,12 @@ std::optional<NavigationGraph> graph_from(GraphOrigin origin, const MemoryFileVi
   return std::nullopt;
 }
 
-NavigationGraph graph_of(const MemoryFileViews& source, const std::optional<GraphOrigin>& wanted,
+NavigationGraph graph_of(const MemoryFileViews& source, const std::optional<GraphOrigin>& requested,
                          GraphOrigin& origin, Executor& executor) {
   const std::string path = source.file().path().string();
   if (source.views().empty()) throw FileError(path, "holds no views; allowed: 2 or more");
-  if (wanted) {
-    origin = *wanted;
+  if (requested) {
+    origin = *requested;
     auto graph = graph_from(origin, source, executor);
     if (graph) return std::move(*graph);
     throw FileError(path, "has no " + std::string(name_of(origin)) +
@@ -142,7 +142,7 @@ void RobotNavigator::set_goal(const std::string& goal) {
   if (!node || graph().exits(*node).empty()) {
     throw FileError(views_.file().path().string(),
                     "no edge leads to the view " + info(view).name +
-                        "; take another goal, or arrange the memory anew");
+                        "; take another goal, or arrange the memory again");
   }
   goal_ = view;
   navigator_->set_goal(view);

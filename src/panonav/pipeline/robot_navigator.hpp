@@ -18,7 +18,7 @@
 
 namespace panonav {
 
-/// What the edges between the views of a memory are taken from.
+/// Source of the edges between the views of a memory.
 enum class GraphOrigin {
   map,          ///< stored by a `Mapper`: motions as the map has them
   lattice,      ///< stored by the verb `arrange`: directions from the views' phases
@@ -30,7 +30,7 @@ enum class GraphOrigin {
 /// The origin of that name; empty where there is none.
 [[nodiscard]] std::optional<GraphOrigin> graph_origin(std::string_view name);
 
-/// How a robot is sent to a goal.
+/// Options for sending a robot to a goal.
 struct RobotNavigatorOptions {
   NavigatorOptions navigator;        ///< how it decides
   PlannerOptions planner;            ///< how it plans
@@ -47,11 +47,11 @@ struct RobotNavigatorOptions {
 /// arrangement all views at once; these are let go then. One thread at a time.
 class RobotNavigator {
  public:
-  /// What a robot is to do after an observation.
+  /// The robot's next motion after an observation.
   struct Step {
     NavigationDecision decision;  ///< the last one
     Velocity velocity;            ///< for the next period of the base (`BaseOptions::period_s`)
-    bool decided = false;         ///< by this observation; else the step decided before goes on
+    bool decided = false;         ///< by this observation; else the previous decision continues
   };
 
   /// `goal`: name or id of a view. Pictures lie as `source` says; empty: as the memory's own.
@@ -67,13 +67,13 @@ class RobotNavigator {
   /// Another goal; where the robot is stays known. Throws FileError as the constructor.
   void set_goal(const std::string& goal);
 
-  /// To be called once in each period of the base. The robot decides anew when the step decided
-  /// before is done, by odometry or else as commanded, and when `report` says that something
-  /// stopped it; only then the picture is looked at. Throws as `ViewEncoder::signature` and
+  /// To be called once in each period of the base. The robot decides again when the previous step
+  /// is done, by odometry or else as commanded, and when `report` says that something stopped it;
+  /// only then the picture is evaluated. Throws as `ViewEncoder::signature` and
   /// `Navigator::observe`.
   [[nodiscard]] Step step(const Observation& observation, RobotReport report = {});
 
-  /// What the edges were taken from.
+  /// Returns the source of the edges.
   [[nodiscard]] GraphOrigin origin() const noexcept { return origin_; }
   [[nodiscard]] ViewId goal() const noexcept { return goal_; }  ///< The goal's id in the memory.
   /// The views and the edges between them.
@@ -82,13 +82,13 @@ class RobotNavigator {
   [[nodiscard]] const AreaPlanner& planner() const noexcept { return navigator_->planner(); }
   /// The file that views are read from.
   [[nodiscard]] const MemoryFile& memory() const noexcept { return views_.file(); }
-  /// What the memory knows of a view besides its signature; read from the file.
+  /// Reads name, pose and stamp of a view from the file.
   [[nodiscard]] ReferenceInfo info(ViewId view) const;
   /// For programs that observe and drive themselves.
   [[nodiscard]] Navigator& navigator() noexcept { return *navigator_; }
-  /// What makes queries of pictures.
+  /// Returns the encoder that makes queries of pictures.
   [[nodiscard]] const ViewEncoder& encoder() const noexcept { return encoder_; }
-  /// How lines are taken along its route; null without one.
+  /// Returns how lines are made along its route; null without one.
   [[nodiscard]] const RouteSource* route() const noexcept {
     return route_source_ ? &*route_source_ : nullptr;
   }

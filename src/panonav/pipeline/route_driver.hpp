@@ -10,13 +10,13 @@
 
 namespace panonav {
 
-/// How a route is repeated.
+/// Options for repeating a route.
 struct RouteDriverOptions {
   RouteFollowerOptions follower;  ///< how the robot is found on it
   PathFollowerOptions path;       ///< how closely its path is kept
   BaseOptions base;               ///< what velocities are made for
-  /// Where along the route the robot was when somebody else drove it last: of several places that a
-  /// route passes it goes on at the one next to it. Empty: at the first.
+  /// Distance along the route at which an earlier drive ended: where the route passes the robot's
+  /// place several times, the drive continues at the pass nearest to it. Empty: at the first pass.
   std::optional<double> resume_m;
 };
 
@@ -25,7 +25,7 @@ struct RouteDriverOptions {
 /// pursuit of the positions of its lines (`PathFollower`). One thread at a time.
 class RouteDriver {
  public:
-  /// How far a repeated route has come.
+  /// State of a repeated route.
   enum class State {
     searching,  ///< the robot stands: no line has told yet where it is
     driving,    ///< the robot is on its way to the end of the route
@@ -33,7 +33,7 @@ class RouteDriver {
     lost,       ///< not found on the route, or not for so long that odometry alone is no guide
   };
 
-  /// What a robot is to do after an observation, and where it is beside the route.
+  /// The robot's next motion after an observation, and its position beside the route.
   struct Step {
     State state = State::searching;  ///< after this observation
     Velocity velocity;               ///< for the next period of the base; 0 unless driving
@@ -47,7 +47,7 @@ class RouteDriver {
   /// Pictures after which a robot that stands is not on the route.
   static constexpr int max_searches = 10;
 
-  /// As `RouteFollower`. Throws OptionError.
+  /// Throws as `RouteFollower`, and OptionError.
   RouteDriver(const MemoryFile& memory, const std::optional<PictureSource>& source,
               const RouteDriverOptions& options = {});
 
@@ -58,7 +58,7 @@ class RouteDriver {
   [[nodiscard]] Step step(const Observation& observation,
                           const std::optional<Pose2>& other_estimate = std::nullopt);
 
-  /// What finds the robot beside the route.
+  /// Returns what finds the robot beside the route.
   [[nodiscard]] const RouteFollower& follower() const noexcept { return follower_; }
 
  private:

@@ -26,10 +26,10 @@ struct RouteFollowerOptions {
 /// robot is looked for around it, then on the whole route. One thread at a time, except `encode`.
 class RouteFollower {
  public:
-  /// Where the robot is beside the route.
+  /// The robot's position beside the route.
   struct Step {
-    std::vector<float> line;            ///< what was seen
-    std::optional<RouteFix> fix;        ///< empty: not on this route
+    std::vector<float> line;                          ///< what was seen
+    std::optional<RouteFix> fix;                      ///< empty: not on this route
     std::vector<RouteChanges::AzimuthRange> changed;  ///< where the scene is not as remembered
   };
 
@@ -55,10 +55,10 @@ class RouteFollower {
 
   [[nodiscard]] const std::string& name() const noexcept {
     return name_;
-  }  ///< What the memory calls the route.
+  }  ///< Name of the route in the memory.
   /// How its lines were taken, and where its poses came from.
   [[nodiscard]] const RouteSource& source() const noexcept { return source_; }
-  /// What follows the robot, with what it knows of it now.
+  /// Returns what follows the robot, with its present state.
   [[nodiscard]] const RouteTracker& tracker() const noexcept { return tracker_; }
 
  private:

@@ -10,7 +10,7 @@ namespace panonav {
 namespace {
 
 constexpr std::size_t lines_at_once = 64;
-/// Between the end of a route and the line that goes on with it.
+/// Largest gap between the end of a route and a line that continues it; chosen.
 constexpr double max_gap_m = 1.0;
 
 std::string route_text(const MemoryFile& file, const std::string& name) {
@@ -20,26 +20,26 @@ std::string route_text(const MemoryFile& file, const std::string& name) {
 /// Lines can only go on with the same camera and in the same frame.
 RouteSource source_for(const MemoryFile& file, const RouteRecorderOptions& options) {
   require(options.every_m >= 0.0, "every_m", options.every_m, ">= 0");
-  RouteSource wanted{.line = options.line.value_or(HorizonScanlineOptions{}),
+  RouteSource source{.line = options.line.value_or(HorizonScanlineOptions{}),
                      .horizon_rows = options.horizon_rows,
                      .from_odometry = options.odometry};
   const auto known = file.route(options.name);
-  if (!known) return wanted;
+  if (!known) return source;
   const RouteSource before = route_source(file, options.name, known->columns());
-  if (!options.line) wanted.line = before.line;
-  if (!options.horizon_rows) wanted.horizon_rows = before.horizon_rows;
-  if (wanted.line != before.line || wanted.horizon_rows != before.horizon_rows) {
+  if (!options.line) source.line = before.line;
+  if (!options.horizon_rows) source.horizon_rows = before.horizon_rows;
+  if (source.line != before.line || source.horizon_rows != before.horizon_rows) {
     throw ContractError(
         route_text(file, options.name) +
         " was recorded with another value of the option columns, the option half_band_rad or "
         "the option horizon_rows; leave them out or take another name");
   }
-  if (wanted.from_odometry != before.from_odometry) {
+  if (source.from_odometry != before.from_odometry) {
     throw ContractError(route_text(file, options.name) + " is in the frame of " +
                         (before.from_odometry ? "its odometry" : "its data set") +
                         ", these poses are not; take another name");
   }
-  return wanted;
+  return source;
 }
 
 std::optional<Pose2> end_of(const MemoryFile& file, const std::string& name) {
@@ -71,7 +71,7 @@ std::size_t RouteRecorder::skip_recorded(std::span<const Pose2> drive) {
   const auto route = file_.route(options_.name);
   if (!route || last_) return 0;
   const std::span<const Pose2> known = route->poses();
-  // As `RoutePanorama::append` leaves lines out.
+  // The same distance within which `RoutePanorama::append` leaves lines out.
   const auto same_place = [](const Pose2& a, const Pose2& b) {
     return distance(a.position(), b.position()) < RoutePanorama::min_step_m;
   };

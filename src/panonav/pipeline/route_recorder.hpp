@@ -36,7 +36,7 @@ struct RouteRecorderOptions {
 /// their odometry, as the options say. One thread at a time, except `encode`.
 class RouteRecorder {
  public:
-  /// What a memory file has of a route, and what a recorder added to it.
+  /// The recorded route, and what this recorder added to it.
   struct Recorded {
     RoutePanorama route;       ///< all of its lines, those of earlier drives included
     std::size_t appended = 0;  ///< lines
@@ -59,14 +59,14 @@ class RouteRecorder {
   RouteRecorder(MemoryFile memory, const std::optional<PictureSource>& source,
                 const RouteRecorderOptions& options = {});
 
-  /// Whether a line is due at the place: so far from the last one.
+  /// True if the place is `every_m` or more from the last line.
   [[nodiscard]] static bool is_due(const std::optional<Pose2>& last, const Pose2& next,
                                    double every_m);
   /// The part of `add` that several threads may do beside each other for observations to come.
   /// Throws as `LineEncoder::line`, ContractError on an observation with neither pose nor odometry.
   [[nodiscard]] EncodedLine encode(const Observation& observation) const;
-  /// How many lines at the beginning of a drive the route holds already, when it holds nothing
-  /// else: a drive whose recording was interrupted goes on behind them. 0 for any other route.
+  /// Returns the number of lines at the beginning of a drive that the route already holds, if it
+  /// holds nothing else: an interrupted recording continues after them. 0 for any other route.
   [[nodiscard]] std::size_t skip_recorded(std::span<const Pose2> drive);
   /// Whatever its distance from the line before. Throws FileError; at the first line also when the
   /// route is there and ends farther than a metre from it.
@@ -78,12 +78,13 @@ class RouteRecorder {
   /// as `add` and `finish`; those before a picture that cannot be read are kept.
   Recorded record(const Dataset& drive, std::span<const Pose2> poses, Executor& executor,
                   const std::function<void(std::size_t lines)>& recorded = {});
-  /// What was added is on the disk. Throws FileError; ContractError when nothing ever was added.
+  /// Writes what was added to the disk. Throws FileError; ContractError when nothing ever was
+  /// added.
   Recorded finish();
 
   /// The file that the route is in.
   [[nodiscard]] const MemoryFile& memory() const noexcept { return file_; }
-  /// How its lines are taken, and where its poses come from.
+  /// Returns how its lines are made, and where its poses come from.
   [[nodiscard]] const RouteSource& source() const noexcept { return source_; }
 
  private:

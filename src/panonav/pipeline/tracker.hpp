@@ -10,7 +10,7 @@
 
 namespace panonav {
 
-/// How a robot is followed.
+/// Options for following a robot.
 struct TrackerOptions {
   MonteCarloOptions filter;  ///< how particles are drawn and weighed
   OdometryNoise odometry;    ///< errors of the robot's wheels
@@ -24,7 +24,7 @@ struct TrackerOptions {
 ///   const auto estimate = tracker.observe(observation);
 ///   if (estimate.state == panonav::LocalisationState::localised) use(*estimate.pose);
 /// Pictures become signatures as the file says, and the observation model comes from the file, too
-/// (`keep_models`); one that does not fit the views any more is learnt anew. Holds the whole
+/// (`keep_models`); one that does not fit the views any more is learnt again. Holds the whole
 /// memory; the file is not needed afterwards. Same file, options and observations: same bits.
 class Tracker {
  public:
@@ -34,11 +34,11 @@ class Tracker {
   /// The same of a file that is open.
   explicit Tracker(const MemoryFile& file, const TrackerOptions& options = {});
   ~Tracker();
-  /// What is left of the other may only be destroyed or assigned to.
+  /// A moved-from object may only be destroyed or assigned to.
   Tracker(Tracker&&) noexcept;
   Tracker& operator=(Tracker&&) noexcept;
 
-  /// As `MonteCarloLocaliser`: forgets what is known of the robot.
+  /// Forgets what is known of the robot, as `MonteCarloLocaliser` does.
   void start_globally(std::optional<double> heading_rad = std::nullopt);
   /// Around a known pose, in the frame of the memory's positions.
   void start_at(const Pose2& pose, double deviation_m, double heading_deviation_rad);
@@ -53,7 +53,7 @@ class Tracker {
   void move_to(const Pose2& odometry);
 
   [[nodiscard]] const VisualMemory& memory() const noexcept;  ///< The views that are held.
-  [[nodiscard]] const ViewEncoder& encoder() const noexcept;  ///< What makes queries of pictures.
+  [[nodiscard]] const ViewEncoder& encoder() const noexcept;  ///< Makes queries of pictures.
   /// The filter, with its particles and its observation model.
   [[nodiscard]] const MonteCarloLocaliser& localiser() const noexcept;
 

@@ -35,11 +35,11 @@ class ViewEncoder {
   /// ContractError when the elevations of the pictures are not the memory's.
   ViewEncoder(const MemoryHeader& header, const PictureSource& source);
   ~ViewEncoder();
-  /// What is left of the other may only be destroyed or assigned to.
+  /// A moved-from object may only be destroyed or assigned to.
   ViewEncoder(ViewEncoder&&) noexcept;
   ViewEncoder& operator=(ViewEncoder&&) noexcept;
 
-  /// As it was given: what all views of the memory have in common.
+  /// Returns the header of the memory.
   [[nodiscard]] const MemoryHeader& header() const noexcept { return header_; }
 
   /// The panoramic cylinder. Throws ContractError (FileError where the observation has a file) on a
@@ -51,13 +51,13 @@ class ViewEncoder {
   /// Throws FileError on a picture that is missing, damaged or of another size than the memory's.
   [[nodiscard]] Panorama read(const DatasetEntry& entry) const;
 
-  /// Of an observation, of a picture as the camera delivers it, or of a panorama that is at hand
-  /// because it is needed for something else: the same bits. Mirror pictures of a level robot go
-  /// through the fused `SignatureExtractor` without a panorama. Throws as `panorama`.
+  /// Computes the signature of an observation; of a picture or of an existing panorama the same
+  /// bits. Mirror pictures of a level robot go through the fused `SignatureExtractor` without a
+  /// panorama. Throws as `panorama`.
   [[nodiscard]] FourierSignature signature(const Observation& observation) const;
-  /// Of a picture as the camera delivers it, of a level robot.
+  /// Computes the signature of a picture as the camera of a level robot delivers it.
   [[nodiscard]] FourierSignature signature(ImageView picture) const;
-  /// Of a panorama of the memory's shape.
+  /// Computes the signature of a panorama of the memory's shape.
   [[nodiscard]] FourierSignature signature(const Panorama& panorama) const;
   /// The signature with the memory's full scale.
   [[nodiscard]] PackedSignature packed(const Observation& observation) const;
@@ -66,7 +66,8 @@ class ViewEncoder {
   /// The same of a panorama of the memory's shape.
   [[nodiscard]] PackedSignature packed(const Panorama& panorama) const;
 
-  /// Of a panorama of the memory's shape; empty where elevations are unknown.
+  /// Extracts the local features of a panorama of the memory's shape; empty where elevations are
+  /// unknown.
   [[nodiscard]] std::optional<LocalFeatures> features(const Panorama& panorama) const;
 
  private:

@@ -10,7 +10,7 @@
 
 namespace panonav {
 
-/// What a memory file knows of a view besides its signature.
+/// Data of a view besides its signature.
 struct ViewRecord {
   ViewId view;             ///< its id in the file
   ReferenceInfo info;      ///< name, pose and stamp

@@ -13,7 +13,7 @@ namespace panonav {
 
 namespace {
 
-/// From pairs of neighbours whose positions the memory knows.
+/// Estimates the scale from pairs of neighbours whose positions the memory knows.
 double scale_of(const VisualMemory& memory, const VisualOdometryOptions& options) {
   std::vector<ViewId> posed;
   for (const ViewId view : memory.views()) {

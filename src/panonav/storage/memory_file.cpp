@@ -353,7 +353,7 @@ void MemoryFile::rename_route(std::string_view name, std::string_view new_name) 
       refuse_taken_name("route", new_name, path());
     }
     panonav::rename_route(tables, name, new_name);
-    // How its pictures became lines goes with it.
+    // The source of its lines is renamed with it.
     const std::string from = "route." + std::string(name);
     if (const auto lines = parameter(from)) {
       set_parameter("route." + std::string(new_name), *lines);

@@ -21,8 +21,8 @@ namespace panonav {
 class RoutePanorama;
 struct TopologicalMap;
 
-/// What a memory file says of all its views: how a picture becomes a signature that can be compared
-/// with them. Fixed when the file is made.
+/// Properties that all views of a memory share: how a picture becomes a signature that can be
+/// compared with them. Fixed when the file is made.
 struct MemoryHeader {
   SignatureShape shape;                     ///< rows and components of every view
   float full_scale = 1.0F;                  ///< magnitude that is packed as 255
@@ -99,50 +99,48 @@ class MemoryFile {
   /// permission with read_write.
   static MemoryFile open(const std::filesystem::path& path, Access access);
   ~MemoryFile();
-  /// What is left of the other may only be destroyed or assigned to.
+  /// A moved-from object may only be destroyed or assigned to.
   MemoryFile(MemoryFile&&) noexcept;
   MemoryFile& operator=(MemoryFile&&) noexcept;
 
-  /// The same memory once more, for another thread.
+  /// Opens the same memory again, for another thread.
   [[nodiscard]] MemoryFile reopen(Access access) const;
   /// Makes a memory at `path`, in a file or on a server, that holds the same under the same ids:
   /// whole or not at all. The change that could be undone is not taken along. Throws FileError as
   /// `create`, and on damage.
   void copy_to(const std::filesystem::path& path) const;
 
-  [[nodiscard]] const MemoryHeader& header() const noexcept;  ///< As the file was made.
+  [[nodiscard]] const MemoryHeader& header() const noexcept;  ///< Fixed when the file was made.
   /// As it was given to `create` or `open`; of a server the address without its password.
   [[nodiscard]] const std::filesystem::path& path() const noexcept;
 
-  /// All that `changes` changes by the member functions below, in one transaction: all of it is on
-  /// the disk when this returns, nothing of it when `changes` throws or the process ends before.
+  /// Makes all changes that `changes` makes through the member functions below in one transaction:
+  /// all are on the disk when this returns, none when `changes` throws or the process ends before.
   /// With `undo`, a description for people, what it replaced or dropped is kept in the file, above
   /// what was kept before, so that `undo` brings it back. Of changes beyond the newest
   /// `max_undo_levels`, and of those with which more than `max_history_bytes` would be kept, the
-  /// description alone is left, of those beyond `max_history` nothing; a server keeps
-  /// one. Throws FileError when the
-  /// change itself takes more than 200 MiB.
+  /// description alone is left, of those beyond `max_history` nothing; a server keeps one. Throws
+  /// FileError when the change itself takes more than 200 MiB.
   void change(const std::function<void()>& changes,
               const std::optional<std::string>& undo = std::nullopt);
   static constexpr std::size_t max_undo_levels = 100;  ///< Changes that can be taken back.
   /// What they may take in the file; the newest is kept whatever it takes.
   static constexpr std::uint64_t max_history_bytes = 64U << 20U;
   static constexpr std::size_t max_history = 1000;  ///< Changes whose description is kept.
-  /// The changes that were kept for `undo`, the newest first. Those that were taken back are not in
-  /// it.
+  /// Returns the changes that were kept for `undo` and not undone, the newest first.
   [[nodiscard]] std::vector<KeptChange> history() const;
-  /// The description of the change that `undo` takes back; empty: there is none.
+  /// Returns the description of the change that `undo` would undo; nullopt: there is none.
   [[nodiscard]] std::optional<std::string> undoable() const;
-  /// Takes back the newest change that was kept for this, in one transaction; the one before it is
-  /// the newest then. What was added since stays. Throws ContractError when there is none,
-  /// FileError when later changes are in the way.
+  /// Undoes the newest kept change, in one transaction; the one before it is the newest then. What
+  /// was added since stays. Throws ContractError when there is none, FileError when later changes
+  /// are in the way.
   void undo();
 
   /// Adds a view and returns once it is on the disk. Throws ContractError on another shape, an
   /// empty or known name, or values that are not finite. Ids grow and are never used twice, even
   /// after a removal.
   ViewId append(const NewView& view);
-  /// All views in one transaction: all or none. Much faster than one by one.
+  /// Adds views in one transaction: all or none. Much faster than one by one.
   std::vector<ViewId> append(std::span<const NewView> views);
   /// Also drops the view's links, thumbnail and features and its node in maps, in one transaction
   /// for all. Throws ContractError when there is no such view; then nothing is removed.
@@ -158,29 +156,30 @@ class MemoryFile {
   /// Drops the link of the two views, in whichever order; nothing happens where there is none.
   void unlink(ViewId a, ViewId b);
 
-  /// The view of that name; empty when there is none. Cost: a look-up in an index.
+  /// Returns the view of that name; nullopt when there is none. Cost: a look-up in an index.
   [[nodiscard]] std::optional<ViewId> find(std::string_view name) const;
-  /// Names of all views, by ascending id: what a resumed recording need not add again.
+  /// Returns the names of all views by ascending id: those that a resumed recording need not add
+  /// again.
   [[nodiscard]] std::vector<std::string> names() const;
-  /// Views that a picture file was stored with, ascending.
+  /// Returns the views that a picture file was stored with, ascending.
   [[nodiscard]] std::vector<ViewId> views_with_thumbnail() const;
-  /// The picture file that was stored with the view; empty where there is none.
+  /// Returns the picture file that was stored with the view; nullopt where there is none.
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> thumbnail(ViewId view) const;
 
-  /// Whether any view has local features. Cost: a look-up.
+  /// True if any view has local features. Cost: a look-up.
   [[nodiscard]] bool has_features() const;
-  /// The packed local features of the view; empty where there are none.
+  /// Returns the packed local features of the view; nullopt where there are none.
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> features(ViewId view) const;
 
-  /// What was learnt from the views (a model of unknown places, weights), by name, as text.
+  /// Stores what was learnt from the views (a model of unknown places, weights) by name, as text.
   void set_parameter(std::string_view name, std::string_view value);
-  /// What `set_parameter` stored under the name; empty where there is nothing.
+  /// Returns what `set_parameter` stored under the name; nullopt where there is nothing.
   [[nodiscard]] std::optional<std::string> parameter(std::string_view name) const;
 
   /// Keeps a map under a name, instead of the one that had it. Throws ContractError on
   /// an empty name, a view that is not in the file, and as `validate`.
   void save_map(std::string_view name, const TopologicalMap& map);
-  /// The same bits; empty when there is no such map.
+  /// Returns the same bits as were saved; nullopt when there is no such map.
   [[nodiscard]] std::optional<TopologicalMap> map(std::string_view name) const;
   /// Throws ContractError when there is no such map.
   void remove_map(std::string_view name);
@@ -193,34 +192,34 @@ class MemoryFile {
   /// an empty name, no lines, and another number of columns than the route has. Cost: that of the
   /// lines and at most 256 more.
   std::size_t append_route(std::string_view name, const RoutePanorama& more);
-  /// The same bits; empty when there is no such route.
+  /// Returns the same bits as were appended; nullopt when there is no such route.
   [[nodiscard]] std::optional<RoutePanorama> route(std::string_view name) const;
-  /// Bytes of its lines and poses as they are kept, packed without loss. Throws ContractError when
-  /// there is no such route.
+  /// Returns the size of its lines and poses as they are kept, packed without loss. Throws
+  /// ContractError when there is no such route.
   [[nodiscard]] std::uint64_t route_bytes(std::string_view name) const;
   /// Throws ContractError when there is no such route.
   void remove_route(std::string_view name);
   /// Gives a route another name. Throws ContractError when there is no such route, and on a new
-  /// name as `rename`. Cost: every line is written anew.
+  /// name as `rename`. Cost: every line is written again.
   void rename_route(std::string_view name, std::string_view new_name);
   /// Ascending.
   [[nodiscard]] std::vector<std::string> route_names() const;
 
-  /// All views and links. Checks every view's checksum and throws FileError at the first fault.
-  /// 100,000 views of 80 x 15 take about 0.6 s of processor time.
+  /// Loads all views and links. Checks every view's checksum and throws FileError at the first
+  /// fault. 100,000 views of 80 x 15 take about 0.6 s of processor time.
   [[nodiscard]] VisualMemory load() const;
-  /// Only these views, which must ascend, without links; nothing else of the file is looked at.
+  /// Loads these views alone, which must ascend, without links; nothing else of the file is read.
   /// Each view's checksum is checked. Throws ContractError on a view that is not in the file. Cost:
   /// some 10 microseconds a view.
   [[nodiscard]] VisualMemory load(std::span<const ViewId> views) const;
-  /// All views, ascending.
+  /// Returns all views, ascending.
   [[nodiscard]] std::vector<ViewId> views() const;
-  /// Views whose position lies in these bounds, each included, ascending. On a server an index of
-  /// positions is used; a file is read through.
+  /// Returns the views whose position lies in these bounds, each included, ascending. On a server
+  /// an index of positions is used; a file is read through.
   [[nodiscard]] std::vector<ViewId> views_within(const PositionBounds& bounds) const;
-  /// All links, ascending.
+  /// Returns all links, ascending.
   [[nodiscard]] std::vector<Link> links() const;
-  /// Everything that is wrong with the file, in full: structure, then view by view. Empty: intact.
+  /// Finds everything that is wrong with the file: structure, then view by view. Empty: intact.
   [[nodiscard]] std::vector<Fault> verify() const;
   /// Counts rows and sizes; nothing is checked. Cost: a pass over the rows of the tables.
   [[nodiscard]] Info info() const;

@@ -32,7 +32,7 @@ void require_band(const std::optional<ElevationBand>& band, std::string_view fie
   }
 }
 
-// What a picture file may have: more than any picture of the memory could be made from.
+// Limits of picture files, larger than any from which a picture of the memory could be made.
 void require_picture(int rows, int columns, std::string_view rows_name,
                      std::string_view columns_name) {
   constexpr int max_side = 32768;

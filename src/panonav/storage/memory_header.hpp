@@ -12,7 +12,7 @@
 
 namespace panonav {
 
-/// What a memory file says of itself, by key.
+/// Value of a setting of a memory.
 using SettingValue = std::variant<std::int64_t, double, std::string, std::vector<std::uint8_t>>;
 /// Entries by key, ascending.
 using Settings = std::map<std::string, SettingValue, std::less<>>;

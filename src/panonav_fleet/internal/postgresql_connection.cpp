@@ -1,4 +1,3 @@
-
 #include "panonav_fleet/internal/postgresql_connection.hpp"
 
 #include <libpq-fe.h>
@@ -242,7 +241,7 @@ PostgresqlConnection::PostgresqlConnection(const ServerAddress& address) : shown
                         std::to_string(PQserverVersion(connection_.get()) / 10000) +
                         "; allowed: 15 and newer");
   }
-  // What is written must mean the same whatever the server's settings are, and what was
+  // The text of statements must mean the same whatever the server's settings are, and what was
   // acknowledged must be on its disk.
   execute(
       "SET search_path = pg_catalog; SET lock_timeout = '10s'; SET bytea_output = hex; "
@@ -317,19 +316,11 @@ void PostgresqlConnection::execute(const std::string& sql) {
   static_cast<void>(checked(exchange(sql, nullptr)));
 }
 
-std::string PostgresqlConnection::try_unique(const std::string& sql) {
-  Result result(exchange(sql, nullptr));
-  if (std::string state = sqlstate_of(result.get()); state == "23505") return state;
+bool PostgresqlConnection::try_unique(const std::string& sql, const PostgresqlValues* values) {
+  Result result(exchange(sql, values));
+  if (sqlstate_of(result.get()) == "23505") return false;
   static_cast<void>(checked(result.release()));
-  return {};
-}
-
-std::string PostgresqlConnection::try_unique(const std::string& sql,
-                                             const PostgresqlValues& values) {
-  Result result(exchange(sql, &values));
-  if (std::string state = sqlstate_of(result.get()); state == "23505") return state;
-  static_cast<void>(checked(result.release()));
-  return {};
+  return true;
 }
 
 PostgresqlRows PostgresqlConnection::run(const std::string& sql, const PostgresqlValues& values) {
@@ -409,9 +400,9 @@ void PostgresqlConnection::copy_out(
       std::string_view rest(sent, static_cast<std::size_t>(size));
       const auto take_bytes = [&](std::size_t count) {
         if (rest.size() < count) refuse();
-        const std::string_view taken = rest.substr(0, count);
+        const std::string_view head = rest.substr(0, count);
         rest.remove_prefix(count);
-        return taken;
+        return head;
       };
       if (std::exchange(begins, false)) {
         take_bytes(15);  // "PGCOPY", flags

@@ -29,7 +29,7 @@ class PostgresqlValues {
   /// No text.
   PostgresqlValues& add_null();
 
-  /// As libpq takes them; valid while these values are.
+  /// The values in the form of libpq; valid while these values are.
   struct Bound {
     std::vector<unsigned> types;
     std::vector<const char*> data;
@@ -80,10 +80,9 @@ class PostgresqlConnection {
 
   /// Statements of ours without values, separated by semicolons.
   void execute(const std::string& sql);
-  /// As `execute`; returns the SQLSTATE of a violated unique constraint ("23505") instead of
-  /// throwing, empty when it is done.
-  [[nodiscard]] std::string try_unique(const std::string& sql);
-  [[nodiscard]] std::string try_unique(const std::string& sql, const PostgresqlValues& values);
+  /// Executes a statement, with values if there are any. Returns false if a unique constraint
+  /// forbids it.
+  [[nodiscard]] bool try_unique(const std::string& sql, const PostgresqlValues* values = nullptr);
   PostgresqlRows run(const std::string& sql, const PostgresqlValues& values = {});
   /// Passes one row after the other to `take`, without holding all of them.
   void stream(const std::string& sql, const PostgresqlValues& values,
@@ -120,7 +119,7 @@ class PostgresqlConnection {
 
 /// Numbers as PostgreSQL sends them: the most significant byte first.
 void append_big_endian(std::string& bytes, std::uint64_t value, int size);
-/// Of up to eight bytes.
+/// Reads a number of up to eight bytes.
 [[nodiscard]] std::uint64_t big_endian_word(std::string_view bytes);
 
 /// Rows in COPY's binary form, for `copy_in`.

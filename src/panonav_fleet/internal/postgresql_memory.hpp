@@ -112,12 +112,12 @@ class PostgresqlTables final : public MemoryTables {
   /// For what only a server is asked (server_exchange.hpp).
   [[nodiscard]] PostgresqlConnection& connection() noexcept { return connection_; }
   [[nodiscard]] std::int64_t memory() const noexcept { return memory_; }
-  /// What a notification says of the areas that were changed since it was asked last: empty for
-  /// many, and where views without a position were changed.
+  /// Returns the changed areas as text for a notification, and forgets them; empty for many areas,
+  /// and where views without a position were changed.
   [[nodiscard]] std::string take_areas();
-  /// Views say which connection added them: its number.
+  /// Returns the number of this connection, which views that it adds refer to.
   std::int64_t session();
-  /// The notification of the transaction will say so.
+  /// Notes a change at a position for the notification of the transaction.
   void changed_at(const std::optional<double>& x_m, const std::optional<double>& y_m) {
     if (x_m && y_m) {
       areas_.insert(area_of(*x_m, *y_m));

@@ -1,4 +1,3 @@
-
 #include "panonav_fleet/internal/postgresql_schema.hpp"
 
 #include <string_view>

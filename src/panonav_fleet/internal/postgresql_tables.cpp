@@ -1,5 +1,3 @@
-
-
 #include <cmath>
 #include <type_traits>
 #include <utility>
@@ -275,14 +273,14 @@ void PostgresqlTables::insert(std::span<const ViewId> ids, std::span<const NewVi
   if (features) beside("features", "features");
   sql += "UPDATE panonav.memories SET last_view = " + std::to_string(ids.back().value) +
          " WHERE id = " + memory + "; RELEASE rows; TRUNCATE pg_temp.panonav_incoming";
-  if (connection_.try_unique(sql).empty()) return;
+  if (connection_.try_unique(sql)) return;
   connection_.execute("ROLLBACK TO rows");
-  const Rows taken = run(
+  const Rows duplicate = run(
       "SELECT i.name FROM pg_temp.panonav_incoming i WHERE EXISTS (SELECT FROM panonav.views v "
       "WHERE v.memory = $1 AND v.name = i.name) OR EXISTS (SELECT FROM pg_temp.panonav_incoming j "
       "WHERE j.name = i.name AND j.id < i.id) ORDER BY i.id LIMIT 1");
-  if (taken.size() == 0) fail_damaged("the id of a new view is taken");
-  refuse_taken_name("view", taken.text(0, 0), path());
+  if (duplicate.size() == 0) fail_damaged("the id of a new view is taken");
+  refuse_taken_name("view", duplicate.text(0, 0), path());
 }
 
 void PostgresqlTables::require_views(std::span<const ViewId> views) {
@@ -319,11 +317,12 @@ void PostgresqlTables::write_info(ViewId view, const ReferenceInfo& info, std::i
   Values values;
   values.add(memory_).add(std::int64_t{view.value}).add(checksum);
   add_info(values, info);
-  const std::string taken = connection_.try_unique(
-      "UPDATE panonav.views SET checksum = $3, name = $4, x_m = $5, y_m = $6, heading_rad = $7, "
-      "stamp_s = $8 WHERE memory = $1 AND id = $2",
-      values);
-  if (!taken.empty()) refuse_taken_name("view", info.name, path());
+  if (!connection_.try_unique(
+          "UPDATE panonav.views SET checksum = $3, name = $4, x_m = $5, y_m = $6, "
+          "heading_rad = $7, stamp_s = $8 WHERE memory = $1 AND id = $2",
+          &values)) {
+    refuse_taken_name("view", info.name, path());
+  }
   changed_rows(before);
   changed_at(info.pose);
 }
@@ -444,7 +443,7 @@ std::optional<StoredBytes> PostgresqlTables::bytes(BesideViews table, ViewId vie
 void PostgresqlTables::write_links(std::span<const Link> links) {
   std::vector<std::int64_t> a, b, kinds, checksums;
   std::set<std::pair<ViewId, ViewId>> written;
-  // Of links of the same two views the last one counts; one statement takes a pair only once.
+  // The last of several links of the same two views counts; one statement accepts a pair only once.
   for (std::size_t i = links.size(); i-- > 0;) {
     const Link& link = links[i];
     if (!written.emplace(link.a, link.b).second) continue;

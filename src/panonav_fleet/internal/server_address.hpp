@@ -15,7 +15,7 @@ struct ServerAddress {
   std::optional<std::string> robot;
 };
 
-/// Whether it begins as the address of a PostgreSQL server.
+/// True if it begins as the address of a PostgreSQL server.
 [[nodiscard]] bool is_postgresql_address(const std::filesystem::path& memory);
 
 /// Throws FileError unless the address names a memory.

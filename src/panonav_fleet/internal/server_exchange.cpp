@@ -1,4 +1,3 @@
-
 #include "panonav_fleet/internal/server_exchange.hpp"
 
 #include <array>

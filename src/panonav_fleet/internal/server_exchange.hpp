@@ -16,7 +16,7 @@
 
 namespace panonav::fleet {
 
-/// What a server accepted last of a view of a file.
+/// The last version of a file's view that a server accepted.
 struct Upload {
   ViewId view;                 ///< in the file
   std::int64_t signature = 0;  ///< `signature_checksum`

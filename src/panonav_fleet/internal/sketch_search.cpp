@@ -22,7 +22,7 @@ struct SketchedView {
   ViewId view;
 };
 
-/// What a thread needs to look at one segment after the other.
+/// Buffers that a thread needs to search one segment after the other.
 struct SegmentScratch {
   explicit SegmentScratch(const SegmentLayout& layout)
       : room(layout),
@@ -88,18 +88,18 @@ class SketchSearch {
 
   /// Compares these in full; none is compared twice.
   void read(std::span<const SketchedView> candidates) {
-    std::vector<ViewId> wanted;
+    std::vector<ViewId> unread;
     for (const SketchedView& candidate : candidates) {
       if (std::ranges::binary_search(compared_, candidate.view)) continue;
-      wanted.push_back(candidate.view);
+      unread.push_back(candidate.view);
     }
-    if (wanted.empty()) return;
-    std::ranges::sort(wanted);
-    read_(wanted, [this](ViewId view, std::span<const std::uint8_t> magnitudes) {
+    if (unread.empty()) return;
+    std::ranges::sort(unread);
+    read_(unread, [this](ViewId view, std::span<const std::uint8_t> magnitudes) {
       compare(view, magnitudes);
     });
     const auto middle = static_cast<std::ptrdiff_t>(compared_.size());
-    compared_.insert(compared_.end(), wanted.begin(), wanted.end());
+    compared_.insert(compared_.end(), unread.begin(), unread.end());
     std::ranges::inplace_merge(compared_, compared_.begin() + middle);
     query_.choose_unit(layout_, nearest_.limit());
   }
@@ -130,7 +130,7 @@ class SketchSearch {
   }
 
   /// Calls body(segment number, place in the order, scratch, chunk) for those of the order from
-  /// `begin` to `end`, on the threads of the executor; chunks are of so many segments.
+  /// `begin` to `end`, on the threads of the executor; each chunk has that many segments.
   template <class Body>
   void for_segments(std::size_t begin, std::size_t end, std::size_t chunk, const Body& body) {
     std::vector<std::uint64_t> bytes((end - begin + chunk - 1) / chunk);
@@ -210,16 +210,16 @@ class SketchSearch {
   std::uint32_t least_of_sample(const SketchSegment& segment, std::size_t number,
                                 SegmentScratch& scratch) const {
     segment.make_tables(layout_, kernels_, query_, scratch.tables);
-    std::uint32_t least = std::numeric_limits<std::uint32_t>::max();
+    std::uint32_t min_bound = std::numeric_limits<std::uint32_t>::max();
     for (std::size_t block = number % sampled_every; block < segment.blocks();
          block += sampled_every) {
       cells(segment, 0, block, 1, scratch);
       const std::size_t rows =
           std::min(kernels::cell_block, segment.rows() - block * kernels::cell_block);
-      least = std::min<std::uint32_t>(
-          least, *std::ranges::min_element(std::span(scratch.bounds).first(rows)));
+      min_bound = std::min<std::uint32_t>(
+          min_bound, *std::ranges::min_element(std::span(scratch.bounds).first(rows)));
     }
-    return least;
+    return min_bound;
   }
 
   /// Those views of a segment that look best by their cells.

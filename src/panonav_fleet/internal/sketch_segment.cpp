@@ -34,11 +34,11 @@ std::int32_t sum_of(const std::uint8_t* bytes, int count) {
 }  // namespace
 
 SegmentLayout::SegmentLayout(SignatureShape shape) : shape_(shape) {
-  const auto most = static_cast<int>(std::bit_floor(static_cast<unsigned>(shape.rows)));
+  const auto max_blocks = static_cast<int>(std::bit_floor(static_cast<unsigned>(shape.rows)));
   for (int level = 0; level < levels; ++level) {
     std::size_t sums = 0;
     for (int k = 0; k < shape.components; ++k) {
-      const int blocks = std::min(most, blocks_of(level, k, shape.components));
+      const int blocks = std::min(max_blocks, blocks_of(level, k, shape.components));
       blocks_[level].push_back(blocks);
       sums += static_cast<std::size_t>(blocks);
     }
@@ -99,7 +99,7 @@ std::vector<std::int32_t> SegmentLayout::counted(int components,
 SketchSegment::SketchSegment(const SegmentLayout& layout, std::span<const ViewId> views,
                              std::span<const std::uint8_t> magnitudes)
     : views_(views.begin(), views.end()),
-      least_(std::ranges::min(views)),
+      smallest_id_(std::ranges::min(views)),
       largest_(std::ranges::max(views)) {
   std::vector<std::int32_t> sums(views.size() * layout.total());
   for (std::size_t row = 0; row < views.size(); ++row) {
@@ -237,8 +237,8 @@ void SketchSegment::make_level(const SegmentLayout& layout, int level,
 }
 
 void SegmentQuery::choose_unit(const SegmentLayout& layout, std::uint32_t largest) {
-  constexpr std::uint32_t most = 254;
-  unit = largest / most + 1;
+  constexpr std::uint32_t max_code = 254;
+  unit = largest / max_code + 1;
   // A little less than the inverse, so that no rounding makes an entry too large.
   const float inverse = (1.0F - 1e-6F) / static_cast<float>(unit);
   factors.resize(layout.dimensions(0));

@@ -12,9 +12,9 @@
 
 namespace panonav::fleet {
 
-/// How views that are not held are sketched: sums of packed magnitudes over blocks of neighbouring
-/// rows at three levels, each finer than the one before. A block of a level consists of blocks of
-/// the next one. docs/search.md says why their differences bound the dissimilarity.
+/// Layout of the sketches of views that are not held: sums of packed magnitudes over blocks of
+/// neighbouring rows at three levels, each finer than the one before. A block of a level consists
+/// of blocks of the next one. docs/search.md says why their differences bound the dissimilarity.
 class SegmentLayout {
  public:
   static constexpr int levels = 3;  ///< cells of 4 bits, then two levels of a byte a sum
@@ -23,7 +23,7 @@ class SegmentLayout {
   [[nodiscard]] SignatureShape shape() const noexcept { return shape_; }
   /// Sums of a level with those that pad it: pairs for cells, groups of 64 for the others.
   [[nodiscard]] std::size_t dimensions(int level) const noexcept { return dimensions_[level]; }
-  /// Of all levels.
+  /// Number over all levels.
   [[nodiscard]] std::size_t total() const noexcept {
     return dimensions_[0] + dimensions_[1] + dimensions_[2];
   }
@@ -52,7 +52,7 @@ class SegmentLayout {
   std::size_t max_rows_ = 0;
 };
 
-/// What a search compares with segments.
+/// The query of a search in the form that segments are compared with.
 struct SegmentQuery {
   std::vector<std::int32_t> sums;     ///< of the query, as `SegmentLayout::sum_blocks` gives them
   std::vector<std::int32_t> counted;  ///< 1 or 0 each
@@ -73,13 +73,13 @@ class SketchSegment {
   [[nodiscard]] std::size_t rows() const noexcept { return views_.size(); }
   /// In the order of the rows.
   [[nodiscard]] std::span<const ViewId> views() const noexcept { return views_; }
-  [[nodiscard]] ViewId least() const noexcept { return least_; }
+  [[nodiscard]] ViewId smallest_id() const noexcept { return smallest_id_; }
   [[nodiscard]] ViewId largest() const noexcept { return largest_; }
   [[nodiscard]] std::size_t blocks() const noexcept;
-  /// Of the sketches, with room for rows that there are not.
+  /// Bytes of the sketches, with room for rows that do not exist yet.
   [[nodiscard]] std::uint64_t bytes() const noexcept;
 
-  /// What each code adds to the bounds, in whole units, rounded down.
+  /// Contribution of each code to the bounds, in whole units, rounded down.
   void make_tables(const SegmentLayout& layout, const kernels::DistanceKernels& kernels,
                    const SegmentQuery& query, std::span<std::uint8_t> tables) const;
   /// Bounds in units, 255 for all beyond, of the rows of blocks first .. first + count - 1; indices
@@ -116,7 +116,7 @@ class SketchSegment {
   void make_level(const SegmentLayout& layout, int level, const std::vector<std::int32_t>& sums);
 
   std::vector<ViewId> views_;
-  ViewId least_, largest_;
+  ViewId smallest_id_, largest_;
   LargePageVector<std::uint8_t> codes_;  // cells, then the two other levels
   std::array<std::size_t, SegmentLayout::levels> begins_{};
   std::vector<std::int32_t> cell_low_, cell_high_;  // smallest and largest sum of each code

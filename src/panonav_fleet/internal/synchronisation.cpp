@@ -1,4 +1,3 @@
-
 #include "panonav_fleet/internal/synchronisation.hpp"
 
 #include <algorithm>

@@ -1,4 +1,3 @@
-
 #include "panonav_fleet/internal/synchronisation.hpp"
 
 #include <algorithm>
@@ -147,7 +146,7 @@ SynchronisedView Synchronisation::make_adopted_row(ViewId view, const LocalRow& 
   SynchronisedView next;
   next.server_view = server_view;
   next.local_checksum = local_checksums_.at(view);
-  // What the server knows of it holds: as if it had changed since.
+  // The server's info holds, as if it had changed since.
   next.server_checksum = info == row.info ? checksum : ~checksum;
   next.signature = signature_checksum(row.signature);
   ++report_.adopted;

@@ -93,7 +93,7 @@ void ViewSketches::insert(std::span<const ViewId> views, std::span<const std::ui
   require(magnitudes.size() == views.size() * view_bytes, "number of magnitudes",
           static_cast<double>(magnitudes.size()), to_text(double(views.size() * view_bytes)));
   if (views.empty()) return;
-  // What the last segment holds comes first.
+  // The views of the last segment come first.
   std::vector<ViewId> ids;
   std::vector<std::uint8_t> bytes;
   own.add_growing(ids, bytes);
@@ -102,48 +102,48 @@ void ViewSketches::insert(std::span<const ViewId> views, std::span<const std::ui
     own.growing.reset();
   }
   own.size += views.size();
-  const std::size_t most = own.layout->max_rows();
+  const std::size_t max_rows = own.layout->max_rows();
   while (!views.empty()) {
-    const std::size_t taken = std::min(views.size(), most - ids.size());
-    const auto of_these = magnitudes.first(taken * view_bytes);
-    if (ids.empty() && taken == most) {
+    const std::size_t count = std::min(views.size(), max_rows - ids.size());
+    const auto of_these = magnitudes.first(count * view_bytes);
+    if (ids.empty() && count == max_rows) {
       own.segments.push_back(all_live(
-          std::make_shared<const SketchSegment>(*own.layout, views.first(taken), of_these)));
+          std::make_shared<const SketchSegment>(*own.layout, views.first(count), of_these)));
     } else {
-      ids.insert(ids.end(), views.begin(), views.begin() + static_cast<std::ptrdiff_t>(taken));
+      ids.insert(ids.end(), views.begin(), views.begin() + static_cast<std::ptrdiff_t>(count));
       bytes.insert(bytes.end(), of_these.begin(), of_these.end());
-      if (ids.size() == most || taken == views.size()) {
+      if (ids.size() == max_rows || count == views.size()) {
         own.segments.push_back(
             all_live(std::make_shared<const SketchSegment>(*own.layout, ids, bytes)));
-        if (ids.size() < most) {
+        if (ids.size() < max_rows) {
           own.growing = std::make_shared<const std::vector<std::uint8_t>>(std::move(bytes));
         }
         ids.clear();
         bytes.clear();
       }
     }
-    views = views.subspan(taken);
+    views = views.subspan(count);
     magnitudes = magnitudes.subspan(of_these.size());
   }
 }
 
 void ViewSketches::insert(const ViewSketches& other) {
   Implementation& own = *implementation_;
-  const Implementation& given = *other.implementation_;
+  const Implementation& added = *other.implementation_;
   if (!(shape() == other.shape())) {
     throw ContractError(
         "shape of other sketches",
         std::to_string(other.shape().rows) + " x " + std::to_string(other.shape().components),
         std::to_string(shape().rows) + " x " + std::to_string(shape().components));
   }
-  const std::size_t full = given.segments.size() - (given.growing ? 1 : 0);
+  const std::size_t full = added.segments.size() - (added.growing ? 1 : 0);
   const auto at = own.segments.end() - (own.growing ? 1 : 0);
-  own.segments.insert(at, given.segments.begin(),
-                      given.segments.begin() + static_cast<std::ptrdiff_t>(full));
-  for (std::size_t i = 0; i < full; ++i) own.size += given.segments[i].count;
+  own.segments.insert(at, added.segments.begin(),
+                      added.segments.begin() + static_cast<std::ptrdiff_t>(full));
+  for (std::size_t i = 0; i < full; ++i) own.size += added.segments[i].count;
   std::vector<ViewId> ids;
   std::vector<std::uint8_t> bytes;
-  given.add_growing(ids, bytes);
+  added.add_growing(ids, bytes);
   insert(ids, bytes);
 }
 
@@ -153,7 +153,7 @@ void ViewSketches::erase(std::span<const ViewId> views) {
   std::ranges::sort(gone);
   for (LiveSegment& segment : own.segments) {
     const SketchSegment& sketches = *segment.sketches;
-    const auto first = std::ranges::lower_bound(gone, sketches.least());
+    const auto first = std::ranges::lower_bound(gone, sketches.smallest_id());
     if (first == gone.end() || sketches.largest() < *first) continue;
     for (std::size_t row = 0; row < sketches.rows(); ++row) {
       if (!segment.has(row) || !std::ranges::binary_search(gone, sketches.views()[row])) continue;

@@ -29,7 +29,7 @@ class ViewSketches {
   /// Shares the sketches.
   ViewSketches(const ViewSketches&);
   ViewSketches& operator=(const ViewSketches&);
-  /// What is left of the other may only be destroyed or assigned to.
+  /// A moved-from object may only be destroyed or assigned to.
   ViewSketches(ViewSketches&&) noexcept;
   ViewSketches& operator=(ViewSketches&&) noexcept;
 

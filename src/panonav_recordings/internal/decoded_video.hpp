@@ -36,7 +36,7 @@ class DecodedVideo {
   [[nodiscard]] std::optional<DecodedFrame> next();
   /// Ends the program; `next`, which another thread may be in, then gives nothing more.
   void stop() const noexcept { child_->stop(); }
-  /// What ffmpeg complained about last; empty when it did not.
+  /// Returns the last complaint of ffmpeg; empty without one.
   [[nodiscard]] const std::string& trouble() const noexcept { return trouble_; }
 
  private:

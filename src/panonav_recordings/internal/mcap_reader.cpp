@@ -36,8 +36,9 @@ class McapFile : public ChunkedFile {
 
  protected:
   [[nodiscard]] ChunkHead chunk_head(const Block& block) const override {
-    constexpr std::uint64_t most = head_bytes + 8 + 8 + 8 + 4 + 4 + 32 + 8;
-    const Buffer bytes = bytes_at(block.at, std::min(most, size() - std::min(block.at, size())));
+    constexpr std::uint64_t max_head_bytes = head_bytes + 8 + 8 + 8 + 4 + 4 + 32 + 8;
+    const Buffer bytes =
+        bytes_at(block.at, std::min(max_head_bytes, size() - std::min(block.at, size())));
     Fields fields(bytes.bytes());
     const auto kind = fields.number<McapRecord>();
     const auto length = fields.number<std::uint64_t>();
@@ -158,13 +159,13 @@ class McapFile : public ChunkedFile {
     }
   }
 
-  /// What the footer says of the summary.
+  /// Position and checksum of the summary.
   struct Footer {
     std::uint64_t at = 0;  ///< of the footer itself
     std::uint64_t summary_at = 0;
     std::uint32_t sum = 0;  ///< checksum of the summary; 0: none
   };
-  /// What the records of the summary say of the messages.
+  /// Counts of messages in the records of the summary.
   struct Summary {
     std::uint64_t indexed = 0;              ///< messages of all indexed chunks
     std::optional<std::uint64_t> messages;  ///< of the whole file
@@ -172,8 +173,8 @@ class McapFile : public ChunkedFile {
     bool is_complete = true;
   };
 
-  // Whether the summary stands for the whole file. What is wrong with it is warned of; a file may
-  // also have none, or one without all that is needed.
+  // Returns true if the summary describes the whole file. Warns of faults in it; a file may also
+  // have none, or an incomplete one.
   bool read_summary() {
     const auto footer = read_footer();
     if (!footer) return false;  // the pass over the file says what it lacks
@@ -282,7 +283,7 @@ class McapFile : public ChunkedFile {
     return counted == *summary.messages;
   }
 
-  /// Of blocks in order.
+  /// True if any of the sorted blocks overlap.
   [[nodiscard]] bool has_overlapping_blocks() const {
     for (std::size_t i = 1; i < blocks_.size(); ++i) {
       if (blocks_[i].at < blocks_[i - 1].index_at + blocks_[i - 1].index_bytes) return true;

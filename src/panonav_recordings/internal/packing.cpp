@@ -16,7 +16,7 @@ namespace panonav::recordings {
 
 namespace {
 
-// Whether the stream ended within `to`; `filled` says how far it came.
+// Returns true if the stream ended within `to`, of which `filled` bytes were written.
 bool unpack_lz4(std::span<const std::uint8_t> from, std::span<std::uint8_t> to,
                 std::size_t& filled) {
   LZ4F_dctx* raw = nullptr;
@@ -88,16 +88,16 @@ std::optional<Packing> packing_named(std::string_view name) noexcept {
   return std::nullopt;
 }
 
-Unpacked unpack(std::span<const std::uint8_t> packed, Packing packing, std::size_t most) {
-  require(std::max(packed.size(), most) < std::numeric_limits<unsigned>::max(), "packed bytes",
+Unpacked unpack(std::span<const std::uint8_t> packed, Packing packing, std::size_t max_bytes) {
+  require(std::max(packed.size(), max_bytes) < std::numeric_limits<unsigned>::max(), "packed bytes",
           static_cast<double>(packed.size()), "less than 4 GiB");
   Unpacked result;
-  result.content = Buffer(most);
-  const std::span<std::uint8_t> to(result.content.data.get(), most);
+  result.content = Buffer(max_bytes);
+  const std::span<std::uint8_t> to(result.content.data.get(), max_bytes);
   std::size_t filled = 0;
   switch (packing) {
     case Packing::none:
-      filled = std::min(packed.size(), most);
+      filled = std::min(packed.size(), max_bytes);
       if (filled > 0) std::memcpy(to.data(), packed.data(), filled);
       result.whole = filled == packed.size();
       break;
@@ -115,21 +115,22 @@ Unpacked unpack(std::span<const std::uint8_t> packed, Packing packing, std::size
   return result;
 }
 
-Unpacked unpack_frame(std::span<const std::uint8_t> packed, std::size_t most) {
+Unpacked unpack_frame(std::span<const std::uint8_t> packed, std::size_t max_bytes) {
   // Where the frame does not say its size, this is a number beyond all sizes.
-  const auto told = ZSTD_getFrameContentSize(packed.data(), packed.size());
-  std::size_t size = static_cast<std::size_t>(std::min<std::uint64_t>(told, most));
-  if (told == ZSTD_CONTENTSIZE_UNKNOWN) size = std::min(most, 16 * packed.size() + 4096);
+  const auto stated_size = ZSTD_getFrameContentSize(packed.data(), packed.size());
+  std::size_t size = static_cast<std::size_t>(std::min<std::uint64_t>(stated_size, max_bytes));
+  if (stated_size == ZSTD_CONTENTSIZE_UNKNOWN)
+    size = std::min(max_bytes, 16 * packed.size() + 4096);
   while (true) {
     Unpacked unpacked = unpack(packed, Packing::zstd, size);
     const bool is_full = !unpacked.whole && unpacked.content.size == size;
-    if (!is_full || size == most || told <= most) return unpacked;
-    size = std::min(most, 16 * size);
+    if (!is_full || size == max_bytes || stated_size <= max_bytes) return unpacked;
+    size = std::min(max_bytes, 16 * size);
   }
 }
 
 UnpackedFile unpack_file(const std::filesystem::path& packed, const std::filesystem::path& to,
-                         std::uint64_t most) {
+                         std::uint64_t max_bytes) {
   std::ifstream from(packed, std::ios::binary);
   if (!from) throw FileError(packed.string(), "cannot be read");
   std::ofstream file(to, std::ios::binary);
@@ -149,7 +150,7 @@ UnpackedFile unpack_file(const std::filesystem::path& packed, const std::filesys
       left = ZSTD_decompressStream(context.get(), &out, &in);
       if (ZSTD_isError(left) != 0) return done;
       is_full = out.pos == out.size;
-      if (done.bytes + out.pos > most) {
+      if (done.bytes + out.pos > max_bytes) {
         done.too_long = true;
         return done;
       }

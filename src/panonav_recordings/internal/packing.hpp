@@ -11,10 +11,10 @@
 
 namespace panonav::recordings {
 
-/// How the bytes of a chunk are packed: LZ4 and Zstandard as frames of those.
+/// Compression of the bytes of a chunk; LZ4 and Zstandard as frames.
 enum class Packing { none, lz4, zstd, bz2 };
 
-/// By the name that recordings give it: "" or "none", "lz4", "zstd", "bz2".
+/// Finds the compression by its name in recordings: "" or "none", "lz4", "zstd", "bz2".
 [[nodiscard]] std::optional<Packing> packing_named(std::string_view name) noexcept;
 
 /// Bytes that are not cleared first, so that memory is taken only as it is filled.
@@ -27,28 +27,28 @@ struct Buffer {
   std::size_t size = 0;
 };
 
-/// What `packed` unpacks to: at most `most` bytes, and never more work than for one byte beyond
+/// Unpacks `packed` to at most `max_bytes` bytes, and never more work than for one byte beyond
 /// them. `whole`: that was all of a complete stream. Else what came before the damage, the end of
-/// `packed`, or `most`.
+/// `packed`, or `max_bytes`.
 struct Unpacked {
   Buffer content;
   bool whole = false;
 };
 [[nodiscard]] Unpacked unpack(std::span<const std::uint8_t> packed, Packing packing,
-                              std::size_t most);
+                              std::size_t max_bytes);
 
-/// A Zstandard frame of a size that is not known, of at most `most` bytes.
-[[nodiscard]] Unpacked unpack_frame(std::span<const std::uint8_t> packed, std::size_t most);
+/// A Zstandard frame of a size that is not known, of at most `max_bytes` bytes.
+[[nodiscard]] Unpacked unpack_frame(std::span<const std::uint8_t> packed, std::size_t max_bytes);
 
-/// Writes what the Zstandard frames of a file unpack to: at most `most` bytes. Memory: two buffers
-/// of 128 KiB and the frames' window, at most 128 MiB.
+/// Writes what the Zstandard frames of a file unpack to: at most `max_bytes` bytes. Memory: two
+/// buffers of 128 KiB and the frames' window, at most 128 MiB.
 struct UnpackedFile {
   std::uint64_t bytes = 0;  ///< written
   bool whole = false;       ///< else the packed file is damaged or cut off behind them
-  bool too_long = false;    ///< more than `most`
+  bool too_long = false;    ///< more than `max_bytes`
 };
 [[nodiscard]] UnpackedFile unpack_file(const std::filesystem::path& packed,
-                                       const std::filesystem::path& to, std::uint64_t most);
+                                       const std::filesystem::path& to, std::uint64_t max_bytes);
 
 /// Replaces `packed` by one LZ4 or Zstandard frame of the bytes, at the speed of a recorder.
 void pack(std::span<const std::uint8_t> bytes, Packing packing, std::vector<std::uint8_t>& packed);

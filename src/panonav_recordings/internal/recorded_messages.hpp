@@ -20,7 +20,7 @@ struct RecordedPicture {
   std::int64_t stamp_ns = 0;  ///< of its header
 };
 
-/// What the chosen topics of a recording say, message by message.
+/// Collects the messages of the chosen topics of a recording.
 struct RecordedMessages {
   std::vector<RecordedPicture> pictures;  ///< one or more, in the order of their recording
   RecordedTrack odometry;                 ///< empty where `chain` gives it

@@ -69,26 +69,26 @@ class TopicChooser {
                                         "; name one with the option image_topic");
   }
 
-  void choose_odometry(const InputOptions::Topics& wanted) {
-    if (wanted.odometry && wanted.odometry_frames) {
+  void choose_odometry(const InputOptions::Topics& requested) {
+    if (requested.odometry && requested.odometry_frames) {
       throw ContractError("odometry", "a topic and frames", "one of the two");
     }
-    if (wanted.odometry) {
-      return use(find_named(*wanted.odometry, is_odometry_type, ros::Odometry::type),
+    if (requested.odometry) {
+      return use(find_named(*requested.odometry, is_odometry_type, ros::Odometry::type),
                  TopicRole::odometry);
     }
     const auto names = names_of(is_odometry_type);
-    if (!wanted.odometry_frames && names.size() == 1) {
+    if (!requested.odometry_frames && names.size() == 1) {
       return use(numbers_of(names[0], is_odometry_type), TopicRole::odometry);
     }
-    if (!wanted.odometry_frames && !names.empty()) {
+    if (!requested.odometry_frames && !names.empty()) {
       choice_.warnings.push_back("odometry of several topics, of which none is used: " +
                                  list_topics(names) + "; name one with the option odometry_topic");
       return;
     }
-    choice_.frames_are_named = wanted.odometry_frames.has_value();
-    choice_.frames =
-        wanted.odometry_frames.value_or(std::pair<std::string, std::string>{"odom", "base_link"});
+    choice_.frames_are_named = requested.odometry_frames.has_value();
+    choice_.frames = requested.odometry_frames.value_or(
+        std::pair<std::string, std::string>{"odom", "base_link"});
     for (const auto& name : names_of(is_transform_type)) {
       use(numbers_of(name, is_transform_type), TopicRole::transforms);
     }

@@ -14,7 +14,7 @@
 
 namespace panonav::recordings {
 
-/// What the messages of a topic give a data set.
+/// Role of the messages of a topic in a data set.
 enum class TopicRole { none, picture, odometry, transforms, tilt, truth };
 
 /// Which topics of a recording become the data set.

@@ -12,7 +12,7 @@
 
 namespace panonav::recordings {
 
-/// Of a message: when it was recorded, and what its header says.
+/// Times of a message: when it was recorded, and the stamp of its header.
 struct RecordedTimes {
   std::int64_t log_ns = 0;
   std::int64_t stamp_ns = 0;

@@ -71,9 +71,9 @@ void RecordingFile::fail(std::string_view what) const {
   throw FileError(path_.string(), to_readable_line(what));
 }
 
-void RecordingFile::require_room(std::size_t places, std::size_t most) const {
-  if (places > most) {
-    fail("has too many messages to list; allowed: up to " + std::to_string(most));
+void RecordingFile::require_room(std::size_t places, std::size_t max_places) const {
+  if (places > max_places) {
+    fail("has too many messages to list; allowed: up to " + std::to_string(max_places));
   }
 }
 
@@ -134,14 +134,14 @@ Buffer ChunkedFile::bytes_at(std::uint64_t at, std::uint64_t count) const {
   return buffer;
 }
 
-std::span<const std::uint8_t> ChunkedFile::peek(std::uint64_t at, std::size_t most) {
+std::span<const std::uint8_t> ChunkedFile::peek(std::uint64_t at, std::size_t max_bytes) {
   if (at >= size_) return {};
-  most = static_cast<std::size_t>(std::min<std::uint64_t>(most, size_ - at));
-  if (at < ahead_at_ || at + most > ahead_at_ + ahead_.size) {
-    ahead_ = bytes_at(at, std::min<std::uint64_t>(std::max(most, ahead_bytes), size_ - at));
+  max_bytes = static_cast<std::size_t>(std::min<std::uint64_t>(max_bytes, size_ - at));
+  if (at < ahead_at_ || at + max_bytes > ahead_at_ + ahead_.size) {
+    ahead_ = bytes_at(at, std::min<std::uint64_t>(std::max(max_bytes, ahead_bytes), size_ - at));
     ahead_at_ = at;
   }
-  return ahead_.bytes().subspan(static_cast<std::size_t>(at - ahead_at_), most);
+  return ahead_.bytes().subspan(static_cast<std::size_t>(at - ahead_at_), max_bytes);
 }
 
 void ChunkedFile::warn_cut(std::uint64_t at) const {
@@ -208,8 +208,9 @@ std::shared_ptr<const Buffer> ChunkedFile::content(std::uint64_t block) const {
   return buffer;
 }
 
-void ChunkedFile::list(std::size_t block, const std::vector<bool>& wanted, const TimeSpan& within,
-                       std::size_t most, std::vector<MessagePlace>& places) const {
+void ChunkedFile::list(std::size_t block, const std::vector<bool>& chosen_topics,
+                       const TimeSpan& within, std::size_t max_places,
+                       std::vector<MessagePlace>& places) const {
   const Block& from = blocks_.at(block);
   std::vector<Entry> read;
   if (!from.entries && (!list_index(from, read) || read.size() != from.messages)) {
@@ -220,11 +221,12 @@ void ChunkedFile::list(std::size_t block, const std::vector<bool>& wanted, const
     }
   }
   for (const Entry& entry : from.entries ? *from.entries : read) {
-    if (!wanted[entry.topic] || entry.time_ns < within.begin_ns || entry.time_ns > within.end_ns) {
+    if (!chosen_topics[entry.topic] || entry.time_ns < within.begin_ns ||
+        entry.time_ns > within.end_ns) {
       continue;
     }
     places.push_back({entry.time_ns, entry.topic, 0, block, entry.offset});
-    require_room(places.size(), most);
+    require_room(places.size(), max_places);
   }
 }
 

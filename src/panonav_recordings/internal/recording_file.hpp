@@ -38,9 +38,10 @@ class RecordingFile {
   /// The times between which the messages of each block lie; nothing where it has none.
   [[nodiscard]] virtual std::vector<std::optional<TimeSpan>> blocks() const = 0;
   /// Appends the places of the messages of a block that are of the wanted topics and within the
-  /// span, in any order. Throws FileError beyond `most` places in all.
-  virtual void list(std::size_t block, const std::vector<bool>& wanted, const TimeSpan& within,
-                    std::size_t most, std::vector<MessagePlace>& places) const = 0;
+  /// span, in any order. Throws FileError beyond `max_places` places in all.
+  virtual void list(std::size_t block, const std::vector<bool>& chosen_topics,
+                    const TimeSpan& within, std::size_t max_places,
+                    std::vector<MessagePlace>& places) const = 0;
   /// Throws FileError on damage.
   [[nodiscard]] virtual RecordedMessage read(const MessagePlace& place) const = 0;
   /// Adds the line "PATH: what" to the warnings, once.
@@ -55,7 +56,7 @@ class RecordingFile {
   std::uint32_t topic_of(std::string_view name, std::string_view type, std::string_view encoding);
   void forget_topics() noexcept;
   /// Throws FileError when there are more places than allowed.
-  void require_room(std::size_t places, std::size_t most) const;
+  void require_room(std::size_t places, std::size_t max_places) const;
   [[noreturn]] void fail(std::string_view what) const;
 
   std::vector<RecordedTopic> topics_;
@@ -111,8 +112,8 @@ class ChunkedFile : public RecordingFile {
   ChunkedFile(const ChunkedFile&) = delete;
   ChunkedFile& operator=(const ChunkedFile&) = delete;
   [[nodiscard]] std::vector<std::optional<TimeSpan>> blocks() const override;
-  void list(std::size_t block, const std::vector<bool>& wanted, const TimeSpan& within,
-            std::size_t most, std::vector<MessagePlace>& places) const override;
+  void list(std::size_t block, const std::vector<bool>& chosen_topics, const TimeSpan& within,
+            std::size_t max_places, std::vector<MessagePlace>& places) const override;
   [[nodiscard]] RecordedMessage read(const MessagePlace& place) const override;
 
  protected:
@@ -132,7 +133,7 @@ class ChunkedFile : public RecordingFile {
     std::uint64_t messages = 0;                 ///< that the index has
     std::optional<std::vector<Entry>> entries;  ///< of files without an index
   };
-  /// What stands in front of a chunk's bytes.
+  /// Header in front of a chunk's bytes.
   struct ChunkHead {
     std::uint64_t at = 0;  ///< of the packed bytes
     std::uint64_t packed_bytes = 0;
@@ -164,11 +165,11 @@ class ChunkedFile : public RecordingFile {
   void warn_cut(std::uint64_t at) const;
   /// The size of the file when it was opened.
   [[nodiscard]] std::uint64_t size() const noexcept { return size_; }
-  /// So many bytes of the file. Throws FileError where it lacks them.
+  /// Reads `count` bytes of the file. Throws FileError where it lacks them.
   [[nodiscard]] Buffer bytes_at(std::uint64_t at, std::uint64_t count) const;
   /// As that for small records one after another, which are read ahead; fewer at the end of the
   /// file. They are there until the next call.
-  [[nodiscard]] std::span<const std::uint8_t> peek(std::uint64_t at, std::size_t most);
+  [[nodiscard]] std::span<const std::uint8_t> peek(std::uint64_t at, std::size_t max_bytes);
 
   RecordingLimits limits_;
   std::vector<Block> blocks_;

@@ -83,8 +83,9 @@ class BagFile : public ChunkedFile {
 
  protected:
   [[nodiscard]] ChunkHead chunk_head(const Block& block) const override {
-    constexpr std::uint64_t most = 4096;
-    const Buffer bytes = bytes_at(block.at, std::min(most, size() - std::min(block.at, size())));
+    constexpr std::uint64_t max_head_bytes = 4096;
+    const Buffer bytes =
+        bytes_at(block.at, std::min(max_head_bytes, size() - std::min(block.at, size())));
     Fields fields(bytes.bytes());
     const auto header = fields.prefixed();
     const BagFields named(header);
@@ -189,7 +190,8 @@ class BagFile : public ChunkedFile {
     connections_.emplace(*number, topic_of(header.text("topic"), data.text("type"), "ros1"));
   }
 
-  // What stands behind the chunks: their connections and times. False where it is damaged.
+  // Reads the index after the chunks: their connections and times. Returns false where it is
+  // damaged.
   bool read_index(std::uint64_t index_at, std::uint32_t chunks) {
     if (index_at < bag_magic.size() || size() - index_at > limits_.chunk_bytes) return false;
     const Buffer bytes = bytes_at(index_at, size() - index_at);

@@ -92,8 +92,8 @@ class DatabaseFile : public RecordingFile {
 
   [[nodiscard]] std::vector<std::optional<TimeSpan>> blocks() const override { return {time_}; }
 
-  void list(std::size_t, const std::vector<bool>& wanted, const TimeSpan& within, std::size_t most,
-            std::vector<MessagePlace>& places) const override {
+  void list(std::size_t, const std::vector<bool>& chosen_topics, const TimeSpan& within,
+            std::size_t max_places, std::vector<MessagePlace>& places) const override {
     const std::lock_guard lock(mutex_);
     // The index of times pays for a part of them alone.
     const bool is_all = within.begin_ns <= time_->begin_ns && within.end_ns >= time_->end_ns;
@@ -107,9 +107,9 @@ class DatabaseFile : public RecordingFile {
     }
     while (step(rows)) {
       const auto place = place_in(rows);
-      if (!place || !wanted[place->topic]) continue;
+      if (!place || !chosen_topics[place->topic]) continue;
       places.push_back(*place);
-      require_room(places.size(), most);
+      require_room(places.size(), max_places);
     }
   }
 
@@ -186,7 +186,8 @@ class DatabaseFile : public RecordingFile {
     }
   }
 
-  // Of a row that begins with id, topic and time. Empty where these are none.
+  // Reads the place of a message from a row that begins with id, topic and time. Empty where these
+  // have other types.
   [[nodiscard]] std::optional<MessagePlace> place_in(const Statement& row) const {
     for (int column = 0; column < 3; ++column) {
       if (sqlite3_column_type(row.get(), column) != SQLITE_INTEGER) {

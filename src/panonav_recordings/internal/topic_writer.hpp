@@ -50,7 +50,8 @@ inline std::int64_t nanoseconds(double stamp_s) {
          std::llround(is_whole_us ? 1e3 * rest_us : rest_ns);
 }
 
-/// What is known of a robot beside its pictures, on the topics where `read_recording` looks for it.
+/// Writes odometry, tilt and true pose of a robot on the topics where `read_recording` looks for
+/// them.
 class RobotTopics {
  public:
   /// `world`: the frame of true poses.

@@ -143,28 +143,28 @@ void V4l2Camera::start(const std::optional<ImageSize>& size) {
   if (!control(descriptor_, VIDIOC_S_FMT, &format)) {
     fail(std::string("does not take the format ") + name_of(*chosen) + ": " + std::strerror(errno));
   }
-  const auto& given = format.fmt.pix;
-  if (!is_usable(given.pixelformat) || given.width < 1 || given.height < 1 || given.width > 65535 ||
-      given.height > 65535) {
-    fail("gives pictures of " + std::to_string(given.width) + " x " + std::to_string(given.height) +
-         " px as " + name_of(given.pixelformat));
+  const auto& pixels = format.fmt.pix;
+  if (!is_usable(pixels.pixelformat) || pixels.width < 1 || pixels.height < 1 ||
+      pixels.width > 65535 || pixels.height > 65535) {
+    fail("gives pictures of " + std::to_string(pixels.width) + " x " +
+         std::to_string(pixels.height) + " px as " + name_of(pixels.pixelformat));
   }
-  pixels_ = given.pixelformat;
-  size_ = {static_cast<int>(given.width), static_cast<int>(given.height)};
+  pixels_ = pixels.pixelformat;
+  size_ = {static_cast<int>(pixels.width), static_cast<int>(pixels.height)};
   const std::uint32_t pixel_bytes = pixels_ == V4L2_PIX_FMT_GREY ? 1 : 2;
-  step_ = std::max(given.bytesperline, given.width * pixel_bytes);
+  step_ = std::max(pixels.bytesperline, pixels.width * pixel_bytes);
 
-  v4l2_requestbuffers wanted{};
-  wanted.count = 4;
-  wanted.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-  wanted.memory = V4L2_MEMORY_MMAP;
-  if (!control(descriptor_, VIDIOC_REQBUFS, &wanted) || wanted.count < 2) {
+  v4l2_requestbuffers request{};
+  request.count = 4;
+  request.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+  request.memory = V4L2_MEMORY_MMAP;
+  if (!control(descriptor_, VIDIOC_REQBUFS, &request) || request.count < 2) {
     fail("is used by another program, or gives no buffers");
   }
-  for (std::uint32_t i = 0; i < wanted.count; ++i) {
+  for (std::uint32_t i = 0; i < request.count; ++i) {
     v4l2_buffer buffer{};
-    buffer.type = wanted.type;
-    buffer.memory = wanted.memory;
+    buffer.type = request.type;
+    buffer.memory = request.memory;
     buffer.index = i;
     if (!control(descriptor_, VIDIOC_QUERYBUF, &buffer)) fail("gives no buffers");
     void* const data = mmap(nullptr, buffer.length, PROT_READ | PROT_WRITE, MAP_SHARED, descriptor_,
@@ -226,7 +226,7 @@ std::optional<V4l2Camera::Frame> V4l2Camera::next(int stop) {
             std::chrono::microseconds(buffer.timestamp.tv_usec));
       }
       if (sequence_) frame.lost = buffer.sequence - *sequence_ - 1U;
-      if (frame.lost > 1'000'000) frame.lost = 0;  // the driver began to count anew
+      if (frame.lost > 1'000'000) frame.lost = 0;  // the driver restarted its counter
       sequence_ = buffer.sequence;
     }
     if (!control(descriptor_, VIDIOC_QBUF, &buffer)) fail("has gone");

@@ -72,8 +72,8 @@ ddsi_serdata* from_vector(const ddsi_sertype* type, ddsi_serdata_kind kind,
   return sample;
 }
 
-ddsi_serdata* from_bytes(const ddsi_sertype* type, ddsi_serdata_kind kind, const void* given) {
-  const ByteSpan bytes = *static_cast<const ByteSpan*>(given);
+ddsi_serdata* from_bytes(const ddsi_sertype* type, ddsi_serdata_kind kind, const void* span) {
+  const ByteSpan bytes = *static_cast<const ByteSpan*>(span);
   const std::size_t size = (bytes.size() + 3) / 4 * 4;
   RawSample* const sample = make_sample(type, kind, size);
   if (sample == nullptr) return nullptr;

@@ -14,7 +14,7 @@ namespace panonav::ros2 {
 /// `dds_write` is a `std::span<const std::uint8_t>`. Belongs to the topic that is made of it.
 [[nodiscard]] ddsi_sertype* make_raw_type(const std::string& name);
 
-/// With its encapsulation header, as it came.
+/// Returns the bytes with their encapsulation header, as received.
 [[nodiscard]] std::span<const std::uint8_t> bytes_of(const ddsi_serdata& sample);
 
 }  // namespace panonav::ros2

@@ -10,8 +10,8 @@
 
 namespace panonav {
 
-/// What localisation and tracking learn of a memory before they answer, with the default options of
-/// learning and over all components.
+/// Models that localisation and tracking learn of a memory before they answer, with the default
+/// options of learning and over all components.
 struct LearntModels {
   PlaceModel place;        ///< for whether a place is known
   PositionModel position;  ///< for positions between references

@@ -18,7 +18,7 @@ namespace panonav {
 void write_map(MemoryTables& tables, std::string_view name, const TopologicalMap& map);
 /// Empty when there is no such map.
 [[nodiscard]] std::optional<TopologicalMap> read_map(MemoryTables& tables, std::string_view name);
-/// Whether there was one.
+/// Returns true if there was one.
 bool erase_map(MemoryTables& tables, std::string_view name);
 /// Drops the nodes of these views, and their edges, from all maps.
 void forget_in_maps(MemoryTables& tables, std::span<const ViewId> views);

@@ -14,8 +14,7 @@
 
 namespace panonav {
 
-/// What every way of keeping a memory has in common: the bytes of its rows, their checksums, and
-/// what is refused.
+/// Functions for memories in files and on servers alike: bytes of rows, checksums, refusals.
 
 /// Calls work(part) for one part of the rows after the other.
 template <class Row, class Work>
@@ -28,14 +27,14 @@ void in_parts(const std::vector<Row>& rows, std::size_t at_once, const Work& wor
 /// Magnitudes, then phases, into `bytes`.
 void pack_signature(const PackedSignature& signature, std::vector<std::uint8_t>& bytes);
 
-/// Over all fields of a view. `scratch` saves an allocation a view.
+/// Computes the checksum over all fields of a view. `scratch` saves an allocation a view.
 [[nodiscard]] std::int64_t view_checksum(RecordBytes& scratch, ViewId id, const ReferenceInfo& info,
                                          std::span<const std::uint8_t> signature);
-/// Of a thumbnail or of local features.
+/// Computes the checksum of a thumbnail or of local features.
 [[nodiscard]] std::int64_t bytes_checksum(ViewId view, std::span<const std::uint8_t> bytes);
 [[nodiscard]] std::int64_t link_checksum(const Link& link);
 [[nodiscard]] std::int64_t setting_checksum(std::string_view key, const SettingValue& value);
-/// Of a change that can be undone; `stamp_s` says when it was made.
+/// Computes the checksum of a change that can be undone; `stamp_s` is when it was made.
 [[nodiscard]] std::int64_t undo_checksum(std::string_view what, double stamp_s,
                                          std::span<const std::uint8_t> changes);
 

@@ -70,7 +70,7 @@ constexpr std::array<Table, 12> tables{{
      "NOT NULL, checksum INTEGER NOT NULL) STRICT, WITHOUT ROWID"},
 }};
 
-// What SQLite adds by itself: the last id of the views, and the index of their names.
+// Entries that SQLite adds by itself: the last id of the views, and the index of their names.
 constexpr std::string_view sequence = "CREATE TABLE sqlite_sequence(name,seq)";
 constexpr std::string_view names_index = "sqlite_autoindex_views_1";
 // The second end of a link, so that a view's links are found from either.

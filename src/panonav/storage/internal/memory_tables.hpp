@@ -26,14 +26,14 @@ struct ViewRow {
   std::int64_t checksum = 0;
 };
 
-/// What a sketch is made of: no checksum covers it alone.
+/// The columns that a sketch is made of; no checksum covers them alone.
 struct MagnitudesRow {
   ViewId id;
   std::optional<Point2> position;
   std::span<const std::uint8_t> magnitudes;  ///< valid until the next row is read
 };
 
-/// Where a view was taken.
+/// The pose of a view.
 struct PositionRow {
   ViewId id;
   ReferencePose pose;
@@ -65,9 +65,9 @@ struct StoredBytes {
 /// Tables of bytes that some views have.
 enum class BesideViews { thumbnails, features };
 
-/// Where the rows of one memory are kept: an SQLite file or a PostgreSQL server. What the rows mean
-/// and what is refused is decided above (`MemoryFile`, map_tables.hpp, route_tables.hpp), once.
-/// Everything that the database refuses is thrown as a FileError of one line that names the memory.
+/// Storage of the rows of one memory: an SQLite file or a PostgreSQL server. `MemoryFile`,
+/// map_tables.hpp and route_tables.hpp decide what the rows mean and what is refused. Everything
+/// that the database refuses is thrown as a FileError of one line that names the memory.
 class MemoryTables {
  public:
   enum class Kind { reading, writing };
@@ -93,9 +93,9 @@ class MemoryTables {
   MemoryTables(const MemoryTables&) = delete;
   MemoryTables& operator=(const MemoryTables&) = delete;
 
-  /// As it was given.
+  /// Returns the path or address as it was passed.
   [[nodiscard]] virtual const std::filesystem::path& path() const noexcept = 0;
-  /// What messages of damage call the memory.
+  /// Returns the path that messages of damage name.
   [[nodiscard]] virtual const std::filesystem::path& place() const noexcept = 0;
   [[noreturn]] void fail_damaged(std::string_view what) const;
   /// Throws FileError on a number that no view has.
@@ -132,7 +132,7 @@ class MemoryTables {
   virtual void read_magnitudes(ViewId first, ViewId last, std::size_t bytes,
                                const Take<MagnitudesRow>& take) = 0;
   [[nodiscard]] virtual std::optional<ViewId> find(std::string_view name) = 0;
-  /// By ascending id.
+  /// Returns the names of all views by ascending id.
   [[nodiscard]] virtual std::vector<std::string> names() = 0;
   /// Ascending.
   [[nodiscard]] virtual std::vector<ViewId> views() = 0;

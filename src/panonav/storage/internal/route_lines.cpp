@@ -30,7 +30,7 @@ std::size_t turn_between(const Pose2& before, const Pose2& now, std::size_t colu
   return static_cast<std::size_t>((turn % size + size) % size);
 }
 
-// What a column is likely to hold: the mean of its left neighbour and of the line before there.
+// Predicts the value of a column: the mean of its left neighbour and of the line before there.
 int guess(std::span<const std::uint8_t> before, std::size_t turn,
           std::span<const std::uint8_t> line, std::size_t column) {
   const int above = before.empty() ? 0 : before[(column + turn) % before.size()];

@@ -14,7 +14,7 @@ namespace panonav {
 namespace {
 
 // Lines of a full block. Many, so that what SQLite adds to a block is small beside it; not more, as
-// the last block is written anew with every append.
+// the last block is written again with every append.
 constexpr std::int64_t lines_of_block = 256;
 
 std::int64_t row_checksum(std::string_view name, const RouteRow& row) {
@@ -168,7 +168,7 @@ bool erase_route(MemoryTables& tables, std::string_view name) {
 
 void verify_routes(MemoryTables& tables,
                    const std::function<void(const std::function<void()>&)>& check) {
-  // From both tables: a route that either has lost is found in the other.
+  // Names of both tables: a route that either has lost is found in the other.
   std::set<std::string> names;
   const auto add = [&](const std::vector<std::string>& found) {
     names.insert(found.begin(), found.end());

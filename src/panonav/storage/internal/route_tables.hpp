@@ -24,7 +24,7 @@ std::size_t append_to_route(MemoryTables& tables, std::string_view name, const R
 [[nodiscard]] std::optional<RoutePanorama> read_route(MemoryTables& tables, std::string_view name);
 /// There must be a route of the one name and none of the other.
 void rename_route(MemoryTables& tables, std::string_view name, std::string_view new_name);
-/// Whether there was one.
+/// Returns true if there was one.
 bool erase_route(MemoryTables& tables, std::string_view name);
 /// Passes every part to `check` that may throw; `check` keeps what it threw.
 void verify_routes(MemoryTables& tables,

@@ -169,17 +169,17 @@ void SqliteTables::write_info(ViewId view, const ReferenceInfo& info, std::int64
 }
 
 void SqliteTables::read_views(const Take<ViewRow>& take) {
-  std::int64_t taken = 0;
+  std::int64_t read = 0;
   Statement rows(database_,
                  "SELECT id, name, x_m, y_m, heading_rad, stamp_s, signature, checksum FROM views "
                  "ORDER BY id");
-  for (; rows.step(); ++taken) take(view_in(rows));
+  for (; rows.step(); ++read) take(view_in(rows));
   // A page that lost its cells loses views without a fault of their own; the index of the names,
   // which lies on other pages, still counts them.
   const std::int64_t count = database_.integer(
       "SELECT count(*) FROM views INDEXED BY sqlite_autoindex_views_1 WHERE name > ''");
-  if (count != taken) {
-    fail_damaged("it holds " + std::to_string(taken) + " of " + std::to_string(count) + " views");
+  if (count != read) {
+    fail_damaged("it holds " + std::to_string(read) + " of " + std::to_string(count) + " views");
   }
 }
 
@@ -412,8 +412,7 @@ std::set<ViewId> SqliteTables::verify_structure(const Check& check) {
   check([&] { static_cast<void>(last_id()); });
   check([&] { static_cast<void>(read_synchronised_views(*this)); });
   check([&] { static_cast<void>(read_synchronised_links(*this)); });
-  // From the table and from the index of the names: a view that either has lost is found in the
-  // other.
+  // Ids of the table and of the index of names: a view that either has lost is found in the other.
   std::set<ViewId> views;
   for (const char* sql : {"SELECT id FROM views NOT INDEXED ORDER BY id",
                           "SELECT id FROM views INDEXED BY sqlite_autoindex_views_1"}) {

@@ -78,7 +78,7 @@ class SqliteTables final : public MemoryTables {
   [[nodiscard]] ViewRow view_in(const Statement& row) const;
   void insert_beside(BesideViews table, ViewId view, std::span<const std::uint8_t> bytes);
   [[nodiscard]] std::vector<std::string> texts(const char* sql);
-  /// What the bounds of `MemoryFile::change` drop.
+  /// Drops what exceeds the bounds of `MemoryFile::change`.
   void shorten_history();
 
   std::filesystem::path path_;

@@ -13,7 +13,7 @@
 
 namespace panonav {
 
-/// What a file knows of a view that a server has, or is being sent.
+/// The file's knowledge of a view that a server has or is being sent.
 struct SynchronisedView {
   std::optional<ViewId> server_view;  ///< its id there; empty: it is being sent for the first time
   std::int64_t local_checksum = 0;    ///< of the row in the file when both were the same
@@ -25,7 +25,8 @@ struct SynchronisedView {
   friend bool operator==(const SynchronisedView&, const SynchronisedView&) = default;
 };
 
-/// Of a signature's packed bytes: signatures are never changed, so it tells views apart.
+/// Computes the checksum of a signature's packed bytes. It identifies a view, as signatures never
+/// change.
 [[nodiscard]] std::int64_t signature_checksum(std::span<const std::uint8_t> signature);
 
 using SynchronisedViews = std::map<ViewId, SynchronisedView>;
