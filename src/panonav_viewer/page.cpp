@@ -149,7 +149,7 @@ void RunPage::add(const recordings::RunMoment& moment) {
   changed.goal = moment.goal;
   if (const std::string changes = staying_json(changed); !changes.empty()) {
     moments_.back().back() = ',';
-    moments_.back() += "\"told\":" + changes + "}";
+    moments_.back() += "\"changes\":" + changes + "}";
   }
   if (number % every_ != 0) return;
   if (number / every_ >= 600) {  // more came than were expected

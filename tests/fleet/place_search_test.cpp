@@ -1,4 +1,4 @@
-// Of memory files; tests/fleet/test_server.py runs all of it with memories on a server, too.
+// Searches memory files; tests/fleet/test_server.py runs all of it with memories on a server, too.
 #include "panonav_fleet/place_search.hpp"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ class PlaceSearchTest : public MemoryFileTest {
     std::vector<NewView> made;
     for (int i = 0; i < count; ++i) {
       made.push_back(random_view(random, small_header().shape, number++));
-      // Of few values, so that there are ties.
+      // Random signatures of few values, so that there are ties.
       for (auto& value : made.back().signature.magnitudes) value /= 64;
     }
     return made;
@@ -130,21 +130,21 @@ TEST_F(PlaceSearchTest, ManyThreadsSearchWhileOthersChange) {
   const auto first = file.append(views(300));
   PlaceSearch search(path);
   // Views that are as the query come, and others go: each search finds one state or the other.
-  NewView wanted = views(1).front();
+  NewView repeated = views(1).front();
   std::atomic<bool> done = false;
   std::atomic<int> wrong = 0;
   std::vector<std::thread> threads;
   for (int thread = 0; thread < 3; ++thread) {
     threads.emplace_back([&] {
       while (!done) {
-        const auto matches = search.search(wanted.signature, {.top = 3}).matches;
+        const auto matches = search.search(repeated.signature, {.top = 3}).matches;
         if (matches.size() != 3 || matches[0].dissimilarity > matches[2].dissimilarity) ++wrong;
       }
     });
   }
   for (int i = 0; i < 10; ++i) {
-    wanted.info.name = "wanted " + std::to_string(i);
-    file.append(wanted);
+    repeated.info.name = "repeated " + std::to_string(i);
+    file.append(repeated);
     file.remove(std::vector{first[static_cast<std::size_t>(i)]});
     search.refresh();
   }
@@ -153,7 +153,7 @@ TEST_F(PlaceSearchTest, ManyThreadsSearchWhileOthersChange) {
   EXPECT_EQ(wrong, 0);
   refresh(search, 300);
   expect_same(search, file);
-  EXPECT_EQ(search.search(wanted.signature, {.top = 3}).matches[2].dissimilarity, 0U);
+  EXPECT_EQ(search.search(repeated.signature, {.top = 3}).matches[2].dissimilarity, 0U);
 }
 
 TEST_F(PlaceSearchTest, RefusesWhatIsNoMemory) {

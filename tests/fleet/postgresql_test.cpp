@@ -128,14 +128,14 @@ TEST_F(MemoryOnServer, StatementsInNamesAreNames) {
   EXPECT_EQ(file.map_names().size(), names.size());
   EXPECT_EQ(file.route_names(), file.map_names());
   const auto again = random_views(0, 1);
-  const std::string taken = message_of<ContractError>([&] {
+  const std::string duplicate = message_of<ContractError>([&] {
     NewView view = again[0];
     view.info.name = names[0];
     file.append(std::vector{again[0], view});
   });
-  EXPECT_TRUE(contains(taken, names[0])) << taken;
+  EXPECT_TRUE(contains(duplicate, names[0])) << duplicate;
   EXPECT_EQ(file.names(), names);
-  // What the server cannot hold as text is refused, and nothing is left of it.
+  // Text that the server cannot hold is refused, and nothing is left of it.
   NewView wrong = random_view(random, small_header().shape, 4);
   wrong.info.name = "\xff";
   const std::string message = message_of<FileError>([&] { file.append(wrong); });
@@ -174,7 +174,8 @@ TEST_F(MemoryOnServer, ChangesAreToldWithTheirAreas) {
   EXPECT_THROW(MemoryChanges(folder / "m.panonav"), FileError);
 }
 
-// What test_server.py counts: says each batch once it is acknowledged, until the server is gone.
+// Reports each batch once it is acknowledged, for test_server.py to count, until the server is
+// gone.
 TEST_F(MemoryOnServer, AppendsUntilTheServerIsGone) {
   const char* memory = std::getenv("PANONAV_TEST_APPEND");
   if (memory == nullptr) GTEST_SKIP() << "no PANONAV_TEST_APPEND";

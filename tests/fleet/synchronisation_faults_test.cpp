@@ -189,7 +189,7 @@ TEST_F(SynchronisedMemory, AFullDiskOfTheFileLosesNothing) {
   EXPECT_TRUE(is_same(content(folder / "b"), all));
 }
 
-/// What bench/synchronise_faults.py starts, kills and counts: a robot that changes its file, tells
+/// The robot that bench/synchronise_faults.py starts, kills and counts: changes its file, tells
 /// each change before and after it was made, and synchronises now and then, for ever or for
 /// PANONAV_TEST_STEPS steps; with -1 it synchronises once.
 TEST_F(SynchronisedMemory, ARobotWorksUntilItIsKilled) {
@@ -244,7 +244,7 @@ TEST_F(SynchronisedMemory, ARobotWorksUntilItIsKilled) {
       };
       const std::vector<ViewId> views = file.views();
       const auto any = [&] { return views[random.index(views.size())]; };
-      const auto told = [&](ViewId view) {
+      const auto identify = [&](ViewId view) {
         return name_of(file.load(std::vector{view}).packed(view));
       };
       const std::uint64_t kind = views.size() < 5 ? 0 : random.index(20);
@@ -252,20 +252,20 @@ TEST_F(SynchronisedMemory, ARobotWorksUntilItIsKilled) {
         for (std::uint64_t i = random.index(3) + 1; i > 0; --i) say("added", add());
       } else if (kind < 15) {
         const ViewId view = any();
-        const auto which = told(view);
+        const auto which = identify(view);
         const double x_m = next++;
         say("moving", which, x_m);
         file.set_pose(view, ReferencePose{x_m, 0.0, std::nullopt});
         say("moved", which, x_m);
       } else if (kind == 15) {
         const ViewId view = any();
-        const auto which = told(view);
+        const auto which = identify(view);
         say("removing", which);
         file.remove(std::vector{view});
         say("removed", which);
       } else if (kind == 16) {
         const ViewId view = any();
-        const auto which = told(view);
+        const auto which = identify(view);
         say("removing", which);
         std::uint64_t instead = 0;
         file.change(

@@ -63,15 +63,15 @@ TEST_F(SynchronisedMemory, WhatOneDoesOthersGet) {
   EXPECT_EQ(sent.removed_on_server, 2U);
   EXPECT_EQ(sent.links_uploaded, 1U);
   open("b").set_parameter("recordings", "2");
-  const SynchronisationReport taken = sync("b");
-  EXPECT_EQ(taken.downloaded, 3U);
-  EXPECT_EQ(taken.updated_in_file, 2U);
-  EXPECT_EQ(taken.removed_in_file, 2U);
-  EXPECT_EQ(taken.links_downloaded, 1U);
-  EXPECT_EQ(taken.conflicts, 0U);
+  const SynchronisationReport received = sync("b");
+  EXPECT_EQ(received.downloaded, 3U);
+  EXPECT_EQ(received.updated_in_file, 2U);
+  EXPECT_EQ(received.removed_in_file, 2U);
+  EXPECT_EQ(received.links_downloaded, 1U);
+  EXPECT_EQ(received.conflicts, 0U);
   EXPECT_TRUE(is_same(content(folder / "a"), content(folder / "b")));
   EXPECT_EQ(names(folder / "b").count("the door"), 1U);
-  // Of what was removed or renamed a recording may bring views back: none counts as known.
+  // A recording may bring removed or renamed views back: none counts as known.
   EXPECT_EQ(open("b").parameter("recordings"), "");
   // Links change and go, too.
   {
@@ -82,7 +82,7 @@ TEST_F(SynchronisedMemory, WhatOneDoesOthersGet) {
   EXPECT_EQ(sync("b").links_uploaded, 1U);
   EXPECT_EQ(sync("a").links_downloaded, 1U);
   EXPECT_TRUE(open("a").links().empty());
-  // What was removed comes back by an undo, as a view of its own.
+  // Removed views come back by an undo, as a view of its own.
   {
     MemoryFile file = open("a");
     file.change([&] { file.remove(std::vector{ViewId{7}}); }, "forget");
@@ -214,8 +214,8 @@ TEST_F(SynchronisedMemory, NamesThatComeTogetherMakeWay) {
   open("a").append(std::vector{named("b/door", 100), named("door", 101)});
   (void)sync("a");
   open("b").append(named("door", 102));
-  const SynchronisationReport taken = sync("b");
-  EXPECT_EQ(taken.renamed, 1U);
+  const SynchronisationReport received = sync("b");
+  EXPECT_EQ(received.renamed, 1U);
   (void)sync("a");
   EXPECT_EQ(names(folder / "b"), (std::set<std::string>{"view_0.png", "view_1.png", "view_2.png",
                                                         "b/door", "door", "b/door (2)"}));

@@ -62,9 +62,9 @@ TEST_F(SynchronisedMemory, AFileKeepsTheAreasAroundIt) {
   const auto all = content(folder / "a");
   const SynchronisationOptions near{areas_around(5.0, 5.0, 12.0)};
   ASSERT_EQ(near.areas->size(), 9U);  // that of (5, 5) and those around it
-  const SynchronisationReport taken = sync("b", near);
-  EXPECT_EQ(taken.downloaded, 4U);  // all others of these areas lie at negative positions
-  EXPECT_EQ(taken.links_downloaded, 1U);
+  const SynchronisationReport received = sync("b", near);
+  EXPECT_EQ(received.downloaded, 4U);  // all others of these areas lie at negative positions
+  EXPECT_EQ(received.links_downloaded, 1U);
   // A view that leaves the file is not removed from the server, nor are its links.
   const SynchronisationOptions far{areas_around(75.0, 45.0, 1.0)};
   const SynchronisationReport moved = sync("b", far);
@@ -93,7 +93,7 @@ TEST_F(SynchronisedMemory, AFileKeepsTheAreasAroundIt) {
   }
   EXPECT_EQ(open("b").links().size(), 1U);
   EXPECT_EQ(names(server("x")).size(), all.size() + 2);
-  // What somebody moves away leaves, what somebody removes goes.
+  // Views that somebody moves away or removes leave the file.
   {
     MemoryFile file = on_server();
     file.set_pose(file.find("view_39.png").value(), ReferencePose{0.0, 0.0, {}});

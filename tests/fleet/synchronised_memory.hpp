@@ -13,7 +13,7 @@
 namespace panonav::fleet {
 using namespace testing;
 
-/// What a view is, whatever its id.
+/// The content of a view, whatever its id.
 struct Seen {
   ReferenceInfo info;
   PackedSignature signature;

@@ -21,7 +21,7 @@ SHARED = ("MemoryFileContent.HeadersComeBack:MemoryFileContent.ContentComesBack:
           "MemoryFileContent.Para*:MemoryFileContent.ABad*:MemoryFileContent.Readers*:MemoryFileContent.TwoW*:"
           "MapTables.*:RouteTables.W*:RouteTables.B*:MemoryFileUndo.*:"
           "ViewsOfAMemoryFile.AreThose*:ViewsOfAMemoryFile.See*:MemoryOnServer.*:SynchronisedMemory.*:PlaceSearchTest.*"
-          # What attacks a file, and how many changes a file keeps for undo: a server keeps the last one.
+          # Excluded: attacks on a file, and the number of changes a file keeps for undo: a server keeps the last one.
           "-*Tampered*:MemoryFileUndo.Damage*:MemoryFileUndo.BringsBackAll*:MemoryFileUndo.History*")
 
 
@@ -51,7 +51,7 @@ class Server:
         run(SERVER, self.folder, "stop")
 
     def kill(self):
-        """As when the machine loses its power: all of its processes at once."""
+        """Kills all processes at once, like a loss of power."""
         first = int((self.folder / "data/postmaster.pid").read_text().split()[0])
         pids = [first] + [int(pid) for pid in subprocess.run(
             ["pgrep", "-P", str(first)], capture_output=True, text=True).stdout.split()]
@@ -89,7 +89,7 @@ def same_answers(server, folder):
             said = re.sub(r'"(created_s|bytes|file_bytes|\w*_ms)":[^,}]*', "", said)
             answers.setdefault(str(memory), []).append(said)
         answer("memorise", folder / "grid", memory)
-        answer("memorise", folder / "grid", memory)  # goes on: nothing is new
+        answer("memorise", folder / "grid", memory)  # continues: nothing is new
         answer("localise", memory, folder / "drive")
         answer("home", "view_00003.png", folder / "drive/view_00004.png", "--memory", memory)
         answer("route", "record", folder / "drive", memory, "--name", "way")
@@ -219,9 +219,9 @@ def searched(server, folder):
         run(PANONAV, "memorise", folder / "grid", memory)  # adds them again, under other ids
         same(before)
         metrics = serving[0].get("/metrics")[1]
-        for name, least in (("panonav_sketch_bytes", 1000), ("panonav_searches_total", len(pictures)),
+        for name, minimum in (("panonav_sketch_bytes", 1000), ("panonav_searches_total", len(pictures)),
                             ("panonav_search_views_read_total", len(pictures)), ("panonav_memory_views", before)):
-            assert float(re.search(name + r'\{memory="m"\} (\S+)', metrics)[1]) >= least, metrics
+            assert float(re.search(name + r'\{memory="m"\} (\S+)', metrics)[1]) >= minimum, metrics
         assert float(re.search(r'panonav_search_seconds_total\{memory="m"\} (\S+)', metrics)[1]) > 0.0
         server.stop()
         status, answer = serving[0].localise(pictures[0])
@@ -248,7 +248,7 @@ def roles(server, folder):
     refused(PANONAV, "localise", other + "&fleet=", folder / "drive", saying="no memory 'hall'")
     refused(PANONAV, "memorise", folder / "grid", other.replace("hall", "new") + "&fleet=", saying="row-level security")
     assert before == run(PANONAV, "list", reads, "--json").split('"views"')[1]
-    # What each may do.
+    # Rights of each role.
     run(PANONAV, "memorise", folder / "grid", server.memory("small", "adds", "&robot=red%20one"))
     run(PANONAV, "forget", server.memory("small", "curates"), "view_00001.png")
     run(PANONAV, "memorise", folder / "grid", other)  # of the same name, in the other fleet
@@ -453,7 +453,7 @@ def synchronised(server, folder):
     sync(one, address)
     assert names(one) == names(two) == names(server.memory("fleet")) and set(expected) < set(names(one))
 
-    # What nobody of us wrote is refused and changes nothing.
+    # A foreign schema is refused and changes nothing.
     before = names(one)
     server.sql(f"UPDATE panonav.views SET signature = signature || '\\x00' WHERE memory = {identity} AND id = 3; UPDATE "
                f"panonav.views SET checksum = 5 WHERE memory = {identity} AND id = 3")
@@ -475,7 +475,7 @@ def other_schema(server):
 
 
 def killed_server(server):
-    """What was acknowledged is there once, the rest not at all or whole."""
+    """Acknowledged views are there once, the others not at all or whole."""
     address = server.memory("appended")
     appending = subprocess.Popen([TEST_FLEET, "--gtest_filter=MemoryOnServer.AppendsUntil*"], text=True,
                                  stdout=subprocess.PIPE, stderr=subprocess.STDOUT,

@@ -66,11 +66,11 @@ struct SketchedCase {
 class SketchedSearch : public ::testing::TestWithParam<SketchedCase> {};
 
 TEST_P(SketchedSearch, FindsWhatAFullScanFinds) {
-  const SketchedCase& given = GetParam();
-  Sketched all(given.shape, given.kind, 31);
-  all.insert(given.views / 2);
+  const SketchedCase& sketched = GetParam();
+  Sketched all(sketched.shape, sketched.kind, 31);
+  all.insert(sketched.views / 2);
   for (int i = 0; i < 3; ++i) all.insert(1);
-  all.insert(given.views / 2);
+  all.insert(sketched.views / 2);
   Random random(32);
   std::vector<ViewId> some;
   for (std::uint32_t id = 1; id <= all.last; ++id) {
@@ -85,12 +85,13 @@ TEST_P(SketchedSearch, FindsWhatAFullScanFinds) {
     const PackedSignature query =
         repeat % 3 == 0 ? all.oracle.views.at(ids[random.index(ids.size())]) : all.maker.next();
     const int components =
-        repeat % 2 == 0 ? 0 : 1 + static_cast<int>(random.index(given.shape.components));
+        repeat % 2 == 0 ? 0 : 1 + static_cast<int>(random.index(sketched.shape.components));
     std::vector<ViewId> excluded;
     for (int i = 0; i < repeat; ++i) excluded.push_back(ids[random.index(ids.size())]);
     std::vector<std::uint8_t> rows;
     if (repeat % 4 == 3) {
-      for (int row = 0; row < given.shape.rows; ++row) rows.push_back(random.index(6) == 0 ? 0 : 1);
+      for (int row = 0; row < sketched.shape.rows; ++row)
+        rows.push_back(random.index(6) == 0 ? 0 : 1);
     }
     const int top = repeat == 5 ? 300 : 1 + static_cast<int>(random.index(20));
     all.expect_exact(query, top, components, {excluded, rows});
@@ -149,7 +150,7 @@ TEST(ViewSketches, ViewsThatAreGoneWhenTheyAreReadAreLeftOut) {
   Sketched all({20, 15}, Kind::clustered, 51);
   all.insert(7000);
   const PackedSignature query = all.maker.next();
-  // Also those that look best by their sketches: the search goes on to others.
+  // Also those that look best by their sketches: the search continues with others.
   for (int round = 0; round < 4; ++round) {
     for (const Match& match : all.oracle.nearest(query, 12, 15, {}))
       all.oracle.views.erase(match.view);

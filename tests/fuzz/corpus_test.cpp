@@ -1,4 +1,4 @@
-// What the fuzzers start from and what they found, on every build.
+// Runs the fuzz targets on their first inputs and on those that failed, in every build.
 #include <gtest/gtest.h>
 
 #include <ctime>
@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Of this thread: other tests run beside this one.
+/// Processor time of this thread: other tests run concurrently.
 double processor_time_s() {
   timespec time{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);

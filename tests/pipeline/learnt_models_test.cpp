@@ -90,18 +90,18 @@ TEST_F(KeptModels, OfOtherViewsAreNotUsed) {
 
 TEST_F(KeptModels, AnswersAreThoseOfModelsLearntAnew) {
   MemoryFile file = make_file();
-  const PlaceRecogniser anew(file);
+  const PlaceRecogniser relearnt(file);
   Tracker tracker_anew(file);
   keep_models(file);
   const PlaceRecogniser kept(file);
   Tracker tracker(file);
-  EXPECT_EQ(kept.localiser().place_model(), anew.localiser().place_model());
-  EXPECT_EQ(kept.localiser().position_model(), anew.localiser().position_model());
+  EXPECT_EQ(kept.localiser().place_model(), relearnt.localiser().place_model());
+  EXPECT_EQ(kept.localiser().position_model(), relearnt.localiser().position_model());
   EXPECT_EQ(tracker.localiser().model(), tracker_anew.localiser().model());
   for (int i = 0; i < 10; ++i) {
     const PackedSignature query = view_at(0, 0.37 * i, 0.21 * i).signature;
     const Place a = kept.localiser().localise(query);
-    const Place b = anew.localiser().localise(query);
+    const Place b = relearnt.localiser().localise(query);
     EXPECT_EQ(a.known, b.known);
     ASSERT_EQ(a.matches.size(), b.matches.size());
     EXPECT_EQ(a.matches.front().view, b.matches.front().view);

@@ -224,7 +224,7 @@ TEST_F(MemoryUpdating, AKillWhileARunIsStoredLeavesTheFileAsBeforeOrAfterIt) {
   auto begun = now();
   before_finish = [&] { begun = now(); };
   ASSERT_GE(run(world, &changed).added, 1U);
-  const auto taken = std::chrono::duration_cast<std::chrono::microseconds>(now() - begun);
+  const auto duration = std::chrono::duration_cast<std::chrono::microseconds>(now() - begun);
   const Remembered learnt = remembered();
   ASSERT_NE(learnt, untouched);
   Random random(23);
@@ -258,7 +258,7 @@ TEST_F(MemoryUpdating, AKillWhileARunIsStoredLeavesTheFileAsBeforeOrAfterIt) {
       ASSERT_EQ(::read(ends[0], &said, 1), 1) << "the run ended by itself";
     } else {
       std::this_thread::sleep_for(
-          std::chrono::microseconds(random.index(static_cast<std::size_t>(taken.count()))));
+          std::chrono::microseconds(random.index(static_cast<std::size_t>(duration.count()))));
     }
     ASSERT_EQ(::kill(child, SIGKILL), 0);
     int status = 0;
@@ -303,7 +303,7 @@ TEST_F(MemoryUpdating, NoiseInTheMidstOfARunDropsNothingAndHasNoAnswersOfItsOwn)
       });
       EXPECT_EQ(changes.forgotten, 0U);
     }
-    // What nobody has ever seen again makes room for what is new, and for nothing else.
+    // Views that were never matched again make room for what is new, and for nothing else.
     const VisualMemory now = file().load();
     for (const ViewId view : before->views()) {
       ASSERT_TRUE(now.contains(view));

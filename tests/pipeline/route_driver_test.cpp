@@ -48,7 +48,7 @@ class RouteDriving : public ::testing::Test {
     return to_picture(world.panorama(pose, 24, 128, band));
   }
 
-  /// Where the robot is in the end; `carry` may put it elsewhere at each step.
+  /// Drives and returns the robot's final pose; `carry` may put it elsewhere at each step.
   Pose2 drive(Pose2 robot, std::uint64_t seed, RouteDriver::State& state,
               const std::function<void(int, Pose2&)>& carry = {}) {
     RouteDriver driver(MemoryFile::open(memory, Access::read_only), std::nullopt);

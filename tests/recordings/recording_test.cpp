@@ -167,7 +167,7 @@ TEST_F(RecordingTest, AFullDiskIsReported) {
   EXPECT_THROW(McapWriter writer(folder / "no" / "a.mcap"), FileError);
 }
 
-// Where a chunk's checksum is wrong the others are read.
+// A chunk with a wrong checksum does not stop the others.
 TEST_F(RecordingTest, ADamagedChunkIsLeftOutAndNamed) {
   const Written written = write_some(folder / "a.mcap", {McapCompression::none, 900, ""}, 60, 2);
   std::string bytes = bytes_of(written.path);

@@ -277,7 +277,7 @@ TEST(RosPictures, BayerPatternsGiveAPlaneOfColoursBack) {
         for (int c = 0; c < 3; ++c) ASSERT_EQ(seen.at(u, v, c), plane.at(u, v, c)) << u << " " << v;
       }
     }
-    // What is measured stays, edges included.
+    // Measured pixels stay, edges included.
     EXPECT_EQ(seen.at(0, 0, pattern[0] == 'r' ? 0 : (pattern[0] == 'g' ? 1 : 2)), data[0]);
   }
 }

@@ -89,15 +89,15 @@ TEST_F(Video, PicturesCanBeReadInAnyOrderAndFromSeveralThreads) {
 TEST_F(Video, ASelectionTakesTheSamePicturesAsOfAFolderWithStamps) {
   const fs::path file = make("walk.mp4", "-c:v libx264rgb -qp 0");
   const auto numbers = [&](const Dataset::Selection& selection) {
-    std::vector<int> taken;
+    std::vector<int> found;
     for (const auto& entry : read_video(file, {}, selection).entries) {
       const Image picture = read_picture(entry);
       for (int i = 0; i < count; ++i) {
-        if (picture == noise(i)) taken.push_back(i);
+        if (picture == noise(i)) found.push_back(i);
       }
-      EXPECT_NEAR(*entry.stamp_s, 0.1 * taken.back(), 1e-6);
+      EXPECT_NEAR(*entry.stamp_s, 0.1 * found.back(), 1e-6);
     }
-    return taken;
+    return found;
   };
   using Numbers = std::vector<int>;
   EXPECT_EQ(numbers({.every_s = 0.5}), (Numbers{0, 5, 10, 15}));

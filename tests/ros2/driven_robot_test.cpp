@@ -73,10 +73,10 @@ TEST_F(LocalisationNodeOnTheWire, DrivesASimulatedRobotToAGoalFindsItKidnappedAn
                   recordings::ros::PoseStamped{
                       {0, "map"}, recordings::ros::pose_of({elsewhere.x_m, elsewhere.y_m, 2.0})});
   EXPECT_TRUE(comes_true([&] {
-    const auto told = FastPeer::next(pose, 1s);
-    return !told.empty() && node_->counts().pictures > before &&
+    const auto cdr = FastPeer::next(pose, 1s);
+    return !cdr.empty() && node_->counts().pictures > before &&
            distance(recordings::ros::planar(
-                        read<recordings::ros::PoseWithCovarianceStamped>(told).pose.pose)
+                        read<recordings::ros::PoseWithCovarianceStamped>(cdr).pose.pose)
                         .position(),
                     elsewhere) < 0.3;
   }));
@@ -154,7 +154,7 @@ TEST_F(LocalisationNodeOnTheWire, LearnsADriveRepeatsItAndGoesOnAfterItDied) {
   EXPECT_TRUE(arrives());
   EXPECT_FALSE(fs::exists(mission));
 
-  // What a node leaves that is killed on its way is there when another one starts.
+  // The mission of a node that was killed is continued by the next one.
   carried_back();
   EXPECT_EQ(ask("repeat drive"), "repeat done");
   ASSERT_TRUE(comes_true([&] { return fs::exists(mission) && robot_is().x_m > 1.3; }));

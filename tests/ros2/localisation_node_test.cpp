@@ -29,13 +29,13 @@ TEST_F(LocalisationNodeOnTheWire, TellsAnotherVendorsProgramsWhereTheRobotIs) {
       peer_.listen<recordings::ros::PoseWithCovarianceStamped>("robot/panonav/pose", true, true);
   auto& references =
       peer_.listen<recordings::ros::PointCloud2>("robot/panonav/references", true, true);
-  const auto told = read<recordings::ros::PoseWithCovarianceStamped>(FastPeer::next(pose, 10s));
-  EXPECT_EQ(told.header.frame_id, "map");
-  const Pose2 found = recordings::ros::planar(told.pose.pose);
+  const auto received = read<recordings::ros::PoseWithCovarianceStamped>(FastPeer::next(pose, 10s));
+  EXPECT_EQ(received.header.frame_id, "map");
+  const Pose2 found = recordings::ros::planar(received.pose.pose);
   EXPECT_LT(distance(found.position(), truth.position()), 0.3);
   EXPECT_LT(std::abs(angle_difference(found.heading_rad, truth.heading_rad)), 0.2);
-  for (const std::size_t i : {0U, 7U, 35U}) EXPECT_GT(told.pose.covariance[i], 0.0) << i;
-  for (const std::size_t i : {14U, 21U, 28U}) EXPECT_EQ(told.pose.covariance[i], 0.0) << i;
+  for (const std::size_t i : {0U, 7U, 35U}) EXPECT_GT(received.pose.covariance[i], 0.0) << i;
+  for (const std::size_t i : {14U, 21U, 28U}) EXPECT_EQ(received.pose.covariance[i], 0.0) << i;
   const auto cloud_bytes = FastPeer::next(references, 10s);
   const auto cloud = read<recordings::ros::PointCloud2>(cloud_bytes);
   EXPECT_EQ(cloud.header.frame_id, "map");
@@ -118,14 +118,14 @@ TEST_F(LocalisationNodeOnTheWire, TakesCompressedPicturesTransformsASimulatedClo
   FastPeer::write(start_pose, begin);
   std::this_thread::sleep_for(100ms);
   for (int i = 1; i < 12 || (i < 40 && FastPeer::waiting(pose) == 0); ++i) step(i);
-  const auto told = FastPeer::next(pose, 10s);
-  ASSERT_FALSE(told.empty());
-  const auto told_pose = read<recordings::ros::PoseWithCovarianceStamped>(told);
-  EXPECT_LT(told_pose.header.stamp_ns, 3'000'000'000);  // of the simulation
+  const auto received = FastPeer::next(pose, 10s);
+  ASSERT_FALSE(received.empty());
+  const auto received_pose = read<recordings::ros::PoseWithCovarianceStamped>(received);
+  EXPECT_LT(received_pose.header.stamp_ns, 3'000'000'000);  // of the simulation
   const double truth_x_m =
-      first.x_m + 0.05 * (1e-9 * static_cast<double>(told_pose.header.stamp_ns) / 0.05 - 1);
-  EXPECT_NEAR(told_pose.pose.pose.position.x, truth_x_m, 0.3);
-  EXPECT_NEAR(told_pose.pose.pose.position.y, first.y_m, 0.3);
+      first.x_m + 0.05 * (1e-9 * static_cast<double>(received_pose.header.stamp_ns) / 0.05 - 1);
+  EXPECT_NEAR(received_pose.pose.pose.position.x, truth_x_m, 0.3);
+  EXPECT_NEAR(received_pose.pose.pose.position.y, first.y_m, 0.3);
   bool dated_ahead = false;
   for (int i = 40; i < 80 && !dated_ahead; ++i) {  // a clock that stands brings no transform
     step(i);

@@ -246,7 +246,7 @@ TEST_F(LocalisationServerTest, ReadsAChangedMemoryAgain) {
   }
   memorise(folder_ / "hall.panonav", world_, 40, 64);
   EXPECT_TRUE(soon([&] { return views() == 64; }));
-  // What cannot be read any more is served as it was.
+  // A memory that can no longer be read is served as it was.
   std::filesystem::remove(folder_ / "hall.panonav");
   std::ofstream(folder_ / "hall.panonav") << "no memory";
   EXPECT_TRUE(soon([&] {

@@ -185,7 +185,7 @@ TEST_F(MemoryFileAttack, IsNamed) {
        "WITH RECURSIVE n(i, b) AS (SELECT 0, bomb(256 * 16410) UNION ALL SELECT i + 1, b FROM n "
        "WHERE i < 199) INSERT INTO route_blocks SELECT 'bomb', i, b, blob_sum('bomb', i, b) FROM n",
        "route bomb: block 0 cannot be unpacked"},
-      // What can be undone.
+      // Kept changes.
       {"INSERT INTO history VALUES(1, 'all', 5.0, x'54FF', 3)", "does not match its checksum"},
   };
   for (const Attack& entry : attacks) {

@@ -1,4 +1,4 @@
-// What happens to a memory file when its writer dies or its disk is full.
+// Memory files whose writer dies or whose disk is full.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/resource.h>
@@ -226,7 +226,7 @@ TEST_F(LogBesideAFile, IsNotRemovedWhileItIsInUse) {
   MemoryFile writer = MemoryFile::open(path, Access::read_write);
   writer.append(numbered_view(small_header().shape, 3));
   { (void)MemoryFile::open(path, Access::read_only); }
-  // As another process would: SQLite removes the log when no lock keeps it from it.
+  // Like another process: SQLite removes the log when no lock keeps it from it.
   EXPECT_EQ(exit_code_of(start_child([&] {
               sqlite3* database = nullptr;
               sqlite3_open(path.c_str(), &database);
@@ -300,7 +300,7 @@ TEST_F(MemoryFileCrash, ChangesInOneAreAllOrNothing) {
   EXPECT_THROW(prune(file, [] { throw ContractError("something", "wrong", "right"); }),
                ContractError);
   EXPECT_TRUE(same_content(file.load(), before));
-  // A part that fails is taken back alone when the caller goes on.
+  // A part that fails is taken back alone when the caller continues.
   file.change([&] {
     EXPECT_THROW(file.remove(std::vector<ViewId>{ids[3], ViewId{99}}), ContractError);
     file.set_parameter("note", "kept");
@@ -349,7 +349,7 @@ TEST_F(MemoryFileCrash, AFullDiskLosesNothing) {
     ASSERT_TRUE(view);
     EXPECT_EQ(memory.packed(*view), expected.signature);
   }
-  // With room again the work goes on.
+  // With room again the work continues.
   EXPECT_GT(file.append(numbered_view(header.shape, appended)), memory.views().back());
 }
 
@@ -399,7 +399,7 @@ class ReadOnlyMemoryFile : public MemoryFileTest {
       file.append(numbered_view(small_header().shape, number));
     }
   }
-  // What an ordinary user can do: 0 reads all and is refused to change.
+  // Rights of an ordinary user: 0 reads all and is refused to change.
   [[nodiscard]] int read_and_try_to_change() const {
     return as_ordinary_user([&] {
       {

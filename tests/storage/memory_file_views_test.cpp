@@ -57,12 +57,12 @@ TEST_F(ViewsOfAMemoryFile, AreThoseOfTheWholeMemory) {
   expect_same_views(all, whole);
   Random random(2);
   for (int trial = 0; trial < 50; ++trial) {
-    std::vector<ViewId> wanted;
+    std::vector<ViewId> chosen;
     for (const ViewId view : whole.views()) {
-      if (random.index(4) == 0) wanted.push_back(view);
+      if (random.index(4) == 0) chosen.push_back(view);
     }
-    const VisualMemory part = source.load(wanted);
-    EXPECT_TRUE(std::ranges::equal(part.views(), wanted));
+    const VisualMemory part = source.load(chosen);
+    EXPECT_TRUE(std::ranges::equal(part.views(), chosen));
     expect_same_views(part, whole);
   }
 }

@@ -110,7 +110,7 @@ TEST_F(RouteTables, WrongLinesAreRefusedAndChangeNothing) {
 TEST_F(RouteTables, TakesLessThan360BytesALineOfTheFile) {
   { (void)MemoryFile::create(path, small_header()); }
   const auto before = std::filesystem::file_size(path);
-  // Round and round in the room; every line is seen anew, with the noise of a camera.
+  // Round and round in the room; every line is observed again, with the noise of a camera.
   const ToyWorld room = pillared_room(1);
   constexpr int places = 120;
   constexpr int laps = 25;

@@ -35,7 +35,7 @@ CONTRAST = """(() => {
   }
   return found;
 })()"""
-# How many colours a canvas holds: one that was not drawn has one.
+# Number of colours of a canvas: 1 if nothing was drawn.
 COLOURS = """name => {
   const canvas = document.querySelector(name);
   if (!canvas || !canvas.width) return 0;
@@ -77,15 +77,15 @@ class Browser:
             self.left += piece
         text, self.left = self.left.split(b"\0", 1)
         message = json.loads(text)
-        what, told = message.get("method"), message.get("params", {})
+        what, params = message.get("method"), message.get("params", {})
         if what == "Runtime.exceptionThrown":
-            self.errors.append(told["exceptionDetails"].get("exception", {}).get("description", str(told)))
-        elif what == "Log.entryAdded" and told["entry"]["level"] in ("error", "warning"):
-            self.errors.append(told["entry"]["text"] + " " + told["entry"].get("url", ""))
-        elif what == "Runtime.consoleAPICalled" and told["type"] in ("error", "warning"):
-            self.errors.append(str(told["args"]))
+            self.errors.append(params["exceptionDetails"].get("exception", {}).get("description", str(params)))
+        elif what == "Log.entryAdded" and params["entry"]["level"] in ("error", "warning"):
+            self.errors.append(params["entry"]["text"] + " " + params["entry"].get("url", ""))
+        elif what == "Runtime.consoleAPICalled" and params["type"] in ("error", "warning"):
+            self.errors.append(str(params["args"]))
         elif what == "Network.requestWillBeSent":
-            self.asked.append(told["request"]["url"])
+            self.asked.append(params["request"]["url"])
         return message
 
     def call(self, method, **parameters):

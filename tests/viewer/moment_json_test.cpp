@@ -20,12 +20,12 @@ TEST(MomentJson, HoldsWhatIsKnownWhateverItIs) {
   moment.covariance = std::array{1.0, 2.0, 0.0, 2.0, 5.0, 0.0, 0.0, 0.0, 9.0};
   moment.truth = ReferencePose{1.00004, 2.0, std::nullopt};
   moment.values = {{"a \"name\"\n</script>", "\xff\xfe"}, {"event", "one"}, {"event", "two"}};
-  const json told = json::parse(moment_json(moment, 0));
-  EXPECT_EQ(told["pose"], json::parse("[null, 2.0, 0.5]"));
-  EXPECT_EQ(told["covariance"], json::parse("[1.0, 2.0, 5.0]"));
-  EXPECT_EQ(told["truth"], json::parse("[1.0, 2.0, null]"));
-  EXPECT_EQ(told["values"]["a \"name\"\n</script>"], "\uFFFD\uFFFD");
-  EXPECT_EQ(told["values"]["event"], "one, two");
+  const json parsed = json::parse(moment_json(moment, 0));
+  EXPECT_EQ(parsed["pose"], json::parse("[null, 2.0, 0.5]"));
+  EXPECT_EQ(parsed["covariance"], json::parse("[1.0, 2.0, 5.0]"));
+  EXPECT_EQ(parsed["truth"], json::parse("[1.0, 2.0, null]"));
+  EXPECT_EQ(parsed["values"]["a \"name\"\n</script>"], "\uFFFD\uFFFD");
+  EXPECT_EQ(parsed["values"]["event"], "one, two");
   EXPECT_EQ(moment_json(moment, 0).find('\n'), std::string::npos);  // one line of an event
   EXPECT_EQ(staying_json(moment), "");
 }
@@ -37,12 +37,12 @@ TEST(MomentJson, TellsModesComparisonsAndStages) {
   moment.comparisons = {{7, 100}, {2, 4'000'000'000U}};
   moment.homing = recordings::RunHoming{1.5, std::numeric_limits<double>::quiet_NaN()};
   moment.stages_ms = {{"reading", 1.25}, {"filter", 0.5}};
-  const json told = json::parse(moment_json(moment, 0));
-  EXPECT_EQ(told["modes"], json::parse("[[0.75, 1.0, 2.0, 0.5, 1.0, 2.0, 5.0],"
-                                       "[0.25, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]]"));
-  EXPECT_EQ(told["compared"], json::parse("[7, 100, 2, 4000000000]"));
-  EXPECT_EQ(told["homing"], json::parse("[1.5, null]"));
-  EXPECT_EQ(told["stages"], json::parse(R"({"reading": 1.25, "filter": 0.5})"));
+  const json parsed = json::parse(moment_json(moment, 0));
+  EXPECT_EQ(parsed["modes"], json::parse("[[0.75, 1.0, 2.0, 0.5, 1.0, 2.0, 5.0],"
+                                         "[0.25, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]]"));
+  EXPECT_EQ(parsed["compared"], json::parse("[7, 100, 2, 4000000000]"));
+  EXPECT_EQ(parsed["homing"], json::parse("[1.5, null]"));
+  EXPECT_EQ(parsed["stages"], json::parse(R"({"reading": 1.25, "filter": 0.5})"));
 }
 
 TEST(MomentJson, TellsWhatStays) {
@@ -51,11 +51,11 @@ TEST(MomentJson, TellsWhatStays) {
   moment.reference_views = {{"a\xff", 0.5}, {"b", std::nullopt}};
   moment.regions = {{{{0.0, 0.0}, {1.0, 0.0}, {0.0, 1.0}}, 3}};
   moment.walls = {{{0.0, 0.0}, {5.0, 0.0}}};
-  const json told = json::parse(staying_json(moment));
-  EXPECT_EQ(told["names"], json::parse(R"(["a\ufffd", "b"])"));
-  EXPECT_EQ(told["headings"], json::parse("[0.5, null]"));
-  EXPECT_EQ(told["regions"], json::parse("[[3, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0]]"));
-  EXPECT_EQ(told["walls"], json::parse("[[0.0, 0.0, 5.0, 0.0]]"));
+  const json parsed = json::parse(staying_json(moment));
+  EXPECT_EQ(parsed["names"], json::parse(R"(["a\ufffd", "b"])"));
+  EXPECT_EQ(parsed["headings"], json::parse("[0.5, null]"));
+  EXPECT_EQ(parsed["regions"], json::parse("[[3, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0]]"));
+  EXPECT_EQ(parsed["walls"], json::parse("[[0.0, 0.0, 5.0, 0.0]]"));
   // Other references without names have not those of the ones before.
   StayingParts staying;
   staying.take(moment);
@@ -65,7 +65,7 @@ TEST(MomentJson, TellsWhatStays) {
   const json kept = json::parse(staying_json(staying.moment));
   EXPECT_EQ(kept["references"], json::parse("[5.0, 6.0]"));
   EXPECT_FALSE(kept.contains("names"));
-  EXPECT_EQ(kept["walls"], told["walls"]);
+  EXPECT_EQ(kept["walls"], parsed["walls"]);
 }
 
 TEST(Page, NeedsNothingFromElsewhere) {

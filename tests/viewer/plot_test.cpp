@@ -27,7 +27,7 @@ class Plot : public InTemporaryFolder {
   Plot() : before_(fs::current_path()) { fs::current_path(folder.path()); }
   ~Plot() override { fs::current_path(before_); }
 
-  /// What lies in the folder.
+  /// Names of the files in the folder.
   [[nodiscard]] std::vector<std::string> files() const {
     std::vector<std::string> names;
     for (const auto& file : fs::directory_iterator(folder.path())) {
@@ -195,7 +195,7 @@ TEST_F(Plot, ColourBarsBeginAtZeroAndHeatMapsAreSmallPictures) {
   EXPECT_TRUE(contains(svg, ">0</text>"));
 }
 
-/// As seen with one kind of cones missing (Machado et al. 2009, severity 1), in CIE L*a*b*.
+/// Colour as seen with one kind of cones missing (Machado et al. 2009, severity 1), in CIE L*a*b*.
 std::array<double, 3> seen(PlotColour colour, const std::array<double, 9>& matrix) {
   std::array<double, 3> linear{};
   for (std::size_t c = 0; c < 3; ++c) {

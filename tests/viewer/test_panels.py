@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Whether the page's panels draw what they drew: test_panels.py [FOLDER] draws one made-up run that holds everything a
 panel can show and compares each canvas, cell by cell, with its reference in tests/viewer/panels. Writes what differs
-into FOLDER. test_panels.py --renew draws the references anew: look at them. Exits with 77 (skipped) without chromium.
+into FOLDER. test_panels.py --renew draws the references again: look at them. Exits with 77 (skipped) without chromium.
 
 A cell is the mean colour of 8 x 8 pixels, and what counts is the mean of the 20 that differ most. Text is not drawn, as fonts differ from machine to machine. The tolerance
 has to be above what another rasteriser does to edges, which drawing with more pixels tells, and below what a layer that
@@ -47,7 +47,7 @@ CELLS = """((name, cell) => {
   small.getContext('2d').putImageData(pixels, 0, 0);
   return small.toDataURL('image/png');
 })"""
-# How far apart two such PNGs are: the mean of the 20 cells that differ most; 255 where their sizes differ.
+# Difference of two such PNGs: the mean of the 20 cells that differ most; 255 where their sizes differ.
 DIFFERENCE = """(async (...urls) => {
   const [a, b] = await Promise.all(urls.map(async url => {
     const image = new Image();
@@ -166,7 +166,7 @@ def compare(browser, folder, kept):
             wrong.append(panel)
             if kept:
                 (kept / f"{panel}.png").write_bytes(base64.b64decode(cells.split(",")[1]))
-    assert not wrong, f"{wrong} look different; where that is meant, test_panels.py --renew draws the references anew"
+    assert not wrong, f"{wrong} look different; where that is meant, test_panels.py --renew draws the references again"
     finer = draw(browser, run, folder, 2)
     for panel, cells in finer.items():
         apart = difference(browser, cells, drawn[panel])

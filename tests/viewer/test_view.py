@@ -28,9 +28,9 @@ def record(folder):
 
 
 def every_panel_draws(browser):
-    for name, least in (("pn-map canvas", 5), ("pn-timeline canvas", 4), ("#panorama-figure canvas", 50),
+    for name, minimum in (("pn-map canvas", 5), ("pn-timeline canvas", 4), ("#panorama-figure canvas", 50),
                         ("#best-figure canvas", 50), ("#difference-figure canvas", 2)):
-        browser.wait(f"{colours(name)} >= {least}")
+        browser.wait(f"{colours(name)} >= {minimum}")
     assert browser.ask("document.querySelectorAll('pn-facts tr').length") >= 5
     assert "0.0 s  localised" in text_of(browser, "pn-facts ol li:last-child")
 
@@ -85,8 +85,8 @@ def look_at_demo(browser, file, shots):
     for dark in (False, True):
         browser.show(DESK, dark)
         browser.settle()
-        least = browser.ask(CONTRAST)
-        assert least["ratio"] >= 4.5, least
+        minimum = browser.ask(CONTRAST)
+        assert minimum["ratio"] >= 4.5, minimum
     browser.show(PHONE)
     browser.ask("scrollTo(0, 0)")
     browser.picture(shots / "demo_phone.png")
@@ -113,7 +113,7 @@ def look(browser, url, shots):
     # Keys: hold, step back and on, go on.
     browser.key(" ", "Space")
     assert text_of(browser, "#play") == "Play"
-    browser.wait("document.querySelector('#clock').textContent.endsWith('held')")
+    browser.wait("document.querySelector('#clock').textContent.endsWith('paused')")
     time.sleep(0.2)
     held = text_of(browser, "#clock")
     time.sleep(0.4)
@@ -140,7 +140,7 @@ def look(browser, url, shots):
     assert line([0, 0.1, 0.2, 0.3, 3.3, 3.4, 3.5]) == [0, 0.1, 0.2, 0.3, "apart", 3.3, 3.4, 3.5]
     assert line([1, 1, 1, 2, 3, 4]) == [1, 1, 1, 2, 3, 4]
     assert line([5]) == [5] and line([5, 5, 5]) == [5, 5, 5]
-    # By keys alone: to the view nearest to the robot, to the next one, into its card, and the robot is told to be there.
+    # Uses keys alone: to the view nearest to the robot, to the next one, into its card, and the robot is told to be there.
     browser.ask("document.querySelector('pn-map').focus()")
     browser.key("ArrowUp")
     near = text_of(browser, "pn-card h2")
@@ -162,8 +162,8 @@ def look(browser, url, shots):
     for dark in (False, True):
         browser.show(DESK, dark)
         browser.picture(shots / f"desk{'_dark' * dark}.png")
-        least = browser.ask(CONTRAST)
-        assert least["ratio"] >= 4.5, least
+        minimum = browser.ask(CONTRAST)
+        assert minimum["ratio"] >= 4.5, minimum
     # A phone: nothing wider than the screen, buttons that a finger finds, touch moves the map.
     browser.show(PHONE)
     browser.picture(shots / "phone.png")
@@ -252,7 +252,7 @@ def watch_verbs(folder):
 
 
 def tell_verbs(folder):
-    """What viewers may tell a run and ask of it, and that it acts upon it."""
+    """Wishes of viewers are accepted and acted upon."""
     drive, memory = folder / "short", folder / "hall.panonav"
     views = [("GET", "view/0", None, 200), ("GET", "view/12", None, 404), ("GET", "view/../0", None, 404)]
     wishes = lambda pose, goal: [("POST", "control", json.dumps({"pose": pose}), 204 if not goal else 400),
@@ -263,8 +263,8 @@ def tell_verbs(folder):
     first, last = references(events)[:2], references(events)[-2:]
     events = watch(["track", memory, drive], [*views, *wishes([*last, None], None)])
     moments = [data for name, data in events if name == "moment"]
-    told = next(i for i, moment in enumerate(moments) if "a viewer tells" in moment["values"].get("event", ""))
-    x, y = moments[told]["modes"][0][1:3]
+    wish = next(i for i, moment in enumerate(moments) if "a viewer tells" in moment["values"].get("event", ""))
+    x, y = moments[wish]["modes"][0][1:3]
     assert math.hypot(x - last[0], y - last[1]) < 1.0, (x, y, last)
     # It is sent to the first reference instead of the last: goal and end are there.
     events = watch(["navigate", memory, "--goal", "view_00011.png", "--scene", "hall"],

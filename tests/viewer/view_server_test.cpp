@@ -136,10 +136,10 @@ TEST(ViewServer, TellsEachMomentInOrder) {
     }
   }
   ASSERT_TRUE(peer.hear_until("\"n\":199,\"t\":199.0,\"pose\":[199.0,2.0,0.5]"));
-  const auto told = peer.events("moment");
-  ASSERT_EQ(told.size(), 200U);
-  for (std::size_t i = 0; i < told.size(); ++i) EXPECT_EQ(told[i]["n"], i);
-  EXPECT_EQ(told.back()["probability"], 0.75);
+  const auto moments = peer.events("moment");
+  ASSERT_EQ(moments.size(), 200U);
+  for (std::size_t i = 0; i < moments.size(); ++i) EXPECT_EQ(moments[i]["n"], i);
+  EXPECT_EQ(moments.back()["probability"], 0.75);
 }
 
 TEST(ViewServer, TellsWhoComesLateWhatWas) {
@@ -167,9 +167,9 @@ TEST(ViewServer, TellsWhoComesLateWhatWas) {
     ASSERT_EQ(staying.size(), 1U);
     EXPECT_EQ(staying[0]["references"], json::parse("[1.0, 2.0, 3.0, 4.0]"));
     EXPECT_EQ(staying[0]["goal"], json::parse("[7.0, 8.0, 0.0]"));
-    const auto told = peer.events("moment");
-    ASSERT_EQ(told.size(), 1U);
-    EXPECT_EQ(told[0]["n"], 29);
+    const auto moments = peer.events("moment");
+    ASSERT_EQ(moments.size(), 1U);
+    EXPECT_EQ(moments[0]["n"], 29);
   }
 }
 
@@ -266,10 +266,10 @@ TEST(ViewServer, DoesNotWaitForSlowViewers) {
   if (all > std::chrono::seconds(4)) GTEST_SKIP() << too_slow;
   ASSERT_TRUE(slow.hear_until("\"n\":" + std::to_string(count - 1) + ","));
   ASSERT_TRUE(slow.hear_until("\"probability\":0.75}\n\n"));
-  const auto told = slow.events("moment");
-  EXPECT_LT(told.size(), static_cast<std::size_t>(count) / 2);  // the rest was never kept for it
-  for (std::size_t i = 1; i < told.size(); ++i) {
-    EXPECT_LT(told[i - 1]["n"].get<int>(), told[i]["n"].get<int>());
+  const auto moments = slow.events("moment");
+  EXPECT_LT(moments.size(), static_cast<std::size_t>(count) / 2);  // the rest was never kept for it
+  for (std::size_t i = 1; i < moments.size(); ++i) {
+    EXPECT_LT(moments[i - 1]["n"].get<int>(), moments[i]["n"].get<int>());
   }
 }
 
@@ -294,7 +294,7 @@ TEST(ViewServer, OutlivesAThousandConnections) {
   server.add(moment_at(1.0));
   EXPECT_TRUE(viewer.hear_until("\"n\":1,"));
   EXPECT_FALSE(strangers.front()->hear());  // made room for others
-  // Of those who know the token, too, only so many are told.
+  // The number of viewers is limited also for those who know the token.
   std::vector<std::unique_ptr<Peer>> viewers;
   for (int i = 0; i < 5; ++i) {
     viewers.push_back(std::make_unique<Peer>(server.url()));

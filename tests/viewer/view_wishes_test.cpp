@@ -44,21 +44,21 @@ TEST(ViewServer, GivesPicturesOfReferences) {
 }
 
 TEST(ViewServer, TakesTheWishesThatTheRunTakes) {
-  const auto told = [](const ViewServer& server, const std::string& body) {
+  const auto post_wish = [](const ViewServer& server, const std::string& body) {
     return control(server.url(), body);
   };
   recordings::RunMoment moment = moment_at(0.0);
   moment.references = {{0.0, 0.0}, {3.0, 4.0}};
   ViewServer takes_pose({.takes = ViewWish::pose});
-  EXPECT_EQ(told(takes_pose, R"({"pose": [1, 2, 0.5]})"), 400);  // beside what? nothing is told
+  EXPECT_EQ(post_wish(takes_pose, R"({"pose": [1, 2, 0.5]})"), 400);  // no references yet
   takes_pose.add(moment);
   EXPECT_FALSE(takes_pose.take_wish());
-  EXPECT_EQ(told(takes_pose, R"({"pose": [9, 9, 9]})"), 400);
-  EXPECT_EQ(told(takes_pose, R"({"pose": [1, 2, 0.5]})"), 204);
+  EXPECT_EQ(post_wish(takes_pose, R"({"pose": [9, 9, 9]})"), 400);
+  EXPECT_EQ(post_wish(takes_pose, R"({"pose": [1, 2, 0.5]})"), 204);
   EXPECT_EQ(takes_pose.take_wish(), (ReferencePose{1.0, 2.0, 0.5}));
   EXPECT_FALSE(takes_pose.take_wish());  // once
-  EXPECT_EQ(told(takes_pose, R"({"pose": [-10, 14, null]})"), 204);
-  EXPECT_EQ(told(takes_pose, R"({"pose": [13, -10, null]})"), 204);  // the last one counts
+  EXPECT_EQ(post_wish(takes_pose, R"({"pose": [-10, 14, null]})"), 204);
+  EXPECT_EQ(post_wish(takes_pose, R"({"pose": [13, -10, null]})"), 204);  // the last one counts
   EXPECT_EQ(takes_pose.take_wish(), (ReferencePose{13.0, -10.0, std::nullopt}));
   for (const std::string wrong :
        {R"({"pose": [1, 2]})", R"({"pose": [1, 2, 0, 0]})", R"({"pose": ["1", 2, 0]})",
@@ -67,7 +67,7 @@ TEST(ViewServer, TakesTheWishesThatTheRunTakes) {
         R"({"pose": [13.1, 2, 0]})", R"({"pose": [1, -10.1, 0]})", R"({"goal": [1, 2]})",
         R"({"pose": [1, 2, 0], "goal": [1, 2]})", R"({"pose": [1, 2, 0], "play": true})",
         R"({"play": false})", "{}", "[]", ""}) {
-    EXPECT_EQ(told(takes_pose, wrong), 400) << wrong;
+    EXPECT_EQ(post_wish(takes_pose, wrong), 400) << wrong;
   }
   EXPECT_FALSE(takes_pose.take_wish());
   Peer stranger(takes_pose.url());
@@ -82,14 +82,14 @@ TEST(ViewServer, TakesTheWishesThatTheRunTakes) {
 
   ViewServer takes_goal({.takes = ViewWish::goal});
   takes_goal.add(moment);
-  EXPECT_EQ(told(takes_goal, R"({"pose": [1, 2, 0.5]})"), 400);
-  EXPECT_EQ(told(takes_goal, R"({"goal": [1, 2]})"), 204);
+  EXPECT_EQ(post_wish(takes_goal, R"({"pose": [1, 2, 0.5]})"), 400);
+  EXPECT_EQ(post_wish(takes_goal, R"({"goal": [1, 2]})"), 204);
   EXPECT_EQ(takes_goal.take_wish(), (ReferencePose{1.0, 2.0, std::nullopt}));
   EXPECT_NE(ask(takes_goal.url(), "").find("\"takes\":\"goal\""), std::string::npos);
 
   ViewServer takes_none;
   takes_none.add(moment);
-  EXPECT_EQ(told(takes_none, R"({"goal": [1, 2]})"), 405);
+  EXPECT_EQ(post_wish(takes_none, R"({"goal": [1, 2]})"), 405);
   EXPECT_NE(ask(takes_none.url(), "").find("\"takes\":\"\""), std::string::npos);
 }
 

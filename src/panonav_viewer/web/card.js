@@ -1,7 +1,7 @@
 import { degrees } from 'panonav/draw';
 
-// What is known of a place on the map: the remembered view that is nearest to it, which shows what would be seen there,
-// with its picture, pose and neighbours, and what may be told to the run: a goal, or where the robot is.
+// Shows the remembered view that is nearest to a place on the map, with picture, pose and neighbours, and sends a goal or
+// the robot's pose to the run.
 class Card extends HTMLElement {
   attach(run, choose) {
     this.run = run;
@@ -16,7 +16,7 @@ class Card extends HTMLElement {
     this.querySelector('.close').addEventListener('click', () => this.choose(undefined));
     this.querySelector('img').addEventListener('error', event => { event.target.hidden = true; });
     this.addEventListener('keydown', event => {
-      event.stopPropagation();  // arrows and digits are the form's
+      event.stopPropagation();  // arrows and digits are for the form
       if (event.key === 'Escape') this.choose(undefined);
     });
     this.querySelector('form').addEventListener('submit', event => {
@@ -25,7 +25,7 @@ class Card extends HTMLElement {
     });
   }
 
-  // `at`: where somebody has clicked; otherwise where the view was taken.
+  // `at`: the clicked position; otherwise that of the view.
   show(reference, at) {
     this.hidden = reference === undefined;
     if (this.hidden) return;
@@ -33,7 +33,7 @@ class Card extends HTMLElement {
     const heading = headings?.[reference], away = at ? Math.hypot(at[0] - place[0], at[1] - place[1]) : 0;
     const metres = ([x, y]) => `x ${x.toFixed(2)} m, y ${y.toFixed(2)} m`;
     this.at = at ?? place;
-    this.querySelector('h2').textContent = (at ? `What would be seen here: ${away.toFixed(2)} m away, ` : '') +
+    this.querySelector('h2').textContent = (at ? `Nearest view, ${away.toFixed(2)} m away: ` : '') +
       (names?.[reference] ?? `remembered view ${reference}`);
     this.querySelector('.where').textContent = metres(place) +
       (typeof heading === 'number' ? `, heading ${degrees(heading).toFixed(0)}°` : '');
@@ -41,7 +41,7 @@ class Card extends HTMLElement {
     image.hidden = !this.run.views;
     if (this.run.views) {
       image.src = this.run.views + reference;
-      image.alt = `What ${names?.[reference] ?? 'the view'} shows`;
+      image.alt = `Picture of ${names?.[reference] ?? 'the view'}`;
     }
     this.showNeighbours(reference);
     const form = this.querySelector('form'), { takes } = this.run;
@@ -52,7 +52,7 @@ class Card extends HTMLElement {
     form.querySelector('output').textContent = '';
     this.place = place;
   }
-  // By edges; where there are none the four nearest views.
+  // Lists the views connected by edges; where there are none the four nearest views.
   showNeighbours(reference) {
     const { references, edges = [], names } = this.run.staying, [x, y] = [references[2 * reference], references[2 * reference + 1]];
     const number = new Map();
@@ -78,9 +78,9 @@ class Card extends HTMLElement {
   }
   async tell() {
     const { takes } = this.run, typed = this.querySelector('input').value;
-    const wanted = takes === 'pose' ? [...this.at, typed === '' ? null : Number(typed) % 360 * Math.PI / 180] : this.place;
-    const answer = await fetch('control', { method: 'POST', body: JSON.stringify({ [takes]: wanted }) }).catch(() => undefined);
-    this.querySelector('output').textContent = answer?.ok ? 'The robot knows.' : 'The run does not take this.';
+    const wish = takes === 'pose' ? [...this.at, typed === '' ? null : Number(typed) % 360 * Math.PI / 180] : this.place;
+    const answer = await fetch('control', { method: 'POST', body: JSON.stringify({ [takes]: wish }) }).catch(() => undefined);
+    this.querySelector('output').textContent = answer?.ok ? 'Sent to the run.' : 'The run refused this.';
   }
 }
 customElements.define('pn-card', Card);

@@ -7,17 +7,17 @@ const shapes = ['dot', 'square', 'triangle', 'cross', 'ring', 'dot'];
 // log_x, log_y, x_range, y_range, names } or { ..., image, x_range, y_range, x_tick, y_tick }.
 export class Chart extends Plot {
   attached() {
-    if (this.given.image) {
+    if (this.content.image) {
       this.image = new Image();
       this.image.onload = () => this.redraw();
-      this.image.src = this.given.image;
+      this.image.src = this.content.image;
     } else {
       this.offerNumbers();
     }
     this.canvas.addEventListener('pointermove', event => this.tell(event.offsetX, event.offsetY));
     this.canvas.addEventListener('pointerleave', () => { this.said.textContent = ''; this.at = undefined; this.redraw(); });
     this.addEventListener('keydown', event => {
-      const by = { ArrowLeft: -1, ArrowRight: 1 }[event.key], all = this.given.series?.[0]?.x.length;
+      const by = { ArrowLeft: -1, ArrowRight: 1 }[event.key], all = this.content.series?.[0]?.x.length;
       if (!by || !all) return;
       event.stopPropagation();
       event.preventDefault();
@@ -36,9 +36,9 @@ export class Chart extends Plot {
         for (const cell of cells) made.append(Object.assign(document.createElement(tag), { textContent: cell }));
         table.append(made);
       };
-      row(['', this.given.x_label, this.given.y_label], 'th');
-      for (const { label, x, y } of this.given.series) {
-        x.forEach((value, i) => row([label, this.given.names?.[value] ?? text(value, 6), text(y[i], 6)], 'td'));
+      row(['', this.content.x_label, this.content.y_label], 'th');
+      for (const { label, x, y } of this.content.series) {
+        x.forEach((value, i) => row([label, this.content.names?.[value] ?? text(value, 6), text(y[i], 6)], 'td'));
       }
       const box = document.createElement('div');
       box.className = 'wide';
@@ -48,8 +48,8 @@ export class Chart extends Plot {
     this.key.after(details);
   }
   range(which) {
-    const { series, names } = this.given, fixed = this.given[`${which}_range`], log = this.given[`log_${which}`];
-    const label = this.given[`${which}_label`], step = this.given[`${which}_tick`];
+    const { series, names } = this.content, fixed = this.content[`${which}_range`], log = this.content[`log_${which}`];
+    const label = this.content[`${which}_label`], step = this.content[`${which}_tick`];
     if (which === 'x' && names) return { from: -0.6, to: names.length - 0.4, names, label };
     if (fixed) return { from: fixed[0], to: fixed[1], log, label, step };
     let low = Infinity, high = -Infinity;
@@ -82,10 +82,10 @@ export class Chart extends Plot {
       context.imageSmoothingEnabled = false;
       context.drawImage(this.image, left, top, right - left, bottom - top);
     }
-    this.given.series?.forEach((series, i) => this.drawSeries(context, series, i, colour));
+    this.content.series?.forEach((series, i) => this.drawSeries(context, series, i, colour));
     this.over?.(context, colour);
     context.restore();
-    this.explain((this.given.series ?? []).map(({ label, style, x }, i) => [label, seriesColours[i % 6],
+    this.explain((this.content.series ?? []).map(({ label, style, x }, i) => [label, seriesColours[i % 6],
       style === 'points' ? shapes[i % 6] : style === 'bars' ? 'area' : 'line', x.length])
       .filter(([label, , , count]) => label && count).map(([label, key, kind]) => [label, key, kind]));
   }
@@ -96,7 +96,7 @@ export class Chart extends Plot {
     context.strokeStyle = context.fillStyle = colour(seriesColours[i % 6]);
     context.lineWidth = 2;
     if (style === 'bars') {
-      const count = this.given.series.length, wide = (px(1) - px(0)) * 0.8 / count;
+      const count = this.content.series.length, wide = (px(1) - px(0)) * 0.8 / count;
       beside = (i - (count - 1) / 2) * wide;
       x.forEach((value, n) => {
         if (!usable(y[n])) return;
@@ -128,14 +128,14 @@ export class Chart extends Plot {
   tell(x, y) {
     if (!this.px) return;
     const { left, right, top, bottom } = this.area;
-    if (this.given.image) {
+    if (this.content.image) {
       const [across, up] = this.axis, share = (from, to, s) => from + (to - from) * s;
       const inside = x >= left && x <= right && y >= top && y <= bottom;
       this.said.textContent = inside ? `${text(share(across.from, across.to, (x - left) / (right - left)))}; ` +
         text(share(up.from, up.to, (bottom - y) / (bottom - top))) : '';
       return;
     }
-    const all = this.given.series[0]?.x ?? [];
+    const all = this.content.series[0]?.x ?? [];
     let best = Infinity;
     all.forEach((value, i) => {
       const apart = Math.abs(this.px(value) - x);
@@ -144,7 +144,7 @@ export class Chart extends Plot {
     this.read();
   }
   read() {
-    const { series, names } = this.given, at = series[0].x[this.at];
+    const { series, names } = this.content, at = series[0].x[this.at];
     if (at === undefined) return;
     const values = series.map(({ label, x, y }) => [label, y[x.indexOf(at)]]).filter(([, value]) => value !== undefined);
     this.said.textContent = `${names?.[at] ?? text(at, 4)}: ${values.map(([label, value]) => `${label} ${text(value)}`.trim()).join(', ')}`;

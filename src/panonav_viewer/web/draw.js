@@ -30,7 +30,7 @@ export class Drawing extends HTMLElement {
 
 export const degrees = radians => radians * 180 / Math.PI;
 
-// Above left: how long so many metres are. `scale`: pixels for each.
+// Draws a bar of a round number of metres above left. `scale`: pixels per metre.
 export function scaleBar(context, scale, width, unit, colour) {
   const length = niceStep(width / scale, 6), px = length * scale;
   context.strokeStyle = context.fillStyle = colour('soft');

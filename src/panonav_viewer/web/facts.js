@@ -1,15 +1,15 @@
 import { degrees } from 'panonav/draw';
 import { isTruth } from 'panonav/store';
 
-// What is known at the moment, as text: also what a screen reader reads. Below, how long each stage took, and what
-// happened so far: changes of state and decisions, each a button that goes there.
+// Lists the figures of the moment as text, also for screen readers; below them the time of each stage, and the events so
+// far: changes of state and decisions, each a button that seeks its moment.
 class Facts extends HTMLElement {
   attach(run) {
     this.run = run;
     this.innerHTML = '<table><caption class="unseen">The moment in figures</caption><tbody></tbody></table>' +
-      '<div hidden><h2>Milliseconds a stage</h2><table class="stages"><caption class="unseen">Milliseconds a stage</caption>' +
+      '<div hidden><h2>Milliseconds per stage</h2><table class="stages"><caption class="unseen">Milliseconds per stage</caption>' +
       '<thead class="unseen"><tr><th>stage</th><th>share</th><th>now</th><th>median</th></tr></thead><tbody></tbody></table></div>' +
-      '<h2>What happened</h2><ol></ol>';
+      '<h2>Events</h2><ol></ol>';
     run.addEventListener('moment', () => this.show());
     run.addEventListener('grown', () => this.list());
   }
@@ -57,7 +57,7 @@ class Facts extends HTMLElement {
       return row;
     }));
   }
-  // Of the moment, and their medians over the last 50 that are known.
+  // Shows the stages of the moment and their medians over the last 50 moments.
   showStages({ stages }) {
     const table = this.querySelector('.stages');
     table.parentElement.hidden = !stages;

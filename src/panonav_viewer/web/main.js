@@ -13,14 +13,14 @@ const skeleton = `
 <span class="clock"></span><nav class="panels" aria-label="Panels"></nav></div>
 <div class="shown"></div>
 <div class="foot controls"><button class="play" type="button" aria-keyshortcuts="Space">Pause</button>
-<button class="back" type="button" aria-label="One picture back" aria-keyshortcuts="ArrowLeft">&#9664;</button>
-<button class="forth" type="button" aria-label="One picture on" aria-keyshortcuts="ArrowRight">&#9654;</button>
+<button class="back" type="button" aria-label="Previous picture" aria-keyshortcuts="ArrowLeft">&#9664;</button>
+<button class="forth" type="button" aria-label="Next picture" aria-keyshortcuts="ArrowRight">&#9654;</button>
 <input class="slider" type="range" min="0" max="0" value="0" aria-label="Picture of the run">
 <label>Speed <select class="speed"><option>0.5</option><option selected>1</option><option>2</option><option>5</option><option>20</option></select></label>
 <span class="hint">Space: pause. Arrows: one picture. Home, End: first, last. Digits: panels. Plus, minus, 0: zoom of the map; on it, arrows and Enter: views.</span></div>`;
 const panels = { map: 'Map', pictures: 'Pictures', facts: 'Facts', route: 'Route', timeline: 'Timeline' };
 
-// Which panels have something to show.
+// Returns the names of the panels that have something to show.
 function usable({ live, moments = [], staying = {}, route }) {
   if (live) return ['map', 'pictures', 'facts', 'timeline'];
   const has = {
@@ -33,23 +33,23 @@ function usable({ live, moments = [], staying = {}, route }) {
   return Object.keys(panels).filter(name => has[name]);
 }
 
-// A run with its panels and controls. In a script element within stands { live: address of events, replay: whether the
-// run obeys } or, of a run that is over, { moments, staying, route }.
+// Shows a run with its panels and controls. A script element within holds { live: address of events, replay: true if the
+// run can be controlled } or, for a run that is over, { moments, staying, route }.
 class RunPlayer extends HTMLElement {
   connectedCallback() {
     if (this.run) return;
-    const data = this.querySelector('script'), given = JSON.parse(data.textContent), run = this.run = new Run();
-    data.remove();
-    this.given = run.given = given;
-    this.live = Boolean(given.live);
-    run.takes = given.takes;
-    run.views = this.live ? 'view/' : undefined;  // where pictures of references are
+    const script = this.querySelector('script'), content = JSON.parse(script.textContent), run = this.run = new Run();
+    script.remove();
+    this.content = run.content = content;
+    this.live = Boolean(content.live);
+    run.takes = content.takes;
+    run.views = this.live ? 'view/' : undefined;  // address of pictures of references
     const title = this.getAttribute('data-title');
     this.insertAdjacentHTML('beforeend', skeleton);
     if (title) this.querySelector('.head').prepend(Object.assign(document.createElement('h1'), { textContent: title }));
     const address = this.live ? (moment, which) => `picture/${moment.n}/${which}` : (moment, which) => moment.data?.[which];
-    usable(given).forEach((name, i) => this.addPanel(name, i, address));
-    // The names that links and scripts find the only run of a page by.
+    usable(content).forEach((name, i) => this.addPanel(name, i, address));
+    // Ids by which links and scripts find the first run of a page.
     if (document.querySelector('pn-run') === this) {
       for (const name of ['state', 'clock', 'panels', 'play', 'slider', 'speed']) this.find(name).id = name;
     }
@@ -57,7 +57,7 @@ class RunPlayer extends HTMLElement {
     this.find('back').addEventListener('click', () => this.step(-1));
     this.find('forth').addEventListener('click', () => this.step(1));
     this.find('slider').addEventListener('input', () => { this.hold(); run.show(Number(this.find('slider').value)); });
-    this.find('speed').closest('label').hidden = this.live && !given.replay;
+    this.find('speed').closest('label').hidden = this.live && !content.replay;
     this.find('speed').addEventListener('change', () => this.control({ speed: this.speed }));
     for (const event of ['moment', 'grown']) run.addEventListener(event, () => this.tell());
     run.addEventListener('sought', () => this.hold());
@@ -66,14 +66,14 @@ class RunPlayer extends HTMLElement {
     }
     if (this.live) {
       this.playing = this.connected = true;
-      follow(run, given.live, now => { this.connected = now; this.tell(); });
+      follow(run, content.live, now => { this.connected = now; this.tell(); });
     } else {
       run.over = true;
-      run.moments = given.moments;
-      let told = {};
-      for (const moment of run.moments) moment.told = told = moment.told ? { ...told, ...moment.told } : told;
-      run.addEventListener('moment', () => Object.assign(run.staying, run.moment.told));
-      run.stay(given.staying);
+      run.moments = content.moments;
+      let changes = {};
+      for (const moment of run.moments) moment.changes = changes = moment.changes ? { ...changes, ...moment.changes } : changes;
+      run.addEventListener('moment', () => Object.assign(run.staying, run.moment.changes));
+      run.stay(content.staying);
       run.say('grown');
       run.show(0);
       this.play(false);
@@ -101,27 +101,27 @@ class RunPlayer extends HTMLElement {
     this.find('panels').append(button);
   }
 
-  seen(whether) {
-    if (whether && !this.held && moves() && this.run.index < this.run.last) this.play(true);
-    else if (!whether) this.play(false);
+  setVisible(visible) {
+    if (visible && !this.held && moves() && this.run.index < this.run.last) this.play(true);
+    else if (!visible) this.play(false);
   }
   hold() {
     if (this.live && this.held) return;
     this.held = true;
     this.play(false);
   }
-  play(wanted) {
+  play(isPlaying) {
     const { run } = this;
-    this.playing = wanted;
-    this.find('play').textContent = wanted ? 'Pause' : 'Play';
+    this.playing = isPlaying;
+    this.find('play').textContent = isPlaying ? 'Pause' : 'Play';
     clearTimeout(this.timer);
     if (this.live) {
-      this.held = !wanted;
-      run.following = wanted;
-      this.control({ play: wanted });
-      if (wanted) run.show(run.last);
+      this.held = !isPlaying;
+      run.following = isPlaying;
+      this.control({ play: isPlaying });
+      if (isPlaying) run.show(run.last);
       this.tell();
-    } else if (wanted) {
+    } else if (isPlaying) {
       if (run.index >= run.last) run.show(0);
       this.advance();
     }
@@ -132,13 +132,13 @@ class RunPlayer extends HTMLElement {
     const wait = (run.moments[run.index + 1].t - run.moment.t) / this.speed;
     this.timer = setTimeout(() => { run.show(run.index + 1); this.advance(); }, 1000 * Math.max(1 / 60, Math.min(2, wait)));
   }
-  control(wanted) {
-    if (this.given.replay && !this.run.ended) fetch('control', { method: 'POST', body: JSON.stringify(wanted) }).catch(() => {});
+  control(command) {
+    if (this.content.replay && !this.run.ended) fetch('control', { method: 'POST', body: JSON.stringify(command) }).catch(() => {});
   }
   step(by) {
     const { run } = this;
     this.hold();
-    if (by === 1 && run.index === run.last) {  // beyond what has come
+    if (by === 1 && run.index === run.last) {  // past the newest moment
       run.following = true;
       this.control({ step: 1 });
     }
@@ -153,7 +153,7 @@ class RunPlayer extends HTMLElement {
     }[key] ?? (/^[1-9]$/.test(key) ? () => this.find('panels').children[key - 1]?.click() : undefined);
   }
   tell() {
-    const { run, given } = this, { moment } = run, state = this.find('state'), slider = this.find('slider');
+    const { run, content } = this, { moment } = run, state = this.find('state'), slider = this.find('slider');
     slider.max = Math.max(0, run.last);
     slider.value = Math.max(0, run.index);
     if (!moment) return;
@@ -167,12 +167,12 @@ class RunPlayer extends HTMLElement {
     this.counted ??= !this.live && run.moments.every(({ t }, i) => t === i);
     this.find('clock').textContent = (this.counted ? '' : `${(moment.t - run.moments[0].t).toFixed(1)} s, `) +
       (!this.live ? `picture ${run.index + 1} of ${run.moments.length}` : run.ended ? 'the run has ended'
-        : !this.connected ? 'connection lost, trying again' : !this.playing ? 'held' : given.replay ? 'replay' : 'live');
+        : !this.connected ? 'connection lost, reconnecting' : !this.playing ? 'paused' : content.replay ? 'replay' : 'live');
   }
 }
 customElements.define('pn-run', RunPlayer);
 
-// Keys are for the run that is looked at.
+// Sends keys to the run in the visible part.
 document.addEventListener('keydown', event => {
   if (event.ctrlKey || event.altKey || event.metaKey || event.target.matches('select, input') || event.shiftKey && event.key !== '+') return;
   const seen = inSight(), player = seen?.localName === 'pn-run' ? seen : document.querySelector('pn-run.whole');

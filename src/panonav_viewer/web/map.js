@@ -4,7 +4,7 @@ import { isTruth, steady } from 'panonav/store';
 
 // Edges in the order of LinkKind.
 const edgeColours = ['reference', 'estimate', 'plan', 'doubt'];
-// From the least to the most alike: viridis, whose lightness rises steadily, so that it is ordered for everybody.
+// Colours from the least to the most similar view: viridis, whose lightness rises steadily, so that everybody sees its order.
 const scale = ['#440154', '#482475', '#414487', '#355f8d', '#2a788e', '#21918c', '#22a884', '#44bf70', '#7ad151', '#bddf26', '#fde725'];
 const areaColours = ['#0072b2', '#e69f00', '#009e73', '#cc79a7', '#56b4e9', '#d55e00'];
 
@@ -32,8 +32,8 @@ class MapPanel extends Drawing {
       event.preventDefault();
       this.zoomBy(Math.exp(-event.deltaY / 400), event.offsetX, event.offsetY);
     }, { passive: false });
-    // Arrows move the map with Shift. Without it they choose views where the keyboard has led here; after a click they
-    // go on stepping through the run.
+    // Arrows move the map with Shift. Without it they choose views if the map was reached by keyboard; after a click they
+    // still step through the run.
     this.addEventListener('pointerdown', () => { this.byPointer = true; });
     this.addEventListener('focusout', () => { this.byPointer = false; });
     this.addEventListener('keydown', event => {
@@ -93,7 +93,7 @@ class MapPanel extends Drawing {
     this.shift = [0, 0];
     this.redraw();
   }
-  // By its place among the references; `at`: where it was looked for.
+  // Chooses a view by its index among the references; `at`: the clicked position.
   choose(reference, at) {
     const { references = [], names } = this.run.staying;
     this.selected = reference;
@@ -108,21 +108,21 @@ class MapPanel extends Drawing {
     this.card.classList.toggle('left', reference !== undefined && this.scale && this.px(references[2 * reference]) > this.clientWidth / 2);
     this.redraw();
   }
-  // The next one in a direction of the screen; at first that nearest to the robot, or in the middle.
+  // Chooses the next view in a direction of the screen; at first that nearest to the robot, or in the middle.
   chooseTowards(right, down) {
     const all = this.run.staying.references ?? [], { pose } = this.run.moment ?? {};
     const from = this.selected !== undefined ? [this.px(all[2 * this.selected]), this.py(all[2 * this.selected + 1])]
       : pose ? [this.px(pose[0]), this.py(pose[1])] : [this.clientWidth / 2, this.clientHeight / 2];
-    let best, least = Infinity;
+    let best, minCost = Infinity;
     for (let i = 0; i < all.length; i += 2) {
       const x = this.px(all[i]) - from[0], y = this.py(all[i + 1]) - from[1], along = x * right + y * down, aside = Math.abs(x * down) + Math.abs(y * right);
       if (i / 2 === this.selected || this.selected !== undefined && along < 1) continue;
       const cost = this.selected === undefined ? Math.hypot(x, y) : along + 2 * aside;
-      if (cost < least) { least = cost; best = i / 2; }
+      if (cost < minCost) { minCost = cost; best = i / 2; }
     }
     if (best !== undefined) this.choose(best);
   }
-  // The reference next to a click; beside all of them that which shows best what would be seen there.
+  // Chooses the reference nearest to a click.
   select(x, y) {
     const all = this.run.staying.references ?? [];
     let best = Infinity, nearest;
@@ -136,7 +136,7 @@ class MapPanel extends Drawing {
     this.said.textContent = `x ${at_x.toFixed(2)} m, y ${at_y.toFixed(2)} m`;
   }
 
-  // Of all that is known of the run, so that the map does not jump.
+  // Returns the bounds of the whole run, so that the map does not jump.
   bounds() {
     const box = [Infinity, Infinity, -Infinity, -Infinity];
     const include = (x, y) => {
@@ -153,7 +153,7 @@ class MapPanel extends Drawing {
       if (moment.truth) include(moment.truth[0], moment.truth[1]);
     }
     if (!(box[0] <= box[2])) return undefined;
-    const [west, south, east, north] = box, around = 1.5;  // what stands near is in the picture
+    const [west, south, east, north] = box, around = 1.5;  // metres around the run whose walls are included
     for (const wall of walls) {
       for (let i = 0; i < wall.length; i += 2) {
         if (wall[i] > west - around && wall[i] < east + around && wall[i + 1] > south - around && wall[i + 1] < north + around) include(wall[i], wall[i + 1]);
@@ -210,7 +210,7 @@ class MapPanel extends Drawing {
         this.dot(context, x, y, 3);
       }
     }
-    if (directions.length) keys.set('where each view sends the robot', ['plan', 0]);
+    if (directions.length) keys.set('direction at each view', ['plan', 0]);
     context.strokeStyle = colour('plan');
     context.lineWidth = 1;
     for (let i = 0; i < directions.length; i += 3) this.pointer(context, directions.slice(i, i + 3), 7);
@@ -227,7 +227,7 @@ class MapPanel extends Drawing {
       this.ring(context, goal[0], goal[1], 8);
     }
 
-    const shown = this.run.given?.unordered ? [] : this.run.moments.slice(0, this.run.index + 1);
+    const shown = this.run.content?.unordered ? [] : this.run.moments.slice(0, this.run.index + 1);
     const exact = moment && isTruth(moment);
     if (!exact && shown.some(({ truth }) => truth)) {
       keys.set('ground truth', ['truth', 0]);
@@ -271,10 +271,10 @@ class MapPanel extends Drawing {
   tell(keys, moment, references) {
     const legend = [...keys].map(([name, [key, round]]) =>
       `<span style="--key:${key.startsWith('linear') ? key : `var(--${key})`};--round:${round}"${key.startsWith('linear') ? ' class="scale"' : ''}>${name}</span>`).join('');
-    if (this.told !== legend) this.legend.innerHTML = this.told = legend;
+    if (this.shownLegend !== legend) this.legend.innerHTML = this.shownLegend = legend;
     const at = ([x, y]) => `x ${x.toFixed(1)} m, y ${y.toFixed(1)} m`;
     const text = ['Map of the run', references.length && `${references.length / 2} remembered views`,
-      moment?.compared && `most alike is view ${this.nameOf(moment.compared[0])}`, moment?.pose && `robot at ${at(moment.pose)}`,
+      moment?.compared && `most similar view ${this.nameOf(moment.compared[0])}`, moment?.pose && `robot at ${at(moment.pose)}`,
       moment?.modes?.length > 1 && `or at ${moment.modes.slice(1, 4).map(([weight, x, y]) => `${at([x, y])} with ${Math.round(100 * weight)} %`).join('; ')}`,
       this.run.staying.goal && `goal at ${at(this.run.staying.goal)}`].filter(Boolean).join(', ');
     if (this.canvas.getAttribute('aria-label') !== text) this.canvas.setAttribute('aria-label', text);
@@ -304,7 +304,7 @@ class MapPanel extends Drawing {
   }
   drawWalls(context, walls, keys, colour) {
     if (!walls.length) return;
-    keys.set('walls and things', ['wall', 0]);
+    keys.set('walls and objects', ['wall', 0]);
     context.strokeStyle = context.fillStyle = colour('wall');
     context.lineWidth = 1.5;
     context.beginPath();
@@ -316,10 +316,10 @@ class MapPanel extends Drawing {
     context.fill('nonzero');
     context.globalAlpha = 1;
   }
-  // Colour and size: from the least to the most alike of those that were compared.
+  // Draws the compared views by colour and size, from the least to the most similar.
   drawSimilarity(context, references, compared, radius, keys, colour) {
     if (compared.length < 4) return;
-    keys.set('less alike &ndash; most alike', [`linear-gradient(90deg,${scale})`, 0]);
+    keys.set('least &ndash; most similar', [`linear-gradient(90deg,${scale})`, 0]);
     const best = compared[1], range = Math.max(1, compared.at(-1) - best);
     context.lineWidth = 0.7;
     context.strokeStyle = colour('soft');
@@ -333,7 +333,7 @@ class MapPanel extends Drawing {
   }
   drawModes(context, modes, keys, colour) {
     if (!modes.length) return;
-    if (modes.length > 1) keys.set('other places, with their share', ['mode', '50%']);
+    if (modes.length > 1) keys.set('other possible poses, with weights', ['mode', '50%']);
     context.font = '12px system-ui';
     modes.forEach(([weight, x, y, heading, ...covariance], i) => {
       context.strokeStyle = context.fillStyle = colour(i ? 'mode' : 'estimate');
@@ -380,7 +380,7 @@ class MapPanel extends Drawing {
     context.lineTo(this.px(x) + length * Math.cos(heading), this.py(y) - length * Math.sin(heading));
     context.stroke();
   }
-  line(context, points) {  // what is missing interrupts it
+  line(context, points) {  // missing points interrupt it
     context.beginPath();
     let drawing = false;
     for (const point of points) {

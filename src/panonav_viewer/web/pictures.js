@@ -1,7 +1,7 @@
 import { degrees } from 'panonav/draw';
 
-// The panorama with its compass; the most similar remembered view, turned as the panorama is; how much they differ,
-// column by column; the camera's picture.
+// Shows the panorama with its compass, the most similar remembered view in the same orientation, their difference by
+// column, and the camera's picture.
 class Pictures extends HTMLElement {
   attach(run, address) {
     this.run = run;
@@ -9,7 +9,7 @@ class Pictures extends HTMLElement {
     this.innerHTML = `
 <figure class="panorama"><canvas role="img" aria-label="Panorama"></canvas><figcaption>Panorama, forward in the middle</figcaption></figure>
 <figure class="best"><canvas role="img" aria-label="Most similar remembered view"></canvas><figcaption></figcaption></figure>
-<figure class="difference"><canvas role="img" aria-label="Difference by column"></canvas><figcaption>Difference of the two by column: the higher, the less alike</figcaption></figure>
+<figure class="difference"><canvas role="img" aria-label="Difference by column"></canvas><figcaption>Difference by column: higher is less similar</figcaption></figure>
 <figure class="camera"><img alt="Picture of the camera"><figcaption>Camera</figcaption></figure>
 <p class="said"></p>`;
     for (const figure of this.querySelectorAll('figure')) {
@@ -21,7 +21,7 @@ class Pictures extends HTMLElement {
     new ResizeObserver(() => this.draw()).observe(this);
   }
 
-  // One set of pictures at a time: a slow connection skips some.
+  // Loads one set of pictures at a time: a slow connection skips some.
   async show() {
     if (this.hidden || !this.run.moment) return;
     if (this.loading) { this.again = true; return; }
@@ -32,14 +32,14 @@ class Pictures extends HTMLElement {
     const found = await Promise.all(['camera', 'panorama', 'best'].map(which => this.load(moment, which)));
     const said = this.querySelector('.said');
     if (!found.some(Boolean) && !this.run.over && moment !== this.run.moments[this.run.last]) {
-      said.textContent = 'Pictures of earlier moments of a live run are not kept; --record keeps them.';
+      said.textContent = 'Pictures of earlier moments of a live run are not kept; use --record to keep them.';
     } else {
       said.textContent = '';
       this.images = found;
       this.moment = moment;
       this.draw();
     }
-    await new Promise(done => setTimeout(done, 30));  // who scrubs sees the map move first
+    await new Promise(done => setTimeout(done, 30));  // lets the map move first while the slider moves
     this.loading = false;
     if (this.again) { this.again = false; this.show(); }
   }
@@ -72,7 +72,7 @@ class Pictures extends HTMLElement {
     figure('difference').hidden = !(panorama && best && turn !== undefined);
     if (!figure('difference').hidden) this.drawDifference(figure, turn);
   }
-  // A heading that is `turn` further left moves what is seen to the right.
+  // Draws a panorama whose heading is `turn` further left shifted to the right.
   drawPanorama(canvas, image, turn, compass) {
     const width = Math.max(1, this.clientWidth - 16), ratio = devicePixelRatio || 1;
     const height = Math.max(40, Math.min(width * 0.3, width * image.naturalHeight / image.naturalWidth));
@@ -106,7 +106,7 @@ class Pictures extends HTMLElement {
       const grey = new Float32Array(columns * rows);
       let sum = 0;
       for (let i = 0; i < grey.length; ++i) sum += grey[i] = (data[4 * i] + data[4 * i + 1] + data[4 * i + 2]) / 3;
-      return grey.map(value => value - sum / grey.length);  // another light is no difference
+      return grey.map(value => value - sum / grey.length);  // a different mean brightness does not count
     };
     const canvas = figure('difference').querySelector('canvas'), width = Math.max(1, this.clientWidth - 16), height = 36;
     const a = pixels(this.images[1], 0), b = pixels(this.images[2], ((turn / (2 * Math.PI) % 1) + 1) % 1 * columns);

@@ -2,19 +2,19 @@ import { scaleBar } from 'panonav/draw';
 import { Plot, mark, text } from 'panonav/plot';
 import { moves, watch, watchTogether } from 'panonav/sight';
 
-// From black over blue and green to yellow: rises in lightness, so that nobody needs to tell the hues apart.
+// Colours from black over blue and green to yellow: rises in lightness, so that nobody needs to tell the hues apart.
 const ramp = [[0, 34, 78], [53, 69, 108], [102, 105, 112], [148, 142, 119], [200, 184, 102], [254, 232, 56]];
 const shade = share => {
   const at = Math.max(0, Math.min(1, share)) * (ramp.length - 1), i = Math.min(ramp.length - 2, Math.floor(at));
   return ramp[i].map((value, c) => Math.round(value + (ramp[i + 1][c] - value) * (at - i)));
 };
 
-// A map seen from above: { title, unit, backdrop: [layers], frames: [{ title, layers: [{ label, colour, circles, crosses, lines, polygons,
+// Shows a map from above: { title, unit, backdrop: [layers], frames: [{ title, layers: [{ label, colour, circles, crosses, lines, polygons,
 // dots, squares }] }] }, or values on a grid: { title, heat: { columns, rows, first, spacing, values, label, crosses } }.
 // Several frames play one after the other.
 class Plan extends Plot {
   attached() {
-    const { frames = [{ layers: [] }], backdrop = [], shown } = this.given;
+    const { frames = [{ layers: [] }], backdrop = [], shown } = this.content;
     this.frames = frames;
     this.backdrop = backdrop;
     this.index = 0;
@@ -23,7 +23,7 @@ class Plan extends Plot {
     this.style.aspectRatio = String(Math.max(0.7, Math.min(2.6, (wide + 1e-3) / (high + 1e-3))));
     this.zoom = 1;
     this.shift = [0, 0];
-    if (this.given.heat) this.shadeCells();
+    if (this.content.heat) this.shadeCells();
     this.canvas.addEventListener('pointerdown', event => { if (event.pointerType === 'mouse') this.canvas.setPointerCapture(event.pointerId); });
     this.canvas.addEventListener('pointermove', event => {
       if (event.buttons && event.pointerType === 'mouse') {
@@ -52,7 +52,7 @@ class Plan extends Plot {
     this.redraw();
   }
   bounds() {
-    const box = [Infinity, Infinity, -Infinity, -Infinity], { heat } = this.given;
+    const box = [Infinity, Infinity, -Infinity, -Infinity], { heat } = this.content;
     const include = flat => {
       for (let i = 0; i < flat.length; i += 2) {
         box[0] = Math.min(box[0], flat[i]); box[1] = Math.min(box[1], flat[i + 1]);
@@ -85,17 +85,17 @@ class Plan extends Plot {
     this.show(this.story && !moves() ? this.frames.length - 1 : 0);
     if (this.story) watchTogether(this.story, this); else watch(this);
   }
-  seen(whether) { this.play(whether && !this.held && moves() && (Boolean(this.story) || this.index < this.frames.length - 1)); }
+  setVisible(visible) { this.play(visible && !this.held && moves() && (Boolean(this.story) || this.index < this.frames.length - 1)); }
   hold() { this.held = true; this.play(false); }
-  play(wanted) {
+  play(isPlaying) {
     clearTimeout(this.timer);
-    if (wanted && this.index >= this.frames.length - 1) this.show(0);
-    this.playing = wanted;
-    this.button.textContent = wanted ? 'Pause' : 'Play';
-    if (!wanted) return;
+    if (isPlaying && this.index >= this.frames.length - 1) this.show(0);
+    this.playing = isPlaying;
+    this.button.textContent = isPlaying ? 'Pause' : 'Play';
+    if (!isPlaying) return;
     const step = () => {
       if (this.index >= this.frames.length - 1) {
-        this.play(Boolean(this.story));  // a story begins anew
+        this.play(Boolean(this.story));  // a story begins again
         return;
       }
       this.show(this.index + 1);
@@ -117,14 +117,14 @@ class Plan extends Plot {
   px(x) { return this.origin[0] + x * this.scale; }
   py(y) { return this.origin[1] - y * this.scale; }
   draw(context, width, height, colour) {
-    const [x0, y0, x1, y1] = this.box, { heat } = this.given, bar = heat ? 64 : 0;
+    const [x0, y0, x1, y1] = this.box, { heat } = this.content, bar = heat ? 64 : 0;
     this.scale = this.zoom * Math.min((width - 28 - bar) / (x1 - x0 || 1), (height - 48) / (y1 - y0 || 1));
     this.origin = [(width - bar) / 2 + this.shift[0] - (x0 + x1) / 2 * this.scale,
       height / 2 + 10 + this.shift[1] + (y0 + y1) / 2 * this.scale];
     const keys = new Map();
     if (heat) this.drawHeat(context, width, height, colour, keys);
     for (const layer of [...this.backdrop, ...this.frames[this.index].layers]) this.drawLayer(context, layer, colour, keys);
-    scaleBar(context, this.scale, width, this.given.unit ?? 'm', colour);
+    scaleBar(context, this.scale, width, this.content.unit ?? 'm', colour);
     this.explain([...keys].map(([name, [key, kind]]) => [name, key, kind]));
   }
   drawLayer(context, layer, colour, keys) {
@@ -152,7 +152,7 @@ class Plan extends Plot {
     if (label && (polygons.length || lines.length || circles.length || dots.length || squares.length || crosses.length)) keys.set(label, [key, kind]);
   }
   shadeCells() {
-    const { heat } = this.given, known = heat.values.filter(value => value !== null);
+    const { heat } = this.content, known = heat.values.filter(value => value !== null);
     this.low = Math.min(0, ...known.length ? [known.reduce((a, b) => Math.min(a, b))] : []);
     this.high = known.reduce((a, b) => Math.max(a, b), this.low);
     if (this.high === this.low) this.high = this.low + 1;
@@ -167,7 +167,7 @@ class Plan extends Plot {
     context.putImageData(pixels, 0, 0);
   }
   drawHeat(context, width, height, colour, keys) {
-    const { heat } = this.given, { first, spacing, columns, rows } = heat, side = spacing * this.scale;
+    const { heat } = this.content, { first, spacing, columns, rows } = heat, side = spacing * this.scale;
     context.imageSmoothingEnabled = false;
     context.drawImage(this.cells, this.px(first[0] - spacing / 2), this.py(first[1] + (rows - 0.5) * spacing), columns * side, rows * side);
     context.strokeStyle = '#fff';
@@ -191,7 +191,7 @@ class Plan extends Plot {
   }
   tell(x, y) {
     if (!this.scale) return;
-    const at = [(x - this.origin[0]) / this.scale, (this.origin[1] - y) / this.scale], { heat, unit = 'm' } = this.given;
+    const at = [(x - this.origin[0]) / this.scale, (this.origin[1] - y) / this.scale], { heat, unit = 'm' } = this.content;
     const place = unit === 'm' ? `x ${at[0].toFixed(2)} m, y ${at[1].toFixed(2)} m` : '';
     if (!heat) { this.said.textContent = place; return; }
     const column = Math.round((at[0] - heat.first[0]) / heat.spacing), row = Math.round((at[1] - heat.first[1]) / heat.spacing);

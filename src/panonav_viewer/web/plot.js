@@ -9,18 +9,18 @@ export const text = (value, digits = 3) => {
   return String(Number(value.toPrecision(Math.max(digits, Math.ceil(Math.log10(Math.abs(value) + 1))))));
 };
 
-// What is drawn from data that never changes: they stand as JSON in a script element within. Below it, `key` explains
-// colours; `said` tells what is under the pointer.
+// Draws data that never change, which a script element within holds as JSON. Below it, `key` explains colours; `said`
+// shows the values under the pointer.
 export class Plot extends Drawing {
   connectedCallback() {
     if (this.tabIndex === 0) return;
     this.tabIndex = 0;
     this.setAttribute('role', 'img');
     whenNear(this, () => {
-      const data = this.querySelector('script');
-      this.given = JSON.parse(data.textContent);
-      data.remove();
-      this.setAttribute('aria-label', this.given.title ?? '');
+      const script = this.querySelector('script');
+      this.content = JSON.parse(script.textContent);
+      script.remove();
+      this.setAttribute('aria-label', this.content.title ?? '');
       this.key = document.createElement('div');
       this.key.className = 'key';
       this.after(this.key);

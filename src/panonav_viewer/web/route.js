@@ -1,14 +1,14 @@
 import { Chart } from 'panonav/chart';
 
-// The route panorama of a run: which line the robot is at, where it truly was, and in which directions the scene is
-// not as remembered. `given`: as a chart with a picture, and `marks`: [along, true along, [azimuth from, to, ...]] of
-// each moment, null for what is not known.
+// Shows the route panorama of a run: the matched line, the true position, and the directions in which the scene has
+// changed. `content`: as a chart with a picture, and `marks`: [along, true along, [azimuth from, to, ...]] of
+// each moment, null where unknown.
 class RoutePanel extends Chart {
   connectedCallback() {}
   attach(run) {
-    this.given = run.given.route;
+    this.content = run.content.route;
     this.setAttribute('role', 'img');
-    this.setAttribute('aria-label', this.given.title);
+    this.setAttribute('aria-label', this.content.title);
     this.insertAdjacentHTML('beforeend', '<div class="legend"></div><div class="said"></div>');
     this.key = this.querySelector('.legend');
     this.said = this.querySelector('.said');
@@ -16,7 +16,7 @@ class RoutePanel extends Chart {
     run.addEventListener('moment', () => this.redraw());
   }
   over(context, colour) {
-    const { left, right } = this.area, { marks } = this.given, keys = [];
+    const { left, right } = this.area, { marks } = this.content, keys = [];
     const across = (way, name, dashes) => {
       context.strokeStyle = colour(name);
       context.lineWidth = 2.5;
@@ -30,7 +30,7 @@ class RoutePanel extends Chart {
     const shown = marks.slice(0, this.run.index + 1);
     for (const [along, , changed] of shown) {
       if (along === null) continue;
-      // Left is positive: a range that passes straight behind has two parts.
+      // Left is positive: a range across the rear has two parts.
       for (let i = 0; i < changed.length; i += 2) {
         const [from, to] = [changed[i], changed[i + 1]];
         for (const [a, b] of to >= from ? [[from, to]] : [[from, 180], [-180, to]]) {
@@ -38,11 +38,11 @@ class RoutePanel extends Chart {
         }
       }
     }
-    if (shown.some(([, , changed]) => changed.length)) keys.push(['not as remembered', 'orange', 'area']);
+    if (shown.some(([, , changed]) => changed.length)) keys.push(['scene has changed', 'orange', 'area']);
     const [along, truth] = marks[this.run.index] ?? [null, null];
     if (truth !== null && truth !== undefined) {
       across(truth, 'yellow', [7, 5]);
-      keys.push(['true place', 'yellow', 'dashes']);
+      keys.push(['true position', 'yellow', 'dashes']);
     }
     if (along !== null) {
       across(along, 'vermilion', []);
@@ -52,10 +52,10 @@ class RoutePanel extends Chart {
       : `at ${along.toFixed(2)} m` + (truth === null ? '' : `, ${(100 * Math.abs(along - truth)).toFixed(1)} cm off`);
     this.explain(keys);
   }
-  draw(...given) {
+  draw(...content) {
     const { explain } = this;
     this.explain = keys => { if (keys.length) explain.call(this, keys); };
-    super.draw(...given);
+    super.draw(...content);
   }
 }
 customElements.define('pn-route', RoutePanel);

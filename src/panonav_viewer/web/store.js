@@ -1,8 +1,8 @@
-// The run as the page knows it. Panels read it and listen:
+// Holds the run. Panels read it and listen to its events:
 //   'moment'   another moment is shown
 //   'staying'  references, edges, plan, directions or goal are new
 //   'grown'    moments were added
-//   'sought'   somebody goes to a moment: the run is held
+//   'sought'   somebody chose a moment: the run is paused
 const maxMoments = 5000;  // of a live run, without their pictures
 
 export class Run extends EventTarget {
@@ -19,7 +19,7 @@ export class Run extends EventTarget {
   get last() { return this.moments.length - 1; }
   say(name) { this.dispatchEvent(new Event(name)); }
 
-  // What a viewer that comes late has missed: [[t, x, y, heading, probability, sure, state, true x, true y], ...].
+  // Adds the moments before the viewer came: [[t, x, y, heading, probability, sure, state, true x, true y], ...].
   takePast(past) {
     this.moments = past.map(([t, x, y, heading, probability, sure, state, trueX, trueY]) =>
       ({ t, pose: x === null ? undefined : [x, y, heading], truth: trueX === null ? undefined : [trueX, trueY, null], probability: probability ?? undefined, sure, state, past: true }));
@@ -47,7 +47,7 @@ export class Run extends EventTarget {
     this.index = Math.max(0, Math.min(this.last, index));
     this.say('moment');
   }
-  // A moment by its time.
+  // Shows the moment at a time.
   seek(t) {
     let low = 0, high = this.last;
     while (low < high) {
@@ -59,7 +59,7 @@ export class Run extends EventTarget {
   }
 }
 
-// Server-sent events; the browser connects again by itself, and the server then tells everything.
+// Receives server-sent events; the browser reconnects by itself, and the server then sends everything again.
 export function follow(run, address, connected) {
   const events = new EventSource(address);
   events.addEventListener('open', () => connected(true));
@@ -70,13 +70,13 @@ export function follow(run, address, connected) {
   events.addEventListener('ended', () => { run.ended = true; events.close(); run.say('moment'); });
 }
 
-// A simulated robot that estimates no pose gives the true one instead.
+// True if the pose is the true one, as of a simulated robot that estimates none.
 export function isTruth({ pose, truth }) {
   return Boolean(pose && truth && pose.every((value, i) => value === truth[i]));
 }
 
-// The points of `name` for a line that stops where a robot was carried: faster than three times what nine of ten steps
-// are.
+// Returns the points of `name` for a line that is interrupted where a robot was carried: where it was faster than three
+// times the 90th percentile.
 export function steady(moments, name) {
   const speeds = moments.map((moment, i) => {
     const before = moments[i - 1], [from, to] = [before?.[name], moment[name]];

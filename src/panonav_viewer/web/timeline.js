@@ -1,7 +1,7 @@
 import { Drawing } from 'panonav/draw';
 import { stateClass } from 'panonav/store';
 
-// State as a band of colour and height, its probability as a line, over time.
+// Shows the state over time as a band of colour and height, its probability as a line.
 class Timeline extends Drawing {
   attached() {
     this.setAttribute('role', 'img');
@@ -20,7 +20,7 @@ class Timeline extends Drawing {
   }
   span() { return [this.run.moments[0].t, Math.max(this.run.moments[this.run.last].t, this.run.moments[0].t + 1e-6)]; }
 
-  // What does not change from moment to moment is drawn once.
+  // Draws once what does not change from moment to moment.
   drawRun(width, height, colour) {
     const { moments } = this.run, ratio = devicePixelRatio || 1;
     const drawn = [width, height, ratio, moments.length, moments[0].t, colour('ground')].join();
@@ -37,14 +37,14 @@ class Timeline extends Drawing {
     context.fillStyle = colour('soft');
     context.strokeStyle = colour('line');
     context.lineWidth = 1;
-    this.told = moments.some(({ probability }) => probability !== undefined);
-    for (const probability of this.told ? [0, 0.5, 1] : []) {
+    this.hasProbability = moments.some(({ probability }) => probability !== undefined);
+    for (const probability of this.hasProbability ? [0, 0.5, 1] : []) {
       context.fillText(probability.toFixed(1), 8, y(probability) + 4);
       context.beginPath();
       context.moveTo(34, y(probability)); context.lineTo(width - 10, y(probability));
       context.stroke();
     }
-    // Height tells the state, too, for those who do not tell the colours apart.
+    // The height shows the state, too, for those who cannot distinguish the colours.
     const heights = { good: 12, doubt: 8, bad: 4 };
     moments.forEach((moment, i) => {
       if (!moment.state) return;
@@ -76,7 +76,7 @@ class Timeline extends Drawing {
     context.beginPath();
     context.moveTo(at, 4); context.lineTo(at, height - 6);
     context.stroke();
-    this.said.textContent = moment.probability === undefined ? this.told ? 'probability of the state' : moment.state ?? ''
+    this.said.textContent = moment.probability === undefined ? this.hasProbability ? 'probability of the state' : moment.state ?? ''
       : `probability ${moment.probability.toFixed(2)}`;
   }
 }
