@@ -1,4 +1,6 @@
 // Recordings of other programs: bags, folders of rosbag2, files of the reference library of MCAP.
+#include <zstd.h>
+
 #include <array>
 #include <cstdlib>
 
