@@ -13,14 +13,14 @@ namespace panonav::python {
 namespace {
 
 Dataset open_with_warnings(const std::filesystem::path& path, const InputOptions& options) {
-  OpenedDataset opened = [&] {
+  Dataset opened = [&] {
     const py::gil_scoped_release free;
     return open_input(path, options);
   }();
   for (const std::string& warning : opened.warnings) {
     if (PyErr_WarnEx(PyExc_UserWarning, warning.c_str(), 1) != 0) throw py::error_already_set();
   }
-  return std::move(opened.dataset);
+  return opened;
 }
 
 }  // namespace

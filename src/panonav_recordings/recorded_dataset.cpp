@@ -193,13 +193,13 @@ std::string shown(MessageBytes bytes, const RecordedTopic& topic) {
 
 }  // namespace
 
-OpenedDataset read_recording(const fs::path& path, PictureSource source,
-                             const InputOptions::Topics& topics) {
+Dataset read_recording(const fs::path& path, PictureSource source,
+                       const InputOptions::Topics& topics) {
   return read_recording(Recording::open(path), path, std::move(source), topics);
 }
 
-OpenedDataset read_recording(std::shared_ptr<const Recording> recording, const fs::path& path,
-                             PictureSource source, const InputOptions::Topics& topics) {
+Dataset read_recording(std::shared_ptr<const Recording> recording, const fs::path& path,
+                       PictureSource source, const InputOptions::Topics& topics) {
   RecordedMessages messages =
       collect_messages(path, *recording, choose_topics(*recording, path, topics, source));
   const bool by_log = messages.sort();
@@ -207,15 +207,15 @@ OpenedDataset read_recording(std::shared_ptr<const Recording> recording, const f
   for (const RecordedPicture& picture : messages.pictures) places.push_back(picture.place);
   const auto store = std::make_shared<const RecordedPictures>(path, recording, std::move(places));
 
-  OpenedDataset opened;
-  opened.dataset.folder = path;
-  opened.dataset.source = std::move(source);
+  Dataset opened;
+  opened.folder = path;
+  opened.source = std::move(source);
   EntryMaker maker(messages, by_log);
   for (const RecordedPicture& picture : messages.pictures) {
-    DatasetEntry& entry = opened.dataset.entries.emplace_back(maker.make(picture));
+    DatasetEntry& entry = opened.entries.emplace_back(maker.make(picture));
     entry.path = path;
     entry.store = store;
-    entry.store_index = opened.dataset.entries.size() - 1;
+    entry.store_index = opened.entries.size() - 1;
   }
   opened.warnings = recording->warnings();
   opened.warnings.insert(opened.warnings.end(), messages.warnings.begin(), messages.warnings.end());

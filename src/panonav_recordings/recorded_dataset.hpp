@@ -21,12 +21,12 @@ namespace panonav::recordings {
 /// Throws FileError: no or several topics of pictures and none named, a topic that is missing or of
 /// another type, named frames that no transforms connect, and what `Recording::open` throws. Cost:
 /// one pass over the messages. Memory: 400 bytes a picture and 80 a message.
-[[nodiscard]] OpenedDataset read_recording(const std::filesystem::path& path, PictureSource source,
-                                           const InputOptions::Topics& topics = {});
+[[nodiscard]] Dataset read_recording(const std::filesystem::path& path, PictureSource source,
+                                     const InputOptions::Topics& topics = {});
 /// The same of a recording that is open; `path` stands in errors and entries.
-[[nodiscard]] OpenedDataset read_recording(std::shared_ptr<const Recording> recording,
-                                           const std::filesystem::path& path, PictureSource source,
-                                           const InputOptions::Topics& topics = {});
+[[nodiscard]] Dataset read_recording(std::shared_ptr<const Recording> recording,
+                                     const std::filesystem::path& path, PictureSource source,
+                                     const InputOptions::Topics& topics = {});
 
 /// One topic as `describe_recording` knows it.
 struct TopicSummary {

@@ -15,10 +15,10 @@ void select_if_needed(Dataset& dataset, const Dataset::Selection& selection) {
   if (selection.by_time() || selection.every > 1) select_pictures(dataset, selection);
 }
 
-OpenedDataset open_recording(const std::filesystem::path& path, const PictureSource& source,
-                             const InputOptions& options) {
-  OpenedDataset opened = read_recording(path, source, options.topics);
-  select_if_needed(opened.dataset, options.selection);
+Dataset open_recording(const std::filesystem::path& path, const PictureSource& source,
+                       const InputOptions& options) {
+  Dataset opened = read_recording(path, source, options.topics);
+  select_if_needed(opened, options.selection);
   return opened;
 }
 
@@ -28,19 +28,19 @@ bool is_video_file(const std::filesystem::path& path) {
 }
 
 /// Pictures that are not selected need not be decoded.
-OpenedDataset open_video(const std::filesystem::path& path, const PictureSource& source,
-                         const InputOptions& options) {
-  return {read_video(path, source, options.selection), {}};
+Dataset open_video(const std::filesystem::path& path, const PictureSource& source,
+                   const InputOptions& options) {
+  return read_video(path, source, options.selection);
 }
 
 bool is_standard_input(const std::filesystem::path& path) {
   return path == "-";
 }
 
-OpenedDataset open_standard_input(const std::filesystem::path& /*path*/,
-                                  const PictureSource& source, const InputOptions& options) {
-  OpenedDataset opened{read_jpeg_stream(STDIN_FILENO, "standard input", source), {}};
-  select_if_needed(opened.dataset, options.selection);
+Dataset open_standard_input(const std::filesystem::path& /*path*/, const PictureSource& source,
+                            const InputOptions& options) {
+  Dataset opened = read_jpeg_stream(STDIN_FILENO, "standard input", source);
+  select_if_needed(opened, options.selection);
   return opened;
 }
 

@@ -297,7 +297,8 @@ class CameraRays {
     if (std::holds_alternative<HyperboloidalModel>(camera.model)) mirror_.emplace(camera);
     for (std::size_t i = 0; dual_ && i < 2; ++i) {
       const double half_m = 0.5 * dual_->baseline_m;
-      const Direction3 axis = LensRotation(dual_->lenses[i]).robot_from_lens({1.0, 0.0, 0.0});
+      const Direction3 axis =
+          FisheyeLens::Rotation(dual_->lenses[i]).robot_from_lens({1.0, 0.0, 0.0});
       viewpoints_[i] = {half_m * axis.x, half_m * axis.y, half_m * axis.z};
     }
   }

@@ -27,13 +27,13 @@ TEST(DualFisheye, RollTurnsWhatIsAboveCounterClockwiseInThePicture) {
   lens.azimuth_rad = 0.4;
   lens.roll_rad = std::numbers::pi / 2;
   const Direction3 above = Direction3::from_angles(0.4, 0.3);
-  const auto seen = project(lens, LensRotation(lens).lens_from_robot(above));
+  const auto seen = project(lens, FisheyeLens::Rotation(lens).lens_from_robot(above));
   ASSERT_TRUE(seen);
   EXPECT_NEAR(seen->right_px, -0.3 * lens.focal_length_px, 1e-9);
   EXPECT_NEAR(seen->up_px, 0, 1e-9);
   lens.roll_rad = 0;
   const auto left =
-      project(lens, LensRotation(lens).lens_from_robot(Direction3::from_angles(0.5, 0)));
+      project(lens, FisheyeLens::Rotation(lens).lens_from_robot(Direction3::from_angles(0.5, 0)));
   EXPECT_NEAR(left->right_px, -0.1 * lens.focal_length_px, 1e-9) << "left in the world, unmirrored";
 }
 

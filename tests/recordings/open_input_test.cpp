@@ -69,9 +69,9 @@ TEST_F(OpenInput, AKindThatIsNotRegisteredIsNamed) {
 }
 
 TEST_F(OpenInput, ADataSetDescribesItself) {
-  const OpenedDataset opened = open_input(folder_ / "data", {.default_source = panorama_});
-  EXPECT_EQ(opened.dataset.source.kind, PictureKind::equirectangular);
-  EXPECT_EQ(opened.dataset.entries.size(), 2U);
+  const Dataset opened = open_input(folder_ / "data", {.default_source = panorama_});
+  EXPECT_EQ(opened.source.kind, PictureKind::equirectangular);
+  EXPECT_EQ(opened.entries.size(), 2U);
   EXPECT_TRUE(opened.warnings.empty());
   EXPECT_TRUE(contains(refusal("data", {.source = panorama_}),
                        "has a dataset.toml, which says how its pictures lie; leave out 'source'"));
@@ -79,25 +79,24 @@ TEST_F(OpenInput, ADataSetDescribesItself) {
   EXPECT_TRUE(contains(refusal("data", {.topics = {.imu = "/imu"}}),
                        "has no topics; leave out the option imu_topic"));
   const auto later = open_input(folder_ / "data", {.selection = {.from_s = 0.5}});
-  ASSERT_EQ(later.dataset.entries.size(), 1U);
-  EXPECT_EQ(later.dataset.entries[0].file, "b.png");
+  ASSERT_EQ(later.entries.size(), 1U);
+  EXPECT_EQ(later.entries[0].file, "b.png");
 }
 
 TEST_F(OpenInput, PicturesLieAsTheCallerSays) {
-  const OpenedDataset flat = open_input(folder_ / "photos", {.default_source = panorama_});
-  EXPECT_EQ(flat.dataset.entries.size(), 2U);
+  const Dataset flat = open_input(folder_ / "photos", {.default_source = panorama_});
+  EXPECT_EQ(flat.entries.size(), 2U);
   EXPECT_EQ(flat.warnings, (std::vector<std::string>{"left out, no PNG or JPEG by name: notes.txt",
                                                      "left out, folders within: evening/"}));
-  const OpenedDataset deep =
-      open_input(folder_ / "photos", {.source = panorama_, .recursive = true});
-  EXPECT_EQ(deep.dataset.entries.size(), 3U);
+  const Dataset deep = open_input(folder_ / "photos", {.source = panorama_, .recursive = true});
+  EXPECT_EQ(deep.entries.size(), 3U);
   ASSERT_EQ(deep.warnings.size(), 2U);
   EXPECT_TRUE(contains(deep.warnings[1], "is 16 x 8 px; a picture of the whole sphere"));
   EXPECT_TRUE(contains(fault("photos", {}),
                        "has no dataset.toml; say what the pictures show with 'source'"));
   EXPECT_TRUE(contains(fault("missing", {.source = panorama_}), "there is no such file or folder"));
   const std::string one = "photos/view_9.png";
-  EXPECT_EQ(open_input(folder_ / one, {.default_source = panorama_}).dataset.entries.size(), 1U);
+  EXPECT_EQ(open_input(folder_ / one, {.default_source = panorama_}).entries.size(), 1U);
   EXPECT_TRUE(contains(refusal(one, {.source = panorama_, .recursive = true}),
                        "is one picture; the option recursive goes with a folder"));
   EXPECT_TRUE(
@@ -109,7 +108,7 @@ TEST_F(OpenInput, RadiansInThePlaceOfDegreesAreHinted) {
   folder_.write("data/dataset.toml",
                 "[images]\nkind = \"panorama\"\nelevation_deg = [-0.5, 0.7]\n[list]\nfile = "
                 "\"images.csv\"\n");
-  const OpenedDataset opened = open_input(folder_ / "data");
+  const Dataset opened = open_input(folder_ / "data");
   ASSERT_EQ(opened.warnings.size(), 1U);
   EXPECT_TRUE(contains(opened.warnings[0], "is -0.5 to 0.7 degrees; are these radians?"));
 }
@@ -119,7 +118,7 @@ TEST_F(OpenInput, AReaderIsReplacedByOneOfItsName) {
   const DatasetReader empty{
       "toy", false, is_toy,
       [](const fs::path& path, const PictureSource& source, const InputOptions& /*options*/) {
-        return OpenedDataset{{.folder = path, .source = source}, {"empty"}};
+        return Dataset{.folder = path, .source = source, .warnings = {"empty"}};
       }};
   register_dataset_reader(empty);
   EXPECT_EQ(open_input("walk.toy", {.default_source = panorama_}).warnings,
@@ -127,7 +126,7 @@ TEST_F(OpenInput, AReaderIsReplacedByOneOfItsName) {
   DatasetReader other = empty;
   other.read = [](const fs::path& path, const PictureSource& source,
                   const InputOptions& /*options*/) {
-    return OpenedDataset{{.folder = path, .source = source}, {}};
+    return Dataset{.folder = path, .source = source};
   };
   register_dataset_reader(other);
   EXPECT_TRUE(open_input("walk.toy", {.default_source = panorama_}).warnings.empty());

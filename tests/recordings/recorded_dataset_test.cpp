@@ -61,8 +61,8 @@ class RecordedTopics : public ::testing::TestWithParam<MessageEncoding> {
     message.orientation = ros::pose_of({0.0, 0.0, 1.2}, tilt).orientation;
     recorded_->add(topic, start_ns + after_ns, message);
   }
-  [[nodiscard]] OpenedDataset read(const InputOptions::Topics& topics = {},
-                                   const PictureSource& source = sphere) const {
+  [[nodiscard]] Dataset read(const InputOptions::Topics& topics = {},
+                             const PictureSource& source = sphere) const {
     return read_recording(recorded_, "drive.bag", source, topics);
   }
   [[nodiscard]] std::string error(const InputOptions::Topics& topics = {}) const {
@@ -89,8 +89,8 @@ INSTANTIATE_TEST_SUITE_P(Encodings, RecordedTopics,
 TEST_P(RecordedTopics, BecomePicturesWithStampsAndOdometry) {
   for (int i = -1; i <= 20; ++i) add_odometry(i * 100 * ms);
   for (int i = 0; i < 8; ++i) add_picture(i * 240 * ms + 7);
-  const auto [dataset, warnings] = read();
-  EXPECT_TRUE(warnings.empty()) << warnings[0];
+  const Dataset dataset = read();
+  EXPECT_TRUE(dataset.warnings.empty()) << dataset.warnings[0];
   ASSERT_EQ(dataset.entries.size(), 8U);
   EXPECT_EQ(dataset.source, sphere);
   EXPECT_EQ(dataset.entries[1].file, "1700000000_240000007");
@@ -118,7 +118,7 @@ TEST_P(RecordedTopics, OdometryEndsAnIntervalBeyondItsLastMessage) {
   const auto read_back = read();
   for (std::size_t i = 0; i < expected.size(); ++i) {
     SCOPED_TRACE(expected[i].first);
-    const DatasetEntry& entry = read_back.dataset.entries[i];
+    const DatasetEntry& entry = read_back.entries[i];
     EXPECT_EQ(entry.odometry.has_value(), expected[i].second);
     if (expected[i].second) expect_odometry(entry, expected[i].first * ms);
   }
@@ -138,7 +138,7 @@ TEST_P(RecordedTopics, TransformsGiveOdometryAlongTheirChain) {
     add_transform("/tf", "base_link", "wheel", i * 100 * ms, {0.0, 0.3, 0.1 * i});
   }
   add_picture(650 * ms);
-  const auto entry = read().dataset.entries.at(0);
+  const auto entry = read().entries.at(0);
   const Pose2 expected = pose_at(0.65) * mount;
   ASSERT_TRUE(entry.odometry);
   EXPECT_NEAR(entry.odometry->x_m, expected.x_m, 1e-9);
@@ -146,13 +146,13 @@ TEST_P(RecordedTopics, TransformsGiveOdometryAlongTheirChain) {
   EXPECT_NEAR(entry.odometry->heading_rad, expected.heading_rad, 1e-9);
 
   const auto other = read({.odometry_frames = std::pair{"odom", "base_footprint"}});
-  expect_odometry(other.dataset.entries[0], 650 * ms);
+  expect_odometry(other.entries[0], 650 * ms);
   EXPECT_TRUE(contains(error({.odometry_frames = std::pair{"odom", "arm"}}),
                        "drive.bag: no transforms lead from odom to arm; it has: "));
   // Who changes the parent is not believed.
   add_transform("/tf", "elsewhere", "base_footprint", 640 * ms, {50.0, 0.0, 0.0});
   const auto changed = read();
-  EXPECT_EQ(changed.dataset.entries[0].odometry, entry.odometry);
+  EXPECT_EQ(changed.entries[0].odometry, entry.odometry);
   EXPECT_EQ(changed.warnings.at(0),
             "1 transforms give a frame another parent than before and are left out");
 }
@@ -162,7 +162,7 @@ TEST_P(RecordedTopics, TransformsInACircleConnectNothing) {
   add_transform("/tf", "b", "a", 0, {});
   add_transform("/tf", "base_link", "b", 0, {});
   add_picture(0);
-  EXPECT_FALSE(read().dataset.entries[0].odometry);
+  EXPECT_FALSE(read().entries[0].odometry);
   EXPECT_TRUE(contains(error({.odometry_frames = std::pair{"odom", "base_link"}}),
                        "no transforms lead from odom to base_link"));
   EXPECT_THROW((void)read({.odometry_frames = std::pair{"odom", "/odom"}}), ContractError);
@@ -184,8 +184,8 @@ TEST_P(RecordedTopics, TopicsAreChosenByTypeOrNamed) {
             "drive.bag: has pictures of several topics: /left, /right; name one with "
             "the option image_topic");
   const auto right = read({.image = "/right"});
-  EXPECT_EQ(read_picture(right.dataset.entries.at(0)), images_[1]);
-  EXPECT_FALSE(right.dataset.entries[0].odometry);
+  EXPECT_EQ(read_picture(right.entries.at(0)), images_[1]);
+  EXPECT_FALSE(right.entries[0].odometry);
   ASSERT_EQ(right.warnings.size(), 2U);
   EXPECT_EQ(right.warnings[0],
             "odometry of several topics, of which none is used: /filtered, /wheels; name one with "
@@ -195,7 +195,7 @@ TEST_P(RecordedTopics, TopicsAreChosenByTypeOrNamed) {
             "with the option imu_topic");
   const auto named = read({.image = "/right", .odometry = "/wheels", .imu = "/imu1"});
   EXPECT_TRUE(named.warnings.empty());
-  EXPECT_TRUE(named.dataset.entries[0].odometry && named.dataset.entries[0].tilt);
+  EXPECT_TRUE(named.entries[0].odometry && named.entries[0].tilt);
   EXPECT_EQ(error({.image = "/imu0"}),
             "drive.bag: has no topic /imu0 of sensor_msgs/Image or sensor_msgs/CompressedImage; it "
             "has: /left, /right");
@@ -219,9 +219,9 @@ TEST_P(RecordedTopics, WithoutStampsTheTimesOfRecordingServe) {
   message.data = png;
   message.format = "png";
   recorded_->add("/camera", start_ns + 502 * ms, message);
-  const auto [dataset, warnings] = read();
-  ASSERT_EQ(warnings.size(), 1U);
-  EXPECT_EQ(warnings[0], "headers without stamps: the times of recording serve instead");
+  const Dataset dataset = read();
+  ASSERT_EQ(dataset.warnings.size(), 1U);
+  EXPECT_EQ(dataset.warnings[0], "headers without stamps: the times of recording serve instead");
   EXPECT_EQ(dataset.entries[0].file, "1700000000_502000000");
   expect_odometry(dataset.entries[0], 500 * ms);  // which is recorded 2 ms later
   EXPECT_EQ(read_encoded_picture(dataset.entries[0]), png);
@@ -236,17 +236,17 @@ TEST_P(RecordedTopics, TiltIsThatOfAnUprightSensor) {
   add_picture(40 * ms);
   add_picture(350 * ms);
   const auto read_back = read();
-  ASSERT_TRUE(read_back.dataset.entries[0].tilt);
-  EXPECT_NEAR(read_back.dataset.entries[0].tilt->roll_rad, 0.1, 1e-12);
-  EXPECT_NEAR(read_back.dataset.entries[0].tilt->pitch_rad, -0.2, 1e-12);
-  EXPECT_FALSE(read_back.dataset.entries[1].tilt);
+  ASSERT_TRUE(read_back.entries[0].tilt);
+  EXPECT_NEAR(read_back.entries[0].tilt->roll_rad, 0.1, 1e-12);
+  EXPECT_NEAR(read_back.entries[0].tilt->pitch_rad, -0.2, 1e-12);
+  EXPECT_FALSE(read_back.entries[1].tilt);
   EXPECT_TRUE(
       contains(read_back.warnings.at(0), "1 of 2 pictures would be tilted by more than 30"));
   // Panoramas that cannot be levelled.
   const auto unknown = read({}, {});
-  EXPECT_FALSE(unknown.dataset.entries[0].tilt);
+  EXPECT_FALSE(unknown.entries[0].tilt);
   EXPECT_TRUE(contains(unknown.warnings.at(0), "roll and pitch of /imu are not used"));
-  EXPECT_TRUE(read({.imu = "/imu"}, {}).dataset.entries[0].tilt);
+  EXPECT_TRUE(read({.imu = "/imu"}, {}).entries[0].tilt);
 }
 
 TEST_P(RecordedTopics, SensorsWithoutOrientationGiveNoTilt) {
@@ -256,7 +256,7 @@ TEST_P(RecordedTopics, SensorsWithoutOrientationGiveNoTilt) {
   recorded_->add("/imu", start_ns, message);
   add_picture(0);
   const auto read_back = read();
-  EXPECT_FALSE(read_back.dataset.entries[0].tilt);
+  EXPECT_FALSE(read_back.entries[0].tilt);
   EXPECT_TRUE(contains(read_back.warnings.at(0), "1 messages of the inertial sensor state no"));
 }
 
@@ -273,15 +273,15 @@ TEST_P(RecordedTopics, DamagedMessagesAreLeftOut) {
   late.header.stamp_ns = start_ns + 100 * ms;
   recorded_->add("/camera", start_ns + 400 * ms, late);
   recorded_->add("/camera", "sensor_msgs/Image", start_ns + 500 * ms, {1, 2, 3});
-  const auto [dataset, warnings] = read();
+  const Dataset dataset = read();
   ASSERT_EQ(dataset.entries.size(), 4U);
   expect_odometry(dataset.entries[1], 150 * ms);
-  ASSERT_EQ(warnings.size(), 3U);
-  EXPECT_TRUE(contains(warnings[0],
+  ASSERT_EQ(dataset.warnings.size(), 3U);
+  EXPECT_TRUE(contains(dataset.warnings[0],
                        "2 messages cannot be read and are left out; the first: "
                        "nav_msgs/Odometry message: position is nan"));
-  EXPECT_EQ(warnings[1], "stamps run back at 1 of 4 pictures");
-  EXPECT_EQ(warnings[2], "1 of 4 pictures are not of the size of the first, 8 x 4 px");
+  EXPECT_EQ(dataset.warnings[1], "stamps run back at 1 of 4 pictures");
+  EXPECT_EQ(dataset.warnings[2], "1 of 4 pictures are not of the size of the first, 8 x 4 px");
   // In the order of recording.
   EXPECT_EQ(dataset.entries[0].file, "1700000000_140000000");
   EXPECT_EQ(dataset.entries[1].file, "1700000000_150000000");
@@ -298,7 +298,7 @@ TEST_P(RecordedTopics, GroundTruthGivesPoses) {
         "/ground_truth", start_ns + after_ns,
         ros::PoseStamped{{start_ns + after_ns, "world"}, ros::pose_of(pose_at(0.1 * i))});
   }
-  const auto entries = read().dataset.entries;
+  const auto entries = read().entries;
   ASSERT_TRUE(entries[1].pose && entries[1].pose->heading_rad);
   EXPECT_NEAR(entries[1].pose->x_m, pose_at(0.5).x_m, 1e-12);
   EXPECT_NEAR(*entries[1].pose->heading_rad, pose_at(0.5).heading_rad, 1e-12);

@@ -200,9 +200,9 @@ Dataset open_recording(const std::string& input, const PictureArguments& picture
     throw UsageError(input + " is a live source; allowed with localise, memorise and track");
   }
   try {
-    OpenedDataset opened = open_input(input, options);
+    Dataset opened = open_input(input, options);
     for (const std::string& warning : opened.warnings) session.note(name_picture_flags(warning));
-    return std::move(opened.dataset);
+    return opened;
   } catch (const OptionError& error) {
     throw UsageError(name_picture_flags(error.what()));
   } catch (const FileError& error) {

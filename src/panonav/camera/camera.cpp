@@ -131,7 +131,7 @@ struct SeenByLens {
 std::optional<SeenByLens> see(const Camera& camera, const DualFisheyeModel& model, int index,
                               const Direction3& direction) {
   const FisheyeLens& lens = model.lenses[index];
-  const auto point = project(lens, LensRotation(lens).lens_from_robot(direction));
+  const auto point = project(lens, FisheyeLens::Rotation(lens).lens_from_robot(direction));
   if (!point) return std::nullopt;
   const auto pixel = within_image(camera, {lens.centre_u_px + mirror_sign(camera) * point->right_px,
                                            lens.centre_v_px - point->up_px});
@@ -230,7 +230,7 @@ std::optional<Direction3> unproject(const Camera& camera, PixelPoint pixel) {
     const auto in_lens = unproject(lens, mirror_sign(camera) * (inside->u_px - lens.centre_u_px),
                                    lens.centre_v_px - inside->v_px);
     if (!in_lens) return std::nullopt;
-    return LensRotation(lens).robot_from_lens(*in_lens);
+    return FisheyeLens::Rotation(lens).robot_from_lens(*in_lens);
   }
   const double right_px = inside->u_px - camera.centre.u_px;
   const double up_px = camera.centre.v_px - inside->v_px;

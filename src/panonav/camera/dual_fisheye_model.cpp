@@ -73,7 +73,7 @@ double angle_at(const FisheyeLens& lens, double radius_px) {
   return angle;
 }
 
-LensRotation::LensRotation(const FisheyeLens& lens) {
+FisheyeLens::Rotation::Rotation(const FisheyeLens& lens) {
   const double ca = std::cos(lens.azimuth_rad);
   const double sa = std::sin(lens.azimuth_rad);
   const double ce = std::cos(lens.elevation_rad);
@@ -86,13 +86,13 @@ LensRotation::LensRotation(const FisheyeLens& lens) {
            Direction3{sa * sr - ca * se * cr, -ca * sr - sa * se * cr, ce * cr}};
 }
 
-Direction3 LensRotation::robot_from_lens(const Direction3& d) const {
+Direction3 FisheyeLens::Rotation::robot_from_lens(const Direction3& d) const {
   const auto& [x, y, z] = axes_;
   return {d.x * x.x + d.y * y.x + d.z * z.x, d.x * x.y + d.y * y.y + d.z * z.y,
           d.x * x.z + d.y * y.z + d.z * z.z};
 }
 
-Direction3 LensRotation::lens_from_robot(const Direction3& d) const {
+Direction3 FisheyeLens::Rotation::lens_from_robot(const Direction3& d) const {
   const auto along = [&d](const Direction3& axis) {
     return d.x * axis.x + d.y * axis.y + d.z * axis.z;
   };

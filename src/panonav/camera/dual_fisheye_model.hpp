@@ -11,6 +11,21 @@ namespace panonav {
 /// r = f (theta + k3 theta^3 + k5 theta^5) from the centre (Kannala, Brandt 2006, two odd terms).
 /// Valid where r grows with theta, from 0 to `max_angle_rad`.
 struct FisheyeLens {
+  /// Rotation of a lens, by its azimuth, elevation and roll. The lens frame has x along the optical
+  /// axis, y towards the left of its picture and z towards the top.
+  class Rotation {
+   public:
+    /// Computes the rotation once, for many directions.
+    explicit Rotation(const FisheyeLens& lens);
+    /// A direction of the lens frame in the robot frame.
+    [[nodiscard]] Direction3 robot_from_lens(const Direction3& d) const;
+    /// A direction of the robot frame in the lens frame.
+    [[nodiscard]] Direction3 lens_from_robot(const Direction3& d) const;
+
+   private:
+    std::array<Direction3, 3> axes_;  ///< of the lens, in the robot frame
+  };
+
   /// A direction as one lens sees it.
   struct Point {
     double right_px = 0.0;  ///< from the lens's centre
@@ -55,21 +70,6 @@ void validate(const DualFisheyeModel& model);
 [[nodiscard]] double radius_at(const FisheyeLens& lens, double angle_rad);
 /// The inverse of it, for a radius within 0 .. radius_at(lens, max_angle_rad), by Newton steps.
 [[nodiscard]] double angle_at(const FisheyeLens& lens, double radius_px);
-
-/// Rotation of a lens, by its azimuth, elevation and roll. The lens frame has x along the optical
-/// axis, y towards the left of its picture and z towards the top.
-class LensRotation {
- public:
-  /// Computes the rotation once, for many directions.
-  explicit LensRotation(const FisheyeLens& lens);
-  /// A direction of the lens frame in the robot frame.
-  [[nodiscard]] Direction3 robot_from_lens(const Direction3& d) const;
-  /// A direction of the robot frame in the lens frame.
-  [[nodiscard]] Direction3 lens_from_robot(const Direction3& d) const;
-
- private:
-  std::array<Direction3, 3> axes_;  ///< of the lens, in the robot frame
-};
 
 /// `in_lens` in the lens frame, of any length but 0. Empty beyond the field of view.
 [[nodiscard]] std::optional<FisheyeLens::Point> project(const FisheyeLens& lens,

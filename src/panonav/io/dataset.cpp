@@ -291,7 +291,8 @@ std::string table_text(const std::vector<DatasetEntry>& entries, const Dataset::
 /// Returns the section [images]; the camera of a mirror is written into a file of its own.
 std::string images_text(const Dataset& dataset) {
   const PictureSource& source = dataset.source;
-  std::string text = "[images]\nkind = \"" + std::string(kind_names[source.kind]) + "\"\n";
+  std::string text = "[images]\nkind = \"" +
+                     std::string(kind_names[static_cast<std::size_t>(source.kind)]) + "\"\n";
   std::optional<ElevationBand> band = source.layout.kept_elevations;
   if (source.kind == PictureKind::panorama) band = source.layout.elevations;
   if (source.kind != PictureKind::mirror) {

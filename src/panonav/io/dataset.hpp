@@ -79,6 +79,8 @@ struct Dataset {
   std::vector<DatasetEntry> entries;  ///< in the order in which they were taken
   /// Of a folder of pictures: what lies in it and was left out, sorted; folders end in "/".
   std::vector<std::string> left_out;
+  /// What was left out, guessed or missing when an input was opened, a line each.
+  std::vector<std::string> warnings;
 };
 
 /// Reads `folder`/dataset.toml and the table that it names (docs/formats.md). Throws FileError with

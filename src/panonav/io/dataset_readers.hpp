@@ -30,13 +30,6 @@ struct InputOptions {
   bool recursive = false;        ///< of a folder: pictures of the folders within, too
 };
 
-/// A data set that is ready to be used.
-struct OpenedDataset {
-  Dataset dataset;  ///< its pictures are read when they are needed
-  /// What was left out, guessed or missing, a line each.
-  std::vector<std::string> warnings;
-};
-
 /// How inputs of one kind are read.
 struct DatasetReader {
   std::string name;         ///< the kind: "recording", "video"
@@ -45,8 +38,8 @@ struct DatasetReader {
   bool (*recognises)(const std::filesystem::path& path) = nullptr;
   /// Reads what `options.selection` takes of it; the pictures lie as `source` says, whatever the
   /// options do. Throws FileError.
-  OpenedDataset (*read)(const std::filesystem::path& path, const PictureSource& source,
-                        const InputOptions& options) = nullptr;
+  Dataset (*read)(const std::filesystem::path& path, const PictureSource& source,
+                  const InputOptions& options) = nullptr;
 };
 
 /// Adds a reader to the one table of the process, or replaces the one of its name. A program calls

@@ -31,10 +31,10 @@ std::string list_names(const std::vector<std::string>& names) {
   return text;
 }
 
-void warn_of_left_out(OpenedDataset& opened) {
+void warn_of_left_out(Dataset& opened) {
   std::vector<std::string> files;
   std::vector<std::string> folders;
-  for (const std::string& name : opened.dataset.left_out) {
+  for (const std::string& name : opened.left_out) {
     (name.ends_with('/') ? folders : files).push_back(name);
   }
   if (!files.empty()) {
@@ -58,28 +58,28 @@ std::optional<ImageSize> first_picture_size(const Dataset& dataset) {
 
 /// Radians in the place of degrees make a band that is far lower than the rows of its pictures; a
 /// data set of a few rows, as a route's may be, has a low band by right.
-void warn_of_low_band(OpenedDataset& opened) {
+void warn_of_low_band(Dataset& opened) {
   constexpr double min_band_deg = 5.0;  // pi radians, taken for degrees, are less
   constexpr double max_stretch = 8.0;   // of pixels; radians stretch them 57 times
-  const PictureLayout& layout = opened.dataset.source.layout;
+  const PictureLayout& layout = opened.source.layout;
   const auto& band = layout.kept_elevations ? layout.kept_elevations : layout.elevations;
   if (!band) return;
   const double low_deg = degrees(band->bottom_rad);
   const double high_deg = degrees(band->top_rad);
   if (high_deg - low_deg >= min_band_deg) return;
-  const auto size = first_picture_size(opened.dataset);
+  const auto size = first_picture_size(opened);
   if (!size || 360.0 * size->height < max_stretch * (high_deg - low_deg) * size->width) return;
   opened.warnings.push_back("hint: the elevation band of " +
-                            to_readable_line(opened.dataset.folder.string()) + " is " +
+                            to_readable_line(opened.folder.string()) + " is " +
                             format_number(low_deg) + " to " + format_number(high_deg) +
                             " degrees; are these radians? elevation_deg is in degrees");
 }
 
 /// A picture twice as wide as high that is said to be a panorama shows the whole sphere in all
 /// likelihood: as a panorama of square pixels it would reach from pole to pole.
-void warn_of_other_kind(OpenedDataset& opened) {
+void warn_of_other_kind(Dataset& opened) {
   constexpr double max_band_deg = 170.0;  // from here on the band is nearly the sphere's
-  const Dataset& dataset = opened.dataset;
+  const Dataset& dataset = opened;
   if (dataset.source.kind != PictureKind::panorama) return;
   const auto& band = dataset.source.layout.elevations;
   if (band && band->top_rad - band->bottom_rad < radians(max_band_deg)) return;
@@ -134,8 +134,8 @@ const PictureSource& stated_source(const fs::path& path, const InputOptions& opt
   throw FileError(path.string(), std::string(why) + " with 'source' (a PictureSource)");
 }
 
-OpenedDataset open_registered(const fs::path& path, const DatasetReader& reader,
-                              const InputOptions& options) {
+Dataset open_registered(const fs::path& path, const DatasetReader& reader,
+                        const InputOptions& options) {
   if (!reader.has_topics) refuse_topics(path, options.topics);
   if (options.topics.odometry && options.topics.odometry_frames) {
     throw OptionError(
@@ -146,13 +146,13 @@ OpenedDataset open_registered(const fs::path& path, const DatasetReader& reader,
   if (options.recursive) {
     throw OptionError(path.string() + " is a " + reader.name + "; leave out the option recursive");
   }
-  OpenedDataset opened = reader.read(path, source, options);
+  Dataset opened = reader.read(path, source, options);
   for (std::string& warning : opened.warnings) warning = path.string() + ": " + warning;
   if (options.source) warn_of_other_kind(opened);
   return opened;
 }
 
-OpenedDataset open_described(const fs::path& folder, const InputOptions& options) {
+Dataset open_described(const fs::path& folder, const InputOptions& options) {
   if (options.source) {
     throw OptionError(folder.string() +
                       " has a dataset.toml, which says how its pictures lie; leave out 'source'");
@@ -162,20 +162,20 @@ OpenedDataset open_described(const fs::path& folder, const InputOptions& options
         folder.string() +
         " has a dataset.toml, which names its pictures; leave out the option recursive");
   }
-  OpenedDataset opened{read_dataset(folder), {}};
+  Dataset opened = read_dataset(folder);
   warn_of_low_band(opened);
   warn_of_other_kind(opened);
   return opened;
 }
 
-OpenedDataset open_pictures(const fs::path& path, const InputOptions& options) {
+Dataset open_pictures(const fs::path& path, const InputOptions& options) {
   refuse_unregistered(path);
   const PictureSource& source =
       stated_source(path, options, "has no dataset.toml; say what the pictures show");
   std::error_code ignored;
-  OpenedDataset opened;
+  Dataset opened;
   if (fs::is_directory(path, ignored)) {
-    opened.dataset =
+    opened =
         options.recursive ? read_picture_tree(path, source) : read_picture_folder(path, source);
   } else if (options.recursive) {
     throw OptionError(path.string() + " is one picture; the option recursive goes with a folder");
@@ -183,7 +183,7 @@ OpenedDataset open_pictures(const fs::path& path, const InputOptions& options) {
     throw OptionError(path.string() +
                       " is one picture; 'from_s', 'to_s' and the option every go with a recording");
   } else {
-    opened.dataset = single_picture(path, source);
+    opened = single_picture(path, source);
   }
   warn_of_left_out(opened);
   if (options.source) warn_of_other_kind(opened);
@@ -197,17 +197,17 @@ bool has_dataset_file(const fs::path& folder) {
   return fs::exists(folder / "dataset.toml", ignored);
 }
 
-OpenedDataset open_input(const fs::path& path, const InputOptions& options) {
+Dataset open_input(const fs::path& path, const InputOptions& options) {
   if (const auto reader = find_dataset_reader(path)) return open_registered(path, *reader, options);
   std::error_code ignored;
   if (!fs::exists(path, ignored)) {
     throw FileError(path.string(), "there is no such file or folder");
   }
   refuse_topics(path, options.topics);
-  OpenedDataset opened =
+  Dataset opened =
       has_dataset_file(path) ? open_described(path, options) : open_pictures(path, options);
   if (options.selection.by_time() || options.selection.every > 1) {
-    select_pictures(opened.dataset, options.selection);
+    select_pictures(opened, options.selection);
   }
   return opened;
 }

@@ -18,7 +18,7 @@ namespace panonav {
 /// OptionError where one does not fit the input; FileError: no such file, unknown layout of the
 /// pictures, a kind for which no reader is registered, and as `read_dataset` and the readers. Cost:
 /// that of the reader; at most the size of the first picture is read.
-[[nodiscard]] OpenedDataset open_input(const std::filesystem::path& path,
-                                       const InputOptions& options = {});
+[[nodiscard]] Dataset open_input(const std::filesystem::path& path,
+                                 const InputOptions& options = {});
 
 }  // namespace panonav

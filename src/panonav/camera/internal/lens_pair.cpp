@@ -20,7 +20,7 @@ Matrix3d world_from_rig(const Stand& stand) {
       .toRotationMatrix();
 }
 Matrix3d rig_from_lens(const FisheyeLens& lens) {
-  const LensRotation rotation(lens);
+  const FisheyeLens::Rotation rotation(lens);
   Matrix3d matrix;
   for (int i = 0; i < 3; ++i) {
     const auto axis =
