@@ -98,7 +98,7 @@ void plan_around(benchmark::State& state) {
     const std::size_t node = random.index(graph().size());
     const std::size_t area = planning.areas().area_of[node];
     const std::size_t shut = graph().exits(node).front().edge;
-    planning.close({&shut, 1});
+    planning.block({&shut, 1});
     benchmark::DoNotOptimize(planning.field(area));
     state.PauseTiming();
     planning.unblock_all();

@@ -16,7 +16,7 @@
 #include "panonav/core/random.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/motion/path.hpp"
-#include "panonav/route/route_place.hpp"
+#include "panonav/route/route_position.hpp"
 #include "panonav_simulation/mapping_run.hpp"
 #include "panonav_simulation/mission.hpp"
 #include "panonav_simulation/recording.hpp"

@@ -20,7 +20,7 @@
 #include "panonav/io/panorama_reader.hpp"
 #include "panonav/motion/path.hpp"
 #include "panonav/route/horizon_scanline.hpp"
-#include "panonav/route/route_place.hpp"
+#include "panonav/route/route_position.hpp"
 #include "panonav/route/route_tracker.hpp"
 #include "panonav/storage/memory_file.hpp"
 #include "panonav_simulation/make_each.hpp"

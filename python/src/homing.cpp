@@ -43,7 +43,7 @@ void bind_vectors(py::module_& m) {
       .field("length", &PhaseReading::length, "In units of R.")
       .field("disagreement_rad", &PhaseReading::disagreement_rad, "Of the two directions.")
       .field("turn_disagreement_rad", &PhaseReading::turn_disagreement_rad, "Of the two turns.")
-      .field("points", &PhaseReading::points, "False for pictures of one place.")
+      .field("points", &PhaseReading::has_direction, "False for pictures of one place.")
       .field("residual", &PhaseReading::residual,
              "Share of the energy of both views that is left unexplained, 0 to 1.");
   py::class_<HomingView>(m, "HomingView", "A view as homing needs it.")

@@ -1,5 +1,4 @@
 #include "memories.hpp"
-#include "panonav/mapping/lattice_map.hpp"
 #include "panonav/mapping/map_measures.hpp"
 #include "panonav/pipeline/arrangement.hpp"
 #include "panonav/pipeline/known_views.hpp"

@@ -45,7 +45,8 @@ void bind_navigation(py::module_& m) {
       .field("area", &NavigationDecision::area, "That is loaded.")
       .field("difference", &NavigationDecision::difference,
              "Of what is seen from `nearest`, homing: from the goal.")
-      .field("way", &NavigationDecision::way, "That is left along the edges, in their unit.")
+      .field("way", &NavigationDecision::path_length,
+             "That is left along the edges, in their unit.")
       .field("components", &NavigationDecision::components, "Compared.")
       .field("bytes_read", &NavigationDecision::bytes_read,
              "Of the loaded area's signatures and index, by this observation.")

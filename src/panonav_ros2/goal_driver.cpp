@@ -112,7 +112,7 @@ void GoalDriver::drive_to_goal(const Observation& observation, const std::option
   if (!step.decided) return;
   feedback_.publish(make_message(
       fine, state,
-      {{"way", format_fixed(decision.way, 3)},
+      {{"way", format_fixed(decision.path_length, 3)},
        {"probability", format_fixed(decision.probability, 4)},
        {"nearest", decision.nearest ? navigator_->info(*decision.nearest).name : std::string()}}));
 }

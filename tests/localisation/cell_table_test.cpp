@@ -27,7 +27,7 @@ TEST(CellTable, NumbersCellsAsAMapDoesInTheOrderOfTheirAdding) {
       EXPECT_EQ(*found, known->second);
     }
     const auto [entry, added] = numbers.try_emplace({cell.x, cell.y}, table.size());
-    ASSERT_EQ(table.number_of(cell), entry->second);
+    ASSERT_EQ(table.find_or_add(cell), entry->second);
     EXPECT_EQ(table[entry->second], cell);
   }
   EXPECT_EQ(table.size(), numbers.size());

@@ -1,5 +1,7 @@
 #include "panonav/localisation/memory_update.hpp"
 
+#include "panonav/localisation/internal/pose_witness.hpp"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -31,8 +33,8 @@ std::vector<PoseWitness> witnesses_along(double step_m, int count, double frame_
 const Pose2 here{2.0, 1.0, 0.0};
 
 std::optional<Pose2> pose_by(const std::vector<PoseWitness>& witnesses, double frame_rad = 0.0) {
-  return witnessed_pose(inverse(Pose2{3.0, -1.0, frame_rad}) * here, witnesses, std::nullopt,
-                        spacing_m);
+  return find_witnessed_pose(inverse(Pose2{3.0, -1.0, frame_rad}) * here, witnesses, std::nullopt,
+                             spacing_m);
 }
 
 TEST(WitnessedPose, IsThatOfAgreeingAnswersInAnyFrameOfTheOdometry) {

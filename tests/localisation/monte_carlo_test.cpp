@@ -12,6 +12,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
+#include "panonav/localisation/internal/particle_modes.hpp"
 #include "panonav/localisation/internal/position_error.hpp"
 #include "panonav_simulation/paths.hpp"
 #include "panonav_simulation/simulated_odometry.hpp"
@@ -306,7 +307,7 @@ TEST(MonteCarlo, TheStatedCovarianceIsThatOfErrorsThatResembleEachOther) {
     yy += error.y_m * error.y_m / runs;
   }
   const std::array<double, 9> particles{particles_m2, 0, 0, 0, particles_m2, 0, 0, 0, 0.01};
-  const auto covariance = stated.stated(particles, heading_rad, scale);
+  const auto covariance = stated.corrected_covariance(particles, heading_rad, scale);
   EXPECT_NEAR(covariance[0], xx, 0.04 * xx);
   EXPECT_NEAR(covariance[1], xy, 0.04 * xx);
   EXPECT_NEAR(covariance[4], yy, 0.04 * yy);

@@ -1,4 +1,4 @@
-#include "panonav/localisation/particle_modes.hpp"
+#include "panonav/localisation/internal/particle_modes.hpp"
 
 #include <gtest/gtest.h>
 

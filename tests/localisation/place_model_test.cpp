@@ -58,7 +58,7 @@ TEST(PlaceModel, OfARobotThatStoodStillKnowsItsPlaceTurnedAndNoOther) {
 
 TEST(PlaceModel, IsTheSameForTheSameSeedAndBoundedInItsSample) {
   const RememberedRoom place(11, {}, 0.4);
-  const PlaceModelOptions options{.sampled_views = 20};
+  const LearningOptions options{.sampled_views = 20};
   const PlaceModel a = learn_place_model(ColumnRanking(place.memory), options);
   const PlaceModel b = learn_place_model(ColumnRanking(place.memory), options);
   EXPECT_TRUE(a.learnt);

@@ -32,7 +32,7 @@ TEST(LowVarianceResample, TakesEachAsOftenAsItsShareUpToOne) {
     }
     if (!(sum > 0.0)) continue;
     const std::size_t count = 1 + random.index(300);
-    const auto survivors = low_variance_resample(weights, count, random);
+    const auto survivors = resample_systematically(weights, count, random);
     ASSERT_EQ(survivors.size(), count);
     EXPECT_TRUE(std::ranges::is_sorted(survivors));
     for (std::size_t i = 0; i < weights.size(); ++i) {
@@ -50,18 +50,18 @@ TEST(LowVarianceResample, IsRightOnAverage) {
   constexpr int trials = 20000;
   Random random(4);
   for (int trial = 0; trial < trials; ++trial) {
-    for (const std::size_t i : low_variance_resample(weights, 2, random)) taken[i] += 1.0;
+    for (const std::size_t i : resample_systematically(weights, 2, random)) taken[i] += 1.0;
   }
   for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(taken[i] / (2.0 * trials), weights[i], 0.01);
 }
 
 TEST(LowVarianceResample, RefusesWeightsThatAreNone) {
   Random random(5);
-  EXPECT_THROW((void)low_variance_resample(std::vector<double>{0.0, 0.0}, 3, random),
+  EXPECT_THROW((void)resample_systematically(std::vector<double>{0.0, 0.0}, 3, random),
                ContractError);
-  EXPECT_THROW((void)low_variance_resample(std::vector<double>{1.0, -0.1}, 3, random),
+  EXPECT_THROW((void)resample_systematically(std::vector<double>{1.0, -0.1}, 3, random),
                ContractError);
-  EXPECT_THROW((void)low_variance_resample(
+  EXPECT_THROW((void)resample_systematically(
                    std::vector<double>{1.0, std::numeric_limits<double>::quiet_NaN()}, 3, random),
                ContractError);
 }

@@ -19,7 +19,7 @@ double log_ratio(ViewLikelihood& likelihood, const Pose2& pose) {
   Particles particle;
   particle.add(pose, 1.0);
   double ratio = 0.0;
-  likelihood.log_ratios(particle, {&ratio, 1});
+  likelihood.compute_log_ratios(particle, {&ratio, 1});
   return ratio;
 }
 
@@ -89,7 +89,7 @@ TEST(ViewLikelihood, IsGreatestNearTheTruthAndInItsHeading) {
   constexpr int asked = 40;
   for (int i = 0; i < asked; ++i) {
     const Pose2 truth = place.room.between(place.grid, place.step_m, random);
-    likelihood.begin(seen(place, truth));
+    likelihood.set_view(seen(place, truth));
     for (std::uint32_t s = 0; s < likelihood.sites().size(); ++s) likelihood.compare(s);
     const double there = log_ratio(likelihood, truth);
     EXPECT_GT(there,
@@ -118,7 +118,7 @@ TEST(ViewLikelihood, ManyParticlesGetWhatEachGetsAlone) {
   const ColumnRanking ranking(place.memory);
   ViewLikelihood likelihood(ranking, learn_observation_model(ranking, {.sampled_views = 8}), true);
   Random random(2);
-  likelihood.begin(seen(place, place.room.between(place.grid, place.step_m, random)));
+  likelihood.set_view(seen(place, place.room.between(place.grid, place.step_m, random)));
   for (std::uint32_t s = 0; s < likelihood.sites().size(); s += 2) likelihood.compare(s);
   Particles particles;
   for (int i = 0; i < 500; ++i) {
@@ -128,7 +128,7 @@ TEST(ViewLikelihood, ManyParticlesGetWhatEachGetsAlone) {
   }
   particles.add({1e300, -1e300, 0.0}, 1.0);
   std::vector<double> ratios(particles.size());
-  likelihood.log_ratios(particles, ratios);
+  likelihood.compute_log_ratios(particles, ratios);
   double most = 0.0;
   for (std::size_t i = 0; i < particles.size(); ++i) {
     EXPECT_EQ(ratios[i], log_ratio(likelihood, particles.pose(i)));
@@ -142,7 +142,7 @@ TEST(ViewLikelihood, ManyParticlesGetWhatEachGetsAlone) {
   particles.weight = ratios;
   auto arranged = particles;
   likelihood.arrange(arranged);
-  likelihood.log_ratios(arranged, ratios);
+  likelihood.compute_log_ratios(arranged, ratios);
   for (std::size_t i = 0; i < arranged.size(); ++i) EXPECT_EQ(ratios[i], arranged.weight[i]);
   const auto in_order = [](const Particles& p) {
     std::vector<std::array<double, 4>> rows;
@@ -171,7 +171,7 @@ TEST(ViewLikelihood, WithoutTheCompassHeadingsDoNotCount) {
   ViewLikelihood likelihood(ranking, learn_observation_model(ranking, {.sampled_views = 8}), false);
   Random random(3);
   const Pose2 truth = place.room.between(place.grid, place.step_m, random);
-  likelihood.begin(seen(place, truth));
+  likelihood.set_view(seen(place, truth));
   for (std::uint32_t s = 0; s < likelihood.sites().size(); ++s) likelihood.compare(s);
   const double ahead = log_ratio(likelihood, truth);
   EXPECT_GT(ahead, 0.0);
@@ -185,13 +185,13 @@ TEST(ViewLikelihood, ANewViewForgetsTheLast) {
   ViewLikelihood likelihood(ranking, learn_observation_model(ranking, {.sampled_views = 8}), true);
   Random random(4);
   const Pose2 truth = place.room.between(place.grid, place.step_m, random);
-  likelihood.begin(seen(place, truth));
+  likelihood.set_view(seen(place, truth));
   const double first = likelihood.compare(0);
   EXPECT_EQ(likelihood.compare(0), first);  // once is enough
   EXPECT_EQ(likelihood.compared_sites().size(), 1U);
   EXPECT_EQ(*likelihood.min_difference(likelihood.compared_sites()), first);
-  likelihood.begin(seen(place, truth));
-  EXPECT_FALSE(likelihood.compared(0));
+  likelihood.set_view(seen(place, truth));
+  EXPECT_FALSE(likelihood.is_compared(0));
   EXPECT_FALSE(likelihood.min_difference(std::vector<std::uint32_t>{0}));
   EXPECT_EQ(log_ratio(likelihood, truth), 0.0);  // nothing compared, nothing explained
 }
@@ -204,14 +204,14 @@ TEST(ViewLikelihood, FindsTheSitesThatParticlesAreNear) {
   Particles particles;
   particles.add({here.x_m, here.y_m, 0.0}, 0.9);
   particles.add({here.x_m, here.y_m, 1.0}, 0.1);
-  const auto near = likelihood.sites_near_most(particles, 5, 0.0);
+  const auto near = likelihood.heaviest_sites(particles, 5, 0.0);
   ASSERT_EQ(near.size(), 5U);
   EXPECT_EQ(std::set<std::uint32_t>(near.begin(), near.end()).size(), 5U);
   const auto around = likelihood.sites_near(here);
   for (const std::uint32_t site : near) EXPECT_NE(std::ranges::find(around, site), around.end());
   EXPECT_LE(around.size(), 12U);
   EXPECT_TRUE(likelihood.sites_near({1e3, 1e3}).empty());
-  EXPECT_TRUE(likelihood.sites_near_most({}, 5, 0.0).empty());
+  EXPECT_TRUE(likelihood.heaviest_sites({}, 5, 0.0).empty());
   EXPECT_EQ(likelihood.site_of(place.memory.views()[3]), 3U);
 }
 
@@ -220,7 +220,7 @@ TEST(ViewLikelihood, RefusesAViewOfAnotherShape) {
   const ColumnRanking ranking(place.memory);
   ViewLikelihood likelihood(ranking, learn_observation_model(ranking, {.sampled_views = 8}), true);
   const auto other = pack(compute_signature(place.room.see({1.0, 1.0, 0.0}, 12)), 1.0F);
-  EXPECT_THROW(likelihood.begin(other), ContractError);
+  EXPECT_THROW(likelihood.set_view(other), ContractError);
 }
 
 }  // namespace

@@ -245,7 +245,7 @@ struct TwoHalls {
                      .direction_a_rad = std::atan2(step.y_m, step.x_m) + random.normal(0.0, 0.08),
                      .direction_b_rad = std::atan2(back.y_m, back.x_m) + random.normal(0.0, 0.08),
                      .length = std::hypot(step.x_m, step.y_m) * std::exp(random.normal(0.0, 0.15)),
-                     .points = true,
+                     .has_direction = true,
                      .residual = residual + random.uniform(0.0, 0.05)};
     springs.push_back(spring);
   }

@@ -13,7 +13,6 @@
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/mapping/lattice_map.hpp"
 #include "support/remembered_worlds.hpp"
 
 namespace panonav::testing {
@@ -368,7 +367,7 @@ TEST(Lattice, GrowsFromNothing) {
 TEST(Lattice, AMapOfItHoldsAllNodesAndSprings) {
   const Place place(9, 0.5);
   const Lattice lattice = arrange(place.memory);
-  const TopologicalMap map = map_of(lattice);
+  const TopologicalMap map = to_topological_map(lattice);
   EXPECT_NO_THROW(validate(map));
   ASSERT_EQ(map.nodes.size(), lattice.nodes.size());
   ASSERT_EQ(map.edges.size(), lattice.springs.size());

@@ -74,7 +74,7 @@ TEST(SubAreas, TwoRoomsAreCutAtTheirDoor) {
   Random random(1);
   for (const int side : {5, 8, 12}) {
     const NavigationGraph graph = rooms_in_a_row(2, side, random);
-    const SubAreas areas = divide(graph, {.views_per_area = side * side});
+    const SubAreas areas = divide_into_areas(graph, {.views_per_area = side * side});
     expect_partition(graph, areas);
     ASSERT_EQ(areas.nodes.size(), 2U);
     EXPECT_EQ(areas.nodes[0].size(), areas.nodes[1].size());
@@ -85,7 +85,7 @@ TEST(SubAreas, TwoRoomsAreCutAtTheirDoor) {
 TEST(SubAreas, FiveRoomsAreCutAtTheirDoors) {
   Random random(1);
   const NavigationGraph graph = rooms_in_a_row(5, 7, random);
-  const SubAreas areas = divide(graph, {.views_per_area = 49});
+  const SubAreas areas = divide_into_areas(graph, {.views_per_area = 49});
   expect_partition(graph, areas);
   ASSERT_EQ(areas.nodes.size(), 5U);
   EXPECT_EQ(areas.gates.size(), 4U);
@@ -94,13 +94,13 @@ TEST(SubAreas, FiveRoomsAreCutAtTheirDoors) {
 TEST(SubAreas, AnyGraphIsDividedIntoConnectedAreasOfSimilarSize) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     const NavigationGraph graph = random_graph(300, 250 + 20 * seed, seed);
-    expect_partition(graph, divide(graph, {.views_per_area = 30}));
+    expect_partition(graph, divide_into_areas(graph, {.views_per_area = 30}));
   }
   Random random(9);
   std::vector<Pose2> poses;
   for (int i = 0; i < 900; ++i) poses.push_back({i % 30 + 0.0, i / 30 + 0.0, 0.0});
   const NavigationGraph graph = posed_graph(poses, 1.5, [](Point2, Point2) { return true; });
-  const SubAreas areas = divide(graph, {.views_per_area = 50});
+  const SubAreas areas = divide_into_areas(graph, {.views_per_area = 50});
   expect_partition(graph, areas);
   for (const auto& nodes : areas.nodes) {
     EXPECT_GE(nodes.size(), 20U);
@@ -112,7 +112,8 @@ TEST(SubAreas, DoorsAreNarrowAndOpenBordersAreNot) {
   Random random(1);
   const int side = 8;
   const NavigationGraph graph = rooms_in_a_row(3, side, random);
-  const auto narrow = find_narrow_places(graph, divide(graph, {.views_per_area = side * side}), 1);
+  const auto narrow =
+      find_narrow_places(graph, divide_into_areas(graph, {.views_per_area = side * side}), 1);
   for (std::size_t node = 0; node < graph.size(); ++node) {
     const auto column = static_cast<int>(node % side);
     const auto row = static_cast<int>(node / side % side);
@@ -125,7 +126,7 @@ TEST(SubAreas, DoorsAreNarrowAndOpenBordersAreNot) {
   std::vector<Pose2> poses;
   for (int i = 0; i < 400; ++i) poses.push_back({i % 20 + 0.0, i / 20 + 0.0, 0.0});
   const NavigationGraph open = posed_graph(poses, 1.5, [](Point2, Point2) { return true; });
-  const SubAreas areas = divide(open, {.views_per_area = 100});
+  const SubAreas areas = divide_into_areas(open, {.views_per_area = 100});
   ASSERT_GT(areas.nodes.size(), 2U);
   const auto none = find_narrow_places(open, areas, 2);
   EXPECT_EQ(std::ranges::count(none, std::uint8_t{0}), 400);
@@ -143,12 +144,12 @@ TEST(AreaPlanner, WithAllGatesEveryWayIsAShortestOne) {
         std::vector<std::size_t> shut;
         for (std::size_t p = seed; p < closed.size(); p += 9) shut.push_back(p);
         for (const std::size_t p : shut) closed[p] = 1;
-        planner.close(shut);
-        EXPECT_EQ(planner.closed(), shut.size());
+        planner.block(shut);
+        EXPECT_EQ(planner.blocked_edges(), shut.size());
       } else if (round == 2) {
         std::ranges::fill(closed, std::uint8_t{0});
         planner.unblock_all();
-        EXPECT_EQ(planner.closed(), 0U);
+        EXPECT_EQ(planner.blocked_edges(), 0U);
       }
       const auto ways = all_ways(graph, closed);
       for (std::size_t goal = 0; goal < graph.size(); goal += 17) {
@@ -158,9 +159,9 @@ TEST(AreaPlanner, WithAllGatesEveryWayIsAShortestOne) {
           for (std::size_t place = 0; place < guides.size(); ++place) {
             const std::size_t node = planner.areas().nodes[area][place];
             const double truth = ways[goal * graph.size() + node];
-            ASSERT_EQ(guides[place].reachable(), std::isfinite(truth));
-            if (!guides[place].reachable()) continue;
-            ASSERT_NEAR(guides[place].way, truth, 1e-9);
+            ASSERT_EQ(guides[place].is_reachable(), std::isfinite(truth));
+            if (!guides[place].is_reachable()) continue;
+            ASSERT_NEAR(guides[place].path_length, truth, 1e-9);
             ++compared;
           }
         }
@@ -183,7 +184,7 @@ TEST(AreaPlanner, FewGatesReachTheGoalFromEverywhereByWaysHardlyLonger) {
   }
   const NavigationGraph graph = posed_graph(poses, 1.5, [](Point2, Point2) { return true; });
   AreaPlanner planner(graph, {.areas = {.views_per_area = 100}});
-  EXPECT_LT(planner.gates(), planner.areas().gates.size());
+  EXPECT_LT(planner.used_gates(), planner.areas().gates.size());
   double longer = 0.0;
   int pairs = 0;
   for (int i = 0; i < 40; ++i) {
@@ -199,8 +200,8 @@ TEST(AreaPlanner, FewGatesReachTheGoalFromEverywhereByWaysHardlyLonger) {
     for (std::size_t k = 0; k + 1 < way.size(); ++k) {
       length += distance(poses[way[k]].position(), poses[way[k + 1]].position());
     }
-    EXPECT_GE(length, flat[start].way - 1e-9);
-    longer += length / flat[start].way;
+    EXPECT_GE(length, flat[start].path_length - 1e-9);
+    longer += length / flat[start].path_length;
     ++pairs;
   }
   RecordProperty("mean_length_over_shortest", std::to_string(longer / pairs));
@@ -213,11 +214,11 @@ TEST(AreaPlanner, AClosedDoorIsGoneRoundOrMakesTheGoalUnreachable) {
   AreaPlanner planner(graph, {.areas = {.views_per_area = 25}});
   planner.set_goal(graph.view(graph.size() - 1));
   ASSERT_FALSE(planner.plan_path(0).empty());
-  planner.close(std::vector<std::size_t>{planner.areas().gates.front()});
+  planner.block(std::vector<std::size_t>{planner.areas().gates.front()});
   EXPECT_TRUE(planner.plan_path(0).empty());
   planner.unblock_all();
   EXPECT_FALSE(planner.plan_path(0).empty());
-  EXPECT_THROW(planner.close(std::vector<std::size_t>{99999}), ContractError);
+  EXPECT_THROW(planner.block(std::vector<std::size_t>{99999}), ContractError);
   EXPECT_THROW(planner.set_goal(ViewId{1}), ContractError);
 }
 

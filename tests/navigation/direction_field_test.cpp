@@ -34,13 +34,13 @@ TEST(DirectionField, WaysAreTheShortestOnes) {
       const auto guides = direction_field(graph, graph.view(goal), {}, closed);
       for (std::size_t node = 0; node < graph.size(); ++node) {
         const double truth = ways[goal * graph.size() + node];
-        ASSERT_EQ(guides[node].reachable(), std::isfinite(truth));
-        if (!guides[node].reachable()) {
+        ASSERT_EQ(guides[node].is_reachable(), std::isfinite(truth));
+        if (!guides[node].is_reachable()) {
           ++unreachable;
           continue;
         }
         ++compared;
-        ASSERT_NEAR(guides[node].way, truth, 1e-9);
+        ASSERT_NEAR(guides[node].path_length, truth, 1e-9);
         const auto way = followed(guides, node);
         ASSERT_EQ(way.front(), node);
         ASSERT_EQ(way.back(), goal);

@@ -12,7 +12,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/motion/path.hpp"
-#include "panonav/navigation/internal/route_stretch.hpp"
+#include "panonav/navigation/internal/route_pilot.hpp"
 #include "support/smooth_path.hpp"
 
 namespace panonav::testing {
@@ -82,12 +82,12 @@ TEST(KnownRoute, AWayOverItsViewsGoesAlongIt) {
       way.push_back(id(1000 + i));
       if (i == b) break;
     }
-    const auto stretch = stretch_along(known, known.along_m(views[a].view), way);
+    const auto stretch = find_section(known, known.along_m(views[a].view), way);
     ASSERT_TRUE(stretch.has_value());
     EXPECT_EQ(stretch->from_m, known.along_m(views[a].view)[0]);
     EXPECT_EQ(stretch->to_m, known.along_m(views[b].view)[0]);
     EXPECT_EQ(way[stretch->last], views[b].view);
-    const auto other = stretch_along(back, back.along_m(views[a].view), way);
+    const auto other = find_section(back, back.along_m(views[a].view), way);
     ASSERT_TRUE(other.has_value());
     EXPECT_NEAR(other->from_m, length_m - stretch->from_m, 1e-9);
     EXPECT_NEAR(other->to_m, length_m - stretch->to_m, 1e-9);
@@ -105,13 +105,13 @@ TEST(KnownRoute, EndsWhereTheWayGoesAcross) {
                                             {id(4), {2, 2, 0}}, {id(5), {5, 1, 0}}};
   const KnownRoute known = make_known_route(blank_route(path), views, unlearnt);
   const std::vector<ViewId> across{id(0), id(1), id(2), id(3), id(4)};
-  const auto stretch = stretch_along(known, known.along_m(id(0)), across);
+  const auto stretch = find_section(known, known.along_m(id(0)), across);
   ASSERT_TRUE(stretch.has_value());
   EXPECT_EQ(stretch->last, 2U);
   EXPECT_DOUBLE_EQ(stretch->length_m(), 2.0);
   // Round the corners it is the route.
   const std::vector<ViewId> round{id(0), id(1), id(2), id(5), id(3), id(4)};
-  const auto whole = stretch_along(known, known.along_m(id(0)), round);
+  const auto whole = find_section(known, known.along_m(id(0)), round);
   ASSERT_TRUE(whole.has_value());
   EXPECT_EQ(whole->last, 5U);
   EXPECT_DOUBLE_EQ(whole->to_m, 10.0);
@@ -134,7 +134,7 @@ TEST(KnownRoute, GoesAlongTheRoundThatIsNearest) {
   for (const int step : {1, -1}) {
     std::vector<ViewId> way;
     for (int i = 0; i < 7; ++i) way.push_back(id(static_cast<std::size_t>((22 + step * i) % 24)));
-    const auto stretch = stretch_along(known, known.along_m(way[0]), way);
+    const auto stretch = find_section(known, known.along_m(way[0]), way);
     ASSERT_TRUE(stretch.has_value());
     EXPECT_EQ(stretch->last, 6U);
     EXPECT_NEAR(stretch->to_m - stretch->from_m, step * 6 * part_m, 1e-9);
@@ -151,8 +151,8 @@ TEST(KnownRoute, RefusesWhatMakesNoSense) {
   EXPECT_THROW((void)make_known_route(route, nowhere, unlearnt), ContractError);
   EXPECT_THROW((void)make_known_route(blank_route({{0, 0, 0}}), {}, unlearnt), ContractError);
   EXPECT_THROW((void)make_known_route(route, {}, {.beside_m = 0.0}), OptionError);
-  EXPECT_FALSE(stretch_along(make_known_route(route, {}, unlearnt), std::vector<double>{0.0},
-                             std::vector<ViewId>{id(1)}));
+  EXPECT_FALSE(find_section(make_known_route(route, {}, unlearnt), std::vector<double>{0.0},
+                            std::vector<ViewId>{id(1)}));
 }
 
 }  // namespace

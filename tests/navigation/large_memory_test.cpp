@@ -36,7 +36,7 @@ TEST(LargeMemory, EveryPlaceIsFoundWithOneAreaInMemory) {
   for (int i = 0; i < 10; ++i) {
     planning.set_goal(graph.view(random.index(graph.size())));
     for (const Guide& guide : planning.field(random.index(areas.nodes.size()))) {
-      EXPECT_TRUE(guide.reachable());
+      EXPECT_TRUE(guide.is_reachable());
     }
   }
 

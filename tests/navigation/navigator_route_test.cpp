@@ -10,7 +10,7 @@
 
 #include "panonav/core/executor.hpp"
 #include "panonav/navigation/navigator.hpp"
-#include "panonav/route/route_place.hpp"
+#include "panonav/route/route_position.hpp"
 #include "support/remembered_worlds.hpp"
 #include "support/smooth_path.hpp"
 #include "support/text.hpp"

@@ -106,7 +106,7 @@ TEST(Navigator, ArrivesFromAnywhereByPhasesAlone) {
         return distance(p.position(), start.position());
       });
       const double shortest =
-          guides[static_cast<std::size_t>(nearest - remembered.poses.begin())].way;
+          guides[static_cast<std::size_t>(nearest - remembered.poses.begin())].path_length;
       if (right && shortest > 1.0) ratios.push_back(run.travelled_m / shortest);
     }
   }

@@ -10,7 +10,6 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/executor.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/mapping/lattice_map.hpp"
 #include "panonav/memory/view_source.hpp"
 #include "panonav/navigation/direction_field.hpp"
 #include "panonav/navigation/internal/area_views.hpp"
@@ -85,7 +84,7 @@ TEST(NavigationGraph, PhasesAloneTellDirections) {
     const auto guides = direction_field(graph, graph.view(goal));
     for (std::size_t node = 0; node < graph.size(); ++node) {
       if (node == goal) continue;
-      ASSERT_TRUE(guides[node].reachable());
+      ASSERT_TRUE(guides[node].is_reachable());
       if (!guides[node].direction_rad) continue;
       const Point2 end = inverse(grid.poses[node]) * grid.poses[goal].position();
       ++all;
@@ -132,8 +131,8 @@ TEST(NavigationGraph, AStoredLatticeSaysTheSameAsTheLattice) {
   Executor executor(1);
   const Lattice lattice = arrange(grid.memory, {}, {}, executor);
   const NavigationGraph graph = graph_from_lattice(lattice);
-  const NavigationGraph stored =
-      graph_from_stored_lattice(map_of(lattice), MemoryViewSource(grid.memory), executor);
+  const NavigationGraph stored = graph_from_stored_lattice(to_topological_map(lattice),
+                                                           MemoryViewSource(grid.memory), executor);
   ASSERT_EQ(stored.size(), graph.size());
   // Springs may be longer than they came to lie, so the stored lattice has some edges more.
   ASSERT_GE(stored.edges().size(), graph.edges().size() * 9 / 10);
@@ -177,7 +176,7 @@ void add_spring(Lattice& lattice, std::size_t a, std::size_t b, Point2 seen_b) {
        .phases = PhaseReading{.direction_a_rad = direction_rad,
                               .direction_b_rad = wrap_angle(direction_rad + std::numbers::pi),
                               .length = 0.2 * length,
-                              .points = true}});
+                              .has_direction = true}});
 }
 
 void add_springs_to_neighbours(Lattice& lattice, std::size_t first, std::size_t end) {
@@ -246,7 +245,7 @@ TEST(NavigationGraph, KeepsTheOnlyEdgeBetweenTwoParts) {
   EXPECT_TRUE(has_edge(graph, door, door + side));
   EXPECT_FALSE(has_edge(graph, door, door + side + 1));
   const auto guides = direction_field(graph, ViewId{0});
-  EXPECT_TRUE(std::ranges::all_of(guides, [](const Guide& guide) { return guide.reachable(); }));
+  EXPECT_TRUE(std::ranges::all_of(guides, [](const Guide& guide) { return guide.is_reachable(); }));
 }
 
 TEST(PlaceScale, TellsNeighboursFromStrangers) {
@@ -255,9 +254,9 @@ TEST(PlaceScale, TellsNeighboursFromStrangers) {
   Executor executor(1);
   const NavigationGraph graph = graph_of_memory(grid.memory, executor);
   const PlaceScale scale = learn_place_scale(source, graph);
-  EXPECT_GT(scale.neighbours, 0.0);
-  EXPECT_LT(scale.neighbours, scale.limit());
-  EXPECT_LT(scale.limit(), scale.strangers);
+  EXPECT_GT(scale.neighbour_difference, 0.0);
+  EXPECT_LT(scale.neighbour_difference, scale.max_difference());
+  EXPECT_LT(scale.max_difference(), scale.stranger_difference);
   EXPECT_THROW((void)learn_place_scale(source, graph, 0, 0), ContractError);
 }
 
@@ -269,7 +268,7 @@ TEST(PlaceScale, ArrivalMeansHalfTheSpacing) {
   Random random(2);
   for (const std::size_t node : {std::size_t{7}, std::size_t{14}, std::size_t{21}}) {
     const ArrivalScale scale = learn_arrival_scale(source, graph, graph.view(node));
-    ASSERT_TRUE(scale.learnt);
+    ASSERT_TRUE(scale.is_learnt);
     const HomingView home = homing_view(grid.memory.signature(graph.view(node)));
     int near_arrived = 0;
     int far_arrived = 0;
@@ -280,8 +279,8 @@ TEST(PlaceScale, ArrivalMeansHalfTheSpacing) {
                          grid.poses[node].y_m + way_m * std::sin(direction),
                          random.uniform(-std::numbers::pi, std::numbers::pi)};
         const HomingView view = homing_view(round_room_signature(grid.room, pose));
-        return image_difference(home, view) <= scale.difference &&
-               home_vector(home, view).length() <= scale.length;
+        return image_difference(home, view) <= scale.max_difference &&
+               home_vector(home, view).length() <= scale.max_length;
       };
       near_arrived += arrived_at(0.1);
       far_arrived += arrived_at(0.5);
@@ -290,7 +289,7 @@ TEST(PlaceScale, ArrivalMeansHalfTheSpacing) {
     EXPECT_EQ(far_arrived, 0);
   }
   const NavigationGraph alone({ViewId{0}}, {});
-  EXPECT_FALSE(learn_arrival_scale(source, alone, ViewId{0}).learnt);
+  EXPECT_FALSE(learn_arrival_scale(source, alone, ViewId{0}).is_learnt);
   EXPECT_THROW((void)learn_arrival_scale(source, alone, ViewId{1}), ContractError);
 }
 
@@ -299,10 +298,10 @@ TEST(AreaViews, HoldsAnAreaAndFindsWhatTheWholeMemoryFinds) {
   const MemoryViewSource source(grid.memory);
   Executor executor(1);
   const NavigationGraph graph = graph_of_memory(grid.memory, executor);
-  const SubAreas areas = divide(graph, {.views_per_area = 6});
+  const SubAreas areas = divide_into_areas(graph, {.views_per_area = 6});
   ASSERT_GT(areas.nodes.size(), 3U);
   AreaViews views(source, 1);
-  EXPECT_THROW((void)views.view(grid.memory.views()[0]), ContractError);
+  EXPECT_THROW((void)views.coefficients(grid.memory.views()[0]), ContractError);
   for (std::size_t area = 0; area < areas.nodes.size(); ++area) {
     views.enter(graph, areas, area);
     EXPECT_EQ(views.area(), area);
@@ -313,8 +312,8 @@ TEST(AreaViews, HoldsAnAreaAndFindsWhatTheWholeMemoryFinds) {
       // Between references, in any heading.
       const Pose2 pose = grid.poses[node] * Pose2{0.08, 0.05, 1.0};
       const FourierSignature seen = round_room_signature(grid.room, pose);
-      const SeenView view(seen, grid.memory.full_scale());
-      const auto found = views.nearest(graph, view);
+      const QueryView view(seen, grid.memory.full_scale());
+      const auto found = views.find_nearest(graph, view);
       const auto match = grid.memory.search(view.packed, {.top = 1}).matches.front();
       ASSERT_TRUE(found.has_value());
       if (views.holds(match.view)) {
@@ -322,7 +321,7 @@ TEST(AreaViews, HoldsAnAreaAndFindsWhatTheWholeMemoryFinds) {
         EXPECT_EQ(found->dissimilarity, match.dissimilarity);
       }
       const std::size_t one[] = {node};
-      EXPECT_EQ(views.nearest(graph, one, view)->node, node);
+      EXPECT_EQ(views.find_nearest(graph, one, view)->node, node);
       const auto anywhere = search_whole_memory(source, graph, areas, seen);
       ASSERT_TRUE(anywhere.has_value());
       EXPECT_LT(distance(grid.poses[anywhere->node].position(), pose.position()), 0.4);
@@ -345,7 +344,7 @@ TEST(AreaViews, WhatIsLoadedAheadNeedNotBeLoadedAgain) {
   } source(grid.memory);
   Executor executor(1);
   const NavigationGraph graph = graph_of_memory(grid.memory, executor);
-  const SubAreas areas = divide(graph, {.views_per_area = 12});
+  const SubAreas areas = divide_into_areas(graph, {.views_per_area = 12});
   ASSERT_GT(areas.nodes.size(), 2U);
   AreaViews at_once(source, 1);
   at_once.enter(graph, areas, 1);
@@ -354,21 +353,21 @@ TEST(AreaViews, WhatIsLoadedAheadNeedNotBeLoadedAgain) {
   views.enter(graph, areas, 0);
   const std::size_t first = views.size();
   source.loaded = 0;
-  views.load_ahead(graph, areas, 0, 100);  // is here
+  views.prefetch(graph, areas, 0, 100);  // is here
   EXPECT_EQ(source.loaded, 0U);
-  views.load_ahead(graph, areas, 2, 3);  // not entered after all
-  views.load_ahead(graph, areas, 1, 5);
+  views.prefetch(graph, areas, 2, 3);  // not entered after all
+  views.prefetch(graph, areas, 1, 5);
   EXPECT_EQ(views.size(), first + 5);
   EXPECT_EQ(views.area(), 0U);
-  views.load_ahead(graph, areas, 1, 4);
+  views.prefetch(graph, areas, 1, 4);
   EXPECT_EQ(source.loaded, 3U + 9U);
   views.enter(graph, areas, 1);
   EXPECT_EQ(source.loaded, 3U + whole);
   EXPECT_EQ(views.size(), whole);
   for (const std::size_t node : areas.nodes[1]) {
-    const SeenView seen(grid.memory.signature(graph.view(node)), grid.memory.full_scale());
-    EXPECT_EQ(views.nearest(graph, seen)->node, at_once.nearest(graph, seen)->node);
-    EXPECT_EQ(views.view(graph.view(node)), at_once.view(graph.view(node)));
+    const QueryView seen(grid.memory.signature(graph.view(node)), grid.memory.full_scale());
+    EXPECT_EQ(views.find_nearest(graph, seen)->node, at_once.find_nearest(graph, seen)->node);
+    EXPECT_EQ(views.coefficients(graph.view(node)), at_once.coefficients(graph.view(node)));
   }
 }
 
@@ -384,17 +383,17 @@ TEST(AreaViews, FewComponentsReadLess) {
     views.enter(graph, areas, 0);
     EXPECT_EQ(views.bytes_read(), 0U);
     for (std::size_t node = 0; node < graph.size(); ++node) {
-      const SeenView seen(grid.memory.signature(graph.view(node)), grid.memory.full_scale(),
-                          components);
-      const auto found = views.nearest(graph, areas.nodes[0], seen);
+      const QueryView seen(grid.memory.signature(graph.view(node)), grid.memory.full_scale(),
+                           components);
+      const auto found = views.find_nearest(graph, areas.nodes[0], seen);
       EXPECT_EQ(found->node, node);
       EXPECT_EQ(found->dissimilarity, 0U);
-      EXPECT_NEAR(views.turn_against(graph.view(node), seen)->heading_rad, 0.0, 1e-3);
+      EXPECT_NEAR(views.read_compass(graph.view(node), seen)->heading_rad, 0.0, 1e-3);
     }
     read[components == 0 ? 0 : 1] = views.bytes_read();
   }
   EXPECT_EQ(read[0] * 5, read[1] * 15);
-  EXPECT_THROW(SeenView(grid.memory.signature(graph.view(0)), 1.0F, 2), ContractError);
+  EXPECT_THROW(QueryView(grid.memory.signature(graph.view(0)), 1.0F, 2), ContractError);
 }
 
 TEST(Obstacle, ClosesAllThatCrossesItAndNothingElse) {
@@ -407,7 +406,7 @@ TEST(Obstacle, ClosesAllThatCrossesItAndNothingElse) {
   // From the middle, the way to the east is shut over one spacing either way.
   const std::size_t node = 12;
   const double direction = angle_difference(0.0, poses[node].heading_rad);
-  const auto across = edges_across(graph, {node, direction, 0.5, 1.0});
+  const auto across = find_crossed_edges(graph, {node, direction, 0.5, 1.0});
   std::size_t expected = 0;
   for (std::size_t p = 0; p < graph.edges().size(); ++p) {
     const Point2 a = poses[*graph.node_of(graph.edges()[p].a)].position();
@@ -422,8 +421,8 @@ TEST(Obstacle, ClosesAllThatCrossesItAndNothingElse) {
     expected += crosses && !at_rim;
   }
   EXPECT_EQ(expected, 5U);
-  EXPECT_THROW((void)edges_across(graph, {99, 0.0, 0.5, 1.0}), ContractError);
-  EXPECT_THROW((void)edges_across(graph, {0, 0.0, -0.5, 1.0}), ContractError);
+  EXPECT_THROW((void)find_crossed_edges(graph, {99, 0.0, 0.5, 1.0}), ContractError);
+  EXPECT_THROW((void)find_crossed_edges(graph, {0, 0.0, -0.5, 1.0}), ContractError);
 }
 
 }  // namespace

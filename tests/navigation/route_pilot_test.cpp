@@ -9,7 +9,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/motion/odometry.hpp"
-#include "panonav/route/route_place.hpp"
+#include "panonav/route/route_position.hpp"
 #include "support/smooth_path.hpp"
 #include "support/toy_world.hpp"
 
@@ -75,11 +75,11 @@ TEST(RoutePilot, DrivesToTheEndOfTheWayInBothDirections) {
     const std::size_t last = route.views.size() - 2;
     const auto way = back ? route.way(last, 1) : route.way(1, last);
     Robot robot{route.pose_of(way.front()) * Pose2{0.05, 0.15, back ? 2.0 : -1.0}};
-    ASSERT_TRUE(pilot.begin(way, route.room.line(robot.pose), shortest_m));
+    ASSERT_TRUE(pilot.begin_leg(way, route.room.line(robot.pose), shortest_m));
     EXPECT_EQ(pilot.end(), way.back());
     int steps = 0;
-    for (; pilot.aim() && steps < 100; ++steps) {
-      const Pose2 moved = robot.go(*pilot.aim());
+    for (; pilot.target() && steps < 100; ++steps) {
+      const Pose2 moved = robot.go(*pilot.target());
       pilot.track(route.room.line(robot.pose), moved);
       EXPECT_EQ(pilot.unknown_steps(), 0);
       // From the first half metre on it is on the route.
@@ -87,7 +87,7 @@ TEST(RoutePilot, DrivesToTheEndOfTheWayInBothDirections) {
         EXPECT_LT(std::abs(project_onto_route(route.path, robot.pose.position()).lateral_m), 0.05);
       }
     }
-    EXPECT_FALSE(pilot.aim().has_value());
+    EXPECT_FALSE(pilot.target().has_value());
     EXPECT_LT(distance(robot.pose.position(), route.pose_of(way.back()).position()), 0.1);
     EXPECT_GT(steps, 20);
   }
@@ -98,26 +98,26 @@ TEST(RoutePilot, BeginsOnlyWhereLineAndViewAgreeAndTheWayIsLong) {
   RoutePilot pilot(route.known);
   const auto way = route.way(4, 15);
   const auto here = route.room.line(route.pose_of(way.front()));
-  ASSERT_TRUE(pilot.begin(way, here, shortest_m));
-  EXPECT_FALSE(pilot.begin(route.way(4, 6), here, shortest_m));
-  EXPECT_FALSE(pilot.drives());
-  EXPECT_TRUE(pilot.begin(route.way(4, 7), here, shortest_m));
+  ASSERT_TRUE(pilot.begin_leg(way, here, shortest_m));
+  EXPECT_FALSE(pilot.begin_leg(route.way(4, 6), here, shortest_m));
+  EXPECT_FALSE(pilot.is_on_leg());
+  EXPECT_TRUE(pilot.begin_leg(route.way(4, 7), here, shortest_m));
   // Another place of the route, another place, a way over other views, no way.
-  EXPECT_FALSE(pilot.begin(way, route.room.line(route.pose_of(route.views[12])), shortest_m));
-  EXPECT_FALSE(pilot.begin(way, pillared_room(777).line({0.3, 0.4, 1.0}), shortest_m));
-  EXPECT_FALSE(pilot.begin(std::vector<ViewId>{ViewId{900}, ViewId{901}}, here, shortest_m));
-  EXPECT_FALSE(pilot.begin({}, here, shortest_m));
-  EXPECT_FALSE(RoutePilot().begin(way, here, shortest_m));
+  EXPECT_FALSE(pilot.begin_leg(way, route.room.line(route.pose_of(route.views[12])), shortest_m));
+  EXPECT_FALSE(pilot.begin_leg(way, pillared_room(777).line({0.3, 0.4, 1.0}), shortest_m));
+  EXPECT_FALSE(pilot.begin_leg(std::vector<ViewId>{ViewId{900}, ViewId{901}}, here, shortest_m));
+  EXPECT_FALSE(pilot.begin_leg({}, here, shortest_m));
+  EXPECT_FALSE(RoutePilot().begin_leg(way, here, shortest_m));
   // A route that was rejected is not begun until it is forgiven; one that was stopped is.
-  ASSERT_TRUE(pilot.begin(way, here, shortest_m));
-  pilot.give_up();
-  EXPECT_FALSE(pilot.drives());
-  EXPECT_FALSE(pilot.begin(way, here, shortest_m));
-  pilot.forgive();
-  EXPECT_TRUE(pilot.begin(way, here, shortest_m));
-  pilot.stop();
-  EXPECT_TRUE(pilot.begin(way, here, shortest_m));
-  EXPECT_THROW((void)pilot.begin(way, std::vector<float>(7), shortest_m), ContractError);
+  ASSERT_TRUE(pilot.begin_leg(way, here, shortest_m));
+  pilot.abandon_leg();
+  EXPECT_FALSE(pilot.is_on_leg());
+  EXPECT_FALSE(pilot.begin_leg(way, here, shortest_m));
+  pilot.allow_all_routes();
+  EXPECT_TRUE(pilot.begin_leg(way, here, shortest_m));
+  pilot.end_leg();
+  EXPECT_TRUE(pilot.begin_leg(way, here, shortest_m));
+  EXPECT_THROW((void)pilot.begin_leg(way, std::vector<float>(7), shortest_m), ContractError);
   EXPECT_THROW(pilot.track(here, {}), ContractError);
 }
 
@@ -126,7 +126,7 @@ TEST(RoutePilot, CountsStepsWithoutAPlaceOnTheLeg) {
   RoutePilot pilot(route.known);
   const auto way = route.way(2, 9);
   const Pose2 start = route.pose_of(way.front());
-  ASSERT_TRUE(pilot.begin(way, route.room.line(start), shortest_m));
+  ASSERT_TRUE(pilot.begin_leg(way, route.room.line(start), shortest_m));
   // Lines of another room, lines of the route beyond the leg, no lines.
   const auto strange = pillared_room(777).line({0.3, 0.4, 1.0});
   const auto beyond = route.room.line(route.pose_of(route.views[17]));
@@ -140,8 +140,8 @@ TEST(RoutePilot, CountsStepsWithoutAPlaceOnTheLeg) {
   // Odometry alone carries over some steps, and the next line agrees.
   Robot robot{start};
   for (int step = 0; step < 3; ++step) {
-    ASSERT_TRUE(pilot.aim().has_value());
-    const Pose2 moved = robot.go(*pilot.aim());
+    ASSERT_TRUE(pilot.target().has_value());
+    const Pose2 moved = robot.go(*pilot.target());
     pilot.track({}, moved);
   }
   pilot.track(route.room.line(robot.pose), {});

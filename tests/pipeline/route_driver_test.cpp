@@ -5,7 +5,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/pipeline/memoriser.hpp"
 #include "panonav/pipeline/route_recorder.hpp"
-#include "panonav/route/route_place.hpp"
+#include "panonav/route/route_position.hpp"
 #include "panonav_simulation/simulated_odometry.hpp"
 #include "support/remembered_worlds.hpp"
 #include "support/smooth_path.hpp"

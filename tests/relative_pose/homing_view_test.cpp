@@ -11,7 +11,6 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/relative_pose/fourier_homing.hpp"
-#include "panonav/relative_pose/reference_views.hpp"
 
 namespace panonav {
 namespace {
@@ -52,28 +51,8 @@ TEST(HomingViewOfBytes, IsThatOfTheUnpackedSignatureToTheBit) {
   EXPECT_THROW((void)homing_view(memory, ViewId{5}), ContractError);
 }
 
-TEST(ReferenceViews, HoldWhatTheLoadedMemoriesHold) {
-  const VisualMemory first = memory_of_noise(2, 3, 6);
-  const VisualMemory second = memory_of_noise(3, 8, 9);
-  ReferenceViews references;
-  EXPECT_EQ(references.find(ViewId{3}), nullptr);
-  references.add(first);
-  references.add(second);
-  EXPECT_EQ(references.size(), 4U);
-  for (const VisualMemory* memory : {&first, &second}) {
-    for (const ViewId view : memory->views()) {
-      ASSERT_NE(references.find(view), nullptr);
-      EXPECT_EQ(*references.find(view), homing_view(*memory, view));
-    }
-  }
-  EXPECT_EQ(references.find(ViewId{7}), nullptr);
-  EXPECT_THROW(references.add(first), ContractError);
-  references.clear();
-  EXPECT_EQ(references.size(), 0U);
-}
-
 // References are kept whole, and are compared with views of which a robot needs less.
-TEST(ReferenceViews, OfAWholeViewOnlyTheCommonComponentsCount) {
+TEST(HomingView, OfAWholeViewOnlyTheCommonComponentsCount) {
   const VisualMemory memory = memory_of_noise(4, 0, 2);
   const HomingView reference = homing_view(memory, ViewId{0});
   const HomingView seen = first_components(homing_view(memory, ViewId{1}), 6);

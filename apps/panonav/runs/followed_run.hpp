@@ -12,7 +12,7 @@
 #include "panonav/io/panorama_reader.hpp"
 #include "panonav/pipeline/route_follower.hpp"
 #include "panonav/route/route_changes.hpp"
-#include "panonav/route/route_place.hpp"
+#include "panonav/route/route_position.hpp"
 #include "panonav/route/route_tracker.hpp"
 #include "panonav_recordings/run_recorder.hpp"
 

@@ -4,7 +4,6 @@
 #include "cli/verbs.hpp"
 #include "panonav/io/dataset.hpp"
 #include "panonav/io/trajectory_file.hpp"
-#include "panonav/mapping/lattice_map.hpp"
 #include "panonav/pipeline/arrangement.hpp"
 #include "panonav/pipeline/graph_file.hpp"
 #include "panonav/storage/memory_address.hpp"
@@ -176,7 +175,7 @@ ExitCode arrange_views(const ArrangeArguments& wanted, Session& session) {
   if (!wanted.no_save) store_lattice(lattice, memory, file);
   if (wanted.tum) write_trajectory(*wanted.tum, trajectory_of(lattice, memory));
   if (wanted.graph) {
-    write_graph(*wanted.graph, map_of(lattice),
+    write_graph(*wanted.graph, to_topological_map(lattice),
                 [&](ViewId view) { return memory.info(view).name; });
   }
   if (wanted.picture) write_lattice_picture(*wanted.picture, lattice, memory);

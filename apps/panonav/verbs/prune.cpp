@@ -62,7 +62,7 @@ void print_loss(const PruneArguments& wanted, const SparseLoss& loss, std::size_
                   format_fixed(loss.positions->median_before_m, 3) + ")  95 % within " +
                   format_fixed(loss.positions->p95_after_m, 3) + " m (before " +
                   format_fixed(loss.positions->p95_before_m, 3) + ")");
-  } else if (loss.asked > 0) {
+  } else if (loss.queries > 0) {
     session.print("dropped views differ from those that stand for them by " +
                   format_fixed(loss.median_difference, 3) + " (median)");
   }
@@ -113,7 +113,7 @@ ExitCode prune(const Arguments& arguments, const PruneArguments& wanted, Session
                                          {"outdated", outdated},
                                          {"factor", factor},
                                          {"median_difference", loss.median_difference},
-                                         {"asked", loss.asked},
+                                         {"asked", loss.queries},
                                          {"position_error", as_json(loss.positions)}}));
     return ExitCode::done;
   }

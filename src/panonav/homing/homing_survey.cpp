@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 #include <mutex>
-#include <unordered_map>
 
 #include "panonav/core/error.hpp"
+#include "panonav/geometry/point_grid.hpp"
 
 namespace panonav {
 
@@ -18,48 +18,33 @@ constexpr double rounding_m = 1e-9;
 // Finds the place nearest to a point, if one is within a fixed reach.
 class PlaceFinder {
  public:
-  PlaceFinder(std::span<const Pose2> places, double reach_m) : places_(places), reach_m_(reach_m) {
+  PlaceFinder(std::span<const Pose2> places, double reach_m)
+      : reach_m_(reach_m + rounding_m), grid_(reach_m_) {
     for (std::size_t i = 0; i < places.size(); ++i) {
-      cells_[key(cell(places[i].x_m), cell(places[i].y_m))].push_back(
-          static_cast<std::uint32_t>(i));
+      grid_.add(static_cast<std::uint32_t>(i), places[i].position());
     }
   }
 
-  // `otherwise` when nothing is in reach; of equally near ones the first.
-  [[nodiscard]] std::uint32_t nearest(Point2 point, std::uint32_t otherwise) const {
+  /// Returns `otherwise` when nothing is in reach; of equally near places the first.
+  [[nodiscard]] std::uint32_t find_nearest(Point2 point, std::uint32_t otherwise) const {
     std::uint32_t best = otherwise;
-    double best_square = (reach_m_ + rounding_m) * (reach_m_ + rounding_m);
+    double best_square = reach_m_ * reach_m_;
     bool found = false;
-    const std::int64_t x = cell(point.x_m);
-    const std::int64_t y = cell(point.y_m);
-    for (std::int64_t dy = -1; dy <= 1; ++dy) {
-      for (std::int64_t dx = -1; dx <= 1; ++dx) {
-        const auto at = cells_.find(key(x + dx, y + dy));
-        if (at == cells_.end()) continue;
-        for (const std::uint32_t i : at->second) {
-          const double ex = places_[i].x_m - point.x_m;
-          const double ey = places_[i].y_m - point.y_m;
-          const double square = ex * ex + ey * ey;
-          if (square > best_square || (found && square == best_square && i >= best)) continue;
-          best = i;
-          best_square = square;
-          found = true;
-        }
-      }
-    }
+    grid_.visit_near(point, [&](std::uint32_t i, Point2 position) {
+      const double ex = position.x_m - point.x_m;
+      const double ey = position.y_m - point.y_m;
+      const double square = ex * ex + ey * ey;
+      if (square > best_square || (found && square == best_square && i >= best)) return;
+      best = i;
+      best_square = square;
+      found = true;
+    });
     return best;
   }
 
  private:
-  [[nodiscard]] std::int64_t cell(double value_m) const {
-    return static_cast<std::int64_t>(std::floor(value_m / (reach_m_ + rounding_m)));
-  }
-  [[nodiscard]] static std::uint64_t key(std::int64_t x, std::int64_t y) {
-    return (static_cast<std::uint64_t>(x) << 32U) ^ (static_cast<std::uint64_t>(y) & 0xFFFFFFFFU);
-  }
-  std::span<const Pose2> places_;
   double reach_m_;
-  std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> cells_;
+  PointGrid grid_;
 };
 
 void check_poses(std::span<const Pose2> poses, const char* what) {
@@ -121,8 +106,8 @@ HomingSurvey survey_homing(std::span<const Pose2> goals, std::span<const Pose2> 
         auto next = static_cast<std::uint32_t>(p);
         if (length > 0.0) {
           const double step_m = std::min(options.max_step_m, options.typical_distance_m * length);
-          next = finder.nearest({here.x_m + step_m * x / length, here.y_m + step_m * y / length},
-                                next);
+          next = finder.find_nearest(
+              {here.x_m + step_m * x / length, here.y_m + step_m * y / length}, next);
         }
         survey.next[pair] = next;
       }

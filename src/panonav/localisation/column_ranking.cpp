@@ -8,8 +8,8 @@
 
 namespace panonav {
 
-double RankedMatch::score_of(double difference) const {
-  // Two views may agree in all columns to the last byte and not in brightness, or the reverse.
+double RankedMatch::score_with(double difference) const {
+  // Keeps both factors above 0 where views agree to the last byte in columns or in brightness.
   constexpr double min_factor = 1e-6;
   constexpr double dissimilarity_exponent = 0.125;  // chosen on recordings (docs/decisions.md)
   return (difference + min_factor) *
@@ -26,30 +26,30 @@ ColumnRanking::ColumnRanking(const VisualMemory& memory, int components, int max
   for (const ViewId view : kept_views_) kept_.emplace_back(memory.packed(view), components);
 }
 
-const ColumnProfiles* ColumnRanking::kept(ViewId view) const {
+const ColumnProfiles* ColumnRanking::find_kept(ViewId view) const {
   const auto at = std::ranges::lower_bound(kept_views_, view);
   if (at == kept_views_.end() || *at != view) return nullptr;
   return &kept_[static_cast<std::size_t>(at - kept_views_.begin())];
 }
 
 ColumnProfiles ColumnRanking::profiles(ViewId view) const {
-  if (const ColumnProfiles* const found = kept(view)) return *found;
+  if (const ColumnProfiles* const found = find_kept(view)) return *found;
   return ColumnProfiles(memory_->packed(view), components_);
 }
 
 std::vector<RankedMatch> ColumnRanking::rank(const PackedSignature& query,
                                              std::span<const Match> matches,
                                              std::span<const std::uint8_t> allowed_rows) const {
-  const ColumnProfiles asked(query, components_, allowed_rows);
+  const ColumnProfiles query_profiles(query, components_, allowed_rows);
   std::vector<RankedMatch> ranked;
   ranked.reserve(matches.size());
   for (const Match& match : matches) {
     // Kept profiles are over all rows.
-    const ColumnProfiles* const found = allowed_rows.empty() ? kept(match.view) : nullptr;
+    const ColumnProfiles* const found = allowed_rows.empty() ? find_kept(match.view) : nullptr;
     const ColumnMatch columns =
-        found != nullptr ? match_columns(asked, *found)
-                         : match_columns(asked, ColumnProfiles(memory_->packed(match.view),
-                                                               components_, allowed_rows));
+        found != nullptr ? match_columns(query_profiles, *found)
+                         : match_columns(query_profiles, ColumnProfiles(memory_->packed(match.view),
+                                                                        components_, allowed_rows));
     ranked.push_back({match, columns});
   }
   std::ranges::sort(ranked, {},

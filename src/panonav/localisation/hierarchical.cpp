@@ -4,69 +4,58 @@
 #include <cmath>
 #include <utility>
 
+#include "panonav/localisation/internal/posed_views.hpp"
+
 namespace panonav {
 
-namespace {
+ReferenceAreas::ReferenceAreas(const VisualMemory& memory) : ReferenceAreas(PosedViews(memory)) {}
 
-std::vector<ViewId> posed_views(const VisualMemory& memory) {
-  std::vector<ViewId> posed;
-  for (const ViewId view : memory.views()) {
-    if (memory.info(view).pose) posed.push_back(view);
-  }
-  return posed;
-}
-
-VoronoiCells cells_of(const VisualMemory& memory, std::span<const ViewId> posed) {
-  std::vector<Point2> positions;
-  positions.reserve(posed.size());
-  for (const ViewId view : posed) positions.push_back(memory.info(view).pose->position());
-  return VoronoiCells(positions);
-}
-
-}  // namespace
-
-ReferenceAreas::ReferenceAreas(const VisualMemory& memory)
-    : views_(posed_views(memory)), cells_(cells_of(memory, views_)) {
+ReferenceAreas::ReferenceAreas(PosedViews posed)
+    : views_(std::move(posed.views)), cells_(posed.positions) {
   areas_m2_.reserve(cells_.sites().size());
   for (std::size_t site = 0; site < cells_.sites().size(); ++site) {
     areas_m2_.push_back(cells_.area_m2(site));
   }
 }
 
-std::optional<std::size_t> ReferenceAreas::site(ViewId view) const {
+std::optional<std::size_t> ReferenceAreas::find_site(ViewId view) const {
   const auto found = std::ranges::lower_bound(views_, view);
   if (found == views_.end() || *found != view) return std::nullopt;
   return cells_.site_of()[static_cast<std::size_t>(found - views_.begin())];
 }
 
 std::vector<Point2> ReferenceAreas::cell(ViewId view) const {
-  const auto here = site(view);
+  const auto here = find_site(view);
   return here ? cells_.cell(*here) : std::vector<Point2>{};
 }
 
-std::optional<double> ReferenceAreas::area_m2(std::span<const Match> views) const {
+std::optional<std::vector<std::size_t>> ReferenceAreas::find_sites(
+    std::span<const Match> views) const {
   std::vector<std::size_t> sites;
   for (const Match& match : views) {
-    const auto here = site(match.view);
-    if (!here) return std::nullopt;
-    sites.push_back(*here);
+    const auto site = find_site(match.view);
+    if (!site) return std::nullopt;
+    sites.push_back(*site);
   }
+  return sites;
+}
+
+std::optional<double> ReferenceAreas::area_m2(std::span<const Match> views) const {
+  auto sites = find_sites(views);
+  if (!sites) return std::nullopt;
   // Views at one position share their cell.
-  std::ranges::sort(sites);
-  sites.erase(std::unique(sites.begin(), sites.end()), sites.end());
+  std::ranges::sort(*sites);
+  sites->erase(std::unique(sites->begin(), sites->end()), sites->end());
   double sum = 0.0;
-  for (const std::size_t here : sites) sum += areas_m2_[here];
+  for (const std::size_t site : *sites) sum += areas_m2_[site];
   return sum;
 }
 
 std::optional<Circle> ReferenceAreas::enclosing_circle(std::span<const Match> views) const {
+  const auto sites = find_sites(views);
+  if (!sites || sites->empty()) return std::nullopt;
   std::vector<Point2> positions;
-  for (const Match& match : views) {
-    const auto here = site(match.view);
-    if (!here) return std::nullopt;
-    positions.push_back(cells_.sites()[*here]);
-  }
-  if (positions.empty()) return std::nullopt;
+  for (const std::size_t site : *sites) positions.push_back(cells_.sites()[site]);
   Circle circle = smallest_enclosing_circle(positions);
   circle.radius_m += cells_.spacing_m() / std::sqrt(2.0);
   return circle;

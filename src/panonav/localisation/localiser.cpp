@@ -17,9 +17,9 @@ namespace panonav {
 
 namespace {
 
-// The signature with the magnitudes of the rows that do not count set to 0; no `allowed_rows`:
-// unchanged.
-PackedSignature with_rows(PackedSignature signature, std::span<const std::uint8_t> allowed_rows) {
+// Returns the signature with the magnitudes of the rows that do not count set to 0; unchanged
+// without `allowed_rows`.
+PackedSignature keep_rows(PackedSignature signature, std::span<const std::uint8_t> allowed_rows) {
   if (allowed_rows.empty()) return signature;
   for (std::size_t i = 0; i < signature.magnitudes.size(); ++i) {
     if (allowed_rows[i % allowed_rows.size()] == 0) signature.magnitudes[i] = 0;
@@ -27,8 +27,8 @@ PackedSignature with_rows(PackedSignature signature, std::span<const std::uint8_
   return signature;
 }
 
-// Without the features in rows that do not count.
-std::optional<LocalFeatures> with_rows(std::optional<LocalFeatures> features,
+// Returns the features without those in rows that do not count.
+std::optional<LocalFeatures> keep_rows(std::optional<LocalFeatures> features,
                                        std::span<const std::uint8_t> allowed_rows) {
   if (features && !allowed_rows.empty()) {
     std::erase_if(features->features, [&](const LocalFeatures::Feature& feature) {
@@ -38,20 +38,20 @@ std::optional<LocalFeatures> with_rows(std::optional<LocalFeatures> features,
   return features;
 }
 
-// Matches of which the heading is the mean, and the nearest one is listed first: the corners of a
-// grid's square.
+/// Matches of which the heading is the mean, and of which the nearest one is listed first: the
+/// corners of a grid's square.
 constexpr std::size_t nearest_references = 4;
 
-// Half the width in which the compass searches: columns tell the turn to a step of theirs.
+/// Half the window of the compass: columns give the rotation to one of their steps.
 constexpr double compass_window_rad = 2.0 * std::numbers::pi / ColumnProfiles::columns;
 
-// The weighted mean of the headings that the nearest references indicate. The error of the compass
+// Returns the weighted mean of the headings by the nearest references. The error of the compass
 // grows with the distance, and so does the square of the difference, so weights are its inverse
-// fourth power. Only those near to what the best match indicates count: a compass that locked on to
-// a wrong maximum must not pull the mean.
-std::optional<double> absolute_heading(const VisualMemory& memory,
+// fourth power. Only headings near that by the best match count: a compass that locked on to a
+// wrong maximum must not pull the mean.
+std::optional<double> estimate_heading(const VisualMemory& memory,
                                        std::span<const PlaceMatch> matches) {
-  constexpr double agreement_rad = radians(15.0);  // chosen
+  constexpr double agreement_rad = radians(15.0);  // three times the compass's usual error
   constexpr double min_difference = 1e-2;          // below it all differences count alike
   std::optional<double> centre_rad;
   double sum = 0.0;
@@ -71,10 +71,10 @@ std::optional<double> absolute_heading(const VisualMemory& memory,
   return wrap_angle(*centre_rad + sum / weights);
 }
 
-// Moves the nearest of the best references to the front: a position that many references agree on
-// tells it better than their differences one by one, in which noise decides between neighbours.
-void put_nearest_first(const VisualMemory& memory, Point2 position,
-                       std::vector<PlaceMatch>& matches) {
+// Moves the nearest of the best references to the front: the position, on which many references
+// agree, identifies it better than single differences, in which noise decides between neighbours.
+void move_nearest_first(const VisualMemory& memory, Point2 position,
+                        std::vector<PlaceMatch>& matches) {
   const auto end =
       matches.begin() + static_cast<std::ptrdiff_t>(std::min(nearest_references, matches.size()));
   const auto distance_m = [&](const PlaceMatch& match) {
@@ -114,10 +114,10 @@ std::vector<PositionBounds> join_overlapping(std::vector<PositionBounds> boxes) 
   return boxes;
 }
 
-// Where the references lie that may support one of the matches (`NeighbourSupport`).
-std::vector<PositionBounds> bounds_of_supporters(const VisualMemory& memory,
-                                                 std::span<const RankedMatch> ranked,
-                                                 double spacing_m) {
+// Returns where the references lie that may support one of the matches (`NeighbourSupport`).
+std::vector<PositionBounds> bound_supporters(const VisualMemory& memory,
+                                             std::span<const RankedMatch> ranked,
+                                             double spacing_m) {
   std::vector<PositionBounds> boxes;
   const double radius_m = NeighbourSupport::radius_m(spacing_m);
   if (!(radius_m > 0.0)) return boxes;
@@ -131,13 +131,13 @@ std::vector<PositionBounds> bounds_of_supporters(const VisualMemory& memory,
   return join_overlapping(std::move(boxes));
 }
 
-VisualMemory joined(const VisualMemory& part, const VisualMemory& drawn) {
+VisualMemory join_memories(const VisualMemory& part, const VisualMemory& drawn) {
   VisualMemory all(part.shape(), part.full_scale(), part.elevations());
   std::vector<ViewId> views;
   std::ranges::set_union(part.views(), drawn.views(), std::back_inserter(views));
   for (const ViewId view : views) {
     const VisualMemory& from = part.contains(view) ? part : drawn;
-    // Somebody may have given its name to another view meanwhile.
+    // Another user may have given its name to another view meanwhile.
     if (all.find(from.info(view).name)) continue;
     all.append_as(view, from.packed(view), from.info(view));
   }
@@ -175,7 +175,7 @@ struct Localiser::ComparedViews {
   PlaceCriterion criterion;  // looks at `ranking`
 };
 
-/// One query on its way to an answer.
+/// The evaluation of one query.
 class Localiser::Query {
  public:
   Query(const Localiser& localiser, ViewIndex& index, const PackedSignature& view,
@@ -196,21 +196,21 @@ class Localiser::Query {
   }
 
   Place answer() {
-    find_candidates();
+    find_candidates();  // [M04 section 2.2]
     if (ranked_.empty()) return std::move(place_);
     load_compared_views();
-    weigh_columns();
-    rank_by_support();
-    rank_by_features();
-    weigh_features();
-    list_matches();
-    if (place_.known) estimate_pose();
+    weigh_columns();                    // evidence of whether the place is known
+    rank_by_support();                  // places that look alike
+    rank_by_features();                 // memories with far references
+    weigh_features();                   // evidence where columns are inconclusive
+    list_matches();                     // headings by the visual compass
+    if (place_.known) estimate_pose();  // [M04 footnote 1]
     return std::move(place_);
   }
 
  private:
-  /// Finds the views of least dissimilarity, in the order of their columns; more of them where none
-  /// explains the query [M04 section 2.2].
+  /// Finds the views of least dissimilarity [M04 section 2.2], in the order of their columns; more
+  /// of them where none explains the query.
   void find_candidates() {
     const int first = std::max(
         {options_.top, PositionModel::candidates, ranks_by_features_ ? verified_candidates : 0});
@@ -240,18 +240,17 @@ class Localiser::Query {
                   .rank(view_, found.matches, mask_.allowed_rows);
   }
 
-  /// Loads what the answer takes of a memory that is not held: the candidates, references that may
-  /// support them, and the views of chance.
+  /// Loads the views that the answer needs of a memory that is not held: the candidates, references
+  /// that may support them, and those of chance.
   void load_compared_views() {
     if (compared_ != nullptr) return;
     std::vector<ViewId> views = ids_of(ranked_);
     views.insert(views.end(), mask_.excluded_views.begin(), mask_.excluded_views.end());
     if (options_.reranked_views > 0) {
-      const auto around =
-          index_.views_within(bounds_of_supporters(*loaded_, ranked_, own_.spacing_m_));
+      const auto around = index_.views_within(bound_supporters(*loaded_, ranked_, own_.spacing_m_));
       views.insert(views.end(), around.begin(), around.end());
     }
-    loaded_.emplace(joined(index_.load(views), *own_.drawn_));
+    loaded_.emplace(join_memories(index_.load(views), *own_.drawn_));
     compared_ =
         &loaded_views_.emplace(*loaded_, options_, std::optional(own_.spacing_m_), index_.size());
   }
@@ -269,7 +268,7 @@ class Localiser::Query {
     if (ranks_by_features_) rank_by_verified_features(*features_, own_.features_, ranked_);
   }
 
-  /// A sequential test: features count only where columns are inconclusive.
+  /// Adds evidence of features only where columns are inconclusive (a sequential test).
   void weigh_features() {
     is_known_by_columns_ = is_known();
     if (make_features_ && own_.features_ && is_inconclusive(place_.evidence)) {
@@ -292,13 +291,13 @@ class Localiser::Query {
         return std::pair(r.match.dissimilarity, r.match.view);
       });
     }
-    const PackedSignature seen = with_rows(view_, mask_.allowed_rows);
+    const PackedSignature query = keep_rows(view_, mask_.allowed_rows);
     const VisualMemory& memory = *compared_->memory;
     for (const RankedMatch& r : ranked_) {
       if (static_cast<int>(place_.matches.size()) == options_.top) break;
       std::optional<CompassReading> reading;
       if (place_.components >= 2) {
-        reading = compass_near(seen, with_rows(memory.packed(r.match.view), mask_.allowed_rows),
+        reading = compass_near(query, keep_rows(memory.packed(r.match.view), mask_.allowed_rows),
                                r.columns.heading_rad, compass_window_rad, options_.components);
       }
       place_.matches.push_back({memory.info(r.match.view).name, r.match.view, r.match.dissimilarity,
@@ -311,18 +310,18 @@ class Localiser::Query {
   void estimate_pose() {
     const PositionModel& model = own_.position_model_;
     place_.position = interpolate_position(compared_->ranking, model, ranked_);
-    // Columns alone do not know the place: so much do they say of the position.
+    // Columns alone do not know the place, so they give the position no better than this.
     if (!is_known_by_columns_ && place_.position && place_.position->radius_m) {
       place_.position->radius_m = std::max(*place_.position->radius_m, model.neighbourhood_m);
     }
-    place_.heading_rad = absolute_heading(*compared_->memory, place_.matches);
+    place_.heading_rad = estimate_heading(*compared_->memory, place_.matches);
     if (place_.position && options_.reranked_views > 0 && !ranks_by_features_) {
-      put_nearest_first(*compared_->memory, place_.position->position(), place_.matches);
+      move_nearest_first(*compared_->memory, place_.position->position(), place_.matches);
     }
   }
 
   [[nodiscard]] std::optional<LocalFeatures> features_of(Handedness handedness) const {
-    return with_rows(make_features_(handedness), mask_.allowed_rows);
+    return keep_rows(make_features_(handedness), mask_.allowed_rows);
   }
 
   const Localiser& own_;

@@ -14,45 +14,45 @@
 namespace panonav {
 
 /// Finds places of a memory from single views, in any heading of the robot. The memory is held, or
-/// searched where it lies; the answers are the same.
+/// searched where it is stored; the answers are the same.
 class Localiser {
  public:
-  /// Learns both models from the memory, which must outlive *this. What is appended later can be
-  /// found, but takes part in the models only when a new Localiser is made. Throws OptionError,
-  /// ContractError on more components than the memory's. Cost: about 200 searches, and 0.2 s for
-  /// comparing columns, at most.
+  /// Learns both models from the memory, which must outlive *this. Views appended later can be
+  /// found, but take part in the models only of a new Localiser. Throws OptionError, ContractError
+  /// on more components than the memory's. Cost: about 200 searches, and 0.2 s for comparing
+  /// columns, at most.
   explicit Localiser(const VisualMemory& memory, const LocaliserOptions& options = {});
-  /// With models learnt before; `spacing_m`: that of the support (`NeighbourSupport`), where it is
+  /// Takes models learnt before; `spacing_m`: that of the support (`NeighbourSupport`), where it is
   /// known. Throws ContractError when the position model was learnt over other components.
   Localiser(const VisualMemory& memory, const PlaceModel& place_model,
             const PositionModel& position_model, const LocaliserOptions& options = {},
             std::optional<double> spacing_m = std::nullopt);
-  /// For a memory that is not held, with models learnt before. `drawn`: those of its views that
-  /// `draw_views` draws. Throws as above.
+  /// For a memory that is not held, with models learnt before. `drawn`: the views that `draw_views`
+  /// draws from it. Throws as above.
   Localiser(std::shared_ptr<const VisualMemory> drawn, const PlaceModel& place_model,
             const PositionModel& position_model, const LocaliserOptions& options, double spacing_m);
 
-  /// From now on, in queries that come with theirs, local features are evidence of whether the
-  /// place is known, where columns are inconclusive. `rank`: they also decide between the best
-  /// matches, for memories in which `FeatureTrial::is_significantly_better`.
+  /// From now on local features are evidence of whether the place is known, in queries that have
+  /// them and where columns are inconclusive. `rank`: they also decide between the best matches,
+  /// for memories in which `FeatureTrial::is_significantly_better`.
   void use_features(FeatureSource features, bool rank) {
     features_ = std::move(features);
     rank_by_features_ = rank;
   }
-  /// Whether features decide between the best matches.
+  /// True if features decide between the best matches.
   [[nodiscard]] bool ranks_by_features() const noexcept { return features_ && rank_by_features_; }
 
-  /// Learnt at construction, or as given.
+  /// Learnt at construction, or as passed to the constructor.
   [[nodiscard]] const PlaceModel& place_model() const noexcept { return place_model_; }
-  /// Learnt at construction, or as given.
+  /// Learnt at construction, or as passed to the constructor.
   [[nodiscard]] const PositionModel& position_model() const noexcept { return position_model_; }
 
   /// Topological localisation. The exact search finds the views of least dissimilarity; comparing
-  /// columns puts them in order. When the best of them differs more than neighbouring views of the
-  /// memory do, a part of the view may be hidden, which the dissimilarity cannot know: then up to
+  /// columns orders them. When the best of them differs more than neighbouring views of the memory
+  /// do, a part of the view may be hidden, which changes the dissimilarity: then up to
   /// `reranked_views` views are compared. Between places that look alike the references around each
-  /// decide (`NeighbourSupport`). By the visual compass, near the turn at which the columns
-  /// fit, follows the heading relative to each match; then whether the place is known, the position
+  /// decide (`NeighbourSupport`). The visual compass, near the rotation at which the columns fit,
+  /// gives the heading relative to each match. Then follow whether the place is known, the position
   /// between the references [M04 footnote 1] and the absolute heading: the weighted mean over the
   /// four nearest references, so that the opposite parallaxes of references on opposite sides
   /// cancel. Throws ContractError on a query of another shape, and where the memory is not held.
@@ -62,8 +62,8 @@ class Localiser {
   /// at most once; empty: they do not count.
   [[nodiscard]] Place localise(const PackedSignature& query, const SearchMask& mask = {},
                                const QueryFeatures& features = {}) const;
-  /// The same by an index of the memory. Of a memory that is not held, the views that the answer
-  /// takes are loaded: those that the search finds and references around them. Throws as `index`.
+  /// Localises by an index of the memory. Of a memory that is not held, it loads the views that the
+  /// answer needs: those that the search finds and references around them. Throws as `index`.
   [[nodiscard]] Place localise(ViewIndex& index, const PackedSignature& query,
                                const SearchMask& mask = {},
                                const QueryFeatures& features = {}) const;
@@ -73,13 +73,13 @@ class Localiser {
   struct ComparedViews;
 
   LocaliserOptions options_;
-  /// Shared by copies. Null: the memory is not held; each query makes its own.
+  // Shared by copies. Null: the memory is not held; each query makes its own.
   std::shared_ptr<const ComparedViews> held_;
-  std::shared_ptr<const VisualMemory> drawn_;  ///< null: the memory is held
-  double spacing_m_ = 0.0;                     ///< where it is not held
+  std::shared_ptr<const VisualMemory> drawn_;  // null: the memory is held
+  double spacing_m_ = 0.0;                     // where it is not held
   PlaceModel place_model_;
   PositionModel position_model_;
-  FeatureSource features_;  ///< empty: features do not count
+  FeatureSource features_;  // empty: features do not count
   bool rank_by_features_ = false;
 };
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
+#include <string_view>
 #include <utility>
 
 #include "panonav/core/error.hpp"
@@ -20,49 +20,52 @@ namespace panonav {
 
 namespace {
 
-// Sectors of the circle in which particles are gathered: 15 degrees each. Chosen.
+/// Sectors of the circle in which particles are clustered: 15 degrees, between the compass's error
+/// of some 5 degrees and the quarter turn after which rooms look alike.
 constexpr int heading_bins = 24;
 
-// Views that the search finds for each image, and references near the particles that are compared;
-// fewer while the robot is localised. Chosen: all modes are followed, in a time that the search
-// does not exceed.
-constexpr int searched_views = 16;
-constexpr int searched_views_when_localised = 4;
-constexpr std::size_t followed_sites = 256;
-constexpr std::size_t followed_sites_when_localised = 16;
-// Least share of the particles' weight near a reference that is compared for them. Chosen.
+// Work per image, so that all modes are followed in a time that the search does not exceed; less
+// while the robot is localised.
+constexpr int searched_views = 16;                ///< views that the search finds
+constexpr int searched_views_when_localised = 4;  ///< the same of a localised robot
+constexpr std::size_t max_followed_sites = 256;   ///< references near the particles compared
+constexpr std::size_t max_followed_sites_when_localised = 16;
+/// Smallest share of the particles' weight near a reference that is compared for them: five of
+/// 5000.
 constexpr double min_followed_weight = 1e-3;
 
-// Probabilities from one image to the next: that the robot was carried anywhere (docs/decisions.md,
-// particle injection), that it leaves the memorised area, and that it comes back. Chosen.
-constexpr double p_kidnap = 0.01;
-constexpr double p_leave = 0.02;
-constexpr double p_return = 0.1;
-// Probability of being elsewhere than where the particles were strewn while nothing is known.
-// Chosen.
+// Probabilities from one image to the next (docs/decisions.md, particle injection).
+constexpr double p_kidnap = 0.01;  ///< that the robot was carried anywhere
+constexpr double p_leave = 0.02;   ///< that it leaves the memorised area
+constexpr double p_return = 0.1;   ///< that it comes back
+/// Probability at the first image that the robot is not where the particles were drawn: few of them
+/// are near it.
 constexpr double p_elsewhere_at_start = 0.9;
-// Belief in being inside the memorised area before the first image: none either way.
+/// Belief in being inside the memorised area before the first image: undecided.
 constexpr double p_inside_at_start = 0.5;
 
-// Log-likelihood ratio that a view of another place reaches by chance; one in a hundred reaches it
-// (docs/decisions.md, "Lost is a second belief"). One image never speaks against the area by more.
-constexpr double log_ratio_by_chance = 1.0;
-// The most by which one image speaks for it, by its likelihood or by its difference alone. Chosen.
+/// Log-likelihood ratio that one in a hundred views of another place reaches by chance
+/// (docs/decisions.md, "Lost is a second belief"). One image is never stronger evidence against the
+/// area than this.
+constexpr double chance_log_ratio = 1.0;
+// Strongest evidence of one image for the area, by its likelihood or by its difference alone: odds
+// of 150 and of 7, so that some images against it prevail
+// (tests/localisation/monte_carlo_test.cpp).
 constexpr double max_log_ratio = 5.0;
 constexpr double max_log_ratio_of_difference = 2.0;
-// Log-likelihood ratio for each part of the way from an explained to an unrelated difference; and
-// the shortest such way, in differences. Chosen.
+/// Log-likelihood ratio of an explained difference against an unrelated one (the same tests).
 constexpr double log_ratio_per_margin = 4.0;
+/// Smallest distance between the two that counts; keeps the margin finite where they coincide.
 constexpr double min_margin_unit = 0.05;
 
-// Least exponent by which a view counts, however near it was taken to the one before. Chosen.
+/// Smallest exponent of a view's likelihood, however near it was taken to the one before, so that a
+/// robot that stands still can be localised.
 constexpr double min_view_exponent = 0.05;
 
-// The robot is localised with this much of the weight in one mode, and in the memorised area up to
-// so many spacings or ranges of similarity from a reference (docs/decisions.md, "Localised means").
-constexpr double min_localised_weight = 0.9;
-constexpr double memorised_reach = 2.0;
-constexpr double min_inside = 0.5;
+// When the robot is localised (docs/decisions.md, "Localised means").
+constexpr double min_localised_weight = 0.9;  ///< of the heaviest mode
+constexpr double memorised_reach = 2.0;       ///< largest distance from a reference, in spacings
+constexpr double min_inside = 0.5;            ///< belief in being in the memorised area
 
 double position_variance_m2(const ParticleModes& modes) {
   return modes.modes.front().covariance[0] + modes.modes.front().covariance[4];
@@ -78,12 +81,12 @@ struct MonteCarloLocaliser::Implementation {
   ViewLikelihood likelihood;
   PoseSampler sampler;
   ParticleWeighing weighing;
-  MonteCarloLocaliser::InjectionRule injection_rule;  // empty: none but the filter's own
+  InjectionRule injection_rule;  // empty: none but the filter's own
   Random random;
   Particles particles;
   double travelled_m = 0.0;  // since the last image
   PositionError error;
-  bool knows_nothing = true;          // no image was seen since the start
+  bool knows_nothing = true;          // no image since the start
   double inside = p_inside_at_start;  // belief that the robot is in the memorised area
   MonteCarloEstimate latest;
 
@@ -109,213 +112,234 @@ struct MonteCarloLocaliser::Implementation {
   }
   [[nodiscard]] ParticleModes modes() const { return find_modes(particles, bins()); }
 
-  void restart(bool is_known);
-  MonteCarloEstimate observe(const PackedSignature& view);
-  void compare_views(const PackedSignature& view, bool was_localised);
-  void compare_found(const PackedSignature& view, int count);
-  void compare_around_best();
-  void inject_by_rule(const PackedSignature& view);
-  void inject_explained();
-  void update_inside();
+  void restart(bool is_known) {
+    error = {};
+    inside = is_known ? 1.0 - p_leave : p_inside_at_start;
+    knows_nothing = !is_known;
+    latest = {};
+  }
+
+  /// Monte-Carlo localisation by one image [M03 section 4].
+  MonteCarloEstimate observe(const PackedSignature& view) {
+    const bool was_localised = latest.state == LocalisationState::localised;
+    latest = {};
+    likelihood.arrange(particles);
+    compare_views(view, was_localised);  // [M03 section 4]: similarities at the references
+    inject_by_rule(view);                // [M03 section 4.1]
+    const double correlation = correlation_with_last_view();
+    const double exponent = knows_nothing ? 1.0 : std::max(min_view_exponent, 1.0 - correlation);
+    const ParticleModes before = knows_nothing ? ParticleModes{} : modes();
+    latest.log_here = weighing.weigh(particles, likelihood, exponent, bins(), random);
+    inject_explained();  // Bayes' rule for a kidnapped robot
+    update_inside();     // Bayes' rule for the memorised area
+    knows_nothing = false;
+    travelled_m = 0.0;
+    const ParticleModes after = modes();
+    latest.particles = static_cast<int>(particles.size());
+    latest.effective_particles = effective_sample_size(particles.weight);
+    update_error(before, after, exponent, correlation);
+    fill_estimate(latest, after);
+    resample_if_needed(after.occupied_bins);  // [Fox 2003]
+    return latest;
+  }
+
+  /// Views from nearly the same place are alike, also in what misleads: a view counts as far as it
+  /// is new.
+  [[nodiscard]] double correlation_with_last_view() const {
+    return std::exp(-travelled_m / model.range_m);
+  }
+
+  /// Compares column by column the views that the search finds, those around the best of them, and
+  /// those around the particles.
+  void compare_views(const PackedSignature& view, bool was_localised) {
+    likelihood.set_view(view);
+    compare_found(view, was_localised ? searched_views_when_localised : searched_views);
+    const std::size_t max_followed =
+        was_localised ? max_followed_sites_when_localised : max_followed_sites;
+    const auto followed = likelihood.heaviest_sites(particles, max_followed, min_followed_weight);
+    for (const std::uint32_t site : followed) likelihood.compare(site);
+
+    const auto here = likelihood.min_difference(followed);
+    const auto anywhere = likelihood.min_difference(likelihood.compared_sites());
+    const bool is_followed = was_localised && here && anywhere && *here <= *anywhere;
+    const bool is_unexplained =
+        !is_followed && anywhere && *anywhere > model.neighbouring_difference;
+    if (knows_nothing || is_unexplained) {
+      const auto sites = static_cast<std::uint32_t>(likelihood.sites().size());
+      if (sites <= static_cast<std::size_t>(options.reranked_views)) {
+        for (std::uint32_t site = 0; site < sites; ++site) likelihood.compare(site);
+      } else if (options.reranked_views > searched_views) {
+        compare_found(view, options.reranked_views);
+      }
+    }
+    compare_around_best();
+    latest.difference_here = likelihood.min_difference(followed);
+    latest.difference_anywhere = likelihood.min_difference(likelihood.compared_sites());
+    latest.views_compared = likelihood.compared_sites().size();
+  }
+
+  void compare_found(const PackedSignature& view, int count) {
+    const SearchResult found =
+        ranking->memory().search(view, {.top = count, .components = ranking->components()});
+    for (const Match& match : found.matches) {
+      if (const auto site = likelihood.site_of(match.view)) likelihood.compare(*site);
+    }
+  }
+
+  void compare_around_best() {
+    const auto sites = likelihood.sites();
+    std::optional<std::uint32_t> best;
+    for (const std::uint32_t site : likelihood.compared_sites()) {
+      if (!best || sites[site].similarity > sites[*best].similarity) best = site;
+    }
+    if (!best) return;
+    const Point2 place = sites[*best].position;
+    for (const std::uint32_t site : likelihood.sites_near(place)) likelihood.compare(site);
+  }
+
+  /// Replaces random particles by new ones, by the caller's rule.
+  void inject_by_rule(const PackedSignature& view) {
+    if (!injection_rule) return;
+    const std::size_t size = particles.size();
+    const InjectedParticles injected = injection_rule(view, size);
+    std::vector<std::uint32_t> sites;
+    for (const ViewId around : injected.around) {
+      if (const auto site = likelihood.site_of(around)) sites.push_back(*site);
+    }
+    if (injected.count == 0 || (sites.empty() && !injected.around.empty())) return;
+    for (std::size_t n = 0; n < injected.count; ++n) {
+      const std::size_t replaced = random.index(size);
+      Pose2 pose;
+      if (sites.empty()) {
+        pose = sampler.draw_anywhere(particles, random);
+      } else {
+        const std::uint32_t site = sites[random.index(sites.size())];
+        likelihood.compare(site);
+        pose = sampler.draw_around({site, false}, particles, random);
+      }
+      particles.set(replaced, pose, 1.0 / static_cast<double>(size));
+    }
+    double sum = 0.0;
+    for (const double weight : particles.weight) sum += weight;
+    for (double& weight : particles.weight) weight /= sum;
+    latest.injected = static_cast<int>(injected.count);
+  }
+
+  void inject_explained() {
+    if (options.injection != MonteCarloOptions::Injection::explained) return;
+    ExplainedInjection injection(likelihood, sampler, model, options.compass);
+    if (!injection.find_places(particles, random)) return;
+    latest.log_there = injection.log_evidence();
+    // A robot that was outside may come back anywhere.
+    const double prior =
+        knows_nothing ? p_elsewhere_at_start : p_kidnap + (1.0 - inside) * p_return;
+    const double elsewhere = kidnap_probability(prior, latest.log_there, latest.log_here);
+    latest.injected = injection.inject(particles, elsewhere, random);
+  }
+
+  /// Updates the belief in being inside by how much better the view is explained than by chance.
+  void update_inside() {
+    double evidence = latest.log_here;
+    if (options.injection == MonteCarloOptions::Injection::explained) {
+      evidence = std::max(evidence, latest.log_there + std::log(p_kidnap));
+    }
+    // Where nothing is known yet, a view like one of the memory's is evidence for being inside.
+    if (latest.difference_anywhere) {
+      const double unit =
+          std::max(min_margin_unit, model.far_difference - model.explained_difference);
+      const double margin = (model.explained_difference - *latest.difference_anywhere) / unit;
+      evidence =
+          std::max(evidence, std::min(max_log_ratio_of_difference, log_ratio_per_margin * margin) +
+                                 chance_log_ratio);
+    }
+    inside = inside * (1.0 - p_leave) + (1.0 - inside) * p_return;
+    const double ratio =
+        std::exp(std::clamp(evidence - chance_log_ratio, -chance_log_ratio, max_log_ratio));
+    inside = inside * ratio / (inside * ratio + 1.0 - inside);
+  }
+
   void update_error(const ParticleModes& before, const ParticleModes& after, double exponent,
-                    double correlation);
-  void describe(MonteCarloEstimate& estimate, const ParticleModes& found) const;
-  void resample_if_needed(std::size_t occupied_bins);
-  [[nodiscard]] bool is_memorised(Point2 place) const;
+                    double correlation) {
+    if (after.modes.empty()) return;
+    if (before.modes.empty()) {
+      error.begin(position_variance_m2(after));
+    } else {
+      error.observe(position_variance_m2(before), position_variance_m2(after), exponent,
+                    correlation, latest.effective_particles);
+    }
+  }
+
+  void fill_estimate(MonteCarloEstimate& estimate, const ParticleModes& found) const {
+    estimate.modes = found.modes;
+    for (PoseMode& mode : estimate.modes) {
+      mode.covariance = error.corrected_covariance(mode.covariance, mode.mean.heading_rad,
+                                                   odometry.translation_scale_error);
+      mode.spread_m = std::sqrt(mode.covariance[0] + mode.covariance[4]);
+    }
+    estimate.spread_m = position_spread_m(particles);
+    estimate.inside = inside;
+    estimate.probability = found.modes.empty() ? 0.0 : inside * found.modes.front().weight;
+    estimate.state = LocalisationState::lost;
+    if (inside < min_inside) return;
+    if (!found.modes.empty() && !is_memorised(found.modes.front().mean.position())) return;
+    estimate.state = LocalisationState::ambiguous;
+    if (found.modes.empty()) return;
+    const PoseMode& first = found.modes.front();
+    estimate.pose = first.mean;
+    const double widest_m = std::max(model.spacing_m, model.range_m);
+    if (first.weight >= min_localised_weight && first.spread_m <= widest_m) {
+      estimate.state = LocalisationState::localised;
+    }
+  }
+
+  void resample_if_needed(std::size_t occupied_bins) {
+    const double min_effective = options.resample_below * static_cast<double>(particles.size());
+    if (!(latest.effective_particles < min_effective)) return;
+    latest.resampled = true;
+    const std::size_t count = std::clamp(kld_sample_size(occupied_bins, options.kld_error),
+                                         static_cast<std::size_t>(options.min_particles),
+                                         static_cast<std::size_t>(options.max_particles));
+    resample_particles(particles, count, random);
+  }
+
+  /// True if a reference is near enough to be compared with the place.
+  [[nodiscard]] bool is_memorised(Point2 place) const {
+    if (!likelihood.sites_near(place).empty()) return true;
+    const double reach_m = memorised_reach * std::max(model.spacing_m, model.range_m);
+    return std::ranges::any_of(likelihood.sites(), [&](const ViewLikelihood::Site& site) {
+      return distance(site.position, place) <= reach_m;
+    });
+  }
 };
 
-void MonteCarloLocaliser::Implementation::restart(bool is_known) {
-  error = {};
-  inside = is_known ? 1.0 - p_leave : p_inside_at_start;
-  knows_nothing = !is_known;
-  latest = {};
+void visit_options(MonteCarloOptions& options, OptionVisitor& visitor) {
+  using T = MonteCarloOptions;
+  constexpr OptionTable table{
+      option<&T::min_particles>("fewest particles", 1, 1e7),
+      option<&T::max_particles>("most particles", 1, 1e7),
+      option<&T::kld_error>(
+          "allowed error of the particles' distribution; smaller needs more particles", 1e-4, 1),
+      option<&T::resample_below>(
+          "effective sample size below which particles are resampled, as a share of them", 0, 1),
+      option<&T::compass>("weigh headings by the visual compass"),
+      choice<&T::injection>("where new particles are drawn", "none", "explained"),
+      option<&T::reranked_views>(
+          "views compared column by column when no near one explains the picture", 0, 1e6),
+      option<&T::seed>("seed of all random choices", 0),
+  };
+  table.visit(options, visitor);
 }
 
-MonteCarloEstimate MonteCarloLocaliser::Implementation::observe(const PackedSignature& view) {
-  const bool was_localised = latest.state == LocalisationState::localised;
-  latest = {};
-  likelihood.arrange(particles);
-  compare_views(view, was_localised);  // [M03 section 4]: similarities at the references
-  inject_by_rule(view);                // [M03 section 4.1]
-  // Views from nearly the same place are alike, also in what misleads: a view counts as far as it
-  // is new.
-  const double correlation = std::exp(-travelled_m / model.range_m);
-  const double exponent = knows_nothing ? 1.0 : std::max(min_view_exponent, 1.0 - correlation);
-  const ParticleModes before = knows_nothing ? ParticleModes{} : modes();
-  latest.log_here = weighing.weigh(particles, likelihood, exponent, bins(), random);
-  inject_explained();  // Bayes' rule for a robot that was kidnapped
-  update_inside();
-  knows_nothing = false;
-  travelled_m = 0.0;
-  const ParticleModes after = modes();
-  latest.particles = static_cast<int>(particles.size());
-  latest.effective_particles = effective_sample_size(particles.weight);
-  update_error(before, after, exponent, correlation);
-  describe(latest, after);
-  resample_if_needed(after.occupied_bins);
-  return latest;
-}
-
-// Compares column by column the views that the search finds, those around the best of them, and
-// those around the particles.
-void MonteCarloLocaliser::Implementation::compare_views(const PackedSignature& view,
-                                                        bool was_localised) {
-  likelihood.begin(view);
-  compare_found(view, was_localised ? searched_views_when_localised : searched_views);
-  const std::size_t max_followed = was_localised ? followed_sites_when_localised : followed_sites;
-  const auto followed = likelihood.sites_near_most(particles, max_followed, min_followed_weight);
-  for (const std::uint32_t site : followed) likelihood.compare(site);
-
-  const auto here = likelihood.min_difference(followed);
-  const auto anywhere = likelihood.min_difference(likelihood.compared_sites());
-  const bool is_followed = was_localised && here && anywhere && *here <= *anywhere;
-  const bool is_unexplained = !is_followed && anywhere && *anywhere > model.neighbouring_difference;
-  if (knows_nothing || is_unexplained) {
-    const auto sites = static_cast<std::uint32_t>(likelihood.sites().size());
-    if (sites <= static_cast<std::size_t>(options.reranked_views)) {
-      for (std::uint32_t site = 0; site < sites; ++site) likelihood.compare(site);
-    } else if (options.reranked_views > searched_views) {
-      compare_found(view, options.reranked_views);
-    }
+std::string_view name_of(LocalisationState state) {
+  switch (state) {
+    case LocalisationState::localised:
+      return "localised";
+    case LocalisationState::ambiguous:
+      return "ambiguous";
+    case LocalisationState::lost:
+      break;
   }
-  compare_around_best();
-  latest.difference_here = likelihood.min_difference(followed);
-  latest.difference_anywhere = likelihood.min_difference(likelihood.compared_sites());
-  latest.views_compared = likelihood.compared_sites().size();
-}
-
-void MonteCarloLocaliser::Implementation::compare_found(const PackedSignature& view, int count) {
-  const SearchResult found =
-      ranking->memory().search(view, {.top = count, .components = ranking->components()});
-  for (const Match& match : found.matches) {
-    if (const auto site = likelihood.site_of(match.view)) likelihood.compare(*site);
-  }
-}
-
-void MonteCarloLocaliser::Implementation::compare_around_best() {
-  const auto sites = likelihood.sites();
-  std::optional<std::uint32_t> best;
-  for (const std::uint32_t site : likelihood.compared_sites()) {
-    if (!best || sites[site].similarity > sites[*best].similarity) best = site;
-  }
-  if (!best) return;
-  const Point2 place = sites[*best].position;
-  for (const std::uint32_t site : likelihood.sites_near(place)) likelihood.compare(site);
-}
-
-// Puts new particles in the place of random ones, as a rule of the caller's says.
-void MonteCarloLocaliser::Implementation::inject_by_rule(const PackedSignature& view) {
-  if (!injection_rule) return;
-  const std::size_t size = particles.size();
-  const MonteCarloLocaliser::InjectedParticles wanted = injection_rule(view, size);
-  std::vector<std::uint32_t> sites;
-  for (const ViewId around : wanted.around) {
-    if (const auto site = likelihood.site_of(around)) sites.push_back(*site);
-  }
-  if (wanted.count == 0 || (sites.empty() && !wanted.around.empty())) return;
-  for (std::size_t n = 0; n < wanted.count; ++n) {
-    const std::size_t replaced = random.index(size);
-    Pose2 pose;
-    if (sites.empty()) {
-      pose = sampler.draw_anywhere(particles, random);
-    } else {
-      const std::uint32_t site = sites[random.index(sites.size())];
-      likelihood.compare(site);
-      pose = sampler.draw_around({site, false}, particles, random);
-    }
-    particles.set(replaced, pose, 1.0 / static_cast<double>(size));
-  }
-  double sum = 0.0;
-  for (const double weight : particles.weight) sum += weight;
-  for (double& weight : particles.weight) weight /= sum;
-  latest.injected = static_cast<int>(wanted.count);
-}
-
-void MonteCarloLocaliser::Implementation::inject_explained() {
-  if (options.injection != MonteCarloOptions::Injection::explained) return;
-  ExplainedInjection injection(likelihood, sampler, model, options.compass);
-  if (!injection.find_places(particles, random)) return;
-  latest.log_there = injection.log_evidence();
-  // A robot that was outside may come back anywhere.
-  const double prior = knows_nothing ? p_elsewhere_at_start : p_kidnap + (1.0 - inside) * p_return;
-  const double elsewhere = kidnap_probability(prior, latest.log_there, latest.log_here);
-  latest.injected = injection.inject(particles, elsewhere, random);
-}
-
-// Updates the belief in being inside by how much better the view is explained than by chance.
-void MonteCarloLocaliser::Implementation::update_inside() {
-  double evidence = latest.log_here;
-  if (options.injection == MonteCarloOptions::Injection::explained) {
-    evidence = std::max(evidence, latest.log_there + std::log(p_kidnap));
-  }
-  // Where nothing is known yet, a view like one of the memory's speaks for being inside.
-  if (latest.difference_anywhere) {
-    const double unit =
-        std::max(min_margin_unit, model.far_difference - model.explained_difference);
-    const double margin = (model.explained_difference - *latest.difference_anywhere) / unit;
-    evidence =
-        std::max(evidence, std::min(max_log_ratio_of_difference, log_ratio_per_margin * margin) +
-                               log_ratio_by_chance);
-  }
-  inside = inside * (1.0 - p_leave) + (1.0 - inside) * p_return;
-  const double ratio =
-      std::exp(std::clamp(evidence - log_ratio_by_chance, -log_ratio_by_chance, max_log_ratio));
-  inside = inside * ratio / (inside * ratio + 1.0 - inside);
-}
-
-void MonteCarloLocaliser::Implementation::update_error(const ParticleModes& before,
-                                                       const ParticleModes& after, double exponent,
-                                                       double correlation) {
-  if (after.modes.empty()) return;
-  if (before.modes.empty()) {
-    error.begin(position_variance_m2(after));
-  } else {
-    error.observe(position_variance_m2(before), position_variance_m2(after), exponent, correlation,
-                  latest.effective_particles);
-  }
-}
-
-void MonteCarloLocaliser::Implementation::describe(MonteCarloEstimate& estimate,
-                                                   const ParticleModes& found) const {
-  estimate.modes = found.modes;
-  for (PoseMode& mode : estimate.modes) {
-    mode.covariance =
-        error.stated(mode.covariance, mode.mean.heading_rad, odometry.translation_scale_error);
-    mode.spread_m = std::sqrt(mode.covariance[0] + mode.covariance[4]);
-  }
-  estimate.spread_m = position_spread_m(particles);
-  estimate.inside = inside;
-  estimate.probability = found.modes.empty() ? 0.0 : inside * found.modes.front().weight;
-  estimate.state = LocalisationState::lost;
-  if (inside < min_inside) return;
-  if (!found.modes.empty() && !is_memorised(found.modes.front().mean.position())) return;
-  estimate.state = LocalisationState::ambiguous;
-  if (found.modes.empty()) return;
-  const PoseMode& first = found.modes.front();
-  estimate.pose = first.mean;
-  const double widest_m = std::max(model.spacing_m, model.range_m);
-  if (first.weight >= min_localised_weight && first.spread_m <= widest_m) {
-    estimate.state = LocalisationState::localised;
-  }
-}
-
-void MonteCarloLocaliser::Implementation::resample_if_needed(std::size_t occupied_bins) {
-  const double min_effective = options.resample_below * static_cast<double>(particles.size());
-  if (!(latest.effective_particles < min_effective)) return;
-  latest.resampled = true;
-  const std::size_t count = std::clamp(kld_sample_size(occupied_bins, options.kld_error),
-                                       static_cast<std::size_t>(options.min_particles),
-                                       static_cast<std::size_t>(options.max_particles));
-  resample_particles(particles, count, random);
-}
-
-// Whether a reference stands near enough to tell anything of the place.
-bool MonteCarloLocaliser::Implementation::is_memorised(Point2 place) const {
-  if (!likelihood.sites_near(place).empty()) return true;
-  const double reach_m = memorised_reach * std::max(model.spacing_m, model.range_m);
-  return std::ranges::any_of(likelihood.sites(), [&](const ViewLikelihood::Site& site) {
-    return distance(site.position, place) <= reach_m;
-  });
+  return "lost";
 }
 
 MonteCarloLocaliser::MonteCarloLocaliser(const VisualMemory& memory,
@@ -390,7 +414,7 @@ MonteCarloEstimate MonteCarloLocaliser::observe(const PackedSignature& view) {
 
 MonteCarloEstimate MonteCarloLocaliser::estimate() const {
   MonteCarloEstimate estimate = implementation_->latest;
-  implementation_->describe(estimate, implementation_->modes());
+  implementation_->fill_estimate(estimate, implementation_->modes());
   return estimate;
 }
 

@@ -11,7 +11,7 @@
 #include "panonav/core/options.hpp"
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/localisation/observation_model.hpp"
-#include "panonav/localisation/particle_modes.hpp"
+#include "panonav/localisation/particles.hpp"
 #include "panonav/memory/visual_memory.hpp"
 #include "panonav/motion/odometry.hpp"
 
@@ -26,55 +26,49 @@ struct MonteCarloOptions {
     explained,  ///< as many as the view is better explained elsewhere than where the particles are
   };
 
-  int min_particles = 200;      ///< fewest, >= 1, also in one narrow mode
-  int max_particles = 5000;     ///< most, when the robot may be anywhere
+  int min_particles = 200;      ///< >= 1, also in one narrow mode
+  int max_particles = 5000;     ///< when the robot may be anywhere
   double kld_error = 0.05;      ///< allowed between the particles' distribution and the true one
-  double resample_below = 0.5;  ///< effective sample size, share of the particles
+  double resample_below = 0.5;  ///< effective sample size, as a share of the particles
   bool compass = true;          ///< the visual compass weighs headings too
-  /// How particles come to where the robot was carried.
-  Injection injection = Injection::explained;
-  int reranked_views = 1000;  ///< compared column by column when no near view explains the picture
+  Injection injection = Injection::explained;  ///< where new particles are drawn
+  int reranked_views = 1000;  ///< compared column by column when no near view explains the image
   int seed = 1;               ///< of all random choices, >= 0
 };
 void visit_options(MonteCarloOptions& options, OptionVisitor& visitor);
 
-/// What a filter can say of where the robot is.
+/// What a filter knows of the robot's place.
 enum class LocalisationState {
-  localised,  ///< one mode, no wider than the references' spacing can tell, and it explains the
-              ///< views
+  localised,  ///< one mode, no wider than the references' spacing resolves, explains the views
   ambiguous,  ///< the views are of this memory, but several places or a large area explain them
-  lost,       ///< the views are not explained by this memory, or odometry has led out of the
-              ///< memorised area
+  lost,       ///< the views are not explained by this memory, or odometry has led out of its area
 };
 /// "localised", "ambiguous", "lost".
 [[nodiscard]] std::string_view name_of(LocalisationState state);
 
-/// What is known after a picture.
+/// The belief of the filter after an image.
 struct MonteCarloEstimate {
   LocalisationState state = LocalisationState::lost;  ///< localised, ambiguous or lost
   /// Heaviest first; all that hold at least 1 % of the weight. Covariance and spread of the
-  /// position are those of its error: of the particles, and of what they take for independent, the
-  /// errors of successive views and the wrong scale of travel (docs/decisions.md).
+  /// position are those of its error: the particles' and, as these take the errors of successive
+  /// views and the scale error of travel for independent, the part that they miss
+  /// (docs/decisions.md).
   std::vector<PoseMode> modes;
-  /// Mean of the heaviest mode; empty when lost.
-  std::optional<Pose2> pose;
+  std::optional<Pose2> pose;         ///< mean of the heaviest mode; nullopt when lost
   double spread_m = 0.0;             ///< root mean square distance of all particles from their mean
-  int particles = 0;                 ///< as many as KLD sampling asks for
-  double effective_particles = 0.0;  ///< before resampling
-  bool resampled = false;            ///< whether light particles were replaced by heavy ones
+  int particles = 0;                 ///< as many as KLD sampling needs
+  double effective_particles = 0.0;  ///< effective sample size before resampling
+  bool resampled = false;            ///< light particles were replaced by heavy ones
   int injected = 0;                  ///< particles that were replaced by new ones
-  /// The minimum difference (`ColumnMatch`) of the view to the references near the particles, and
-  /// to those anywhere; empty when none was compared.
+  /// Minimum difference (`ColumnMatch`) of the view to the references near the particles; nullopt
+  /// when none was compared.
   std::optional<double> difference_here;
-  std::optional<double> difference_anywhere;  ///< to those anywhere
-  /// Log-likelihood of the view relative to that of a view that nothing explains: where the
-  /// particles were, and anywhere in the memory (only with
-  /// `MonteCarloOptions::Injection::explained`).
+  std::optional<double> difference_anywhere;  ///< the same to all references
+  /// Log-likelihood of the view where the particles were, relative to that of an unexplained view.
   double log_here = 0.0;
-  double log_there = 0.0;  ///< anywhere in the memory
-  /// Belief that the robot is in the memorised area, 0 .. 1; lost below one half.
-  double inside = 0.0;
-  /// That the robot is at the heaviest mode: `inside` times the mode's weight. Of what is said with
+  double log_there = 0.0;  ///< the same anywhere in the memory (only with `Injection::explained`)
+  double inside = 0.0;  ///< belief that the robot is in the memorised area, 0 .. 1; lost below 0.5
+  /// That the robot is at the heaviest mode: `inside` times the mode's weight. Of estimates with
   /// 0.9 and more inside the memorised area, more than nine of ten are right (docs/decisions.md).
   double probability = 0.0;
   std::uint64_t views_compared = 0;  ///< column by column
@@ -84,12 +78,11 @@ struct MonteCarloEstimate {
 ///
 /// A robot with an unknown start is localised within a few images, keeps its position where images
 /// are missing or uninformative, and recovers after it was kidnapped. In places that look alike the
-/// filter keeps several modes.
-///
-/// Runs in the calling thread. Same memory, options and calls: same bits.
+/// filter keeps several modes. Runs in the calling thread. Same memory, options and calls: same
+/// bits.
 class MonteCarloLocaliser {
  public:
-  /// What a rule of particle injection asks for at an image.
+  /// The result of a rule of particle injection for one image.
   struct InjectedParticles {
     std::size_t count = 0;       ///< replaced by new ones
     std::vector<ViewId> around;  ///< references around which these are drawn; empty: anywhere
@@ -102,11 +95,11 @@ class MonteCarloLocaliser {
   /// must not change. Throws OptionError; ContractError as `learn_observation_model`.
   explicit MonteCarloLocaliser(const VisualMemory& memory, const MonteCarloOptions& options = {},
                                const OdometryNoise& odometry = {});
-  /// With a model learnt before.
+  /// Takes a model learnt before.
   MonteCarloLocaliser(std::shared_ptr<const ColumnRanking> ranking, const ObservationModel& model,
                       const MonteCarloOptions& options = {}, const OdometryNoise& odometry = {});
   ~MonteCarloLocaliser();
-  /// What is left of the other may only be destroyed or assigned to.
+  /// The source of a move may only be destroyed or assigned to.
   MonteCarloLocaliser(MonteCarloLocaliser&&) noexcept;
   MonteCarloLocaliser& operator=(MonteCarloLocaliser&&) noexcept;
 
@@ -114,24 +107,24 @@ class MonteCarloLocaliser {
   /// [M03 section 4.1]; empty: by none.
   void set_injection_rule(InjectionRule rule);
 
-  /// Forgets everything. `heading_rad`: where it is known.
+  /// Starts again anywhere in the memorised area. `heading_rad`: where it is known.
   void start_globally(std::optional<double> heading_rad = std::nullopt);
-  /// Around a known pose; deviations of each coordinate, >= 0.
+  /// Starts again around a known pose; standard deviations of each coordinate, >= 0.
   void start_at(const Pose2& pose, double deviation_m, double heading_deviation_rad);
 
-  /// The robot moved by `robot_old_from_robot_new` according to its odometry; any number of steps
-  /// may come between two images.
+  /// Moves the particles by `robot_old_from_robot_new` of the odometry and its noise; any number of
+  /// steps may come between two images.
   void move(const Pose2& step);
 
-  /// The robot took a picture. Throws ContractError on a signature of another shape than the
-  /// memory's.
+  /// Weighs the particles by an image. Throws ContractError on a signature of another shape than
+  /// the memory's.
   MonteCarloEstimate observe(const PackedSignature& view);
-  /// What is known now, without a picture.
+  /// The present belief, without an image.
   [[nodiscard]] MonteCarloEstimate estimate() const;
 
   /// The hypotheses after the last step.
   [[nodiscard]] const Particles& particles() const noexcept;
-  /// How alike this memory's views are at a distance.
+  /// How similar this memory's views are at a distance.
   [[nodiscard]] const ObservationModel& model() const noexcept;
 
  private:

@@ -22,27 +22,30 @@ namespace panonav {
 
 namespace {
 
-// References around a place that are compared for it: as many as decide a likelihood
-// (`ViewLikelihood::sites_near`).
+/// References around a position that are compared for it: as many as decide a likelihood
+/// (`ViewLikelihood::sites_near`).
 constexpr std::size_t near_sites = 12;
-// Spacings from which on views are far from each other: chosen, longer than most ranges.
+/// Spacings beyond which views are far from each other: longer than most ranges of similarity.
 constexpr double far_spacings = 6.0;
-// References up to which the fall of the similarity is fitted, in number and in spacings. Chosen.
+/// References up to which the fall of the similarity is fitted: those within four spacings on a
+/// grid.
 constexpr std::size_t fitted_sites = 48;
 constexpr double fitted_spacings = 4.0;
-// Spacings within which references are neighbours of a grid, diagonal ones included.
+/// Spacings within which references are neighbours on a grid, diagonal ones included.
 constexpr double adjacent_site_spacings = 1.5;
-// Bounds of the range of similarity, in spacings: chosen; beyond them the fit is noise.
+/// Bounds of the range of similarity in spacings: at shorter ones neighbours have nothing in
+/// common, at longer ones the fitted four spacings show no fall.
 constexpr double min_range_spacings = 0.4;
 constexpr double max_range_spacings = 20.0;
-// Beyond this no view is told apart better, and one odd view would count for all others. Chosen.
+/// Largest log-likelihood of a typical view at its own place: beyond it no view is placed better,
+/// and one odd view would outweigh all others.
 constexpr double max_log_likelihood = 50.0;
-// Columns tell turns in steps; three of them are what a neighbouring view may be off by.
+/// Smallest width of headings: three steps of the columns, by which a neighbouring view may be off.
 constexpr double min_heading_width_rad = 3.0 * 2.0 * std::numbers::pi / ColumnProfiles::columns;
-// The width in median errors of turns; larger errors than the other number are turns at which the
-// columns fit by chance or by symmetry. Chosen.
-constexpr double median_turn_errors = 3.0;
-constexpr double max_turn_error_rad = std::numbers::pi / 4.0;
+/// Width of headings in median errors: normal errors exceed it once in 23 times.
+constexpr double median_heading_errors = 3.0;
+/// Larger errors are headings at which the columns fit by chance or by symmetry.
+constexpr double max_heading_error_rad = std::numbers::pi / 4.0;
 
 struct Site {
   ViewId view;
@@ -60,7 +63,7 @@ std::vector<Site> posed_sites(const VisualMemory& memory) {
   return sites;
 }
 
-/// The nearest other sites, ascending by distance.
+/// Returns the nearest other sites, ascending by distance.
 std::vector<std::uint32_t> nearest_sites(std::span<const Site> sites, std::size_t own,
                                          std::size_t count) {
   std::vector<std::pair<double, std::uint32_t>> found;
@@ -75,7 +78,7 @@ std::vector<std::uint32_t> nearest_sites(std::span<const Site> sites, std::size_
   return nearest;
 }
 
-/// One view, left out of the memory, compared with the others where asked.
+/// One view, left out of the memory, compared with the others where needed.
 class LeftOutView {
  public:
   LeftOutView(const ColumnRanking& ranking, std::span<const Site> sites, std::size_t own)
@@ -98,14 +101,13 @@ class LeftOutView {
   std::vector<std::optional<ColumnMatch>> matches_;
 };
 
-// Negative for views more unlike than views far from each other are on average.
+// Negative for views that differ more than views far from each other do on average.
 double similarity_of(const ColumnMatch& match, double far) {
   return far * far - match.difference * match.difference;
 }
 
-// Slope of the logarithm of the mean similarity over distance. At no distance a view is like
-// itself, so the line starts at far^2. Bins that have fallen to a twentieth of that say nothing but
-// noise.
+// Fits the slope of the logarithm of the mean similarity over distance [M04 section 2.2]. The line
+// starts at far^2, the similarity of a view to itself. Bins below a twentieth of that are noise.
 double fit_range(std::span<const std::pair<double, double>> distance_and_similarity,
                  double spacing_m, double far) {
   constexpr auto bins = static_cast<std::size_t>(2.0 * fitted_spacings);
@@ -125,7 +127,7 @@ double fit_range(std::span<const std::pair<double, double>> distance_and_similar
     product -= counts[b] * distance_m * std::log(similarities[b] / (counts[b] * far * far));
     square += counts[b] * distance_m * distance_m;
   }
-  // Nothing like a view beside it: what is known is that the range is no longer than that.
+  // No view resembles its neighbours: the range is at most the smallest one.
   if (!(square > 0.0)) return min_range_spacings * spacing_m;
   if (!(product > 0.0)) return max_range_spacings * spacing_m;
   return std::clamp(square / product, min_range_spacings * spacing_m,
@@ -135,8 +137,8 @@ double fit_range(std::span<const std::pair<double, double>> distance_and_similar
 /// Squared similarity explained at each candidate place, the view's own one first.
 using Explained = std::vector<double>;
 
-// The sharpness that gives the places of the views left out the highest probability among all
-// candidates: the logarithm of that probability is concave in the sharpness.
+// Fits the sharpness that gives the places of the views left out the highest probability among all
+// candidates; the logarithm of that probability is concave in the sharpness.
 double fit_sharpness(std::span<const Explained> views) {
   std::vector<double> own;
   for (const Explained& view : views) own.push_back(view.front());
@@ -145,11 +147,11 @@ double fit_sharpness(std::span<const Explained> views) {
   const auto slope = [&](double sharpness) {
     double sum = 0.0;
     for (const Explained& view : views) {
-      const double most = *std::ranges::max_element(view);
+      const double largest = *std::ranges::max_element(view);
       double weights = 0.0;
       double mean = 0.0;
       for (const double value : view) {
-        const double weight = std::exp(sharpness * (value - most));
+        const double weight = std::exp(sharpness * (value - largest));
         weights += weight;
         mean += weight * value;
       }
@@ -167,11 +169,11 @@ double fit_sharpness(std::span<const Explained> views) {
   return 0.5 * (low + high);
 }
 
-/// The posed views of a memory, those of them that are left out in turn, and the places that are
-/// candidates for each of these.
+/// The posed views of a memory, those that are left out in turn, and the candidate places of each
+/// of these.
 class LearningSample {
  public:
-  LearningSample(const ColumnRanking& ranking, const ObservationModelOptions& options)
+  LearningSample(const ColumnRanking& ranking, const LearningOptions& options)
       : sites_(posed_sites(ranking.memory())) {
     require(sites_.size() >= static_cast<std::size_t>(ObservationModel::min_views),
             "views with a position in the memory", static_cast<double>(sites_.size()),
@@ -192,7 +194,7 @@ class LearningSample {
       own_.push_back(number_of(view));
       left_out_.emplace_back(ranking, sites_, own_.back());
     }
-    // All, or so many that with the references around them the limit is kept.
+    // All, or as many as keep the limit together with the references around them.
     const int count = static_cast<int>(sites_.size()) <= options.compared_views
                           ? static_cast<int>(sites_.size())
                           : std::max(8, options.compared_views / static_cast<int>(near_sites));
@@ -206,7 +208,7 @@ class LearningSample {
   [[nodiscard]] double spacing_m() const { return spacing_m_; }
   [[nodiscard]] std::size_t size() const { return own_.size(); }
 
-  /// Learns how unlike views far from each other are.
+  /// Returns the median difference of views far from each other.
   double far_difference() {
     std::vector<double> far;
     for (std::size_t i = 0; i < own_.size(); ++i) {
@@ -217,14 +219,14 @@ class LearningSample {
         far.push_back(left_out_[i].match(c).difference);
       }
     }
-    // A memory smaller than that: as unlike as views of places that have nothing in common.
+    // In a smaller memory that of places that have nothing in common.
     return far.empty() ? PlaceModel::unrelated_difference : quantile(far, 0.5);
   }
 
-  /// Learns how similarity falls with distance, and how wrong turns of neighbours are.
+  /// Learns how similarity falls with distance, and how far headings of neighbours are off.
   void learn_fall(ObservationModel& model) {
     std::vector<std::pair<double, double>> curve;
-    std::vector<double> turns;
+    std::vector<double> heading_errors;
     for (std::size_t i = 0; i < own_.size(); ++i) {
       const Site& here = sites_[own_[i]];
       for (const std::uint32_t s : nearest_sites(sites_, own_[i], fitted_sites)) {
@@ -234,7 +236,7 @@ class LearningSample {
         curve.emplace_back(distance_m, similarity_of(match, model.far_difference));
         if (distance_m <= adjacent_site_spacings * spacing_m_ && here.heading_rad &&
             sites_[s].heading_rad) {
-          turns.push_back(std::abs(
+          heading_errors.push_back(std::abs(
               angle_difference(*sites_[s].heading_rad + match.heading_rad, *here.heading_rad)));
         }
       }
@@ -242,13 +244,15 @@ class LearningSample {
     model.range_m = fit_range(curve, spacing_m_, model.far_difference);
     model.neighbouring_difference =
         model.far_difference * std::sqrt(1.0 - std::exp(-spacing_m_ / model.range_m));
-    std::erase_if(turns, [](double turn) { return turn > max_turn_error_rad; });
-    model.heading_width_rad =
-        turns.empty() ? min_heading_width_rad
-                      : std::max(median_turn_errors * quantile(turns, 0.5), min_heading_width_rad);
+    std::erase_if(heading_errors, [](double error) { return error > max_heading_error_rad; });
+    model.heading_width_rad = heading_errors.empty()
+                                  ? min_heading_width_rad
+                                  : std::max(median_heading_errors * quantile(heading_errors, 0.5),
+                                             min_heading_width_rad);
   }
 
-  /// Squared similarity that each view left out explains at its own place and at the candidates.
+  /// Returns the squared similarity that each view left out explains at its own place and at the
+  /// candidates.
   std::vector<Explained> explain(const ObservationModel& model) {
     near_.resize(sites_.size());
     std::vector<Explained> explained;
@@ -291,24 +295,14 @@ class LearningSample {
 
 }  // namespace
 
-void visit_options(ObservationModelOptions& options, OptionVisitor& visitor) {
-  using T = ObservationModelOptions;
-  constexpr OptionTable table{
-      option<&T::sampled_views>("views left out in turn to learn how views change with distance", 8,
-                                1e6),
-      option<&T::compared_views>("views with which each of them is compared", 8, 1e6),
-      option<&T::seed>("seed of the draws", 0),
-  };
-  table.visit(options, visitor);
-}
-
 ObservationModel learn_observation_model(const ColumnRanking& ranking,
-                                         const ObservationModelOptions& options) {
+                                         const LearningOptions& options) {
   validate(options);
+  constexpr int max_place_samples = 40;  // the default of `learn_place_model`
   LearningSample sample(ranking, options);
   const PlaceModel place = learn_place_model(
-      ranking, {.sampled_views = std::min(options.sampled_views, PlaceModelOptions{}.sampled_views),
-                .seed = options.seed});
+      ranking,
+      {.sampled_views = std::min(options.sampled_views, max_place_samples), .seed = options.seed});
   ObservationModel model;
   model.spacing_m = sample.spacing_m();
   model.explained_difference = place.threshold;

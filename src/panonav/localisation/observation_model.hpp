@@ -1,30 +1,20 @@
 #pragma once
 
-#include <array>
-
-#include "panonav/core/options.hpp"
 #include "panonav/localisation/column_ranking.hpp"
+#include "panonav/localisation/sample.hpp"
 
 namespace panonav {
 
-/// How many views a model is learnt from.
-struct ObservationModelOptions {
-  int sampled_views = 100;    ///< that are left out in turn; all of smaller memories
-  int compared_views = 1000;  ///< with which each is compared; all of smaller memories
-  int seed = 1;               ///< of the draws
-};
-void visit_options(ObservationModelOptions& options, OptionVisitor& visitor);
-
-/// How alike views are at a distance, in one memory, and how much of a position that tells. Plain
-/// numbers, learnt from the memory's posed views, so that they can be kept beside it.
+/// How similar views are at a distance in one memory, and how well that determines a position.
+/// Plain numbers, learnt from the memory's posed views, to be stored with it.
 ///
 /// The similarity of two views is far_difference^2 - difference^2 (`ColumnMatch`), never below 0. A
 /// view's similarity to references at the distance r of its place is expected as
 /// amplitude * exp(-r / range_m): [M04 section 2.2] the dissimilarity grows with distance and
-/// saturates. The amplitude says how well the view as a whole is explained; people in view, light
+/// saturates. The amplitude is how well the view as a whole is explained; people in view, light
 /// and noise lower it, so it is free, and only the pattern over the references places the robot.
 struct ObservationModel {
-  /// Fewest posed views to learn from.
+  /// Smallest number of posed views to learn from.
   static constexpr int min_views = 8;
 
   double spacing_m = 0.0;       ///< between references
@@ -33,18 +23,20 @@ struct ObservationModel {
   /// Half the inverse square of the deviation of a similarity from its expectation: log-likelihood
   /// for each squared unit of similarity explained.
   double sharpness = 0.0;
-  double heading_width_rad = 0.0;        ///< headings farther off than this do not explain a view
-  double explained_difference = 0.5;     ///< a view of the memory's places differs by less from the
-                                         ///< best reference (`PlaceModel::threshold`)
+  double heading_width_rad = 0.0;  ///< headings that differ by more do not explain a view
+  /// A view of the memory's places differs by less from the best reference
+  /// (`PlaceModel::threshold`).
+  double explained_difference = 0.5;
   double neighbouring_difference = 0.4;  ///< expected between references one spacing apart
-  int sampled_views = 0;                 ///< that it was learnt from
+  int sampled_views = 0;                 ///< from which it was learnt
   friend bool operator==(const ObservationModel&, const ObservationModel&) = default;
 };
 
-/// Throws OptionError, and ContractError on a memory with fewer than `min_views` posed views or
-/// with all of them in one place. Cost: one comparison of columns for each pair of a sampled and a
-/// compared view, 0.25 s for the defaults and a memory of 1000 views; and a place model.
+/// Learns the model by leaving views out in turn, and a place model. Throws OptionError, and
+/// ContractError on a memory with fewer than `min_views` posed views or with all of them in one
+/// place. Cost: one comparison of columns for each pair of a sampled and a compared view, 0.25 s
+/// for the defaults and a memory of 1000 views; and a place model.
 [[nodiscard]] ObservationModel learn_observation_model(const ColumnRanking& ranking,
-                                                       const ObservationModelOptions& options = {});
+                                                       const LearningOptions& options = {});
 
 }  // namespace panonav

@@ -17,14 +17,14 @@ namespace panonav {
 
 namespace {
 
-// The left of the robot becomes its right: I'(phi) = I(-phi), so psi' = -psi.
-PackedSignature mirrored(PackedSignature signature) {
+// Exchanges left and right: I'(phi) = I(-phi), so psi' = -psi.
+PackedSignature mirror(PackedSignature signature) {
   for (std::uint8_t& phase : signature.phases) phase = static_cast<std::uint8_t>(-phase);
   return signature;
 }
 
-// Among views that were taken elsewhere: a robot that stands still takes the same view again.
-std::optional<ViewId> nearest_in_space(const VisualMemory& memory, ViewId view) {
+// Returns the nearest view taken elsewhere: a robot that stands still takes the same view again.
+std::optional<ViewId> find_nearest_in_space(const VisualMemory& memory, ViewId view) {
   const auto& pose = memory.info(view).pose;
   if (!pose) return std::nullopt;
   std::optional<ViewId> nearest;
@@ -41,20 +41,21 @@ std::optional<ViewId> nearest_in_space(const VisualMemory& memory, ViewId view) 
   return nearest;
 }
 
-// Drawn views with which the mirrored query is compared, and spare ones for those that are
-// excluded. Chosen: 80 column profiles take 0.2 MB.
+/// Drawn views with which the mirrored query is compared: their standard deviation errs by 9 %.
 constexpr std::size_t chance_views = 64;
+/// Drawn views that replace excluded ones; 80 column profiles take 0.2 MB in all.
 constexpr std::size_t spare_views = 16;
-// Views whose local features are compared for chance and for neighbours. Chosen: 0.1 ms each.
+/// Views whose local features are compared for chance and for neighbours, 0.1 ms each.
 constexpr std::size_t feature_views = 12;
-// Matches of which the best and the tenth best are taken. Chosen.
+/// Matches of which the best and the tenth best count: the ranking by columns is right to some.
 constexpr std::size_t examined_matches = 16;
-// Standard deviations of a Gaussian between its mean and its first decile.
+/// Standard deviations of a Gaussian between its mean and its first decile.
 constexpr double decile_deviations = 1.2816;
 
-// Over the better half of the columns, at the turn at which all of them fit best.
-double better_half(const ColumnProfiles& query, const ColumnProfiles& reference,
-                   double heading_rad) {
+// Returns the difference over the better half of the columns, at the rotation at which all of them
+// fit best.
+double better_half_difference(const ColumnProfiles& query, const ColumnProfiles& reference,
+                              double heading_rad) {
   auto columns = column_distances_near(query, reference, heading_rad);
   const auto half = columns.begin() + columns.size() / 2;
   std::ranges::nth_element(columns, half);
@@ -63,8 +64,8 @@ double better_half(const ColumnProfiles& query, const ColumnProfiles& reference,
          static_cast<double>(half - columns.begin());
 }
 
-// The tenth smallest; of fewer the largest.
-double tenth_of(std::vector<double> differences) {
+// Returns the tenth smallest difference; of fewer the largest.
+double tenth_smallest(std::vector<double> differences) {
   std::ranges::sort(differences);
   return differences[std::min<std::size_t>(10, differences.size()) - 1];
 }
@@ -76,8 +77,8 @@ double log_odds_by_columns(const PlaceEvidence& evidence) {
   return std::inner_product(learnt.begin(), learnt.end(), features.begin(), 0.0);
 }
 
-double log_share(int verified, int chance) {
-  return std::log((1.0 + verified) / (1.0 + chance));
+double log_ratio(int verified, int reference) {
+  return std::log((1.0 + verified) / (1.0 + reference));
 }
 
 }  // namespace
@@ -100,17 +101,7 @@ std::vector<ViewId> draw_views(std::span<const ViewId> views) {
   return sample;
 }
 
-void visit_options(PlaceModelOptions& options, OptionVisitor& visitor) {
-  using T = PlaceModelOptions;
-  constexpr OptionTable table{
-      option<&T::sampled_views>("views used for learning when a place is known", 8, 1e6),
-      option<&T::compared_views>("views with which each of them is compared", 8, 1e6),
-      option<&T::seed>("seed of the draws", 0),
-  };
-  table.visit(options, visitor);
-}
-
-PlaceModel learn_place_model(const ColumnRanking& ranking, const PlaceModelOptions& options) {
+PlaceModel learn_place_model(const ColumnRanking& ranking, const LearningOptions& options) {
   validate(options);
   const VisualMemory& memory = ranking.memory();
   PlaceModel model;
@@ -131,7 +122,7 @@ PlaceModel learn_place_model(const ColumnRanking& ranking, const PlaceModelOptio
   std::vector<double> beside;
   for (const ViewId view : sample) {
     const ColumnProfiles own = ranking.profiles(view);
-    const ColumnProfiles reversed(mirrored(memory.packed(view)), ranking.components());
+    const ColumnProfiles reversed(mirror(memory.packed(view)), ranking.components());
     double best = std::numeric_limits<double>::infinity();
     double best_of_mirrored = best;
     for (std::size_t i = 0; i < compared.size(); ++i) {
@@ -142,7 +133,7 @@ PlaceModel learn_place_model(const ColumnRanking& ranking, const PlaceModelOptio
       best = std::min(best, between.back());
     }
     nearest.push_back(best);
-    if (const auto neighbour = nearest_in_space(memory, view)) {
+    if (const auto neighbour = find_nearest_in_space(memory, view)) {
       beside.push_back(match_columns(own, ranking.profiles(*neighbour)).difference);
     }
     nearest_of_mirrored.push_back(best_of_mirrored);
@@ -150,20 +141,20 @@ PlaceModel learn_place_model(const ColumnRanking& ranking, const PlaceModelOptio
   model.neighbouring = quantile(nearest, 0.5);
   model.arbitrary = quantile(between, 0.5);
   model.mirrored = quantile(nearest_of_mirrored, 0.5);
-  double least =
+  double min_threshold =
       std::min(PlaceModel::related_share * model.arbitrary, PlaceModel::unrelated_difference);
   if (beside.size() >= static_cast<std::size_t>(PlaceModel::min_views)) {
     model.beside = quantile(beside, 0.9);
-    least = std::min(least, *model.beside);
+    min_threshold = std::min(min_threshold, *model.beside);
   }
-  model.threshold = std::max(0.5 * (model.neighbouring + model.mirrored), least);
+  model.threshold = std::max(0.5 * (model.neighbouring + model.mirrored), min_threshold);
   model.learnt = true;
   return model;
 }
 
 std::array<double, column_term_count> column_terms(const PlaceEvidence& evidence) noexcept {
-  // What `bench/place_probability` learnt from: below the least difference rounding decides, from
-  // the large one on a view is unlike by itself, and memories had so many views and components.
+  // The range from which `bench/place_probability` learnt: below the smallest difference rounding
+  // decides, above the large one a view is dissimilar by itself; and sizes of the memories.
   constexpr double min_difference = 0.02;
   constexpr double large_difference = 0.5;
   constexpr int min_views = 8;
@@ -185,7 +176,7 @@ double place_probability(const PlaceEvidence& evidence) noexcept {
   // By `bench/place_probability` (docs/decisions.md), in the order of `feature_terms`.
   constexpr std::array<double, feature_term_count> learnt{-2.99, 0.23, 3.10, 1.53};
   const PlaceEvidence::Features& found = *evidence.features;
-  if (learnt[0] + learnt[2] * log_share(found.seen, found.chance) <= 0.0) return by_columns;
+  if (learnt[0] + learnt[2] * log_ratio(found.seen, found.chance) <= 0.0) return by_columns;
   const auto features = feature_terms(evidence);
   const double z = std::inner_product(learnt.begin(), learnt.end(), features.begin(), 0.0);
   return 1.0 / (1.0 + std::exp(-z));
@@ -199,8 +190,8 @@ bool is_inconclusive(const PlaceEvidence& evidence) noexcept {
 
 std::array<double, feature_term_count> feature_terms(const PlaceEvidence& evidence) noexcept {
   const PlaceEvidence::Features found = evidence.features.value_or(PlaceEvidence::Features{});
-  return {1.0, log_odds_by_columns(evidence), log_share(found.verified, found.chance),
-          log_share(found.verified, found.neighbour)};
+  return {1.0, log_odds_by_columns(evidence), log_ratio(found.verified, found.chance),
+          log_ratio(found.verified, found.neighbour)};
 }
 
 PlaceCriterion::PlaceCriterion(const ColumnRanking& ranking, std::size_t views)
@@ -225,19 +216,20 @@ ColumnProfiles PlaceCriterion::profiles(ViewId view,
              : ColumnProfiles(ranking_->memory().packed(view), 0, allowed_rows);
 }
 
-double PlaceCriterion::chance(const PackedSignature& query, const ColumnProfiles& asked,
-                              const SearchMask& mask) const {
-  // A picture without structure is like any other without structure.
+double PlaceCriterion::chance_difference(const PackedSignature& query,
+                                         const ColumnProfiles& query_profiles,
+                                         const SearchMask& mask) const {
+  // An image without structure resembles any other one without structure.
   const auto is_flat = [](std::uint8_t value) { return value == 128; };
-  if (std::ranges::all_of(asked.values(), is_flat)) return 0.0;
-  const ColumnProfiles elsewhere(mirrored(query), 0, mask.allowed_rows);
+  if (std::ranges::all_of(query_profiles.values(), is_flat)) return 0.0;
+  const ColumnProfiles elsewhere(mirror(query), 0, mask.allowed_rows);
   std::vector<double> by_chance;
   for (std::size_t i = 0; i < sample_.size() && by_chance.size() < chance_views; ++i) {
     if (std::ranges::find(mask.excluded_views, sample_[i]) != mask.excluded_views.end()) continue;
     const ColumnProfiles reference =
         mask.allowed_rows.empty() ? profiles_[i] : profiles(sample_[i], mask.allowed_rows);
-    by_chance.push_back(
-        better_half(elsewhere, reference, match_columns(elsewhere, reference).heading_rad));
+    by_chance.push_back(better_half_difference(elsewhere, reference,
+                                               match_columns(elsewhere, reference).heading_rad));
   }
   if (by_chance.empty()) return PlaceEvidence{}.chance;
   const double middle = mean(by_chance);
@@ -263,17 +255,17 @@ PlaceEvidence PlaceCriterion::evidence(const PackedSignature& query,
   std::ranges::partial_sort(best.begin(), end, best.end(), {}, [](const RankedMatch* match) {
     return std::pair(match->columns.difference, match->match.view);
   });
-  const ColumnProfiles asked(query, 0, mask.allowed_rows);
+  const ColumnProfiles query_profiles(query, 0, mask.allowed_rows);
   std::vector<double> differences;
   for (auto match = best.begin(); match != end; ++match) {
     const ColumnProfiles reference = profiles((*match)->match.view, mask.allowed_rows);
-    const ColumnMatch turned = match_columns(asked, reference);
+    const ColumnMatch turned = match_columns(query_profiles, reference);
     found.of_all_columns = std::min(found.of_all_columns, turned.difference);
-    differences.push_back(better_half(asked, reference, turned.heading_rad));
+    differences.push_back(better_half_difference(query_profiles, reference, turned.heading_rad));
   }
   found.difference = *std::ranges::min_element(differences);
-  found.tenth = tenth_of(std::move(differences));
-  found.chance = chance(query, asked, mask);
+  found.tenth = tenth_smallest(std::move(differences));
+  found.chance = chance_difference(query, query_profiles, mask);
   return found;
 }
 
@@ -307,7 +299,7 @@ std::optional<PlaceEvidence::Features> PlaceCriterion::feature_evidence(
     found.verified = std::max(found.verified, verified);
     candidates.push_back(std::move(*there));
   }
-  // Where there is no other view, neighbours tell nothing.
+  // Without another view there are no neighbours.
   if (candidates.size() < 2) found.neighbour = found.verified;
   for (std::size_t i = 0; i < std::min(candidates.size(), feature_views + 1); ++i) {
     if (i == best) continue;
@@ -322,17 +314,17 @@ PlaceEvidence PlaceCriterion::evidence_for_first(
   PlaceEvidence found{.components = query.shape.components};
   if (candidates.empty()) return found;
   found.views = views_;
-  const ColumnProfiles asked(query);
+  const ColumnProfiles query_profiles(query);
   std::vector<double> differences;
   for (const PackedSignature& candidate : candidates) {
     const ColumnProfiles reference(candidate);
-    const ColumnMatch turned = match_columns(asked, reference);
+    const ColumnMatch turned = match_columns(query_profiles, reference);
     if (differences.empty()) found.of_all_columns = std::min(1.0, turned.difference);
-    differences.push_back(better_half(asked, reference, turned.heading_rad));
+    differences.push_back(better_half_difference(query_profiles, reference, turned.heading_rad));
   }
   found.difference = differences.front();
-  found.tenth = tenth_of(std::move(differences));
-  found.chance = chance(query, asked, {});
+  found.tenth = tenth_smallest(std::move(differences));
+  found.chance = chance_difference(query, query_profiles, {});
   return found;
 }
 

@@ -8,6 +8,7 @@
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/voronoi.hpp"
 #include "panonav/localisation/internal/kriging.hpp"
+#include "panonav/localisation/internal/posed_views.hpp"
 #include "panonav/localisation/neighbour_support.hpp"
 #include "panonav/localisation/position_model.hpp"
 #include "panonav/localisation/sample.hpp"
@@ -16,43 +17,29 @@ namespace panonav {
 
 namespace {
 
-// What the learning chooses from: neighbourhoods in spacings of the memory, exponents of the
-// variogram. 1 is exact for signatures that move as a random walk, 2 would be for signatures that
-// change linearly with the position but leaves the solution without a unique answer.
+/// Neighbourhoods in spacings of the memory that learning compares: rings of a grid.
+/// Exponents of the variogram: 1 is exact for signatures that change as a random walk, 2 would be
+/// for signatures that change linearly with the position but has no unique solution.
 constexpr std::array<double, 6> neighbourhoods = {1.6, 2.3, 3.2, 4.5, 6.5, 9.0};
 constexpr std::array<double, 3> exponents = {1.0, 1.25, 1.5};
-// Share of the true positions that lie within the radius; of the rest, half may lie in a place that
-// only looks alike.
+/// Share of the true positions that lie within the radius; of the rest, half may lie in a place
+/// that only looks alike.
 constexpr double coverage = 0.95;
 constexpr double max_wrong_share = 0.5 * (1.0 - coverage);
-// Matches that are searched for a view left out, of which the doubles are taken away. Chosen.
+/// Matches searched for a view left out: its doubles at up to 48 places can be removed.
 constexpr int searched_matches = 4 * PositionModel::candidates;
-// Spacings up to which a view's nearest match shows the view's own place. Chosen.
+/// Spacings within which a view's nearest match shows the view's own place: a grid's neighbours.
 constexpr double own_place_spacings = 2.0;
-// Least unit of squared differences, for memories of equal views.
+/// Smallest unit of squared differences, for memories of equal views.
 constexpr double min_difference_unit = 1e-4;
 
-/// The views of a memory that have positions.
-struct PosedViews {
-  explicit PosedViews(const VisualMemory& memory) {
-    for (const ViewId view : memory.views()) {
-      if (const auto& pose = memory.info(view).pose) {
-        views.push_back(view);
-        positions.push_back(pose->position());
-      }
-    }
-  }
-  std::vector<ViewId> views;
-  std::vector<Point2> positions;
-};
-
-/// Views that were left out of the memory in turn, and what resembles them there.
+/// Views that were left out of the memory in turn, and the views that resemble them there.
 struct LeftOutViews {
   std::vector<Point2> truths;
-  /// All that the search finds, its doubles included, which decide most where there are few views:
-  /// how to interpolate is learnt from it.
+  /// All that the search finds, doubles included, which matter most where there are few views: the
+  /// interpolation is learnt from them.
   std::vector<ResemblingViews> found;
-  /// What an answer is made of: how far the result is off is learnt from it.
+  /// The views of an answer: the radius is learnt from them.
   std::vector<ResemblingViews> answered;
 
   [[nodiscard]] std::size_t size() const { return truths.size(); }
@@ -64,8 +51,7 @@ struct LeftOutViews {
   }
 };
 
-// Returns the best match of each place but that at `truth`, of what the search found for a view
-// taken there.
+// Returns the best match of each place except the one at `truth`, where the view was taken.
 std::vector<ViewId> find_doubles(const VisualMemory& memory, Point2 truth,
                                  std::span<const RankedMatch> ranked, double spacing_m) {
   std::vector<Point2> places{truth};
@@ -127,9 +113,8 @@ double learn_difference_unit(const LeftOutViews& left_out) {
 }
 
 // Chooses the neighbourhood and the exponent that place the views best. False where no view is
-// found near its place. Views whose nearest match only looks alike say nothing on how to
-// interpolate; a wide neighbourhood would then win because the middle of many wrong places is wrong
-// by less.
+// found near its place. Views whose nearest match only looks alike do not count: they would favour
+// a wide neighbourhood, as the middle of many wrong places is wrong by less.
 bool choose_interpolation(const LeftOutViews& left_out, PositionModel& model) {
   double best_sum_m = std::numeric_limits<double>::infinity();
   for (const double spacings : neighbourhoods) {
@@ -152,7 +137,7 @@ bool choose_interpolation(const LeftOutViews& left_out, PositionModel& model) {
   return std::isfinite(best_sum_m);
 }
 
-/// How far the interpolated positions are off, and their kriging variances.
+/// Errors of the interpolated positions, and their kriging variances.
 struct InterpolationErrors {
   std::vector<double> errors_m;
   std::vector<double> variances;
@@ -169,7 +154,7 @@ InterpolationErrors interpolate_all(const LeftOutViews& left_out, const Position
   return result;
 }
 
-// Learns from which ratio on the wrong one of two places may have been taken: the largest share of
+// Learns from which ratio on the answer may be the wrong one of two places: the largest share of
 // views, from the clearest on, of which hardly any was found elsewhere, is not ambiguous.
 void learn_ambiguity(const LeftOutViews& left_out, std::span<const double> errors_m,
                      PositionModel& model) {
@@ -194,8 +179,8 @@ void learn_ambiguity(const LeftOutViews& left_out, std::span<const double> error
   model.ambiguous_radius_m = quantile(ambiguous_errors_m, coverage);
 }
 
-// Learns how large a radius holds the errors of views found near their place, apart for those that
-// references surround. False where there is none to learn from.
+// Learns how large a radius holds the errors of views found near their place, separately for those
+// that references surround. False where there is none to learn from.
 bool learn_radii(const LeftOutViews& left_out, const InterpolationErrors& errors,
                  PositionModel& model) {
   std::vector<double> all;
@@ -208,11 +193,11 @@ bool learn_radii(const LeftOutViews& left_out, const InterpolationErrors& errors
     (is_surrounded(left_out.answered[i], model.spacing_m) ? surrounded : at_edge)
         .push_back(all.back());
   }
-  // None near: then every answer is ambiguous.
+  // Where none is near, every answer is ambiguous.
   if (all.empty() && model.ambiguous_from) all.push_back(0.0);
   if (all.empty()) return false;
-  // The quantile of a sample of n that a further draw stays below with at least this probability;
-  // of all where there are few of a kind.
+  // Returns the quantile of a sample of n that a further draw stays below with at least this
+  // probability; that of all where there are few of a kind.
   const auto bound = [&](const std::vector<double>& kind) {
     const auto& of = kind.size() < PositionModel::min_views ? all : kind;
     const double n = static_cast<double>(of.size());
@@ -225,8 +210,7 @@ bool learn_radii(const LeftOutViews& left_out, const InterpolationErrors& errors
 
 }  // namespace
 
-PositionModel learn_position_model(const ColumnRanking& ranking,
-                                   const PositionModelOptions& options) {
+PositionModel learn_position_model(const ColumnRanking& ranking, const LearningOptions& options) {
   validate(options);
   const PosedViews posed(ranking.memory());
   PositionModel model;
@@ -239,7 +223,7 @@ PositionModel learn_position_model(const ColumnRanking& ranking,
   if (left_out.size() < PositionModel::min_views) return model;
   model.sampled_views = static_cast<int>(left_out.size());
   model.difference_unit = learn_difference_unit(left_out);
-  if (!choose_interpolation(left_out, model)) return model;
+  if (!choose_interpolation(left_out, model)) return model;  // [M04 footnote 1]
   const InterpolationErrors errors = interpolate_all(left_out, model);
   model.variance_unit = quantile(errors.variances, 0.5);
   model.median_error_m = quantile(errors.errors_m, 0.5);

@@ -7,15 +7,6 @@
 
 namespace panonav {
 
-void visit_options(PositionModelOptions& options, OptionVisitor& visitor) {
-  using T = PositionModelOptions;
-  constexpr OptionTable table{
-      option<&T::sampled_views>("views used for learning", 8, 1e6),
-      option<&T::seed>("seed of the draw", 0),
-  };
-  table.visit(options, visitor);
-}
-
 std::optional<PositionEstimate> interpolate_position(const ColumnRanking& ranking,
                                                      const PositionModel& model,
                                                      std::span<const RankedMatch> matches) {

@@ -2,77 +2,68 @@
 
 #include <optional>
 #include <span>
-#include <vector>
 
-#include "panonav/core/options.hpp"
 #include "panonav/localisation/column_ranking.hpp"
 #include "panonav/localisation/place.hpp"
-#include "panonav/memory/visual_memory.hpp"
+#include "panonav/localisation/sample.hpp"
 
 namespace panonav {
 
-/// How many views a model is learnt from.
-struct PositionModelOptions {
-  int sampled_views = 200;  ///< of larger memories only so many views are used for learning
-  int seed = 1;             ///< of the draw
-};
-void visit_options(PositionModelOptions& options, OptionVisitor& visitor);
-
 /// How positions follow from differences of views in one memory; learnt from its posed views by
-/// leaving one out. Plain numbers, so that it can be kept beside the memory.
+/// leaving one out. Plain numbers, to be stored with the memory.
 struct PositionModel {
-  /// Fewest posed views to learn from.
+  /// Smallest number of posed views to learn from.
   static constexpr int min_views = 8;
   /// Best matches that may take part in an interpolation, before those far from the best one are
   /// left out. Further references change positions by less than their error.
   static constexpr int candidates = 16;
 
-  bool learnt = false;           ///< false: fewer than `min_views` posed views; the nearest view's
-                                 ///< position is the answer
+  /// False: fewer than `min_views` posed views; the answer is the nearest view's position.
+  bool learnt = false;
   int components = 0;            ///< over which views were compared; 0: all
   int sampled_views = 0;         ///< that were left out in turn
-  double neighbourhood_m = 0.0;  ///< references farther than this from the nearest one take no part
-  double exponent =
-      1.5;  ///< of the variogram: half the mean square distance ~ difference^(2 exponent)
+  double neighbourhood_m = 0.0;  ///< references farther than this from the nearest one are left out
+  /// Of the variogram: half the mean square distance ~ difference^(2 exponent).
+  double exponent = 1.5;
   double difference_unit = 1.0;  ///< median squared difference to the nearest view
   double variance_unit = 0.0;    ///< median kriging variance
-  /// Radius that holds 95 % over the kriging deviation, where references that look alike surround
-  /// the nearest one: they leave no half of a turn free around it.
+  /// Radius that holds 95 % over the kriging deviation, where similar references surround the
+  /// nearest one: they leave no half of a circle free around it.
   double radius_m_per_deviation = 0.0;
   /// The same elsewhere: the place may lie beyond the outermost references.
   double edge_radius_m_per_deviation = 0.0;
   double spacing_m = 0.0;  ///< of the posed views
   /// From this ratio on, of the best match's difference to that of the best match elsewhere (more
-  /// than 3 spacings from it), the wrong one of two places that look alike may have been taken;
-  /// empty where that hardly happens. Then the radius is at least the other number.
+  /// than 3 spacings from it), the answer may be the wrong one of two places that look alike;
+  /// nullopt where that hardly happens.
   std::optional<double> ambiguous_from;
-  /// The least radius from the ratio `ambiguous_from` on.
-  double ambiguous_radius_m = 0.0;
-  double median_error_m = 0.0;  ///< of the views left out
-  double error95_m = 0.0;       ///< 95 % of the views left out were nearer
+  double ambiguous_radius_m = 0.0;  ///< smallest radius from the ratio `ambiguous_from` on
+  double median_error_m = 0.0;      ///< of the views left out
+  double error95_m = 0.0;           ///< 95 % of the views left out were nearer
   friend bool operator==(const PositionModel&, const PositionModel&) = default;
 };
 
 /// Learns the neighbourhood and the exponent that place the views of the memory best when each is
 /// left out in turn, and then how large a radius holds 95 % of the errors of those that were found
 /// near their place. Where more than 1 of 40 was found elsewhere, in a place that looks alike,
-/// those are told by how little better they match than elsewhere, and have a radius of their own.
-/// With a view its double at each place that looks alike is left out: a query is as far from the
-/// references there as from its own. Views left out are farther from the other references than
+/// those are recognised by how little better they match than elsewhere, and have a radius of their
+/// own. With a view its double at each place that looks alike is left out: a query is as far from
+/// the references there as from its own. Views left out are farther from the other references than
 /// queries between the references are, so the radius rather holds too many than too few. Throws
 /// OptionError. Cost: `sampled_views` searches and about 1 ms for each.
 [[nodiscard]] PositionModel learn_position_model(const ColumnRanking& ranking,
-                                                 const PositionModelOptions& options = {});
+                                                 const LearningOptions& options = {
+                                                     .sampled_views = 200});
 
 /// Ordinary kriging in the space of the views: the position is the weighted mean of the
 /// neighbouring references' positions whose expected squared error is smallest, when half the mean
 /// square distance between two places grows as the square of their views' difference
-/// (`ColumnMatch`) to the power of the exponent. It accounts for references that tell the same
-/// twice, and at a memorised view it gives that view's position. [M04 section 2.2: dissimilarity
+/// (`ColumnMatch`) to the power of the exponent. References that show the same share their weight,
+/// and at a memorised view the result is that view's position. [M04 section 2.2: dissimilarity
 /// grows linearly with distance at short range; so does the squared difference.]
 ///
 /// `matches`: the best first, over as many components as the model was learnt over; views without a
-/// pose and views far from the best one, which only look alike, take no part. Empty when the best
+/// pose and views far from the best one, which only look alike, are left out. nullopt when the best
 /// view has no pose. Cost: 240 comparisons of columns and a dense solution of at most 17 unknowns,
 /// 0.7 ms.
 [[nodiscard]] std::optional<PositionEstimate> interpolate_position(

@@ -7,15 +7,25 @@
 
 namespace panonav {
 
+void visit_options(LearningOptions& options, OptionVisitor& visitor) {
+  using T = LearningOptions;
+  constexpr OptionTable table{
+      option<&T::sampled_views>("views left out in turn to learn from", 8, 1e6),
+      option<&T::compared_views>("views with which each of them is compared", 8, 1e6),
+      option<&T::seed>("seed of the draws", 0),
+  };
+  table.visit(options, visitor);
+}
+
 std::vector<ViewId> sample_views(std::span<const ViewId> views, int count, std::uint64_t seed) {
   std::vector<ViewId> sample(views.begin(), views.end());
-  const auto wanted = static_cast<std::size_t>(count);
-  if (sample.size() <= wanted) return sample;
+  const auto size = static_cast<std::size_t>(count);
+  if (sample.size() <= size) return sample;
   Random random(seed);
-  for (std::size_t i = 0; i < wanted; ++i) {
+  for (std::size_t i = 0; i < size; ++i) {
     std::swap(sample[i], sample[i + random.index(sample.size() - i)]);
   }
-  sample.resize(wanted);
+  sample.resize(size);
   std::ranges::sort(sample);
   return sample;
 }

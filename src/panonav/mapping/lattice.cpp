@@ -174,7 +174,7 @@ class Arranger {
     std::vector<GraphEdge> edges;
     for (const Lattice::Spring& spring : measured_.springs()) {
       const auto weight = grown.weights.find({spring.a, spring.b});
-      const bool points = spring.phases && spring.phases->points;
+      const bool points = spring.phases && spring.phases->has_direction;
       if (weight == grown.weights.end() || (!points && weight->second < min_grown_weight) ||
           !fits(spring, unit, layout_.poses[spring.a], layout_.poses[spring.b])) {
         continue;
@@ -353,6 +353,22 @@ Lattice arrange(const VisualMemory& memory, const LatticeOptions& options,
                 const LatticeWatch& watch) {
   validate(options);
   return Arranger(memory, options, motion, executor, watch).arrange();
+}
+
+TopologicalMap to_topological_map(const Lattice& lattice) {
+  TopologicalMap map;
+  for (const Lattice::Node& node : lattice.nodes)
+    map.nodes.push_back({node.view, node.pose, node.component});
+  for (const Lattice::Spring& spring : lattice.springs) {
+    const Lattice::Node& a = lattice.nodes[spring.a];
+    const Lattice::Node& b = lattice.nodes[spring.b];
+    map.edges.push_back({.a = a.view,
+                         .b = b.view,
+                         .a_from_b = inverse(a.pose) * b.pose,
+                         .kind = LinkKind::neighbour,
+                         .weight = spring.weight});
+  }
+  return map;
 }
 
 }  // namespace panonav

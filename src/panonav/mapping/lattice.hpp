@@ -10,6 +10,7 @@
 #include "panonav/core/options.hpp"
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/mapping/dissimilarity_curve.hpp"
+#include "panonav/mapping/topological_map.hpp"
 #include "panonav/memory/visual_memory.hpp"
 #include "panonav/relative_pose/view_pair.hpp"
 
@@ -143,5 +144,10 @@ using LatticeWatch =
 /// lattice must come from the same memory, of which views may only have been added. Throws
 /// OptionError, ContractError.
 void extend(Lattice& lattice, const VisualMemory& memory, const LatticeOptions& options = {});
+
+/// The arrangement as a map that can be stored and exported: its views with their poses and
+/// components, and its springs as edges of kind `neighbour` with the motion that the poses give and
+/// the weight that the spring kept. Lengths are in the lattice's unit.
+[[nodiscard]] TopologicalMap to_topological_map(const Lattice& lattice);
 
 }  // namespace panonav

@@ -1,7 +1,6 @@
 #include "panonav/mapping/sparse_memory.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <set>
@@ -11,6 +10,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
+#include "panonav/geometry/point_grid.hpp"
 #include "panonav/relative_pose/fourier_homing.hpp"
 #include "panonav/relative_pose/homing_view.hpp"
 
@@ -18,48 +18,16 @@ namespace panonav {
 
 namespace {
 
-/// Kept views by the square of the floor in which they lie.
-class KeptByPlace {
- public:
-  explicit KeptByPlace(double reach_m) : reach_m_(reach_m) {}
-
-  void insert(ViewId view, Point2 position) { cells_[key(position)].push_back({view, position}); }
-
-  template <class Visit>
-  void visit_near(Point2 position, const Visit& visit) const {
-    for (int dx = -1; dx <= 1; ++dx) {
-      for (int dy = -1; dy <= 1; ++dy) {
-        const auto cell =
-            cells_.find(key({position.x_m + dx * reach_m_, position.y_m + dy * reach_m_}));
-        if (cell == cells_.end()) continue;
-        for (const auto& [view, at] : cell->second) {
-          if (distance(at, position) <= reach_m_) visit(view, distance(at, position));
-        }
-      }
-    }
-  }
-
- private:
-  [[nodiscard]] std::uint64_t key(Point2 p) const {
-    // Wraps far away, where two cells may share a key: the distance is checked all the same.
-    const auto x = static_cast<std::int64_t>(std::floor(std::fmod(p.x_m / reach_m_, 1e9)));
-    const auto y = static_cast<std::int64_t>(std::floor(std::fmod(p.y_m / reach_m_, 1e9)));
-    return (static_cast<std::uint64_t>(x) << 32U) ^ (static_cast<std::uint64_t>(y) & 0xFFFFFFFFU);
-  }
-  double reach_m_;
-  std::unordered_map<std::uint64_t, std::vector<std::pair<ViewId, Point2>>> cells_;
-};
-
-// Views at most so many links away, without the view itself.
+// Returns the views at most `links` links away, without the view itself.
 std::vector<ViewId> within_links(const VisualMemory& memory, ViewId view, int links) {
-  std::unordered_set<ViewId> seen{view};
+  std::unordered_set<ViewId> visited{view};
   std::vector<ViewId> found;
   std::vector<ViewId> front{view};
   for (int i = 0; i < links && !front.empty(); ++i) {
     std::vector<ViewId> next;
     for (const ViewId at : front) {
       for (const ViewId neighbour : memory.neighbours(at)) {
-        if (seen.insert(neighbour).second) next.push_back(neighbour);
+        if (visited.insert(neighbour).second) next.push_back(neighbour);
       }
     }
     found.insert(found.end(), next.begin(), next.end());
@@ -68,31 +36,20 @@ std::vector<ViewId> within_links(const VisualMemory& memory, ViewId view, int li
   return found;
 }
 
-/// Who stands for a view: itself where it is kept.
-class Representatives {
- public:
-  explicit Representatives(const SparseSelection& selection) {
-    for (const SparseSelection::Redundant& redundant : selection.redundant) {
-      kept_.emplace(redundant.view, redundant.kept);
-    }
-  }
-  [[nodiscard]] ViewId of(ViewId view) const {
-    const auto found = kept_.find(view);
-    return found == kept_.end() ? view : found->second;
-  }
+/// The kept view that represents each dropped one.
+using Representatives = std::unordered_map<ViewId, ViewId>;
 
- private:
-  std::unordered_map<ViewId, ViewId> kept_;
-};
+Representatives representatives_of(const SparseSelection& selection) {
+  Representatives kept;
+  for (const auto& redundant : selection.redundant) kept.emplace(redundant.view, redundant.kept);
+  return kept;
+}
 
-/// Says of each pair of views whether it is new.
-class Pairs {
- public:
-  bool insert(ViewId a, ViewId b) { return pairs_.insert(std::minmax(a.value, b.value)).second; }
-
- private:
-  std::set<std::pair<std::uint32_t, std::uint32_t>> pairs_;
-};
+/// Returns the view that represents another one: itself where it is kept.
+ViewId representative(const Representatives& kept, ViewId view) {
+  const auto found = kept.find(view);
+  return found == kept.end() ? view : found->second;
+}
 
 }  // namespace
 
@@ -115,18 +72,19 @@ void visit_options(SparseMemoryOptions& options, OptionVisitor& visitor) {
 SparseSelection select_references(const VisualMemory& memory, const SparseMemoryOptions& options) {
   validate(options);
   SparseSelection selection;
-  KeptByPlace by_place(std::max(options.reach_m, options.outdated_within_m));
+  const double reach_m = std::max(options.reach_m, options.outdated_within_m);
+  PointGrid by_position(reach_m);
   std::unordered_map<ViewId, HomingView> kept;
   const auto views = memory.views();
   for (auto at = views.rbegin(); at != views.rend(); ++at) {
     const ViewId view = *at;
-    HomingView seen = homing_view(memory, view);
+    HomingView coefficients = homing_view(memory, view);
     const auto& pose = memory.info(view).pose;
     std::optional<SparseSelection::Redundant> best;
     const auto consider = [&](ViewId other, std::optional<double> distance_m) {
       const auto found = kept.find(other);
       if (found == kept.end()) return;
-      const double difference = image_difference(found->second, seen);
+      const double difference = image_difference(found->second, coefficients);
       const bool outdated = distance_m && *distance_m < options.outdated_within_m;
       const bool alike =
           difference <= options.max_difference && (!distance_m || *distance_m <= options.reach_m);
@@ -135,7 +93,10 @@ SparseSelection select_references(const VisualMemory& memory, const SparseMemory
       best = SparseSelection::Redundant{view, other, difference, !alike};
     };
     if (pose) {
-      by_place.visit_near(pose->position(), consider);
+      by_position.visit_near(pose->position(), [&](std::uint32_t other, Point2 position) {
+        const double distance_m = distance(position, pose->position());
+        if (distance_m <= reach_m) consider(ViewId{other}, distance_m);
+      });
     } else {
       for (const ViewId other : within_links(memory, view, options.reach_links)) {
         consider(other, std::nullopt);
@@ -146,8 +107,8 @@ SparseSelection select_references(const VisualMemory& memory, const SparseMemory
       continue;
     }
     selection.kept.push_back(view);
-    kept.emplace(view, std::move(seen));
-    if (pose) by_place.insert(view, pose->position());
+    kept.emplace(view, std::move(coefficients));
+    if (pose) by_position.add(view.value, pose->position());
   }
   std::ranges::reverse(selection.kept);
   std::ranges::reverse(selection.redundant);
@@ -155,38 +116,39 @@ SparseSelection select_references(const VisualMemory& memory, const SparseMemory
 }
 
 std::vector<Link> contract_links(std::span<const Link> links, const SparseSelection& selection) {
-  const Representatives representatives(selection);
-  Pairs pairs;
+  const Representatives kept = representatives_of(selection);
+  std::set<std::pair<ViewId, ViewId>> pairs;
   std::vector<Link> left;
   for (const Link& link : links) {
-    const Link moved{representatives.of(link.a), representatives.of(link.b), link.kind};
-    if (moved.a != moved.b && pairs.insert(moved.a, moved.b)) left.push_back(moved);
+    const Link moved{representative(kept, link.a), representative(kept, link.b), link.kind};
+    if (moved.a != moved.b && pairs.insert(std::minmax(moved.a, moved.b)).second)
+      left.push_back(moved);
   }
   return left;
 }
 
 TopologicalMap contract_map(const TopologicalMap& map, const SparseSelection& selection) {
   validate(map);
-  const Representatives representatives(selection);
+  const Representatives kept = representatives_of(selection);
   TopologicalMap left;
   for (const MapNode& node : map.nodes) {
-    if (representatives.of(node.view) == node.view) left.nodes.push_back(node);
+    if (representative(kept, node.view) == node.view) left.nodes.push_back(node);
   }
   const auto node_of = [&](ViewId view) -> const MapNode* {
     const auto found = std::ranges::lower_bound(left.nodes, view, {}, &MapNode::view);
     return found != left.nodes.end() && found->view == view ? &*found : nullptr;
   };
-  Pairs pairs;
+  std::set<std::pair<ViewId, ViewId>> pairs;
   for (const MapEdge& edge : map.edges) {
     MapEdge moved = edge;
-    moved.a = representatives.of(edge.a);
-    moved.b = representatives.of(edge.b);
+    moved.a = representative(kept, edge.a);
+    moved.b = representative(kept, edge.b);
     const MapNode* const a = node_of(moved.a);
     const MapNode* const b = node_of(moved.b);
     // A view outside of the map, or of another component, may stand for one in it.
     if (moved.a == moved.b || a == nullptr || b == nullptr || a->component != b->component)
       continue;
-    if (!pairs.insert(moved.a, moved.b)) continue;
+    if (!pairs.insert(std::minmax(moved.a, moved.b)).second) continue;
     if (moved.a != edge.a || moved.b != edge.b) moved.a_from_b = inverse(a->pose) * b->pose;
     left.edges.push_back(moved);
   }
@@ -195,20 +157,20 @@ TopologicalMap contract_map(const TopologicalMap& map, const SparseSelection& se
 }
 
 SparseLoss measure_loss(const VisualMemory& memory, const SparseSelection& selection,
-                        std::size_t max_asked) {
-  require(max_asked >= 1, "max_asked", static_cast<double>(max_asked), ">= 1");
+                        std::size_t max_queries) {
+  require(max_queries >= 1, "max_queries", static_cast<double>(max_queries), ">= 1");
   SparseLoss loss;
   const std::size_t count = selection.redundant.size();
   if (count == 0) return loss;
   std::vector<ViewId> dropped;
   for (const SparseSelection::Redundant& redundant : selection.redundant)
     dropped.push_back(redundant.view);
-  const std::size_t asked = std::min(count, max_asked);
+  const std::size_t queries = std::min(count, max_queries);
   std::vector<double> differences;
   std::vector<double> before_m;
   std::vector<double> after_m;
-  for (std::size_t i = 0; i < asked; ++i) {
-    const SparseSelection::Redundant& redundant = selection.redundant[i * count / asked];
+  for (std::size_t i = 0; i < queries; ++i) {
+    const SparseSelection::Redundant& redundant = selection.redundant[i * count / queries];
     differences.push_back(redundant.difference);
     const auto& pose = memory.info(redundant.view).pose;
     if (!pose) continue;
@@ -227,7 +189,7 @@ SparseLoss measure_loss(const VisualMemory& memory, const SparseSelection& selec
     before_m.push_back(*before);
     after_m.push_back(*after);
   }
-  loss.asked = asked;
+  loss.queries = queries;
   loss.median_difference = order_statistic(differences, 0.5);
   if (before_m.size() >= 2) {
     loss.positions =

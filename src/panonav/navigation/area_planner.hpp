@@ -18,83 +18,83 @@ namespace panonav {
 struct PlannerOptions {
   FieldOptions field;    ///< of the directions within an area
   SubAreaOptions areas;  ///< of the areas' size
-  /// Gates that count between two areas at most, spread over their border; more make ways through
-  /// wide borders shorter and planning slower. 0: all, and every way is a shortest one.
+  /// Gates used between two areas at most, spread over their border; more make paths through wide
+  /// borders shorter and planning slower. 0: all, and every path is a shortest one.
   int gates_per_border = 4;
 };
 void visit_options(PlannerOptions& options, OptionVisitor& visitor);
 
-/// Plans over areas first, then inside: the sub-goals of the outlook of [M04 section 3.5]. The ways
-/// between the gates of an area are found once; a goal then costs a search in its own area and one
-/// over the gates, and the field of an area a search in that area. So a plan does not look at
-/// views outside the areas that it needs. Closed edges stay closed until they are opened.
+/// Plans over areas first, then inside: the sub-goals of the outlook of [M04 section 3.5]. The
+/// paths between the gates of an area are found once; a goal then costs a search in its own area
+/// and one over the gates, and the field of an area a search in that area. So a plan looks at no
+/// views outside of the areas that it needs. Blocked edges stay blocked until they are unblocked.
 class AreaPlanner {
  public:
-  /// Throws OptionError. Cost: that of `divide`, and a search in its area for each gate.
+  /// Throws OptionError. Cost: that of `divide_into_areas`, and a search in its area for each gate.
   explicit AreaPlanner(NavigationGraph graph, const PlannerOptions& options = {});
-  /// With areas made before. Throws ContractError when they are not those of this graph.
+  /// Plans over areas made before. Throws ContractError when they are not those of this graph.
   AreaPlanner(NavigationGraph graph, SubAreas areas, const PlannerOptions& options = {});
 
-  /// As it was given.
+  /// As passed to the constructor.
   [[nodiscard]] const NavigationGraph& graph() const noexcept { return graph_; }
-  /// Made at construction, or as given.
+  /// Made at construction, or as passed to the constructor.
   [[nodiscard]] const SubAreas& areas() const noexcept { return areas_; }
-  /// Gates that count, of all borders.
-  [[nodiscard]] std::size_t gates() const noexcept;
+  /// Number of gates used, over all borders.
+  [[nodiscard]] std::size_t used_gates() const noexcept;
 
   /// Throws ContractError when the view is not in the graph.
   void set_goal(ViewId goal);
-  /// The view that plans lead to; empty before the first `set_goal`.
+  /// The view that plans lead to; nullopt before the first `set_goal`.
   [[nodiscard]] std::optional<ViewId> goal() const;
 
-  /// Edges that cannot be used now. Throws ContractError on one that there is not. Cost: the
-  /// ways between gates of the areas at both ends are found anew, and the plan over areas.
-  void close(std::span<const std::size_t> edges);
-  /// All edges may be used again. Cost: as `close`, for the areas of the edges that were closed.
+  /// Excludes edges from plans. Throws ContractError on an edge that the graph does not have. Cost:
+  /// finds the paths between gates again for the areas at both ends, and the plan over areas.
+  void block(std::span<const std::size_t> edges);
+  /// Allows all edges again. Cost: as `block`, for the areas of the edges that were blocked.
   void unblock_all();
-  /// Whether an edge, by its number, cannot be used now.
-  [[nodiscard]] bool is_blocked(std::size_t edge) const { return closed_.at(edge) != 0; }
-  /// Number of edges that cannot be used now.
-  [[nodiscard]] std::size_t closed() const noexcept;
+  /// True if the edge of this number is excluded from plans.
+  [[nodiscard]] bool is_blocked(std::size_t edge) const { return blocked_.at(edge) != 0; }
+  /// Number of blocked edges.
+  [[nodiscard]] std::size_t blocked_edges() const noexcept;
 
-  /// Guides towards the goal by place in the area; none is reachable without a goal. Throws
-  /// ContractError when there is no such area.
+  /// Returns the guides towards the goal, in the order of the area's nodes; without a goal none is
+  /// reachable. Throws ContractError when there is no such area.
   [[nodiscard]] std::vector<Guide> field(std::size_t area) const;
 
-  /// The nodes from `start` to the goal, both included; empty when it cannot be reached. Makes the
-  /// fields of the areas on the way.
+  /// Returns the nodes from `start` to the goal, both included; none when it cannot be reached.
+  /// Makes the fields of the areas on the path.
   [[nodiscard]] std::vector<std::size_t> plan_path(std::size_t start) const;
 
  private:
   /// Two areas and the edges between them.
   struct Border {
-    std::size_t low = 0, high = 0;    // areas
-    std::vector<std::size_t> edges;   // all
-    std::vector<std::size_t> chosen;  // those that count
+    std::size_t low = 0, high = 0;  // areas
+    std::vector<std::size_t> edges;
+    std::vector<std::size_t> gates;  // the edges that are used
   };
-  /// Ends of gates within an area, and the ways between them.
-  struct Ends {
+  /// The nodes of an area at which gates end, and the paths between them.
+  struct GateEnds {
     std::vector<std::size_t> borders;
-    std::vector<std::size_t> nodes;  // ascending
-    std::vector<double> ways;        // nodes.size() squared; infinite where there is none
-    std::vector<double> to_goal;     // of each of `nodes`
+    std::vector<std::size_t> nodes;       // ascending
+    std::vector<double> path_lengths;     // nodes.size() squared; infinite where there is no path
+    std::vector<double> lengths_to_goal;  // of each of `nodes`
   };
-  /// Ends of an edge with the one in `area` first.
+  /// Returns the ends of an edge, that in `area` first.
   [[nodiscard]] std::pair<std::size_t, std::size_t> ends_of(std::size_t edge,
                                                             std::size_t area) const;
-  [[nodiscard]] std::vector<Guide> tree_from(std::size_t area, std::size_t node) const;
+  [[nodiscard]] std::vector<Guide> search_from(std::size_t area, std::size_t node) const;
   [[nodiscard]] std::optional<std::size_t> end_beyond(std::size_t area,
                                                       const NavigationGraph::Exit& exit) const;
   void choose_gates(Border& border) const;
-  void find_ways(std::size_t area);
+  void find_paths(std::size_t area);
   void plan_over_areas();
 
   NavigationGraph graph_;
   SubAreas areas_;
   PlannerOptions options_;
-  std::vector<std::uint8_t> closed_;  // by edge
+  std::vector<std::uint8_t> blocked_;  // by edge
   std::vector<Border> borders_;
-  std::vector<Ends> ends_;  // by area
+  std::vector<GateEnds> ends_;  // by area
   std::optional<std::size_t> goal_;
 };
 

@@ -15,18 +15,19 @@ void visit_options(FieldOptions& options, OptionVisitor& visitor) {
   using T = FieldOptions;
   constexpr OptionTable table{
       option<&T::links_ahead>("edges ahead that count for a direction", 1, 100),
-      option<&T::max_bend_rad>("bend of the way beyond which edges no longer count for a direction",
-                               0, std::numbers::pi),
+      option<&T::max_bend_rad>(
+          "bend of the path beyond which edges no longer count for a direction", 0,
+          std::numbers::pi),
   };
   table.visit(options, visitor);
 }
 
-std::vector<Guide> search_tree(const NavigationGraph& graph, const SubAreas& areas,
+std::vector<Guide> search_area(const NavigationGraph& graph, const SubAreas& areas,
                                std::size_t area, std::span<const SearchRoot> roots,
-                               std::span<const std::uint8_t> closed) {
+                               std::span<const std::uint8_t> blocked) {
   require(area < areas.nodes.size(), "area", static_cast<double>(area), "one of the areas");
-  require(closed.empty() || closed.size() == graph.edges().size(), "size of closed",
-          static_cast<double>(closed.size()), "0 or the number of edges");
+  require(blocked.empty() || blocked.size() == graph.edges().size(), "size of blocked",
+          static_cast<double>(blocked.size()), "0 or the number of edges");
   const std::vector<std::size_t>& nodes = areas.nodes[area];
   std::vector<Guide> guides(nodes.size());
   for (std::size_t place = 0; place < nodes.size(); ++place) guides[place].next = nodes[place];
@@ -36,20 +37,20 @@ std::vector<Guide> search_tree(const NavigationGraph& graph, const SubAreas& are
     require(root.node < graph.size() && areas.area_of[root.node] == area, "node of a root",
             static_cast<double>(root.node), "a node of the area");
     Guide& guide = guides[areas.place_of[root.node]];
-    if (!(root.way < guide.way)) continue;
-    guide = {root.way, root.next, root.edge, std::nullopt};
-    open.emplace(root.way, root.node);
+    if (!(root.path_length < guide.path_length)) continue;
+    guide = {root.path_length, root.next, root.edge, std::nullopt};
+    open.emplace(root.path_length, root.node);
   }
   while (!open.empty()) {
-    const auto [way, node] = open.top();
+    const auto [length, node] = open.top();
     open.pop();
-    if (way > guides[areas.place_of[node]].way) continue;
+    if (length > guides[areas.place_of[node]].path_length) continue;
     for (const NavigationGraph::Exit& exit : graph.exits(node)) {
       if (areas.area_of[exit.node] != area) continue;
-      if (!closed.empty() && closed[exit.edge] != 0) continue;
-      const double longer = way + graph.edges()[exit.edge].length;
+      if (!blocked.empty() && blocked[exit.edge] != 0) continue;
+      const double longer = length + graph.edges()[exit.edge].length;
       Guide& guide = guides[areas.place_of[exit.node]];
-      if (longer < guide.way) {
+      if (longer < guide.path_length) {
         guide = {longer, node, exit.edge, std::nullopt};
         open.emplace(longer, exit.node);
       }
@@ -60,7 +61,7 @@ std::vector<Guide> search_tree(const NavigationGraph& graph, const SubAreas& are
 
 namespace {
 
-// The mean direction to the next nodes, as far as the way is straight enough.
+// Returns the mean direction to the next nodes, as far as the path is straight.
 std::optional<double> direction_at(const NavigationGraph& graph, const SubAreas& areas,
                                    std::size_t node, const FieldOptions& options,
                                    std::span<const Guide> guides) {
@@ -70,7 +71,7 @@ std::optional<double> direction_at(const NavigationGraph& graph, const SubAreas&
   std::size_t here = node;
   for (int i = 0; i < options.links_ahead && areas.area_of[here] == areas.area_of[node]; ++i) {
     const Guide& guide = guides[areas.place_of[here]];
-    if (!guide.reachable() || guide.next == here) break;
+    if (!guide.is_reachable() || guide.next == here) break;
     const auto motion = graph.motion_from(here, guide.edge);
     if (!motion) break;
     const Pose2 node_from_next = node_from_here * *motion;
@@ -105,12 +106,12 @@ void set_directions(const NavigationGraph& graph, const SubAreas& areas, std::si
 
 std::vector<Guide> direction_field(const NavigationGraph& graph, ViewId goal,
                                    const FieldOptions& options,
-                                   std::span<const std::uint8_t> closed) {
+                                   std::span<const std::uint8_t> blocked) {
   const auto node = graph.node_of(goal);
   require(node.has_value(), "goal", static_cast<double>(goal.value), "a view of the graph");
   const SearchRoot root{*node, 0.0, *node, 0};
   const SubAreas areas = make_single_area(graph);
-  std::vector<Guide> guides = search_tree(graph, areas, 0, {&root, 1}, closed);
+  std::vector<Guide> guides = search_area(graph, areas, 0, {&root, 1}, blocked);
   set_directions(graph, areas, 0, options, guides);
   return guides;
 }

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
-#include "panonav/route/route_place.hpp"
+#include "panonav/route/route_position.hpp"
 
 namespace panonav {
 
@@ -37,9 +37,9 @@ KnownRoute make_known_route(const RoutePanorama& route, std::span<const KnownRou
                           "finite numbers");
     }
     KnownRoute::Reference reference{placed.view, {}};
-    for (const RoutePosition& place :
+    for (const RoutePosition& pass :
          find_passes(route.poses(), placed.pose.position(), options.beside_m)) {
-      reference.along_m.push_back(place.along_m);
+      reference.along_m.push_back(pass.along_m);
     }
     if (!reference.along_m.empty()) known.references.push_back(std::move(reference));
   }

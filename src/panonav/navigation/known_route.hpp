@@ -14,8 +14,8 @@ namespace panonav {
 
 /// Which references count as lying on a route, and how a robot is followed along it.
 struct KnownRouteOptions {
-  /// References and robots lie no farther beside the route. A search tries places up to 0.5 m
-  /// beside it; a robot at a reference may be a little farther off than that.
+  /// Largest lateral offset of references and robots from the route. A search tries positions up to
+  /// 0.5 m beside it; a robot at a reference may be a little farther off than that reference.
   double beside_m = 0.4;
   RouteTrackerOptions tracker;  ///< of the robot on the route
   RouteFitOptions fit;          ///< of its scanlines
@@ -23,25 +23,25 @@ struct KnownRouteOptions {
 void visit_options(KnownRouteOptions& options, OptionVisitor& visitor);
 
 /// A recorded route together with the references of the memory that lie on it, so that plans over
-/// the memory may lead along it. Made by `known_route`; cost of a copy: that of the tracker.
+/// the memory may follow it. Made by `make_known_route`; a copy costs as much as one of the
+/// tracker.
 struct KnownRoute {
-  /// A reference view and its pose in a route's frame.
+  /// A reference view and its pose in the route's frame.
   struct View {
     ViewId view;  ///< an id of the memory
     Pose2 pose;   ///< in the route's frame
   };
   /// A view that lies on the route.
   struct Reference {
-    ViewId view;  ///< an id of the memory
-    /// Ways along the route to where it passes the view, ascending: one for each time.
-    std::vector<double> along_m;
+    ViewId view;                  ///< an id of the memory
+    std::vector<double> along_m;  ///< distances along the route at which it passes, ascending
     friend bool operator==(const Reference&, const Reference&) = default;
   };
   RouteTracker tracker;               ///< holds the route; copied for each run along it
   std::vector<Reference> references;  ///< on the route, ascending by view
-  double beside_m = 0.0;              ///< as of the options
+  double beside_m = 0.0;              ///< as in the options
 
-  /// Distances along the route at which it passes the view; empty when it does not.
+  /// Returns the distances along the route at which it passes the view; none when it does not.
   [[nodiscard]] std::span<const double> along_m(ViewId view) const;
 };
 

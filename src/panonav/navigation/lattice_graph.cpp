@@ -1,4 +1,4 @@
-// The edges of a spring lattice that a robot can trust.
+// Graphs of spring lattices: the edges that a robot can follow.
 
 #include <algorithm>
 #include <cmath>
@@ -15,51 +15,65 @@ namespace panonav {
 
 namespace {
 
-// A spring as navigation sees it.
+/// What navigation needs of a spring.
 struct Spring {
-  NodePair ends;
+  EdgeEnds ends;
   std::optional<Pose2> motion;  // a_from_b by the phases; unit R
   double length = 0.0;          // in the arrangement
   double weight = 0.0;
   bool one_component = false;
-  int support = 0;  // third views that confirm it
+  int support = 0;  // number of third views that confirm it
 };
 
-// Counts for each spring the third views that tell the same motion. Those of one place confirm the
-// turn alone.
+/// A third view joins two readings, each with the error of one: 20 degrees, and this share of the
+/// motion's length.
+constexpr double max_rotation_error_rad = 0.35;
+constexpr double max_position_error = 0.4;
+/// Length of springs in spacings up to which they become edges. The distance to the nearest of
+/// several views, each with an error, is a tenth below the spacing, so this means two spacings:
+/// views of a square grid have others at 1.41 and 2.
+constexpr double max_spacings = 2.3;
+/// The same of springs that a torn arrangement rejected although they are right: as short as those
+/// to nearest views are, and confirmed by so many third views.
+constexpr double max_spacings_of_rejected = 1.5;
+constexpr int min_support_of_rejected = 3;
+/// Share of their neighbours that the ends of an edge have in common. On an open square grid with
+/// edges up to two spacings nearest neighbours have half of theirs in common, views two spacings
+/// apart a quarter; one may be missing.
+constexpr double min_common_share = 0.25;
+
+// Counts for each spring the third views that show the same motion. Those of one place confirm the
+// rotation alone.
 void count_support(std::size_t views, std::vector<Spring>& springs) {
-  // A third view joins two readings, each with the error of one.
-  constexpr double max_turn_rad = 0.35;
-  constexpr double max_off = 0.4;  // of the motion's length
-  struct Way {
+  struct Motion {
     std::size_t to;
     Pose2 motion;
   };
-  std::vector<std::vector<Way>> ways(views);
+  std::vector<std::vector<Motion>> from(views);
   for (const Spring& spring : springs) {
     if (!spring.motion) continue;
-    ways[spring.ends.a].push_back({spring.ends.b, *spring.motion});
-    ways[spring.ends.b].push_back({spring.ends.a, inverse(*spring.motion)});
+    from[spring.ends.a].push_back({spring.ends.b, *spring.motion});
+    from[spring.ends.b].push_back({spring.ends.a, inverse(*spring.motion)});
   }
-  for (auto& list : ways) std::ranges::sort(list, {}, &Way::to);
+  for (auto& motions : from) std::ranges::sort(motions, {}, &Motion::to);
   for (Spring& spring : springs) {
     if (!spring.motion) continue;
-    for (const Way& first : ways[spring.ends.a]) {
-      const auto& onward = ways[first.to];
-      const auto second = std::ranges::lower_bound(onward, spring.ends.b, {}, &Way::to);
+    for (const Motion& first : from[spring.ends.a]) {
+      const auto& onward = from[first.to];
+      const auto second = std::ranges::lower_bound(onward, spring.ends.b, {}, &Motion::to);
       if (second == onward.end() || second->to != spring.ends.b) continue;
       const Pose2 around = first.motion * second->motion;
       const double off = distance(around.position(), spring.motion->position());
-      const double turned = angle_difference(around.heading_rad, spring.motion->heading_rad);
-      spring.support += static_cast<int>(std::abs(turned) <= max_turn_rad &&
-                                         off <= max_off * length_of(*spring.motion));
+      const double rotation = angle_difference(around.heading_rad, spring.motion->heading_rad);
+      spring.support += static_cast<int>(std::abs(rotation) <= max_rotation_error_rad &&
+                                         off <= max_position_error * length_of(*spring.motion));
     }
   }
 }
 
-// By view: how far apart references are around it, in the unit of `lengths`, which are by spring:
-// the median distance to the nearest one, of the view and those that springs join to it. Infinite
-// where nothing is told.
+// Returns for each view the spacing of the references around it, in the unit of `lengths`, which
+// are those of the springs: the median distance to the nearest one, of the view and those that
+// springs join to it. Infinite where no length is known.
 std::vector<double> spacings_around(std::size_t views, const std::vector<Spring>& springs,
                                     const std::vector<double>& lengths) {
   constexpr double unknown = std::numeric_limits<double>::infinity();
@@ -83,65 +97,56 @@ std::vector<double> spacings_around(std::size_t views, const std::vector<Spring>
   return spacings;
 }
 
-// An edge that may be kept.
+/// An edge that may be kept.
 struct Candidate {
   NavigationGraph::Edge edge;
-  NodePair ends;
-  double far = 0.0;         // in spacings of the references around
+  EdgeEnds ends;
+  double spacings = 0.0;    // its length in spacings of the references around
   bool joins_only = false;  // kept only where without it two components would not be joined
 };
 
-// How long the edges of springs are, in spacings of the references around: similarity falls faster
-// with distance where things are near, so that the unit of phases and of the arrangement changes
-// from place to place. What the arrangement kept it laid out by the directions of all springs
-// around; of what it gave up the phases alone tell how far it leads.
-std::vector<Candidate> candidates_of(const std::vector<ViewId>& views,
-                                     const std::vector<Spring>& springs, double min_weight) {
-  // The distance to the nearest of several views, each with an error, is a tenth below the spacing,
-  // so this means two spacings: views of a square grid have others at 1.41 and 2.
-  constexpr double max_spacings = 2.3;
-  // An arrangement that is torn gives right springs up; so many third views speak for one then,
-  // and it must be as short as those to nearest views are.
-  constexpr int enough_support = 3;
-  constexpr double max_spacings_of_rejected = 1.5;
+// Makes edges whose lengths are in spacings of the references around: similarity falls faster with
+// distance where things are near, so the unit of phases and of the arrangement changes from place
+// to place. The arrangement laid out what it kept by the directions of all springs around; of what
+// it rejected only the phases have a length.
+std::vector<Candidate> make_candidates(const std::vector<ViewId>& views,
+                                       const std::vector<Spring>& springs, double min_weight) {
   const auto is_rejected = [&](const Spring& spring) {
     return spring.weight < min_weight || !spring.one_component;
   };
   std::vector<double> laid_out;
-  std::vector<double> seen;
+  std::vector<double> read;
   for (const Spring& spring : springs) {
     laid_out.push_back(is_rejected(spring) ? 0.0 : spring.length);
-    seen.push_back(spring.motion ? length_of(*spring.motion) : 0.0);
+    read.push_back(spring.motion ? length_of(*spring.motion) : 0.0);
   }
   const std::vector<double> spacings_laid_out = spacings_around(views.size(), springs, laid_out);
-  const std::vector<double> spacings_seen = spacings_around(views.size(), springs, seen);
+  const std::vector<double> spacings_read = spacings_around(views.size(), springs, read);
   std::vector<Candidate> candidates;
   for (std::size_t i = 0; i < springs.size(); ++i) {
     const Spring& spring = springs[i];
     const auto [a, b] = spring.ends;
     const bool rejected = is_rejected(spring);
-    const std::vector<double>& spacings = rejected ? spacings_seen : spacings_laid_out;
+    const std::vector<double>& spacings = rejected ? spacings_read : spacings_laid_out;
     const double spacing = 0.5 * (spacings[a] + spacings[b]);
-    const double length = rejected ? seen[i] : laid_out[i];
+    const double length = rejected ? read[i] : laid_out[i];
     Candidate candidate{
         {views[a], views[b], 0.0, spring.motion}, spring.ends, unknown_length_share};
     if (std::isfinite(spacing) && (length > 0.0 || spring.motion)) {
-      candidate.far = candidate.edge.length = length / spacing;
+      candidate.spacings = candidate.edge.length = length / spacing;
     }
-    if (seen[i] > 0.0) scale_displacement(*candidate.edge.a_from_b, candidate.far / seen[i]);
-    candidate.joins_only = candidate.far > (rejected ? max_spacings_of_rejected : max_spacings) ||
-                           (rejected && spring.support < enough_support);
+    if (read[i] > 0.0) scale_displacement(*candidate.edge.a_from_b, candidate.spacings / read[i]);
+    candidate.joins_only =
+        candidate.spacings > (rejected ? max_spacings_of_rejected : max_spacings) ||
+        (rejected && spring.support < min_support_of_rejected);
     candidates.push_back(candidate);
   }
   return candidates;
 }
 
-// An edge whose ends have hardly any neighbour in common leads to another place that looks alike:
-// ways would be planned through it as through a hole in the wall.
-void doubt_lonely_edges(std::size_t views, std::vector<Candidate>& candidates) {
-  // On an open square grid with edges up to two spacings nearest neighbours have half of theirs
-  // in common, views two spacings apart a quarter. One of these may be missing.
-  constexpr double min_common = 0.25;
+// Marks edges whose ends have hardly any neighbour in common: they lead to another place that looks
+// alike, and paths would be planned through them as through a hole in the wall.
+void mark_lonely_edges(std::size_t views, std::vector<Candidate>& candidates) {
   std::vector<std::vector<std::size_t>> around(views);
   for (const Candidate& candidate : candidates) {
     if (candidate.joins_only) continue;
@@ -156,22 +161,21 @@ void doubt_lonely_edges(std::size_t views, std::vector<Candidate>& candidates) {
     const auto common = std::ranges::count_if(
         a, [&](std::size_t node) { return std::ranges::binary_search(b, node); });
     const auto others = static_cast<double>(std::max(a.size(), b.size()) - 1);
-    candidate.joins_only = static_cast<double>(common + 1) < min_common * others;
+    candidate.joins_only = static_cast<double>(common + 1) < min_common_share * others;
   }
 }
 
-// The edges of the springs that may be kept.
-std::vector<NavigationGraph::Edge> edges_of(const std::vector<ViewId>& views,
-                                            std::vector<Spring> springs, double min_weight) {
+std::vector<NavigationGraph::Edge> choose_edges(const std::vector<ViewId>& views,
+                                                std::vector<Spring> springs, double min_weight) {
   count_support(views.size(), springs);
   std::erase_if(springs, [&](const Spring& spring) {
     return (spring.weight < min_weight || !spring.one_component) && spring.support == 0;
   });
-  std::vector<Candidate> candidates = candidates_of(views, springs, min_weight);
-  doubt_lonely_edges(views.size(), candidates);
-  // Those in doubt last, and the nearest first: so they are left out where others lead there, too.
+  std::vector<Candidate> candidates = make_candidates(views, springs, min_weight);
+  mark_lonely_edges(views.size(), candidates);
+  // Marked ones last, the nearest first: they are left out where others lead there, too.
   std::ranges::stable_sort(candidates, {}, [](const Candidate& candidate) {
-    return std::pair(candidate.joins_only, candidate.far);
+    return std::pair(candidate.joins_only, candidate.spacings);
   });
   DisjointSets groups(views.size());
   std::vector<NavigationGraph::Edge> kept;
@@ -192,14 +196,14 @@ NavigationGraph graph_from_lattice(const Lattice& lattice, double min_weight) {
   for (const Lattice::Spring& spring : lattice.springs) {
     const Lattice::Node& a = lattice.nodes.at(spring.a);
     const Lattice::Node& b = lattice.nodes.at(spring.b);
-    // Without phases the arrangement knows no headings, and so no direction in the frame of a view.
+    // Without phases the arrangement has no headings, and so no directions.
     springs.push_back({{spring.a, spring.b},
                        spring.phases ? motion_of(*spring.phases) : std::nullopt,
                        distance(a.pose.position(), b.pose.position()),
                        spring.weight,
                        a.component == b.component});
   }
-  std::vector<NavigationGraph::Edge> edges = edges_of(views, std::move(springs), min_weight);
+  std::vector<NavigationGraph::Edge> edges = choose_edges(views, std::move(springs), min_weight);
   return {std::move(views), std::move(edges)};
 }
 
@@ -215,7 +219,7 @@ NavigationGraph graph_from_stored_lattice(const TopologicalMap& arrangement,
   std::vector<Link> links;
   std::vector<Spring> springs;
   for (const MapEdge& edge : arrangement.edges) {
-    const NodePair ends{number_of(edge.a), number_of(edge.b)};
+    const EdgeEnds ends{number_of(edge.a), number_of(edge.b)};
     const MapNode& a = arrangement.nodes[ends.a];
     const MapNode& b = arrangement.nodes[ends.b];
     links.push_back({edge.a, edge.b, edge.kind});
@@ -224,7 +228,7 @@ NavigationGraph graph_from_stored_lattice(const TopologicalMap& arrangement,
   }
   const std::vector<NavigationGraph::Edge> read = read_edges(source, links, executor);
   for (std::size_t i = 0; i < springs.size(); ++i) springs[i].motion = read[i].a_from_b;
-  std::vector<NavigationGraph::Edge> edges = edges_of(views, std::move(springs), min_weight);
+  std::vector<NavigationGraph::Edge> edges = choose_edges(views, std::move(springs), min_weight);
   return {std::move(views), std::move(edges)};
 }
 

@@ -38,14 +38,13 @@ bool agree(const Pose2& a, const Pose2& b) {
   return std::abs(turned) <= max_disagreement_rad && std::abs(aside) <= max_disagreement_rad;
 }
 
-// Whether most triangles with a third view that tell anything say the same of an edge, as
-// `arrange` asks; true where there is no triangle at all, and false where none of them tells
-// anything.
+// True if most triangles with a third view whose motions are known confirm an edge, as in
+// `arrange`, or there is no triangle at all; false where no motions are known.
 bool is_supported(const NavigationGraph& graph, const NavigationGraph::Edge& edge) {
   const std::size_t a = *graph.node_of(edge.a);
   const std::size_t b = *graph.node_of(edge.b);
   int triangles = 0;
-  int telling = 0;
+  int readable = 0;
   int closed = 0;
   for (const NavigationGraph::Exit& first : graph.exits(a)) {
     const auto exits = graph.exits(first.node);
@@ -55,10 +54,10 @@ bool is_supported(const NavigationGraph& graph, const NavigationGraph::Edge& edg
     const auto a_from_c = graph.motion_from(a, first.edge);
     const auto c_from_b = graph.motion_from(first.node, second->edge);
     if (!a_from_c || !c_from_b) continue;
-    ++telling;
+    ++readable;
     closed += static_cast<int>(agree(*edge.a_from_b, *a_from_c * *c_from_b));
   }
-  return triangles == 0 || 2 * closed > telling;
+  return triangles == 0 || 2 * closed > readable;
 }
 
 }  // namespace
@@ -93,7 +92,7 @@ NavigationGraph::NavigationGraph(std::vector<ViewId> views,
   std::partial_sum(begins_.begin(), begins_.end(), begins_.begin());
   exits_.resize(begins_.back());
   std::vector<std::size_t> next(begins_.begin(), begins_.end() - 1);
-  // In this order the lower ends of a node come before its higher ones, both ascending.
+  // In this order the exits of a node to lower nodes come before those to higher ones.
   for (const Ends& e : ends) {
     exits_[next[e.high]++] = {e.low, edges_.size()};
     edges_.push_back(edges[e.edge]);
@@ -164,15 +163,15 @@ NavigationGraph graph_from_map(const TopologicalMap& map, double min_weight) {
 
 namespace {
 
-// Nodes of one component of a map within `reach` of each other, without those that have an edge.
-std::vector<NodePair> near_pairs(const TopologicalMap& map, double reach) {
+// Returns nodes of one component within `reach` of each other that no edge joins.
+std::vector<EdgeEnds> near_pairs(const TopologicalMap& map, double reach) {
   std::set<std::pair<ViewId, ViewId>> known;
   for (const MapEdge& edge : map.edges) known.insert(std::minmax(edge.a, edge.b));
-  // From west to east, so that those too far to the east need not be looked at.
+  // In the order of x, so that nodes too far along it need not be visited.
   std::vector<std::size_t> order(map.nodes.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::ranges::stable_sort(order, {}, [&](std::size_t i) { return map.nodes[i].pose.x_m; });
-  std::vector<NodePair> pairs;
+  std::vector<EdgeEnds> pairs;
   for (std::size_t i = 0; i < order.size(); ++i) {
     const MapNode& node = map.nodes[order[i]];
     for (std::size_t j = i + 1; j < order.size(); ++j) {
@@ -186,7 +185,7 @@ std::vector<NodePair> near_pairs(const TopologicalMap& map, double reach) {
       pairs.push_back({std::min(order[i], order[j]), std::max(order[i], order[j])});
     }
   }
-  std::ranges::sort(pairs, {}, [](const NodePair& p) { return std::pair(p.a, p.b); });
+  std::ranges::sort(pairs, {}, [](const EdgeEnds& p) { return std::pair(p.a, p.b); });
   return pairs;
 }
 
@@ -203,10 +202,10 @@ NavigationGraph graph_from_map_and_neighbours(const TopologicalMap& map, const V
     differences.push_back(image_difference(homing_view(memory.signature(edge.a)),
                                            homing_view(memory.signature(edge.b))));
   }
-  // What a grid's diagonal is to its spacing; as different as nearly all edges are.
+  // The diagonal of a grid over its spacing; and what nine of ten edges differ by at most.
   const double reach = 1.5 * upper_median(lengths);
   const double max_difference = quantile(differences, 0.9);
-  const std::vector<NodePair> pairs = near_pairs(map, reach);
+  const std::vector<EdgeEnds> pairs = near_pairs(map, reach);
   std::vector<std::optional<NavigationGraph::Edge>> found(pairs.size());
   constexpr std::size_t pairs_per_chunk = 64;
   executor.for_chunks(

@@ -1,7 +1,9 @@
 #include "panonav/navigation/navigator.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <numbers>
 #include <utility>
 
@@ -9,22 +11,21 @@
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/navigation/internal/navigator_core.hpp"
-#include "panonav/relative_pose/fourier_homing.hpp"
 
 namespace panonav {
 
 namespace {
 
-// A vector of less confidence is as likely as not but the error of reading it.
-constexpr double min_confidence = 0.5;
-// The next reference as the robot sees it now counts where it does not contradict the field.
+/// The direction of the next reference counts where it differs from that of the field by less:
+/// twice the 30 degrees by which neighbours on a grid's diagonal may differ from the path.
 constexpr double max_correction_rad = std::numbers::pi / 3.0;
-// A search step that is turned aside by more says nothing about the edge ahead.
+/// A step that leads aside by more is no attempt of the edge ahead, of which it makes half or less.
 constexpr double max_aside_rad = 1.0;
-// An edge so much longer than usual is held to until its end. `step_m` is half a usual edge.
-constexpr double min_long = 2.0;
-constexpr double steps_of_edge = 2.0;
-// Fewer tell no home vector.
+/// An edge of so many typical lengths is followed to its end: no reference stands along it.
+constexpr double min_long_edge = 2.0;
+/// Steps for each typical length of an edge: `step_m` is half of one.
+constexpr double steps_per_length = 2.0;
+/// Fewer components give no home vector.
 constexpr int min_components = 3;
 
 MemoryScales learn_scales(const ViewSource& source, const AreaPlanner& planner,
@@ -32,10 +33,10 @@ MemoryScales learn_scales(const ViewSource& source, const AreaPlanner& planner,
   const NavigationGraph& graph = planner.graph();
   require(graph.size() > 0, "views of the graph", 0.0, ">= 1");
   const ViewId first = graph.view(0);
-  const VisualMemory one = source.load({&first, 1});
+  const VisualMemory memory = source.load({&first, 1});
   MemoryScales scales;
-  scales.full_scale = one.full_scale();
-  scales.components = one.shape().components;
+  scales.full_scale = memory.full_scale();
+  scales.components = memory.shape().components;
   const int coarse = options.coarse_components;
   require(coarse == 0 || coarse >= min_components, "coarse_components", coarse, "0, or 3 or more");
   if (coarse < scales.components) scales.coarse_components = coarse;
@@ -46,7 +47,7 @@ MemoryScales learn_scales(const ViewSource& source, const AreaPlanner& planner,
   std::vector<double> lengths;
   for (const NavigationGraph::Edge& edge : graph.edges()) lengths.push_back(edge.length);
   if (!lengths.empty()) scales.typical_length = upper_median(std::move(lengths));
-  scales.narrow = find_narrow_places(graph, planner.areas(), options.near_links);
+  scales.is_narrow = find_narrow_places(graph, planner.areas(), options.near_links);
   return scales;
 }
 
@@ -57,7 +58,7 @@ Navigator::Core::Core(const ViewSource& source_, AreaPlanner planner_,
     : source(&source_),
       planner(std::move(planner_)),
       options(options_),
-      // The next place and what is looked at there are at hand on both sides of a border.
+      // The next place and the references compared there are loaded on both sides of a border.
       views(source_, options_.near_links + 1),
       criterion(source_) {
   validate(options);
@@ -65,7 +66,7 @@ Navigator::Core::Core(const ViewSource& source_, AreaPlanner planner_,
 }
 
 void Navigator::Core::set_goal(ViewId view) {
-  if (planner.closed() > 0) planner.unblock_all();
+  if (planner.blocked_edges() > 0) planner.unblock_all();
   planner.set_goal(view);
   const std::size_t node = *graph().node_of(view);
   const auto around = nodes_around(graph(), {&node, 1}, options.near_links);
@@ -74,66 +75,64 @@ void Navigator::Core::set_goal(ViewId view) {
           homing_view(source->load({&view, 1}).signature(view)),
           learn_arrival_scale(*source, graph(), view)};
   homing.reset();
-  pilot.stop();
-  pilot.forgive();
+  pilot.end_leg();
+  pilot.allow_all_routes();
   place.doubt = {};
   last = {};
   obstruction = {};
   progress = {};
   state = NavigationState::moving;
-  plan_anew();
+  replan();
 }
 
 void Navigator::Core::forget_place() {
   place = {};
   last = {};
   homing.reset();
-  pilot.stop();
-  plan.under_way.reset();
+  pilot.end_leg();
+  plan.committed.reset();
 }
 
-// The robot is not where it was taken for: what it held to there does not lead on.
-void Navigator::Core::forget_plans(Step& step) {
+// Ends homing, the committed edge and the leg of a robot that is not where it was assumed to be.
+void Navigator::Core::abandon_plans(Step& step) {
   homing.reset();
-  plan.under_way.reset();
-  if (pilot.drives()) step.note(NavigationEvent::route_left);
-  pilot.stop();
+  plan.committed.reset();
+  if (pilot.is_on_leg()) step.add_event(NavigationEvent::route_left);
+  pilot.end_leg();
 }
 
-// The field of the loaded area, and what it is to bring the robot nearer, start anew.
-void Navigator::Core::plan_anew() {
+void Navigator::Core::replan() {
   plan = {};
   if (views.area()) plan.field = planner.field(*views.area());
-  progress.min_way = std::numeric_limits<double>::infinity();
+  progress.min_path_length = std::numeric_limits<double>::infinity();
 }
 
 const Guide& Navigator::Core::guide() const {
   return plan.field.at(planner.areas().place_of[*place.node]);
 }
 
-// Along a long edge the robot goes on for its end, whatever reference is nearest meanwhile;
-// along any other when it has come back to where that begins though nothing stood in the way: then
-// a reference beside it has sent it back.
-void Navigator::Core::begin_long_way() {
+// Commits to a long edge; and to any other one whose beginning the robot has come back to although
+// nothing obstructed it: a reference beside the edge has sent it back.
+void Navigator::Core::commit_to_edge_if_needed() {
   const double length = relative_length(guide());
-  const bool came_back = progress.steps_in_vain >= options.min_agreeing_steps &&
-                         !progress.was_obstructed() && guide().way <= progress.min_way &&
-                         length > 0.0;
-  if (plan.under_way || (length < min_long && !came_back)) return;
-  const double steps = steps_of_edge * std::max(1.0, length);
-  plan.under_way = {*place.node, guide(), static_cast<int>(std::ceil(steps))};
+  const bool came_back = progress.steps_without_progress >= options.min_agreeing_steps &&
+                         !progress.was_obstructed() &&
+                         guide().path_length <= progress.min_path_length && length > 0.0;
+  if (plan.committed || (length < min_long_edge && !came_back)) return;
+  const double steps = steps_per_length * std::max(1.0, length);
+  plan.committed = {*place.node, guide(), static_cast<int>(std::ceil(steps))};
 }
 
-void Navigator::Core::go_home(Step& step) {
+void Navigator::Core::home_to_goal(Step& step) {
   const ArrivalScale& arrival = goal->arrival;
   if (!homing) {
     HomingPursuitOptions pursuit = options.homing;
     pursuit.max_step_m = std::min(pursuit.max_step_m, options.step_m);
-    pursuit.arrived_difference = arrival.difference;
-    // Well inside: the vector has an error of its own.
-    pursuit.stop_length = 0.25 * arrival.length;
+    pursuit.arrived_difference = arrival.max_difference;
+    // Well inside, as the vector has an error of its own.
+    pursuit.stop_length = 0.25 * arrival.max_length;
     homing.emplace(goal->view, pursuit);
-    step.note(NavigationEvent::homing);
+    step.add_event(NavigationEvent::homing);
   }
   const HomingPursuit::Decision pursued = homing->decide(step.view.view);
   NavigationDecision& decision = step.decision;
@@ -142,54 +141,54 @@ void Navigator::Core::go_home(Step& step) {
   decision.next = graph().view(goal->node);
   decision.direction_rad = pursued.turn_rad;
   decision.advance_m = pursued.advance_m;
-  const bool obstructed = obstruction.level >= 2 * options.min_agreeing_steps;
-  if (pursued.state == HomingPursuit::State::moving && !obstructed) return;
-  // Homing may stop for other reasons than a short vector; the place decides. Noise and new things
-  // in view make a difference, too: a robot that sees no way left is there when the place may be
-  // this one.
+  const bool is_obstructed = obstruction.level >= 2 * options.min_agreeing_steps;
+  if (pursued.state == HomingPursuit::State::moving && !is_obstructed) return;
+  // Homing may stop for other reasons than a short vector, so the place decides. Noise and new
+  // objects in view raise the difference, too: a shorter vector makes up for a larger one.
   const double length = pursued.vector.length();
-  if ((pursued.difference <= arrival.difference && length <= arrival.length) ||
-      (pursued.difference <= std::max(2.0 * arrival.difference, scales.place.limit()) &&
-       length <= 0.5 * arrival.length)) {
+  if ((pursued.difference <= arrival.max_difference && length <= arrival.max_length) ||
+      (pursued.difference <=
+           std::max(2.0 * arrival.max_difference, scales.place.max_difference()) &&
+       length <= 0.5 * arrival.max_length)) {
     state = NavigationState::arrived;
     return;
   }
-  step.note(NavigationEvent::homing_failed);
+  step.add_event(NavigationEvent::homing_failed);
   homing.reset();
   obstruction.level = 0;
-  try_again(step, obstructed ? NavigationState::blocked : NavigationState::lost);
+  unblock_edges_or_end(step, is_obstructed ? NavigationState::blocked : NavigationState::lost);
 }
 
-// The direction of where the robot still knew its place: the way back of its own steps, as
-// something near may hide what the reference there shows; else as the reference is seen from here.
-std::optional<double> Navigator::Core::way_back_rad(const SeenView& view) {
-  if (place.known_at &&
-      std::hypot(place.known_at->x_m, place.known_at->y_m) >= 0.5 * options.step_m) {
-    return std::atan2(place.known_at->y_m, place.known_at->x_m);
+// Returns the direction in which the robot last knew its place: by its own steps, as something near
+// may hide what the reference there shows; where it has hardly moved, by the home vector.
+std::optional<double> Navigator::Core::direction_to_known_place(const QueryView& view) {
+  if (const auto& known = place.known_position_m;
+      known && std::hypot(known->x_m, known->y_m) >= 0.5 * options.step_m) {
+    return std::atan2(known->y_m, known->x_m);
   }
   const HomeVector back =
-      home_vector(views.view(graph().view(*place.known_node), view.components), view.view);
-  if (back.confidence <= min_confidence) return std::nullopt;
+      home_vector(views.coefficients(graph().view(*place.known_node), view.components), view.view);
+  if (back.confidence <= min_vector_confidence) return std::nullopt;
   return back.direction_rad();
 }
 
-// From an unknown place to where the robot still knew its own, if something tells where that is.
-bool Navigator::Core::go_back(Step& step) {
-  if (!place.known_node || obstruction.now) return false;
+// Leads back from an unknown place; false where nothing tells in which direction.
+bool Navigator::Core::return_to_known_place(Step& step) {
+  if (!place.known_node || obstruction.is_present) return false;
   const std::size_t node = *place.known_node;
   if (!views.holds(graph().view(node))) return false;
-  const auto direction_rad = way_back_rad(step.view);
+  const auto direction_rad = direction_to_known_place(step.view);
   if (!direction_rad) return false;
   const SubAreas& areas = planner.areas();
   if (place.doubt.unknown_steps == options.min_agreeing_steps &&
       areas.area_of[node] == views.area()) {
-    // Something hides the place that should come next, as what stands in the way does.
+    // Something hides the place that should come next, as an obstacle does.
     const Guide& ahead = plan.field.at(areas.place_of[node]);
-    if (ahead.reachable() && ahead.next != node) {
-      EdgeTries& tries =
-          progress.tries.try_emplace(ahead.edge, EdgeTries{node, 0, 0}).first->second;
-      ++tries.steps;
-      tries.obstructed += 2;
+    if (ahead.is_reachable() && ahead.next != node) {
+      EdgeAttempts& attempts =
+          progress.edge_attempts.try_emplace(ahead.edge, EdgeAttempts{node}).first->second;
+      ++attempts.steps;
+      attempts.obstructed_steps += 2;
     }
   }
   step.decision.next = graph().view(node);
@@ -199,134 +198,145 @@ bool Navigator::Core::go_back(Step& step) {
   return true;
 }
 
-// The goal, or another reference from which the goal is too near for a direction, as views of
-// several drives may be from one place, or for a step, which would lead beyond it.
+// True at the goal, and at a reference from which it is too near for a direction, as views of
+// several drives may be, or for a step, which would lead beyond it.
 bool Navigator::Core::is_at_goal() const {
   if (*place.node == goal->node) return true;
   const bool is_around = goal->around.contains(*place.node);
-  // The first steps of homing try how far one leads.
+  // The first steps of homing show how far one leads.
   if (homing && is_around) return true;
-  if (!step_ways.empty() && is_around && guide().way <= 0.5 * upper_median(step_ways)) return true;
+  if (!path_reductions.empty() && is_around &&
+      guide().path_length <= 0.5 * upper_median(path_reductions)) {
+    return true;
+  }
   if (guide().next != goal->node) return false;
   const auto motion = graph().motion_from(*place.node, guide().edge);
   return motion && std::hypot(motion->x_m, motion->y_m) <= 0.5 * scales.typical_length;
 }
 
-// Of the reference at the end of an edge, in the frame of the robot, which is turned against the
-// view from which the edge begins. Empty where no view tells it.
-std::optional<double> Navigator::Core::direction_of(std::size_t from, const Guide& ahead,
-                                                    const Step& step) {
+// Returns the direction of an edge in the frame of the robot: that of the field, turned by the
+// compass, and half way from there to where the home vector sees the end of the edge. Empty where
+// no view shows it.
+std::optional<double> Navigator::Core::direction_along_edge(std::size_t from, const Guide& ahead,
+                                                            const Step& step) {
   std::optional<double> direction;
-  std::optional<CompassReading> turned;
-  if (views.holds(graph().view(from))) turned = views.turn_against(graph().view(from), step.view);
-  if (ahead.direction_rad && turned) {
-    direction = wrap_angle(*ahead.direction_rad - turned->heading_rad);
+  if (views.holds(graph().view(from))) {
+    const auto compass = views.read_compass(graph().view(from), step.view);
+    if (compass && ahead.direction_rad) {
+      direction = wrap_angle(*ahead.direction_rad - compass->heading_rad);
+    }
   }
   const ViewId next = graph().view(ahead.next);
   if (!views.holds(next)) return direction;
-  const HomeVector seen = home_vector(views.view(next, step.view.components), step.view.view);
-  if (seen.confidence <= min_confidence) return direction;
-  const double seen_rad = seen.direction_rad();
-  const std::optional<double> known =
-      direction || obstruction.now ? direction : step.heading_for_rad;
-  const double off = known ? angle_difference(seen_rad, *known) : 0.0;
-  return std::abs(off) < max_correction_rad ? seen_rad - 0.5 * off : direction;
+  const HomeVector to_next =
+      home_vector(views.coefficients(next, step.view.components), step.view.view);
+  if (to_next.confidence <= min_vector_confidence) return direction;
+  const double next_rad = to_next.direction_rad();
+  const std::optional<double> expected =
+      direction || obstruction.is_present ? direction : step.last_direction_rad;
+  const double off = expected ? angle_difference(next_rad, *expected) : 0.0;
+  return std::abs(off) < max_correction_rad ? next_rad - 0.5 * off : direction;
 }
 
-void Navigator::Core::follow(Step& step) {
-  if (place.doubt.unknown_steps > 0 && go_back(step)) return;
-  begin_long_way();
-  const std::size_t from = plan.under_way ? plan.under_way->from : *place.node;
-  const Guide ahead = plan.under_way ? plan.under_way->guide : guide();
-  std::optional<double> direction = direction_of(from, ahead, step);
-  // Where no view tells the direction, the robot goes on as it went.
-  if (!direction) direction = obstruction.now ? 0.0 : step.heading_for_rad.value_or(0.0);
+void Navigator::Core::follow_field(Step& step) {
+  if (place.doubt.unknown_steps > 0 && return_to_known_place(step)) return;
+  commit_to_edge_if_needed();
+  const std::size_t from = plan.committed ? plan.committed->from : *place.node;
+  const Guide ahead = plan.committed ? plan.committed->guide : guide();
+  std::optional<double> direction = direction_along_edge(from, ahead, step);
+  // Where no view shows a direction, the robot continues in that of the step before.
+  if (!direction) direction = obstruction.is_present ? 0.0 : step.last_direction_rad.value_or(0.0);
   double detour = detour_rad();
-  if (obstruction.now && place.doubt.unknown_steps > 0 && step.heading_for_rad) {
-    // What hides the place is left behind to see where this is.
-    direction = step.heading_for_rad;
+  if (obstruction.is_present && place.doubt.unknown_steps > 0 && step.last_direction_rad) {
+    // The robot backs away from what hides the place, to recognise it.
+    direction = step.last_direction_rad;
     detour = std::numbers::pi;
   }
   step.decision.next = graph().view(ahead.next);
   step.decision.direction_rad = wrap_angle(*direction + detour);
   step.decision.advance_m = options.step_m;
   last.direction_rad = step.decision.direction_rad;
-  ++progress.tries.try_emplace(ahead.edge, EdgeTries{from, 0, 0}).first->second.steps;
-  if (obstruction.level >= 2 || std::abs(detour) < max_aside_rad) last.aimed_for = ahead.edge;
+  ++progress.edge_attempts.try_emplace(ahead.edge, EdgeAttempts{from}).first->second.steps;
+  if (obstruction.level >= 2 || std::abs(detour) < max_aside_rad) last.target_edge = ahead.edge;
 }
 
-// A leg along a route, where views leave no doubt of the place and nothing was in the way so far:
-// what shut an edge may shut the route, too.
-void Navigator::Core::begin_leg(Step& step) {
-  if (pilot.routes().empty() || step.report.line.empty() || obstruction.now ||
-      place.doubt.unknown_steps > 0 || place.doubt.elsewhere_steps > 0 || planner.closed() > 0) {
+// Begins a leg along a recorded route where the place is beyond doubt and nothing obstructed the
+// robot so far: what blocks an edge may block the route, too.
+void Navigator::Core::begin_leg_if_possible(Step& step) {
+  if (pilot.routes().empty() || step.report.line.empty() || obstruction.is_present ||
+      place.doubt.unknown_steps > 0 || place.doubt.other_place_steps > 0 ||
+      planner.blocked_edges() > 0) {
     return;
   }
-  std::vector<ViewId> way;
-  for (const std::size_t node : planner.plan_path(*place.node)) way.push_back(graph().view(node));
-  if (!pilot.begin(way, step.report.line, options.min_leg_m)) return;
-  plan.under_way.reset();
-  step.note(NavigationEvent::route);
+  std::vector<ViewId> path;
+  for (const std::size_t node : planner.plan_path(*place.node)) path.push_back(graph().view(node));
+  if (!pilot.begin_leg(path, step.report.line, options.min_leg_m)) return;
+  plan.committed.reset();
+  step.add_event(NavigationEvent::route);
 }
 
-// Repeats a recorded route; false where there is none to go along, or none any more.
-bool Navigator::Core::go_along_route(Step& step) {
-  if (!pilot.drives()) {
-    begin_leg(step);
+// Repeats a recorded route [Y03]; false where no leg is under way.
+bool Navigator::Core::follow_route(Step& step) {
+  if (!pilot.is_on_leg()) {
+    begin_leg_if_possible(step);
   } else if (pilot.unknown_steps() >= options.min_agreeing_steps ||
              obstruction.level >= 2 * options.min_agreeing_steps ||
-             progress.steps_in_vain > patience()) {
-    pilot.give_up();
-    step.note(NavigationEvent::route_left);
-    // The way by views has not been tried here.
-    progress.tries.clear();
-    obstruction.level = progress.steps_in_vain = 0;
+             progress.steps_without_progress > max_steps_without_progress()) {
+    pilot.abandon_leg();
+    step.add_event(NavigationEvent::route_left);
+    // The path by views has not been tried here.
+    progress.edge_attempts.clear();
+    obstruction.level = progress.steps_without_progress = 0;
   }
-  if (!pilot.drives()) return false;
-  const auto aim = pilot.aim();
-  if (!aim) {
-    pilot.stop();
+  if (!pilot.is_on_leg()) return false;
+  const auto target = pilot.target();
+  if (!target) {
+    pilot.end_leg();
     return false;
   }
   NavigationDecision& decision = step.decision;
   decision.on_route = true;
   decision.next = pilot.end();
-  decision.direction_rad = std::atan2(aim->y_m, aim->x_m);
-  // The straight way there is near the route; odometry errs by little over a usual step.
-  decision.advance_m = std::min(options.step_m, std::hypot(aim->x_m, aim->y_m));
+  decision.direction_rad = std::atan2(target->y_m, target->x_m);
+  // The straight line there is near the route; odometry errs little over one step.
+  decision.advance_m = std::min(options.step_m, std::hypot(target->x_m, target->y_m));
   last.direction_rad = decision.direction_rad;
   return true;
 }
 
+// [M04 section 3.5]
 void Navigator::Core::decide(Step& step) {
   locate(step);
-  if (state == NavigationState::moving) notice_obstacles(step);
-  if (state == NavigationState::moving && !guide().reachable() && !find_way_from_here(step)) {
-    try_again(step, NavigationState::unreachable);
-    // Nothing was closed that could be opened.
-    if (!guide().reachable()) state = NavigationState::unreachable;
+  if (state == NavigationState::moving) update_progress(step);
+  if (state == NavigationState::moving && !guide().is_reachable() && !relocalise_with_path(step)) {
+    unblock_edges_or_end(step, NavigationState::unreachable);
+    // Nothing was blocked that could be unblocked.
+    if (!guide().is_reachable()) state = NavigationState::unreachable;
   }
-  judge_place(step);
+  update_probability(step);
   last = {};
-  // At an unknown place the robot waits for observations to agree; then it goes by the best guess.
-  const int unknown_steps = place.doubt.unknown_steps;
-  const bool waits =
-      unknown_steps > 0 && unknown_steps < options.min_agreeing_steps && !obstruction.now;
-  if (state == NavigationState::moving && !waits) {
-    if (is_at_goal()) {
-      pilot.stop();
-      go_home(step);
-    } else {
-      homing.reset();
-      if (!go_along_route(step)) follow(step);
-    }
-  }
+  if (state == NavigationState::moving) choose_motion(step);
   if (state == NavigationState::moving && progress.steps >= options.max_run_steps) {
     state = NavigationState::blocked;
   }
   last.view = step.view.view;
   last.advance_m = step.decision.advance_m;
-  if (last.advance_m == options.step_m && !homing) last.way = guide().way;
+  if (last.advance_m == options.step_m && !homing) last.path_length = guide().path_length;
+}
+
+void Navigator::Core::choose_motion(Step& step) {
+  // At an unknown place the robot waits for observations to agree; then the best guess counts.
+  const int unknown_steps = place.doubt.unknown_steps;
+  if (unknown_steps > 0 && unknown_steps < options.min_agreeing_steps && !obstruction.is_present) {
+    return;
+  }
+  if (is_at_goal()) {
+    pilot.end_leg();
+    home_to_goal(step);
+    return;
+  }
+  homing.reset();
+  if (!follow_route(step)) follow_field(step);
 }
 
 NavigationDecision Navigator::Core::observe(const FourierSignature& view,
@@ -339,27 +349,82 @@ NavigationDecision Navigator::Core::observe(const FourierSignature& view,
     return stopped;
   }
   const std::uint64_t bytes_before = views.bytes_read();
-  if (pilot.drives()) pilot.track(report.line, report.moved);
-  Step step{
-      view,
-      report,
-      SeenView(view, scales.full_scale, needs_all_components() ? 0 : scales.coarse_components),
-      {.step = number},
-      std::nullopt};
+  if (pilot.is_on_leg()) pilot.track(report.line, report.moved);
+  const int components = needs_all_components() ? 0 : scales.coarse_components;
+  Step step{view, report, QueryView(view, scales.full_scale, components), {.step = number}, {}};
   decide(step);
   NavigationDecision& decision = step.decision;
   decision.state = state;
   if (state != NavigationState::moving) decision.advance_m = 0.0;
   decision.nearest = graph().view(*place.node);
   decision.area = *views.area();
-  decision.way = guide().way;
+  decision.path_length = guide().path_length;
   decision.components = step.view.components;
   decision.bytes_read = views.bytes_read() - bytes_before;
   // An observation that entered an area has loaded enough.
-  const bool entered =
+  const bool entered_area =
       std::ranges::find(decision.events, NavigationEvent::entered_area) != decision.events.end();
-  if (state == NavigationState::moving && !entered) load_ahead();
+  if (state == NavigationState::moving && !entered_area) prefetch_next_area();
   return std::move(decision);
+}
+
+std::string_view name_of(NavigationState state) {
+  constexpr std::array<std::string_view, 5> names{"moving", "arrived", "blocked", "lost",
+                                                  "unreachable"};
+  return names.at(static_cast<std::size_t>(state));
+}
+
+std::string_view name_of(NavigationEvent event) {
+  constexpr std::array<std::string_view, 11> names{
+      "relocalised", "kidnapped", "entered_area",  "unknown_place", "obstructed", "closed",
+      "reopened",    "homing",    "homing_failed", "route",         "route_left"};
+  return names.at(static_cast<std::size_t>(event));
+}
+
+std::string describe(const NavigationDecision& decision) {
+  std::string line = std::to_string(decision.step) + " " + std::string(name_of(decision.state));
+  std::array<char, 120> numbers{};
+  if (decision.nearest) {
+    std::snprintf(numbers.data(), numbers.size(), " at view %u (probability %.2f)",
+                  static_cast<unsigned>(decision.nearest->value), decision.probability);
+    line += numbers.data();
+  }
+  if (decision.next) line += " to view " + std::to_string(decision.next->value);
+  line += " in area " + std::to_string(decision.area);
+  std::snprintf(numbers.data(), numbers.size(), ", way left %.4g, difference %.3f",
+                decision.path_length, decision.difference);
+  line += numbers.data();
+  if (decision.advance_m > 0.0) {
+    const char* how = decision.homing ? "home" : decision.on_route ? "along a route" : "go";
+    std::snprintf(numbers.data(), numbers.size(), ", %s %.3f m towards %.1f degrees", how,
+                  decision.advance_m, degrees(decision.direction_rad));
+    line += numbers.data();
+  }
+  for (const NavigationEvent event : decision.events) line += ", " + std::string(name_of(event));
+  return line;
+}
+
+void visit_options(NavigatorOptions& options, OptionVisitor& visitor) {
+  using T = NavigatorOptions;
+  constexpr OptionTable table{
+      option<&T::step_m>("longest way between two steps", above(0), 100),
+      option<&T::near_links>("edges from the last place within which the next one is searched", 1,
+                             10),
+      option<&T::coarse_components>("components compared in the open, 0 for all", 0, 1000),
+      option<&T::views_ahead>("views of the next area that a step loads", 0, 1e6),
+      options_of<&T::homing>(),
+      option<&T::min_agreeing_steps>(
+          "steps that must agree before another place or a block is believed", 1, 1000),
+      option<&T::lost_patience>("steps without a known place after which the robot is lost", 1,
+                                1e6),
+      option<&T::edge_patience>("steps without coming nearer after which an edge counts as blocked",
+                                1, 1e6),
+      option<&T::min_leg_m>("shortest way along a recorded route that is worth a leg", above(0),
+                            1000),
+      option<&T::attempts>("times that closed edges, or the last stretch, are tried", 1, 1000),
+      option<&T::max_run_steps>("steps after which a run ends", 1, 1e9),
+  };
+  table.visit(options, visitor);
 }
 
 Navigator::Navigator(const ViewSource& source, AreaPlanner planner, const NavigatorOptions& options)

@@ -9,27 +9,27 @@ namespace panonav {
 
 namespace {
 
-// Of each area, so many views are compared by their phases, too.
+/// Views of each area that are compared by their phases, too: the least dissimilar ones.
 constexpr int compared_per_area = 3;
 
 }  // namespace
 
 std::optional<FoundView> search_whole_memory(const ViewSource& source, const NavigationGraph& graph,
                                              const SubAreas& areas, const FourierSignature& view,
-                                             const std::function<bool(std::size_t)>& is_wanted) {
-  const HomingView seen = homing_view(view);
+                                             const std::function<bool(std::size_t)>& filter) {
+  const HomingView query = homing_view(view);
   std::optional<FoundView> best;
   for (const auto& nodes : areas.nodes) {
     std::vector<ViewId> views;
     for (const std::size_t node : nodes) {
-      if (!is_wanted || is_wanted(node)) views.push_back(graph.view(node));
+      if (!filter || filter(node)) views.push_back(graph.view(node));
     }
     if (views.empty()) continue;
     const VisualMemory memory = source.load(views);
     const SearchResult found =
         memory.search(pack(view, memory.full_scale()), {.top = compared_per_area});
     for (const Match& match : found.matches) {
-      const double difference = image_difference(homing_view(memory, match.view), seen);
+      const double difference = image_difference(homing_view(memory, match.view), query);
       if (!best || difference < best->difference) {
         best = {*graph.node_of(match.view), match.dissimilarity, difference};
       }

@@ -23,10 +23,10 @@ void visit_options(SubAreaOptions& options, OptionVisitor& visitor) {
 namespace {
 
 constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
-// Share of the views that the smaller side of a cut has at least.
-constexpr double min_side = 1.0 / 3.0;
+/// Smallest share of the views on one side of a cut, so that areas become similar in size.
+constexpr double min_side_share = 1.0 / 3.0;
 
-/// Some nodes of a graph with the edges among them, numbered anew.
+/// Some nodes of a graph with the edges among them, numbered from 0.
 struct Component {
   std::vector<std::size_t> nodes;  // ascending
   std::vector<std::size_t> begins, neighbours;
@@ -37,8 +37,8 @@ struct Component {
   }
 };
 
-Component component_of(const NavigationGraph& graph, std::vector<std::size_t> nodes,
-                       std::vector<std::size_t>& number) {
+Component make_component(const NavigationGraph& graph, std::vector<std::size_t> nodes,
+                         std::vector<std::size_t>& number) {
   Component component;
   component.nodes = std::move(nodes);
   for (std::size_t i = 0; i < component.size(); ++i) number[component.nodes[i]] = i;
@@ -53,7 +53,8 @@ Component component_of(const NavigationGraph& graph, std::vector<std::size_t> no
   return component;
 }
 
-// Edges from `from` to every node; `none` where there is no way over nodes with side `side`.
+// Returns the number of edges from `from` to every node over nodes of `side`; `none` where there is
+// no such path.
 std::vector<std::size_t> steps_from(const Component& component, std::size_t from,
                                     std::span<const std::uint8_t> sides, std::uint8_t side) {
   std::vector<std::size_t> steps(component.size(), none);
@@ -69,7 +70,7 @@ std::vector<std::size_t> steps_from(const Component& component, std::size_t from
   return steps;
 }
 
-std::size_t farthest(std::span<const std::size_t> steps) {
+std::size_t find_farthest(std::span<const std::size_t> steps) {
   std::size_t best = 0;
   for (std::size_t i = 1; i < steps.size(); ++i) {
     if (steps[i] != none && (steps[best] == none || steps[i] > steps[best])) best = i;
@@ -82,7 +83,7 @@ std::size_t farthest(std::span<const std::size_t> steps) {
 // out.
 std::vector<double> second_eigenvector(const Component& component, int iterations) {
   const std::vector<std::uint8_t> everywhere(component.size(), 0);
-  const auto outermost = farthest(steps_from(component, 0, everywhere, 0));
+  const auto outermost = find_farthest(steps_from(component, 0, everywhere, 0));
   const auto steps = steps_from(component, outermost, everywhere, 0);
   std::vector<double> values(steps.begin(), steps.end());
   std::vector<double> relaxed(values.size());
@@ -111,15 +112,16 @@ std::vector<double> second_eigenvector(const Component& component, int iteration
   return values;
 }
 
-// 1 for the nodes up to the cut of least normalised cut along the order of `values`.
-std::vector<std::uint8_t> best_cut(const Component& component, std::span<const double> values) {
+// Returns 1 for the nodes before the least normalised cut in the order of `values`.
+std::vector<std::uint8_t> find_best_cut(const Component& component,
+                                        std::span<const double> values) {
   std::vector<std::size_t> order(component.size());
   std::iota(order.begin(), order.end(), 0U);
   std::ranges::stable_sort(order, {}, [&](std::size_t n) { return values[n]; });
   std::vector<std::uint8_t> sides(component.size(), 0);
   const auto total = static_cast<double>(component.neighbours.size());
   const auto low =
-      static_cast<std::size_t>(std::ceil(min_side * static_cast<double>(component.size())));
+      static_cast<std::size_t>(std::ceil(min_side_share * static_cast<double>(component.size())));
   double cut = 0.0;
   double volume = 0.0;
   double best = std::numeric_limits<double>::infinity();
@@ -141,9 +143,9 @@ std::vector<std::uint8_t> best_cut(const Component& component, std::span<const d
   return sides;
 }
 
-// All nodes of a side but those of its largest piece change over.
-void give_away_fragments(const Component& component, std::uint8_t side,
-                         std::vector<std::uint8_t>& sides) {
+// Moves all nodes of a side but those of its largest piece to the other side.
+void move_fragments(const Component& component, std::uint8_t side,
+                    std::vector<std::uint8_t>& sides) {
   std::vector<std::size_t> piece(component.size(), none);
   std::vector<std::size_t> sizes;
   for (std::size_t n = 0; n < component.size(); ++n) {
@@ -164,20 +166,20 @@ void give_away_fragments(const Component& component, std::uint8_t side,
   }
 }
 
-// Connected pieces of some nodes, each ascending, in the order of their first nodes.
-std::vector<std::vector<std::size_t>> pieces(const NavigationGraph& graph,
-                                             const std::vector<std::size_t>& nodes,
-                                             std::vector<std::size_t>& number) {
-  const Component component = component_of(graph, nodes, number);
-  std::vector<std::uint8_t> taken(component.size(), 0);
+// Returns the connected pieces of some nodes, each ascending, in the order of their first nodes.
+std::vector<std::vector<std::size_t>> find_pieces(const NavigationGraph& graph,
+                                                  const std::vector<std::size_t>& nodes,
+                                                  std::vector<std::size_t>& number) {
+  const Component component = make_component(graph, nodes, number);
+  std::vector<std::uint8_t> visited(component.size(), 0);
   std::vector<std::vector<std::size_t>> result;
   for (std::size_t n = 0; n < component.size(); ++n) {
-    if (taken[n] != 0) continue;
-    const auto steps = steps_from(component, n, taken, 0);
+    if (visited[n] != 0) continue;
+    const auto steps = steps_from(component, n, visited, 0);
     result.emplace_back();
     for (std::size_t m = 0; m < component.size(); ++m) {
       if (steps[m] == none) continue;
-      taken[m] = 1;
+      visited[m] = 1;
       result.back().push_back(component.nodes[m]);
     }
   }
@@ -195,7 +197,7 @@ SubAreas make_single_area(const NavigationGraph& graph) {
   return areas;
 }
 
-SubAreas divide(const NavigationGraph& graph, const SubAreaOptions& options) {
+SubAreas divide_into_areas(const NavigationGraph& graph, const SubAreaOptions& options) {
   validate(options);
   SubAreas areas;
   areas.area_of.resize(graph.size());
@@ -203,8 +205,8 @@ SubAreas divide(const NavigationGraph& graph, const SubAreaOptions& options) {
   std::vector<std::size_t> number(graph.size(), none);
   std::vector<std::size_t> all(graph.size());
   std::iota(all.begin(), all.end(), 0U);
-  std::vector<std::vector<std::size_t>> open = pieces(graph, all, number);
-  // Halving stops where halves would be farther from the size aimed at than the whole, as a ratio.
+  std::vector<std::vector<std::size_t>> open = find_pieces(graph, all, number);
+  // Halving stops where the whole is nearer to the size aimed at than the halves, as a ratio.
   const auto largest = static_cast<std::size_t>(std::sqrt(2.0) * options.views_per_area);
   while (!open.empty()) {
     std::vector<std::size_t> nodes = std::move(open.back());
@@ -213,15 +215,15 @@ SubAreas divide(const NavigationGraph& graph, const SubAreaOptions& options) {
       areas.nodes.push_back(std::move(nodes));
       continue;
     }
-    const Component component = component_of(graph, std::move(nodes), number);
+    const Component component = make_component(graph, std::move(nodes), number);
     std::vector<std::uint8_t> sides =
-        best_cut(component, second_eigenvector(component, options.iterations));
-    give_away_fragments(component, 1, sides);
-    give_away_fragments(component, 0, sides);
+        find_best_cut(component, second_eigenvector(component, options.iterations));
+    move_fragments(component, 1, sides);
+    move_fragments(component, 0, sides);
     std::vector<std::size_t> half[2];
     for (std::size_t n = 0; n < component.size(); ++n) half[sides[n]].push_back(component.nodes[n]);
     for (const auto& side : half) {
-      for (auto& piece : pieces(graph, side, number)) open.push_back(std::move(piece));
+      for (auto& piece : find_pieces(graph, side, number)) open.push_back(std::move(piece));
     }
   }
   std::ranges::sort(areas.nodes);

@@ -6,14 +6,12 @@
 #include <utility>
 #include <vector>
 
-#include "panonav/mapping/lattice_map.hpp"
-
 namespace panonav {
 
 void store_lattice(const Lattice& lattice, const VisualMemory& memory, MemoryFile& file) {
   std::set<std::pair<ViewId, ViewId>> known;
   for (const Link& link : memory.links()) known.insert(std::minmax(link.a, link.b));
-  const TopologicalMap map = map_of(lattice);
+  const TopologicalMap map = to_topological_map(lattice);
   std::vector<Link> links;
   for (const MapEdge& edge : map.edges) {
     if (edge.weight < min_spring_weight || known.contains(std::minmax(edge.a, edge.b))) continue;

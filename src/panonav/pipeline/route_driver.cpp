@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "panonav/core/error.hpp"
-#include "panonav/route/route_place.hpp"
+#include "panonav/route/route_position.hpp"
 
 namespace panonav {
 

@@ -25,7 +25,7 @@ MonteCarloLocaliser localiser_for(const MemoryFile& file, const VisualMemory& me
   validate(options.filter);
   try {
     // The filter's seed is that of learning, too; what is kept was learnt with the default one.
-    if (options.filter.seed == ObservationModelOptions{}.seed) {
+    if (options.filter.seed == LearningOptions{}.seed) {
       if (const auto models = kept_models(file, memory); models && models->observation) {
         return {std::make_shared<const ColumnRanking>(memory), *models->observation, options.filter,
                 options.odometry};

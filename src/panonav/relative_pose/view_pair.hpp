@@ -1,39 +1,41 @@
 #pragma once
 
-#include <cstddef>
 #include <optional>
 
+#include "panonav/geometry/pose2.hpp"
 #include "panonav/relative_pose/homing_view.hpp"
 #include "panonav/relative_pose/turn_correlation.hpp"
 
 namespace panonav {
 
-/// Relative pose of two views from their phases [M04 sections 3.4 and 3.5].
+/// Relative pose of two views, read from their phases [M04 sections 3.4 and 3.5].
 struct PhaseReading {
   double turn_rad = 0.0;         ///< heading of b minus heading of a
   double direction_a_rad = 0.0;  ///< towards b, in the frame of the robot that took a
   double direction_b_rad = 0.0;  ///< towards a, in the frame of the robot that took b
   /// Distance between the places in units of R, the typical distance of the things around.
   double length = 0.0;
-  /// Each view by itself gives the direction of the other one. This is the angle between the two
-  /// answers, in [0, pi]: small for neighbouring places, anything for unrelated ones.
+  /// Angle between the directions that the two views show, in [0, pi]: small for neighbouring
+  /// places, arbitrary for unrelated ones.
   double disagreement_rad = 0.0;
-  /// The same for the headings.
-  double turn_disagreement_rad = 0.0;
-  /// False for pictures of one place, where no direction is meant; directions and length are then
-  /// 0.
-  bool points = false;
+  double turn_disagreement_rad = 0.0;  ///< the same of the headings
+  /// False for views of one place; directions and length are then 0.
+  bool has_direction = false;
   /// Share of the energy of both views that turn and displacement leave unexplained, 0 .. 1: the
-  /// mean of both answers.
+  /// mean of both readings.
   double residual = 1.0;
+
+  /// Pose of b in the frame of a by both directions, with lengths of `unit` for each R.
+  [[nodiscard]] Pose2 a_from_b(double unit = 1.0) const;
+  /// The reading of the views in reverse order.
+  [[nodiscard]] PhaseReading reversed() const;
 };
 
-/// Reads both ways, from a to b and back. Empty when either view has no structure. Throws
-/// ContractError when the views differ in shape or have fewer than three components. Cost: that of
-/// two home vectors.
-/// With `window` only headings of b minus those of a within it are considered: places that look
-/// alike when turned by a quarter are then not mistaken for each other; empty also when no turn
-/// within them fits.
+/// Reads the home vectors from a to b and back. nullopt when a view has no structure. With `window`
+/// only headings of b minus those of a within it are considered, so that places that look alike
+/// after a quarter turn are not mistaken for each other; nullopt also when no heading in it fits.
+/// Throws ContractError when the views differ in shape or have fewer than three components. Cost:
+/// that of two home vectors.
 [[nodiscard]] std::optional<PhaseReading> read_phases(
     const HomingView& a, const HomingView& b,
     const std::optional<HeadingWindow>& window = std::nullopt);

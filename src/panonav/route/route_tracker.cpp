@@ -9,7 +9,7 @@
 
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
-#include "panonav/route/route_place.hpp"
+#include "panonav/route/route_position.hpp"
 
 namespace panonav {
 

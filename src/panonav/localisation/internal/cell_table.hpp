@@ -14,16 +14,16 @@ struct GridCell {
   friend bool operator==(const GridCell&, const GridCell&) = default;
 };
 
-/// The whole number at or below `cells`, within -limit .. limit: places beyond any map share the
-/// outermost cell, and no number is in it too.
+/// Returns the largest integer not above `cells`, within -limit .. limit: positions beyond any map,
+/// and no number, fall into the outermost cell.
 [[nodiscard]] inline std::int32_t cell_index(double cells, double limit) noexcept {
   const double far = cells < limit ? (cells > -limit ? cells : -limit) : limit;
   const auto towards_zero = static_cast<std::int32_t>(far);  // faster than floor
   return towards_zero - (static_cast<double>(towards_zero) > far ? 1 : 0);
 }
 
-/// The cells of a grid in which there is something, numbered from 0 in the order in which they were
-/// added. Open addressing, because it is asked for each particle.
+/// The occupied cells of a grid, numbered from 0 in the order in which they were added. Open
+/// addressing, as it is searched for each particle.
 class CellTable {
  public:
   [[nodiscard]] std::size_t size() const noexcept { return cells_.size(); }
@@ -32,8 +32,8 @@ class CellTable {
     const std::uint32_t number = slots_[slot_of(cell)];
     return number == none ? std::nullopt : std::optional(number);
   }
-  /// Adds the cell when it is not there.
-  std::uint32_t number_of(GridCell cell) {
+  /// Returns the number of the cell; adds it when it is not there.
+  std::uint32_t find_or_add(GridCell cell) {
     const std::size_t slot = slot_of(cell);
     if (slots_[slot] != none) return slots_[slot];
     const auto added = static_cast<std::uint32_t>(cells_.size());
@@ -49,7 +49,7 @@ class CellTable {
  private:
   static constexpr std::uint32_t none = 0xFFFFFFFF;
 
-  /// Where the cell is, or where it would be.
+  /// Returns the slot of the cell, or the one where it would be.
   [[nodiscard]] std::size_t slot_of(GridCell cell) const noexcept {
     std::uint64_t hash = static_cast<std::uint32_t>(cell.x) * 0x9E3779B97F4A7C15ULL;
     hash = (hash ^ static_cast<std::uint32_t>(cell.y)) * 0xBF58476D1CE4E5B9ULL;

@@ -11,16 +11,17 @@ namespace panonav {
 
 namespace {
 
-// Least weight of new particles, in particles' worth: less is none. Chosen.
+/// Smallest weight of new particles, in particles: below half of one none is drawn.
 constexpr double min_injected_particles = 0.5;
-// Share of the particles that are replaced: that of the weight times the factor, so that a tenth of
-// the old ones stays where they have none; at least the other number. Chosen.
+/// Share of the particles that are replaced, as a multiple of the new particles' weight: a tenth of
+/// the old ones stays where they have no weight left.
 constexpr double replaced_share_factor = 0.9;
+/// Smallest such share: 250 of 5000 particles cover the places that explain a view.
 constexpr double min_replaced_share = 0.05;
-// Log-likelihood by which a drawn particle may be less likely than the best place; below it all
-// weigh alike, 1 : 8000. Chosen.
+/// Log-likelihood by which a drawn particle may be less likely than the best place; below it all
+/// weigh alike, 1 : 8000, so that none vanishes.
 constexpr double max_log_loss = 9.0;
-// Log-likelihood ratios beyond it decide alone; so that exponentials stay finite.
+/// Larger log-likelihood ratios decide alone; keeps exponentials finite.
 constexpr double max_log_odds = 50.0;
 
 double sum_of(const std::vector<double>& values) {
@@ -29,8 +30,8 @@ double sum_of(const std::vector<double>& values) {
   return sum;
 }
 
-/// The numbers of the `count` lightest particles, in no order.
-std::vector<std::size_t> lightest_of(const Particles& particles, std::size_t count) {
+/// Returns the numbers of the `count` lightest particles, in no order.
+std::vector<std::size_t> find_lightest(const Particles& particles, std::size_t count) {
   std::vector<std::size_t> order(particles.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
   const auto end = order.begin() + static_cast<std::ptrdiff_t>(count);
@@ -62,10 +63,10 @@ bool ExplainedInjection::find_places(const Particles& particles, Random& random)
   }
   if (places_.empty()) return false;
   likelihoods_.resize(poses.size());
-  likelihood_->log_ratios(poses, likelihoods_);
+  likelihood_->compute_log_ratios(poses, likelihoods_);
   log_largest_ = std::max(0.0, *std::ranges::max_element(likelihoods_));
   for (double& value : likelihoods_) value = std::exp(value - log_largest_);
-  // Anywhere else, and in any other heading, nothing explains the view.
+  // In all other places and headings the view is unexplained.
   const double share = heading_share_ / static_cast<double>(sites.size());
   const double unexplained = std::max(0.0, 1.0 - share * static_cast<double>(likelihoods_.size()));
   log_evidence_ =
@@ -75,13 +76,13 @@ bool ExplainedInjection::find_places(const Particles& particles, Random& random)
 
 Particles ExplainedInjection::draw(const Particles& particles, std::size_t count,
                                    Random& random) const {
-  const std::vector<std::size_t> drawn = low_variance_resample(likelihoods_, count, random);
+  const std::vector<std::size_t> drawn = resample_systematically(likelihoods_, count, random);
   Particles fresh;
   for (const std::size_t d : drawn) {
     fresh.add(sampler_->draw_around(places_[d], particles, random), 0.0);
   }
   std::vector<double> log_ratios(fresh.size());
-  likelihood_->log_ratios(fresh, log_ratios);
+  likelihood_->compute_log_ratios(fresh, log_ratios);
   for (std::size_t n = 0; n < fresh.size(); ++n) {
     fresh.weight[n] =
         std::exp(std::max(log_ratios[n] - log_largest_, -max_log_loss)) / likelihoods_[drawn[n]];
@@ -95,7 +96,7 @@ int ExplainedInjection::inject(Particles& particles, double probability, Random&
   const double replaced = std::max(min_replaced_share, replaced_share_factor * probability) * size;
   const auto count = static_cast<std::size_t>(std::max(1L, std::lround(replaced)));
   const Particles fresh = draw(particles, count, random);
-  const std::vector<std::size_t> lightest = lightest_of(particles, fresh.size());
+  const std::vector<std::size_t> lightest = find_lightest(particles, fresh.size());
   for (std::size_t n = 0; n < fresh.size(); ++n) particles.set(lightest[n], fresh.pose(n), 0.0);
   const double kept = sum_of(particles.weight);
   for (double& weight : particles.weight) weight *= kept > 0.0 ? (1.0 - probability) / kept : 0.0;

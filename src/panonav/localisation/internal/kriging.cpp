@@ -13,10 +13,9 @@ namespace panonav {
 
 namespace {
 
-// Spacings within which references are next to each other: the neighbours on a grid, diagonal ones
-// included.
+/// Spacings within which references are neighbours on a grid, diagonal ones included.
 constexpr double adjacent_spacings = 1.5;
-// A straight edge leaves half a turn free around the nearest reference; for rounding.
+/// Rounding of the half circle that a straight edge leaves free around the nearest reference.
 constexpr double edge_tolerance_rad = radians(1.0);
 
 // Differences are means of roots; their squares grow with the distance.
@@ -56,13 +55,13 @@ ResemblingViews compare_with_each_other(const ColumnRanking& ranking,
 }
 
 double ratio_to_elsewhere(const ResemblingViews& near, double spacing_m) {
-  double least = std::numeric_limits<double>::infinity();
+  double min_elsewhere = std::numeric_limits<double>::infinity();
   for (std::size_t i = 1; i < near.views.size(); ++i) {
     if (distance(near.positions[i], near.positions[0]) <= elsewhere_spacings * spacing_m) continue;
-    least = std::min(least, near.to_query(static_cast<Eigen::Index>(i)));
+    min_elsewhere = std::min(min_elsewhere, near.to_query(static_cast<Eigen::Index>(i)));
   }
-  if (!(least < std::numeric_limits<double>::infinity())) return 0.0;
-  return least > 0.0 ? std::sqrt(near.to_query(0) / least) : 1.0;
+  if (!(min_elsewhere < std::numeric_limits<double>::infinity())) return 0.0;
+  return min_elsewhere > 0.0 ? std::sqrt(near.to_query(0) / min_elsewhere) : 1.0;
 }
 
 bool is_surrounded(const ResemblingViews& near, double spacing_m) {
@@ -103,7 +102,7 @@ KrigedPosition krige(const ResemblingViews& near, double neighbourhood_m, double
       matrix(i, j) = variogram(near.between(a, static_cast<Eigen::Index>(result.used[j])));
     }
   }
-  // Of least norm: references with equal signatures share their weight.
+  // The solution of least norm: references with equal signatures share their weight.
   const Eigen::VectorXd solution = matrix.completeOrthogonalDecomposition().solve(right);
   double total = 0.0;
   for (Eigen::Index i = 0; i < size; ++i) total += solution(i);

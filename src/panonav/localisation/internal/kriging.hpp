@@ -10,11 +10,11 @@
 
 namespace panonav {
 
-/// Share of the typical kriging variance that stays even where the query equals a reference: noise
-/// of the sensor. Chosen.
+/// Share of the typical kriging variance that remains where the query equals a reference: noise of
+/// the sensor. Chosen by tests/localisation/position_model_test.cpp, where the radius holds 95 %.
 inline constexpr double min_variance_share = 0.1;
-/// Spacings of the references beyond which a place is elsewhere: farther than any neighbourhood of
-/// a place on a grid.
+/// Spacings of the references beyond which a place is elsewhere: farther than the neighbours of a
+/// place on a grid.
 inline constexpr double elsewhere_spacings = 3.0;
 
 /// Posed views that resemble a query, the best match first.
@@ -22,28 +22,28 @@ struct ResemblingViews {
   std::vector<ViewId> views;
   std::vector<Point2> positions;
   Eigen::VectorXd to_query;  ///< squared differences of columns
-  /// The same between the views. (i, j): view j asked, view i the reference. Comparing columns is
-  /// not quite symmetric, and only so is the answer to view j view j.
+  /// The same between the views. (i, j): view j is the query, view i the reference. Comparing
+  /// columns is not quite symmetric; in this order the answer to view j is view j.
   Eigen::MatrixXd between;
 };
 /// Compares the first `PositionModel::candidates` posed views of the matches with each other.
 [[nodiscard]] ResemblingViews compare_with_each_other(const ColumnRanking& ranking,
                                                       std::span<const RankedMatch> matches);
 
-/// Ratio of the best match's difference to that of the best match elsewhere; 0 where there is no
-/// other.
+/// Returns the best match's difference over that of the best match elsewhere; 0 where there is
+/// none.
 [[nodiscard]] double ratio_to_elsewhere(const ResemblingViews& near, double spacing_m);
-/// Whether the references next to the nearest one that look like the query stand all around it.
+/// True if similar references stand all around the nearest one.
 [[nodiscard]] bool is_surrounded(const ResemblingViews& near, double spacing_m);
 
 /// A position by ordinary kriging.
 struct KrigedPosition {
   Point2 position;
-  double variance = 0.0;  ///< in units of the variogram
-  std::vector<std::size_t> used;
-  std::vector<double> weights;
+  double variance = 0.0;          ///< in units of the variogram
+  std::vector<std::size_t> used;  ///< numbers of the resembling views
+  std::vector<double> weights;    ///< of these
 };
-/// Takes part in it what lies within `neighbourhood_m` of the best match; the variogram is the
+/// Interpolates over the views within `neighbourhood_m` of the best match; the variogram is the
 /// squared difference over `unit`, to the power of `exponent`.
 [[nodiscard]] KrigedPosition krige(const ResemblingViews& near, double neighbourhood_m,
                                    double exponent, double unit);

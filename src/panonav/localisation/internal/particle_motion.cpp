@@ -13,18 +13,19 @@ namespace panonav {
 
 namespace {
 
-constexpr std::size_t most = 128;  // at a time, so that all stays in the first-level cache
-using Numbers = std::array<double, most>;
+/// Particles at a time, so that all data stay in the first-level cache.
+constexpr std::size_t block_size = 128;
+using Numbers = std::array<double, block_size>;
 
 void move_block(const kernels::PoseColumns& poses, const StepSampler& sampler, Random& random) {
   const std::size_t count = poses.x_m.size();
   const kernels::Instructions instructions = kernels::chosen_instructions();
-  std::array<std::uint64_t, most> bits, further_bits;
+  std::array<std::uint64_t, block_size> bits, further_bits;
   for (std::size_t i = 0; i < count; ++i) {
     bits[i] = random.next();
     if (sampler.holonomic()) further_bits[i] = random.next();
   }
-  std::array<float, most> first, second, third, unused;
+  std::array<float, block_size> first, second, third, unused;
   const auto draw = [&](const auto& from, auto& x, auto& y) {
     kernels::normal_pairs(std::span(from).first(count), std::span(x).first(count),
                           std::span(y).first(count), instructions);
@@ -52,9 +53,9 @@ void move_block(const kernels::PoseColumns& poses, const StepSampler& sampler, R
 }  // namespace
 
 void move_particles(Particles& particles, const StepSampler& sampler, Random& random) {
-  for (std::size_t begin = 0; begin < particles.size(); begin += most) {
+  for (std::size_t begin = 0; begin < particles.size(); begin += block_size) {
     const auto part = [begin](std::vector<double>& column) {
-      return std::span(column).subspan(begin, std::min(most, column.size() - begin));
+      return std::span(column).subspan(begin, std::min(block_size, column.size() - begin));
     };
     move_block({part(particles.x_m), part(particles.y_m), part(particles.heading_rad)}, sampler,
                random);

@@ -1,14 +1,14 @@
 #pragma once
 
 #include "panonav/core/random.hpp"
-#include "panonav/localisation/particle_modes.hpp"
+#include "panonav/localisation/particles.hpp"
 #include "panonav/motion/odometry.hpp"
 
 namespace panonav {
 
-/// Moves each particle by a draw of its own, as `StepSampler::move` one after the other: the same
-/// random numbers, the same poses to six digits. Same particles and generator: same bits on every
-/// machine. Cost: 10 ns a particle with AVX-512.
+/// Moves each particle by a draw of its own, as `StepSampler::move` would one after the other: the
+/// same random numbers, the same poses to six digits. Same particles and generator: same bits on
+/// every machine. Cost: 10 ns a particle with AVX-512.
 void move_particles(Particles& particles, const StepSampler& sampler, Random& random);
 
 }  // namespace panonav

@@ -10,29 +10,31 @@ namespace panonav {
 
 namespace {
 
-// Stages of one view; the last one takes all that is left of it. Chosen.
+/// Stages of one view; the last one takes all that is left of it. Chosen by the rooms of
+/// tests/localisation/monte_carlo_test.cpp, where no view needs more.
 constexpr int max_stages = 6;
-// Particles that stand for one mode in three dimensions, at which a stage stops: chosen, the
-// default of `MonteCarloOptions::min_particles`. Of few particles a third counts.
+/// Effective sample size below which a stage stops: particles that represent one mode in three
+/// dimensions, the default of `MonteCarloOptions::min_particles`; a third of few particles.
 constexpr double min_effective_sample_size = 200.0;
 constexpr double min_effective_share = 1.0 / 3.0;
-// Halvings in the search for a stage's exponent, and its least share of what is left: chosen.
+/// Halvings in the search for a stage's exponent: it is found to 1/64 of what is left.
 constexpr int exponent_halvings = 6;
+/// Smallest share of what is left that a stage takes: the resolution of that search.
 constexpr double min_exponent_share = 1.0 / 64.0;
-// What is left of the exponent is rounding below this.
+/// A rest of the exponent below it is rounding.
 constexpr double exponent_tolerance = 1e-9;
-// Below this sum of weights, all particles that explain the view had lost their weight: the least
-// exponential of the kernel is 1e-38.
+/// Sum of weights below which no particle explains the view: the smallest exponential of the kernel
+/// is 1e-38.
 constexpr double min_weight_sum = 1e-37;
-// From this exponent on, the stages tell more of a view's likelihood than the first particles do,
-// which may all miss a narrow maximum: chosen.
-constexpr double min_telling_exponent = 0.2;
+/// Smallest exponent at which the stages estimate a view's likelihood better than the first
+/// particles, which may all miss a narrow maximum; below it the estimate is extrapolated fivefold.
+constexpr double min_evidence_exponent = 0.2;
 
 }  // namespace
 
-double ParticleWeighing::take_log_ratios(const Particles& particles, ViewLikelihood& likelihood) {
+double ParticleWeighing::update_log_ratios(const Particles& particles, ViewLikelihood& likelihood) {
   log_ratios_.resize(particles.size());
-  likelihood.log_ratios(particles, log_ratios_);
+  likelihood.compute_log_ratios(particles, log_ratios_);
   const double largest = *std::ranges::max_element(log_ratios_);
   log_ratios_below_max_.resize(log_ratios_.size());
   std::ranges::transform(log_ratios_, log_ratios_below_max_.begin(),
@@ -40,8 +42,8 @@ double ParticleWeighing::take_log_ratios(const Particles& particles, ViewLikelih
   return largest;
 }
 
-ParticleWeighing::WeightSums ParticleWeighing::make_factors(const Particles& particles,
-                                                            double exponent) {
+ParticleWeighing::WeightSums ParticleWeighing::update_factors(const Particles& particles,
+                                                              double exponent) {
   factors_.resize(log_ratios_.size());
   kernels::exponentials(log_ratios_below_max_, static_cast<float>(exponent), factors_,
                         kernels::chosen_instructions());
@@ -62,16 +64,16 @@ ParticleWeighing::WeightSums ParticleWeighing::temper_to_min_effective_sample_si
     return sums.weights * sums.weights >= min_size * sums.squares;
   };
   const double largest = exponent;
-  const WeightSums sums = make_factors(particles, largest);
+  const WeightSums sums = update_factors(particles, largest);
   if (is_large_enough(sums)) return sums;
   double low = 0.0;
   double high = largest;
   for (int i = 0; i < exponent_halvings; ++i) {
     const double middle = 0.5 * (low + high);
-    (is_large_enough(make_factors(particles, middle)) ? low : high) = middle;
+    (is_large_enough(update_factors(particles, middle)) ? low : high) = middle;
   }
   exponent = std::max(low, min_exponent_share * largest);
-  return make_factors(particles, exponent);
+  return update_factors(particles, exponent);
 }
 
 double ParticleWeighing::weigh(Particles& particles, ViewLikelihood& likelihood, double exponent,
@@ -80,13 +82,13 @@ double ParticleWeighing::weigh(Particles& particles, ViewLikelihood& likelihood,
   double evidence_of_first = 0.0;
   double left = exponent;
   for (int stage = 0; stage < max_stages; ++stage) {
-    const double largest = take_log_ratios(particles, likelihood);
+    const double largest = update_log_ratios(particles, likelihood);
     if (stage == 0) {
-      evidence_of_first = largest + std::log(make_factors(particles, 1.0).weights);
+      evidence_of_first = largest + std::log(update_factors(particles, 1.0).weights);
     }
     double part = left;
     const bool is_last = stage + 1 == max_stages;
-    const double sum = (is_last ? make_factors(particles, part)
+    const double sum = (is_last ? update_factors(particles, part)
                                 : temper_to_min_effective_sample_size(particles, part))
                            .weights;
     if (!(sum > min_weight_sum)) {
@@ -102,8 +104,8 @@ double ParticleWeighing::weigh(Particles& particles, ViewLikelihood& likelihood,
     resample_and_spread(particles, bins, random);
     likelihood.arrange(particles);
   }
-  return exponent >= min_telling_exponent ? std::max(evidence_of_first, evidence / exponent)
-                                          : evidence_of_first;
+  return exponent >= min_evidence_exponent ? std::max(evidence_of_first, evidence / exponent)
+                                           : evidence_of_first;
 }
 
 }  // namespace panonav

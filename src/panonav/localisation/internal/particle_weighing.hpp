@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "panonav/core/random.hpp"
+#include "panonav/localisation/internal/particle_modes.hpp"
 #include "panonav/localisation/internal/view_likelihood.hpp"
-#include "panonav/localisation/particle_modes.hpp"
 
 namespace panonav {
 
@@ -13,25 +13,25 @@ namespace panonav {
 /// Oudjane and Le Gland 2001). Keeps its buffers from view to view.
 class ParticleWeighing {
  public:
-  /// Multiplies the weights by the likelihood of the view that `likelihood` holds, to the power of
+  /// Multiplies the weights by the likelihood of the view of `likelihood`, to the power of
   /// `exponent`, > 0 and <= 1, and normalises them. Returns the logarithm of the mean likelihood
-  /// over that of a view that nothing explains. The particles are arranged
-  /// (`ViewLikelihood::arrange`). `bins`: of the modes within which they are spread.
+  /// over that of an unexplained view. The particles must be arranged (`ViewLikelihood::arrange`).
+  /// `bins`: of the modes within which they are spread.
   double weigh(Particles& particles, ViewLikelihood& likelihood, double exponent,
                const PoseBins& bins, Random& random);
 
  private:
-  /// Sums over the particles after their weights were multiplied.
+  /// Sums over the particles with multiplied weights.
   struct WeightSums {
     double weights = 0.0;
     double squares = 0.0;
   };
-  /// Takes the log-likelihoods at the particles; returns the largest of them.
-  double take_log_ratios(const Particles& particles, ViewLikelihood& likelihood);
-  /// Makes the factors by which the likelihood to the power of `exponent` multiplies the weights.
-  WeightSums make_factors(const Particles& particles, double exponent);
-  /// The same with the largest exponent up to the given one after which the effective sample size
-  /// is still large enough; lowers `exponent` to it.
+  /// Computes the log-likelihoods at the particles; returns the largest of them.
+  double update_log_ratios(const Particles& particles, ViewLikelihood& likelihood);
+  /// Computes the factors by which the likelihood to the power of `exponent` multiplies the
+  /// weights.
+  WeightSums update_factors(const Particles& particles, double exponent);
+  /// Lowers `exponent` until the effective sample size is large enough, and computes the factors.
   WeightSums temper_to_min_effective_sample_size(const Particles& particles, double& exponent);
 
   std::vector<double> log_ratios_;           // of the particles

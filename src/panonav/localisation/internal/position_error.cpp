@@ -22,14 +22,14 @@ void PositionError::observe(double before_m2, double after_m2, double share, dou
                             double effective) {
   const double ratio = before_m2 > 0.0 ? after_m2 / before_m2 : 1.0;
   const double kept = std::min(1.0, ratio);
-  const double taken = 1.0 - kept;
-  // Particles that a view spreads, where it moves them to another place, are no surer.
+  const double gain = 1.0 - kept;
+  // Particles that a view moves to another place spread; the error grows with them.
   const double error_m2 = variance_at(before_m2) * std::max(1.0, ratio);
   const double with_view_m2 = last_ ? correlation * last_->of_error_and_view_m2 : 0.0;
-  // The particles say that the view's share has the variance after / taken, and so the whole view
-  // `share` times that.
+  // By the particles the view's share has the variance after / gain, and so the whole view `share`
+  // times that.
   last_ = {after_m2,
-           kept * kept * error_m2 + taken * share * after_m2 + 2.0 * kept * taken * with_view_m2 +
+           kept * kept * error_m2 + gain * share * after_m2 + 2.0 * kept * gain * with_view_m2 +
                after_m2 / effective,
            kept * with_view_m2 + share * after_m2};
   per_scale_m_ = {kept * per_scale_m_.x_m, kept * per_scale_m_.y_m};
@@ -44,8 +44,9 @@ double PositionError::variance_at(double particles_m2) const {
   return last_->of_error_m2 * particles_m2 / last_->of_particles_m2;
 }
 
-std::array<double, 9> PositionError::stated(std::array<double, 9> particles, double heading_rad,
-                                            double translation_scale_error) const {
+std::array<double, 9> PositionError::corrected_covariance(std::array<double, 9> particles,
+                                                          double heading_rad,
+                                                          double translation_scale_error) const {
   std::array<double, 9> covariance = particles;
   const double particles_m2 = particles[0] + particles[4];
   if (particles_m2 > 0.0) {

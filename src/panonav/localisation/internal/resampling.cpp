@@ -20,8 +20,8 @@ double effective_sample_size(std::span<const double> weights) {
   return squares > 0.0 ? sum * sum / squares : 0.0;
 }
 
-std::vector<std::size_t> low_variance_resample(std::span<const double> weights, std::size_t count,
-                                               Random& random) {
+std::vector<std::size_t> resample_systematically(std::span<const double> weights, std::size_t count,
+                                                 Random& random) {
   double sum = 0.0;
   for (const double weight : weights) {
     require(std::isfinite(weight) && weight >= 0.0, "weight of a particle", weight, ">= 0");
@@ -44,7 +44,7 @@ std::vector<std::size_t> low_variance_resample(std::span<const double> weights, 
 }
 
 void resample_particles(Particles& particles, std::size_t count, Random& random) {
-  const auto survivors = low_variance_resample(particles.weight, count, random);
+  const auto survivors = resample_systematically(particles.weight, count, random);
   Particles next;
   next.resize(count);
   for (std::size_t i = 0; i < count; ++i) {
@@ -55,7 +55,7 @@ void resample_particles(Particles& particles, std::size_t count, Random& random)
 
 void resample_and_spread(Particles& particles, const PoseBins& bins, Random& random) {
   const std::size_t count = particles.size();
-  const auto survivors = low_variance_resample(particles.weight, count, random);
+  const auto survivors = resample_systematically(particles.weight, count, random);
   const ParticleModes found = find_modes(particles, bins);
   std::vector<std::size_t> members(found.modes.size());
   for (const std::size_t s : survivors) {

@@ -13,14 +13,15 @@ namespace panonav {
 
 namespace {
 
-constexpr double near_spacings = 2.0;  // beyond the border of the references too, twelve are near
-
-// Mean distance of a place in a square of a grid from the nearest corner.
+/// Reach of the references near a cell in spacings: twelve lie in it beyond the border of the
+/// references, too.
+constexpr double near_spacings = 2.0;
+/// Mean distance of a position in a square of a grid from the nearest corner, in spacings.
 constexpr double nearest_spacings = 0.3826;
-
-constexpr std::size_t max_near = 12;  // a grid's square and the ring around it
-constexpr auto lanes_of_all = static_cast<std::size_t>(kernels::similarity_lanes);
-static_assert(max_near <= lanes_of_all);
+/// References near a cell: a grid's square and the ring around it.
+constexpr std::size_t max_near = 12;
+constexpr auto lane_count = static_cast<std::size_t>(kernels::similarity_lanes);
+static_assert(max_near <= lane_count);
 
 }  // namespace
 
@@ -70,21 +71,21 @@ void ViewLikelihood::index_sites() {
   for (std::size_t i = 0; i < entries.size();) {
     const GridCell place{std::get<0>(entries[i]), std::get<1>(entries[i])};
     Cell cell{place, static_cast<std::uint32_t>(near_.size()), 0, 0, 0};
-    std::size_t taken = 0;
+    std::size_t count = 0;
     for (; i < entries.size() && std::get<0>(entries[i]) == place.x &&
            std::get<1>(entries[i]) == place.y;
          ++i) {
-      if (taken++ < max_near) near_.push_back(std::get<3>(entries[i]));
+      if (count++ < max_near) near_.push_back(std::get<3>(entries[i]));
     }
     cell.end = static_cast<std::uint32_t>(near_.size());
-    table_.number_of(place);
+    table_.find_or_add(place);
     cells_.push_back(cell);
   }
   group_of_cell_.assign(cells_.size() + 1, 0);
 }
 
 GridCell ViewLikelihood::cell_of(Point2 position) const noexcept {
-  constexpr double limit = 2e9;  // farther than any memory reaches all places are alike
+  constexpr double limit = 2e9;  // farther than any memory reaches
   return {cell_index(position.x_m * cells_per_metre_, limit),
           cell_index(position.y_m * cells_per_metre_, limit)};
 }
@@ -93,13 +94,13 @@ Point2 ViewLikelihood::centre_of(GridCell cell) const noexcept {
   return {(cell.x + 0.5) * cell_m_, (cell.y + 0.5) * cell_m_};
 }
 
-void ViewLikelihood::begin(const PackedSignature& view) {
+void ViewLikelihood::set_view(const PackedSignature& view) {
   const SignatureShape shape = ranking_->memory().shape();
   if (view.shape != shape) {
     throw ContractError("rows of the view's signature", view.shape.rows,
                         to_text(shape.rows) + " with " + to_text(shape.components) + " components");
   }
-  asked_.emplace(view, ranking_->components());
+  view_.emplace(view, ranking_->components());
   compared_sites_.clear();
   max_similarity_ = 0.0;
   fall_.blur_square_m2 = 0.0F;
@@ -111,7 +112,7 @@ void ViewLikelihood::begin(const PackedSignature& view) {
 double ViewLikelihood::compare(std::uint32_t site) {
   Site& s = sites_[site];
   if (s.compared_at == number_) return differences_[site];
-  const auto [match, other] = match_columns_twice(*asked_, profiles_[site]);
+  const auto [match, other] = match_columns_twice(*view_, profiles_[site]);
   const double far = model_.far_difference;
   s.compared_at = number_;
   const auto similarity_of = [far](const ColumnMatch& m) {
@@ -138,28 +139,28 @@ double ViewLikelihood::compare(std::uint32_t site) {
 }
 
 std::optional<double> ViewLikelihood::min_difference(std::span<const std::uint32_t> sites) const {
-  std::optional<double> least;
+  std::optional<double> smallest;
   for (const std::uint32_t site : sites) {
-    if (!compared(site)) continue;
+    if (!is_compared(site)) continue;
     const double difference = differences_[site];
-    if (!least || difference < *least) least = difference;
+    if (!smallest || difference < *smallest) smallest = difference;
   }
-  return least;
+  return smallest;
 }
 
-const kernels::SimilarityLanes& ViewLikelihood::lanes_of(Cell& cell) {
+const kernels::SimilarityLanes& ViewLikelihood::get_or_create_lanes(Cell& cell) {
   if (cell.lanes_revision == revision_) return lanes_[cell.lanes];
   cell.lanes_revision = revision_;
   cell.lanes = static_cast<std::uint32_t>(lanes_.size());
   kernels::SimilarityLanes& lanes = lanes_.emplace_back();
-  for (std::size_t i = 0; i < lanes_of_all; ++i) {
+  for (std::size_t i = 0; i < lane_count; ++i) {
     lanes.x_m[i] = 1e6F / fall_.per_metre;
     lanes.y_m[i] = lanes.heading_rad[i] = lanes.per_square_turn[i] = 0.0F;
     lanes.other_heading_rad[i] = 0.0F;
     lanes.log_similarity[i] = lanes.other_log_similarity[i] =
         -std::numeric_limits<float>::infinity();
   }
-  // Small numbers, wherever on Earth the origin is.
+  // Relative to the cell, so that numbers are small wherever the origin is.
   const Point2 centre = centre_of(cell.place);
   const auto per_square_turn =
       static_cast<float>(-0.5 / (model_.heading_width_rad * model_.heading_width_rad));
@@ -178,11 +179,11 @@ const kernels::SimilarityLanes& ViewLikelihood::lanes_of(Cell& cell) {
   return lanes;
 }
 
-void ViewLikelihood::log_ratios(const Particles& particles, std::span<double> ratios) {
+void ViewLikelihood::compute_log_ratios(const Particles& particles, std::span<double> ratios) {
   if (particles.empty()) return;
-  // Particles of one cell that follow each other are handed on together.
-  constexpr std::size_t most = 128;
-  std::array<float, most> x_m, y_m, heading_rad, explained;
+  // Successive particles of one cell are passed on together.
+  constexpr std::size_t block_size = 128;
+  std::array<float, block_size> x_m, y_m, heading_rad, explained;
   std::size_t begin = 0;
   auto next = cell_of(particles.position(0));
   while (begin < particles.size()) {
@@ -196,12 +197,12 @@ void ViewLikelihood::log_ratios(const Particles& particles, std::span<double> ra
       ++count;
       if (begin + count == particles.size()) break;
       next = cell_of(particles.position(begin + count));
-    } while (count < most && next == place);
+    } while (count < block_size && next == place);
     if (const auto cell = table_.find(place)) {
-      kernels::explain_similarity(lanes_of(cells_[*cell]), fall_, std::span(x_m).first(count),
-                                  std::span(y_m).first(count), std::span(heading_rad).first(count),
-                                  std::span(explained).first(count),
-                                  kernels::chosen_instructions());
+      kernels::explain_similarity(
+          get_or_create_lanes(cells_[*cell]), fall_, std::span(x_m).first(count),
+          std::span(y_m).first(count), std::span(heading_rad).first(count),
+          std::span(explained).first(count), kernels::chosen_instructions());
     } else {
       explained.fill(0.0F);
     }
@@ -218,7 +219,7 @@ std::span<const std::uint32_t> ViewLikelihood::sites_near(Point2 position) const
   return std::span(near_).subspan(cells_[*cell].begin, cells_[*cell].end - cells_[*cell].begin);
 }
 
-void ViewLikelihood::group(const Particles& particles) {
+void ViewLikelihood::group_particles(const Particles& particles) {
   groups_.clear();
   group_of_.resize(particles.size());
   GridCell last;
@@ -242,7 +243,7 @@ void ViewLikelihood::group(const Particles& particles) {
 }
 
 void ViewLikelihood::arrange(Particles& particles) {
-  group(particles);
+  group_particles(particles);
   std::uint32_t begin = 0;
   for (Group& group : groups_) {
     const std::uint32_t count = group.count;
@@ -256,9 +257,10 @@ void ViewLikelihood::arrange(Particles& particles) {
   std::swap(particles, arranged_);
 }
 
-std::vector<std::uint32_t> ViewLikelihood::sites_near_most(const Particles& particles,
-                                                           std::size_t most, double least) {
-  group(particles);
+std::vector<std::uint32_t> ViewLikelihood::heaviest_sites(const Particles& particles,
+                                                          std::size_t max_sites,
+                                                          double min_weight) {
+  group_particles(particles);
   std::vector<double> mass(sites_.size());
   std::vector<std::uint32_t> found;
   for (const Group& group : groups_) {
@@ -269,13 +271,13 @@ std::vector<std::uint32_t> ViewLikelihood::sites_near_most(const Particles& part
       mass[near_[i]] += group.weight;
     }
   }
-  std::erase_if(found, [&](std::uint32_t site) { return mass[site] < least; });
-  most = std::min(most, found.size());
-  std::partial_sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(most), found.end(),
-                    [&](std::uint32_t a, std::uint32_t b) {
+  std::erase_if(found, [&](std::uint32_t site) { return mass[site] < min_weight; });
+  max_sites = std::min(max_sites, found.size());
+  std::partial_sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(max_sites),
+                    found.end(), [&](std::uint32_t a, std::uint32_t b) {
                       return mass[a] != mass[b] ? mass[a] > mass[b] : a < b;
                     });
-  found.resize(most);
+  found.resize(max_sites);
   return found;
 }
 

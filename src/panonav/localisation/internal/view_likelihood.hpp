@@ -9,22 +9,22 @@
 #include "panonav/localisation/column_ranking.hpp"
 #include "panonav/localisation/internal/cell_table.hpp"
 #include "panonav/localisation/observation_model.hpp"
-#include "panonav/localisation/particle_modes.hpp"
+#include "panonav/localisation/particles.hpp"
 #include "panonav/memory/visual_memory.hpp"
 
 namespace panonav {
 
-/// How well one view fits at any pose, also between references (`ObservationModel`).
+/// Likelihood of one view at any pose, also between references (`ObservationModel`).
 ///
-/// The similarity of the view to the references around a pose is correlated with what is expected
-/// there, exp(-distance / range): with amplitude a free, least squares explain
+/// The similarity of the view to the references around a pose is correlated with the expected one,
+/// exp(-distance / range): with amplitude a free, least squares explain
 /// (sum similarity expected)^2 / sum expected^2 of the squared similarity. A heading that differs
-/// from what a reference tells takes that reference's similarity away. References that were not
-/// compared count as unlike.
+/// from that of a reference takes the reference's similarity away. References that were not
+/// compared count as dissimilar.
 class ViewLikelihood {
  public:
-  /// Over the posed views of the ranking's memory; the ranking must outlive *this. Cost: linear in
-  /// them. `compass` false: headings do not count.
+  /// Covers the posed views of the ranking's memory; the ranking must outlive *this. Without
+  /// `compass` headings do not count. Cost: linear in the views.
   ViewLikelihood(const ColumnRanking& ranking, const ObservationModel& model, bool compass);
 
   /// The position of a posed view.
@@ -32,53 +32,54 @@ class ViewLikelihood {
     ViewId view;
     Point2 position;
     float reference_heading_rad;  ///< NaN: not known
-    float heading_rad;  ///< absolute, of the robot that took the view compared; NaN: not known
-    float similarity;   ///< 0: unlike, or not compared
+    float heading_rad;  ///< absolute, of the robot that took the compared view; NaN: not known
+    float similarity;   ///< 0: dissimilar, or not compared
     float log_similarity;
-    float other_heading_rad;  ///< the second heading that fits (`match_columns_twice`), and
-    float other_similarity;   ///< the similarity then
+    float other_heading_rad;  ///< the second heading that fits (`match_columns_twice`)
+    float other_similarity;   ///< in the second heading
     float other_log_similarity;
-    std::uint32_t compared_at;  ///< number of the view that it was compared with
+    std::uint32_t compared_at;  ///< number of the view with which it was compared
   };
 
-  /// Forgets the last view. Throws ContractError on a signature of another shape.
-  void begin(const PackedSignature& view);
-  /// Compares the view with a site's reference, unless it was; returns their difference. Cost: 1
+  /// Sets the view to compare. Throws ContractError on a signature of another shape.
+  void set_view(const PackedSignature& view);
+  /// Returns the difference of the view and a site's reference; compares them if needed. Cost: 1
   /// microsecond.
   double compare(std::uint32_t site);
-  [[nodiscard]] bool compared(std::uint32_t site) const noexcept {
+  [[nodiscard]] bool is_compared(std::uint32_t site) const noexcept {
     return sites_[site].compared_at == number_;
   }
+  /// Smallest difference to those of the sites that were compared; nullopt when none was.
   [[nodiscard]] std::optional<double> min_difference(std::span<const std::uint32_t> sites) const;
 
-  /// Log-likelihood of the view at each pose, over that of a view which no reference there
-  /// explains; >= 0. Cost: 15 ns a pose where those of one cell follow each other (`arrange`).
-  void log_ratios(const Particles& particles, std::span<double> ratios);
-  /// Changes the order of particles so that those of one cell follow each other. Cost: 10 ns each.
+  /// Computes the log-likelihood of the view at each pose, over that of an unexplained view; >= 0.
+  /// Cost: 15 ns a pose where those of one cell follow each other (`arrange`).
+  void compute_log_ratios(const Particles& particles, std::span<double> ratios);
+  /// Reorders particles so that those of one cell follow each other. Cost: 10 ns each.
   void arrange(Particles& particles);
 
   [[nodiscard]] std::span<const Site> sites() const noexcept { return sites_; }
-  /// Nearest sites of a place, 12 at most; empty far from all references.
+  /// Returns the nearest sites of a position, 12 at most; none far from all references.
   [[nodiscard]] std::span<const std::uint32_t> sites_near(Point2 position) const noexcept;
-  /// The sites near most of the particles' weight, heaviest first: those with at least `least` of
-  /// it around them, `most` at most.
-  [[nodiscard]] std::vector<std::uint32_t> sites_near_most(const Particles& particles,
-                                                           std::size_t most, double least);
+  /// Returns at most `max_sites` sites with at least `min_weight` of the particles around them,
+  /// heaviest first.
+  [[nodiscard]] std::vector<std::uint32_t> heaviest_sites(const Particles& particles,
+                                                          std::size_t max_sites, double min_weight);
   [[nodiscard]] std::optional<std::uint32_t> site_of(ViewId view) const noexcept;
-  /// Compared with the view so far, in the order of comparison.
+  /// The sites compared with the view so far, in the order of comparison.
   [[nodiscard]] std::span<const std::uint32_t> compared_sites() const noexcept {
     return compared_sites_;
   }
 
  private:
-  /// What is near a cell.
+  /// A cell with references near.
   struct Cell {
     GridCell place;
     std::uint32_t begin, end;      ///< in `near_`
-    std::uint32_t lanes_revision;  ///< of the comparisons that `lanes` tells
+    std::uint32_t lanes_revision;  ///< of the comparisons when `lanes` was made
     std::uint32_t lanes;
   };
-  /// Particles of one cell; all that are in no cell are a group too.
+  /// The particles of one cell; all that are in no cell form a group too.
   struct Group {
     std::uint32_t cell;  ///< in `cells_`; their number for no cell
     std::uint32_t count;
@@ -86,10 +87,10 @@ class ViewLikelihood {
   };
   void index_sites();
   /// Fills `groups_`, in the order of their first particles, and `group_of_`.
-  void group(const Particles& particles);
+  void group_particles(const Particles& particles);
   [[nodiscard]] GridCell cell_of(Point2 position) const noexcept;
   [[nodiscard]] Point2 centre_of(GridCell cell) const noexcept;
-  [[nodiscard]] const kernels::SimilarityLanes& lanes_of(Cell& cell);
+  [[nodiscard]] const kernels::SimilarityLanes& get_or_create_lanes(Cell& cell);
 
   const ColumnRanking* ranking_;
   ObservationModel model_;
@@ -101,14 +102,14 @@ class ViewLikelihood {
   CellTable table_;            ///< of the cells with references near
   std::vector<Cell> cells_;    ///< as `table_` numbers them
   std::vector<std::uint32_t> near_;
-  std::vector<kernels::SimilarityLanes> lanes_;  ///< of cells asked for since the last comparison
+  std::vector<kernels::SimilarityLanes> lanes_;  ///< made since the last comparison
   std::vector<Group> groups_;
   std::vector<std::uint32_t> group_of_;       ///< each particle
-  std::vector<std::uint32_t> group_of_cell_;  ///< right only where the group is of the cell
+  std::vector<std::uint32_t> group_of_cell_;  ///< valid only where the group is of the cell
   Particles arranged_;
   std::uint32_t revision_ = 1;
   std::vector<std::uint32_t> compared_sites_;
-  std::optional<ColumnProfiles> asked_;
+  std::optional<ColumnProfiles> view_;
   double max_similarity_ = 0.0;
   kernels::SimilarityLanes::Fall fall_{1.0F, 0.0F};
   std::uint32_t number_ = 0;

@@ -71,7 +71,7 @@ DissimilarityCurve make_first_curve(std::span<const Lattice::Spring> measured,
   std::vector<double> slopes;
   std::vector<double> units;
   for (const auto& spring : measured) {
-    if (!spring.phases || !spring.phases->points || !agrees(spring)) continue;
+    if (!spring.phases || !spring.phases->has_direction || !agrees(spring)) continue;
     if (const NodeMotion* moved = motions.between({spring.a, spring.b})) {
       units.push_back(travel(*moved) / spring.phases->length);
     }
@@ -112,7 +112,8 @@ void fit_phase_unit(std::span<const Lattice::Spring> springs, std::span<const Po
                     Lattice::Errors& errors) {
   std::vector<double> ratios;
   for (const auto& spring : springs) {
-    if (spring.weight < min_curve_weight || !spring.phases || !spring.phases->points) continue;
+    if (spring.weight < min_curve_weight || !spring.phases || !spring.phases->has_direction)
+      continue;
     ratios.push_back(laid_out(poses, spring.a, spring.b) / spring.phases->length);
   }
   if (ratios.empty()) return;

@@ -49,25 +49,25 @@ std::vector<std::size_t> LatticeGraph::components() const {
   return found;
 }
 
-std::vector<double> LatticeGraph::shortest_ways(std::size_t from) const {
-  std::vector<double> ways(size(), std::numeric_limits<double>::infinity());
+std::vector<double> LatticeGraph::shortest_path_lengths(std::size_t from) const {
+  std::vector<double> lengths(size(), std::numeric_limits<double>::infinity());
   using Open = std::pair<double, std::size_t>;
   std::priority_queue<Open, std::vector<Open>, std::greater<>> open;
-  ways.at(from) = 0.0;
+  lengths.at(from) = 0.0;
   open.emplace(0.0, from);
   while (!open.empty()) {
-    const auto [way, node] = open.top();
+    const auto [length, node] = open.top();
     open.pop();
-    if (way > ways[node]) continue;
+    if (length > lengths[node]) continue;
     for (const Neighbour& neighbour : neighbours(node)) {
-      const double longer = way + neighbour.length;
-      if (longer < ways[neighbour.node]) {
-        ways[neighbour.node] = longer;
+      const double longer = length + neighbour.length;
+      if (longer < lengths[neighbour.node]) {
+        lengths[neighbour.node] = longer;
         open.emplace(longer, neighbour.node);
       }
     }
   }
-  return ways;
+  return lengths;
 }
 
 }  // namespace panonav

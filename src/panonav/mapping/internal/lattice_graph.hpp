@@ -19,26 +19,43 @@ class LatticeGraph {
   /// Throws ContractError on a node that is not below `nodes` or a length below 0.
   LatticeGraph(std::size_t nodes, std::span<const GraphEdge> edges);
 
-  /// What an edge leads to.
+  /// An edge as seen from one of its nodes.
   struct Neighbour {
     std::size_t node;  ///< at the other end of the edge
-    std::size_t edge;  ///< its place among the edges given
+    std::size_t edge;  ///< its index among those of the constructor
     double length;     ///< of the edge
   };
   /// Number of nodes.
   [[nodiscard]] std::size_t size() const noexcept { return begins_.size() - 1; }
-  /// Ends of the edges at a node, which the caller guarantees to be there.
+  /// The edges of a node, which the caller guarantees to exist.
   [[nodiscard]] std::span<const Neighbour> neighbours(std::size_t node) const {
     return std::span(neighbours_).subspan(begins_[node], begins_[node + 1] - begins_[node]);
   }
 
-  /// Number of each node's connected component. Components are numbered by size, the largest first,
-  /// then by their first node.
+  /// Returns the number of each node's connected component. Components are numbered by size, the
+  /// largest first, then by their first node.
   [[nodiscard]] std::vector<std::size_t> components() const;
 
-  /// Length of the shortest path from `from` to every node, infinite where there is none
-  /// (Dijkstra).
-  [[nodiscard]] std::vector<double> shortest_ways(std::size_t from) const;
+  /// Returns the length of the shortest path from `from` to every node, infinite where there is
+  /// none (Dijkstra).
+  [[nodiscard]] std::vector<double> shortest_path_lengths(std::size_t from) const;
+
+  /// Calls visit(a, to_b, to_c, ac) for all nodes a, b and c that edges join to each other: `to_b`
+  /// leads from a, `to_c` from b, and `ac` is the number of the edge between a and c.
+  template <class Visit>
+  void visit_triangles(const Visit& visit) const {
+    constexpr auto none = static_cast<std::size_t>(-1);
+    std::vector<std::size_t> edge_to(size(), none);  // from a
+    for (std::size_t a = 0; a < size(); ++a) {
+      for (const Neighbour& to_b : neighbours(a)) edge_to[to_b.node] = to_b.edge;
+      for (const Neighbour& to_b : neighbours(a)) {
+        for (const Neighbour& to_c : neighbours(to_b.node)) {
+          if (edge_to[to_c.node] != none) visit(a, to_b, to_c, edge_to[to_c.node]);
+        }
+      }
+      for (const Neighbour& to_b : neighbours(a)) edge_to[to_b.node] = none;
+    }
+  }
 
  private:
   std::vector<std::size_t> begins_;

@@ -186,12 +186,12 @@ class Grower {
 
 bool fits(const Lattice::Spring& spring, double unit, const Pose2& a, const Pose2& b) {
   if (!spring.phases || !agrees(spring)) return false;
-  const Pose2 said = step_of(spring, unit);
+  const Pose2 said = spring.phases->a_from_b(unit);
   const Pose2 laid_out = inverse(a) * b;
   if (std::abs(angle_difference(said.heading_rad, laid_out.heading_rad)) > turn_tolerance_rad) {
     return false;
   }
-  if (!spring.phases->points) return true;
+  if (!spring.phases->has_direction) return true;
   const double direction_rad = std::atan2(said.y_m, said.x_m);
   const double apart = std::hypot(laid_out.x_m, laid_out.y_m);
   const double length = unit * spring.phases->length;

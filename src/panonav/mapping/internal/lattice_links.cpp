@@ -54,29 +54,19 @@ std::vector<unsigned char> find_supported(std::size_t nodes, std::span<const Lat
                                           std::span<const std::size_t> ranks) {
   std::vector<GraphEdge> edges;
   for (const LatticeLink& link : links) edges.push_back({link.a, link.b, 1.0});
-  const LatticeGraph graph(nodes, edges);
-  std::vector<std::size_t> link_to(nodes, links.size());
   std::vector<unsigned char> supported(links.size());
-  const auto from = [&](std::size_t node, const LatticeLink& link) {
+  const auto step_from = [&](std::size_t node, const LatticeLink& link) {
     return node == link.a ? link.step : inverse(link.step);
   };
-  for (std::size_t a = 0; a < nodes; ++a) {
-    for (const auto& n : graph.neighbours(a)) link_to[n.node] = n.edge;
-    for (const auto& n : graph.neighbours(a)) {
-      if (ranks[n.edge] >= low_rank) continue;
-      for (const auto& m : graph.neighbours(n.node)) {
-        const std::size_t across = link_to[m.node];
-        if (m.node <= a || across == links.size() || ranks[m.edge] >= low_rank) continue;
+  LatticeGraph(nodes, edges)
+      .visit_triangles([&](std::size_t a, const auto& to_b, const auto& to_c, std::size_t ac) {
+        if (to_c.node <= a || ranks[to_b.edge] >= low_rank || ranks[to_c.edge] >= low_rank) return;
         const double longest =
-            std::max({links[n.edge].length, links[m.edge].length, links[across].length});
-        const Pose2 around = from(a, links[n.edge]) * from(n.node, links[m.edge]);
-        if (is_near(around, from(a, links[across]), max_triangle_gap * longest)) {
-          supported[across] = 1;
-        }
-      }
-    }
-    for (const auto& n : graph.neighbours(a)) link_to[n.node] = links.size();
-  }
+            std::max({links[to_b.edge].length, links[to_c.edge].length, links[ac].length});
+        const Pose2 around =
+            step_from(a, links[to_b.edge]) * step_from(to_b.node, links[to_c.edge]);
+        if (is_near(around, step_from(a, links[ac]), max_triangle_gap * longest)) supported[ac] = 1;
+      });
   return supported;
 }
 
@@ -186,16 +176,6 @@ void count_in_spacings(std::size_t nodes, std::vector<LatticeLink>& links) {
 
 }  // namespace
 
-Pose2 step_of(const Lattice::Spring& spring, double unit) {
-  const PhaseReading& phases = *spring.phases;
-  if (!phases.points) return {0.0, 0.0, phases.turn_rad};
-  const double from_b = phases.direction_b_rad + phases.turn_rad - std::numbers::pi;
-  const double direction =
-      phases.direction_a_rad + 0.5 * angle_difference(from_b, phases.direction_a_rad);
-  return {unit * phases.length * std::cos(direction), unit * phases.length * std::sin(direction),
-          phases.turn_rad};
-}
-
 bool is_near(const Pose2& a, const Pose2& b, double within) {
   return std::abs(angle_difference(a.heading_rad, b.heading_rad)) <= turn_tolerance_rad &&
          distance(a.position(), b.position()) <= within;
@@ -206,8 +186,8 @@ std::vector<LatticeLink> make_links(std::size_t nodes, std::span<const Lattice::
   std::vector<LatticeLink> links;
   for (const Lattice::Spring& spring : springs) {
     if (!spring.phases || !agrees(spring)) continue;
-    links.push_back({spring.a, spring.b, step_of(spring, unit), unit * spring.phases->length,
-                     spring.phases->residual, 0.0});
+    links.push_back({spring.a, spring.b, spring.phases->a_from_b(unit),
+                     unit * spring.phases->length, spring.phases->residual, 0.0});
   }
   learn_probabilities(nodes, links);
   count_in_spacings(nodes, links);

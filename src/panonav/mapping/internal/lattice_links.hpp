@@ -23,9 +23,6 @@ struct LatticeLink {
   double probability;  ///< that it joins views that lie so
 };
 
-/// The relative pose a_from_b that the phases of a spring say; `unit`: of their lengths.
-[[nodiscard]] Pose2 step_of(const Lattice::Spring& spring, double unit);
-
 /// Whether two poses have the same heading within the tolerance, and positions within `within`.
 [[nodiscard]] bool is_near(const Pose2& a, const Pose2& b, double within);
 

@@ -1,6 +1,7 @@
 #include "panonav/mapping/internal/lattice_springs.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -30,15 +31,13 @@ constexpr double min_angle_deviation_rad = 0.0035;
 
 /// Displacement and turn of the spring from one of its ends.
 Pose2 step_from(std::size_t from, const Lattice::Spring& spring) {
-  const PhaseReading& phases = *spring.phases;
-  const bool forward = from == spring.a;
-  const double direction = forward ? phases.direction_a_rad : phases.direction_b_rad;
-  return {spring.length * std::cos(direction), spring.length * std::sin(direction),
-          forward ? phases.turn_rad : wrap_angle(-phases.turn_rad)};
+  const PhaseReading phases = from == spring.a ? *spring.phases : spring.phases->reversed();
+  return {spring.length * std::cos(phases.direction_a_rad),
+          spring.length * std::sin(phases.direction_a_rad), phases.turn_rad};
 }
 
 bool has_direction(const Lattice::Spring& spring) {
-  return spring.phases && spring.phases->points;
+  return spring.phases && spring.phases->has_direction;
 }
 
 }  // namespace
@@ -127,7 +126,7 @@ SpringTerm spring_term(const Lattice::Spring& spring, const Lattice::Errors& err
   const PhaseReading& phases = *spring.phases;
   term.turn =
       SpringTurn{phases.turn_rad, std::hypot(errors.turn_rad, 0.5 * phases.turn_disagreement_rad)};
-  if (!phases.points) return term;
+  if (!phases.has_direction) return term;
   term.direction = SpringDirection{phases.direction_a_rad, phases.direction_b_rad,
                                    std::hypot(errors.direction_rad, 0.5 * phases.disagreement_rad)};
   if (phase_lengths) {
@@ -140,38 +139,30 @@ SpringTerm spring_term(const Lattice::Spring& spring, const Lattice::Errors& err
 std::vector<double> closing_triangles(std::size_t nodes, std::span<const Lattice::Spring> springs) {
   std::vector<GraphEdge> edges;
   for (const auto& spring : springs) edges.push_back({spring.a, spring.b, spring.length});
-  const LatticeGraph graph(nodes, edges);
   std::vector<double> all(springs.size());
   std::vector<double> closing(springs.size());
-  std::vector<std::size_t> spring_to(nodes, springs.size());  // from the node at hand
-  for (std::size_t a = 0; a < nodes; ++a) {
-    for (const auto& n : graph.neighbours(a)) spring_to[n.node] = n.edge;
-    for (const auto& n : graph.neighbours(a)) {
-      const Lattice::Spring& ab = springs[n.edge];
-      if (n.node < a || !has_direction(ab)) continue;
-      const Pose2 to_b = step_from(a, ab);
-      for (const auto& m : graph.neighbours(n.node)) {
+  LatticeGraph(nodes, edges)
+      .visit_triangles([&](std::size_t a, const auto& to_b, const auto& to_c, std::size_t ac) {
         // Each triangle once.
-        if (m.node < n.node || spring_to[m.node] == springs.size()) continue;
-        const std::size_t across = spring_to[m.node];
-        const Lattice::Spring& bc = springs[m.edge];
-        const Lattice::Spring& ac = springs[across];
-        if (!has_direction(bc) || !has_direction(ac)) continue;
-        const Pose2 by_b = to_b * step_from(n.node, bc);
-        const Pose2 straight = step_from(a, ac);
-        const double longest = std::max({ab.length, bc.length, ac.length});
+        if (to_b.node < a || to_c.node < to_b.node) return;
+        const std::array numbers{to_b.edge, to_c.edge, ac};
+        double longest = 0.0;
+        for (const std::size_t number : numbers) {
+          if (!has_direction(springs[number])) return;
+          longest = std::max(longest, springs[number].length);
+        }
+        const Pose2 by_b =
+            step_from(a, springs[to_b.edge]) * step_from(to_b.node, springs[to_c.edge]);
+        const Pose2 straight = step_from(a, springs[ac]);
         const bool closes =
             std::abs(angle_difference(by_b.heading_rad, straight.heading_rad)) <=
                 turn_closing_rad &&
             distance(by_b.position(), straight.position()) <= displacement_closing * longest;
-        for (const std::size_t edge : {n.edge, m.edge, across}) {
-          all[edge] += 1.0;
-          closing[edge] += closes ? 1.0 : 0.0;
+        for (const std::size_t number : numbers) {
+          all[number] += 1.0;
+          closing[number] += closes ? 1.0 : 0.0;
         }
-      }
-    }
-    for (const auto& n : graph.neighbours(a)) spring_to[n.node] = springs.size();
-  }
+      });
   for (std::size_t s = 0; s < springs.size(); ++s) {
     if (all[s] > 0.0) closing[s] /= all[s];
   }

@@ -68,9 +68,9 @@ std::vector<std::size_t> choose_landmarks(const LatticeGraph& graph, std::size_t
   std::size_t next = 0;
   while (landmarks.size() < std::min(count, graph.size())) {
     landmarks.push_back(next);
-    const auto ways = graph.shortest_ways(next);
-    distances.insert(distances.end(), ways.begin(), ways.end());
-    for (std::size_t i = 0; i < nearest.size(); ++i) nearest[i] = std::min(nearest[i], ways[i]);
+    const auto lengths = graph.shortest_path_lengths(next);
+    distances.insert(distances.end(), lengths.begin(), lengths.end());
+    for (std::size_t i = 0; i < nearest.size(); ++i) nearest[i] = std::min(nearest[i], lengths[i]);
     for (const std::size_t landmark : landmarks) nearest[landmark] = -1.0;
     next = static_cast<std::size_t>(std::ranges::max_element(nearest) - nearest.begin());
   }
@@ -86,7 +86,8 @@ bool turn_to_directions(const std::vector<std::size_t>& members,
   std::vector<Point2> seen;
   const std::size_t component = components[members.front()];
   for (const Lattice::Spring& spring : springs) {
-    if (components[spring.a] != component || !spring.phases || !spring.phases->points) continue;
+    if (components[spring.a] != component || !spring.phases || !spring.phases->has_direction)
+      continue;
     const Pose2& a = poses[spring.a];
     const Pose2& b = poses[spring.b];
     const double length = distance(a.position(), b.position());
@@ -106,15 +107,6 @@ bool turn_to_directions(const std::vector<std::size_t>& members,
     poses[node].y_m = p.y_m;
   }
   return true;
-}
-
-/// What the phases say of the way from `from`, whichever end of the spring that is.
-PhaseReading seen_from(std::size_t from, const Lattice::Spring& spring) {
-  PhaseReading phases = *spring.phases;
-  if (from == spring.a) return phases;
-  phases.turn_rad = wrap_angle(-phases.turn_rad);
-  std::swap(phases.direction_a_rad, phases.direction_b_rad);
-  return phases;
 }
 
 }  // namespace
@@ -153,7 +145,7 @@ bool is_compatible(const PhaseReading& phases, const CoarseMotion& motion) {
   const double turn = std::abs(angle_difference(phases.turn_rad, motion.step.heading_rad));
   if (turn > max_deviations * motion.turn_deviation_rad) return false;
   const double travel = std::hypot(motion.step.x_m, motion.step.y_m);
-  if (!phases.points || travel <= max_deviations * motion.distance_deviation_m) return true;
+  if (!phases.has_direction || travel <= max_deviations * motion.distance_deviation_m) return true;
   const double direction = std::abs(
       angle_difference(phases.direction_a_rad, std::atan2(motion.step.y_m, motion.step.x_m)));
   return direction <= max_deviations * motion.direction_deviation_rad;
@@ -186,10 +178,12 @@ LatticeStart lay_out_by_motion(std::size_t nodes, std::span<const NodeMotion> mo
         Pose2 step = moved.motion.step;  // in the frame of the motion's first node
         const auto found = seen.find(std::minmax(moved.a, moved.b));
         if (found != seen.end()) {
-          const PhaseReading phases = seen_from(moved.a, *found->second);
+          const Lattice::Spring& spring = *found->second;
+          const PhaseReading phases =
+              moved.a == spring.a ? *spring.phases : spring.phases->reversed();
           if (is_compatible(phases, moved.motion)) {
             step.heading_rad = phases.turn_rad;
-            if (phases.points) {
+            if (phases.has_direction) {
               const double travel = std::hypot(step.x_m, step.y_m);
               step.x_m = travel * std::cos(phases.direction_a_rad);
               step.y_m = travel * std::sin(phases.direction_a_rad);

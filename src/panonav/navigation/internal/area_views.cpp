@@ -11,55 +11,47 @@
 
 namespace panonav {
 
-SeenView::SeenView(const FourierSignature& seen, float full_scale, int components_)
-    : packed(pack(seen, full_scale)),
-      view(homing_view(seen)),
-      components(components_ == 0 ? seen.components() : components_) {
+QueryView::QueryView(const FourierSignature& signature, float full_scale, int components_)
+    : packed(pack(signature, full_scale)),
+      view(homing_view(signature)),
+      components(components_ == 0 ? signature.components() : components_) {
   require(components >= 3 || components_ == 0, "components", components, "0, or 3 or more");
   if (components_ != 0) view = first_components(view, components_);
 }
 
-AreaViews::AreaViews(const ViewSource& source, int links) : source_(&source), links_(links) {}
-
-std::optional<std::size_t> AreaViews::area() const noexcept {
-  return here_.area;
-}
-
-void AreaViews::begin(const NavigationGraph& graph, const SubAreas& areas, std::size_t area,
-                      Loading& loading) const {
-  loading = {.area = area};
+AreaViews::LoadedArea AreaViews::list_area(const NavigationGraph& graph, const SubAreas& areas,
+                                           std::size_t area) const {
+  LoadedArea listed{.area = area};
   for (const std::size_t node : nodes_around(graph, areas.nodes.at(area), links_)) {
-    loading.views.push_back(graph.view(node));
+    listed.views.push_back(graph.view(node));
   }
+  return listed;
 }
 
-void AreaViews::load(Loading& loading, std::size_t most) const {
-  const std::size_t count = std::min(most, loading.views.size() - loading.loaded);
+void AreaViews::load(LoadedArea& area, std::size_t max_views) const {
+  const std::size_t count = std::min(max_views, area.views.size() - area.loaded);
   if (count == 0) return;
-  loading.parts.push_back(source_->load(std::span(loading.views).subspan(loading.loaded, count)));
-  loading.coefficients.add(loading.parts.back());
-  loading.loaded += count;
+  const auto views = std::span(area.views).subspan(area.loaded, count);
+  const VisualMemory& part = area.parts.emplace_back(source_->load(views));
+  for (const ViewId view : part.views()) area.coefficients.emplace(view, homing_view(part, view));
+  area.loaded += count;
 }
 
 void AreaViews::enter(const NavigationGraph& graph, const SubAreas& areas, std::size_t area) {
   if (here_.area == area) return;
-  if (ahead_.area == area) {
-    here_ = std::move(ahead_);
-  } else {
-    begin(graph, areas, area, here_);
-  }
+  here_ = ahead_.area == area ? std::move(ahead_) : list_area(graph, areas, area);
   ahead_ = {};
   load(here_, here_.views.size());
 }
 
-void AreaViews::load_ahead(const NavigationGraph& graph, const SubAreas& areas, std::size_t area,
-                           int max_views) {
+void AreaViews::prefetch(const NavigationGraph& graph, const SubAreas& areas, std::size_t area,
+                         int max_views) {
   if (here_.area == area) return;
-  if (ahead_.area != area) begin(graph, areas, area, ahead_);
+  if (ahead_.area != area) ahead_ = list_area(graph, areas, area);
   load(ahead_, static_cast<std::size_t>(max_views));
 }
 
-const VisualMemory* AreaViews::part_of(ViewId view) const {
+const VisualMemory* AreaViews::find_part(ViewId view) const {
   const auto after = std::ranges::upper_bound(
       here_.parts, view, {}, [](const VisualMemory& part) { return part.views().front(); });
   if (after == here_.parts.begin()) return nullptr;
@@ -67,46 +59,55 @@ const VisualMemory* AreaViews::part_of(ViewId view) const {
   return part.contains(view) ? &part : nullptr;
 }
 
-std::optional<CompassReading> AreaViews::turn_against(ViewId view, const SeenView& seen) {
-  const VisualMemory* const part = part_of(view);
+const VisualMemory& AreaViews::part_of(ViewId view) const {
+  const VisualMemory* const part = find_part(view);
   require(part != nullptr, "view", static_cast<double>(view.value), "one that is loaded");
-  bytes_read_ += 2 * static_cast<std::uint64_t>(seen.packed.shape.rows) * seen.components;
-  return compass(seen.packed, part->packed(view), seen.components);
+  return *part;
 }
 
-const HomingView& AreaViews::view(ViewId view, int components) {
-  const HomingView* const held = here_.coefficients.find(view);
-  require(held != nullptr, "view", static_cast<double>(view.value), "one that is loaded");
+std::optional<CompassReading> AreaViews::read_compass(ViewId view, const QueryView& query) {
+  const VisualMemory& part = part_of(view);
+  bytes_read_ += 2 * static_cast<std::uint64_t>(query.packed.shape.rows) * query.components;
+  return compass(query.packed, part.packed(view), query.components);
+}
+
+const HomingView& AreaViews::coefficients(ViewId view, int components) {
+  const auto held = here_.coefficients.find(view);
+  require(held != here_.coefficients.end(), "view", static_cast<double>(view.value),
+          "one that is loaded");
   // Magnitudes and phases, a byte each.
-  bytes_read_ += 2 * static_cast<std::uint64_t>(held->rows()) *
-                 (components == 0 ? held->components() : components);
-  return *held;
+  bytes_read_ += 2 * static_cast<std::uint64_t>(held->second.rows()) *
+                 (components == 0 ? held->second.components() : components);
+  return held->second;
 }
 
-std::optional<FoundView> AreaViews::nearest(const NavigationGraph& graph,
-                                            std::span<const std::size_t> nodes,
-                                            const SeenView& seen) {
+std::optional<FoundView> AreaViews::find_nearest(const NavigationGraph& graph,
+                                                 std::span<const std::size_t> nodes,
+                                                 const QueryView& query) {
   std::optional<FoundView> best;
   for (const std::size_t node : nodes) {
-    const VisualMemory* const part = part_of(graph.view(node));
+    const VisualMemory* const part = find_part(graph.view(node));
     if (part == nullptr) continue;
     const auto dissimilarity =
-        dissimilarity_packed(seen.packed, part->packed(graph.view(node)), seen.components);
-    bytes_read_ += static_cast<std::uint64_t>(seen.packed.shape.rows) * seen.components;
-    const bool nearer =
+        dissimilarity_packed(query.packed, part->packed(graph.view(node)), query.components);
+    bytes_read_ += static_cast<std::uint64_t>(query.packed.shape.rows) * query.components;
+    const bool is_nearer =
         !best || std::tuple(dissimilarity, node) < std::tuple(best->dissimilarity, best->node);
-    if (nearer) best = {node, dissimilarity, 0.0};
+    if (is_nearer) best = {node, dissimilarity, 0.0};
   }
   if (best) {
-    best->difference = image_difference(view(graph.view(best->node), seen.components), seen.view);
+    best->difference =
+        image_difference(coefficients(graph.view(best->node), query.components), query.view);
   }
   return best;
 }
 
-std::optional<FoundView> AreaViews::nearest(const NavigationGraph& graph, const SeenView& seen) {
+std::optional<FoundView> AreaViews::find_nearest(const NavigationGraph& graph,
+                                                 const QueryView& query) {
   std::optional<Match> best;
   for (const VisualMemory& part : here_.parts) {
-    const SearchResult found = part.search(seen.packed, {.top = 1, .components = seen.components});
+    const SearchResult found =
+        part.search(query.packed, {.top = 1, .components = query.components});
     bytes_read_ += found.bytes_read;
     for (const Match& match : found.matches) {
       if (!best || match.dissimilarity < best->dissimilarity) best = match;
@@ -114,28 +115,26 @@ std::optional<FoundView> AreaViews::nearest(const NavigationGraph& graph, const 
   }
   if (!best) return std::nullopt;
   return FoundView{*graph.node_of(best->view), best->dissimilarity,
-                   image_difference(view(best->view, seen.components), seen.view)};
+                   image_difference(coefficients(best->view, query.components), query.view)};
 }
 
-std::vector<PackedSignature> AreaViews::with_most_alike(ViewId view, const SeenView& seen,
-                                                        int count) const {
-  const VisualMemory* const own = part_of(view);
-  require(own != nullptr, "view", static_cast<double>(view.value), "one that is loaded");
+std::vector<PackedSignature> AreaViews::most_similar_signatures(ViewId view, const QueryView& query,
+                                                                int count) const {
+  std::vector<PackedSignature> signatures{part_of(view).packed(view)};
   std::vector<Match> others;
   for (const VisualMemory& part : here_.parts) {
     const SearchResult found =
-        part.search(seen.packed, {.top = count, .components = seen.components},
+        part.search(query.packed, {.top = count, .components = query.components},
                     {.excluded_views = std::span(&view, part.contains(view) ? 1 : 0)});
     others.insert(others.end(), found.matches.begin(), found.matches.end());
   }
   std::ranges::sort(others, {},
                     [](const Match& match) { return std::pair(match.dissimilarity, match.view); });
-  std::vector<PackedSignature> alike{own->packed(view)};
   for (const Match& match : others) {
-    if (alike.size() > static_cast<std::size_t>(count)) break;
-    alike.push_back(part_of(match.view)->packed(match.view));
+    if (signatures.size() > static_cast<std::size_t>(count)) break;
+    signatures.push_back(part_of(match.view).packed(match.view));
   }
-  return alike;
+  return signatures;
 }
 
 }  // namespace panonav

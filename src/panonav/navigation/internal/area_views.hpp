@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <span>
 #include <vector>
@@ -11,82 +12,83 @@
 #include "panonav/navigation/search_whole_memory.hpp"
 #include "panonav/navigation/sub_areas.hpp"
 #include "panonav/relative_pose/homing_view.hpp"
-#include "panonav/relative_pose/reference_views.hpp"
 #include "panonav/signature/compass.hpp"
 
 namespace panonav {
 
-/// What a robot sees, as references are compared with it.
-struct SeenView {
+/// The view of a robot in the forms in which references are compared with it.
+struct QueryView {
   /// Throws ContractError unless `components` is 0 (all) or 3 .. those of the signature.
-  SeenView(const FourierSignature& seen, float full_scale, int components = 0);
+  QueryView(const FourierSignature& signature, float full_scale, int components = 0);
 
   PackedSignature packed;  ///< with the memory's full scale
   HomingView view;         ///< the first `components` only
   int components;          ///< that are compared
 };
 
-/// The views of one area and those around it, loaded from a source: what a robot needs to have at
-/// hand. Of the memory nothing else is held but what was loaded ahead of the area that comes next.
+/// The views of one area and those around it, loaded from a source. Nothing else of the memory is
+/// held but what was prefetched of the next area.
 class AreaViews {
  public:
-  /// Views up to `links` edges outside an area are loaded with it. The source must outlive
+  /// Views up to `links` edges outside of an area are loaded with it. The source must outlive
   /// *this.
-  AreaViews(const ViewSource& source, int links);
+  AreaViews(const ViewSource& source, int links) : source_(&source), links_(links) {}
 
-  /// Loads the area, or what of it was not loaded ahead.
+  /// Loads the area, as far as it was not prefetched.
   void enter(const NavigationGraph& graph, const SubAreas& areas, std::size_t area);
-  /// Loads some views of the area that will be entered next, `max_views` at most, so that no look
-  /// has to wait for all of them. Another area than at the last call: what was loaded is dropped.
-  void load_ahead(const NavigationGraph& graph, const SubAreas& areas, std::size_t area,
-                  int max_views);
-  /// Empty before the first `enter`.
-  [[nodiscard]] std::optional<std::size_t> area() const noexcept;
-  /// Views held, those loaded ahead included.
+  /// Loads at most `max_views` further views of the area that will be entered next. Drops what was
+  /// prefetched of another area.
+  void prefetch(const NavigationGraph& graph, const SubAreas& areas, std::size_t area,
+                int max_views);
+  /// nullopt before the first `enter`.
+  [[nodiscard]] std::optional<std::size_t> area() const noexcept { return here_.area; }
+  /// Number of views held, prefetched ones included.
   [[nodiscard]] std::size_t size() const noexcept { return here_.loaded + ahead_.loaded; }
-  /// Whether it belongs to the area that was entered.
-  [[nodiscard]] bool holds(ViewId view) const { return part_of(view) != nullptr; }
+  /// True if the view was loaded with the area that was entered.
+  [[nodiscard]] bool holds(ViewId view) const { return find_part(view) != nullptr; }
 
-  /// Throw ContractError on a view that is not loaded.
-  /// How far the robot is turned against the view.
-  [[nodiscard]] std::optional<CompassReading> turn_against(ViewId view, const SeenView& seen);
-  /// All its coefficients, computed when it was loaded; compared with a view of fewer components
-  /// only the common ones, `components`, count (0: all). Valid until the next `enter`.
-  [[nodiscard]] const HomingView& view(ViewId view, int components = 0);
-  /// The least dissimilar of those `nodes` that are loaded; empty when none is. Ties by node.
-  [[nodiscard]] std::optional<FoundView> nearest(const NavigationGraph& graph,
-                                                 std::span<const std::size_t> nodes,
-                                                 const SeenView& seen);
-  /// The least dissimilar of all loaded views.
-  [[nodiscard]] std::optional<FoundView> nearest(const NavigationGraph& graph,
-                                                 const SeenView& seen);
+  // These throw ContractError on a view that is not loaded.
+  /// Returns the heading of the robot relative to the view; nullopt where the compass tells none.
+  [[nodiscard]] std::optional<CompassReading> read_compass(ViewId view, const QueryView& query);
+  /// Returns all coefficients of the view, computed when it was loaded. Counts the bytes of
+  /// `components` of them as read (0: all). Valid until the next `enter`.
+  [[nodiscard]] const HomingView& coefficients(ViewId view, int components = 0);
+  /// Returns the view of least dissimilarity among those of `nodes` that are loaded; the lower node
+  /// of equal ones.
+  [[nodiscard]] std::optional<FoundView> find_nearest(const NavigationGraph& graph,
+                                                      std::span<const std::size_t> nodes,
+                                                      const QueryView& query);
+  /// The same among all loaded views.
+  [[nodiscard]] std::optional<FoundView> find_nearest(const NavigationGraph& graph,
+                                                      const QueryView& query);
+  /// Returns the view, then the `count` others of least dissimilarity to the query.
+  [[nodiscard]] std::vector<PackedSignature> most_similar_signatures(ViewId view,
+                                                                     const QueryView& query,
+                                                                     int count) const;
 
-  /// A loaded view, and then the `count` others that are least dissimilar to what is seen.
-  [[nodiscard]] std::vector<PackedSignature> with_most_alike(ViewId view, const SeenView& seen,
-                                                             int count) const;
-
-  /// Bytes of signatures, and of the index over them, that the comparisons so far have read;
-  /// without `with_most_alike`.
+  /// Bytes of signatures and of their index that the comparisons so far have read, without
+  /// `most_similar_signatures`.
   [[nodiscard]] std::uint64_t bytes_read() const noexcept { return bytes_read_; }
 
  private:
-  /// An area as far as it is loaded: the first `loaded` of its views, in parts.
-  struct Loading {
+  /// An area of which the first `loaded` views are loaded, in parts.
+  struct LoadedArea {
     std::optional<std::size_t> area;
     std::vector<ViewId> views;  // ascending
     std::size_t loaded = 0;
-    std::vector<VisualMemory> parts;  // ascending, too
-    ReferenceViews coefficients;      // of all parts
+    std::vector<VisualMemory> parts;            // ascending
+    std::map<ViewId, HomingView> coefficients;  // of all parts
   };
-  void begin(const NavigationGraph& graph, const SubAreas& areas, std::size_t area,
-             Loading& loading) const;
-  void load(Loading& loading, std::size_t most) const;
-  [[nodiscard]] const VisualMemory* part_of(ViewId view) const;
+  [[nodiscard]] LoadedArea list_area(const NavigationGraph& graph, const SubAreas& areas,
+                                     std::size_t area) const;
+  void load(LoadedArea& area, std::size_t max_views) const;
+  [[nodiscard]] const VisualMemory* find_part(ViewId view) const;
+  [[nodiscard]] const VisualMemory& part_of(ViewId view) const;
 
   const ViewSource* source_;
   int links_;
-  Loading here_;
-  Loading ahead_;
+  LoadedArea here_;
+  LoadedArea ahead_;
   std::uint64_t bytes_read_ = 0;
 };
 

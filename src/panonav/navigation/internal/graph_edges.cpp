@@ -1,26 +1,24 @@
 #include "panonav/navigation/internal/graph_edges.hpp"
 
 #include <algorithm>
-#include <numbers>
 #include <set>
 
 #include "panonav/core/statistics.hpp"
-#include "panonav/geometry/angles.hpp"
 #include "panonav/relative_pose/homing_view.hpp"
 
 namespace panonav {
 
 namespace {
 
-/// Least length of an edge, over the median length: that between pictures of one place.
+/// Smallest length of an edge over the median length: that between images of one place.
 constexpr double min_length_share = 0.1;
 
 // Reads some edges from the phases of their views, which are all held at once.
 void read_some_edges(const ViewSource& source, std::span<const Link> links,
                      std::span<NavigationGraph::Edge> edges, Executor& executor) {
-  std::set<ViewId> wanted;
-  for (const Link& link : links) wanted.insert({link.a, link.b});
-  const VisualMemory memory = source.load(std::vector<ViewId>(wanted.begin(), wanted.end()));
+  std::set<ViewId> ids;
+  for (const Link& link : links) ids.insert({link.a, link.b});
+  const VisualMemory memory = source.load(std::vector<ViewId>(ids.begin(), ids.end()));
   constexpr std::size_t links_per_chunk = 64;
   executor.for_chunks(
       links.size(), links_per_chunk, [&](std::size_t begin, std::size_t end, std::size_t) {
@@ -38,13 +36,8 @@ void read_some_edges(const ViewSource& source, std::span<const Link> links,
 }  // namespace
 
 std::optional<Pose2> motion_of(const PhaseReading& reading) {
-  if (!reading.points) return Pose2{0.0, 0.0, reading.turn_rad};
-  if (reading.disagreement_rad > max_disagreement_rad) return std::nullopt;
-  const double from_b = reading.direction_b_rad + reading.turn_rad - std::numbers::pi;
-  const double direction =
-      reading.direction_a_rad + 0.5 * angle_difference(from_b, reading.direction_a_rad);
-  return Pose2{reading.length * std::cos(direction), reading.length * std::sin(direction),
-               wrap_angle(reading.turn_rad)};
+  if (reading.has_direction && reading.disagreement_rad > max_disagreement_rad) return std::nullopt;
+  return reading.a_from_b();
 }
 
 void complete_lengths(std::vector<NavigationGraph::Edge>& edges) {
@@ -54,9 +47,9 @@ void complete_lengths(std::vector<NavigationGraph::Edge>& edges) {
   }
   const double typical = lengths.empty() ? 1.0 : upper_median(lengths);
   for (NavigationGraph::Edge& edge : edges) {
-    const bool known = edge.a_from_b || edge.length > 0.0;
-    edge.length =
-        known ? std::max(edge.length, min_length_share * typical) : unknown_length_share * typical;
+    const bool is_known = edge.a_from_b || edge.length > 0.0;
+    edge.length = is_known ? std::max(edge.length, min_length_share * typical)
+                           : unknown_length_share * typical;
   }
 }
 

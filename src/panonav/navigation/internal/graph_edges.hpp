@@ -16,8 +16,8 @@ namespace panonav {
 /// Length of an edge of which nothing is known, over the median length.
 inline constexpr double unknown_length_share = 3.0;
 
-/// Two nodes of a graph or a map.
-struct NodePair {
+/// The two nodes of an edge of a graph or a map.
+struct EdgeEnds {
   std::size_t a = 0;
   std::size_t b = 0;
 };
@@ -33,12 +33,11 @@ inline void scale_displacement(Pose2& motion, double factor) {
   return std::hypot(motion.x_m, motion.y_m);
 }
 
-/// Returns the motion that two readings indicate: they are averaged, as each has its own error.
-/// Empty where they disagree.
+/// Returns the mean motion that both views of a reading show; nullopt where they disagree.
 [[nodiscard]] std::optional<Pose2> motion_of(const PhaseReading& reading);
 
 /// Sets the length of edges of which neither length nor motion is known from that of the others,
-/// and raises those between pictures of one place to a least one.
+/// and raises those between images of one place to a minimum.
 void complete_lengths(std::vector<NavigationGraph::Edge>& edges);
 
 /// Reads edges from the phases of their views; length 0 and no motion where nothing is read.

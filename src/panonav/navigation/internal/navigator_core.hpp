@@ -1,20 +1,12 @@
 #pragma once
 
-// The state of a navigator in named values, each of which is forgotten by assignment.
+// The state of a navigator in named values, each of which is reset by assignment.
 
-#include <cstddef>
-#include <cstdint>
 #include <limits>
 #include <map>
-#include <optional>
 #include <set>
-#include <vector>
 
-#include "panonav/geometry/pose2.hpp"
-#include "panonav/homing/homing_pursuit.hpp"
 #include "panonav/localisation/place_model.hpp"
-#include "panonav/navigation/area_planner.hpp"
-#include "panonav/navigation/direction_field.hpp"
 #include "panonav/navigation/internal/area_views.hpp"
 #include "panonav/navigation/internal/place_scale.hpp"
 #include "panonav/navigation/internal/route_pilot.hpp"
@@ -22,23 +14,26 @@
 
 namespace panonav {
 
-/// What a navigator learns of its memory once.
+/// A home vector of less confidence is as likely as not only the error of reading it.
+inline constexpr double min_vector_confidence = 0.5;
+
+/// What a navigator learns once of its memory.
 struct MemoryScales {
   PlaceScale place;   ///< by all components
   PlaceScale coarse;  ///< by the first ones
   float full_scale = 1.0F;
   int components = 0;
-  int coarse_components = 0;         ///< 0: all
-  double typical_length = 1.0;       ///< of an edge
-  std::vector<std::uint8_t> narrow;  ///< by node
+  int coarse_components = 0;            ///< 0: all
+  double typical_length = 1.0;          ///< median length of an edge
+  std::vector<std::uint8_t> is_narrow;  ///< by node: not 0 near a narrow gate
 
-  /// A reference that differs by more was taken at another place.
-  [[nodiscard]] double limit(const SeenView& view) const noexcept {
-    return (view.components == components ? place : coarse).limit();
+  /// A reference that differs from the view by more was taken at another place.
+  [[nodiscard]] double max_difference(const QueryView& view) const noexcept {
+    return (view.components == components ? place : coarse).max_difference();
   }
 };
 
-/// Where to go. Lasts until another goal is set.
+/// The goal of the run. Lasts until another one is set.
 struct NavigationGoal {
   std::size_t node = 0;
   std::set<std::size_t> around;  ///< nodes, its own included
@@ -46,83 +41,82 @@ struct NavigationGoal {
   ArrivalScale arrival;
 };
 
-/// What speaks against the place where the robot is taken to be. Begins anew with a goal.
+/// Evidence against the place where the robot is assumed to be. Reset with each goal.
 struct PlaceDoubt {
-  int unknown_steps = 0;  ///< one after the other at which no reference looked right
-  int improbable_steps =
-      0;                    ///< one after the other at which the place was probably not the robot's
-  int elsewhere_steps = 0;  ///< one after the other that agree on another place
-  std::optional<std::size_t> elsewhere;
+  int unknown_steps = 0;                  ///< successive steps at which no reference matched
+  int improbable_steps = 0;               ///< successive steps at which the place was improbable
+  int other_place_steps = 0;              ///< successive steps that agree on another place
+  std::optional<std::size_t> other_node;  ///< that place
 };
 
-/// Where the robot is. Lasts from goal to goal, until it is told to be forgotten.
+/// Where the robot is. Lasts from goal to goal, until `Navigator::forget_place`.
 struct NavigationPlace {
   std::optional<std::size_t> node;
-  std::optional<std::size_t> known_node;  ///< where the place last looked right
-  std::optional<Point2> known_at;  ///< that, in the robot's frame, as far as steps tell; metres
+  std::optional<std::size_t> known_node;   ///< where the place last matched
+  std::optional<Point2> known_position_m;  ///< of it in the robot's frame, by dead reckoning
   PlaceDoubt doubt;
 };
 
-/// The step before: of one observation for the next.
+/// The step before the present observation.
 struct LastStep {
   std::optional<HomingView> view;       ///< from which it began
   std::optional<double> direction_rad;  ///< in the frame of `view`; empty: the robot stood
   double advance_m = 0.0;
-  std::optional<double> way;             ///< that was left before it, if it was a whole step
-  std::optional<std::size_t> aimed_for;  ///< the edge, unless the step led around
+  std::optional<double> path_length;       ///< that was left before it, if it was a whole step
+  std::optional<std::size_t> target_edge;  ///< empty where the step led around
 };
 
-/// What stands in the robot's way. Begins anew with a goal.
+/// Obstacles in front of the robot. Reset with each goal.
 struct Obstruction {
-  bool now = false;  ///< in the step before this observation
-  int level = 0;     ///< grows by 2 with each step that fails, falls by 1 with each that does not
+  bool is_present = false;  ///< in the step before this observation
+  int level = 0;  ///< grows by 2 with each step that fails, falls by 1 with each other one
 };
 
-/// What became of the steps along an edge since the robot came nearer to the goal.
-struct EdgeTries {
+/// The steps that were made along an edge since the robot last came nearer to the goal.
+struct EdgeAttempts {
   std::size_t node = 0;  ///< from which it was tried first
   int steps = 0;
-  int obstructed = 0;
+  int obstructed_steps = 0;
 };
 
-/// How far the run has come. Begins anew with a goal.
+/// How far the run has come. Reset with each goal.
 struct Progress {
   int steps = 0;
   int attempts = 0;
-  int ways_sought = 0;  ///< from places without one, in this attempt
-  double min_way = std::numeric_limits<double>::infinity();  ///< since the last plan
-  int steps_in_vain = 0;                   ///< since the way became shorter or an edge was closed
-  std::map<std::size_t, EdgeTries> tries;  ///< by edge, since the way became shorter
-  bool closed_here = false;                ///< an edge, and the robot was not far from there since
-  std::vector<std::size_t> around_closed;  ///< nodes around that edge, ascending
-  std::set<std::size_t> suspects;          ///< edges that were closed in earlier attempts
+  int path_searches = 0;  ///< from places without a path, in this attempt
+  double min_path_length = std::numeric_limits<double>::infinity();  ///< since the last plan
+  int steps_without_progress = 0;  ///< since the path became shorter or an edge was blocked
+  std::map<std::size_t, EdgeAttempts> edge_attempts;  ///< by edge, since the path became shorter
+  bool is_near_blocked_edge = false;           ///< since it was blocked, without leaving its nodes
+  std::vector<std::size_t> near_blocked_edge;  ///< nodes around that edge, ascending
+  std::set<std::size_t> suspect_edges;         ///< that were blocked in earlier attempts
 
   [[nodiscard]] bool was_obstructed() const;
 };
 
-/// An edge that is held to until its end: other references may be nearer on the way.
-struct UnderWay {
+/// An edge that is followed to its end, although other references may be nearer on the way.
+struct CommittedEdge {
   std::size_t from = 0;  ///< node
   Guide guide;           ///< there
   int steps_left = 0;
 };
 
-/// The way to the goal. Begins anew where edges are closed or opened.
+/// The path to the goal. Reset where edges are blocked or unblocked.
 struct Plan {
   std::vector<Guide> field;  ///< of the loaded area
-  std::optional<UnderWay> under_way;
+  std::optional<CommittedEdge> committed;
 };
 
-/// An observation and what is decided after it.
+/// An observation and the decision after it.
 struct Step {
   const FourierSignature& signature;
   const RobotReport& report;
-  SeenView view;
+  QueryView view;
   NavigationDecision decision;
-  /// Where the step before led, in the frame of the robot now, unless it failed.
-  std::optional<double> heading_for_rad;
+  /// Direction of the step before in the frame of the robot now; empty where it failed.
+  std::optional<double> last_direction_rad;
 
-  void note(NavigationEvent event) { decision.events.push_back(event); }
+  void add_event(NavigationEvent event) { decision.events.push_back(event); }
 };
 
 struct Navigator::Core {
@@ -144,8 +138,8 @@ struct Navigator::Core {
   Obstruction obstruction;
   Progress progress;
   Plan plan;
-  std::optional<HomingPursuit> homing;  ///< the last stretch, while it lasts
-  std::vector<double> step_ways;        ///< by which the last steps brought any goal nearer
+  std::optional<HomingPursuit> homing;  ///< while the robot homes to the goal
+  std::vector<double> path_reductions;  ///< by the last whole steps, towards any goal
 
   void set_goal(ViewId goal);
   void forget_place();
@@ -154,43 +148,48 @@ struct Navigator::Core {
  private:
   [[nodiscard]] const NavigationGraph& graph() const { return planner.graph(); }
   [[nodiscard]] const Guide& guide() const;
-  void plan_anew();
-  void forget_plans(Step& step);
+  void replan();
+  void abandon_plans(Step& step);
   void decide(Step& step);
+  void choose_motion(Step& step);
 
   // The place (navigator_place.cpp).
-  struct Located;
+  struct PlaceCandidates;
   [[nodiscard]] bool needs_all_components() const;
-  [[nodiscard]] Located search_around(const SeenView& view);
+  [[nodiscard]] PlaceCandidates find_candidates(const QueryView& view);
   void locate(Step& step);
-  [[nodiscard]] bool line_tells() const;
-  void judge_place(Step& step);
-  void accept(const Located& located, Step& step);
+  void search_place(Step& step);
+  void update_known_place(Step& step);
+  [[nodiscard]] bool is_localised_on_route() const;
+  [[nodiscard]] double place_probability_of(const Step& step) const;
+  void update_probability(Step& step);
+  void choose_place(const PlaceCandidates& candidates, Step& step);
   void relocalise(Step& step);
-  void enter(std::size_t node, Step& step);
-  void load_ahead();
+  void set_place(std::size_t node, Step& step);
+  void prefetch_next_area();
 
-  // Progress and what hinders it (navigator_progress.cpp).
-  void notice_obstacles(Step& step);
-  void count_try();
-  void close_way(std::size_t edge, Step& step);
-  void try_again(Step& step, NavigationState otherwise);
-  [[nodiscard]] bool find_way_from_here(Step& step);
+  // Progress and obstacles (navigator_progress.cpp).
+  void update_progress(Step& step);
+  void detect_obstruction(Step& step);
+  void update_path_length();
+  void block_edge(std::size_t edge, Step& step);
+  void unblock_edges_or_end(Step& step, NavigationState end_state);
+  [[nodiscard]] bool relocalise_with_path(Step& step);
   [[nodiscard]] double relative_length(const Guide& ahead) const;
-  [[nodiscard]] int patience() const;
+  [[nodiscard]] int max_steps_without_progress() const;
   [[nodiscard]] double detour_rad() const;
 
-  // Where to go.
+  // The next motion.
   [[nodiscard]] bool is_at_goal() const;
-  void go_home(Step& step);
-  [[nodiscard]] std::optional<double> way_back_rad(const SeenView& view);
-  [[nodiscard]] bool go_back(Step& step);
-  void begin_long_way();
-  [[nodiscard]] std::optional<double> direction_of(std::size_t from, const Guide& ahead,
-                                                   const Step& step);
-  void follow(Step& step);
-  void begin_leg(Step& step);
-  [[nodiscard]] bool go_along_route(Step& step);
+  void home_to_goal(Step& step);
+  [[nodiscard]] std::optional<double> direction_to_known_place(const QueryView& view);
+  [[nodiscard]] bool return_to_known_place(Step& step);
+  void commit_to_edge_if_needed();
+  [[nodiscard]] std::optional<double> direction_along_edge(std::size_t from, const Guide& ahead,
+                                                           const Step& step);
+  void follow_field(Step& step);
+  void begin_leg_if_possible(Step& step);
+  [[nodiscard]] bool follow_route(Step& step);
 };
 
 }  // namespace panonav

@@ -1,4 +1,4 @@
-// Where a navigator's robot is: the reference that it is nearest to.
+// The place of a navigator's robot: the reference that it is nearest to.
 
 #include <algorithm>
 #include <iterator>
@@ -10,144 +10,158 @@ namespace panonav {
 
 namespace {
 
-// The next place is looked for again around the outermost that was found, so often: a step is half
-// an edge, and four where references stand eight times as close as it was meant for.
-constexpr int rounds_farther = 2;
-// Views beside the place by which the probability that it is right is told.
-constexpr int compared_with_place = 15;
+/// Times that the search for the next place continues around the outermost reference found: a step
+/// is half an edge, and four edges where references stand eight times as densely as intended.
+constexpr int max_search_rounds = 2;
+/// Views besides the place that the evidence for it takes: the tenth best match is one of them.
+constexpr int compared_views = 15;
 
 }  // namespace
 
-// The references most like a view: around the last place, and in all of the area.
-struct Navigator::Core::Located {
-  std::vector<std::size_t> around;
-  std::optional<FoundView> here;
-  std::optional<FoundView> anywhere;
-  bool elsewhere = false;  // the latter is another place, and looks right
+/// The references most similar to a view.
+struct Navigator::Core::PlaceCandidates {
+  std::vector<std::size_t> around;    ///< nodes around the last place
+  std::optional<FoundView> here;      ///< the best of these
+  std::optional<FoundView> anywhere;  ///< the best of the loaded area
+  bool is_elsewhere = false;          ///< `anywhere` is another place that matches
 };
 
-void Navigator::Core::enter(std::size_t node, Step& step) {
+void Navigator::Core::set_place(std::size_t node, Step& step) {
   place.node = node;
   const std::size_t area = planner.areas().area_of[node];
   if (views.area() == area) return;
   views.enter(graph(), planner.areas(), area);
   plan.field = planner.field(area);
-  step.note(NavigationEvent::entered_area);
+  step.add_event(NavigationEvent::entered_area);
 }
 
 void Navigator::Core::relocalise(Step& step) {
   const auto found = search_whole_memory(*source, graph(), planner.areas(), step.signature);
-  step.note(NavigationEvent::relocalised);
+  step.add_event(NavigationEvent::relocalised);
   if (!found) return;
-  // A place that does not look like it either is no reason to leave the one that was expected.
-  if (place.node && found->difference > scales.place.limit()) return;
-  if (place.node) step.note(NavigationEvent::kidnapped);
+  // A place that does not match either is no reason to leave the expected one.
+  if (place.node && found->difference > scales.place.max_difference()) return;
+  if (place.node) step.add_event(NavigationEvent::kidnapped);
   step.decision.difference = found->difference;
-  forget_plans(step);
-  enter(found->node, step);
+  abandon_plans(step);
+  set_place(found->node, step);
 }
 
 bool Navigator::Core::needs_all_components() const {
-  return scales.coarse_components == 0 || !place.node || scales.narrow[*place.node] != 0 ||
+  return scales.coarse_components == 0 || !place.node || scales.is_narrow[*place.node] != 0 ||
          goal->around.contains(*place.node) || place.doubt.unknown_steps > 0 ||
-         place.doubt.elsewhere_steps > 0 || 2 * progress.steps_in_vain > patience();
+         place.doubt.other_place_steps > 0 ||
+         2 * progress.steps_without_progress > max_steps_without_progress();
 }
 
-Navigator::Core::Located Navigator::Core::search_around(const SeenView& view) {
-  Located located;
-  located.around = nodes_around(graph(), {&*place.node, 1}, options.near_links);
-  located.here = views.nearest(graph(), located.around, view);
-  // Where references stand close together a step leads beyond those: from the outermost on the
-  // search goes on, if it finds more similar ones.
+Navigator::Core::PlaceCandidates Navigator::Core::find_candidates(const QueryView& view) {
+  PlaceCandidates found;
+  found.around = nodes_around(graph(), {&*place.node, 1}, options.near_links);
+  found.here = views.find_nearest(graph(), found.around, view);
+  // Where references stand densely a step leads beyond those: the search continues around the
+  // outermost one while it finds more similar ones.
   std::size_t centre = *place.node;
-  for (int round = 0; round < rounds_farther && located.here; ++round) {
+  for (int round = 0; round < max_search_rounds && found.here; ++round) {
     const auto inner = nodes_around(graph(), {&centre, 1}, options.near_links - 1);
-    if (std::ranges::binary_search(inner, located.here->node)) break;
-    centre = located.here->node;
+    if (std::ranges::binary_search(inner, found.here->node)) break;
+    centre = found.here->node;
     const auto farther = nodes_around(graph(), {&centre, 1}, options.near_links);
-    const auto found = views.nearest(graph(), farther, view);
-    if (!found || found->dissimilarity >= located.here->dissimilarity) break;
-    located.here = found;
+    const auto nearest = views.find_nearest(graph(), farther, view);
+    if (!nearest || nearest->dissimilarity >= found.here->dissimilarity) break;
+    found.here = nearest;
     std::vector<std::size_t> both;
-    std::ranges::set_union(located.around, farther, std::back_inserter(both));
-    located.around = std::move(both);
+    std::ranges::set_union(found.around, farther, std::back_inserter(both));
+    found.around = std::move(both);
   }
-  located.anywhere = views.nearest(graph(), view);
-  located.elsewhere = located.here && located.anywhere &&
-                      located.anywhere->dissimilarity < located.here->dissimilarity &&
-                      located.anywhere->difference <= scales.limit(view) &&
-                      !std::ranges::binary_search(located.around, located.anywhere->node);
-  return located;
+  found.anywhere = views.find_nearest(graph(), view);
+  found.is_elsewhere = found.here && found.anywhere &&
+                       found.anywhere->dissimilarity < found.here->dissimilarity &&
+                       found.anywhere->difference <= scales.max_difference(view) &&
+                       !std::ranges::binary_search(found.around, found.anywhere->node);
+  return found;
 }
 
-// The place near where the robot was, unless several observations say otherwise.
-void Navigator::Core::accept(const Located& located, Step& step) {
+// Chooses the candidate near the last place, unless several observations agree on another one.
+void Navigator::Core::choose_place(const PlaceCandidates& candidates, Step& step) {
   PlaceDoubt& doubt = place.doubt;
-  if (located.elsewhere) {
-    // They must agree on the place, too.
-    const bool again =
-        doubt.elsewhere && std::ranges::binary_search(
-                               nodes_around(graph(), {&*doubt.elsewhere, 1}, options.near_links),
-                               located.anywhere->node);
-    doubt.elsewhere_steps = again ? doubt.elsewhere_steps + 1 : 1;
-    doubt.elsewhere = located.anywhere->node;
+  const auto reset_other_place = [&doubt] {
+    doubt.other_place_steps = 0;
+    doubt.other_node.reset();
+  };
+  if (candidates.is_elsewhere) {
+    const std::size_t other = candidates.anywhere->node;
+    const bool agrees =
+        doubt.other_node &&
+        std::ranges::binary_search(
+            nodes_around(graph(), {&*doubt.other_node, 1}, options.near_links), other);
+    doubt.other_place_steps = agrees ? doubt.other_place_steps + 1 : 1;
+    doubt.other_node = other;
   } else {
-    doubt.elsewhere_steps = 0;
-    doubt.elsewhere.reset();
+    reset_other_place();
   }
-  const bool accepted = doubt.elsewhere_steps >= options.min_agreeing_steps;
-  const auto& found = accepted ? located.anywhere : located.here;
+  const bool is_kidnapped = doubt.other_place_steps >= options.min_agreeing_steps;
+  const auto& found = is_kidnapped ? candidates.anywhere : candidates.here;
   if (found) {
     step.decision.difference = found->difference;
-    enter(found->node, step);
+    set_place(found->node, step);
   }
-  if (accepted) {
-    step.note(NavigationEvent::kidnapped);
-    doubt.elsewhere_steps = 0;
-    doubt.elsewhere.reset();
-    forget_plans(step);
+  if (is_kidnapped) {
+    step.add_event(NavigationEvent::kidnapped);
+    reset_other_place();
+    abandon_plans(step);
   }
 }
 
-bool Navigator::Core::line_tells() const {
-  return pilot.drives() && pilot.unknown_steps() == 0;
+bool Navigator::Core::is_localised_on_route() const {
+  return pilot.is_on_leg() && pilot.unknown_steps() == 0;
 }
 
 void Navigator::Core::locate(Step& step) {
-  std::optional<ViewId> told = step.report.estimate;
-  if (!told && line_tells()) told = pilot.place();
-  if (told) {
-    const auto node = graph().node_of(*told);
-    if (node) enter(*node, step);
+  std::optional<ViewId> reported = step.report.estimate;
+  if (!reported && is_localised_on_route()) reported = pilot.nearest_reference();
+  if (reported) {
+    const auto node = graph().node_of(*reported);
+    if (node) set_place(*node, step);
   }
-  if (!place.node) {
-    relocalise(step);
+  if (place.node) {
+    search_place(step);
   } else {
-    Located located = search_around(step.view);
-    const bool in_doubt =
-        !located.here || located.elsewhere || located.here->difference > scales.limit(step.view);
-    if (in_doubt && step.view.components != scales.components) {
-      step.view = SeenView(step.signature, scales.full_scale);
-      located = search_around(step.view);
-    }
-    accept(located, step);
+    relocalise(step);
   }
-  const auto looks_right = [&] { return step.decision.difference <= scales.limit(step.view); };
-  if (plan.under_way) {
-    const bool beyond = looks_right() && guide().way < plan.under_way->guide.way;
-    if (beyond || --plan.under_way->steps_left < 0) plan.under_way.reset();
+  update_known_place(step);
+}
+
+// Searches around the last place, with all components where the first ones leave doubt.
+void Navigator::Core::search_place(Step& step) {
+  PlaceCandidates found = find_candidates(step.view);
+  const bool is_doubtful = !found.here || found.is_elsewhere ||
+                           found.here->difference > scales.max_difference(step.view);
+  if (is_doubtful && step.view.components != scales.components) {
+    step.view = QueryView(step.signature, scales.full_scale);
+    found = find_candidates(step.view);
   }
-  // Between references that stand far apart no place looks right.
+  choose_place(found, step);
+}
+
+// Counts the steps at which the place does not match; searches the whole memory again and again,
+// and gives up in the end.
+void Navigator::Core::update_known_place(Step& step) {
+  const auto matches = [&] { return step.decision.difference <= scales.max_difference(step.view); };
+  if (plan.committed) {
+    const bool is_beyond = matches() && guide().path_length < plan.committed->guide.path_length;
+    if (is_beyond || --plan.committed->steps_left < 0) plan.committed.reset();
+  }
   int& unknown_steps = place.doubt.unknown_steps;
-  if (looks_right() || plan.under_way || line_tells()) {
+  // Between references that stand far apart no place matches.
+  if (matches() || plan.committed || is_localised_on_route()) {
     unknown_steps = 0;
-    if (looks_right() && !plan.under_way) place.known_node = place.node;
+    if (matches() && !plan.committed) place.known_node = place.node;
     return;
   }
-  step.note(NavigationEvent::unknown_place);
+  step.add_event(NavigationEvent::unknown_place);
   ++unknown_steps;
   if (unknown_steps % options.min_agreeing_steps == 0) relocalise(step);
-  if (looks_right()) {
+  if (matches()) {
     unknown_steps = 0;
     place.known_node = place.node;
   } else if (unknown_steps >= options.lost_patience) {
@@ -155,28 +169,30 @@ void Navigator::Core::locate(Step& step) {
   }
 }
 
-// A reference that looks right has to look better than chance, too: in another building the limit
-// of the difference lets enough views through to drive on for ever.
-void Navigator::Core::judge_place(Step& step) {
-  const auto probability = [&] {
-    return place_probability(criterion.evidence_for_first(
-        step.view.packed,
-        views.with_most_alike(graph().view(*place.node), step.view, compared_with_place)));
-  };
-  step.decision.probability = probability();
+double Navigator::Core::place_probability_of(const Step& step) const {
+  return place_probability(criterion.evidence_for_first(
+      step.view.packed,
+      views.most_similar_signatures(graph().view(*place.node), step.view, compared_views)));
+}
+
+// A reference that matches must also match better than by chance: in another building enough views
+// differ by little to drive on without end.
+void Navigator::Core::update_probability(Step& step) {
+  step.decision.probability = place_probability_of(step);
   int& improbable_steps = place.doubt.improbable_steps;
-  // Between references that stand far apart no place is probable, nor where something stands in
-  // the way and in the picture: what ends such a run is that every way was tried.
-  if (step.decision.probability < 0.5 && !plan.under_way && !line_tells() &&
+  // No place is probable between references that stand far apart, nor with an obstacle in view:
+  // such a run ends when every path was tried.
+  if (step.decision.probability < 0.5 && !plan.committed && !is_localised_on_route() &&
       obstruction.level == 0) {
     ++improbable_steps;
   }
-  const bool sought = std::ranges::find(step.decision.events, NavigationEvent::relocalised) !=
-                      step.decision.events.end();
-  if (state == NavigationState::moving && improbable_steps > 0 && !sought &&
+  const bool has_relocalised =
+      std::ranges::find(step.decision.events, NavigationEvent::relocalised) !=
+      step.decision.events.end();
+  if (state == NavigationState::moving && improbable_steps > 0 && !has_relocalised &&
       improbable_steps % options.min_agreeing_steps == 0) {
     relocalise(step);
-    step.decision.probability = probability();
+    step.decision.probability = place_probability_of(step);
   }
   if (step.decision.probability >= 0.5) {
     improbable_steps = 0;
@@ -185,9 +201,8 @@ void Navigator::Core::judge_place(Step& step) {
   }
 }
 
-// Some views of the area into which the way leads.
-void Navigator::Core::load_ahead() {
-  if (options.views_ahead == 0 || !place.node || !guide().reachable()) return;
+void Navigator::Core::prefetch_next_area() {
+  if (options.views_ahead == 0 || !place.node || !guide().is_reachable()) return;
   const SubAreas& areas = planner.areas();
   const std::size_t here = *views.area();
   std::size_t node = *place.node;
@@ -196,7 +211,7 @@ void Navigator::Core::load_ahead() {
     if (next == node) return;  // the goal
     node = next;
   }
-  views.load_ahead(graph(), areas, areas.area_of[node], options.views_ahead);
+  views.prefetch(graph(), areas, areas.area_of[node], options.views_ahead);
 }
 
 }  // namespace panonav

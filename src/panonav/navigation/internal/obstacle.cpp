@@ -9,8 +9,8 @@
 
 namespace panonav {
 
-std::vector<std::size_t> edges_across(const NavigationGraph& graph, const Obstacle& obstacle,
-                                      int links) {
+std::vector<std::size_t> find_crossed_edges(const NavigationGraph& graph, const Obstacle& obstacle,
+                                            int links) {
   require(obstacle.node < graph.size(), "node of an obstacle", static_cast<double>(obstacle.node),
           "a node of the graph");
   require(std::isfinite(obstacle.direction_rad), "direction_rad", obstacle.direction_rad, "finite");
@@ -18,7 +18,7 @@ std::vector<std::size_t> edges_across(const NavigationGraph& graph, const Obstac
           obstacle.distance, ">= 0 and finite");
   require(std::isfinite(obstacle.half_width) && obstacle.half_width >= 0.0, "half_width",
           obstacle.half_width, ">= 0 and finite");
-  // Nodes around, in a frame that looks along the direction of motion.
+  // The nodes around, in a frame whose x axis is the direction of motion.
   std::map<std::size_t, Pose2> placed{
       {obstacle.node, inverse(Pose2{0.0, 0.0, obstacle.direction_rad})}};
   std::vector<std::size_t> front{obstacle.node};
@@ -34,7 +34,7 @@ std::vector<std::size_t> edges_across(const NavigationGraph& graph, const Obstac
     }
     front.swap(next);
   }
-  std::vector<std::size_t> across;
+  std::vector<std::size_t> crossed;
   for (const auto& [node, pose] : placed) {
     for (const NavigationGraph::Exit& exit : graph.exits(node)) {
       if (exit.node < node || !graph.motion_from(node, exit.edge)) continue;
@@ -45,11 +45,11 @@ std::vector<std::size_t> edges_across(const NavigationGraph& graph, const Obstac
       if ((before < 0.0) == (beyond < 0.0)) continue;
       const double share = before / (before - beyond);
       const double y = pose.y_m + share * (other->second.y_m - pose.y_m);
-      if (std::abs(y) <= obstacle.half_width) across.push_back(exit.edge);
+      if (std::abs(y) <= obstacle.half_width) crossed.push_back(exit.edge);
     }
   }
-  std::ranges::sort(across);
-  return across;
+  std::ranges::sort(crossed);
+  return crossed;
 }
 
 }  // namespace panonav

@@ -18,13 +18,9 @@ namespace {
 using ViewPair = std::pair<ViewId, ViewId>;
 
 VisualMemory views_of(const ViewSource& source, const std::vector<ViewPair>& pairs) {
-  std::set<ViewId> wanted;
-  for (const auto& [a, b] : pairs) {
-    wanted.insert(a);
-    wanted.insert(b);
-  }
-  const std::vector<ViewId> views(wanted.begin(), wanted.end());
-  return source.load(views);
+  std::set<ViewId> ids;
+  for (const auto& [a, b] : pairs) ids.insert({a, b});
+  return source.load(std::vector<ViewId>(ids.begin(), ids.end()));
 }
 
 double median_difference(const ViewSource& source, const std::vector<ViewPair>& pairs,
@@ -44,23 +40,23 @@ double median_difference(const ViewSource& source, const std::vector<ViewPair>& 
 PlaceScale learn_place_scale(const ViewSource& source, const NavigationGraph& graph, int components,
                              int samples) {
   require(samples >= 1, "samples", samples, ">= 1");
-  const auto most = static_cast<std::size_t>(samples);
+  const auto max_pairs = static_cast<std::size_t>(samples);
   PlaceScale scale;
   std::vector<ViewPair> linked;
   const std::size_t edges = graph.edges().size();
-  for (std::size_t i = 0; i < std::min(most, edges); ++i) {
-    const NavigationGraph::Edge& edge = graph.edges()[i * edges / std::min(most, edges)];
+  for (std::size_t i = 0; i < std::min(max_pairs, edges); ++i) {
+    const NavigationGraph::Edge& edge = graph.edges()[i * edges / std::min(max_pairs, edges)];
     linked.emplace_back(edge.a, edge.b);
   }
-  if (!linked.empty()) scale.neighbours = median_difference(source, linked, components);
-  // Views half of all views apart in their order: far from each other but for a few.
+  if (!linked.empty()) scale.neighbour_difference = median_difference(source, linked, components);
+  // Pairs half of all views apart in their order: nearly all are far from each other.
   std::vector<ViewPair> strange;
   const std::size_t half = graph.size() / 2;
-  for (std::size_t i = 0; i < std::min(most, half); ++i) {
-    const std::size_t first = i * half / std::min(most, half);
+  for (std::size_t i = 0; i < std::min(max_pairs, half); ++i) {
+    const std::size_t first = i * half / std::min(max_pairs, half);
     strange.emplace_back(graph.view(first), graph.view(first + half));
   }
-  if (!strange.empty()) scale.strangers = median_difference(source, strange, components);
+  if (!strange.empty()) scale.stranger_difference = median_difference(source, strange, components);
   return scale;
 }
 
@@ -73,12 +69,12 @@ ArrivalScale learn_arrival_scale(const ViewSource& source, const NavigationGraph
   if (graph.exits(*node).empty()) return scale;
   std::vector<double> lengths;
   for (const NavigationGraph::Edge& edge : graph.edges()) lengths.push_back(edge.length);
-  const double usual = upper_median(std::move(lengths));
-  // Views of the goal itself from another drive tell nothing of the spacing, unless there are no
+  const double typical = upper_median(std::move(lengths));
+  // Views of the goal itself from another drive show no spacing; they count where there are no
   // others.
-  for (const double least : {0.5 * usual, 0.0}) {
+  for (const double min_length : {0.5 * typical, 0.0}) {
     for (const auto& exit : graph.exits(*node)) {
-      if (graph.edges()[exit.edge].length < least) continue;
+      if (graph.edges()[exit.edge].length < min_length) continue;
       pairs.emplace_back(goal, graph.view(exit.node));
     }
     if (!pairs.empty()) break;
@@ -89,7 +85,7 @@ ArrivalScale learn_arrival_scale(const ViewSource& source, const NavigationGraph
   for (const auto& [unused, neighbour] : pairs) {
     const HomingView view = homing_view(memory.signature(neighbour));
     const auto reading = read_phases(home, view);
-    if (reading && reading->points) {
+    if (reading && reading->has_direction) {
       nearest.emplace_back(reading->length, image_difference(home, view));
     }
   }

@@ -3,24 +3,71 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <utility>
 #include <vector>
 
 #include "panonav/core/error.hpp"
-#include "panonav/route/route_place.hpp"
+#include "panonav/route/route_position.hpp"
 
 namespace panonav {
 
-bool RoutePilot::begin(std::span<const ViewId> way, std::span<const float> line,
-                       double shortest_m) {
-  stop();
-  if (way.empty()) return false;
-  std::optional<RouteStretch> planned;
+namespace {
+
+/// Largest length of the route over the straight line between two views: a right corner has 1.41.
+constexpr double max_winding = 1.5;
+
+// Follows the route from one position in one direction: 1 as recorded, -1 back.
+std::optional<RouteSection> follow_path(const KnownRoute& route, double start_m, double direction,
+                                        std::span<const ViewId> path) {
+  const auto poses = route.tracker.lines().poses();
+  std::optional<RouteSection> found;
+  double at_m = start_m;
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    const Point2 here = point_on_route(poses, at_m);
+    std::optional<double> next_m;
+    for (const double along_m : route.along_m(path[i])) {
+      const double ahead_m = direction * (along_m - at_m);
+      if (ahead_m < 0.0 || (next_m && ahead_m >= direction * (*next_m - at_m))) continue;
+      const double straight_m = distance(here, point_on_route(poses, along_m));
+      if (ahead_m <= max_winding * straight_m) next_m = along_m;
+    }
+    if (!next_m) continue;
+    at_m = *next_m;
+    found = {start_m, at_m, i};
+  }
+  return found;
+}
+
+}  // namespace
+
+double RouteSection::length_m() const noexcept {
+  return std::abs(to_m - from_m);
+}
+
+std::optional<RouteSection> find_section(const KnownRoute& route, std::span<const double> starts_m,
+                                         std::span<const ViewId> path) {
+  std::optional<RouteSection> best;
+  for (const double start_m : starts_m) {
+    for (const double direction : {1.0, -1.0}) {
+      const auto found = follow_path(route, start_m, direction, path);
+      if (!found) continue;
+      const bool is_better = !best || found->last > best->last ||
+                             (found->last == best->last && found->length_m() < best->length_m());
+      if (is_better) best = found;
+    }
+  }
+  return best;
+}
+
+bool RoutePilot::begin_leg(std::span<const ViewId> path, std::span<const float> line,
+                           double min_length_m) {
+  end_leg();
+  if (path.empty()) return false;
+  std::optional<RouteSection> planned;
   std::size_t chosen = 0;
   for (std::size_t i = 0; i < routes_.size(); ++i) {
-    if (rejected_.contains(i)) continue;
-    const auto found = stretch_along(routes_[i], routes_[i].along_m(way.front()), way);
-    if (!found || found->length_m() < shortest_m) continue;
+    if (abandoned_.contains(i)) continue;
+    const auto found = find_section(routes_[i], routes_[i].along_m(path.front()), path);
+    if (!found || found->length_m() < min_length_m) continue;
     if (planned && found->last <= planned->last) continue;
     planned = found;
     chosen = i;
@@ -30,67 +77,66 @@ bool RoutePilot::begin(std::span<const ViewId> way, std::span<const float> line,
   const auto fix = route.tracker.search(line);
   if (!fix) return false;
   // Line and view must agree on the place, which the route may pass several times.
-  const auto path = route.tracker.lines().poses();
+  const auto poses = route.tracker.lines().poses();
   std::vector<double> starts_m;
-  for (const RoutePosition& place : find_passes(path, fix->pose.position(), route.beside_m)) {
+  for (const RoutePosition& start : find_passes(poses, fix->pose.position(), route.beside_m)) {
     const auto agrees = [&](double along_m) {
-      return std::abs(along_m - place.along_m) <= shortest_m;
+      return std::abs(along_m - start.along_m) <= min_length_m;
     };
-    if (std::ranges::any_of(route.along_m(way.front()), agrees)) starts_m.push_back(place.along_m);
+    if (std::ranges::any_of(route.along_m(path.front()), agrees)) starts_m.push_back(start.along_m);
   }
-  const auto stretch = stretch_along(route, starts_m, way);
-  if (!stretch || stretch->length_m() < shortest_m) return false;
+  const auto section = find_section(route, starts_m, path);
+  if (!section || section->length_m() < min_length_m) return false;
   leg_.emplace(Leg{chosen,
-                   *stretch,
+                   *section,
                    route.tracker,
-                   PathFollower(route_segment(path, stretch->from_m, stretch->to_m)),
-                   way[stretch->last],
-                   {},
-                   0});
+                   PathFollower(route_segment(poses, section->from_m, section->to_m)),
+                   path[section->last],
+                   {}});
   leg_->tracker.set_pose(fix->pose);
-  take_aim();
+  update_target();
   return true;
 }
 
 void RoutePilot::track(std::span<const float> line, const Pose2& moved) {
   if (!leg_) throw ContractError("leg", "none", "one under way");
   RouteTracker& tracker = leg_->tracker;
-  bool known = false;
+  bool is_known = false;
   if (line.empty()) {
     tracker.set_pose(*tracker.pose() * moved);
   } else {
-    known = tracker.track(line, moved).has_value();
+    is_known = tracker.track(line, moved).has_value();
   }
-  take_aim();
+  update_target();
   // A place of the route that is not on the leg is of no use.
-  known &= distance(tracker.pose()->position(), leg_->follower.position()) <=
-           routes_[leg_->route].beside_m;
-  leg_->unknown_steps = known ? 0 : leg_->unknown_steps + 1;
+  is_known &= distance(tracker.pose()->position(), leg_->follower.position()) <=
+              routes_[leg_->route].beside_m;
+  leg_->unknown_steps = is_known ? 0 : leg_->unknown_steps + 1;
 }
 
-ViewId RoutePilot::place() const {
-  const RouteStretch& stretch = leg_->stretch;
+ViewId RoutePilot::nearest_reference() const {
+  const RouteSection& section = leg_->section;
   const double driven_m = leg_->follower.along_m();
-  const double along_m = stretch.from_m + (stretch.to_m < stretch.from_m ? -driven_m : driven_m);
-  const auto off_m = [&](const KnownRoute::Reference& reference) {
+  const double along_m = section.from_m + (section.to_m < section.from_m ? -driven_m : driven_m);
+  const auto distance_m = [&](const KnownRoute::Reference& reference) {
     double min_m = std::numeric_limits<double>::infinity();
     for (const double there_m : reference.along_m) {
       min_m = std::min(min_m, std::abs(there_m - along_m));
     }
     return min_m;
   };
-  return std::ranges::min_element(routes_[leg_->route].references, {}, off_m)->view;
+  return std::ranges::min_element(routes_[leg_->route].references, {}, distance_m)->view;
 }
 
-void RoutePilot::take_aim() {
+void RoutePilot::update_target() {
   const Pose2 route_from_robot = *leg_->tracker.pose();
-  leg_->aim = leg_->follower.next_target(route_from_robot.position());
-  if (leg_->aim) leg_->aim = inverse(route_from_robot) * *leg_->aim;
+  leg_->target = leg_->follower.next_target(route_from_robot.position());
+  if (leg_->target) leg_->target = inverse(route_from_robot) * *leg_->target;
 }
 
-void RoutePilot::give_up() {
-  if (leg_) rejected_.insert(leg_->route);
-  stop();
+void RoutePilot::abandon_leg() {
+  if (leg_) abandoned_.insert(leg_->route);
+  end_leg();
 }
 
 }  // namespace panonav

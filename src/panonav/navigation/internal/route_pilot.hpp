@@ -7,66 +7,84 @@
 
 #include "panonav/geometry/pose2.hpp"
 #include "panonav/motion/path_follower.hpp"
-#include "panonav/navigation/internal/route_stretch.hpp"
 #include "panonav/navigation/known_route.hpp"
 
 namespace panonav {
 
-/// Drives legs along recorded routes by horizon scanlines: where a planned path goes along a route,
+/// A section of a route that a planned path follows.
+struct RouteSection {
+  double from_m = 0.0;   ///< along the route
+  double to_m = 0.0;     ///< along the route; less than `from_m`: against its recording
+  std::size_t last = 0;  ///< number of the path's view at the end of the section
+  /// Path length of the section, in either direction.
+  [[nodiscard]] double length_m() const noexcept;
+};
+
+/// Finds how far a path over views follows a route in one direction, from one of the positions
+/// `starts_m` along it. The section ends at the last view on the route such that, between
+/// successive views of the path, the route is at most 1.5 times as long as the straight line: it
+/// may turn a right corner between two views (1.41), but makes no detour where the path goes
+/// straight. Of several sections the one that comes farthest on the path counts, then the shortest.
+/// Empty when no view lies ahead. Cost: O(starts * passages of the path's views * lines).
+[[nodiscard]] std::optional<RouteSection> find_section(const KnownRoute& route,
+                                                       std::span<const double> starts_m,
+                                                       std::span<const ViewId> path);
+
+/// Drives legs along recorded routes by horizon scanlines: where a planned path follows a route,
 /// the robot repeats the route as it was recorded. Deterministic.
 class RoutePilot {
  public:
-  /// None to drive along.
+  /// Has no routes.
   RoutePilot() = default;
   /// The routes must outlive *this.
   explicit RoutePilot(std::span<const KnownRoute> routes) : routes_(routes) {}
 
   [[nodiscard]] std::span<const KnownRoute> routes() const noexcept { return routes_; }
-  /// Whether a leg is under way.
-  [[nodiscard]] bool drives() const noexcept { return leg_.has_value(); }
+  /// True while a leg is under way.
+  [[nodiscard]] bool is_on_leg() const noexcept { return leg_.has_value(); }
 
-  /// Begins a leg of at least `shortest_m` along the route that leads farthest along the path,
-  /// which starts with the robot's place. `line` must show that the robot is on the route, no
-  /// farther from that place than `shortest_m`. Routes that were rejected are not used. Returns
-  /// whether a leg began. Throws ContractError on a line of another length than the route's. Cost:
-  /// that of `stretch_along` for each route, and of a search where one leads far enough.
-  bool begin(std::span<const ViewId> way, std::span<const float> line, double shortest_m);
+  /// Begins a leg of at least `min_length_m` along the route that leads farthest along the path,
+  /// which starts at the robot's place. `line` must show that the robot is on the route, no farther
+  /// from that place than `min_length_m`. Abandoned routes are not used. Returns whether a leg
+  /// began. Throws ContractError on a line of another length than the route's. Cost: that of
+  /// `find_section` for each route, and of a search where one leads far enough.
+  bool begin_leg(std::span<const ViewId> path, std::span<const float> line, double min_length_m);
 
-  /// The next observation of a leg: `moved` is the robot's motion since the observation before, in
-  /// the frame it had then. An empty line: none was taken, and the motion alone is used. Throws
-  /// ContractError as `begin`, and without a leg.
+  /// Takes the next observation of a leg: `moved` is the robot's motion since the observation
+  /// before, in the frame it had then. With an empty line the motion alone counts. Throws
+  /// ContractError as `begin_leg`, and without a leg.
   void track(std::span<const float> line, const Pose2& moved);
 
-  // Of the leg under way; undefined without one.
-  /// Where to go, in the robot's frame; empty when the leg has come to its end.
-  [[nodiscard]] const std::optional<Point2>& aim() const { return leg_->aim; }
-  /// The reference to which it leads.
+  // Undefined without a leg.
+  /// The point to drive to, in the robot's frame; nullopt when the leg has come to its end.
+  [[nodiscard]] const std::optional<Point2>& target() const { return leg_->target; }
+  /// The reference at the end of the leg.
   [[nodiscard]] ViewId end() const { return leg_->end; }
-  /// The reference beside the robot according to line and motion.
-  [[nodiscard]] ViewId place() const;
-  /// Number of consecutive observations that gave no place on the leg.
+  /// The reference nearest to the robot along the route.
+  [[nodiscard]] ViewId nearest_reference() const;
+  /// Number of successive observations that showed no place on the leg.
   [[nodiscard]] int unknown_steps() const { return leg_->unknown_steps; }
 
   /// Ends the leg, if there is one.
-  void stop() noexcept { leg_.reset(); }
-  /// Ends the leg; its route is not used again until `forgive`.
-  void give_up();
-  void forgive() noexcept { rejected_.clear(); }
+  void end_leg() noexcept { leg_.reset(); }
+  /// Ends the leg; its route is not used again until `allow_all_routes`.
+  void abandon_leg();
+  void allow_all_routes() noexcept { abandoned_.clear(); }
 
  private:
   struct Leg {
     std::size_t route;
-    RouteStretch stretch;
+    RouteSection section;
     RouteTracker tracker;
     PathFollower follower;
     ViewId end;
-    std::optional<Point2> aim;
+    std::optional<Point2> target;
     int unknown_steps = 0;
   };
-  void take_aim();
+  void update_target();
 
   std::span<const KnownRoute> routes_;
-  std::set<std::size_t> rejected_;
+  std::set<std::size_t> abandoned_;
   std::optional<Leg> leg_;
 };
 

@@ -1,4 +1,4 @@
-#include "panonav/localisation/particle_modes.hpp"
+#include "panonav/localisation/internal/particle_modes.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -15,7 +15,8 @@ namespace panonav {
 
 namespace {
 
-constexpr int reach = 2;  // bins beside the heaviest one
+/// Bins beside the heaviest one that belong to its mode, in each direction.
+constexpr int mode_reach = 2;
 
 struct Bin {
   GridCell place;
@@ -24,7 +25,7 @@ struct Bin {
   int mode;
 };
 
-// Sums of one mode relative to an anchor, so that nothing is lost far from the origin.
+/// Sums over one mode relative to an anchor, so that no digits are lost far from the origin.
 struct Moments {
   Pose2 anchor;
   bool anchored = false;
@@ -73,7 +74,7 @@ struct Moments {
   }
 };
 
-/// Bins by their place: a cell and a sector of headings.
+/// Bins by cell and sector of headings.
 class BinTable {
  public:
   explicit BinTable(int headings) : headings_(static_cast<std::size_t>(headings)) {}
@@ -86,9 +87,9 @@ class BinTable {
     return bin == none ? std::nullopt : std::optional(bin);
   }
   std::uint32_t find_or_add(GridCell place, std::int32_t heading) {
-    // Mostly it is the cell of the particle before.
+    // Usually it is the cell of the particle before.
     if (cells_.size() == 0 || cells_[last_] != place) {
-      last_ = cells_.number_of(place);
+      last_ = cells_.find_or_add(place);
       bin_of_.resize(cells_.size() * headings_, none);
     }
     std::uint32_t& bin = bin_of_[last_ * headings_ + static_cast<std::size_t>(heading)];
@@ -109,12 +110,12 @@ class BinTable {
   std::uint32_t last_ = 0;
 };
 
-// Particles beyond any map, or at no number, share the outermost bin.
-std::int32_t bin_at(double cells) {
+// Returns the index of a bin; beyond any map, and for no number, the outermost one.
+std::int32_t bin_index(double cells) {
   return cell_index(cells, 1e9);
 }
 
-/// Puts the particles into bins; returns the bin of each. `sum`: of the weights.
+/// Counts the particles in bins; returns the bin of each and sets the sum of the weights.
 std::vector<std::uint32_t> fill_bins(const Particles& particles, const PoseBins& bins,
                                      BinTable& table, double& sum) {
   std::vector<std::uint32_t> bin_of(particles.size());
@@ -122,9 +123,10 @@ std::vector<std::uint32_t> fill_bins(const Particles& particles, const PoseBins&
   const double sectors_per_radian = bins.headings / (2.0 * std::numbers::pi);
   sum = 0.0;
   for (std::size_t i = 0; i < particles.size(); ++i) {
-    const GridCell place{bin_at(particles.x_m[i] * cells_per_metre),
-                         bin_at(particles.y_m[i] * cells_per_metre)};
-    const auto sector = bin_at((particles.heading_rad[i] + std::numbers::pi) * sectors_per_radian);
+    const GridCell place{bin_index(particles.x_m[i] * cells_per_metre),
+                         bin_index(particles.y_m[i] * cells_per_metre)};
+    const auto sector =
+        bin_index((particles.heading_rad[i] + std::numbers::pi) * sectors_per_radian);
     const std::int32_t heading = std::clamp(sector, 0, bins.headings - 1);
     bin_of[i] = table.find_or_add(place, heading);
     table.bins()[bin_of[i]].weight += particles.weight[i];
@@ -133,13 +135,13 @@ std::vector<std::uint32_t> fill_bins(const Particles& particles, const PoseBins&
   return bin_of;
 }
 
-/// Gives the bins around the seed that are of no mode yet to this one; returns their weight.
+/// Adds the bins around the seed that belong to no mode yet to this one; returns their weight.
 double gather_mode(BinTable& table, const PoseBins& bins, std::uint32_t seed, int mode) {
   const std::span<Bin> cells = table.bins();
   double weight = 0.0;
-  const std::int32_t turn_reach = bins.headings > 2 * reach ? reach : 0;
-  for (std::int32_t dx = -reach; dx <= reach; ++dx) {
-    for (std::int32_t dy = -reach; dy <= reach; ++dy) {
+  const std::int32_t turn_reach = bins.headings > 2 * mode_reach ? mode_reach : 0;
+  for (std::int32_t dx = -mode_reach; dx <= mode_reach; ++dx) {
+    for (std::int32_t dy = -mode_reach; dy <= mode_reach; ++dy) {
       for (std::int32_t dh = -turn_reach; dh <= turn_reach; ++dh) {
         const std::int32_t heading = (cells[seed].heading + dh + bins.headings) % bins.headings;
         const GridCell place{cells[seed].place.x + dx, cells[seed].place.y + dy};
@@ -167,15 +169,14 @@ std::vector<double> gather_modes(BinTable& table, const PoseBins& bins, double m
   for (const std::uint32_t seed : order) {
     if (cells[seed].mode >= 0) continue;
     // No later mode can be heavier than all its bins at this weight.
-    constexpr double max_bins = (2 * reach + 1) * (2 * reach + 1) * (2 * reach + 1);
+    constexpr double max_bins = (2 * mode_reach + 1) * (2 * mode_reach + 1) * (2 * mode_reach + 1);
     if (cells[seed].weight * max_bins < min_weight) break;
     weights.push_back(gather_mode(table, bins, seed, static_cast<int>(weights.size())));
   }
   return weights;
 }
 
-/// Numbers the modes by their weight, and takes the bins of those below `min_weight` out of them.
-/// Returns how many are left.
+/// Numbers the modes by their weight, without those below `min_weight`. Returns how many are left.
 std::size_t renumber_by_weight(std::span<Bin> cells, const std::vector<double>& weights,
                                double min_weight) {
   std::vector<int> by_weight;
@@ -225,7 +226,7 @@ ParticleModes find_modes(const Particles& particles, const PoseBins& bins, doubl
 
 double position_spread_m(const Particles& particles) {
   if (particles.empty()) return 0.0;
-  // Relative to the first, so that nothing is lost far from the origin.
+  // Relative to the first, so that no digits are lost far from the origin.
   const Point2 anchor = particles.position(0);
   double weight = 0.0;
   double first_x = 0.0;

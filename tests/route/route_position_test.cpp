@@ -1,4 +1,4 @@
-#include "panonav/route/route_place.hpp"
+#include "panonav/route/route_position.hpp"
 
 #include <gtest/gtest.h>
 

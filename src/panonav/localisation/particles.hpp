@@ -1,0 +1,54 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "panonav/geometry/pose2.hpp"
+
+namespace panonav {
+
+/// Hypotheses of the robot's pose, column by column as kernels need them. Invariant: columns of one
+/// size. In a filter the weights sum to 1.
+struct Particles {
+  std::vector<double> x_m,     ///< in the frame of the memory's positions
+      y_m,                     ///< in the frame of the memory's positions
+      heading_rad;             ///< in [-pi, pi)
+  std::vector<double> weight;  ///< >= 0
+
+  /// Number of particles.
+  [[nodiscard]] std::size_t size() const noexcept { return weight.size(); }
+  /// True if there is none.
+  [[nodiscard]] bool empty() const noexcept { return weight.empty(); }
+  /// Position of particle i < size().
+  [[nodiscard]] Point2 position(std::size_t i) const { return {x_m[i], y_m[i]}; }
+  /// Pose of particle i < size().
+  [[nodiscard]] Pose2 pose(std::size_t i) const { return {x_m[i], y_m[i], heading_rad[i]}; }
+  /// Replaces particle i < size().
+  void set(std::size_t i, const Pose2& pose, double new_weight) {
+    x_m[i] = pose.x_m;
+    y_m[i] = pose.y_m;
+    heading_rad[i] = pose.heading_rad;
+    weight[i] = new_weight;
+  }
+  /// Appends a particle.
+  void add(const Pose2& pose, double new_weight) {
+    resize(size() + 1);
+    set(size() - 1, pose, new_weight);
+  }
+  /// Keeps the first `count`; additional ones are all zeros.
+  void resize(std::size_t count) {
+    for (auto* column : {&x_m, &y_m, &heading_rad, &weight}) column->resize(count);
+  }
+};
+
+/// A cluster of particles.
+struct PoseMode {
+  double weight = 0.0;                 ///< sum over its particles
+  Pose2 mean;                          ///< weighted; the heading is the circular mean
+  std::array<double, 9> covariance{};  ///< of x, y (m) and heading (rad), row by row
+  double spread_m = 0.0;               ///< root mean square distance of the particles from the mean
+  double heading_spread_rad = 0.0;     ///< the same of the headings
+};
+
+}  // namespace panonav
