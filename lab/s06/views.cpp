@@ -225,7 +225,7 @@ viewer::Series curve_by_distance(const Arena& arena, const PairSums& sums, doubl
 std::vector<HomingView> turned_north(const ArenaRecording& recording) {
   std::vector<HomingView> views;
   for (const auto& placed : recording.views) {
-    views.push_back(turn(placed.view, -placed.pose.heading_rad));
+    views.push_back(rotate(placed.view, -placed.pose.heading_rad));
   }
   return views;
 }

@@ -1,7 +1,5 @@
 #include "lab/y03/route_contours.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -61,8 +59,10 @@ constexpr double smoothing_deg = 1.0;    // of the lines before they are differe
 constexpr int max_control_points = 120;  // control points, at the strongest edges of the line
 constexpr int max_contour_moves = 200;   // moves of the contours
 
-// With fewer control points a pose is not worth asking for.
+// Fewest control points that determine a pose.
 constexpr std::size_t min_points = 8;
+// Damping of the steps that fit a pose: what no control point determines stays.
+constexpr double pose_damping = 1e-6;
 
 using Vector = Eigen::Vector3d;
 
@@ -231,61 +231,67 @@ void RouteContours::add_heading_terms(const RouteContourFix& fix, std::vector<Te
   }
 }
 
-// One Gauss-Newton step with Cauchy's weights: sets the residual and the covariance of the fix, and
-// returns the change of its pose; empty where the terms determine none.
-std::optional<Eigen::Vector3d> RouteContours::solve(const std::vector<Term>& terms,
-                                                    std::size_t along_terms,
-                                                    RouteContourFix& fix) const {
+// Fills the equations with Cauchy's weights, and sets the residual and the covariance of the fix;
+// false where the terms determine none.
+bool RouteContours::fill_equations(const std::vector<Term>& terms, std::size_t along_terms,
+                                   RouteContourFix& fix, DenseEquations<3>& equations) const {
   std::vector<double> sizes;
-  for (const Term& term : std::span(terms).first(along_terms)) {
-    sizes.push_back(term.deviations);
-  }
+  for (const Term& term : std::span(terms).first(along_terms)) sizes.push_back(term.deviations);
   const double noise = std::max(0.1, 1.4826 * upper_median_in_place(std::span(sizes)));
-  Eigen::Matrix3d matrix = Eigen::Matrix3d::Zero();
-  Vector right = Vector::Zero();
+  equations.begin();
   double left = 0.0;
   double weights = 0.0;
   for (std::size_t i = 0; i < terms.size(); ++i) {
     const Term& term = terms[i];
     const double ratio = term.difference * std::sqrt(term.weight) / (2.0 * noise);
     const double weight = term.weight / (1.0 + ratio * ratio);
-    matrix += weight * term.slope * term.slope.transpose();
-    right += weight * term.difference * term.slope;
+    equations.matrix += weight * term.slope * term.slope.transpose();
+    equations.right += weight * term.difference * term.slope;
     if (i >= along_terms) continue;
     left += weight * term.difference * term.difference;
     weights += weight;
   }
   fix.residual_m = std::sqrt(left / weights) * spacing_m_;
-  matrix.diagonal() *= 1.0 + 1e-6;
-  const Vector change = matrix.ldlt().solve(right);
-  const Eigen::Matrix3d inverse = matrix.ldlt().solve(Eigen::Matrix3d::Identity());
-  if (!change.allFinite() || !inverse.allFinite()) return std::nullopt;
+  Eigen::Matrix3d damped = equations.matrix;
+  damped.diagonal() *= 1.0 + pose_damping;
+  const Eigen::Matrix3d inverse = damped.ldlt().solve(Eigen::Matrix3d::Identity());
+  if (!inverse.allFinite()) return false;
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t j = 0; j < 3; ++j) {
       fix.covariance[3 * i + j] =
           noise * noise * inverse(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
     }
   }
-  return change;
+  return true;
 }
 
 bool RouteContours::fit_pose(RouteContourFix& fix) const {
-  constexpr int steps = 20;
-  for (int step = 0; step <= steps; ++step) {
-    std::vector<Term> terms = path_terms(fix);
-    const std::size_t along_terms = terms.size();
-    if (along_terms < min_points) return false;
-    add_heading_terms(fix, terms);
-    const auto change = solve(terms, along_terms, fix);
-    if (!change) return false;
-    const double length_m = std::hypot((*change)[0], (*change)[1]);
-    const double scale = std::min(1.0, 0.1 / std::max(1e-12, length_m));
-    if (step == steps || (length_m < 1e-5 && std::abs((*change)[2]) < 1e-6)) break;
-    fix.pose.x_m += scale * (*change)[0];
-    fix.pose.y_m += scale * (*change)[1];
-    fix.pose.heading_rad = wrap_angle(fix.pose.heading_rad + scale * (*change)[2]);
-  }
-  return true;
+  constexpr int max_moves = 20;
+  struct PoseProblem {
+    const RouteContours& contours;
+    RouteContourFix& fix;
+    int moves = 0;
+
+    bool linearise(DenseEquations<3>& equations) const {
+      std::vector<Term> terms = contours.path_terms(fix);
+      const std::size_t along_terms = terms.size();
+      if (along_terms < min_points) return false;
+      contours.add_heading_terms(fix, terms);
+      return contours.fill_equations(terms, along_terms, fix, equations);
+    }
+    bool move(const Vector& change) {
+      const double length_m = std::hypot(change[0], change[1]);
+      if (moves++ == max_moves || (length_m < 1e-5 && std::abs(change[2]) < 1e-6)) return true;
+      const double scale = std::min(1.0, 0.1 / std::max(1e-12, length_m));
+      fix.pose.x_m += scale * change[0];
+      fix.pose.y_m += scale * change[1];
+      fix.pose.heading_rad = wrap_angle(fix.pose.heading_rad + scale * change[2]);
+      return false;
+    }
+  } problem{*this, fix};
+  DenseEquations<3> equations;
+  return minimise(problem, equations, {.max_steps = max_moves + 1, .damping = pose_damping})
+      .solvable;
 }
 
 std::optional<RouteContourFix> RouteContours::fit(std::span<const float> line,

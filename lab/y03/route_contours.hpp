@@ -1,12 +1,12 @@
 #pragma once
 
-#include <Eigen/Core>
 #include <array>
 #include <cstddef>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "panonav/geometry/least_squares.hpp"
 #include "panonav/route/route_crossing.hpp"
 #include "panonav/route/route_panorama.hpp"
 
@@ -63,9 +63,8 @@ class RouteContours {
                 const std::vector<bool>& joined) const;
   [[nodiscard]] std::vector<Term> path_terms(const RouteContourFix& fix) const;
   void add_heading_terms(const RouteContourFix& fix, std::vector<Term>& terms) const;
-  [[nodiscard]] std::optional<Eigen::Vector3d> solve(const std::vector<Term>& terms,
-                                                     std::size_t along_terms,
-                                                     RouteContourFix& fix) const;
+  [[nodiscard]] bool fill_equations(const std::vector<Term>& terms, std::size_t along_terms,
+                                    RouteContourFix& fix, DenseEquations<3>& equations) const;
   bool fit_pose(RouteContourFix& fix) const;
 
   int columns_;

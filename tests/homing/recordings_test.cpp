@@ -54,7 +54,7 @@ TEST(HomingOnRecordings, GantryViewsPointHome) {
         if (h == c || distance(home, here) > 0.301) continue;
         const double turned_rad =
             2.0 * std::numbers::pi * static_cast<double>(random.index(columns)) / columns;
-        const HomeVector found = home_vector(views[h], turn(views[c], turned_rad));
+        const HomeVector found = home_vector(views[h], rotate(views[c], turned_rad));
         const double truth = std::atan2(home.y_m - here.y_m, home.x_m - here.x_m);
         sum += std::cos(found.direction_rad() + turned_rad - truth);
         ++pairs;

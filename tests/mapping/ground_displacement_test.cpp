@@ -126,9 +126,9 @@ TEST(GroundLengths, OdometryTellsMetresWhateverItsScale) {
       without.add(view);
       pose = pose * Pose2{0.1, 0.0, 0.02};
     }
-    const double way_m = std::hypot(odometry.pose().x_m, odometry.pose().y_m);
+    const double path_m = std::hypot(odometry.pose().x_m, odometry.pose().y_m);
     const double guessed_m = std::hypot(without.pose().x_m, without.pose().y_m);
-    EXPECT_NEAR(way_m, 0.1 * steps, 0.05 * steps * 0.1) << "scale " << scale_m;
+    EXPECT_NEAR(path_m, 0.1 * steps, 0.05 * steps * 0.1) << "scale " << scale_m;
     EXPECT_GT(std::abs(guessed_m - 0.1 * steps), 0.2 * steps * 0.1) << "guard: a guess is no metre";
   }
 }

@@ -82,7 +82,7 @@ TEST(LatticeGraph, PartsAndWays) {
   const std::vector<GraphEdge> edges{{5, 6, 1.0}, {0, 1, 1.0}, {1, 2, 2.0}, {0, 2, 4.0}};
   const LatticeGraph graph(7, edges);
   EXPECT_EQ(graph.components(), (std::vector<std::size_t>{0, 0, 0, 2, 3, 1, 1}));
-  const auto ways = graph.shortest_ways(0);
+  const auto ways = graph.shortest_path_lengths(0);
   EXPECT_EQ(ways[2], 3.0);
   EXPECT_TRUE(std::isinf(ways[5]));
   EXPECT_THROW(LatticeGraph(2, edges), ContractError);
@@ -292,8 +292,8 @@ TEST(LatticeGrowth, AFalseSpringDoesNotFoldAHall) {
   const double across =
       distance(grown.start.poses[0].position(), grown.start.poses[TwoHalls::views - 1].position());
   EXPECT_NEAR(across, std::hypot(5.0, 5.0), 0.7);
-  EXPECT_FALSE(fits(halls.springs.back(), 1.0, grown.start.poses[1],
-                    grown.start.poses[TwoHalls::views - 2]));
+  EXPECT_FALSE(fits_layout(halls.springs.back(), 1.0, grown.start.poses[1],
+                           grown.start.poses[TwoHalls::views - 2]));
 }
 
 TEST(LatticeGrowth, TheOrderOfViewsDoesNotMatter) {

@@ -155,8 +155,8 @@ TEST(LoopClosureFinder, RefusesAHeadingBeyondTheDrift) {
     std::size_t closures = 0;
     for (std::size_t i = 0; i < truth.size(); ++i) {
       const FourierSignature view = round_room_signature(world, truth[i]);
-      const double way_m = 10.0 * static_cast<double>(i) / round;
-      nodes.push_back({memory.append(view, {.name = std::to_string(i)}), way_m});
+      const double path_m = 10.0 * static_cast<double>(i) / round;
+      nodes.push_back({memory.append(view, {.name = std::to_string(i)}), path_m});
       poses.push_back(truth[i]);
       if (i >= round - 20) {
         const Pose2& since = truth[round - 20];

@@ -122,12 +122,12 @@ TEST_P(EveryRule, TurningTheRobotTurnsTheVectorAndNothingElse) {
     const HomingView current = view_of(seen_from(around, 0.1, -0.05, 1.0, 12));
     const HomeVector v = home_vector(home, current, GetParam().options);
     constexpr double delta = 2.1;
-    const HomeVector other = home_vector(home, turn(current, delta), GetParam().options);
+    const HomeVector other = home_vector(home, rotate(current, delta), GetParam().options);
     EXPECT_NEAR(std::cos(delta) * v.xi + std::sin(delta) * v.eta, other.xi, 1e-4);
     EXPECT_NEAR(-std::sin(delta) * v.xi + std::cos(delta) * v.eta, other.eta, 1e-4);
     EXPECT_NEAR(angle_difference(v.heading_rad - delta, other.heading_rad), 0.0, 1e-4);
     EXPECT_NEAR(v.residual, other.residual, 1e-4);
-    const HomeVector same = home_vector(turn(home, -1.3), current, GetParam().options);
+    const HomeVector same = home_vector(rotate(home, -1.3), current, GetParam().options);
     EXPECT_NEAR(same.xi, v.xi, 1e-4);
     EXPECT_NEAR(same.eta, v.eta, 1e-4);
     EXPECT_NEAR(angle_difference(v.heading_rad - 1.3, same.heading_rad), 0.0, 1e-4);
@@ -139,7 +139,7 @@ TEST_P(EveryRule, IdenticalViewsGiveNoWayAndNoConfidence) {
     const ToyWorld around = random_surroundings(7, 2.0);
     const HomingView home = view_of(seen_from(around, 0.0, 0.0, 0.0, rows));
     for (const double heading : {0.0, 1.7}) {
-      const HomeVector v = home_vector(home, turn(home, heading), GetParam().options);
+      const HomeVector v = home_vector(home, rotate(home, heading), GetParam().options);
       EXPECT_LT(v.length(), 1e-4);
       EXPECT_LT(v.confidence, 0.5);
       EXPECT_NEAR(angle_difference(v.heading_rad, -heading), 0.0, 1e-4);
@@ -167,7 +167,7 @@ TEST_P(EveryRule, ViewsWithoutStructureGiveNothingAndNoNaN) {
     a[only] = 0.4F;
     const HomingView wave(1, 10, a, std::vector<float>(10));
     for (const auto* other : {&wave}) {
-      const HomeVector v = home_vector(wave, turn(*other, 0.2), GetParam().options);
+      const HomeVector v = home_vector(wave, rotate(*other, 0.2), GetParam().options);
       EXPECT_TRUE(std::isfinite(v.xi) && std::isfinite(v.eta) && std::isfinite(v.heading_rad));
       EXPECT_TRUE(std::isfinite(v.residual) && v.confidence >= 0.0 && v.confidence <= 1.0);
     }
@@ -254,13 +254,13 @@ TEST(ImageDifference, LeanIsNotADifference) {
     const ToyWorld around = random_surroundings(700 + trial, 6.0);
     const Panorama level = seen_from(around, 0.0, 0.0, 0.0, 40);
     const Panorama tilted = tilted_panorama(level, radians(1.5));
-    tilted_at_home += image_difference(view_of(level), turn(view_of(tilted), 1.0)) / 30;
+    tilted_at_home += image_difference(view_of(level), rotate(view_of(tilted), 1.0)) / 30;
     // Without elevations nothing is known of a tilt.
     const auto bare = [](const Panorama& view) {
       return view_of(Panorama(view.rows(), view.columns(), std::nullopt,
                               {view.values().begin(), view.values().end()}));
     };
-    flat += image_difference(bare(level), turn(bare(tilted), 1.0)) / 30;
+    flat += image_difference(bare(level), rotate(bare(tilted), 1.0)) / 30;
   }
   EXPECT_LT(tilted_at_home, 0.4 * flat);
 }
@@ -323,7 +323,7 @@ TEST(FourierHoming, CoherenceTakesFewerFrequenciesFromAfar) {
 TEST(FourierHoming, DifferenceIsZeroAtHomeAndGrowsWithTheDistance) {
   const ToyWorld around = random_surroundings(21);
   const HomingView home = view_of(seen_from(around, 0.0, 0.0, 0.0, 1));
-  EXPECT_NEAR(image_difference(home, turn(home, 0.8)), 0.0, 1e-5);
+  EXPECT_NEAR(image_difference(home, rotate(home, 0.8)), 0.0, 1e-5);
   double before = 0.0;
   for (const double d : {0.02, 0.1, 0.3}) {
     const double difference = image_difference(home, view_of(seen_from(around, d, 0.0, 1.0, 1)));
@@ -461,7 +461,7 @@ TEST(ChanceMatch, ViewsOfOnePlaceAreKnownWhicheverWayTheRobotFaces) {
       const ChanceMatch match = compare_with_chance(home, here);
       known += match.is_beyond_chance() ? 1 : 0;
       ++asked;
-      const ChanceMatch turned = compare_with_chance(turn(home, 1.0), turn(here, -2.0));
+      const ChanceMatch turned = compare_with_chance(rotate(home, 1.0), rotate(here, -2.0));
       EXPECT_NEAR(turned.match, match.match, 2e-3);
       EXPECT_NEAR(turned.chance, match.chance, 2e-2);
     }

@@ -75,10 +75,10 @@ TEST(RelativeTilt, IsFoundWhateverTheHeading) {
     largest_error = std::max({largest_error, std::abs(found.roll_rad - tilt.roll_rad),
                               std::abs(found.pitch_rad - tilt.pitch_rad)});
     // What is left of the difference.
-    const HomingView level = turn(level_view(current, found), -heading);
+    const HomingView level = rotate(level_view(current, found), -heading);
     double before = 0.0;
     double after = 0.0;
-    const HomingView same = turn(current, -heading);
+    const HomingView same = rotate(current, -heading);
     for (int k = 1; k < 10; ++k) {
       for (int y = 4; y < 36; ++y) {
         before += std::abs(same.a(y, k) - home.a(y, k)) + std::abs(same.b(y, k) - home.b(y, k));

@@ -14,9 +14,10 @@ namespace {
 
 constexpr int stages_of_coarse_to_fine = 3;
 constexpr int stages_of_recovering = 4;
-constexpr double gain_against = 0.5;
-// Less than two such steps undo one halving, so that a direction at random shortens the step.
-constexpr double gain_agreeing = 1.25;
+/// Factor of the step when a vector opposes the one before it.
+constexpr double opposing_factor = 0.5;
+/// Factor when they agree: two such steps do not undo one halving, so random directions shorten it.
+constexpr double agreeing_factor = 1.25;
 
 }  // namespace
 
@@ -47,8 +48,7 @@ HomingPursuit::HomingPursuit(HomingView home, const HomingPursuitOptions& option
   validate(vector_);
 }
 
-// Whether there is a further stage after homing stopped in this one.
-bool HomingPursuit::goes_on(double difference) const noexcept {
+bool HomingPursuit::has_next_stage(double difference) const noexcept {
   switch (options_.strategy) {
     case HomingPursuitOptions::Strategy::steady:
       return false;
@@ -60,7 +60,7 @@ bool HomingPursuit::goes_on(double difference) const noexcept {
   return false;
 }
 
-FourierHomingOptions HomingPursuit::vector_of_stage(const HomingView& current) const {
+FourierHomingOptions HomingPursuit::vector_options_of_stage(const HomingView& current) const {
   FourierHomingOptions vector = vector_;
   int highest = 0;
   if (options_.strategy == HomingPursuitOptions::Strategy::coarse_to_fine) {
@@ -75,22 +75,22 @@ FourierHomingOptions HomingPursuit::vector_of_stage(const HomingView& current) c
   return vector;
 }
 
-// As a robot would see it that is tilted as the one at home was. The heading is better known once
-// the view is level, and then the tilt, too.
-HomingView HomingPursuit::tilted_as_at_home(const HomingView& seen) const {
+// Returns the view of a robot that is tilted as at home. The heading is better known once the view
+// is level, and then the tilt, too.
+HomingView HomingPursuit::level_as_at_home(const HomingView& view) const {
   constexpr int passes = 2;
-  HomingView level = seen;
+  HomingView level = view;
   for (int i = 0; i < passes; ++i) {
     const HomeVector vector = home_vector(home_, level, vector_);
-    const Tilt tilt = relative_tilt(home_, seen, vector.heading_rad);
-    if (tilt == Tilt{}) return seen;
-    level = level_view(seen, tilt);
+    const Tilt tilt = relative_tilt(home_, view, vector.heading_rad);
+    if (tilt == Tilt{}) return view;
+    level = level_view(view, tilt);
   }
   return level;
 }
 
-HomingPursuit::Decision HomingPursuit::decide(const HomingView& seen) {
-  const HomingView current = vector_.tilt && home_.elevations() ? tilted_as_at_home(seen) : seen;
+HomingPursuit::Decision HomingPursuit::decide(const HomingView& view) {
+  const HomingView current = vector_.tilt && home_.elevations() ? level_as_at_home(view) : view;
   HomingPursuit::Decision decision;
   decision.difference = image_difference(home_, current);
   ++steps_since_min_;
@@ -99,15 +99,15 @@ HomingPursuit::Decision HomingPursuit::decide(const HomingView& seen) {
     steps_since_min_ = 0;
   }
   for (;;) {
-    const FourierHomingOptions options = vector_of_stage(current);
+    const FourierHomingOptions options = vector_options_of_stage(current);
     const HomeVector vector = home_vector(home_, current, options);
     decision.vector = vector;
     decision.stage = stage_;
-    // The same in a frame that stays: that of the robot at home.
+    // In a constant frame: that of the robot at home.
     const double direction_in_home_rad = vector.direction_rad() - vector.heading_rad;
     if (direction_in_home_rad_) {
-      const bool against = std::cos(direction_in_home_rad - *direction_in_home_rad_) < 0.0;
-      gain_ = against ? gain_ * gain_against : std::min(1.0, gain_ * gain_agreeing);
+      const bool is_opposing = std::cos(direction_in_home_rad - *direction_in_home_rad_) < 0.0;
+      gain_ = is_opposing ? gain_ * opposing_factor : std::min(1.0, gain_ * agreeing_factor);
     }
     direction_in_home_rad_ = direction_in_home_rad;
     decision.turn_rad = vector.direction_rad();
@@ -123,7 +123,7 @@ HomingPursuit::Decision HomingPursuit::decide(const HomingView& seen) {
       ++steps_;
       return decision;
     }
-    if (state_ == HomingPursuit::State::moving && goes_on(decision.difference)) {
+    if (state_ == HomingPursuit::State::moving && has_next_stage(decision.difference)) {
       ++stage_;
       min_difference_ = decision.difference;
       steps_since_min_ = 0;

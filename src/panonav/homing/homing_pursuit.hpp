@@ -10,9 +10,9 @@ namespace panonav {
 
 /// How a run home goes, and when it ends.
 struct HomingPursuitOptions {
-  /// Which frequencies are used at which stage of a run home.
+  /// Which frequencies count at which stage.
   enum class Strategy {
-    steady,          ///< as the options of the home vector say, all the way
+    steady,          ///< those of the home vector's options throughout
     coarse_to_fine,  ///< few frequencies first; when homing stops, more [S06 section 5]
     /// Ours: steady. Where homing stops and the difference of the views says that this is not home,
     /// coarse to fine from there, and at last once more as the options say. The home vector weights
@@ -28,45 +28,45 @@ struct HomingPursuitOptions {
   int coarse = 2;
   int middle = 4;                   ///< of the second stage, >= 1
   int fine = 10;                    ///< of the third stage, >= 1
-  double typical_distance_m = 3.0;  ///< R_typ, of the things around [S06 section 3]
+  double typical_distance_m = 3.0;  ///< R_typ, distance of the things around [S06 section 3]
   double max_step_m = 0.3;          ///< l_max [S06 section 3]
   /// Homing stops when the vector is shorter, in units of R: the root of S06's epsilon.
   double stop_length = 0.01;
-  /// Homing also stops when steps have become shorter than this, because successive vectors opposed
-  /// each other.
+  /// Homing also stops when steps become shorter than this, because successive vectors oppose each
+  /// other.
   double min_step_m = 0.01;
   /// Homing also stops when the views have not become more similar for this many steps: the robot
-  /// runs in circles or along an obstacle.
+  /// moves in circles or along an obstacle.
   int patience = 10;
-  int max_steps = 60;  ///< most steps of a run, >= 1
-  /// The robot has arrived when the views differ by no more than this where homing stops, by
-  /// `image_difference` [S06 section 4.3].
+  int max_steps = 60;  ///< of a run, >= 1
+  /// Largest difference of the views at home where homing stops, by `image_difference` [S06 section
+  /// 4.3].
   double arrived_difference = 0.08;
 };
 void visit_options(HomingPursuitOptions& options, OptionVisitor& visitor);
 
-/// The run home of S06 section 3: one view in, one step out. Direction by the home vector, length
-/// min(l_max, R_typ length) [S06 section 3, step 3]. Where R is not what was assumed, or with
-/// noise, that alone oscillates around the goal. The step is therefore halved when a vector opposes
-/// the one before it, both in the frame of the home view, and grows by a quarter when they agree.
+/// Homing of S06 section 3: one step for each view. Direction by the home vector, length
+/// min(l_max, R_typ length) [S06 section 3, step 3]. With a wrong R or noise that alone
+/// oscillates around the goal. The step is therefore halved when a vector opposes the one before
+/// it, both in the frame of the home view, and grows by a quarter when they agree.
 ///
-/// Holds the state of one run. It does not depend on how the robot moves: a differential robot
-/// turns and drives, a holonomic one drives sideways, and the heading does not matter.
+/// Holds the state of one run. Does not depend on how the robot moves: a differential robot turns
+/// and drives, a holonomic one drives sideways, and the heading does not matter.
 class HomingPursuit {
  public:
-  /// How far a run home has come.
+  /// The state of a run.
   enum class State {
     moving,       ///< another step is made
     arrived,      ///< homing stopped, and the place looks like home
     wrong_place,  ///< homing stopped, and the place does not look like home
-    exhausted,    ///< the most steps were made
+    exhausted,    ///< `max_steps` were made
   };
   /// The next motion of the robot after a view.
   struct Decision {
-    State state = State::moving;  ///< whether to go on
-    double turn_rad = 0.0;        ///< direction in which to go, in the current robot frame
-    double advance_m = 0.0;       ///< how far; 0 unless moving
-    HomeVector vector;            ///< on which the decision rests
+    State state = State::moving;  ///< of the run
+    double turn_rad = 0.0;        ///< direction of the motion, in the current robot frame
+    double advance_m = 0.0;       ///< length of the step; 0 unless moving
+    HomeVector vector;            ///< of the decision
     int stage = 0;                ///< counts changes of the frequencies
     double difference = 1.0;      ///< of the views, by `image_difference`
   };
@@ -75,19 +75,21 @@ class HomingPursuit {
   explicit HomingPursuit(HomingView home, const HomingPursuitOptions& options = {},
                          const FourierHomingOptions& vector = {});
 
-  /// With the option `tilt` of the home vector and known elevations, the tilt of the robot against
-  /// the one at home is found and taken out first (`relative_tilt`). Throws ContractError as
+  /// Decides the next motion after a view. With the option `tilt` of the home vector and known
+  /// elevations, the view is levelled first (`relative_tilt`). Throws ContractError as
   /// `home_vector`. After a decision that stops, further ones do too.
-  [[nodiscard]] Decision decide(const HomingView& seen);
+  [[nodiscard]] Decision decide(const HomingView& view);
 
-  /// The view at home, as it was given.
+  /// The view at home.
   [[nodiscard]] const HomingView& home() const noexcept { return home_; }
-  [[nodiscard]] int steps() const noexcept { return steps_; }  ///< Decisions to move so far.
+  [[nodiscard]] int steps() const noexcept {
+    return steps_;
+  }  ///< Number of decisions to move so far.
 
  private:
-  [[nodiscard]] HomingView tilted_as_at_home(const HomingView& seen) const;
-  [[nodiscard]] FourierHomingOptions vector_of_stage(const HomingView& current) const;
-  [[nodiscard]] bool goes_on(double difference) const noexcept;
+  [[nodiscard]] HomingView level_as_at_home(const HomingView& view) const;
+  [[nodiscard]] FourierHomingOptions vector_options_of_stage(const HomingView& current) const;
+  [[nodiscard]] bool has_next_stage(double difference) const noexcept;
 
   HomingView home_;
   HomingPursuitOptions options_;

@@ -12,7 +12,8 @@ namespace panonav {
 
 namespace {
 
-// Rounding of coordinates must not decide whether a step of exactly the limit counts.
+/// Tolerance of distances, so that rounding does not decide whether a step of exactly the limit
+/// counts.
 constexpr double rounding_m = 1e-9;
 
 // Finds the place nearest to a point, if one is within a fixed reach.

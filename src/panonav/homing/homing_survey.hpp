@@ -12,22 +12,22 @@
 
 namespace panonav {
 
-/// The home vector to the view number `goal` of one set from the view number `place` of another.
-/// Called from several threads at once.
+/// Returns the home vector to view `goal` of one set from view `place` of another. Called from
+/// several threads at once.
 using HomingRule = std::function<HomeVector(std::size_t goal, std::size_t place)>;
 
 /// Simulated runs over the places of a recording [S06 section 4.4].
 struct HomingSurveyOptions {
-  double typical_distance_m = 0.5;  ///< R^typ: what a home vector of length 1 is worth, > 0
+  double typical_distance_m = 0.5;  ///< R^typ: metres for a home vector of length 1, > 0
   double max_step_m = 0.05;         ///< l^max, > 0
   double obstacle_m = 0.02;         ///< a step that ends farther from all places stops the run, > 0
   int max_steps = 30;               ///< of one stage of a run, >= 1
 };
 void visit_options(HomingSurveyOptions& options, OptionVisitor& visitor);
 
-/// What a rule does at every place for every goal.
+/// The result of a rule at every place for every goal.
 struct HomingSurvey {
-  /// The average homeward component over the pairs of a range of distances [S06 eq. 48].
+  /// The average homeward component in a range of distances [S06 eq. 48].
   struct Bin {
     double distance_m = 0.0;  ///< middle of the bin
     std::size_t pairs = 0;    ///< pairs of a place and a goal in the bin
@@ -35,12 +35,12 @@ struct HomingSurvey {
   };
 
   std::vector<Pose2> goals;   ///< where the home views were taken
-  std::vector<Pose2> places;  ///< where the current views were taken, and where runs may stand
-  /// For each goal one number per place: the place to which the step leads, the place itself where
-  /// the run stops.
+  std::vector<Pose2> places;  ///< where the current views were taken, and where runs may be
+  /// For each goal the number of the place to which the step from each place leads; the place
+  /// itself where the run stops.
   std::vector<std::uint32_t> next;
-  /// For each goal one number per place: cosine between home vector and true direction of the goal,
-  /// 0 for a vector of length 0; NaN where place and goal are the same.
+  /// For each goal and place the cosine between home vector and true direction of the goal, 0 for a
+  /// vector of length 0; NaN where place and goal are the same.
   std::vector<float> homeward;
 
   /// The part of `next` for one goal: a number for each place.
@@ -56,7 +56,7 @@ struct HomingSurvey {
 /// Progress 0 .. 1; called from several threads at once, but never by two at the same time.
 using SurveyProgress = std::function<void(double fraction)>;
 
-/// Applies `rule` to all pairs. Same bits on any number of threads. Throws OptionError;
+/// Applies the rule to all pairs. Same bits on any number of threads. Throws OptionError;
 /// ContractError when there is no goal, no place, or a coordinate is not finite; what `rule`
 /// throws. Cost: goals x places home vectors, and 8 bytes for each.
 [[nodiscard]] HomingSurvey survey_homing(std::span<const Pose2> goals,
@@ -64,28 +64,31 @@ using SurveyProgress = std::function<void(double fraction)>;
                                          const HomingSurveyOptions& options, Executor& executor,
                                          const SurveyProgress& progress = {});
 
-/// Bin i holds the distances within half a bin of i `bin_m`; so places on a grid of this spacing
-/// fall into the middle of bins. Throws ContractError unless bin_m > 0.
+/// Averages the homeward component by distance [S06 eq. 48]. Bin i holds the distances within half
+/// a bin of i `bin_m`; so places on a grid of this spacing fall into the middle of bins. Throws
+/// ContractError unless bin_m > 0.
 [[nodiscard]] std::vector<HomingSurvey::Bin> homeward_by_distance(const HomingSurvey& survey,
                                                                   double bin_m = 0.025);
 
-/// Over all pairs above 0 and up to `max_m`; NaN when there is none.
+/// Averages the homeward component over all pairs above 0 and up to `max_m`; NaN when there is
+/// none.
 [[nodiscard]] double mean_homeward_component(const HomingSurvey& survey, double max_m);
 
-/// Where runs to the goal end that start at each place. With several stages a run goes on with the
-/// next one where the last has stopped [S06 section 5]: surveys of the same goals and places.
-/// Throws ContractError on none, on different sizes and on a goal out of range.
+/// Returns the place where the run to the goal ends that starts at each place. With several stages
+/// a run continues with the next one where the last has stopped [S06 section 5]: surveys of the
+/// same goals and places. Throws ContractError on none, on different sizes and on a goal out of
+/// range.
 [[nodiscard]] std::vector<std::uint32_t> final_places(std::span<const HomingSurvey* const> stages,
                                                       std::size_t goal,
                                                       const HomingSurveyOptions& options = {});
 
-/// Metres between goal and end of the run from each place, goal after goal.
+/// Returns the metres between goal and end of the run from each place, goal after goal.
 [[nodiscard]] std::vector<float> final_distances(std::span<const HomingSurvey* const> stages,
                                                  const HomingSurveyOptions& options,
                                                  Executor& executor);
 
-/// Mean number of places from which runs end within each of the accepted distances [S06 section
-/// 4.4]; `distances` as from `final_distances`, for `goals` goals.
+/// Returns the mean number of places from which runs end within each of the accepted distances [S06
+/// section 4.4]; `distances` as from `final_distances`, for `goals` goals.
 [[nodiscard]] std::vector<double> mean_catchment_areas(std::span<const float> distances,
                                                        std::size_t goals,
                                                        std::span<const double> accepted_m);

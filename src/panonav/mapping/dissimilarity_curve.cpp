@@ -9,16 +9,18 @@ namespace panonav {
 
 namespace {
 
-constexpr double share_of_level = 0.95;  // where the curve counts as level, as in [M04] figure 7
+/// Share of the level of far views from which on the curve counts as flat [M04 figure 7].
+constexpr double share_of_level = 0.95;
 
 struct DistanceGroup {
   double dissimilarity = 0.0;
   double distance = 0.0;
-  double square = 0.0;  // of what the distance misses
+  double square = 0.0;  // mean squared deviation from the distance
   double weight = 0.0;
 };
 
-/// Pool adjacent violators: the rising sequence that is nearest in weighted least squares.
+/// Makes the values rise: the nearest rising sequence in weighted least squares (pool adjacent
+/// violators).
 template <class Value>
 void make_rising(std::vector<DistanceGroup>& groups, Value value) {
   struct Block {
@@ -97,7 +99,7 @@ DissimilarityCurve::DissimilarityCurve(std::span<const DissimilarityCurve::Sampl
   knots_.push_back({});
   for (const DistanceGroup& group : groups) {
     if (!(group.dissimilarity > knots_.back().dissimilarity)) {
-      // Views that look exactly alike: the best guess is that they are at one place.
+      // Identical views are most likely at one place.
       continue;
     }
     knots_.push_back({group.dissimilarity, group.distance, std::sqrt(group.square)});

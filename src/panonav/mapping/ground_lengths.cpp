@@ -12,14 +12,17 @@ namespace panonav {
 
 namespace {
 
-// Steps by which the next is judged.
+/// Latest steps that predict the next one, and from how many on they do.
 constexpr std::size_t max_latest = 15;
 constexpr std::size_t min_latest = 3;
-// Before the first of them: times the length that the views' default scale gives.
+/// Starts of the first steps, times the length by the default scale: octaves around it.
 constexpr std::array<double, 4> first_guesses{0.5, 1.0, 2.0, 4.0};
+/// Largest standard deviation of a length that counts, as a share of it.
 constexpr double max_relative_deviation = 0.2;
-constexpr double max_relative_change = 2.0;  // either way, against the latest steps
-constexpr double min_length = 0.03;          // in camera heights; shorter steps tell no scale
+/// Largest factor between a length and the one by the latest steps, either way.
+constexpr double max_relative_change = 2.0;
+/// Shortest length in camera heights that shows a scale: below it rounding of pixels decides.
+constexpr double min_length = 0.03;
 
 }  // namespace
 
@@ -33,7 +36,8 @@ std::optional<double> GroundLengths::scale_m() const {
   return upper_median(latest_scales_m_);
 }
 
-bool GroundLengths::correct(const HomingView& before, const HomingView& after, VisualStep& step) {
+bool GroundLengths::correct_step(const HomingView& before, const HomingView& after,
+                                 VisualStep& step) {
   Pose2& motion = step.before_from_after;
   const double length_m = std::hypot(motion.x_m, motion.y_m);
   if (!(length_m > 0.0)) return true;
@@ -42,15 +46,15 @@ bool GroundLengths::correct(const HomingView& before, const HomingView& after, V
   };
   const auto known_m = scale_m();
   std::optional<GroundDisplacement> found;
-  const auto look_near = [&](double guess_m) {
+  const auto search_near = [&](double guess_m) {
     const auto one =
         ground_displacement(before, after, scaled(guess_m / length_m / camera_height_m_));
     if (one && (!found || one->difference < found->difference)) found = one;
   };
   if (known_m) {
-    look_near(*known_m * step.length_in_views);
+    search_near(*known_m * step.length_in_views);
   } else {
-    for (const double guess : first_guesses) look_near(guess * length_m);
+    for (const double guess : first_guesses) search_near(guess * length_m);
   }
   if (found) {
     const double length = std::hypot(found->x, found->y);

@@ -21,16 +21,16 @@ namespace panonav {
 
 namespace {
 
-/// Weight of a link at the limit of what agrees, which `GrownLayout::weights` says.
+/// Weight of a link at the limit of agreement (`GrownLayout::weights`).
 constexpr double min_grown_weight = 0.25;
-/// Largest error of headings laid out by motion and phases; below what symmetric rooms may turn
-/// places by, which is a quarter turn.
-constexpr double max_turn_error_rad = 0.25 * std::numbers::pi;
-/// Share of the triangles of a spring that must close, where no motion tells which views are near:
-/// more than half (docs/decisions.md).
+/// Largest error of headings laid out by motion and phases: half of the quarter turn after which
+/// symmetric rooms look alike.
+constexpr double max_heading_error_rad = 0.25 * std::numbers::pi;
+/// Share of the triangles of a spring of which more must close, where no motion shows which views
+/// are near (docs/decisions.md).
 constexpr double min_closing_triangles = 0.5;
 
-/// Pairs of views that were measured, each once, ascending.
+/// The measured pairs of views, each once, ascending.
 class MeasuredPairs {
  public:
   MeasuredPairs(const SpringViews& views, Executor& executor)
@@ -38,9 +38,9 @@ class MeasuredPairs {
 
   [[nodiscard]] const std::vector<Lattice::Spring>& springs() const { return springs_; }
 
-  /// Measures the pairs that are not known yet; `hint(pair)`: what is known of their turns.
-  template <class Hint>
-  void add(const std::vector<NodePair>& pairs, const Hint& hint) {
+  /// Measures the pairs that are not known yet, with the headings of `window(pair)`.
+  template <class Window>
+  void add(const std::vector<NodePair>& pairs, const Window& window) {
     std::vector<NodePair> added;
     for (const NodePair& pair : pairs) {
       if (known_.insert(pair).second) added.push_back(pair);
@@ -49,7 +49,7 @@ class MeasuredPairs {
     springs_.resize(before + added.size());
     executor_.for_chunks(added.size(), 16, [&](std::size_t begin, std::size_t end, std::size_t) {
       for (std::size_t i = begin; i < end; ++i) {
-        springs_[before + i] = views_.measure(added[i], hint(added[i]));
+        springs_[before + i] = views_.measure(added[i], window(added[i]));
       }
     });
     std::ranges::sort(springs_, {}, [](const auto& s) { return NodePair{s.a, s.b}; });
@@ -77,7 +77,7 @@ class Arranger {
         motions_(memory, motion),
         measured_(views_, executor) {
     for (const ViewId view : memory.views()) lattice_.nodes.push_back({.view = view});
-    by_motion_ = motions_.connect(size());
+    by_motion_ = motions_.connect_all(size());
     lattice_.metric = !motions_.empty();
   }
 
@@ -108,27 +108,26 @@ class Arranger {
  private:
   [[nodiscard]] std::size_t size() const { return lattice_.nodes.size(); }
 
-  /// Returns what motion or the headings so far say of the turn between two nodes.
-  [[nodiscard]] std::optional<HeadingWindow> hint(NodePair pair) const {
+  /// Returns the window of headings between two nodes by motion or by the headings so far.
+  [[nodiscard]] std::optional<HeadingWindow> heading_window(NodePair pair) const {
     if (!by_motion_) return std::nullopt;
     if (layout_.poses.empty()) return motions_.heading_between(pair);
     return HeadingWindow{
         static_cast<float>(angle_difference(layout_.poses[pair.second].heading_rad,
                                             layout_.poses[pair.first].heading_rad)),
-        static_cast<float>(max_turn_error_rad)};
+        static_cast<float>(max_heading_error_rad)};
   }
   void measure(const std::vector<NodePair>& pairs) {
-    measured_.add(pairs, [this](NodePair pair) { return hint(pair); });
+    measured_.add(pairs, [this](NodePair pair) { return heading_window(pair); });
   }
 
-  /// Where motion tells how all views are connected, similarity is asked later, and only for views
-  /// that it brings near to each other.
+  /// Measures pairs along the motions and, unless these connect all views, the most similar ones.
   void measure_first_pairs() {
     std::vector<NodePair> pairs;
     for (const auto& step : motions_.all()) pairs.push_back(std::minmax(step.a, step.b));
     if (!by_motion_) {
-      const auto alike = views_.most_similar(options_, executor_);
-      pairs.insert(pairs.end(), alike.begin(), alike.end());
+      const auto similar = views_.find_most_similar(options_, executor_);
+      pairs.insert(pairs.end(), similar.begin(), similar.end());
     }
     measure(pairs);
   }
@@ -144,7 +143,7 @@ class Arranger {
       for (const std::size_t j : near[i]) pairs.push_back(std::minmax(i, j));
     }
     if (by_motion_) {
-      // Headings are better known now, and so is which of several turns is meant.
+      // Headings are better known now, and so is which of several fits is right.
       for (const auto& spring : measured_.springs()) pairs.emplace_back(spring.a, spring.b);
       measured_.clear();
     }
@@ -159,9 +158,8 @@ class Arranger {
     fit_phase_unit(lattice_.springs, layout_.poses, lattice_.errors);
   }
 
-  /// Where motion tells nothing and phases are read, the layout grows from what is certain. The
-  /// springs are those inside the components that agree with the layout. Views that none of these
-  /// holds to their component leave it.
+  /// Grows the layout from the most certain springs. Keeps the springs inside the components that
+  /// agree with the layout; views without any of these leave their component.
   void grow_from_most_certain() {
     measure(proposals_);
     const double unit = lattice_.errors.phase_unit;
@@ -174,9 +172,9 @@ class Arranger {
     std::vector<GraphEdge> edges;
     for (const Lattice::Spring& spring : measured_.springs()) {
       const auto weight = grown.weights.find({spring.a, spring.b});
-      const bool points = spring.phases && spring.phases->has_direction;
-      if (weight == grown.weights.end() || (!points && weight->second < min_grown_weight) ||
-          !fits(spring, unit, layout_.poses[spring.a], layout_.poses[spring.b])) {
+      const bool has_direction = spring.phases && spring.phases->has_direction;
+      if (weight == grown.weights.end() || (!has_direction && weight->second < min_grown_weight) ||
+          !fits_layout(spring, unit, layout_.poses[spring.a], layout_.poses[spring.b])) {
         continue;
       }
       add_spring(spring).weight = weight->second;
@@ -187,21 +185,23 @@ class Arranger {
     for (const GraphEdge& edge : edges) layout_.handedness_known[layout_.components[edge.a]] = 1;
   }
 
-  /// Springs within the curve's range whose views agree with each other and with a third one.
+  /// Chooses the springs within the curve's range whose views agree with each other and with a
+  /// third one.
   void choose_springs() {
     lattice_.springs.clear();
     for (const Lattice::Spring& spring : measured_.springs()) {
-      if (spring.dissimilarity > lattice_.curve.max_dissimilarity() || !agrees(spring)) continue;
+      if (spring.dissimilarity > lattice_.curve.max_dissimilarity() || !has_agreeing_views(spring))
+        continue;
       add_spring(spring);
     }
     if (options_.phases) {
-      keep_confirmed(size(), by_motion_ ? 0.0 : min_closing_triangles, lattice_.springs);
+      drop_unconfirmed(size(), by_motion_ ? 0.0 : min_closing_triangles, lattice_.springs);
     }
   }
 
   Lattice::Spring& add_spring(const Lattice::Spring& measured) {
     Lattice::Spring& spring = lattice_.springs.emplace_back(measured);
-    // Before the curve is known the views' own idea of the distance is the better one.
+    // Before the curve is fitted the phases show the distance better.
     spring.length = !curve_is_fitted_ && spring.phases
                         ? lattice_.errors.phase_unit * spring.phases->length
                         : lattice_.curve.distance(spring.dissimilarity);
@@ -223,7 +223,7 @@ class Arranger {
     layout_ = by_motion_ ? lay_out_by_motion(size(), motions_.all(), measured_.springs())
                          : lay_out_by_springs(size(), springs_and_motions(), options_.landmarks);
   }
-  /// Lays out the nodes again when springs hold together other views than before.
+  /// Lays out the nodes again when the springs connect other views than before.
   void lay_out_if_needed() {
     if (by_motion_) return;
     std::vector<GraphEdge> edges;
@@ -237,10 +237,10 @@ class Arranger {
     learn_errors(lattice_.springs, lattice_.curve, lattice_.errors);
     std::vector<SpringTerm> terms;
     for (const auto& spring : lattice_.springs) {
-      terms.push_back(spring_term(spring, lattice_.errors, curve_is_fitted_));
+      terms.push_back(make_spring_term(spring, lattice_.errors, curve_is_fitted_));
     }
-    const auto of_motions = motions_.terms();
-    terms.insert(terms.end(), of_motions.begin(), of_motions.end());
+    const auto motion_terms = motions_.spring_terms();
+    terms.insert(terms.end(), motion_terms.begin(), motion_terms.end());
     const auto solution = solve_lattice(terms, layout_.poses, {}, [this] {
       if (watch_) watch_(layout_.poses, layout_.components);
     });
@@ -251,10 +251,10 @@ class Arranger {
     lattice_.iterations += solution.iterations;
   }
 
-  /// Makes the median distance of a view to its nearest one 1, or, where there is motion, its
-  /// length a metre.
+  /// Scales the layout to metres where there is motion, else to a median distance of 1 between
+  /// nearest views.
   void set_unit() {
-    const auto scale = lattice_.metric ? motions_.scale_of(layout_.poses) : unit_scale();
+    const auto scale = lattice_.metric ? motions_.layout_scale(layout_.poses) : unit_scale();
     if (!scale) return;
     for (Pose2& pose : layout_.poses) {
       pose.x_m *= *scale;
@@ -334,8 +334,8 @@ void visit_options(CoarseMotionOptions& options, OptionVisitor& visitor) {
   table.visit(options, visitor);
 }
 
-CoarseMotion coarse_motion(ViewId from, ViewId to, const Pose2& step,
-                           const CoarseMotionOptions& options) {
+CoarseMotion make_coarse_motion(ViewId from, ViewId to, const Pose2& step,
+                                const CoarseMotionOptions& options) {
   validate(options);
   // A robot that turns on the spot still has deviations above 0.
   constexpr double min_travel_m = 0.01;

@@ -18,11 +18,11 @@ namespace panonav {
 
 /// How the arrangement is made.
 struct LatticeOptions {
-  int neighbours = 12;  ///< springs that each view gets
+  int neighbours = 12;  ///< springs from each view to the most similar ones
   int components = 0;   ///< of the signatures; 0 takes all
   bool phases = true;   ///< directions and headings from phases [M04 section 3.4]
-  int landmarks = 150;  ///< views from which the start is laid out
-  int rounds = 3;       ///< how often curve and springs are made anew from the arrangement
+  int landmarks = 150;  ///< views from which the initial arrangement is made
+  int rounds = 3;       ///< times that curve and springs are made from the arrangement
 };
 void visit_options(LatticeOptions& options, OptionVisitor& visitor);
 
@@ -45,12 +45,12 @@ struct CoarseMotionOptions {
 };
 void visit_options(CoarseMotionOptions& options, OptionVisitor& visitor);
 
-/// The motion with deviations as the options say; one centimetre of travel at least. Throws
+/// Makes a motion with the deviations of the options, for at least one centimetre of travel. Throws
 /// OptionError.
-[[nodiscard]] CoarseMotion coarse_motion(ViewId from, ViewId to, const Pose2& step,
-                                         const CoarseMotionOptions& options = {});
+[[nodiscard]] CoarseMotion make_coarse_motion(ViewId from, ViewId to, const Pose2& step,
+                                              const CoarseMotionOptions& options = {});
 
-/// Views with the poses that their springs give them.
+/// Views with the poses that follow from their springs.
 struct Lattice {
   /// A view in the arrangement.
   struct Node {
@@ -58,30 +58,30 @@ struct Lattice {
     Pose2 pose;                 ///< in its component's frame; heading 0 without phases
     std::size_t component = 0;  ///< index of its group
   };
-  /// A pair of views with a distance that their dissimilarity tells.
+  /// A pair of views with a distance read from their dissimilarity.
   struct Spring {
     std::size_t a = 0;                   ///< nodes, a < b
     std::size_t b = 0;                   ///< the other node
-    double dissimilarity = 0.0;          ///< of the two views, over the components asked for
+    double dissimilarity = 0.0;          ///< of the two views, over the components of the options
     double length = 0.0;                 ///< rest length, read from the dissimilarity
     double stiffness = 1.0;              ///< K of [M04 eq. 5]
     double weight = 1.0;                 ///< robust weight, 1 .. 0: near 0 it is an outlier
-    std::optional<PhaseReading> phases;  ///< what their phases tell; empty without phases
+    std::optional<PhaseReading> phases;  ///< nullopt without phases
   };
   /// Standard deviations of springs, estimated from the arrangement itself; lengths in its unit.
   struct Errors {
     double length = 0.25;        ///< of the rest length of a spring of stiffness 1
     double direction_rad = 0.1;  ///< of a direction in which both views agree
     double turn_rad = 0.1;       ///< of a turn in which both views agree
-    /// How long the unit of the lengths that phases tell is, and how far these are off, as a share.
+    /// Length of the unit of lengths by phases.
     double phase_unit = 1.0;
-    double phase_length = 0.25;  ///< standard deviation of such a length, as a share of it
+    double phase_length = 0.25;  ///< standard deviation of such lengths, as a share
   };
   /// A connected component: views that springs join. Each component has its own frame, and nothing
   /// is known of their relative poses.
   struct Component {
     std::size_t views = 0;  ///< nodes of the component
-    /// False: it may as well be the mirror image.
+    /// False: it may be the mirror image.
     bool handedness_known = false;
   };
 
@@ -90,8 +90,8 @@ struct Lattice {
   std::vector<Component> components;  ///< the largest first
   DissimilarityCurve curve{1.0};      ///< of the last round
   Errors errors;                      ///< of the last round
-  /// Pairs of views whose relative pose was read, or whose dissimilarity, without phases; those
-  /// that are no springs were rejected.
+  /// Pairs of views whose relative pose, without phases whose dissimilarity, was read; those that
+  /// are no springs were rejected.
   std::size_t candidates = 0;
   /// True: metres, from the coarse motion. False: the unit is the median distance of a view to its
   /// nearest one.
@@ -100,35 +100,34 @@ struct Lattice {
   int iterations = 0;   ///< of the solver, over all rounds
 };
 
-/// Hears how an arrangement unfolds, after each step: the poses of all views in the memory's order,
-/// each in the frame of its component, and to which component each belongs. Lengths change their
-/// unit from step to step. The spans end with the call.
+/// Called after each step of an arrangement with the poses of all views in the memory's order, each
+/// in the frame of its component, and the component of each. Lengths change their unit from step to
+/// step. The spans are valid during the call.
 using LatticeWatch =
     std::function<void(std::span<const Pose2> poses, std::span<const std::size_t> components)>;
 
-/// Arranges the views of a memory by their similarity alone [M04 section 3], in any order. Poses
-/// that the memory may hold are not used.
+/// Arranges the views of a memory, in any order, by their similarity alone [M04 section 3], without
+/// poses of the memory.
 ///
 /// 1. Each view gets springs to its `neighbours` most similar views, so cost grows with the views
 ///    and not with their pairs.
-/// 2. With phases, both views of a spring give direction and turn of the other one. Pairs whose
-///    answers differ by more than 45 degrees are unrelated and get no spring. Where there is no
-///    motion, connected components then grow from the springs that are most certain, and what
-///    contradicts is left out (internal/lattice_growth.hpp); in each round views that came to lie
-///    near each other are measured, too. Components that nothing certain joins stay apart.
+/// 2. With phases, both views of a spring give direction and turn of the other one. Pairs that
+///    disagree by more than 45 degrees are unrelated and get no spring. Without motion, connected
+///    components then grow from the most certain springs, without those that contradict
+///    (internal/lattice_growth.hpp); in each round views near each other are measured, too.
+///    Components that nothing certain joins stay apart.
 /// 3. Otherwise pairs of whose triangles with third views not more than half close get no spring,
 ///    and the start is deterministic: multidimensional scaling of the shortest paths along the
 ///    springs. Directions distinguish a mirror image; without phases it cannot be distinguished.
 /// 4. There the energy of springs and, with phases, of directions and turns is minimised; outliers
-/// are
-///    rejected (internal/lattice_solver.hpp).
+///    are rejected (internal/lattice_solver.hpp).
 /// 5. The curve from dissimilarity to distance is fitted to the arrangement, pairs beyond its range
-///    are left out, views that came to lie near each other get springs too, and 3 or 4 are done
-///    again, `rounds` times in all.
+///    are left out, views near each other get springs too, and 3 or 4 are repeated, `rounds` times
+///    in all.
 ///
-/// `motion` [M04 section 3.4]: motions of the robot between views, any number. Views that it
-/// connects are laid out by it first, and only consistent springs are taken from similarity, so
-/// that places that look alike are not confused. It makes the map metric. Throws OptionError, and
+/// `motion` [M04 section 3.4]: any number of motions of the robot between views. Views that they
+/// connect are laid out by them first, and similarity gives consistent springs only, so that places
+/// that look alike are not confused. Motions make the map metric. Throws OptionError, and
 /// ContractError on a motion with an unknown view or numbers that are not finite. The same input
 /// gives the same bits on any number of threads, watched or not.
 [[nodiscard]] Lattice arrange(const VisualMemory& memory, const LatticeOptions& options,
@@ -136,18 +135,17 @@ using LatticeWatch =
                               const LatticeWatch& watch = {});
 
 /// Adds the views of the memory that the lattice does not have, one after the other. A view gets
-/// springs to the most similar views of the lattice and the place of minimum energy among those
-/// that they point to; then a few nodes around it are adjusted. Other views stay where they are, so
-/// the cost of a view grows with the lattice only by the search (and one pass over the springs). A
-/// view joins the connected component to which most of its springs lead; without springs it is a
-/// component of its own, the last one. `arrange` joins components, this function does not. The
-/// lattice must come from the same memory, of which views may only have been added. Throws
-/// OptionError, ContractError.
+/// springs to the most similar views of the lattice and, of the poses to which they point, that of
+/// minimum energy; then a few nodes around it are adjusted. Other views stay where they are, so the
+/// cost of a view grows with the lattice only by the search and one pass over the springs. A view
+/// joins the connected component to which most of its springs lead; without springs it is a new
+/// one. Does not join components, as `arrange` does. The lattice must come from the same memory, to
+/// which views may have been added. Throws OptionError, ContractError.
 void extend(Lattice& lattice, const VisualMemory& memory, const LatticeOptions& options = {});
 
-/// The arrangement as a map that can be stored and exported: its views with their poses and
-/// components, and its springs as edges of kind `neighbour` with the motion that the poses give and
-/// the weight that the spring kept. Lengths are in the lattice's unit.
+/// Converts the arrangement into a map that can be stored and exported: its views with their poses
+/// and components, and its springs as edges of kind `neighbour` with the motion between the poses
+/// and the weight of the spring. Lengths are in the lattice's unit.
 [[nodiscard]] TopologicalMap to_topological_map(const Lattice& lattice);
 
 }  // namespace panonav

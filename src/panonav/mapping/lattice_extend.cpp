@@ -12,7 +12,7 @@ namespace panonav {
 
 namespace {
 
-/// A few nodes of the lattice with the springs among them, numbered anew.
+/// Some nodes of the lattice with the springs among them, numbered from 0.
 struct Neighbourhood {
   std::vector<std::size_t> nodes;
   std::vector<Pose2> poses;
@@ -20,7 +20,7 @@ struct Neighbourhood {
   std::vector<std::size_t> spring_numbers;
 };
 
-Neighbourhood neighbourhood_of(const Lattice& lattice, const std::vector<std::size_t>& nodes) {
+Neighbourhood make_neighbourhood(const Lattice& lattice, const std::vector<std::size_t>& nodes) {
   Neighbourhood result{.nodes = nodes};
   std::map<std::size_t, std::size_t> number;
   for (const std::size_t node : nodes) {
@@ -32,7 +32,7 @@ Neighbourhood neighbourhood_of(const Lattice& lattice, const std::vector<std::si
     const auto a = number.find(spring.a);
     const auto b = number.find(spring.b);
     if (a == number.end() || b == number.end()) continue;
-    SpringTerm term = spring_term(spring, lattice.errors, true);
+    SpringTerm term = make_spring_term(spring, lattice.errors, true);
     term.a = a->second;
     term.b = b->second;
     result.springs.push_back(term);
@@ -61,44 +61,46 @@ class Extender {
   }
 
   void add_all() {
-    // The lattice knows nothing of views that come later.
+    // Views that come later are not in the lattice yet.
     std::vector<ViewId> excluded = unknown_;
     for (const ViewId view : unknown_) {
-      add(view, excluded);
+      add_view(view, excluded);
       excluded.erase(excluded.begin());
     }
     std::ranges::sort(lattice_.springs, {}, [](const auto& s) { return NodePair{s.a, s.b}; });
   }
 
  private:
-  void add(ViewId view, std::span<const ViewId> excluded) {
+  void add_view(ViewId view, std::span<const ViewId> excluded) {
     const std::size_t node = lattice_.nodes.size();
-    std::vector<Lattice::Spring> springs = springs_to(view, node, excluded);
+    std::vector<Lattice::Spring> springs = make_springs(view, node, excluded);
     number_.emplace(view, node);
-    std::map<std::size_t, std::size_t> leads_to;
-    for (const auto& spring : springs) ++leads_to[lattice_.nodes[spring.a].component];
-    if (leads_to.empty()) {
+    std::map<std::size_t, std::size_t> links_to_component;
+    for (const auto& spring : springs) ++links_to_component[lattice_.nodes[spring.a].component];
+    if (links_to_component.empty()) {
       lattice_.nodes.push_back({view, {}, lattice_.components.size()});
       lattice_.components.push_back({.views = 1, .handedness_known = false});
       return;
     }
     const std::size_t component =
-        std::ranges::max_element(leads_to, {}, [](const auto& p) { return p.second; })->first;
+        std::ranges::max_element(links_to_component, {}, [](const auto& p) {
+          return p.second;
+        })->first;
     std::erase_if(springs,
                   [&](const auto& s) { return lattice_.nodes[s.a].component != component; });
     lattice_.nodes.push_back({view, {}, component});
     ++lattice_.components[component].views;
     lattice_.springs.insert(lattice_.springs.end(), springs.begin(), springs.end());
-    place(node, springs);
+    place_node(node, springs);
     relax_around(node, springs);
   }
 
-  [[nodiscard]] std::vector<Lattice::Spring> springs_to(ViewId view, std::size_t node,
-                                                        std::span<const ViewId> excluded) const {
+  [[nodiscard]] std::vector<Lattice::Spring> make_springs(ViewId view, std::size_t node,
+                                                          std::span<const ViewId> excluded) const {
     std::vector<Lattice::Spring> springs;
     if (node == 0) return springs;
-    const PackedSignature seen = memory_.packed(view);
-    const auto found = memory_.search(seen, {options_.neighbours, options_.components},
+    const PackedSignature query = memory_.packed(view);
+    const auto found = memory_.search(query, {options_.neighbours, options_.components},
                                       {.excluded_views = excluded});
     for (const Match& match : found.matches) {
       if (match.dissimilarity > lattice_.curve.max_dissimilarity()) continue;
@@ -106,7 +108,7 @@ class Extender {
                              .b = node,
                              .dissimilarity = static_cast<double>(match.dissimilarity)};
       if (options_.phases) spring.phases = read_phases(homing(match.view), homing(view));
-      if (!agrees(spring)) continue;
+      if (!has_agreeing_views(spring)) continue;
       spring.length = lattice_.curve.distance(spring.dissimilarity);
       spring.stiffness = lattice_.curve.stiffness(spring.length);
       springs.push_back(spring);
@@ -115,19 +117,20 @@ class Extender {
   }
 
   [[nodiscard]] HomingView homing(ViewId view) const {
-    const HomingView seen = homing_view(memory_, view);
-    return options_.components > 0 ? first_components(seen, options_.components) : seen;
+    const HomingView coefficients = homing_view(memory_, view);
+    return options_.components > 0 ? first_components(coefficients, options_.components)
+                                   : coefficients;
   }
 
-  /// Of the places that the springs point to, the one of least energy.
-  void place(std::size_t node, std::span<const Lattice::Spring> springs) {
+  /// Sets the pose of least energy among those to which the springs point.
+  void place_node(std::size_t node, std::span<const Lattice::Spring> springs) {
     std::vector<std::size_t> nodes;
     for (const auto& spring : springs) nodes.push_back(spring.a);
     nodes.push_back(node);
-    Neighbourhood around = neighbourhood_of(lattice_, nodes);
+    Neighbourhood around = make_neighbourhood(lattice_, nodes);
     std::vector<unsigned char> moving(nodes.size(), 0);
     moving.back() = 1;
-    double least = INFINITY;
+    double min_energy = INFINITY;
     for (const auto& spring : springs) {
       Pose2 step{spring.length, 0.0, 0.0};
       if (spring.phases) {
@@ -136,15 +139,15 @@ class Extender {
       }
       around.poses.back() = lattice_.nodes[spring.a].pose * step;
       const auto solution = solve_lattice(around.springs, around.poses, moving);
-      if (solution.energy >= least) continue;
-      least = solution.energy;
+      if (solution.energy >= min_energy) continue;
+      min_energy = solution.energy;
       lattice_.nodes[node].pose = around.poses.back();
     }
   }
 
-  /// The new node and those that it hangs on give way; what these hang on stays.
+  /// Moves the new node and its neighbours; the neighbours of these are fixed.
   void relax_around(std::size_t node, std::span<const Lattice::Spring> springs) {
-    std::vector<unsigned char> role(lattice_.nodes.size(), 0);  // 1 stays, 2 gives way
+    std::vector<unsigned char> role(lattice_.nodes.size(), 0);  // 1: fixed, 2: moves
     role[node] = 2;
     for (const auto& spring : springs) role[spring.a] = 2;
     for (const Lattice::Spring& spring : lattice_.springs) {
@@ -158,7 +161,7 @@ class Extender {
       nodes.push_back(i);
       moving.push_back(role[i] == 2 ? 1 : 0);
     }
-    Neighbourhood around = neighbourhood_of(lattice_, nodes);
+    Neighbourhood around = make_neighbourhood(lattice_, nodes);
     const auto solution = solve_lattice(around.springs, around.poses, moving);
     lattice_.iterations += solution.iterations;
     for (std::size_t i = 0; i < nodes.size(); ++i) lattice_.nodes[nodes[i]].pose = around.poses[i];

@@ -11,8 +11,8 @@ namespace panonav {
 
 namespace {
 
-// ranks[j]: how many points are nearer to `centre` than j, from 1; that of the centre is 0.
-std::vector<std::size_t> ranks_around(std::span<const Point2> points, std::size_t centre) {
+// Returns for each point its rank by distance from the centre, from 1; 0 for the centre itself.
+std::vector<std::size_t> rank_around(std::span<const Point2> points, std::size_t centre) {
   std::vector<std::size_t> order(points.size());
   std::iota(order.begin(), order.end(), 0U);
   std::ranges::stable_sort(order, {}, [&](std::size_t j) {
@@ -48,17 +48,17 @@ NeighbourPreservation neighbour_preservation(std::span<const Point2> map,
   double untrue = 0.0;
   double lost = 0.0;
   for (std::size_t i = 0; i < n; ++i) {
-    const auto in_map = ranks_around(map, i);
-    const auto in_truth = ranks_around(truth, i);
+    const auto in_map = rank_around(map, i);
+    const auto in_truth = rank_around(truth, i);
     for (std::size_t j = 0; j < n; ++j) {
       if (j == i) continue;
       if (in_map[j] <= k && in_truth[j] > k) untrue += static_cast<double>(in_truth[j] - k);
       if (in_truth[j] <= k && in_map[j] > k) lost += static_cast<double>(in_map[j] - k);
     }
   }
-  const double most = 0.5 * static_cast<double>(n) * static_cast<double>(k) *
-                      static_cast<double>(2 * n - 3 * k - 1);
-  return {1.0 - untrue / most, 1.0 - lost / most};
+  const double max_sum = 0.5 * static_cast<double>(n) * static_cast<double>(k) *
+                         static_cast<double>(2 * n - 3 * k - 1);
+  return {1.0 - untrue / max_sum, 1.0 - lost / max_sum};
 }
 
 ClosureCount count_closures(const TopologicalMap& map,

@@ -10,7 +10,7 @@
 
 namespace panonav {
 
-/// Whether the shapes of two sets of points can be compared: as many points in both, at least
+/// True if the shapes of two sets of points can be compared: as many points in both, at least
 /// three, and neither all at one place.
 [[nodiscard]] bool is_comparable(std::span<const Point2> map, std::span<const Point2> truth);
 
@@ -21,18 +21,18 @@ struct NeighbourPreservation {
   double continuity = 1.0;       ///< neighbours in truth are neighbours in the map
 };
 
-/// Over the `neighbours` nearest of each point; ties by order. Throws ContractError on sets of
-/// different size, a coordinate that is not finite, and unless 1 <= neighbours and 3 neighbours + 1
-/// < 2 points, for which the measure is defined. Cost O(n^2 log n).
+/// Compares the `neighbours` nearest points of each point; ties by order. Throws ContractError on
+/// sets of different size, a coordinate that is not finite, and unless 1 <= neighbours and 3
+/// neighbours + 1 < 2 points, for which the measure is defined. Cost O(n^2 log n).
 [[nodiscard]] NeighbourPreservation neighbour_preservation(std::span<const Point2> map,
                                                            std::span<const Point2> truth,
                                                            int neighbours);
 
 /// Closures of a map by how far apart their views truly are.
 struct ClosureCount {
-  std::size_t right = 0;    ///< at most the distance asked for
+  std::size_t right = 0;    ///< at most the distance of the call
   std::size_t wrong = 0;    ///< farther
-  std::size_t unknown = 0;  ///< the truth of a view is not known
+  std::size_t unknown = 0;  ///< the true position of a view is not known
 };
 /// Counts the edges of kind closure by the true distance of their views, which `truth` tells.
 [[nodiscard]] ClosureCount count_closures(const TopologicalMap& map,

@@ -43,23 +43,23 @@ struct EdgeError {
   double heading = 0.0;
 };
 
-// In the frame of node a, in standard deviations.
-EdgeError error_of(const PoseEdge& edge, const Pose2& a, const Pose2& b) {
-  const Pose2 seen = inverse(a) * b;
+// Returns the error in the frame of node a, in standard deviations.
+EdgeError edge_error_of(const PoseEdge& edge, const Pose2& a, const Pose2& b) {
+  const Pose2 present = inverse(a) * b;
   const double position = 1.0 / edge.position_deviation_m;
-  return {
-      position * (seen.x_m - edge.a_from_b.x_m), position * (seen.y_m - edge.a_from_b.y_m),
-      angle_difference(seen.heading_rad, edge.a_from_b.heading_rad) / edge.heading_deviation_rad};
+  return {position * (present.x_m - edge.a_from_b.x_m),
+          position * (present.y_m - edge.a_from_b.y_m),
+          angle_difference(present.heading_rad, edge.a_from_b.heading_rad) /
+              edge.heading_deviation_rad};
 }
 
 double square(const EdgeError& error) {
   return error.x * error.x + error.y * error.y + error.heading * error.heading;
 }
 
-/// Returns the nodes that stay where they are: those of `fixed`, and the first one of each
-/// component without any.
-std::vector<std::uint8_t> hold_components(std::size_t nodes, std::span<const PoseEdge> edges,
-                                          std::span<const std::uint8_t> fixed) {
+/// Returns 1 for the nodes of `fixed` and the first one of each component without any.
+std::vector<std::uint8_t> choose_fixed_nodes(std::size_t nodes, std::span<const PoseEdge> edges,
+                                             std::span<const std::uint8_t> fixed) {
   std::vector<std::uint8_t> held(nodes, 0);
   std::ranges::copy(fixed, held.begin());
   const auto components = connected_components(nodes, edges);
@@ -73,8 +73,8 @@ std::vector<std::uint8_t> hold_components(std::size_t nodes, std::span<const Pos
   return held;
 }
 
-/// The graph with its unknowns as `minimise` sees it. Steps narrow the loss of doubtful edges
-/// (graduated non-convexity).
+/// The graph as a problem for `minimise`. Steps narrow the loss of doubtful edges (graduated
+/// non-convexity).
 class Graph {
  public:
   Graph(std::span<Pose2> nodes, std::span<const PoseEdge> edges,
@@ -84,8 +84,8 @@ class Graph {
         options_(options),
         final_scale_(options.doubt_deviations * options.doubt_deviations),
         weights_(edges.size(), 1.0),
-        fixed_(hold_components(nodes.size(), edges, fixed)) {
-    // The first steps trust every edge.
+        fixed_(choose_fixed_nodes(nodes.size(), edges, fixed)) {
+    // In the first steps every edge has full weight.
     const bool doubtful = std::ranges::any_of(edges, &PoseEdge::doubtful);
     scale_ = doubtful ? std::numeric_limits<double>::infinity() : final_scale_;
   }
@@ -93,7 +93,7 @@ class Graph {
   bool linearise(SparseEquations& equations) {
     equations.reset(static_cast<int>(nodes_.size() * unknowns));
     for (std::size_t i = 0; i < nodes_.size() * unknowns; ++i) {
-      // A component may hang on nothing but edges whose weight has fallen to almost nothing.
+      // Holds components whose edges have almost no weight left.
       const double held = fixed_[i / unknowns] != 0 ? 1.0 : 1e-9;
       equations.add(static_cast<int>(i), static_cast<int>(i), held);
     }
@@ -105,21 +105,21 @@ class Graph {
     return true;
   }
 
-  /// True when all edges have their final weights and no pose moves any more.
+  /// Returns true when all edges have their final weights and no pose moves any more.
   bool move(const Eigen::VectorXd& change) {
     ++steps_;
     const double moved = move_nodes(change);
     if (std::isinf(scale_)) {
-      // Where edges lose their weight, positions need not be exact.
-      constexpr double nearly_m = 0.05;
-      if (moved > nearly_m && steps_ < options_.max_iterations / 4) return false;
-      scale_ = std::max(final_scale_, weigh());
+      // Before weights change, positions need not be exact.
+      constexpr double nearly_settled_m = 0.05;
+      if (moved > nearly_settled_m && steps_ < options_.max_iterations / 4) return false;
+      scale_ = std::max(final_scale_, update_weights());
     } else if (scale_ > final_scale_) {
       scale_ = std::max(final_scale_, 0.25 * scale_);
     } else if (moved <= options_.settled_m) {
       return true;
     }
-    weigh();
+    update_weights();
     return false;
   }
 
@@ -131,9 +131,9 @@ class Graph {
   [[nodiscard]] const std::vector<double>& weights() const { return weights_; }
 
  private:
-  /// Weighs doubtful edges by their errors against the scale (squared deviations). Returns the
-  /// largest squared error of a doubtful edge.
-  double weigh() {
+  /// Sets the weights of doubtful edges by their errors against the scale (squared deviations).
+  /// Returns the largest squared error of a doubtful edge.
+  double update_weights() {
     double largest = 0.0;
     for (std::size_t i = 0; i < edges_.size(); ++i) {
       if (!edges_[i].doubtful) continue;
@@ -151,7 +151,7 @@ class Graph {
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
       if (fixed_[i] != 0) continue;
       const auto at = static_cast<Eigen::Index>(i * unknowns);
-      // No heading turns by more than half a radian at once, or the linear model means nothing.
+      // Headings change by at most half a radian at once, as far as the linear model holds.
       const double turn = std::clamp(change[at + 2], -0.5, 0.5);
       nodes_[i] = {nodes_[i].x_m + change[at], nodes_[i].y_m + change[at + 1],
                    wrap_angle(nodes_[i].heading_rad + turn)};
@@ -161,14 +161,14 @@ class Graph {
   }
 
   [[nodiscard]] EdgeError edge_error(std::size_t i) const {
-    return error_of(edges_[i], nodes_[edges_[i].a], nodes_[edges_[i].b]);
+    return edge_error_of(edges_[i], nodes_[edges_[i].a], nodes_[edges_[i].b]);
   }
 
   void add_edge(std::size_t i, SparseEquations& equations) const {
     const PoseEdge& edge = edges_[i];
     const Pose2& a = nodes_[edge.a];
     const Pose2& b = nodes_[edge.b];
-    const EdgeError error = error_of(edge, a, b);
+    const EdgeError error = edge_error_of(edge, a, b);
     const double weight = weights_[i];
     const double p = 1.0 / edge.position_deviation_m;
     const double h = 1.0 / edge.heading_deviation_rad;
@@ -194,7 +194,7 @@ class Graph {
       for (std::size_t n = 0; n <= m; ++n) {
         double sum = 0.0;
         for (std::size_t r = 0; r < 3; ++r) sum += jacobian[r][m] * jacobian[r][n];
-        // Fixed poses keep their equation x = 0; the pattern stays the same.
+        // Fixed poses keep the equation x = 0, so that the pattern stays the same.
         const bool stays = fixed_[index(m) / unknowns] != 0 || fixed_[index(n) / unknowns] != 0;
         equations.add(static_cast<int>(index(m)), static_cast<int>(index(n)),
                       stays ? 0.0 : weight * sum);
@@ -254,7 +254,7 @@ std::vector<std::size_t> connected_components(std::size_t nodes, std::span<const
 }
 
 double normalised_residual(const PoseEdge& edge, std::span<const Pose2> nodes) {
-  return std::sqrt(square(error_of(edge, nodes[edge.a], nodes[edge.b])));
+  return std::sqrt(square(edge_error_of(edge, nodes[edge.a], nodes[edge.b])));
 }
 
 }  // namespace panonav

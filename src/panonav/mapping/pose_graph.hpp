@@ -12,38 +12,38 @@ namespace panonav {
 
 /// A measured motion between two nodes of a map.
 struct PoseEdge {
-  std::size_t a = 0;                    ///< place of a node among those given
-  std::size_t b = 0;                    ///< place of another node
+  std::size_t a = 0;                    ///< index of a node
+  std::size_t b = 0;                    ///< index of another node
   Pose2 a_from_b;                       ///< as measured
   double position_deviation_m = 0.1;    ///< standard deviation of x and of y, > 0
   double heading_deviation_rad = 0.05;  ///< above 0
-  /// The edge may be an outlier, as a loop closure may: its weight falls where the others
-  /// contradict it.
+  /// The edge may be an outlier, as a loop closure may: its weight falls where others contradict
+  /// it.
   bool doubtful = false;
   friend bool operator==(const PoseEdge&, const PoseEdge&) = default;
 };
 
-/// When the optimisation ends, and how far edges are believed.
+/// When the optimisation ends, and how outliers are weighed.
 struct PoseGraphOptions {
   int max_iterations = 40;  ///< steps of the solver, >= 1
-  /// The optimisation has converged when no position changes by more than this.
+  /// The optimisation has converged when no position changes by more.
   double settled_m = 1e-3;
-  /// An edge that may be an outlier has half its weight at this many standard deviations.
+  /// Standard deviations at which a doubtful edge has half its weight.
   double doubt_deviations = 5.0;
 };
 void visit_options(PoseGraphOptions& options, OptionVisitor& visitor);
 
-/// How an optimisation went.
+/// The result of an optimisation.
 struct PoseGraphReport {
-  int iterations = 0;                ///< steps that were made
+  int iterations = 0;                ///< steps made
   bool settled = true;               ///< false: `max_iterations` were not enough
-  double cost = 0.0;                 ///< half the weighted sum of squares in the end
+  double cost = 0.0;                 ///< final half weighted sum of squares
   std::vector<double> edge_weights;  ///< one per edge, 0 .. 1; 1 for edges that are not doubtful
 };
 
 /// Optimises the poses of `nodes`: Gauss-Newton on the sparse normal equations. Edges that may be
 /// outliers have a robust cost (Geman and McClure), which is approached from the quadratic one
-/// (graduated non-convexity), so that the drift before the first closure does not reject it. Nodes
+/// (graduated non-convexity), so that drift does not reject the first closure. Nodes
 /// without edges, those whose entry in `fixed` is not 0, and the first node of each connected
 /// component without a fixed one stay where they are. Deterministic. Throws ContractError on an
 /// edge to a node that is not there or to itself, a value that is not finite or a deviation not
@@ -53,11 +53,12 @@ PoseGraphReport optimise_pose_graph(std::span<Pose2> nodes, std::span<const Pose
                                     const PoseGraphOptions& options = {},
                                     std::span<const std::uint8_t> fixed = {});
 
-/// The connected component of each node, numbered from 0 in the order of their first nodes.
+/// Returns the connected component of each node, numbered from 0 in the order of their first nodes.
 [[nodiscard]] std::vector<std::size_t> connected_components(std::size_t nodes,
                                                             std::span<const PoseEdge> edges);
 
-/// Residual of an edge at the nodes' poses, in standard deviations. The edge must be valid.
+/// Returns the residual of an edge at the nodes' poses, in standard deviations. The edge must be
+/// valid.
 [[nodiscard]] double normalised_residual(const PoseEdge& edge, std::span<const Pose2> nodes);
 
 }  // namespace panonav

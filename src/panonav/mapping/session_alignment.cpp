@@ -14,11 +14,11 @@ namespace panonav {
 
 namespace {
 
-/// Deviation of a match in metres and radians: that of `PoseEdge`, as of any measured motion.
+/// Standard deviation of a match in metres and radians: the default of `PoseEdge`.
 constexpr double match_position_deviation_m = 0.1;
 constexpr double match_heading_deviation_rad = 0.05;
-/// Deviations of the motion between two nodes of a map that has been optimised, for each metre of
-/// it (m/m, rad/m) and of one that stands still: a quarter and a half of those of a single step
+/// Standard deviations of the motion between two nodes of an optimised map, for each metre of it
+/// (m/m, rad/m) and for one of length 0: a quarter and a half of those of a single step
 /// (`MappingOptions`), as the steps and closures around have corrected it.
 constexpr double edge_deviation = 0.02;
 constexpr double edge_turn_deviation = 0.01;
@@ -29,12 +29,12 @@ double translation_m(const Pose2& motion) {
   return std::hypot(motion.x_m, motion.y_m);
 }
 
-std::vector<PassedNode> passed_nodes(const TopologicalMap& map, std::size_t component) {
+std::vector<PassedNode> make_passed_nodes(const TopologicalMap& map, std::size_t component) {
   std::vector<PassedNode> nodes;
-  double way_m = 0.0;
+  double path_m = 0.0;
   for (std::size_t i = 0; i < map.nodes.size(); ++i) {
-    if (i > 0) way_m += distance(map.nodes[i - 1].pose.position(), map.nodes[i].pose.position());
-    nodes.push_back({map.nodes[i].view, way_m, component});
+    if (i > 0) path_m += distance(map.nodes[i - 1].pose.position(), map.nodes[i].pose.position());
+    nodes.push_back({map.nodes[i].view, path_m, component});
   }
   return nodes;
 }
@@ -42,19 +42,21 @@ std::vector<PassedNode> passed_nodes(const TopologicalMap& map, std::size_t comp
 std::vector<LoopClosure> find_matches(const VisualMemory& memory, const TopologicalMap& first,
                                       const TopologicalMap& second,
                                       const LoopClosureOptions& closure, double scale_m) {
-  // The views of the second session come one by one, as those of a robot that drives.
-  VisualMemory seen(memory.shape(), memory.full_scale(), memory.elevations());
-  std::vector<PassedNode> nodes = passed_nodes(first, 0);
-  const std::vector<PassedNode> others = passed_nodes(second, 1);
+  // The views of the second session come one by one, as from a robot that drives.
+  VisualMemory views(memory.shape(), memory.full_scale(), memory.elevations());
+  std::vector<PassedNode> nodes = make_passed_nodes(first, 0);
+  const std::vector<PassedNode> others = make_passed_nodes(second, 1);
   std::vector<Pose2> poses;
-  const auto see = [&](ViewId view) { return seen.append(memory.packed(view), memory.info(view)); };
+  const auto append = [&](ViewId view) {
+    return views.append(memory.packed(view), memory.info(view));
+  };
   for (std::size_t i = 0; i < first.nodes.size(); ++i) {
-    nodes[i].view = see(first.nodes[i].view);
+    nodes[i].view = append(first.nodes[i].view);
     poses.push_back(first.nodes[i].pose);
   }
-  LoopClosureFinder finder(seen, closure, {}, ClosureScope::other_components);
+  LoopClosureFinder finder(views, closure, {}, ClosureScope::other_components);
   std::vector<LoopClosure> matches;
-  std::vector<std::size_t> number;  // in the second map, of the nodes behind those of the first
+  std::vector<std::size_t> number;  // in the second map, of the nodes after those of the first
   for (std::size_t i = 0; i < second.nodes.size(); ++i) {
     const ViewId view = second.nodes[i].view;
     const auto same = std::ranges::lower_bound(first.nodes, view, {}, &MapNode::view);
@@ -63,7 +65,7 @@ std::vector<LoopClosure> find_matches(const VisualMemory& memory, const Topologi
       continue;
     }
     nodes.push_back(others[i]);
-    nodes.back().view = see(view);
+    nodes.back().view = append(view);
     poses.push_back(second.nodes[i].pose);
     number.push_back(i);
     for (LoopClosure found :
@@ -76,8 +78,8 @@ std::vector<LoopClosure> find_matches(const VisualMemory& memory, const Topologi
   return matches;
 }
 
-/// Returns metres for each unit of length that the views of the map's first edges give; empty where
-/// none of these can be read. Cost: 0.3 ms an edge.
+/// Returns the metric scale of visual displacements by the map's first edges; nullopt where none
+/// can be read. Cost: 0.3 ms an edge.
 std::optional<double> view_scale_m(const VisualMemory& memory, const TopologicalMap& map) {
   constexpr std::size_t max_edges = 200;  // the median of so many ratios errs by a few percent
   const auto pose_of = [&](ViewId view) {
@@ -95,7 +97,7 @@ std::optional<double> view_scale_m(const VisualMemory& memory, const Topological
   return length_scale_m(lengths);
 }
 
-/// What the matches of two sessions say of how these lie to each other.
+/// The matches of two sessions, each with the relative pose of these.
 class Matches {
  public:
   Matches(const TopologicalMap& first, const TopologicalMap& second,
@@ -107,7 +109,7 @@ class Matches {
         spacing_m_(closure.spacing_m),
         tolerance_m_(closure.max_length * scale_m),
         tolerance_rad_(2.0 * closure.heading_tolerance_rad),
-        way_(passed_nodes(second, 0)),
+        path_(make_passed_nodes(second, 0)),
         matches_(std::move(matches)) {
     for (const LoopClosure& match : matches_) {
       frames_.push_back(first.nodes[match.earlier].pose * match.earlier_from_later *
@@ -128,8 +130,8 @@ class Matches {
   }
   [[nodiscard]] const LoopClosure& operator[](std::size_t i) const { return matches_[i]; }
 
-  /// The match that leads to the same frame as most places, with those that do.
-  [[nodiscard]] Hypothesis best_among(const Set& among) const {
+  /// Returns the largest set of matches that lead to one frame, and its number of places.
+  [[nodiscard]] Hypothesis find_hypothesis(const Set& among) const {
     Hypothesis best;
     for (const std::size_t i : among) {
       Set agreeing;
@@ -142,30 +144,30 @@ class Matches {
     return best;
   }
 
-  /// Where the maps lie upon each other, views must match. Maps drift, so that the frame is that of
-  /// the nearest match along the way.
-  void confirm(const Set& set, SessionAlignment& alignment) const {
+  /// Counts the places where the maps overlap, and those with a match. Maps drift, so the frame is
+  /// that of the nearest match along the path.
+  void count_confirmed_places(const Set& set, SessionAlignment& alignment) const {
     std::optional<double> last_m;
-    for (std::size_t i = 0; i < way_.size(); ++i) {
-      const double here_m = way_[i].way_m;
+    for (std::size_t i = 0; i < path_.size(); ++i) {
+      const double here_m = path_[i].path_m;
       if (last_m && here_m - *last_m < spacing_m_) continue;
       const auto off_m = [&](std::size_t match) {
-        return std::abs(way_[matches_[match].later].way_m - here_m);
+        return std::abs(path_[matches_[match].later].path_m - here_m);
       };
       const std::size_t nearest = *std::ranges::min_element(set, {}, off_m);
       const Point2 place = (frames_[nearest] * second_->nodes[i].pose).position();
-      const bool beside = std::ranges::any_of(first_->nodes, [&](const MapNode& node) {
+      const bool is_overlapping = std::ranges::any_of(first_->nodes, [&](const MapNode& node) {
         return distance(node.pose.position(), place) < 0.5 * tolerance_m_;
       });
-      if (!beside) continue;
+      if (!is_overlapping) continue;
       last_m = here_m;
       ++alignment.expected_places;
       if (off_m(nearest) <= 2.0 * spacing_m_) ++alignment.confirmed_places;
     }
   }
 
-  /// Of the match whose frame puts the places of all others nearest to where they put them.
-  [[nodiscard]] Pose2 middle_frame(const Set& set) const {
+  /// Returns the frame of the match that places all others nearest to where they place themselves.
+  [[nodiscard]] Pose2 medoid_frame(const Set& set) const {
     const auto total_gap_m = [&](std::size_t i) {
       double sum = 0.0;
       for (const std::size_t j : set) sum += gap_m(i, j);
@@ -175,7 +177,7 @@ class Matches {
   }
 
  private:
-  /// Between the places where both put the second's node of match j.
+  /// Returns the distance between the positions of match j in the frames of both.
   [[nodiscard]] double gap_m(std::size_t i, std::size_t j) const {
     const Pose2& there = second_->nodes[matches_[j].later].pose;
     return distance((frames_[i] * there).position(), (frames_[j] * there).position());
@@ -187,12 +189,12 @@ class Matches {
            std::abs(angle_difference(frames_[i].heading_rad, frames_[j].heading_rad)) <
                tolerance_rad_;
   }
-  /// Matches nearer to each other than `spacing_m` along the way count once.
+  /// Counts matches nearer to each other than `spacing_m` along the path once.
   [[nodiscard]] int count_places(const Set& set) const {
     int count = 0;
     double last_m = 0.0;
     for (const std::size_t i : set) {
-      const double here_m = way_[matches_[i].later].way_m;
+      const double here_m = path_[matches_[i].later].path_m;
       if (count > 0 && here_m - last_m < spacing_m_) continue;
       ++count;
       last_m = here_m;
@@ -204,7 +206,7 @@ class Matches {
   const TopologicalMap* second_;
   SessionAlignmentOptions options_;
   double spacing_m_, tolerance_m_, tolerance_rad_;
-  std::vector<PassedNode> way_;
+  std::vector<PassedNode> path_;
   std::vector<LoopClosure> matches_;
   std::vector<Pose2> frames_;
 };
@@ -238,21 +240,21 @@ std::optional<SessionAlignment> align_sessions(const VisualMemory& memory,
                view_scale_m(memory, second).value_or(0.0));
   const Matches matches(first, second, options, closure, scale_m,
                         find_matches(memory, first, second, closure, scale_m));
-  const Matches::Hypothesis best = matches.best_among(matches.all());
+  const Matches::Hypothesis best = matches.find_hypothesis(matches.all());
   if (best.places < options.min_places) return std::nullopt;
   Matches::Set others;
   std::ranges::set_difference(matches.all(), best.matches, std::back_inserter(others));
   SessionAlignment alignment;
   alignment.places = best.places;
-  alignment.other_places = matches.best_among(others).places;
+  alignment.other_places = matches.find_hypothesis(others).places;
   alignment.refuted = others.size();
   if (alignment.other_places * options.distinctness > best.places) return std::nullopt;
-  matches.confirm(best.matches, alignment);
+  matches.count_confirmed_places(best.matches, alignment);
   if (alignment.confirmed_places < options.min_confirmed * alignment.expected_places) {
     return std::nullopt;
   }
   for (const std::size_t i : best.matches) alignment.matches.push_back(matches[i]);
-  alignment.first_from_second = matches.middle_frame(best.matches);
+  alignment.first_from_second = matches.medoid_frame(best.matches);
   return alignment;
 }
 

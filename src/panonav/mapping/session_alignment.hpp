@@ -13,13 +13,13 @@
 
 namespace panonav {
 
-/// When two sessions are taken to have places in common.
+/// When two sessions count as having places in common.
 struct SessionAlignmentOptions {
-  /// Places of the second session, at least half a metre apart along its way, that must lead to one
-  /// and the same frame of the first.
+  /// Places of the second session, at least half a metre apart along its path, that must lead to
+  /// the same frame of the first.
   int min_places = 10;
-  /// Where the maps come to lie upon each other views must match: of such places at least this
-  /// share. Shelves that are built alike match here and there, and not on a whole way.
+  /// Share of the places where the maps overlap whose views must match: shelves that are built
+  /// alike match here and there, but not along a whole path.
   double min_confirmed = 0.7;
   /// Any other frame must explain fewer places by this factor.
   double distinctness = 2.0;
@@ -28,25 +28,24 @@ struct SessionAlignmentOptions {
 };
 void visit_options(SessionAlignmentOptions& options, OptionVisitor& visitor);
 
-/// How the maps of two sessions lie to each other.
+/// The relative pose of the maps of two sessions, with its evidence.
 struct SessionAlignment {
-  Pose2 first_from_second;  ///< takes a pose of the second map into the frame of the first
+  Pose2 first_from_second;  ///< transforms the second map into the frame of the first
   /// Places that lead to this frame: `earlier` is a node of the first session, `later` one of the
   /// second, by their numbers there.
   std::vector<LoopClosure> matches;
   int places = 0;        ///< of the matches, at least half a metre apart
   int other_places = 0;  ///< the same of the next best frame
-  /// Places of the second session that come to lie beside a view of the first, at least half a
-  /// metre apart, and how many of them are matched there.
+  /// Places of the second session near a view of the first, at least half a metre apart.
   int expected_places = 0;
-  int confirmed_places = 0;  ///< of these, with a match there
+  int confirmed_places = 0;  ///< those of them with a match
   std::size_t refuted = 0;   ///< matches that lead elsewhere
 };
 
 /// Finds the places that two sessions have in common, by appearance alone: for each view of the
 /// second in turn, closures are searched among those of the first. Each closure
-/// tells how the second map lies in the frame of the first; the largest set of closures that agree
-/// counts. Empty where they are too few, or others nearly as many. All nodes of a map are in one
+/// gives the frame of the second map in the first; the largest set of closures that agree
+/// counts. nullopt where they are too few, or others nearly as many. All nodes of a map are in one
 /// frame. `memory` holds the views of both, as far as they have different ids; a view that is in
 /// both is a place in common by itself. Throws OptionError, ContractError on a map that `validate`
 /// refuses or whose views are not in the memory. Cost: two searches of
@@ -55,9 +54,9 @@ struct SessionAlignment {
     const VisualMemory& memory, const TopologicalMap& first, const TopologicalMap& second,
     const SessionAlignmentOptions& options = {});
 
-/// Both maps in the frame of the first, joined by the matches, and optimised as a pose graph: the
-/// maps give way where the matches demand it. The nodes of the first keep their frame on the whole;
-/// the first of them stays where it is.
+/// Joins both maps in the frame of the first by the matches, and optimises them as a pose graph, in
+/// which both may change. The nodes of the first keep their frame on the whole; its first node is
+/// fixed.
 [[nodiscard]] TopologicalMap join_sessions(const TopologicalMap& first,
                                            const TopologicalMap& second,
                                            const SessionAlignment& alignment,

@@ -21,8 +21,8 @@ struct MapEdge {
   ViewId a;                            ///< one node, by its view
   ViewId b;                            ///< the other
   Pose2 a_from_b;                      ///< pose of b in the frame of a, metres
-  LinkKind kind = LinkKind::sequence;  ///< why they are joined
-  double weight = 1.0;  ///< 0 .. 1; small for a closure that the rest of the map contradicts
+  LinkKind kind = LinkKind::sequence;  ///< of the edge
+  double weight = 1.0;  ///< 0 .. 1; small where the rest of the map contradicts a closure
   friend bool operator==(const MapEdge&, const MapEdge&) = default;
 };
 
@@ -38,7 +38,7 @@ struct TopologicalMap {
 /// 0 .. 1.
 void validate(const TopologicalMap& map);
 
-/// Gives the connected components the numbers from 0 on, in their order: some may be gone.
+/// Numbers the connected components from 0 without gaps, in their order.
 void renumber_components(TopologicalMap& map);
 
 /// The number of connected components.

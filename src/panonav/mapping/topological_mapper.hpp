@@ -14,20 +14,19 @@
 
 namespace panonav {
 
-/// What becomes a node, and how nodes are joined.
+/// Which views become nodes, and how nodes are joined.
 struct MappingOptions {
   /// A view becomes a node when it differs from the last node by more (`image_difference`, 0 .. 1):
   /// capture by threshold, as in F11's second set. 0 keeps every view.
   double capture_difference = 0.0;
-  bool close_loops = true;  ///< whether places passed before are looked for
-  /// Where neither views nor wheels give a step, it is taken as this long, straight ahead and as
-  /// uncertain as it is long: for recordings whose pictures are far apart. 0: a new connected
-  /// component begins.
+  bool close_loops = true;  ///< search for places passed before
+  /// Assumed length of a step that neither views nor wheels give, straight ahead and as uncertain
+  /// as it is long: for recordings whose images are far apart. 0: a new connected component begins.
   double bridge_m = 0.0;
-  /// Steps are taken from the wheels where these are known: length and direction are theirs, and
-  /// the turn is the mean of theirs and that of the views, weighted by how far both are right. The
-  /// error of the views' turns is learnt from the last steps: it is what the wheels' own error,
-  /// that of `OdometryNoise`, does not explain of their difference.
+  /// Steps come from the wheels where these are known: length and direction are theirs, and the
+  /// turn is the mean of theirs and that of the views, weighted by their variances. The error of
+  /// the views' turns is learnt from the last steps: the part of their difference that the wheels'
+  /// own error, that of `OdometryNoise`, does not explain.
   bool wheels = true;
   /// Standard deviation of the position after a step read from views, for each metre of it.
   double step_deviation = 0.08;
@@ -37,7 +36,7 @@ struct MappingOptions {
 void visit_options(MappingOptions& options, OptionVisitor& visitor);
 
 /// Makes a map from one view after the other: a node for each, linked with the one before by visual
-/// odometry; loops are closed as `LoopClosureOptions` says. A closure moves the nodes since the
+/// odometry; loops are closed by `LoopClosureOptions`. A closure moves the nodes since the
 /// closure before so that they fit the older map. Where a contradiction remains and the map has
 /// grown by a hundredth since the last time, the whole is optimised as a pose graph. The cost of a
 /// view therefore stays small in large maps. Where neither views nor wheels give a step, a new
@@ -45,12 +44,12 @@ void visit_options(MappingOptions& options, OptionVisitor& visitor);
 /// with the others.
 class TopologicalMapper {
  public:
-  /// What the mapper did with a view.
+  /// The changes of the map by one view.
   struct Update {
     std::optional<VisualStep> step;     ///< from the node before
-    bool new_component = false;         ///< nothing connects the view with the node before
+    bool new_component = false;         ///< no step connects the view with the node before
     std::vector<LoopClosure> closures;  ///< that became certain; numbers of nodes
-    bool optimised = false;             ///< the whole map was
+    bool optimised = false;             ///< the whole map was optimised
   };
 
   /// `memory` must outlive the mapper. Throws OptionError.
@@ -58,30 +57,29 @@ class TopologicalMapper {
                              const VisualOdometryOptions& odometry = {},
                              const LoopClosureOptions& closure = {},
                              const PoseGraphOptions& graph = {});
-  /// What is left of the other may only be destroyed or assigned to.
+  /// The source of a move may only be destroyed or assigned to.
   TopologicalMapper(TopologicalMapper&&) noexcept;
   TopologicalMapper& operator=(TopologicalMapper&&) noexcept;
   ~TopologicalMapper();
 
-  /// Whether the view differs enough from the last node to become one.
+  /// True if the view differs enough from the last node to become one.
   [[nodiscard]] bool is_new(const OdometryView& view) const;
 
-  /// Adds a node. The view must be the memory's latest; `moved` is what wheels say since the last
-  /// node (robot_old_from_robot_new), empty where there are none. Throws ContractError on a view
+  /// Adds a node. The view must be the memory's latest; `moved`: motion by the wheels since the
+  /// last node (robot_old_from_robot_new), nullopt without wheels. Throws ContractError on a view
   /// that is not in the memory or not later than those before, on another shape, and on a step that
   /// is not finite.
-  Update add(ViewId view, OdometryView seen, const std::optional<Pose2>& moved = std::nullopt);
+  Update add(ViewId view, OdometryView image, const std::optional<Pose2>& moved = std::nullopt);
 
-  /// Optimises what is not optimised yet.
+  /// Optimises the map if it has changed since the last time.
   void finish();
 
   [[nodiscard]] std::size_t size() const noexcept;  ///< Number of nodes.
-  /// Of each node, in the frame of its connected component.
+  /// The pose of each node, in the frame of its connected component.
   [[nodiscard]] std::span<const Pose2> poses() const noexcept;
-  /// Components are numbered in the order of their first nodes.
+  /// The map, with components numbered in the order of their first nodes.
   [[nodiscard]] TopologicalMap map() const;
-  /// Metres for each unit of length of the views: from the wheels, or else from the visual
-  /// odometry.
+  /// Metric scale of visual displacements: from the wheels, or else from the visual odometry.
   [[nodiscard]] double scale_m() const;
 
  private:

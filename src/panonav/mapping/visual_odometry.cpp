@@ -14,9 +14,9 @@ namespace panonav {
 
 namespace {
 
-// Steps are short: the least squares need no search before them, and the search's own grid of
-// displacements would show in the lengths.
-FourierHomingOptions vector_options(const VisualOdometryOptions& options) {
+// Returns options for short steps: the least squares need no search, whose grid of displacements
+// would show in the lengths.
+FourierHomingOptions make_vector_options(const VisualOdometryOptions& options) {
   return {.iterations = options.iterations, .displacement_search = false};
 }
 
@@ -39,20 +39,20 @@ std::optional<VisualStep> published_step(const OdometryView& before, const Odome
 std::optional<VisualStep> home_vector_step(const OdometryView& before, const OdometryView& after,
                                            const VisualOdometryOptions& options) {
   const HomeVector vector =
-      home_vector(before.coefficients, after.coefficients, vector_options(options));
+      home_vector(before.coefficients, after.coefficients, make_vector_options(options));
   if (!(vector.correlation > 0.0)) return std::nullopt;
   VisualStep step;
   Pose2 motion = inverse(Pose2{vector.xi, vector.eta, vector.heading_rad});
   if (options.nearer_side) {
-    // The robot goes away from home.
+    // The robot moves away from home.
     const AzimuthFlow flow =
         refine_flow(before.coefficients, after.coefficients,
                     {.g0 = -vector.heading_rad, .a1 = -vector.eta, .b1 = vector.xi}, 1);
     const double turn = flow.turn_rad();
-    // Far from the start the flow has lost its way.
-    constexpr double farthest_rad = 0.2;
-    if (std::abs(angle_difference(turn, motion.heading_rad)) < farthest_rad) {
-      // The length stays the home vector's, whose weights leave out what does not fit.
+    // Far from its start the flow has diverged.
+    constexpr double max_change_rad = 0.2;
+    if (std::abs(angle_difference(turn, motion.heading_rad)) < max_change_rad) {
+      // The length stays that of the home vector, whose weights reject outliers.
       const double direction = flow.direction_rad() + turn;
       motion = {vector.length() * std::cos(direction), vector.length() * std::sin(direction),
                 wrap_angle(turn)};
@@ -133,7 +133,7 @@ std::optional<VisualStep> VisualOdometry::add(OdometryView view) {
   if (last_) {
     step = visual_step(*last_, view, options_);
     if (step) {
-      if (ground_) ground_->correct(last_->coefficients, view.coefficients, *step);
+      if (ground_) ground_->correct_step(last_->coefficients, view.coefficients, *step);
       pose_ = pose_ * step->before_from_after;
     } else {
       ++breaks_;

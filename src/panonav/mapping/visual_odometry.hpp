@@ -13,7 +13,7 @@
 
 namespace panonav {
 
-/// How a step is read from two views.
+/// How a step is estimated from two views.
 struct VisualOdometryOptions {
   /// How the motion between two views is estimated.
   enum class Rule {
@@ -29,31 +29,30 @@ struct VisualOdometryOptions {
   };
 
   Rule rule = Rule::home_vector;  ///< published, or our own
-  /// Metres for each unit of length that the views give: the distance R of things around for
-  /// `home_vector`, the distance of signatures 1 apart for `published`. See `length_scale_m`.
+  /// Metres for each unit of visual length: the distance R of things around for `home_vector`, the
+  /// distance of signatures 1 apart for `published`. See `length_scale_m`.
   double scale_m = 1.5;
   /// Height of the camera above level ground; with it `VisualOdometry` and maps read lengths from
   /// the ground, in metres (`GroundLengths`). 0: not known.
   double camera_height_m = 0.0;
   /// Of `published`: components compared for the distance (k1) and for the turn (k2); 0 takes all.
   int distance_components = 0;
-  int turn_components = 0;  ///< For the turn.
-  /// Times that the solution of `home_vector` is refined.
+  int turn_components = 0;  ///< for the turn
+  /// Refinements of the solution of `home_vector`.
   int iterations = 1;
   /// Turn and direction of `home_vector` are refined by the flow over azimuth (`refine_flow`),
   /// which separates a turn from things that are nearer on one side of the path. Along a wall this
   /// is most of the drift.
   bool nearer_side = true;
-  /// A step is not believed when turn and displacement leave more than this share of the energy of
-  /// the views unexplained.
+  /// Largest share of the energy of the views that turn and displacement may leave unexplained.
   double max_residual = 0.5;
 };
 void visit_options(VisualOdometryOptions& options, OptionVisitor& visitor);
 
-/// A view as visual odometry compares it.
+/// A view in the forms in which visual odometry compares it.
 struct OdometryView {
   FourierSignature signature;  ///< of the view, for the distance and the compass
-  HomingView coefficients;     ///< the same as homing takes it
+  HomingView coefficients;     ///< of the same view, for the home vector
 
   /// Throws ContractError unless there are three components or more.
   explicit OdometryView(FourierSignature view);
@@ -62,12 +61,12 @@ struct OdometryView {
 /// The motion between two views.
 struct VisualStep {
   Pose2 before_from_after;       ///< pose of the second view in the frame of the first, metres
-  double length_in_views = 0.0;  ///< before it is multiplied by the scale
+  double length_in_views = 0.0;  ///< without the scale
   double correlation = 0.0;      ///< of the views at the turn found, -1 .. 1
   double residual = 1.0;         ///< share of the energy of the views left unexplained, 0 .. 1
 };
 
-/// Empty where the views show no motion that can be believed: no structure, or too little in
+/// Estimates the motion between two views. nullopt where they have no structure or too little in
 /// common. Throws ContractError on views of different shapes; OptionError. Cost: `home_vector`
 /// without the search of displacements and one iteration of `refine_flow`.
 [[nodiscard]] std::optional<VisualStep> visual_step(const OdometryView& before,
@@ -76,32 +75,32 @@ struct VisualStep {
 
 /// A step whose length is known from elsewhere, such as wheels.
 struct KnownLength {
-  double length_in_views = 0.0;  ///< as `VisualStep` tells it, > 0
+  double length_in_views = 0.0;  ///< of the `VisualStep`, > 0
   double length_m = 0.0;         ///< of the same step, by the other source
 };
 
-/// The scale from known steps: the median of their ratios, which is robust against single wrong
-/// ones. Steps of no length are left out; empty when none remains. Throws ContractError on a
-/// negative length or one that is not finite.
+/// Estimates the scale from known steps: the median of their ratios, which is robust against single
+/// wrong ones. Steps of no length are left out; nullopt when none remains. Throws ContractError on
+/// a negative length or one that is not finite.
 [[nodiscard]] std::optional<double> length_scale_m(std::span<const KnownLength> steps);
 
-/// Pose by pose from one view after the other [F11 section 4, eq. 3-5].
+/// Integrates steps from one view after the other [F11 section 4, eq. 3-5].
 class VisualOdometry {
  public:
   /// Throws OptionError.
   explicit VisualOdometry(const VisualOdometryOptions& options = {});
 
-  /// The step from the view before; empty for the first view and where there is no believable step:
+  /// Returns the step from the view before; nullopt for the first view and where no step is found:
   /// the pose then stays, and `breaks()` counts. Throws as `visual_step`.
   std::optional<VisualStep> add(OdometryView view);
 
-  /// The view added last; empty before the first.
+  /// The view added last; nullopt before the first.
   [[nodiscard]] const std::optional<OdometryView>& last() const noexcept { return last_; }
-  /// Metres for each unit of length of the views: from the ground, or as it was given.
+  /// Metric scale of visual displacements: from the ground, or that of the options.
   [[nodiscard]] double scale_m() const;
   /// start_from_robot.
   [[nodiscard]] const Pose2& pose() const noexcept { return pose_; }
-  /// Views at which no step was believed, the first one not counted.
+  /// Number of views without a step, without the first one.
   [[nodiscard]] int breaks() const noexcept { return breaks_; }
 
  private:

@@ -15,10 +15,12 @@ namespace panonav {
 
 namespace {
 
+/// Rows to which views are averaged: enough vertical structure for noise of its spectrum.
 constexpr int max_bands = 16;
-constexpr int surrogates = 40;
+/// Views of noise: the standard deviation of their matches errs by 11 %.
+constexpr int noise_views = 40;
 
-HomingView banded(const HomingView& view) {
+HomingView average_to_bands(const HomingView& view) {
   const int bands = std::min(max_bands, view.rows());
   std::vector<float> cosines;
   std::vector<float> sines;
@@ -40,10 +42,10 @@ HomingView banded(const HomingView& view) {
 }
 
 /// Noise with the spectrum of a view. A cosine transform over the rows splits each frequency into
-/// vertical patterns, which are turned each by itself.
-class NoiseOf {
+/// vertical patterns, each of which is rotated by itself.
+class NoiseGenerator {
  public:
-  explicit NoiseOf(const HomingView& view)
+  explicit NoiseGenerator(const HomingView& view)
       : view_(view), rows_(static_cast<std::size_t>(view.rows())), energy_(rows_, 0.0F) {
     const auto rows = static_cast<double>(rows_);
     for (std::size_t m = 0; m < rows_; ++m) {
@@ -68,20 +70,21 @@ class NoiseOf {
     }
   }
 
-  [[nodiscard]] HomingView draw(Random random) const {
+  [[nodiscard]] HomingView draw_view(Random random) const {
     const std::size_t size = rows_ * static_cast<std::size_t>(view_.components());
     std::vector<float> cosines(size, 0.0F);
     std::vector<float> sines(size, 0.0F);
     std::vector<float> energy(rows_, 0.0F);
     for (std::size_t i = 0; i < spectrum_.size(); ++i) {
-      const std::size_t first = rows_ + i / rows_ * rows_;  // frequency 0 counts for nothing
+      const std::size_t first = rows_ + i / rows_ * rows_;  // frequency 0 does not count
       const std::size_t pattern = i % rows_ * rows_;
-      const double turn = random.uniform(0.0, 2.0 * std::numbers::pi);
-      const auto turned = spectrum_[i] * std::complex<float>(static_cast<float>(std::cos(turn)),
-                                                             static_cast<float>(std::sin(turn)));
+      const double rotation_rad = random.uniform(0.0, 2.0 * std::numbers::pi);
+      const auto rotated =
+          spectrum_[i] * std::complex<float>(static_cast<float>(std::cos(rotation_rad)),
+                                             static_cast<float>(std::sin(rotation_rad)));
       for (std::size_t y = 0; y < rows_; ++y) {
-        cosines[first + y] += patterns_[pattern + y] * turned.real();
-        sines[first + y] += patterns_[pattern + y] * turned.imag();
+        cosines[first + y] += patterns_[pattern + y] * rotated.real();
+        sines[first + y] += patterns_[pattern + y] * rotated.imag();
       }
     }
     for (std::size_t i = rows_; i < size; ++i) {
@@ -105,8 +108,8 @@ class NoiseOf {
   std::vector<float> energy_;                  // by row
 };
 
-double match_of(const HomingView& home, const HomingView& current,
-                const FourierHomingOptions& options) {
+double sum_of_correlations(const HomingView& home, const HomingView& current,
+                           const FourierHomingOptions& options) {
   return home_vector(home, current, options).correlation +
          home_vector(current, home, options).correlation;
 }
@@ -114,35 +117,35 @@ double match_of(const HomingView& home, const HomingView& current,
 }  // namespace
 
 bool ChanceMatch::is_beyond_chance() const noexcept {
-  // One draw more than the 40 of a normal distribution whose mean and deviation come from them:
-  // Student's t of 39 degrees of freedom at 0.99, times the root of 1 + 1 / 40.
-  constexpr double rare = 2.426 * 1.0124;
-  return deviation > 1e-6 && match - chance > rare * deviation;
+  // 0.99 quantile of a further draw from the distribution of 40, whose mean and deviation come from
+  // them: Student's t of 39 degrees of freedom, times the root of 1 + 1 / 40.
+  constexpr double min_deviations = 2.426 * 1.0124;
+  return deviation > 1e-6 && match - chance > min_deviations * deviation;
 }
 
 double ChanceMatch::direction_probability() const noexcept {
   if (deviation <= 1e-6) return 0.0;
-  constexpr double most = 10.0;  // deviations; beyond them nothing was learnt
-  const double deviations = std::min((match - chance) / deviation, most);
+  constexpr double max_deviations = 10.0;  // up to which it was learnt
+  const double deviations = std::min((match - chance) / deviation, max_deviations);
   return 1.0 / (1.0 + std::exp(2.301 - 1.074 * deviations));
 }
 
 ChanceMatch compare_with_chance(const HomingView& home, const HomingView& current,
                                 const FourierHomingOptions& options) {
-  const HomingView goal = banded(home);
-  const HomingView here = banded(current);
+  const HomingView goal = average_to_bands(home);
+  const HomingView here = average_to_bands(current);
   ChanceMatch result;
-  result.match = match_of(goal, here, options);
-  const NoiseOf noise(here);
+  result.match = sum_of_correlations(goal, here, options);
+  const NoiseGenerator noise(here);
   constexpr std::uint64_t seed = 1;
   std::vector<double> matches;
-  for (std::uint64_t i = 0; i < surrogates; ++i) {
-    matches.push_back(match_of(goal, noise.draw(Random(seed, i)), options));
-    result.chance += matches.back() / surrogates;
+  for (std::uint64_t i = 0; i < noise_views; ++i) {
+    matches.push_back(sum_of_correlations(goal, noise.draw_view(Random(seed, i)), options));
+    result.chance += matches.back() / noise_views;
   }
   double square = 0.0;
   for (const double match : matches) square += (match - result.chance) * (match - result.chance);
-  result.deviation = std::sqrt(square / (surrogates - 1));
+  result.deviation = std::sqrt(square / (noise_views - 1));
   return result;
 }
 

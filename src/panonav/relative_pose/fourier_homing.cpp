@@ -39,7 +39,7 @@ class PairOfViews {
       std::copy_n(current.cosines(k).data(), rows_, c_.current_a(k));
       std::copy_n(current.sines(k).data(), rows_, c_.current_b(k));
     }
-    if (!sees_rise()) return;
+    if (!uses_rows()) return;
     const auto& band = home.elevations();
     const double row_rad = (band->top_rad - band->bottom_rad) / static_cast<double>(rows_);
     for (std::size_t y = 0; y < rows_; ++y) {
@@ -50,11 +50,11 @@ class PairOfViews {
   }
 
   HomeVector find_vector();
-  [[nodiscard]] double difference();
+  [[nodiscard]] double compute_difference();
 
  private:
-  /// Whether it is known how the image changes from row to row.
-  [[nodiscard]] bool sees_rise() const noexcept {
+  /// True if the change of the image from row to row counts.
+  [[nodiscard]] bool uses_rows() const noexcept {
     return (options_.vertical_motion || options_.tilt) && home_.elevations() && rows_ >= 3;
   }
   [[nodiscard]] bool has_start() const noexcept { return start_ && start_->displacement.ring > 0; }
@@ -63,22 +63,22 @@ class PairOfViews {
   void set_highest(int iteration);
   void correlate();
   [[nodiscard]] bool has_structure() const;
-  [[nodiscard]] std::span<const float> find_turns(int iteration);
-  void solve_at_best_turn(std::span<const float> turns);
+  [[nodiscard]] std::span<const float> find_headings(int iteration);
+  void solve_at_best_heading(std::span<const float> headings);
   void move_current(const PairSolution& solution);
 
   [[nodiscard]] PairSolution solve_at(double turn_rad);
-  void keep(float turn_rad, const PairSolution& solution, double residual);
+  void set_best(float turn_rad, const PairSolution& solution, double residual);
   [[nodiscard]] double correlation_at(float turn_rad) const {
     return static_cast<double>(correlation_.at(turn_rad));
   }
-  void turn_home(double turn_rad);
-  void weigh();
+  void rotate_home(double turn_rad);
+  void set_weights();
   void average_views();
-  void take_rises();
+  void differentiate_rows();
   void sum_equations();
-  void take_out_tilt(const RowTerms& terms);
-  void move_current(const DisplacementStart& start);
+  void eliminate_tilt(const RowTerms& terms);
+  void displace_current(const DisplacementStart& start);
 
   const HomingView& home_;
   const HomingView& current_;
@@ -90,12 +90,12 @@ class PairOfViews {
   int known_;
   PairCoefficients c_;
   std::optional<DisplacementStart> start_;
-  std::array<float, max_starting_estimates> turns_{};
+  std::array<float, max_starting_estimates> headings_{};
   TurnCorrelation correlation_;
   double home_energy_ = 0.0;
   double current_energy_ = 0.0;
   PerFrequency component_weights_{};
-  // By row: how fast things rise as the robot comes nearer, and the tangent of the elevation.
+  // By row: how fast things rise as the robot approaches, and the tangent of the elevation.
   std::vector<float> approach_, tangent_;
   std::vector<float> row_weights_;  // empty: all alike
   PairEquations normal_;
@@ -104,16 +104,16 @@ class PairOfViews {
   HomeVector vector_;
 };
 
-// [S06 section 2.3]
+// Fourier homing [S06 section 2.3]
 HomeVector PairOfViews::find_vector() {
   if (options_.displacement_search) search_displacement();  // eq. 3, as in section 3
   for (int iteration = 0;; ++iteration) {
     set_highest(iteration);  // footnote 6
     correlate();             // eq. 33
     if (!has_structure()) return {};
-    const auto turns = find_turns(iteration);  // eq. 33-43, footnote 10
-    if (turns.empty()) return {};
-    solve_at_best_turn(turns);  // eq. 17-20, 29-30
+    const auto headings = find_headings(iteration);  // eq. 33-43, footnote 10
+    if (headings.empty()) return {};
+    solve_at_best_heading(headings);  // eq. 17-20, 29-30
     if (iteration >= options_.iterations) return vector_;
     move_current(best_);  // eq. 23-26
   }
@@ -122,7 +122,7 @@ HomeVector PairOfViews::find_vector() {
 void PairOfViews::search_displacement() {
   start_ = find_start(home_, current_, known_, window_);
   const double direction = start_->displacement.direction_rad() + start_->ahead_rad;
-  if (has_start()) move_current(*start_);
+  if (has_start()) displace_current(*start_);
   vector_.xi = start_->displacement.length() * std::cos(direction);
   vector_.eta = start_->displacement.length() * std::sin(direction);
 }
@@ -132,7 +132,7 @@ void PairOfViews::set_highest(int iteration) {
   highest_ = std::max(1, max_frequency_ * (iteration + 1) / (options_.iterations + 1));
 }
 
-// Correlation of the home view, not turned, with the current view, summed over the rows.
+// Correlates the home view, not rotated, with the current view, summed over the rows [S06 eq. 33].
 void PairOfViews::correlate() {
   correlation_.highest = highest_;
   home_energy_ = current_energy_ = 0.0;
@@ -159,43 +159,43 @@ void PairOfViews::correlate() {
 }
 
 bool PairOfViews::has_structure() const {
-  // Views are of the order of 1, so a transform in single precision leaves less than this of
-  // nothing.
+  // Views are of the order of 1, so a transform of a constant in single precision stays below this.
   constexpr double rounding = 1e-6;
-  const double most = std::sqrt(home_energy_) * std::sqrt(current_energy_);
-  return most > rounding * rounding * static_cast<double>(rows_);
+  const double max_correlation = std::sqrt(home_energy_) * std::sqrt(current_energy_);
+  return max_correlation > rounding * rounding * static_cast<double>(rows_);
 }
 
-std::span<const float> PairOfViews::find_turns(int iteration) {
+std::span<const float> PairOfViews::find_headings(int iteration) {
   int count = 1;
   if (has_start() && iteration == 0) {
-    turns_[0] = static_cast<float>(start_->turn_rad);
+    headings_[0] = static_cast<float>(start_->turn_rad);
   } else if (options_.turn == FourierHomingOptions::TurnEstimate::sequential) {
-    turns_[0] = sequential_heading(correlation_);
+    headings_[0] = sequential_heading(correlation_);
   } else {
     const auto estimates = static_cast<std::size_t>(options_.starting_estimates);
-    count = find_highest_peaks(correlation_, std::span(turns_).first(estimates), window_);
+    count = find_highest_peaks(correlation_, std::span(headings_).first(estimates), window_);
   }
-  return std::span(turns_).first(static_cast<std::size_t>(count));
+  return std::span(headings_).first(static_cast<std::size_t>(count));
 }
 
-void PairOfViews::solve_at_best_turn(std::span<const float> turns) {
+void PairOfViews::solve_at_best_heading(std::span<const float> headings) {
   best_ = {};
   variance_ = 0.0;
   vector_.heading_rad = 0.0;
   vector_.residual = 1.0;
   double best_residual = 2.0;  // above all
-  for (std::size_t i = 0; i < turns.size(); ++i) {
-    const float turn = turns[i];
-    // A heading at which the views do not even correlate half as well explains nothing better.
+  for (std::size_t i = 0; i < headings.size(); ++i) {
+    const float turn = headings[i];
+    // A heading at which the views correlate less than half as well explains them no better.
     constexpr double min_share = 0.5;
-    if (i > 0 && correlation_at(turn) < min_share * correlation_at(turns[0])) break;
+    if (i > 0 && correlation_at(turn) < min_share * correlation_at(headings[0])) break;
     const PairSolution solution = solve_at(static_cast<double>(turn));
-    const double left = std::max(0.0, normal_.energy - solution.explained);
-    const double residual = normal_.energy_of_views > 0.0 ? left / normal_.energy_of_views : 1.0;
+    const double unexplained = std::max(0.0, normal_.energy - solution.explained);
+    const double residual =
+        normal_.energy_of_views > 0.0 ? unexplained / normal_.energy_of_views : 1.0;
     if (residual >= best_residual) continue;
     best_residual = residual;
-    keep(turn, solution, residual);
+    set_best(turn, solution, residual);
   }
   vector_.xi += best_.xi;
   vector_.eta += best_.eta;
@@ -203,7 +203,7 @@ void PairOfViews::solve_at_best_turn(std::span<const float> turns) {
   vector_.confidence = square > 0.0 ? square / (square + variance_) : 0.0;
 }
 
-void PairOfViews::turn_home(double turn_rad) {
+void PairOfViews::rotate_home(double turn_rad) {
   for_frequencies(known_ + 1, turn_rad, [&](int k, float c, float s) {
     const float* const a = home_.cosines(k).data();
     const float* const b = home_.sines(k).data();
@@ -216,7 +216,7 @@ void PairOfViews::turn_home(double turn_rad) {
   });
 }
 
-void PairOfViews::weigh() {
+void PairOfViews::set_weights() {
   row_weights_.clear();
   if (options_.weights == FourierHomingOptions::Weights::equal) {
     for (int k = 1; k <= highest_; ++k) component_weights_[static_cast<std::size_t>(k)] = 1.0;
@@ -226,7 +226,7 @@ void PairOfViews::weigh() {
   if (rows_ > 1) row_weights_ = weigh_rows(c_, highest_, rows_, component_weights_);
 }
 
-// Both views, or the current one alone, as their slopes count [S06 eq. 20].
+// Averages both views, or copies the current one, whose slopes count [S06 eq. 20].
 void PairOfViews::average_views() {
   const bool both = options_.gradient == FourierHomingOptions::Gradient::both;
   for (int k = 0; k <= std::min(known_, highest_ + 1); ++k) {
@@ -243,7 +243,7 @@ void PairOfViews::average_views() {
   }
 }
 
-void PairOfViews::take_rises() {
+void PairOfViews::differentiate_rows() {
   const auto& band = home_.elevations();
   const double row_rad = (band->top_rad - band->bottom_rad) / static_cast<double>(rows_);
   for (int k = 0; k <= std::min(known_, highest_ + 1); ++k) {
@@ -261,62 +261,62 @@ void PairOfViews::take_rises() {
   }
 }
 
-// At the present turn and with the present weights [S06 eq. 30].
+// Sums the normal equations at the present heading and weights [S06 eq. 30].
 void PairOfViews::sum_equations() {
   average_views();
-  if (sees_rise()) take_rises();
+  if (uses_rows()) differentiate_rows();
   RowTerms terms{.weights = row_weights_, .tangent = tangent_};
   if (options_.vertical_motion) terms.approach = approach_;
   normal_ = {};
   for (int k = 1; k <= highest_; ++k) {
-    normal_.add(pair_equations(c_, k, rows_, terms),
+    normal_.add(panonav::sum_equations(c_, k, rows_, terms),
                 component_weights_[static_cast<std::size_t>(k)]);
   }
-  if (options_.tilt && sees_rise()) take_out_tilt(terms);
+  if (options_.tilt && uses_rows()) eliminate_tilt(terms);
 }
 
-void PairOfViews::take_out_tilt(const RowTerms& terms) {
+void PairOfViews::eliminate_tilt(const RowTerms& terms) {
   TiltEquations tilt;
   double equations = 0.0;
   for (int k = 1; k <= highest_; ++k) {
     const double weight = component_weights_[static_cast<std::size_t>(k)];
-    tilt.add(tilt_equations(c_, k, rows_, terms), weight);
+    tilt.add(sum_tilt_equations(c_, k, rows_, terms), weight);
     equations += 2.0 * weight * static_cast<double>(rows_);
   }
-  // Robots tilt by a degree or two: more must be shown by the views.
+  // Expected tilt on uneven ground: one standard deviation, 2 degrees (docs/decisions.md).
   constexpr double tilt_deviation_rad = 0.035;
-  const double certain =
+  const double certainty =
       normal_.energy / std::max(1.0, equations) / (tilt_deviation_rad * tilt_deviation_rad);
-  normal_ = without_tilt(normal_, tilt, certain);
+  normal_ = panonav::eliminate_tilt(normal_, tilt, certainty);
 }
 
 PairSolution PairOfViews::solve_at(double turn_rad) {
-  turn_home(turn_rad);
-  weigh();
+  rotate_home(turn_rad);
+  set_weights();
   sum_equations();
   return solve(normal_);
 }
 
-// Sets what is known of the best turn so far.
-void PairOfViews::keep(float turn_rad, const PairSolution& solution, double residual) {
+// Sets the home vector of the best heading so far.
+void PairOfViews::set_best(float turn_rad, const PairSolution& solution, double residual) {
   best_ = solution;
   vector_.heading_rad = wrap_angle(static_cast<double>(turn_rad) + solution.turn);
   vector_.residual = std::min(1.0, residual);
-  const double most = std::sqrt(home_energy_) * std::sqrt(current_energy_);
-  vector_.correlation = std::clamp(correlation_at(turn_rad) / most, -1.0, 1.0);
+  const double max_correlation = std::sqrt(home_energy_) * std::sqrt(current_energy_);
+  vector_.correlation = std::clamp(correlation_at(turn_rad) / max_correlation, -1.0, 1.0);
   vector_.frequencies = 0.0;
   for (int k = 1; k <= highest_; ++k) {
     vector_.frequencies += component_weights_[static_cast<std::size_t>(k)];
   }
-  // Coefficients have about four digits at best: noise of pixels, rounding of phases.
+  // Coefficients have four digits at best, by the noise of pixels and the rounding of phases.
   constexpr double min_noise = 1e-8;
-  const double left = std::max(0.0, normal_.energy - solution.explained);
-  const double noise = std::max(left, min_noise * normal_.energy_of_views);
+  const double unexplained = std::max(0.0, normal_.energy - solution.explained);
+  const double noise = std::max(unexplained, min_noise * normal_.energy_of_views);
   const double equations = 2.0 * vector_.frequencies * static_cast<double>(rows_);
   variance_ = noise / std::max(1.0, equations - 3.0) * solution.variance;
 }
 
-// a_k + a_k^x xi + a_k^y eta -> a_k, with the slopes of the current view [S06 section 2.3].
+// Moves the view: a_k + a_k^x xi + a_k^y eta -> a_k, by its own slopes [S06 eq. 23-26].
 void PairOfViews::move_current(const PairSolution& solution) {
   const auto x = static_cast<float>(solution.xi);
   const auto y = static_cast<float>(solution.eta);
@@ -338,8 +338,8 @@ void PairOfViews::move_current(const PairSolution& solution) {
   }
 }
 
-// The expected image at a displacement of any length.
-void PairOfViews::move_current(const DisplacementStart& start) {
+// Replaces the current view by the expected image at a displacement [S06 eq. 3].
+void PairOfViews::displace_current(const DisplacementStart& start) {
   const auto count = static_cast<std::size_t>(known_) + 1;
   std::array<float, max_displaced_frequencies + 1> a{};
   std::array<float, max_displaced_frequencies + 1> b{};
@@ -361,21 +361,21 @@ void PairOfViews::move_current(const DisplacementStart& start) {
   }
 }
 
-double PairOfViews::difference() {
+double PairOfViews::compute_difference() {
   correlate();
   std::array<float, 1> turn{};
   if (!(home_energy_ + current_energy_ > 0.0) || find_highest_peaks(correlation_, turn) == 0)
     return 1.0;
-  turn_home(static_cast<double>(turn[0]));
-  weigh();
+  rotate_home(static_cast<double>(turn[0]));
+  set_weights();
   sum_equations();
   return std::clamp(normal_.energy / normal_.energy_of_views, 0.0, 2.0);
 }
 
-int highest_used(const HomingView& home, const HomingView& current, int highest) {
+int used_frequency(const HomingView& home, const HomingView& current, int highest) {
   const int common = std::min(home.components(), current.components());
-  const int most = std::min(common - 2, TurnCorrelation::max_frequencies);
-  return highest == 0 ? most : highest;
+  const int max_highest = std::min(common - 2, TurnCorrelation::max_frequencies);
+  return highest == 0 ? max_highest : highest;
 }
 
 void check_pair(const HomingView& home, const HomingView& current, int highest) {
@@ -383,9 +383,9 @@ void check_pair(const HomingView& home, const HomingView& current, int highest) 
           to_text(home.rows()) + ", as of the home view");
   const int common = std::min(home.components(), current.components());
   require(common >= 3, "components of the views", common, ">= 3");
-  const int most = std::min(common - 2, TurnCorrelation::max_frequencies);
-  require(highest >= 0 && highest <= most, "highest frequency", highest,
-          "0 (all) or 1 .. " + to_text(most));
+  const int max_highest = std::min(common - 2, TurnCorrelation::max_frequencies);
+  require(highest >= 0 && highest <= max_highest, "highest frequency", highest,
+          "0 (all) or 1 .. " + to_text(max_highest));
 }
 
 }  // namespace
@@ -396,6 +396,36 @@ double HomeVector::length() const noexcept {
 
 double HomeVector::direction_rad() const noexcept {
   return std::atan2(eta, xi);
+}
+
+void visit_options(FourierHomingOptions& options, OptionVisitor& visitor) {
+  using T = FourierHomingOptions;
+  constexpr OptionTable table{
+      option<&T::highest>("highest frequency compared; 0 takes all", 0, 62),
+      option<&T::iterations>("times that the solution is refined", 0, 20),
+      option<&T::rising>("each iteration compares higher frequencies"),
+      choice<&T::turn>("how the heading is found first", "sequential", "global"),
+      choice<&T::gradient>("views whose gradients count", "current", "both"),
+      choice<&T::weights>("weights of components and rows", "equal", "coherence"),
+      option<&T::starting_estimates>("headings tried", 1,
+                                     static_cast<double>(max_starting_estimates)),
+      option<&T::displacement_search>("try displacements up to two thirds of R before solving"),
+      option<&T::vertical_motion>("rows off the horizon move up and down, too"),
+      option<&T::tilt>("the robot may tilt a little, as on uneven ground"),
+  };
+  table.visit(options, visitor);
+}
+
+FourierHomingOptions published_homing_options(int highest, int iterations) {
+  return {.highest = highest,
+          .iterations = iterations,
+          .turn = FourierHomingOptions::TurnEstimate::sequential,
+          .gradient = FourierHomingOptions::Gradient::current,
+          .weights = FourierHomingOptions::Weights::equal,
+          .starting_estimates = 1,
+          .displacement_search = false,
+          .vertical_motion = false,
+          .tilt = false};
 }
 
 HomeVector home_vector(const HomingView& home, const HomingView& current,
@@ -409,13 +439,14 @@ HomeVector home_vector(const HomingView& home, const HomingView& current,
           "within", window->half_width_rad, "> 0 and <= pi");
   require(options.turn == FourierHomingOptions::TurnEstimate::global, "turn estimate",
           static_cast<double>(options.turn), "global");
-  return PairOfViews(home, current, options, highest_used(home, current, options.highest), *window)
+  return PairOfViews(home, current, options, used_frequency(home, current, options.highest),
+                     *window)
       .find_vector();
 }
 
 HomeVector home_vector_unchecked(const HomingView& home, const HomingView& current,
                                  const FourierHomingOptions& options) {
-  return PairOfViews(home, current, options, highest_used(home, current, options.highest))
+  return PairOfViews(home, current, options, used_frequency(home, current, options.highest))
       .find_vector();
 }
 
@@ -424,7 +455,8 @@ double image_difference(const HomingView& home, const HomingView& current, int h
   FourierHomingOptions options = published_homing_options(highest);
   options.gradient = FourierHomingOptions::Gradient::both;
   options.tilt = true;
-  return PairOfViews(home, current, options, highest_used(home, current, highest)).difference();
+  return PairOfViews(home, current, options, used_frequency(home, current, highest))
+      .compute_difference();
 }
 
 }  // namespace panonav

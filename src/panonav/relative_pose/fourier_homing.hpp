@@ -8,19 +8,19 @@ namespace panonav {
 
 /// The displacement and turn between two views.
 struct HomeVector {
-  /// Towards home in the frame of the robot that took the current view, in units of the distance R
-  /// at which all things are assumed to be.
+  /// Displacement to home, forwards, in the frame of the robot that took the current view; in units
+  /// of the distance R at which all things are assumed to be.
   double xi = 0.0;
   double eta = 0.0;  ///< the same to the left
   /// Heading of the home view minus heading of the current view, in [-pi, pi).
   double heading_rad = 0.0;
-  /// Similarity of the views: their correlation at the heading that the compass found, -1 .. 1 [S06
-  /// eq. 33 over its largest possible value].
+  /// Correlation of the views at the heading found first, -1 .. 1 [S06 eq. 33 over its largest
+  /// possible value].
   double correlation = 0.0;
   /// Share of the energy of both views that turn and displacement leave unexplained, 0 .. 1.
   double residual = 1.0;
   /// Confidence 0 .. 1: the square of the vector's length over that square plus its variance, which
-  /// follows from the residual. Near 0 at home, where there is no direction to point to.
+  /// follows from the residual. Near 0 at home, where there is no direction.
   double confidence = 0.0;
   /// Effective number of frequencies: the sum of their weights.
   double frequencies = 0.0;
@@ -29,12 +29,12 @@ struct HomeVector {
   [[nodiscard]] double direction_rad() const noexcept;  ///< in the current robot frame
 };
 
-/// The largest number of headings that can be tried.
+/// Largest value of `FourierHomingOptions::starting_estimates`.
 inline constexpr int max_starting_estimates = 6;
 
 /// The defaults are our own rule; `published_homing_options` is S06's.
 struct FourierHomingOptions {
-  /// How the heading between the views is found first.
+  /// How the heading between the views is estimated first.
   enum class TurnEstimate {
     sequential,  ///< S06's rule: each component refines those before [S06 eq. 40-43]
     global,      ///< the maximum of the correlation over all headings
@@ -53,39 +53,38 @@ struct FourierHomingOptions {
     coherence,
   };
 
-  int highest = 0;     ///< K, the highest frequency; 0 takes all that both views have, but one
+  int highest = 0;     ///< K, the highest frequency; 0: all but one that both views have
   int iterations = 0;  ///< N_it of S06 section 2.3
-  /// The first iteration compares a few frequencies and each further one more, up to K [S06
-  /// footnote 6].
+  /// The first iteration compares a few frequencies, each further one more, up to K [S06 footnote
+  /// 6].
   bool rising = false;
-  TurnEstimate turn = TurnEstimate::global;  ///< how the first heading is found
+  TurnEstimate turn = TurnEstimate::global;  ///< how the first heading is estimated
   Gradient gradient = Gradient::both;        ///< where the slope of the image is taken
-  Weights weights = Weights::coherence;      ///< which components and rows count more
-  /// Headings from which the displacement is solved; the one that explains the views best is taken
-  /// [S06 footnote 10].
+  Weights weights = Weights::coherence;      ///< of components and rows
+  /// Headings from which the displacement is solved; the best explanation of the views counts [S06
+  /// footnote 10].
   int starting_estimates = 2;
-  /// Displacements up to two thirds of R are tried first, as hs_ei tries them, and least squares
-  /// start from the best. Views from far away are thus compared as they would look from there.
+  /// Tries displacements up to two thirds of R first, as hs_ei does, and starts the least squares
+  /// from the best one: views from far away are thus compared as they would look from there.
   bool displacement_search = true;
-  /// Rows off the horizon: things also move up and down in the image as the robot comes nearer.
-  /// Used only where elevations are known.
+  /// Things off the horizon also move up and down in the image as the robot approaches. Used only
+  /// where elevations are known.
   bool vertical_motion = true;
-  /// Two more unknowns: the robot's tilt against the home view, a degree or two on uneven ground.
-  /// Used only where elevations are known.
+  /// Solves also for the robot's tilt against the home view, a degree or two on uneven ground. Used
+  /// only where elevations are known.
   bool tilt = true;
   friend bool operator==(const FourierHomingOptions&, const FourierHomingOptions&) = default;
 };
 void visit_options(FourierHomingOptions& options, OptionVisitor& visitor);
 
-/// hs_Fi as published, with K = `highest`.
+/// Returns the options of hs_Fi as published, with K = `highest`.
 [[nodiscard]] FourierHomingOptions published_homing_options(int highest, int iterations = 0);
 
-/// The home vector by Fourier homing [S06 section 2.3, eq. 16-30; signs and missing terms as in
-/// docs/equations.md]. Heading first, then displacement and a correction of the heading in least
-/// squares over the components of all rows. Iterations move the current view by what was found and
-/// solve again.
-/// Turning either robot on the spot turns the vector's frame and nothing else. Identical views give
-/// the zero vector with confidence 0; views without structure give all zeros and residual 1.
+/// Computes the home vector by Fourier homing [S06 section 2.3, eq. 16-30; signs and missing terms
+/// as in docs/equations.md]: the heading first, then displacement and a correction of the heading
+/// in least squares over the components of all rows. Iterations move the current view by the result
+/// and solve again. The heading of either robot only rotates the vector's frame. Identical views
+/// give the zero vector with confidence 0; views without structure give all zeros and residual 1.
 /// With `window` only headings within it are considered, before least squares correct them, as in
 /// places that look alike after a quarter turn; where no heading there fits better than its
 /// neighbours, the vector is all zeros with residual 1.
@@ -96,14 +95,14 @@ void visit_options(FourierHomingOptions& options, OptionVisitor& visitor);
                                      const FourierHomingOptions& options = {},
                                      const std::optional<HeadingWindow>& window = std::nullopt);
 
-/// The same with options already checked, for loops.
+/// Computes the same without checks of options and views, for loops.
 [[nodiscard]] HomeVector home_vector_unchecked(const HomingView& home, const HomingView& current,
                                                const FourierHomingOptions& options);
 
-/// Sum of squared differences of the first K components at the heading of their best correlation
-/// [S06 eq. 15, 28], relative to the energy of both views: 0 for the same place, about 1 for
-/// unrelated views. Where elevations are known, what a tilt of the robot by a few degrees explains
-/// is left out. Throws ContractError as `home_vector`.
+/// Computes the sum of squared differences of the first K components at the heading of their best
+/// correlation [S06 eq. 15, 28], relative to the energy of both views: 0 for the same place, about
+/// 1 for unrelated views. Where elevations are known, differences by a tilt of the robot by a few
+/// degrees do not count. Throws ContractError as `home_vector`.
 [[nodiscard]] double image_difference(const HomingView& home, const HomingView& current,
                                       int highest = 0);
 

@@ -29,13 +29,13 @@ HomingView::HomingView(int rows, int components, std::vector<float> cosines,
 
 namespace {
 
-// Of the phase that a byte stands for.
+/// Cosine and sine of the phase of a byte.
 struct Direction {
   float cosine;
   float sine;
 };
 
-const std::array<Direction, 256>& directions() {
+const std::array<Direction, 256>& byte_directions() {
   static const std::array<Direction, 256> table = [] {
     std::array<Direction, 256> filled{};
     PackedSignature packed{{1, 1}, {255}, {0}};
@@ -54,14 +54,14 @@ const std::array<Direction, 256>& directions() {
 
 HomingView homing_view(const VisualMemory& memory, ViewId view) {
   const PackedSignature packed = memory.packed(view);
-  const auto& table = directions();
+  const auto& table = byte_directions();
   const float unit = memory.full_scale() / 255.0F;
   const auto rows = static_cast<std::size_t>(packed.shape.rows);
   std::vector<float> cosines(packed.shape.size());
   std::vector<float> sines(packed.shape.size());
   for (std::size_t i = 0; i < cosines.size(); ++i) {
     const float magnitude = static_cast<float>(packed.magnitudes[i]) * unit;
-    // A magnitude of 0 has no phase, whatever its byte.
+    // A magnitude of 0 has no phase.
     const Direction direction = table[packed.magnitudes[i] == 0 ? 0 : packed.phases[i]];
     cosines[i] = magnitude * direction.cosine;
     sines[i] = i < rows ? 0.0F : -magnitude * direction.sine;
@@ -90,29 +90,29 @@ HomingView horizon_view(const FourierSignature& signature, double half_band_rad)
   require(half_band_rad > 0.0, "half_band_rad", half_band_rad, "> 0");
   const HomingView all = homing_view(signature);
   const int rows = all.rows();
-  std::vector<int> counted;
+  std::vector<int> used_rows;
   if (const auto& band = all.elevations()) {
     const double row_rad = (band->top_rad - band->bottom_rad) / rows;
     int nearest = 0;
-    double least = 1e9;
+    double min_elevation = 1e9;
     for (int y = 0; y < rows; ++y) {
       const double elevation = std::abs(band->top_rad - (y + 0.5) * row_rad);
-      if (elevation <= half_band_rad) counted.push_back(y);
-      if (elevation < least) {
-        least = elevation;
+      if (elevation <= half_band_rad) used_rows.push_back(y);
+      if (elevation < min_elevation) {
+        min_elevation = elevation;
         nearest = y;
       }
     }
-    if (counted.empty()) counted.push_back(nearest);
+    if (used_rows.empty()) used_rows.push_back(nearest);
   } else {
-    for (int y = 0; y < rows; ++y) counted.push_back(y);
+    for (int y = 0; y < rows; ++y) used_rows.push_back(y);
   }
   const auto components = static_cast<std::size_t>(all.components());
   std::vector<float> cosines(components);
   std::vector<float> sines(components);
-  const float share = 1.0F / static_cast<float>(counted.size());
+  const float share = 1.0F / static_cast<float>(used_rows.size());
   for (int k = 0; k < all.components(); ++k) {
-    for (const int y : counted) {
+    for (const int y : used_rows) {
       cosines[static_cast<std::size_t>(k)] += share * all.a(y, k);
       sines[static_cast<std::size_t>(k)] += share * all.b(y, k);
     }
@@ -132,7 +132,7 @@ HomingView first_components(const HomingView& view, int components) {
   return {view.rows(), components, std::move(cosines), std::move(sines), view.elevations()};
 }
 
-HomingView turn(const HomingView& view, double turn_rad) {
+HomingView rotate(const HomingView& view, double turn_rad) {
   std::vector<float> cosines;
   std::vector<float> sines;
   // I'(phi) = I(phi + turn).

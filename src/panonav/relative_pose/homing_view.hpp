@@ -11,7 +11,8 @@
 
 namespace panonav {
 
-/// A view as homing needs it: the Fourier coefficients a_k, b_k of every row [S06 eq. 10, 12, 13],
+/// A view in the form that homing needs: the Fourier coefficients a_k, b_k of every row [S06 eq.
+/// 10, 12, 13],
 ///   I(phi) ~ a_0/2 + sum_k a_k cos(k phi) + b_k sin(k phi),   k = 0 .. components - 1.
 /// One row for S06's horizon band, or all rows of a panorama. Stored component-major (k, then row),
 /// so that loops over the rows of a component run over neighbouring numbers. Invariant: rows >= 1,
@@ -26,7 +27,7 @@ class HomingView {
   [[nodiscard]] int rows() const noexcept { return rows_; }
   /// Frequencies k = 0 .. components - 1.
   [[nodiscard]] int components() const noexcept { return components_; }
-  /// Empty: unknown, every row counts as on the horizon.
+  /// nullopt: unknown, every row counts as on the horizon.
   [[nodiscard]] const std::optional<ElevationBand>& elevations() const noexcept {
     return elevations_;
   }
@@ -34,11 +35,11 @@ class HomingView {
   [[nodiscard]] float a(int row, int k) const noexcept { return cosines_[index(row, k)]; }
   /// The sine coefficient b_k of a row. The caller guarantees that row and k are in the view.
   [[nodiscard]] float b(int row, int k) const noexcept { return sines_[index(row, k)]; }
-  /// a_k and b_k of all rows, `rows()` numbers each.
+  /// a_k of all rows.
   [[nodiscard]] std::span<const float> cosines(int k) const noexcept {
     return std::span(cosines_).subspan(index(0, k), static_cast<std::size_t>(rows_));
   }
-  /// The same of b_k.
+  /// b_k of all rows.
   [[nodiscard]] std::span<const float> sines(int k) const noexcept {
     return std::span(sines_).subspan(index(0, k), static_cast<std::size_t>(rows_));
   }
@@ -56,26 +57,26 @@ class HomingView {
   std::optional<ElevationBand> elevations_;
 };
 
-/// All rows of a signature. Throws ContractError when it has fewer than two components.
+/// Converts all rows of a signature. Throws ContractError when it has fewer than two components.
 [[nodiscard]] HomingView homing_view(const FourierSignature& signature);
 
-/// The same of a view of a memory, to the bit, but from its bytes through tables instead of by a
-/// sine and a cosine a coefficient. Throws ContractError when there is no such view. Cost: 1
-/// microsecond for 40 rows and 15 components.
+/// Converts a view of a memory to the same bits, from its bytes by tables instead of by a sine and
+/// a cosine a coefficient. Throws ContractError when there is no such view. Cost: 1 microsecond for
+/// 40 rows and 15 components.
 [[nodiscard]] HomingView homing_view(const VisualMemory& memory, ViewId view);
 
-/// S06's one-dimensional view: the mean of the rows whose middle lies within `half_band_rad` of the
-/// horizon, or of all rows where elevations are unknown. The row nearest to the horizon is always
-/// used. Throws ContractError when the signature has fewer than two components or half_band_rad is
-/// not above 0.
+/// Returns S06's one-dimensional view: the mean of the rows whose middle lies within
+/// `half_band_rad` of the horizon, or of all rows where elevations are unknown. The row nearest to
+/// the horizon is always used. Throws ContractError when the signature has fewer than two
+/// components or half_band_rad is not above 0.
 [[nodiscard]] HomingView horizon_view(const FourierSignature& signature,
                                       double half_band_rad = 5.0 * std::numbers::pi / 180.0);
 
-/// The first components of a view, as what is stored of a snapshot. Throws ContractError unless 2
+/// Returns the first components of a view, as a snapshot stores them. Throws ContractError unless 2
 /// <= components <= those of the view.
 [[nodiscard]] HomingView first_components(const HomingView& view, int components);
 
-/// The view after the robot turned by `turn_rad` counter-clockwise.
-[[nodiscard]] HomingView turn(const HomingView& view, double turn_rad);
+/// Returns the view after the robot turned by `turn_rad` counter-clockwise.
+[[nodiscard]] HomingView rotate(const HomingView& view, double turn_rad);
 
 }  // namespace panonav

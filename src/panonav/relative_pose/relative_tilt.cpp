@@ -15,24 +15,23 @@ namespace panonav {
 
 namespace {
 
-/// Coarse structure first, which the tilt moves by less than its own size.
+/// One stage of the estimation: coarse structure first, which the tilt moves by less than its size.
 struct TiltStage {
   int frequencies;
   double smoothed_rad;  // of the Gaussian over rows
 };
 constexpr std::array<TiltStage, 2> tilt_stages{{{6, radians(5.0)}, {12, radians(2.0)}}};
-constexpr int tilt_iterations = 3;
-constexpr int tilt_columns = 48;
-/// Rows at either end are partly out of sight once a view is levelled.
+constexpr int tilt_iterations = 3;  ///< Gauss-Newton steps at each stage
+constexpr int tilt_columns = 48;    ///< four for each period of the highest frequency
+/// Margin at either end that is partly out of sight in a levelled view.
 constexpr double tilt_margin_rad = radians(5.0);
-/// What is expected before anything is seen, one standard deviation: two views tilted by some 3
-/// degrees each; displacements of a third of the distance of things; headings known to 10 degrees.
-constexpr double usual_tilt_rad = 0.06;
-constexpr double usual_displacement = 0.3;
-constexpr double usual_turn_rad = 0.2;
+// Standard deviations of the prior.
+constexpr double tilt_deviation_rad = 0.06;     ///< two views tilted by some 3 degrees each
+constexpr double displacement_deviation = 0.3;  ///< in units of the distance of things
+constexpr double turn_deviation_rad = 0.2;      ///< headings known to 10 degrees
 
-/// The cylinder of the first frequencies.
-Panorama cylinder(const HomingView& view, int frequencies, int columns) {
+/// Makes the panorama of the first frequencies.
+Panorama synthesise(const HomingView& view, int frequencies, int columns) {
   Panorama panorama(view.rows(), columns, view.elevations());
   for (int k = 0; k < std::min(frequencies, view.components()); ++k) {
     for (int c = 0; c < columns; ++c) {
@@ -46,7 +45,7 @@ Panorama cylinder(const HomingView& view, int frequencies, int columns) {
   return panorama;
 }
 
-Panorama smoothed_over_rows(const Panorama& panorama, double sigma_rows) {
+Panorama smooth_rows(const Panorama& panorama, double sigma_rows) {
   const int reach = static_cast<int>(std::ceil(2.5 * sigma_rows));
   std::vector<float> kernel;
   float sum = 0.0F;
@@ -65,8 +64,8 @@ Panorama smoothed_over_rows(const Panorama& panorama, double sigma_rows) {
   return result;
 }
 
-/// The tilt at one stage as `minimise` sees it. Unknowns: turn, displacement in two directions,
-/// pitch, roll; the first three are found again at each step.
+/// The tilt at one stage as a problem for `minimise`. Unknowns: turn, displacement in two
+/// directions, pitch, roll; the first three are solved again at each step.
 class TiltProblem {
  public:
   using Equations = DenseEquations<5>;
@@ -74,21 +73,21 @@ class TiltProblem {
   TiltProblem(const Panorama& home, const Panorama& current, int margin, Tilt& tilt)
       : home_(home), current_(current), margin_(margin), tilt_(tilt) {}
 
-  /// False where nothing is left to explain.
+  /// False where no residual is left.
   bool linearise(Equations& equations) const {
     equations.set_zero();
     const Panorama level = level_panorama(current_, tilt_);
     const double values = static_cast<double>((level.rows() - 2 * margin_) * level.columns());
     const double noise = add_rows(level, equations) / values;
     if (!(noise > 0.0)) return false;
-    const double certain = noise / (usual_tilt_rad * usual_tilt_rad);
-    equations.matrix(0, 0) += noise / (usual_turn_rad * usual_turn_rad);
-    equations.matrix(1, 1) += noise / (usual_displacement * usual_displacement);
-    equations.matrix(2, 2) += noise / (usual_displacement * usual_displacement);
-    equations.matrix(3, 3) += certain;
-    equations.matrix(4, 4) += certain;
-    equations.right[3] -= certain * tilt_.pitch_rad;
-    equations.right[4] -= certain * tilt_.roll_rad;
+    const double certainty = noise / (tilt_deviation_rad * tilt_deviation_rad);
+    equations.matrix(0, 0) += noise / (turn_deviation_rad * turn_deviation_rad);
+    equations.matrix(1, 1) += noise / (displacement_deviation * displacement_deviation);
+    equations.matrix(2, 2) += noise / (displacement_deviation * displacement_deviation);
+    equations.matrix(3, 3) += certainty;
+    equations.matrix(4, 4) += certainty;
+    equations.right[3] -= certainty * tilt_.pitch_rad;
+    equations.right[4] -= certainty * tilt_.roll_rad;
     return true;
   }
 
@@ -100,8 +99,8 @@ class TiltProblem {
   }
 
  private:
-  /// Adds what is left of the home view once the current one is levelled, and how the unknowns
-  /// change it. Returns its energy.
+  /// Adds the residuals of the home view against the levelled current one with their derivatives.
+  /// Returns their energy.
   double add_rows(const Panorama& level, Equations& equations) const {
     const int columns = level.columns();
     const auto& band = *level.elevations();
@@ -122,10 +121,10 @@ class TiltProblem {
         const Equations::Vector slopes(
             aside, aside * sine + up * approach * cosine, -aside * cosine + up * approach * sine,
             up * cosine + aside * tangent * sine, -up * sine + aside * tangent * cosine);
-        const auto rest = static_cast<double>(home_.at(y, c) - level.at(y, c));
+        const auto residual = static_cast<double>(home_.at(y, c) - level.at(y, c));
         equations.matrix += slopes * slopes.transpose();
-        equations.right += rest * slopes;
-        energy += rest * rest;
+        equations.right += residual * slopes;
+        energy += residual * residual;
       }
     }
     return energy;
@@ -150,13 +149,13 @@ Tilt relative_tilt(const HomingView& home, const HomingView& current, double hea
   const double row_rad = (band.top_rad - band.bottom_rad) / home.rows();
   const int margin =
       std::clamp(static_cast<int>(std::ceil(tilt_margin_rad / row_rad)), 1, (home.rows() - 2) / 3);
-  const HomingView aligned = turn(home, -heading_rad);
+  const HomingView aligned = rotate(home, -heading_rad);
   for (const TiltStage& stage : tilt_stages) {
     const double sigma_rows = stage.smoothed_rad / row_rad;
     const Panorama smooth_home =
-        smoothed_over_rows(cylinder(aligned, stage.frequencies, tilt_columns), sigma_rows);
+        smooth_rows(synthesise(aligned, stage.frequencies, tilt_columns), sigma_rows);
     const Panorama smooth_current =
-        smoothed_over_rows(cylinder(current, stage.frequencies, tilt_columns), sigma_rows);
+        smooth_rows(synthesise(current, stage.frequencies, tilt_columns), sigma_rows);
     TiltProblem problem(smooth_home, smooth_current, margin, tilt);
     TiltProblem::Equations equations;
     if (!minimise(problem, equations, {.max_steps = tilt_iterations}).solvable) return tilt;
@@ -165,10 +164,10 @@ Tilt relative_tilt(const HomingView& home, const HomingView& current, double hea
 }
 
 HomingView level_view(const HomingView& view, const Tilt& tilt) {
-  // Four columns a period and more, so that interpolation takes little of the finest.
+  // Four columns a period and more, so that interpolation hardly damps the highest frequency.
   const int columns = 4 * view.components();
   return homing_view(compute_signature(
-      level_panorama(cylinder(view, view.components(), columns), tilt), view.components()));
+      level_panorama(synthesise(view, view.components(), columns), tilt), view.components()));
 }
 
 }  // namespace panonav

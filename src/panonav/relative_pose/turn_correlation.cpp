@@ -11,7 +11,8 @@ namespace panonav {
 
 namespace {
 
-constexpr int max_points = 512;  // 8 for each of 62 frequencies, rounded up to a power of two
+/// Points of the grid: 8 for each of 62 frequencies, rounded up to a power of two.
+constexpr int max_points = 512;
 
 CorrelationPoint<float> evaluate(const TurnCorrelation& correlation, float turn_rad) noexcept {
   const std::size_t count = static_cast<std::size_t>(correlation.highest) + 1;
@@ -19,7 +20,7 @@ CorrelationPoint<float> evaluate(const TurnCorrelation& correlation, float turn_
                                std::span(correlation.imaginary).first(count), turn_rad);
 }
 
-// From a point of the grid to the maximum beside it.
+// Returns the maximum next to a point of the grid (Newton's rule).
 float refine(const TurnCorrelation& correlation, float turn_rad, float half_step_rad) noexcept {
   float turn = turn_rad;
   for (int i = 0; i < 3; ++i) {
@@ -70,7 +71,7 @@ float sequential_heading(const TurnCorrelation& correlation) noexcept {
                            correlation.imaginary[i] * correlation.imaginary[i]);
     all += weights[i];
   }
-  const auto refined_from = [&](float first_rad) {
+  const auto refine_from = [&](float first_rad) {
     float turn = first_rad;
     float sum = weights[1];
     for (int k = 2; k <= correlation.highest; ++k) {
@@ -79,15 +80,16 @@ float sequential_heading(const TurnCorrelation& correlation) noexcept {
       const auto frequency = static_cast<float>(k);
       const float turns =
           std::nearbyint((frequency * turn - differences[i]) / (2.0F * std::numbers::pi_v<float>));
-      const float told = (differences[i] + 2.0F * std::numbers::pi_v<float> * turns) / frequency;
-      turn = (sum * turn + weights[i] * told) / (sum + weights[i]);
+      const float estimate =
+          (differences[i] + 2.0F * std::numbers::pi_v<float> * turns) / frequency;
+      turn = (sum * turn + weights[i] * estimate) / (sum + weights[i]);
       sum += weights[i];
     }
     return turn;
   };
-  const float first = refined_from(differences[1]);
+  const float first = refine_from(differences[1]);
   if (weights[1] >= 0.1F * all / static_cast<float>(correlation.highest)) return first;
-  const float opposite = refined_from(differences[1] + std::numbers::pi_v<float>);
+  const float opposite = refine_from(differences[1] + std::numbers::pi_v<float>);
   return correlation.at(opposite) > correlation.at(first) ? opposite : first;
 }
 
@@ -118,34 +120,32 @@ int find_highest_peaks(const TurnCorrelation& correlation, std::span<float> turn
     float value;
     float turn_rad;
   };
-  // A maximum may lie between two points: more are refined than are asked for.
-  std::array<Peak, 8> peaks{};
+  // A maximum may lie between two points: more are refined than returned.
+  std::array<Peak, max_points / 2> peaks;
   std::size_t found = 0;
-  const std::size_t wanted = std::min(peaks.size(), turns.size() + 2);
   for (std::size_t i = 0; i < count; ++i) {
     const float value = real[i];
     if (!(value > real[(i + count - 1) % count] && value >= real[(i + 1) % count])) continue;
-    if (!window.contains(2.0F * std::numbers::pi_v<float> * static_cast<float>(i) /
-                         static_cast<float>(count)))
-      continue;
-    std::size_t at = std::min(found, wanted);
-    while (at > 0 && peaks[at - 1].value < value) --at;
-    if (at >= wanted) continue;
-    found = std::min(found + 1, wanted);
-    for (std::size_t j = found - 1; j > at; --j) peaks[j] = peaks[j - 1];
-    peaks[at] = {value, 2.0F * std::numbers::pi_v<float> * static_cast<float>(i) /
-                            static_cast<float>(count)};
+    const float turn_rad =
+        2.0F * std::numbers::pi_v<float> * static_cast<float>(i) / static_cast<float>(count);
+    if (window.contains(turn_rad)) peaks[found++] = {value, turn_rad};
   }
+  const auto by_value = [](const Peak& a, const Peak& b) {
+    return a.value != b.value ? a.value > b.value : a.turn_rad < b.turn_rad;
+  };
+  const std::size_t refined = std::min({found, std::size_t{8}, turns.size() + 2});
+  std::partial_sort(peaks.begin(), peaks.begin() + static_cast<std::ptrdiff_t>(refined),
+                    peaks.begin() + static_cast<std::ptrdiff_t>(found), by_value);
   const float half_step_rad = std::numbers::pi_v<float> / static_cast<float>(count);
-  for (std::size_t i = 0; i < found; ++i) {
+  for (std::size_t i = 0; i < refined; ++i) {
     peaks[i].turn_rad = refine(correlation, peaks[i].turn_rad, half_step_rad);
     peaks[i].value = correlation.at(peaks[i].turn_rad);
   }
-  std::stable_sort(peaks.begin(), peaks.begin() + static_cast<std::ptrdiff_t>(found),
+  std::stable_sort(peaks.begin(), peaks.begin() + static_cast<std::ptrdiff_t>(refined),
                    [](const Peak& a, const Peak& b) { return a.value > b.value; });
-  const std::size_t given = std::min(found, turns.size());
-  for (std::size_t i = 0; i < given; ++i) turns[i] = peaks[i].turn_rad;
-  return static_cast<int>(given);
+  const std::size_t filled = std::min(refined, turns.size());
+  for (std::size_t i = 0; i < filled; ++i) turns[i] = peaks[i].turn_rad;
+  return static_cast<int>(filled);
 }
 
 }  // namespace panonav

@@ -10,8 +10,8 @@ namespace panonav {
 
 namespace {
 
-// One row of as many columns as the panorama has.
-std::vector<float> mean_row(const Panorama& panorama, double half_band_rad) {
+// Returns the mean of the rows near the horizon, with the columns of the panorama.
+std::vector<float> average_rows(const Panorama& panorama, double half_band_rad) {
   std::vector<double> sum(static_cast<std::size_t>(panorama.columns()));
   double weights = 0.0;
   const auto add = [&](int y, double weight) {
@@ -31,7 +31,7 @@ std::vector<float> mean_row(const Panorama& panorama, double half_band_rad) {
           to_text(degrees(band.bottom_rad)) + " .. " + to_text(degrees(band.top_rad)) + " degrees",
           "a band that holds the horizon");
     }
-    // Rows go down: the next one on the other side of the horizon.
+    // Rows go downwards: this is the next one on the other side of the horizon.
     const double elevation = panorama.elevation_rad(*near);
     const int other = std::clamp(elevation > 0.0 ? *near + 1 : *near - 1, 0, panorama.rows() - 1);
     const double beyond = panorama.elevation_rad(other);
@@ -58,7 +58,7 @@ void visit_options(HorizonScanlineOptions& options, OptionVisitor& visitor) {
 std::vector<float> horizon_scanline(const Panorama& panorama,
                                     const HorizonScanlineOptions& options) {
   validate(options);
-  const auto row = mean_row(panorama, options.half_band_rad);
+  const auto row = average_rows(panorama, options.half_band_rad);
   const auto from = static_cast<double>(row.size());
   const auto count = static_cast<std::size_t>(options.columns);
   const double step = from / static_cast<double>(count);
@@ -95,7 +95,7 @@ std::vector<float> smooth_line(std::span<const float> line, double sigma) {
     sum += (k == 0 ? 1.0F : 2.0F) * kernel[k];
   }
   for (float& weight : kernel) weight /= sum;
-  // Continued beyond both ends, so that the loops below have no wrap.
+  // Continued beyond both ends, so that the loops below do not wrap.
   std::vector<float> closed(line.size() + 2 * reach);
   for (std::size_t i = 0; i < closed.size(); ++i) {
     closed[i] = line[(i + line.size() - reach % line.size()) % line.size()];

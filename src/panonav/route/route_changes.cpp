@@ -11,12 +11,15 @@ namespace panonav {
 
 namespace {
 
-constexpr int min_pictures = 5;         // in which a change shows, one after the other
-constexpr double max_deviations = 3.0;  // of noise; more are unexplained
+/// Successive images in which a change must appear: noise of half a direction is rarer.
+constexpr int min_images = 5;
+/// Residual in standard deviations of the noise from which on a column is unexplained: normal
+/// errors exceed it once in 370 times.
+constexpr double max_deviations = 3.0;
 
 }  // namespace
 
-bool RouteChanges::counts(Point2 position) {
+bool RouteChanges::is_at_new_line(Point2 position) {
   if (lines_.empty()) return true;
   const auto off_m = [&](const Pose2& line) { return distance(line.position(), position); };
   const auto nearest =
@@ -26,7 +29,7 @@ bool RouteChanges::counts(Point2 position) {
 
 std::vector<RouteChanges::AzimuthRange> RouteChanges::add(const RouteFix& fix) {
   const auto limit = static_cast<float>(max_deviations * fix.noise);
-  std::array<int, sectors> above{};
+  std::array<int, sectors> unexplained{};
   std::array<int, sectors> all{};
   const std::size_t columns = fix.unexplained.size();
   for (std::size_t c = 0; c < columns; ++c) {
@@ -38,18 +41,18 @@ std::vector<RouteChanges::AzimuthRange> RouteChanges::add(const RouteFix& fix) {
         azimuth / (2.0 * std::numbers::pi) - std::floor(azimuth / (2.0 * std::numbers::pi));
     const auto sector = std::min(sectors - 1, static_cast<std::size_t>(share * sectors));
     ++all[sector];
-    above[sector] += value > limit ? 1 : 0;
+    unexplained[sector] += value > limit ? 1 : 0;
   }
-  // A thing beside the route goes from sector to sector as the robot passes it.
-  const auto before = pictures_;
-  const int more = counts(fix.pose.position()) ? 1 : 0;
+  // An object beside the route moves from sector to sector as the robot passes it.
+  const auto before = images_;
+  const int increment = is_at_new_line(fix.pose.position()) ? 1 : 0;
   for (std::size_t s = 0; s < sectors; ++s) {
-    const bool high = all[s] > 0 && 2 * above[s] >= all[s];
+    const bool is_unexplained = all[s] > 0 && 2 * unexplained[s] >= all[s];
     const int so_far =
         std::max({before[(s + sectors - 1) % sectors], before[s], before[(s + 1) % sectors]});
-    pictures_[s] = high ? std::max(1, so_far + more) : 0;
+    images_[s] = is_unexplained ? std::max(1, so_far + increment) : 0;
   }
-  const auto changed = [&](std::size_t s) { return pictures_[s % sectors] >= min_pictures; };
+  const auto changed = [&](std::size_t s) { return images_[s % sectors] >= min_images; };
   std::vector<RouteChanges::AzimuthRange> ranges;
   for (std::size_t s = 0; s < sectors; ++s) {
     if (!changed(s) || changed(s + sectors - 1)) continue;

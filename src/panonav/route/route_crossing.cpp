@@ -36,11 +36,12 @@ void find_crossings(std::span<const Pose2> path, std::size_t first, Point2 viewp
     const double low = span >= 0.0 ? from : to;
     const double width = std::abs(span);
     from = to;
-    // The stretch as seen ahead, then as it lies behind the viewpoint.
-    for (const double turned : {0.0, std::numbers::pi}) {
-      const auto begin = static_cast<long long>(std::ceil((low + turned) * columns_per_rad - 1e-9));
+    // The section ahead of the viewpoint, then behind it.
+    for (const double offset_rad : {0.0, std::numbers::pi}) {
+      const auto begin =
+          static_cast<long long>(std::ceil((low + offset_rad) * columns_per_rad - 1e-9));
       const auto end =
-          static_cast<long long>(std::floor((low + turned + width) * columns_per_rad + 1e-9));
+          static_cast<long long>(std::floor((low + offset_rad + width) * columns_per_rad + 1e-9));
       if (begin > end) continue;
       const auto size = static_cast<long long>(count);
       long long column = ((begin % size) + size) % size;
@@ -51,17 +52,18 @@ void find_crossings(std::span<const Pose2> path, std::size_t first, Point2 viewp
         const double uy = directions[c].y;
         const double across = ex * uy - ey * ux;
         if (std::abs(across) < 1e-9) continue;
-        // viewpoint + far u = a + share e.
+        // viewpoint + distance_m u = a + share e.
         const double share = (ay * ux - ax * uy) / across;
         if (share < -1e-6 || share > 1.0 + 1e-6) continue;
-        const double far = (ax + share * ex) * ux + (ay + share * ey) * uy;
+        const double distance_m = (ax + share * ex) * ux + (ay + share * ey) * uy;
         RouteCrossing& best = crossings[c];
-        if (best.along >= 0.0F && std::abs(far) >= std::abs(static_cast<double>(best.distance_m))) {
+        if (best.along >= 0.0F &&
+            std::abs(distance_m) >= std::abs(static_cast<double>(best.distance_m))) {
           continue;
         }
         best.along =
             static_cast<float>(static_cast<double>(first + i) + std::clamp(share, 0.0, 1.0));
-        best.distance_m = static_cast<float>(far);
+        best.distance_m = static_cast<float>(distance_m);
         best.along_by_x = static_cast<float>(uy / across);
         best.along_by_y = static_cast<float>(-ux / across);
       }

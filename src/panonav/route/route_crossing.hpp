@@ -8,9 +8,9 @@
 
 namespace panonav {
 
-/// Where the line of sight in one direction crosses the memorised path.
+/// The point where the line of sight in one direction crosses the recorded path.
 struct RouteCrossing {
-  float along = -1.0F;      ///< index of the line, with its fraction; below 0: nowhere
+  float along = -1.0F;      ///< index of the line, with its fraction; below 0: none
   float distance_m = 0.0F;  ///< from the viewpoint, positive ahead of it and negative behind
   float along_by_x = 0.0F;  ///< change of `along` with the viewpoint, per metre
   float along_by_y = 0.0F;  ///< the same along y
@@ -22,14 +22,14 @@ struct Direction2 {
   double y = 0.0;  ///< along the y axis
 };
 
-/// `count` directions, equally spaced from the x axis counter-clockwise.
+/// Returns `count` directions, equally spaced from the x axis counter-clockwise.
 [[nodiscard]] std::vector<Direction2> equal_directions(std::size_t count);
 
-/// The crossing nearest to `viewpoint` for each of `directions`, which must be those of
+/// Finds the crossing nearest to `viewpoint` for each of `directions`, which must be those of
 /// `equal_directions` [Y03 eq. 5, for paths of any shape]. Light in the plane of the path that
-/// reaches the viewpoint either passed the crossing before or would have come to it after; the
-/// nearest crossing has the least in between. `path`: places of the lines `first` and on. Throws
-/// nothing. Cost: O(path + directions).
+/// reaches the viewpoint passed the crossing before or would reach it later; the nearest crossing
+/// has the least in between. `path`: poses of the lines from `first` on. Throws nothing. Cost:
+/// O(path + directions).
 void find_crossings(std::span<const Pose2> path, std::size_t first, Point2 viewpoint,
                     std::span<const Direction2> directions, std::span<RouteCrossing> crossings);
 

@@ -1,6 +1,5 @@
 #include "panonav/route/route_fit.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
@@ -12,6 +11,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/geometry/least_squares.hpp"
 #include "panonav/motion/path.hpp"
 #include "panonav/route/horizon_scanline.hpp"
 #include "panonav/route/internal/line_sampling.hpp"
@@ -20,68 +20,103 @@ namespace panonav {
 
 namespace {
 
-// Unknowns: x, y, heading, gain, offset.
-using Matrix = Eigen::Matrix<double, 5, 5>;
-using Vector = Eigen::Matrix<double, 5, 1>;
+/// Unknowns: x, y, heading, gain, offset.
+using Equations = DenseEquations<5>;
 
-// Things are a few metres away; smoothing by an angle is smoothing by this over it along the path.
-constexpr double usual_distance_m = 2.0;
-
-// With fewer directions three numbers are not worth asking for.
+/// Typical distance of things: smoothing by an angle equals smoothing by this times it along the
+/// path.
+constexpr double typical_distance_m = 2.0;
+/// Fewest directions from which a pose, gain and offset are fitted.
 constexpr std::size_t min_directions = 16;
-
-// A grey level: lines are bytes.
+/// Smallest noise: a grey level, as lines are bytes.
 constexpr double min_noise = 1.0 / 255.0;
-
-// Standard deviations of a Gaussian for the median of its absolute values.
+/// Standard deviation of a Gaussian over the median of its absolute values.
 constexpr double deviations_per_median = 1.4826;
+/// Damping of the steps: directions in which nothing changes stay.
+constexpr double fit_damping = 1e-3;
+/// Longest step, as far as smoothing resolves.
+constexpr double max_step_m = 0.25;
+constexpr double max_step_rad = 0.2;
 
 }  // namespace
 
-// One direction: what the route shows there, what the line shows, and how both change.
+/// One direction: the values of the route and of the line, and their derivatives.
 struct RouteLines::Term {
-  float shown = 0.0F;
-  float shown_x = 0.0F;  // per metre
-  float shown_y = 0.0F;
-  float seen = 0.0F;
-  float seen_turn = 0.0F;  // per radian of heading, with the sign of the residual
+  float expected = 0.0F;
+  float expected_by_x = 0.0F;  // per metre
+  float expected_by_y = 0.0F;
+  float measured = 0.0F;
+  float measured_by_heading = 0.0F;  // per radian, with the sign of the residual
   std::uint32_t direction = 0;
 };
 
-// The normal equations of all directions: differences are what the route shows less gain times what
-// is seen less offset.
+/// The normal equations of all directions. Residuals: expected - gain * measured - offset.
 struct RouteLines::Linearised {
-  Matrix matrix = Matrix::Zero();
-  Vector right = Vector::Zero();
+  Equations equations;
   double gain = 1.0;
   double offset = 0.0;
-  double noise = 0.0;      // deviation of a difference, by the median
-  double variance = 0.0;   // of a difference, robust
-  double deviation = 0.0;  // of what the route shows
+  double noise = 0.0;      // standard deviation of a residual, by the median
+  double variance = 0.0;   // of a residual, robust
+  double deviation = 0.0;  // of the expected values
   double correlation = 0.0;
 
-  // Returns the equations at these terms; empty where a line has no structure.
-  static std::optional<Linearised> at(const std::vector<Term>& terms, bool robust,
-                                      std::vector<float>& scratch);
+  /// Returns the equations of these terms; nullopt where a line has no structure.
+  static std::optional<Linearised> make(const std::vector<Term>& terms, bool robust);
 
  private:
-  double mean_seen_ = 0.0;
-  double mean_shown_ = 0.0;
+  double mean_measured_ = 0.0;
+  double mean_expected_ = 0.0;
 
-  [[nodiscard]] bool set_light(const std::vector<Term>& terms);
-  void set_noise(const std::vector<Term>& terms, std::vector<float>& scratch);
+  [[nodiscard]] bool fit_light(const std::vector<Term>& terms);
+  void set_noise(const std::vector<Term>& terms);
   void set_equations(const std::vector<Term>& terms, bool robust);
-  [[nodiscard]] double difference(const Term& term) const {
-    return static_cast<double>(term.shown) - gain * static_cast<double>(term.seen) - offset;
+  [[nodiscard]] double residual(const Term& term) const {
+    return static_cast<double>(term.expected) - gain * static_cast<double>(term.measured) - offset;
   }
 };
 
-// What a fit writes over and over.
-struct RouteLines::Workspace {
-  std::vector<float> seen;
-  std::vector<RouteCrossing> crossings;
-  std::vector<Term> terms;
-  std::vector<float> scratch;
+/// The fit at one level as a problem for `minimise`.
+class RouteLines::FitProblem {
+ public:
+  FitProblem(const RouteLines& route, const Level& level, std::span<const float> line,
+             const Window& window, Pose2& pose)
+      : route_(route),
+        level_(level),
+        line_(smooth_line(line, level.sigma)),
+        window_(window),
+        pose_(pose),
+        settled_(&level == &route.levels_.back() ? 3e-4
+                                                 : 0.05 * typical_distance_m * level.sigma * 2.0 *
+                                                       std::numbers::pi / route.columns_) {}
+
+  /// Returns the equations at the present pose.
+  [[nodiscard]] std::optional<Linearised> linearised() {
+    if (!route_.collect_terms(level_, line_, pose_, window_, terms_)) return std::nullopt;
+    return Linearised::make(terms_, route_.options_.robust);
+  }
+  bool linearise(Equations& equations) {
+    const auto made = linearised();
+    if (made) equations = made->equations;
+    return made.has_value();
+  }
+  bool move(const Equations::Vector& change) {
+    const double length_m = std::hypot(change[0], change[1]);
+    const double scale = std::min({1.0, max_step_m / std::max(1e-12, length_m),
+                                   max_step_rad / std::max(1e-12, std::abs(change[2]))});
+    pose_.x_m += scale * change[0];
+    pose_.y_m += scale * change[1];
+    pose_.heading_rad = wrap_angle(pose_.heading_rad + scale * change[2]);
+    return length_m < settled_ && std::abs(change[2]) < settled_;
+  }
+
+ private:
+  const RouteLines& route_;
+  const Level& level_;
+  std::vector<float> line_;
+  const Window& window_;
+  Pose2& pose_;
+  double settled_;  // in metres and radians
+  std::vector<Term> terms_;
 };
 
 void visit_options(RouteFitOptions& options, OptionVisitor& visitor) {
@@ -114,8 +149,8 @@ RouteLines::RouteLines(const RoutePanorama& route, const RouteFitOptions& option
     }
     const double sigma_rad = level.sigma * 2.0 * std::numbers::pi / columns_;
     level.half_slope =
-        static_cast<std::size_t>(std::lround(usual_distance_m * sigma_rad / (2.0 * spacing_m)));
-    // Two a standard deviation show all that is left of a line.
+        static_cast<std::size_t>(std::lround(typical_distance_m * sigma_rad / (2.0 * spacing_m)));
+    // Two columns a standard deviation show all structure that is left.
     while (2.0 * static_cast<double>(2 * level.stride) <= level.sigma &&
            static_cast<std::size_t>(columns_) % (2 * level.stride) == 0) {
       level.stride *= 2;
@@ -124,36 +159,37 @@ RouteLines::RouteLines(const RoutePanorama& route, const RouteFitOptions& option
     levels_.push_back(std::move(level));
   }
   for (std::size_t i = 0; i < route.size(); ++i) {
-    const auto turned = world_line(route, i);
+    const auto line = world_line(route, i);
     for (Level& level : levels_) {
-      const auto smooth = smooth_line(turned, level.sigma);
+      const auto smooth = smooth_line(line, level.sigma);
       level.values.insert(level.values.end(), smooth.begin(), smooth.end());
     }
   }
 }
 
-std::optional<RouteLines::Window> RouteLines::window(Point2 position) const {
-  std::size_t nearest = 0;
-  double least = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < poses_.size(); ++i) {
-    const double off = distance(poses_[i].position(), position);
-    if (off < least) {
-      least = off;
-      nearest = i;
-    }
-  }
-  if (!(least < options_.reach_m)) return std::nullopt;
-  const auto in_reach = [&](std::size_t i) {
-    return distance(poses_[i].position(), position) < options_.reach_m;
-  };
+std::optional<RouteLines::Window> RouteLines::find_window(Point2 position) const {
+  const auto distance_m = [&](const Pose2& pose) { return distance(pose.position(), position); };
+  const auto nearest =
+      static_cast<std::size_t>(std::ranges::min_element(poses_, {}, distance_m) - poses_.begin());
+  const auto is_in_reach = [&](std::size_t i) { return distance_m(poses_[i]) < options_.reach_m; };
+  if (!is_in_reach(nearest)) return std::nullopt;
   Window found{nearest, nearest + 1};
-  while (found.begin > 0 && in_reach(found.begin - 1)) --found.begin;
-  while (found.end < poses_.size() && in_reach(found.end)) ++found.end;
+  while (found.begin > 0 && is_in_reach(found.begin - 1)) --found.begin;
+  while (found.end < poses_.size() && is_in_reach(found.end)) ++found.end;
   if (found.end - found.begin < 2) return std::nullopt;
   return found;
 }
 
-float RouteLines::shown(const Level& level, float along, std::size_t column) const noexcept {
+std::vector<RouteCrossing> RouteLines::find_crossings_in(
+    const Window& window, Point2 viewpoint, std::span<const Direction2> directions) const {
+  std::vector<RouteCrossing> crossings(directions.size());
+  find_crossings(std::span(poses_).subspan(window.begin, window.end - window.begin), window.begin,
+                 viewpoint, directions, crossings);
+  return crossings;
+}
+
+float RouteLines::expected_value(const Level& level, float along,
+                                 std::size_t column) const noexcept {
   const auto before = std::min(static_cast<std::size_t>(along), poses_.size() - 2);
   const float share = along - static_cast<float>(before);
   const float* const at =
@@ -161,16 +197,13 @@ float RouteLines::shown(const Level& level, float along, std::size_t column) con
   return at[0] + share * (at[columns_] - at[0]);
 }
 
-bool RouteLines::collect(const Level& level, std::span<const float> seen, const Pose2& pose,
-                         const Window& window, std::vector<RouteCrossing>& crossings,
-                         std::vector<Term>& terms) const {
-  crossings.resize(level.directions.size());
-  find_crossings(std::span(poses_).subspan(window.begin, window.end - window.begin), window.begin,
-                 pose.position(), level.directions, crossings);
+bool RouteLines::collect_terms(const Level& level, std::span<const float> line, const Pose2& pose,
+                               const Window& window, std::vector<Term>& terms) const {
+  const auto crossings = find_crossings_in(window, pose.position(), level.directions);
   const double columns_per_rad = columns_ / (2.0 * std::numbers::pi);
-  const double turn = pose.heading_rad * columns_per_rad;
-  const auto row = [&](std::size_t line) {
-    return level.values.data() + line * static_cast<std::size_t>(columns_);
+  const double rotation = pose.heading_rad * columns_per_rad;
+  const auto row = [&](std::size_t i) {
+    return level.values.data() + i * static_cast<std::size_t>(columns_);
   };
   terms.clear();
   for (std::size_t k = 0; k < crossings.size(); ++k) {
@@ -180,50 +213,51 @@ bool RouteLines::collect(const Level& level, std::span<const float> seen, const 
     const auto before = std::min(static_cast<std::size_t>(crossing.along), poses_.size() - 2);
     const std::size_t low = before >= level.half_slope ? before - level.half_slope : 0;
     const std::size_t high = std::min(before + 1 + level.half_slope, poses_.size() - 1);
-    const float along = (row(high)[c] - row(low)[c]) / static_cast<float>(high - low);
-    const LineSample at = sample_line(seen, static_cast<double>(c) - turn);
-    terms.push_back(
-        {shown(level, crossing.along, c), along * crossing.along_by_x, along * crossing.along_by_y,
-         at.value, at.slope * static_cast<float>(columns_per_rad), static_cast<std::uint32_t>(c)});
+    const float slope = (row(high)[c] - row(low)[c]) / static_cast<float>(high - low);
+    const LineSample at = sample_line(line, static_cast<double>(c) - rotation);
+    terms.push_back({expected_value(level, crossing.along, c), slope * crossing.along_by_x,
+                     slope * crossing.along_by_y, at.value,
+                     at.slope * static_cast<float>(columns_per_rad),
+                     static_cast<std::uint32_t>(c)});
   }
   return terms.size() >= min_directions;
 }
 
-bool RouteLines::Linearised::set_light(const std::vector<Term>& terms) {
+bool RouteLines::Linearised::fit_light(const std::vector<Term>& terms) {
   const auto n = static_cast<double>(terms.size());
-  double seen = 0.0;
-  double shown = 0.0;
+  double measured = 0.0;
+  double expected = 0.0;
   for (const Term& term : terms) {
-    seen += static_cast<double>(term.seen) / n;
-    shown += static_cast<double>(term.shown) / n;
+    measured += static_cast<double>(term.measured) / n;
+    expected += static_cast<double>(term.expected) / n;
   }
-  double seen_square = 0.0;
-  double shown_square = 0.0;
+  double measured_square = 0.0;
+  double expected_square = 0.0;
   double product = 0.0;
   for (const Term& term : terms) {
-    const double x = static_cast<double>(term.seen) - seen;
-    const double y = static_cast<double>(term.shown) - shown;
-    seen_square += x * x / n;
-    shown_square += y * y / n;
+    const double x = static_cast<double>(term.measured) - measured;
+    const double y = static_cast<double>(term.expected) - expected;
+    measured_square += x * x / n;
+    expected_square += y * y / n;
     product += x * y / n;
   }
   constexpr double min_variance = 1e-8;
-  if (seen_square < min_variance || shown_square < min_variance) return false;
-  // Another light is a factor of a few at most, and never turns black into white.
-  gain = std::clamp(product / seen_square, 0.2, 5.0);
-  offset = shown - gain * seen;
-  deviation = std::sqrt(shown_square);
-  mean_seen_ = seen;
-  mean_shown_ = shown;
+  if (measured_square < min_variance || expected_square < min_variance) return false;
+  // The light changes by a factor of a few at most, and never turns black into white.
+  gain = std::clamp(product / measured_square, 0.2, 5.0);
+  offset = expected - gain * measured;
+  deviation = std::sqrt(expected_square);
+  mean_measured_ = measured;
+  mean_expected_ = expected;
   return true;
 }
 
-void RouteLines::Linearised::set_noise(const std::vector<Term>& terms,
-                                       std::vector<float>& scratch) {
-  scratch.clear();
-  for (const Term& term : terms) scratch.push_back(std::abs(static_cast<float>(difference(term))));
+void RouteLines::Linearised::set_noise(const std::vector<Term>& terms) {
+  std::vector<float> sizes;
+  sizes.reserve(terms.size());
+  for (const Term& term : terms) sizes.push_back(std::abs(static_cast<float>(residual(term))));
   noise = std::max(min_noise, deviations_per_median *
-                                  static_cast<double>(upper_median_in_place(std::span(scratch))));
+                                  static_cast<double>(upper_median_in_place(std::span(sizes))));
 }
 
 void RouteLines::Linearised::set_equations(const std::vector<Term>& terms, bool robust) {
@@ -237,13 +271,14 @@ void RouteLines::Linearised::set_equations(const std::vector<Term>& terms, bool 
   double yy = 0.0;
   double xy = 0.0;
   for (const Term& term : terms) {
-    const double off = difference(term);
-    // Cauchy's weight; three deviations are usual, more are likely a change of the scene.
+    const double off = residual(term);
+    // Cauchy's weight: more than three standard deviations are likely a change of the scene.
     const double ratio = off / (3.0 * noise);
     const double weight = robust ? 1.0 / (1.0 + ratio * ratio) : 1.0;
-    const std::array<double, 5> slope{
-        static_cast<double>(term.shown_x), static_cast<double>(term.shown_y),
-        gain * static_cast<double>(term.seen_turn), -static_cast<double>(term.seen), -1.0};
+    const std::array<double, 5> slope{static_cast<double>(term.expected_by_x),
+                                      static_cast<double>(term.expected_by_y),
+                                      gain * static_cast<double>(term.measured_by_heading),
+                                      -static_cast<double>(term.measured), -1.0};
     for (std::size_t i = 0; i < slope.size(); ++i) {
       const double weighted = weight * slope[i];
       sums[i] -= off * weighted;
@@ -251,8 +286,8 @@ void RouteLines::Linearised::set_equations(const std::vector<Term>& terms, bool 
     }
     left += weight * off * off;
     weights += weight;
-    const double a = static_cast<double>(term.seen) - mean_seen_;
-    const double b = static_cast<double>(term.shown) - mean_shown_;
+    const double a = static_cast<double>(term.measured) - mean_measured_;
+    const double b = static_cast<double>(term.expected) - mean_expected_;
     x += weight * a;
     y += weight * b;
     xx += weight * a * a;
@@ -262,37 +297,37 @@ void RouteLines::Linearised::set_equations(const std::vector<Term>& terms, bool 
   const double within = (xx - x * x / weights) * (yy - y * y / weights);
   correlation = within > 0.0 ? (xy - x * y / weights) / std::sqrt(within) : 0.0;
   for (Eigen::Index i = 0; i < 5; ++i) {
-    right[i] = sums[static_cast<std::size_t>(i)];
+    equations.right[i] = sums[static_cast<std::size_t>(i)];
     for (Eigen::Index j = 0; j <= i; ++j) {
-      matrix(i, j) = matrix(j, i) = lower[static_cast<std::size_t>(5 * i + j)];
+      equations.matrix(i, j) = equations.matrix(j, i) = lower[static_cast<std::size_t>(5 * i + j)];
     }
   }
   constexpr double rounding_variance = min_noise * min_noise / 12.0;  // of bytes
   variance = std::max(left / weights, rounding_variance);
 }
 
-std::optional<RouteLines::Linearised> RouteLines::Linearised::at(const std::vector<Term>& terms,
-                                                                 bool robust,
-                                                                 std::vector<float>& scratch) {
+std::optional<RouteLines::Linearised> RouteLines::Linearised::make(const std::vector<Term>& terms,
+                                                                   bool robust) {
   Linearised result;
-  if (!result.set_light(terms)) return std::nullopt;
-  result.set_noise(terms, scratch);
+  if (!result.fit_light(terms)) return std::nullopt;
+  result.set_noise(terms);
   result.set_equations(terms, robust);
   return result;
 }
 
-// By direction in the world: how far what is seen lies outside of all that is shown within `shift`
-// columns, or what is shown outside of all that is seen there, whichever is less; NaN where the
-// path is not crossed.
+// Returns for each direction in the world how far the measured value lies outside of all expected
+// ones within `shift` columns, or the expected one outside of the measured ones, whichever is less;
+// NaN where the path is not crossed.
 std::vector<float> RouteLines::shift_tolerant_residuals(const std::vector<Term>& terms,
                                                         std::size_t columns, double gain,
                                                         double offset, int shift) {
-  const float nothing = std::numeric_limits<float>::quiet_NaN();
-  std::vector<float> shown(columns, nothing);
-  std::vector<float> seen(columns, nothing);
+  const float none = std::numeric_limits<float>::quiet_NaN();
+  std::vector<float> expected(columns, none);
+  std::vector<float> measured(columns, none);
   for (const Term& term : terms) {
-    shown[term.direction] = term.shown;
-    seen[term.direction] = static_cast<float>(gain * static_cast<double>(term.seen) + offset);
+    expected[term.direction] = term.expected;
+    measured[term.direction] =
+        static_cast<float>(gain * static_cast<double>(term.measured) + offset);
   }
   const auto outside = [&](const std::vector<float>& values, const std::vector<float>& others,
                            std::size_t c) {
@@ -307,129 +342,107 @@ std::vector<float> RouteLines::shift_tolerant_residuals(const std::vector<Term>&
     }
     return std::max({0.0F, low - values[c], values[c] - high});
   };
-  std::vector<float> left(columns, nothing);
+  std::vector<float> left(columns, none);
   for (const Term& term : terms) {
     const std::size_t c = term.direction;
-    left[c] = std::min(outside(seen, shown, c), outside(shown, seen, c));
+    left[c] = std::min(outside(measured, expected, c), outside(expected, measured, c));
   }
   return left;
 }
 
-// Gauss-Newton from level to level.
-bool RouteLines::descend(std::span<const Level> levels, std::span<const float> line,
-                         const Window& near, Workspace& work, Pose2& pose) const {
-  for (const Level& level : levels) {
-    work.seen = smooth_line(line, level.sigma);
-    const bool last = &level == &levels_.back();
-    const double near_enough_m =
-        last ? 3e-4 : 0.05 * usual_distance_m * level.sigma * 2.0 * std::numbers::pi / columns_;
-    for (int step = 0; step < options_.max_steps; ++step) {
-      if (!collect(level, work.seen, pose, near, work.crossings, work.terms)) return false;
-      const auto normal = Linearised::at(work.terms, options_.robust, work.scratch);
-      if (!normal) return false;
-      // A little damping: directions in which nothing changes stay where they are.
-      Matrix damped = normal->matrix;
-      damped.diagonal() *= 1.0 + 1e-3;
-      const Vector change = damped.ldlt().solve(normal->right);
-      if (!change.allFinite()) return false;
-      // No step is longer than what smoothing lets it see.
-      const double length_m = std::hypot(change[0], change[1]);
-      const double scale = std::min(
-          {1.0, 0.25 / std::max(1e-12, length_m), 0.2 / std::max(1e-12, std::abs(change[2]))});
-      pose.x_m += scale * change[0];
-      pose.y_m += scale * change[1];
-      pose.heading_rad = wrap_angle(pose.heading_rad + scale * change[2]);
-      if (length_m < near_enough_m && std::abs(change[2]) < near_enough_m) break;
-    }
-  }
-  return true;
+void RouteLines::check_line(std::span<const float> line) const {
+  if (line.size() == static_cast<std::size_t>(columns_)) return;
+  throw ContractError("values of the line", static_cast<double>(line.size()),
+                      std::to_string(columns_));
 }
 
 std::optional<RouteFix> RouteLines::fit(std::span<const float> line, const Pose2& predicted) const {
-  if (line.size() != static_cast<std::size_t>(columns_)) {
-    throw ContractError("values of the line", static_cast<double>(line.size()),
-                        std::to_string(columns_));
-  }
-  const auto near = window(predicted.position());
-  if (!near) return std::nullopt;
-  Workspace work;
-  work.terms.reserve(line.size());
-  work.scratch.reserve(line.size());
-  std::optional<Linearised> normal;
+  check_line(line);
+  const auto window = find_window(predicted.position());
+  if (!window) return std::nullopt;
+  const auto minimise_at = [&](const Level& level, Pose2& pose) {
+    FitProblem problem(*this, level, line, *window, pose);
+    Equations equations;
+    return minimise(problem, equations, {.max_steps = options_.max_steps, .damping = fit_damping})
+        .solvable;
+  };
+  std::optional<Linearised> best;
   Pose2 pose;
-  const auto try_from = [&](std::span<const Level> levels, Pose2 start) {
-    if (!descend(levels, line, *near, work, start)) return;
-    // `descend` leaves the line as its last level sees it.
-    if (!collect(levels_.back(), work.seen, start, *near, work.crossings, work.terms)) return;
-    const auto there = Linearised::at(work.terms, options_.robust, work.scratch);
-    if (!there || (normal && there->correlation <= normal->correlation)) return;
-    normal = there;
+  const auto fit_last_level = [&](Pose2 start) {
+    const Level& level = levels_.back();
+    if (!minimise_at(level, start)) return;
+    const auto fitted = FitProblem(*this, level, line, *window, start).linearised();
+    if (!fitted || (best && fitted->correlation <= best->correlation)) return;
+    best = fitted;
     pose = start;
   };
   // Smoothed lines lead from afar, but may lead away: near things and far ones behind them blend.
-  // From a good prediction the lines themselves find their way. What explains more is believed.
-  const std::span<const Level> levels(levels_);
-  try_from(levels.last(1), predicted);
+  // From a good prediction the lines themselves converge. The better correlation counts.
+  fit_last_level(predicted);
   Pose2 coarse = predicted;
-  if (levels.size() > 1 && descend(levels.first(levels.size() - 1), line, *near, work, coarse)) {
-    // So near to each other both end at the same place.
+  const auto coarse_levels = std::span(levels_).first(levels_.size() - 1);
+  if (!coarse_levels.empty() &&
+      std::ranges::all_of(coarse_levels, [&](const Level& l) { return minimise_at(l, coarse); })) {
+    // Within these both would end at the same pose.
     constexpr double same_m = 0.01;
     constexpr double same_rad = 0.01;
-    const bool same = normal && distance(coarse.position(), pose.position()) < same_m &&
-                      std::abs(angle_difference(coarse.heading_rad, pose.heading_rad)) < same_rad;
-    if (!same) try_from(levels.last(1), coarse);
+    const bool is_same =
+        best && distance(coarse.position(), pose.position()) < same_m &&
+        std::abs(angle_difference(coarse.heading_rad, pose.heading_rad)) < same_rad;
+    if (!is_same) fit_last_level(coarse);
   }
-  if (!normal) return std::nullopt;
-  return described(line, pose, *normal, *near, work);
+  if (!best) return std::nullopt;
+  return make_fix(line, pose, *best, *window);
 }
 
-std::optional<RouteFix> RouteLines::described(std::span<const float> line, const Pose2& pose,
-                                              const Linearised& normal, const Window& near,
-                                              Workspace& work) const {
-  const Matrix inverse = normal.matrix.ldlt().solve(Matrix::Identity());
+std::optional<RouteFix> RouteLines::make_fix(std::span<const float> line, const Pose2& pose,
+                                             const Linearised& fitted, const Window& window) const {
+  const Equations::Matrix inverse =
+      fitted.equations.matrix.ldlt().solve(Equations::Matrix::Identity());
   if (!inverse.allFinite()) return std::nullopt;
-  work.seen = smooth_line(line, levels_.back().sigma);
-  static_cast<void>(collect(levels_.back(), work.seen, pose, near, work.crossings, work.terms));
+  std::vector<Term> terms;
+  static_cast<void>(
+      collect_terms(levels_.back(), smooth_line(line, levels_.back().sigma), pose, window, terms));
   RouteFix fix;
   fix.pose = pose;
-  fix.columns = static_cast<int>(work.terms.size());
-  fix.correlation = normal.correlation;
-  fix.residual = std::sqrt(normal.variance) / normal.deviation;
+  fix.columns = static_cast<int>(terms.size());
+  fix.correlation = fitted.correlation;
+  fix.residual = std::sqrt(fitted.variance) / fitted.deviation;
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t j = 0; j < 3; ++j) {
       fix.covariance[3 * i + j] =
-          normal.variance * inverse(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+          fitted.variance * inverse(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
     }
   }
-  fix.noise = normal.noise;
+  fix.noise = fitted.noise;
   const int shift = std::max(1, columns_ / 360);
-  const double turn = fix.pose.heading_rad * columns_ / (2.0 * std::numbers::pi);
-  const auto left =
-      shift_tolerant_residuals(work.terms, line.size(), normal.gain, normal.offset, shift);
+  const double rotation = fix.pose.heading_rad * columns_ / (2.0 * std::numbers::pi);
+  const auto residuals =
+      shift_tolerant_residuals(terms, line.size(), fitted.gain, fitted.offset, shift);
   fix.unexplained.resize(line.size());
-  for (std::size_t c = 0; c < left.size(); ++c) {
+  for (std::size_t c = 0; c < residuals.size(); ++c) {
     const auto size = static_cast<long long>(line.size());
-    const long long at = (std::llround(static_cast<double>(c) - turn) % size + size) % size;
-    fix.unexplained[static_cast<std::size_t>(at)] = left[c];
+    const long long at = (std::llround(static_cast<double>(c) - rotation) % size + size) % size;
+    fix.unexplained[static_cast<std::size_t>(at)] = residuals[c];
   }
   return fix;
 }
 
 std::vector<float> RouteLines::synthesise(const Pose2& pose) const {
-  const float nothing = std::numeric_limits<float>::quiet_NaN();
-  std::vector<float> line(static_cast<std::size_t>(columns_), nothing);
-  const auto near = window(pose.position());
-  if (!near) return line;
-  std::vector<RouteCrossing> crossings(line.size());
-  find_crossings(std::span(poses_).subspan(near->begin, near->end - near->begin), near->begin,
-                 pose.position(), levels_.back().directions, crossings);
-  std::vector<float> world(line.size(), nothing);
-  for (std::size_t c = 0; c < line.size(); ++c) {
-    if (crossings[c].along >= 0.0F) world[c] = shown(levels_.back(), crossings[c].along, c);
+  const auto size = static_cast<std::size_t>(columns_);
+  std::vector<float> world(size, std::numeric_limits<float>::quiet_NaN());
+  const auto window = find_window(pose.position());
+  if (!window) return world;
+  const auto crossings = find_crossings_in(*window, pose.position(), levels_.back().directions);
+  for (std::size_t c = 0; c < size; ++c) {
+    if (crossings[c].along >= 0.0F) {
+      world[c] = expected_value(levels_.back(), crossings[c].along, c);
+    }
   }
-  const double turn = pose.heading_rad * columns_ / (2.0 * std::numbers::pi);
-  for (std::size_t c = 0; c < line.size(); ++c) {
-    line[c] = sample_line(world, static_cast<double>(c) + turn).value;
+  const double rotation = pose.heading_rad * columns_ / (2.0 * std::numbers::pi);
+  std::vector<float> line(size);
+  for (std::size_t c = 0; c < size; ++c) {
+    line[c] = sample_line(world, static_cast<double>(c) + rotation).value;
   }
   return line;
 }

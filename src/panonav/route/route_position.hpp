@@ -7,27 +7,27 @@
 
 namespace panonav {
 
-/// Where a robot is as seen from a route.
+/// A position relative to a route.
 struct RoutePosition {
-  double along_m = 0.0;    ///< way along the path to its place nearest to the robot
-  double lateral_m = 0.0;  ///< from there to the robot; positive to the left of the path
+  double along_m = 0.0;    ///< path length to the point of the route nearest to the position
+  double lateral_m = 0.0;  ///< offset from there; positive to the left of the route
 };
 
-// Of a way through the positions of `path`, which must not be empty. They throw nothing. Cost:
-// O(path).
+// These take a path of at least one pose and throw nothing. Cost: O(path).
 
-/// The place of `position` beside the path. Places of a path of one pose are at 0 along it.
+/// Projects a position onto a path. Along a path of one pose it is 0.
 [[nodiscard]] RoutePosition project_onto_route(std::span<const Pose2> path, Point2 position);
 
-/// All places where the path passes `position` within `reach_m`, ascending along it: the nearest
-/// one of each stretch that is so near. Empty on a path of one pose.
+/// Returns the passes of the path within `reach_m` of a position, ascending along it: the nearest
+/// point of each section that is so near. None on a path of one pose.
 [[nodiscard]] std::vector<RoutePosition> find_passes(std::span<const Pose2> path, Point2 position,
                                                      double reach_m);
 
-/// Where the path is `along_m` from its start; before its start and beyond its end these.
+/// Returns the point of the path `along_m` from its start; the ends for points beyond them.
 [[nodiscard]] Point2 point_on_route(std::span<const Pose2> path, double along_m);
 
-/// The path between two ways along it, both ends included; back when it begins at the greater one.
+/// Returns the path between two distances along it, both ends included; in reverse when it begins
+/// at the larger one.
 [[nodiscard]] std::vector<Point2> route_segment(std::span<const Pose2> path, double from_m,
                                                 double to_m);
 

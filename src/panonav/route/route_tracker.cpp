@@ -37,15 +37,15 @@ RouteTracker::RouteTracker(const RoutePanorama& route, const RouteTrackerOptions
     : options_(options), lines_(route, fit) {
   validate(options);
   min_correlation_ = options.min_correlation;
-  if (min_correlation_ == 0.0) min_correlation_ = learnt_correlation(route, fit);
+  if (min_correlation_ == 0.0) min_correlation_ = learn_min_correlation(route, fit);
 }
 
-double RouteTracker::learnt_correlation(const RoutePanorama& route,
-                                        const RouteFitOptions& options) const {
+double RouteTracker::learn_min_correlation(const RoutePanorama& route,
+                                           const RouteFitOptions& options) const {
   // Where nothing can be learnt: half of the variance is explained.
-  constexpr double usual = 0.7071;
+  constexpr double default_correlation = 0.7071;
   constexpr std::size_t samples = 40;
-  if (route.size() < 6) return usual;
+  if (route.size() < 6) return default_correlation;
   RoutePanorama half(route.columns());
   for (std::size_t i = 0; i < route.size(); i += 2) half.append(route.poses()[i], route.line(i));
   const RouteLines others(half, options);
@@ -58,34 +58,34 @@ double RouteTracker::learnt_correlation(const RoutePanorama& route,
     auto line = line_values(route, i);
     if (const auto fix = others.fit(line, route.poses()[i])) right.push_back(fix->correlation);
     std::ranges::reverse(line);
-    if (const auto fix = best_anywhere(line)) wrong.push_back(fix->correlation);
+    if (const auto fix = find_best_on_route(line)) wrong.push_back(fix->correlation);
   }
-  if (right.size() < 3 || wrong.size() < 3) return usual;
+  if (right.size() < 3 || wrong.size() < 3) return default_correlation;
   const double low = std::max(0.0, order_statistic(std::move(wrong), 0.95));
   const double high = order_statistic(std::move(right), 0.05);
-  // A view from beside the path or of a changed scene fits worse than one from the path.
+  // A line from beside the path or of a changed scene fits worse than one from the path.
   return low + std::max(0.0, high - low) / 3.0;
 }
 
-RouteFix RouteTracker::placed(RouteFix fix, RouteFix::Origin origin) const {
-  const RoutePosition place = project_onto_route(lines_.poses(), fix.pose.position());
+RouteFix RouteTracker::with_route_position(RouteFix fix, RouteFix::Origin origin) const {
+  const RoutePosition position = project_onto_route(lines_.poses(), fix.pose.position());
   fix.origin = origin;
-  fix.along_m = place.along_m;
-  fix.lateral_m = place.lateral_m;
+  fix.along_m = position.along_m;
+  fix.lateral_m = position.lateral_m;
   return fix;
 }
 
 std::optional<RouteFix> RouteTracker::recover(std::span<const float> line,
                                               const Pose2& predicted) const {
-  const auto coarse = lines_.coarse(line);
+  const auto coarse = lines_.to_coarse_line(line);
   std::optional<RouteLines::Candidate> start;
   constexpr int rings = 2;
-  constexpr int around = 8;
+  constexpr int directions = 8;
   for (int ring = 0; ring <= rings; ++ring) {
-    for (int k = 0; k < (ring == 0 ? 1 : around); ++k) {
+    for (int k = 0; k < (ring == 0 ? 1 : directions); ++k) {
       const double off = options_.recovery_m * ring / rings;
-      const double angle = 2.0 * std::numbers::pi * k / around;
-      const auto found = lines_.candidate(
+      const double angle = 2.0 * std::numbers::pi * k / directions;
+      const auto found = lines_.find_candidate(
           coarse, {predicted.x_m + off * std::cos(angle), predicted.y_m + off * std::sin(angle)});
       if (found && (!start || found->correlation > start->correlation)) start = found;
     }
@@ -94,8 +94,8 @@ std::optional<RouteFix> RouteTracker::recover(std::span<const float> line,
   return lines_.fit(line, start->pose);
 }
 
-std::optional<RouteFix> RouteTracker::best_anywhere(std::span<const float> line) const {
-  const auto coarse = lines_.coarse(line);
+std::optional<RouteFix> RouteTracker::find_best_on_route(std::span<const float> line) const {
+  const auto coarse = lines_.to_coarse_line(line);
   std::vector<RouteLines::Candidate> found;
   const auto path = lines_.poses();
   double since = std::numeric_limits<double>::infinity();
@@ -111,7 +111,7 @@ std::optional<RouteFix> RouteTracker::best_anywhere(std::span<const float> line)
     for (int side = -options_.search_sides; side <= options_.search_sides; ++side) {
       const double off = side * options_.search_lateral_m;
       const auto candidate =
-          lines_.candidate(coarse, {path[i].x_m + off * nx, path[i].y_m + off * ny});
+          lines_.find_candidate(coarse, {path[i].x_m + off * nx, path[i].y_m + off * ny});
       if (candidate) found.push_back(*candidate);
     }
   }
@@ -120,7 +120,7 @@ std::optional<RouteFix> RouteTracker::best_anywhere(std::span<const float> line)
   std::vector<Point2> tried;
   for (const auto& candidate : found) {
     if (tried.size() >= static_cast<std::size_t>(options_.max_candidates)) break;
-    // A fit finds what is near by itself.
+    // A fit finds nearby positions by itself.
     const bool near = std::ranges::any_of(tried, [&](Point2 other) {
       return distance(other, candidate.pose.position()) < 1.5 * options_.search_lateral_m;
     });
@@ -133,14 +133,15 @@ std::optional<RouteFix> RouteTracker::best_anywhere(std::span<const float> line)
 }
 
 std::optional<RouteFix> RouteTracker::search(std::span<const float> line) const {
-  auto best = best_anywhere(line);
+  auto best = find_best_on_route(line);
   if (!best || best->correlation < min_correlation_) return std::nullopt;
-  return placed(*std::move(best), RouteFix::Origin::search);
+  return with_route_position(*std::move(best), RouteFix::Origin::search);
 }
 
 std::optional<RouteFix> RouteTracker::track(std::span<const float> line, const Pose2& step) {
   const auto agrees = [&](const RouteFix& fix, double within_m) {
-    return elsewhere_ && distance((*elsewhere_ * step).position(), fix.pose.position()) <= within_m;
+    return unconfirmed_ &&
+           distance((*unconfirmed_ * step).position(), fix.pose.position()) <= within_m;
   };
   std::optional<RouteFix> found;
   if (pose_) {
@@ -149,37 +150,38 @@ std::optional<RouteFix> RouteTracker::track(std::span<const float> line, const P
     const auto off_m = [&](const RouteFix& fix) {
       return distance(fix.pose.position(), predicted.position());
     };
-    const auto believed = [&](const std::optional<RouteFix>& fix) {
+    const auto is_acceptable = [&](const std::optional<RouteFix>& fix) {
       return fix && fix->correlation >= min_correlation_ &&
              off_m(*fix) <= 1.5 * options_.recovery_m;
     };
     auto fix = lines_.fit(line, predicted);
-    if (believed(fix)) {
-      found = placed(*std::move(fix), RouteFix::Origin::prediction);
+    if (is_acceptable(fix)) {
+      found = with_route_position(*std::move(fix), RouteFix::Origin::prediction);
     } else {
       fix = recover(line, predicted);
-      if (believed(fix)) found = placed(*std::move(fix), RouteFix::Origin::recovery);
+      if (is_acceptable(fix))
+        found = with_route_position(*std::move(fix), RouteFix::Origin::recovery);
     }
-    // Odometry is right to centimetres from one line to the next.
-    if (found && followed_ && off_m(*found) > options_.surprise_m &&
+    // Odometry errs by centimetres from one line to the next.
+    if (found && is_followed_ && off_m(*found) > options_.surprise_m &&
         !agrees(*found, options_.surprise_m)) {
-      elsewhere_ = found->pose;
+      unconfirmed_ = found->pose;
       return std::nullopt;
     }
   }
   if (!found) {
     auto anywhere = search(line);
-    // A robot that was followed until now is seldom kidnapped; a line is sooner mistaken.
+    // A followed robot is seldom kidnapped; a wrong match of one line is more likely.
     if (anywhere && (!pose_ || agrees(*anywhere, options_.recovery_m))) {
       found = std::move(anywhere);
     } else {
-      elsewhere_ = anywhere ? std::optional(anywhere->pose) : std::nullopt;
+      unconfirmed_ = anywhere ? std::optional(anywhere->pose) : std::nullopt;
     }
   }
   if (found) {
     pose_ = found->pose;
-    elsewhere_.reset();
-    followed_ = true;
+    unconfirmed_.reset();
+    is_followed_ = true;
   }
   return found;
 }

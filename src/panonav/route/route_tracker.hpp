@@ -9,77 +9,77 @@
 
 namespace panonav {
 
-/// Where a tracker looks for the robot, and when it believes what it finds.
+/// Where a tracker searches for the robot, and when it accepts a fit.
 struct RouteTrackerOptions {
-  double search_step_m = 0.2;      ///< between the places along the path that a search tries
-  double search_lateral_m = 0.25;  ///< and to either side of it
-  int search_sides = 2;            ///< so many times to either side
-  int max_candidates = 6;          ///< places that a search fits
-  double recovery_m = 0.5;         ///< by which a prediction may be off
-  /// A robot that was followed until now and seems to be farther than this from where odometry puts
-  /// it is believed to be there once the next line agrees.
+  double search_step_m = 0.2;      ///< between the positions along the path that a search tries
+  double search_lateral_m = 0.25;  ///< between those to either side of it
+  int search_sides = 2;            ///< positions to either side
+  int max_candidates = 6;          ///< positions that a search fits
+  double recovery_m = 0.5;         ///< largest error of a prediction
+  /// Distance from the odometry's prediction beyond which a fix of a followed robot must be
+  /// confirmed by the next line.
   double surprise_m = 0.15;
-  /// Correlation from which on a fit is believed; 0: learnt from the route itself.
+  /// Smallest correlation of an accepted fit; 0: learnt from the route itself.
   double min_correlation = 0.0;
   friend bool operator==(const RouteTrackerOptions&, const RouteTrackerOptions&) = default;
 };
 void visit_options(RouteTrackerOptions& options, OptionVisitor& visitor);
 
-/// Follows a robot along a route panorama: odometry predicts, the line decides. Without a
-/// prediction, or where it does not hold, the whole route is searched. Deterministic; a copy goes
-/// on as the original.
+/// Follows a robot along a route panorama: odometry predicts, the line corrects. Without a
+/// prediction, or where it fails, the whole route is searched. Deterministic; a copy continues as
+/// the original.
 class RouteTracker {
  public:
-  /// Learns from the route which correlation a fit must have: lines fitted into the route made of
-  /// every second of the others tell what right fits have, mirrored lines, which show a place that
-  /// there is not, what wrong ones have; the limit lies a third of the way from the latter's 95 %
+  /// Learns from the route which correlation a fit must have: right fits are those of lines into
+  /// the route made of every second other line, wrong ones those of mirrored lines, which show a
+  /// place that does not exist; the limit lies a third of the distance from the latter's 95 %
   /// quantile to the former's 5 % quantile. Throws OptionError, and ContractError on a route of
   /// fewer than two lines. Cost: 40 searches.
   explicit RouteTracker(const RoutePanorama& route, const RouteTrackerOptions& options = {},
                         const RouteFitOptions& fit = {});
 
-  /// `step`: how the robot moved since the last line, in the frame it had then [Y03 section 4.1].
-  /// Empty: not on this route, as far as the line tells, or at a surprising place of it, which is
-  /// believed once two lines one after the other agree on it; the odometry is then carried on.
+  /// Locates the robot by a line; `step`: its motion since the last line, in the frame it had then
+  /// [Y03 section 4.1]. nullopt: the line does not match this route, or at an unexpected place,
+  /// which is accepted once two successive lines agree on it; the odometry is then integrated.
   /// Throws ContractError on a wrong length.
   std::optional<RouteFix> track(std::span<const float> line, const Pose2& step);
 
-  /// From the line alone. Cost: some 10 microseconds for each place tried.
+  /// Locates the robot by the line alone. Cost: some 10 microseconds for each position tried.
   [[nodiscard]] std::optional<RouteFix> search(std::span<const float> line) const;
 
   /// Forgets where the robot is.
   void reset() noexcept {
     pose_.reset();
-    elsewhere_.reset();
-    followed_ = false;
+    unconfirmed_.reset();
+    is_followed_ = false;
   }
-  /// Takes it from elsewhere.
+  /// Sets the pose by another source.
   void set_pose(const Pose2& pose) noexcept {
     pose_ = pose;
-    elsewhere_.reset();
-    followed_ = false;
+    unconfirmed_.reset();
+    is_followed_ = false;
   }
-  /// Where the robot is believed to be, odometry included; empty: unknown.
+  /// The estimated pose, odometry included; nullopt: unknown.
   [[nodiscard]] const std::optional<Pose2>& pose() const noexcept { return pose_; }
-  /// The least correlation of a fit that is believed: learnt, or as given.
+  /// Smallest correlation of an accepted fit: learnt, or that of the options.
   [[nodiscard]] double min_correlation() const noexcept { return min_correlation_; }
-  /// The route as fits compare it.
+  /// The route as prepared for fits.
   [[nodiscard]] const RouteLines& lines() const noexcept { return lines_; }
 
  private:
-  [[nodiscard]] double learnt_correlation(const RoutePanorama& route,
-                                          const RouteFitOptions& options) const;
-  [[nodiscard]] std::optional<RouteFix> best_anywhere(std::span<const float> line) const;
+  [[nodiscard]] double learn_min_correlation(const RoutePanorama& route,
+                                             const RouteFitOptions& options) const;
+  [[nodiscard]] std::optional<RouteFix> find_best_on_route(std::span<const float> line) const;
   [[nodiscard]] std::optional<RouteFix> recover(std::span<const float> line,
                                                 const Pose2& predicted) const;
-  [[nodiscard]] RouteFix placed(RouteFix fix, RouteFix::Origin origin) const;
+  [[nodiscard]] RouteFix with_route_position(RouteFix fix, RouteFix::Origin origin) const;
 
   RouteTrackerOptions options_;
   RouteLines lines_;
   double min_correlation_ = 0.0;
   std::optional<Pose2> pose_;
-  std::optional<Pose2> elsewhere_;  // where the last line would have put the robot
-  bool followed_ = false;           // a line has told where the robot is
+  std::optional<Pose2> unconfirmed_;  // unexpected pose by the last line
+  bool is_followed_ = false;          // a line has located the robot
 };
 
 }  // namespace panonav

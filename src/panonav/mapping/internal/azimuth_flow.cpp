@@ -15,11 +15,13 @@ namespace panonav {
 
 namespace {
 
+/// Azimuths at which views are compared: two for each period of 32 frequencies.
 constexpr int columns = 64;
+/// Rows of taller views are averaged to so many.
 constexpr int max_bands = 40;
-constexpr int unknowns = 5;
+constexpr int unknowns = 5;  // of AzimuthFlow
 
-// A column and its harmonics.
+/// The azimuth of a column and its harmonics.
 struct Azimuth {
   double phi = 0.0;
   double c1 = 1.0;
@@ -28,7 +30,7 @@ struct Azimuth {
   double s2 = 0.0;
 };
 
-std::array<Azimuth, columns> all_azimuths() {
+std::array<Azimuth, columns> make_azimuths() {
   std::array<Azimuth, columns> azimuths;
   for (int c = 0; c < columns; ++c) {
     const double phi = 2.0 * std::numbers::pi * c / columns;
@@ -38,7 +40,7 @@ std::array<Azimuth, columns> all_azimuths() {
   return azimuths;
 }
 
-// Rows averaged to bands; frequencies 1 .. highest, band-major.
+/// A view with rows averaged to bands; frequencies 1 .. highest, band-major.
 struct Bands {
   int bands = 0;
   int highest = 0;
@@ -46,7 +48,7 @@ struct Bands {
   std::vector<float> sines;
 };
 
-Bands bands_of(const HomingView& view, int bands, int highest) {
+Bands average_to_bands(const HomingView& view, int bands, int highest) {
   Bands made{bands, highest, {}, {}};
   const auto size = static_cast<std::size_t>(bands) * static_cast<std::size_t>(highest);
   made.cosines.assign(size, 0.0F);
@@ -68,13 +70,13 @@ Bands bands_of(const HomingView& view, int bands, int highest) {
 
 using Pixels = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-struct Sampled {
+struct SampledBands {
   Pixels values;  // bands x columns
   Pixels slopes;  // over azimuth
 };
 
-// The bands at one azimuth for each column.
-Sampled sample(const Bands& view, const std::array<double, columns>& azimuths) {
+// Samples the bands at one azimuth for each column.
+SampledBands sample_bands(const Bands& view, const std::array<double, columns>& azimuths) {
   Pixels cosines(view.highest, columns);
   Pixels sines(view.highest, columns);
   for (int c = 0; c < columns; ++c) {
@@ -90,14 +92,14 @@ Sampled sample(const Bands& view, const std::array<double, columns>& azimuths) {
   const Eigen::Map<const Pixels> b(view.sines.data(), view.bands, view.highest);
   const Eigen::VectorXf frequencies =
       Eigen::VectorXf::LinSpaced(view.highest, 1.0F, static_cast<float>(view.highest));
-  Sampled sampled;
+  SampledBands sampled;
   sampled.values = a * cosines + b * sines;
   sampled.slopes =
       (b * frequencies.asDiagonal()) * cosines - (a * frequencies.asDiagonal()) * sines;
   return sampled;
 }
 
-// Change over elevation, upwards, by the difference of the bands around.
+// Returns the change over elevation, upwards, by the difference of the adjacent bands.
 Pixels elevation_slopes(const Pixels& values, double band_height_rad) {
   Pixels slopes = Pixels::Zero(values.rows(), values.cols());
   const auto step = static_cast<float>(2.0 * band_height_rad);
@@ -116,10 +118,10 @@ class FlowProblem {
       : flow_(start) {
     const int bands = std::min(max_bands, after.rows());
     const int highest = std::min({before.components(), after.components(), columns / 2}) - 1;
-    earlier_ = bands_of(before, bands, highest);
+    earlier_ = average_to_bands(before, bands, highest);
     std::array<double, columns> unmoved{};
     for (std::size_t c = 0; c < columns; ++c) unmoved[c] = azimuths_[c].phi;
-    now_ = sample(bands_of(after, bands, highest), unmoved);
+    now_ = sample_bands(average_to_bands(after, bands, highest), unmoved);
     rise_ = Eigen::VectorXf::Zero(bands);
     if (after.elevations()) {
       const double height = after.elevations()->top_rad - after.elevations()->bottom_rad;
@@ -130,7 +132,7 @@ class FlowProblem {
       }
     }
     now_up_ = elevation_slopes(now_.values, band_height_rad_);
-    compare();
+    update_residuals();
   }
 
   [[nodiscard]] const AzimuthFlow& flow() const { return flow_; }
@@ -156,7 +158,7 @@ class FlowProblem {
                           across_up[c] * (mixed + mixed.transpose());
       equations.right += across_difference[c] * turns + up_difference[c] * rises;
     }
-    // A weak prior: what no pixel shows stays 0.
+    // A weak prior: unknowns on which no pixel depends stay 0.
     const double prior = 1e-6 * equations.matrix.trace() + 1e-12;
     equations.matrix.diagonal().array() += prior;
     return true;
@@ -168,27 +170,27 @@ class FlowProblem {
     flow_.b1 += change[2];
     flow_.a2 += change[3];
     flow_.b2 += change[4];
-    compare();
+    update_residuals();
     return false;
   }
 
  private:
-  /// Sets what the flow leaves unexplained, and how pixels change with it.
-  void compare() {
+  /// Updates the residuals of the flow and the derivatives of pixels.
+  void update_residuals() {
     std::array<double, columns> moved{};
     for (std::size_t c = 0; c < columns; ++c) {
       const Azimuth& at = azimuths_[c];
       moved[c] = at.phi + flow_.g0 + flow_.a1 * at.c1 + flow_.b1 * at.s1 + flow_.a2 * at.c2 +
                  flow_.b2 * at.s2;
     }
-    const Sampled then = sample(earlier_, moved);
+    const SampledBands then = sample_bands(earlier_, moved);
     const Pixels then_up = elevation_slopes(then.values, band_height_rad_);
     across_ = 0.5F * (now_.slopes + then.slopes);
     up_ = rise_.asDiagonal() * (0.5F * (now_up_ + then_up));
     difference_ = now_.values - then.values;
     for (int c = 0; c < columns; ++c) {
       const Azimuth& at = azimuths_[static_cast<std::size_t>(c)];
-      // The displacement in this direction, of the flow so far.
+      // The vertical motion by the displacement so far.
       difference_.col(c) += static_cast<float>(flow_.a1 * at.s1 - flow_.b1 * at.c1) * up_.col(c);
     }
     const double left = static_cast<double>(difference_.squaredNorm());
@@ -197,10 +199,10 @@ class FlowProblem {
     flow_.residual = energy > 0.0 ? std::min(1.0, left / energy) : 1.0;
   }
 
-  std::array<Azimuth, columns> azimuths_ = all_azimuths();
+  std::array<Azimuth, columns> azimuths_ = make_azimuths();
   AzimuthFlow flow_;
   Bands earlier_;
-  Sampled now_;
+  SampledBands now_;
   Eigen::VectorXf rise_;  // how much a band moves up for each unit ahead: sin e cos e
   double band_height_rad_ = 1.0;
   Pixels now_up_, across_, up_, difference_;

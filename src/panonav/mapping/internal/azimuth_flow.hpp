@@ -4,10 +4,10 @@
 
 namespace panonav {
 
-/// How directions shift from one view to the next, over azimuth phi of the later view:
+/// The shift of directions from one view to the next, over azimuth phi of the later view:
 ///   g(phi) = turn + a1 cos phi + b1 sin phi + a2 cos 2 phi + b2 sin 2 phi,
-/// so that what is seen at phi later was at phi + g(phi) before. The first harmonic is the way that
-/// was gone among things all equally far; the second one says on which side things are nearer.
+/// so that a thing at phi in the later view was at phi + g(phi) before. The first harmonic is the
+/// displacement among things all equally far; the second one shows on which side things are nearer.
 struct AzimuthFlow {
   double g0 = 0.0;
   double a1 = 0.0;
@@ -21,14 +21,14 @@ struct AzimuthFlow {
   [[nodiscard]] double direction_rad() const noexcept;
   [[nodiscard]] double length() const noexcept;
   /// Heading of the later view minus heading of the earlier one. Things that are nearer on one side
-  /// of the way shift more there, which looks like a turn; with inverse distances
-  /// rho0 + rho1 cos(phi - phi1) the second harmonic tells by how much: it has the amplitude
-  /// v rho1 / 2, and its phase is that of the nearer side.
+  /// of the path shift more there, which looks like a rotation; with inverse distances
+  /// rho0 + rho1 cos(phi - phi1) the second harmonic shows its size: it has the amplitude
+  /// v rho1 / 2 and the phase of the nearer side.
   [[nodiscard]] double turn_rad() const noexcept;
 };
 
 /// Refines `start` (with a2 = b2 = 0 a turn and a displacement) by Gauss-Newton over the pixels
-/// that the first components of both views describe, 64 columns and at most 40 rows; rows off the
+/// of the first components of both views, 64 columns and at most 40 rows; rows off the
 /// horizon also move up and down, where elevations are known. Both views must have the same rows.
 /// Cost: about 60 microseconds an iteration for 80 x 15.
 [[nodiscard]] AzimuthFlow refine_flow(const HomingView& before, const HomingView& after,

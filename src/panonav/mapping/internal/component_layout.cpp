@@ -14,18 +14,17 @@ namespace panonav {
 
 namespace {
 
-/// A component is averaged whenever it has grown by a quarter: the cost of all averages then is
-/// that of some five of the whole.
+/// Growth after which a component is averaged: all averages cost as much as five of the whole.
 constexpr double min_growth = 1.25;
-/// Reweighted solutions at each average.
+/// Reweighted solutions at each average, chosen on the worlds of `lattice_growth.hpp`.
 constexpr int average_rounds = 3;
-/// Differences below these count as squares, not as absolute values: 2 degrees, about what phases
-/// are right to, and a tenth of the link.
+/// Smaller differences count as squares, not as absolute values: 2 degrees, the resolution of
+/// phases, and a tenth of the link.
 constexpr double small_angle_rad = 0.03;
 constexpr double small_gap = 0.1;
 
-/// Least absolute differences over links between the views of one component, by reweighting. The
-/// first view stays.
+/// Minimises absolute differences over links between the views of one component, by reweighting.
+/// The first view stays.
 class ComponentAverage {
  public:
   ComponentAverage(const std::vector<std::size_t>& views, std::vector<std::size_t> inside,
@@ -81,7 +80,7 @@ class ComponentAverage {
   }
 
  private:
-  /// `missing`: from what the layout has to what link k says; `weight`: of its square.
+  /// Solves for the unknowns; `missing`: from the layout to link k, `weight`: of its square.
   template <class Missing, class Weight>
   std::optional<Eigen::VectorXd> solve(const Missing& missing, const Weight& weight) {
     const int unknowns = static_cast<int>(unknown_.size()) - 1;
@@ -129,14 +128,14 @@ ComponentLayout::ComponentLayout(std::size_t nodes, std::vector<LatticeLink> lin
     if (link.probability > 0.5 && link.length > 0.0) lengths.push_back(link.length);
   }
   typical_ = lengths.empty() ? 1.0 : upper_median(lengths);
-  // Pictures of one place: no direction, and no length to be measured by.
+  // Images of one place have no direction and no length.
   for (LatticeLink& link : links_) {
-    if (link.length == 0.0) link.length = beside_lengths * typical_;
+    if (link.length == 0.0) link.length = adjacent_lengths * typical_;
   }
   std::map<std::size_t, std::size_t> first;  // view of each component
   for (std::size_t i = 0; i < nodes; ++i) {
-    const std::size_t given = start.components.empty() ? i : start.components[i];
-    component_[i] = first.try_emplace(given, i).first->second;
+    const std::size_t component = start.components.empty() ? i : start.components[i];
+    component_[i] = first.try_emplace(component, i).first->second;
     members_[component_[i]].push_back(i);
   }
   for (std::size_t i = 0; i < nodes; ++i) {

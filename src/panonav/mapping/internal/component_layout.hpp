@@ -10,14 +10,14 @@
 
 namespace panonav {
 
-/// Views in connected components that grow: their poses, each in the frame of its component, and
-/// the links inside and between the components. A component is named after one of its views.
+/// Views in growing connected components: their poses, each in the frame of its component, and the
+/// links inside and between the components. A component has the number of one of its views.
 class ComponentLayout {
  public:
-  /// Begins with the components of `start`, or with single views where it is empty.
+  /// Starts with the components of `start`, or with single views where it is empty.
   ComponentLayout(std::size_t nodes, std::vector<LatticeLink> links, const LatticeStart& start);
 
-  /// The ends of a link between two components.
+  /// A link between two components p and q.
   struct Ends {
     std::size_t in_p, in_q;
     Pose2 step;  ///< in_p_from_in_q
@@ -31,28 +31,29 @@ class ComponentLayout {
   [[nodiscard]] const std::vector<std::size_t>& links_of(std::size_t view) const {
     return links_of_[view];
   }
-  /// Numbers of the links to each other component.
+  /// Numbers of the links of component p to each other one.
   [[nodiscard]] const std::map<std::size_t, std::vector<std::size_t>>& neighbours(
       std::size_t p) const {
     return between_[p];
   }
   [[nodiscard]] int iterations() const { return iterations_; }
-  /// Median length of the links that are more likely right than wrong.
+  /// Median length of the links with a probability above one half.
   [[nodiscard]] double typical_length() const { return typical_; }
 
   [[nodiscard]] bool is_inside(const LatticeLink& link) const {
     return component_[link.a] == component_[link.b];
   }
+  /// The ends of link k, that in component p first.
   [[nodiscard]] Ends ends_of(std::size_t k, std::size_t p) const;
-  /// Whether a link between two components agrees with their relative pose.
+  /// True if link k between two components agrees with their relative pose.
   [[nodiscard]] bool agrees_with(std::size_t k, const Ends& ends, const Pose2& p_from_q) const;
-  /// Whether a link inside a component agrees with the layout.
+  /// True if a link inside a component agrees with the layout.
   [[nodiscard]] bool agrees_inside(const LatticeLink& link) const;
 
-  /// Makes component q a part of p with its links. Averages p where it has grown much since the
-  /// last time. Returns the components whose links to p have changed.
+  /// Adds component q with its links to p. Averages p where it has grown much since the last time.
+  /// Returns the components whose links to p have changed.
   std::vector<std::size_t> join(std::size_t p, std::size_t q, const Pose2& p_from_q);
-  /// Makes a single view a part of p; nothing grows from it.
+  /// Adds a single view to p; drops its other links.
   void attach(std::size_t p, std::size_t view, const Pose2& p_from_view);
   /// Averages headings, then positions, over the links inside a component that agree with it.
   void average(std::size_t p);

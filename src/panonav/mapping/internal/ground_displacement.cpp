@@ -17,15 +17,18 @@ namespace {
 
 using Pixels = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
+/// Azimuths of the later view: two for each period of 32 frequencies.
 constexpr int coarse_columns = 64;
-constexpr int fine_columns = 256;  // of the view that is looked up between coarse_columns
-constexpr int iterations = 4;
-constexpr int min_bands = 4;
-// Nearer to the horizon the ground is far and walls begin.
+/// Azimuths of the earlier view, between which it is interpolated linearly.
+constexpr int fine_columns = 256;
+constexpr int iterations = 4;  ///< Gauss-Newton steps from a start within a quarter camera height
+constexpr int min_bands = 4;   ///< fewest bands that are compared
+/// Highest elevation of the ground: above it the ground is far and walls begin.
 constexpr double highest_elevation_rad = -10.0 * std::numbers::pi / 180.0;
+/// Height of a band: the ground of neighbouring ones differs by less than it moves.
 constexpr double band_height_rad = 1.75 * std::numbers::pi / 180.0;
 
-// Rows below the horizon, averaged to bands.
+/// Rows below the horizon, averaged to bands.
 struct GroundBands {
   int begin = 0;  // rows
   int bands = 0;
@@ -34,7 +37,7 @@ struct GroundBands {
   double step_rad = 0.0;   // downwards
 };
 
-std::optional<GroundBands> ground_bands(const HomingView& view) {
+std::optional<GroundBands> find_ground_bands(const HomingView& view) {
   if (!view.elevations()) return std::nullopt;
   const ElevationBand& band = *view.elevations();
   const double row_rad = (band.top_rad - band.bottom_rad) / view.rows();
@@ -49,8 +52,8 @@ std::optional<GroundBands> ground_bands(const HomingView& view) {
   return made;
 }
 
-// Bands x coarse_columns. The mean of a row belongs to it: the ground moves from row to row.
-Pixels sampled(const HomingView& view, const GroundBands& ground, int count) {
+// Samples bands x columns. The mean of a row belongs to it: the ground moves from row to row.
+Pixels sample_ground(const HomingView& view, const GroundBands& ground, int count) {
   const int highest = std::min(view.components(), coarse_columns / 2) - 1;
   Pixels cosines = Pixels::Zero(ground.bands, highest);
   Pixels sines = Pixels::Zero(ground.bands, highest);
@@ -85,7 +88,7 @@ Pixels sampled(const HomingView& view, const GroundBands& ground, int count) {
   return values;
 }
 
-// A pixel of the later view where the earlier one shows the same point of the ground.
+/// The residual of a pixel of the later view whose point of the ground the earlier one shows, too.
 struct Equation {
   double difference = 0.0;
   Eigen::Vector2d slopes = Eigen::Vector2d::Zero();  // over x, y
@@ -95,8 +98,8 @@ class Ground {
  public:
   Ground(const HomingView& before, const HomingView& after, const GroundBands& bands)
       : bands_(bands),
-        later_(sampled(after, bands, coarse_columns)),
-        earlier_(sampled(before, bands, fine_columns)) {}
+        later_(sample_ground(after, bands, coarse_columns)),
+        earlier_(sample_ground(before, bands, fine_columns)) {}
 
   [[nodiscard]] std::size_t pixels() const {
     return static_cast<std::size_t>(bands_.bands) * coarse_columns;
@@ -117,7 +120,8 @@ class Ground {
   }
 
  private:
-  // A point of the ground in the frame of the earlier view, which the later one shows as `value`.
+  // Compares a point of the ground in the frame of the earlier view with its `value` in the later
+  // one.
   [[nodiscard]] std::optional<Equation> compare(const Eigen::Vector2d& point, double value) const {
     const double distance = point.norm();
     if (!(distance > 1e-3)) return std::nullopt;
@@ -155,7 +159,7 @@ class GroundProblem {
 
   GroundProblem(const Ground& ground, const Pose2& start) : ground_(ground), motion_(start) {}
 
-  /// False where both views show too little in common, or nothing that changes with the motion.
+  /// False where both views have too little in common, or no pixel changes with the motion.
   bool linearise(Equations& normal) {
     ground_.linearise(motion_, equations_);
     if (equations_.size() < ground_.pixels() / 4) return false;
@@ -177,7 +181,7 @@ class GroundProblem {
     const double trace = normal.matrix.trace();
     if (!(trace > 0.0)) return false;
     normal.matrix.diagonal().array() += 1e-9 * trace;
-    // The shortest wave of 15 components covers four coarse_columns, which say the same.
+    // The shortest wave of 15 components covers four columns, which are not independent.
     variance_ = 4.0 * left / weights;
     return true;
   }
@@ -188,7 +192,7 @@ class GroundProblem {
     return false;
   }
 
-  /// What the last `linearise` says of the motion.
+  /// Returns the motion with the deviation of the last `linearise`.
   [[nodiscard]] GroundDisplacement result(const Equations& normal) const {
     const double length = std::hypot(motion_.x_m, motion_.y_m);
     const Eigen::Vector2d along = length > 0.0
@@ -221,7 +225,7 @@ std::optional<GroundDisplacement> ground_displacement(const HomingView& before,
                                                       const HomingView& after, const Pose2& start) {
   require(before.rows() == after.rows(), "rows of the view before", before.rows(),
           "those of the view after");
-  const auto bands = ground_bands(after);
+  const auto bands = find_ground_bands(after);
   if (!bands || before.elevations() != after.elevations()) return std::nullopt;
   return solve(Ground(before, after, *bands), start);
 }

@@ -14,16 +14,17 @@ namespace {
 
 // Where no other source is given, values were chosen as `lattice_growth.hpp` says.
 
-/// Probability that a wrong link agrees with a relative pose that other links say: once in five
-/// times, as rooms and shelves stand parallel to each other. q in docs/equations.md.
+/// Probability that a wrong link agrees with the relative pose of others: once in five times, as
+/// rooms and shelves stand parallel to each other. q in docs/equations.md.
 constexpr double p_chance = 0.2;
-/// Probability that the longer one of two links of a view looks more alike, when both are right; as
-/// often as not when one is wrong.
+/// Probability that the views of the longer one of two right links of a view are more similar; 0.5
+/// when one is wrong.
 constexpr double p_discordant = 0.15;
-constexpr double clearly_longer = 1.2;  ///< ratio of lengths from which links are compared so
-/// Probability that views beside each other agree on their relative pose. a in docs/equations.md.
-constexpr double p_beside_agree = 0.7;
-/// Most certain links that propose a relative pose each.
+/// Smallest ratio of lengths of links that are compared so: beyond the error of lengths.
+constexpr double min_longer_ratio = 1.2;
+/// Probability that adjacent views agree on their relative pose. a in docs/equations.md.
+constexpr double p_adjacent_agree = 0.7;
+/// Links, the most certain ones, that propose a relative pose each.
 constexpr std::size_t max_hypotheses = 8;
 
 /// The links between two components, the most certain ones first.
@@ -36,7 +37,7 @@ class LinksBetween {
     });
   }
 
-  [[nodiscard]] JoinHypothesis best() const {
+  [[nodiscard]] JoinHypothesis find_best() const {
     std::vector<JoinHypothesis> all;
     for (std::size_t h = 0; h < std::min(max_hypotheses, links_.size()); ++h) {
       all.push_back(propose(links_[h]));
@@ -48,8 +49,8 @@ class LinksBetween {
     }
     best.evidence -= other;
     if (best.evidence > 0.0) {
-      best.evidence +=
-          std::log((1.0 - p_beside_agree) / (1.0 - p_chance)) * contradictions(best.p_from_q);
+      best.evidence += std::log((1.0 - p_adjacent_agree) / (1.0 - p_chance)) *
+                       count_contradictions(best.p_from_q);
     }
     return best;
   }
@@ -58,19 +59,19 @@ class LinksBetween {
   [[nodiscard]] const LatticeLink& link(std::size_t k) const { return layout_.links()[k]; }
   [[nodiscard]] const Pose2& pose(std::size_t view) const { return layout_.poses()[view]; }
 
-  /// Returns the relative pose that a link says, or the mean of those that agree with it where the
+  /// Returns the relative pose by link k, or the mean of those that agree with it where the
   /// evidence for it is larger.
   [[nodiscard]] JoinHypothesis propose(std::size_t k) const {
     const auto ends = layout_.ends_of(k, p_);
     const Pose2 read = pose(ends.in_p) * ends.step * inverse(pose(ends.in_q));
     const double of_read = evidence_for(read, k);
-    const Pose2 mean = mean_of_agreeing(read);
+    const Pose2 mean = average_agreeing(read);
     const double of_mean = evidence_for(mean, k);
     if (of_mean > of_read) return {of_mean, mean};
     return {of_read, read};
   }
 
-  /// Whether two relative poses put the view of link k at different places.
+  /// True if two relative poses put the view of link k at different places.
   [[nodiscard]] bool differs(const JoinHypothesis& a, const JoinHypothesis& b,
                              std::size_t k) const {
     const Pose2& at = pose(layout_.ends_of(k, p_).in_q);
@@ -81,9 +82,9 @@ class LinksBetween {
            distance(here.position(), there.position()) > near_lengths * layout_.typical_length();
   }
 
-  /// Log-likelihood ratio of how alike the views of a link look against those of the links of the
-  /// same views, inside their components, that are clearly longer in the layout.
-  [[nodiscard]] double concordance(const ComponentLayout::Ends& ends, double laid_out,
+  /// Returns the log-likelihood ratio of the similarity of a link's views against that of the links
+  /// of the same views, inside their components, that are clearly longer in the layout.
+  [[nodiscard]] double concordance(const ComponentLayout::Ends& ends, double layout_length,
                                    double residual) const {
     double longer = 0.0;
     double more_alike = 0.0;
@@ -92,7 +93,7 @@ class LinksBetween {
         const LatticeLink& own = link(k);
         if (!layout_.is_inside(own) || !layout_.agrees_inside(own)) continue;
         const double length = distance(pose(own.a).position(), pose(own.b).position());
-        if (length < clearly_longer * laid_out) continue;
+        if (length < min_longer_ratio * layout_length) continue;
         longer += 1.0;
         more_alike += own.residual < residual ? 1.0 : 0.0;
       }
@@ -104,8 +105,8 @@ class LinksBetween {
                   (1.0 - share) * std::log((1.0 - p_discordant) / 0.5));
   }
 
-  /// Returns the log-odds of a relative pose that link `first` says. Links that share a view share
-  /// their errors: the n-th one of a view counts for 1/n.
+  /// Returns the log-odds of a relative pose by link `first`. Links that share a view share their
+  /// errors: the n-th one of a view counts for 1/n.
   [[nodiscard]] double evidence_for(const Pose2& p_from_q, std::size_t first) const {
     std::map<std::size_t, int> used;
     const auto of_first = layout_.ends_of(first, p_);
@@ -128,38 +129,37 @@ class LinksBetween {
     return evidence;
   }
 
-  /// Returns the mean of what the links say that agree with a relative pose.
-  [[nodiscard]] Pose2 mean_of_agreeing(const Pose2& p_from_q) const {
-    std::vector<std::tuple<double, Point2, Pose2>> agreeing;  // weight, in q, said in p
+  /// Returns the mean relative pose of the links that agree with one.
+  [[nodiscard]] Pose2 average_agreeing(const Pose2& p_from_q) const {
+    std::vector<std::tuple<double, Point2, Pose2>> agreeing;  // weight, in q, read in p
     double weights = 0.0;
     double turned = 0.0;
     for (const std::size_t k : links_) {
       const auto ends = layout_.ends_of(k, p_);
       if (!layout_.agrees_with(k, ends, p_from_q)) continue;
-      const Pose2 said = pose(ends.in_p) * ends.step;
+      const Pose2 read_pose = pose(ends.in_p) * ends.step;
       const double weight = link(k).probability / (link(k).length * link(k).length);
       weights += weight;
-      turned +=
-          weight * angle_difference(said.heading_rad, (p_from_q * pose(ends.in_q)).heading_rad);
-      agreeing.emplace_back(weight, pose(ends.in_q).position(), said);
+      turned += weight *
+                angle_difference(read_pose.heading_rad, (p_from_q * pose(ends.in_q)).heading_rad);
+      agreeing.emplace_back(weight, pose(ends.in_q).position(), read_pose);
     }
     if (agreeing.size() < 2) return p_from_q;
     Pose2 mean{0.0, 0.0, wrap_angle(p_from_q.heading_rad + turned / weights)};
     Point2 shift;
-    for (const auto& [weight, in_q, said] : agreeing) {
+    for (const auto& [weight, in_q, read_pose] : agreeing) {
       const Point2 at = mean * in_q;
-      shift.x_m += weight / weights * (said.x_m - at.x_m);
-      shift.y_m += weight / weights * (said.y_m - at.y_m);
+      shift.x_m += weight / weights * (read_pose.x_m - at.x_m);
+      shift.y_m += weight / weights * (read_pose.y_m - at.y_m);
     }
     mean.x_m = shift.x_m;
     mean.y_m = shift.y_m;
     return mean;
   }
 
-  /// Returns how many views of either component come to lie beside one of the other without any
-  /// link that agrees: no wall fits between them. Only near where the two meet: farther off the
-  /// layout may have drifted.
-  [[nodiscard]] double contradictions(const Pose2& p_from_q) const {
+  /// Returns how many views of either component become adjacent to one of the other without any
+  /// link that agrees: no wall fits between them. Counts only near where the two meet.
+  [[nodiscard]] double count_contradictions(const Pose2& p_from_q) const {
     const double typical = layout_.typical_length();
     std::vector<Point2> meeting;
     std::set<std::size_t> agreeing;
@@ -169,7 +169,7 @@ class LinksBetween {
       meeting.push_back(pose(ends.in_p).position());
       agreeing.insert({ends.in_p, ends.in_q});
     }
-    std::set<std::size_t> alone;
+    std::set<std::size_t> without_link;
     for (const std::size_t b : layout_.members(q_)) {
       const Point2 at = (p_from_q * pose(b)).position();
       if (std::ranges::none_of(
@@ -177,12 +177,12 @@ class LinksBetween {
         continue;
       }
       for (const std::size_t a : layout_.members(p_)) {
-        if (distance(at, pose(a).position()) >= beside_lengths * typical) continue;
-        if (!agreeing.contains(a)) alone.insert(a);
-        if (!agreeing.contains(b)) alone.insert(b);
+        if (distance(at, pose(a).position()) >= adjacent_lengths * typical) continue;
+        if (!agreeing.contains(a)) without_link.insert(a);
+        if (!agreeing.contains(b)) without_link.insert(b);
       }
     }
-    return static_cast<double>(alone.size());
+    return static_cast<double>(without_link.size());
   }
 
   const ComponentLayout& layout_;
@@ -193,8 +193,8 @@ class LinksBetween {
 
 }  // namespace
 
-JoinHypothesis best_hypothesis(const ComponentLayout& layout, std::size_t p, std::size_t q) {
-  return LinksBetween(layout, p, q).best();
+JoinHypothesis find_best_hypothesis(const ComponentLayout& layout, std::size_t p, std::size_t q) {
+  return LinksBetween(layout, p, q).find_best();
 }
 
 }  // namespace panonav

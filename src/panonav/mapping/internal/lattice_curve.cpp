@@ -10,13 +10,13 @@ namespace panonav {
 
 namespace {
 
-/// Least error of the lengths that phases say, as a share: phases are packed in steps of 0.025 rad.
+/// Smallest error of lengths by phases, as a share: phases are packed in steps of 0.025 rad.
 constexpr double min_phase_length_error = 0.02;
-/// Pairs drawn for the level of far views, of which a quarter counts: its mean then errs by 1/20 of
-/// the spread.
+/// Pairs drawn for the level of far views, of which a quarter counts: its mean errs by 1/20 of the
+/// spread.
 constexpr std::size_t far_pairs = 2000;
 
-double laid_out(std::span<const Pose2> poses, std::size_t a, std::size_t b) {
+double layout_distance(std::span<const Pose2> poses, std::size_t a, std::size_t b) {
   return distance(poses[a].position(), poses[b].position());
 }
 
@@ -35,8 +35,8 @@ std::vector<double> slopes_to_nearest(std::span<const Lattice::Spring> measured,
   return slopes;
 }
 
-/// Returns the dissimilarity of far views: the mean over the farther quarter of pairs drawn. Empty
-/// where no views are far from each other: when those lie no farther apart than twice `near`.
+/// Returns the dissimilarity of far views: the mean over the farther quarter of pairs drawn.
+/// nullopt where no views are far from each other: at most twice `near`.
 std::optional<double> level_of_far_views(const SpringViews& views, const LatticeStart& layout,
                                          double near) {
   const std::size_t nodes = layout.poses.size();
@@ -46,7 +46,7 @@ std::optional<double> level_of_far_views(const SpringViews& views, const Lattice
     const auto a = static_cast<std::size_t>(random.index(nodes));
     const auto b = static_cast<std::size_t>(random.index(nodes));
     if (a == b || layout.components[a] != layout.components[b]) continue;
-    drawn.push_back({views.dissimilarity(std::minmax(a, b)), laid_out(layout.poses, a, b)});
+    drawn.push_back({views.dissimilarity(std::minmax(a, b)), layout_distance(layout.poses, a, b)});
   }
   if (drawn.empty()) return std::nullopt;
   std::ranges::sort(drawn, [](const auto& a, const auto& b) {
@@ -71,8 +71,8 @@ DissimilarityCurve make_first_curve(std::span<const Lattice::Spring> measured,
   std::vector<double> slopes;
   std::vector<double> units;
   for (const auto& spring : measured) {
-    if (!spring.phases || !spring.phases->has_direction || !agrees(spring)) continue;
-    if (const NodeMotion* moved = motions.between({spring.a, spring.b})) {
+    if (!spring.phases || !spring.phases->has_direction || !has_agreeing_views(spring)) continue;
+    if (const NodeMotion* moved = motions.find({spring.a, spring.b})) {
       units.push_back(travel(*moved) / spring.phases->length);
     }
     if (spring.dissimilarity > 0.0) slopes.push_back(spring.phases->length / spring.dissimilarity);
@@ -81,8 +81,9 @@ DissimilarityCurve make_first_curve(std::span<const Lattice::Spring> measured,
   for (double& slope : slopes) slope *= errors.phase_unit;
   if (!motions.empty()) slopes.clear();
   for (const NodeMotion& motion : motions.all()) {
-    const double seen = views.dissimilarity(std::minmax(motion.a, motion.b));
-    if (seen > 0.0 && travel(motion) > 0.0) slopes.push_back(travel(motion) / seen);
+    const double dissimilarity = views.dissimilarity(std::minmax(motion.a, motion.b));
+    if (dissimilarity > 0.0 && travel(motion) > 0.0)
+      slopes.push_back(travel(motion) / dissimilarity);
   }
   if (slopes.empty()) slopes = slopes_to_nearest(measured, views.size());
   return DissimilarityCurve(slopes.empty() ? 1.0 : upper_median(slopes));
@@ -94,7 +95,7 @@ std::optional<DissimilarityCurve> fit_curve(std::span<const Lattice::Spring> mea
   std::vector<DissimilarityCurve::Sample> pairs;
   for (const auto& spring : springs.empty() ? measured : springs) {
     if (!springs.empty() && spring.weight < min_curve_weight) continue;
-    pairs.push_back({spring.dissimilarity, laid_out(layout.poses, spring.a, spring.b)});
+    pairs.push_back({spring.dissimilarity, layout_distance(layout.poses, spring.a, spring.b)});
   }
   if (pairs.empty()) return std::nullopt;
   std::vector<double> lengths;
@@ -103,7 +104,7 @@ std::optional<DissimilarityCurve> fit_curve(std::span<const Lattice::Spring> mea
     lengths.push_back(pair.distance);
     max_dissimilarity = std::max(max_dissimilarity, pair.dissimilarity);
   }
-  // Where all views are near, correlation ends nowhere.
+  // Where all views are near, the curve has no flat part.
   const auto far = level_of_far_views(views, layout, upper_median(lengths));
   return DissimilarityCurve(pairs, far.value_or(2.0 * max_dissimilarity));
 }
@@ -114,7 +115,7 @@ void fit_phase_unit(std::span<const Lattice::Spring> springs, std::span<const Po
   for (const auto& spring : springs) {
     if (spring.weight < min_curve_weight || !spring.phases || !spring.phases->has_direction)
       continue;
-    ratios.push_back(laid_out(poses, spring.a, spring.b) / spring.phases->length);
+    ratios.push_back(layout_distance(poses, spring.a, spring.b) / spring.phases->length);
   }
   if (ratios.empty()) return;
   const double unit = upper_median(ratios);

@@ -16,17 +16,16 @@ namespace panonav {
 
 namespace {
 
-/// Odds at which two components are joined, times the views of the smaller: 95 %
-/// (docs/decisions.md).
+/// Odds for a join, times the views of the smaller component: 95 % (docs/decisions.md).
 constexpr double min_join_odds = 19.0;
-/// The same of a single view that is left over, which can misplace nothing but itself.
+/// The same of a remaining single view, which can misplace nothing but itself.
 constexpr double min_odds_of_single_views = 1.0;
-/// Averages of each component in the end; more change positions by less than phases are right to.
+/// Averages of each component in the end; more change positions by less than phases resolve.
 constexpr int last_averages = 3;
-/// Pairs of views that are proposed for each two components that may touch.
+/// Pairs of views proposed for each two components that may be adjacent: they cost 50 readings.
 constexpr std::size_t max_proposals = 50;
-/// Once lengths have been learnt from the layout, which differ from those of the phases as near
-/// things from far ones, springs fit by directions and roughly by lengths.
+/// Largest errors of directions and lengths in the final layout, whose lengths differ from those of
+/// the phases as near things from far ones.
 constexpr double direction_tolerance_rad = 3.0 * turn_tolerance_rad;
 constexpr double length_tolerance_factor = 3.0;
 
@@ -37,7 +36,7 @@ class Grower {
       : watch_(watch), layout_(nodes, make_links(nodes, springs, unit), start) {}
 
   GrownLayout grow() {
-    consider_all();
+    push_all_joins();
     join_most_certain_first();
     attach_single_views();
     GrownLayout result{.proposals = propose_pairs()};
@@ -60,22 +59,22 @@ class Grower {
     }
   };
 
-  /// Empty where what is known does not suffice to join the two.
+  /// Returns the join of two components; nullopt where the evidence is too weak.
   [[nodiscard]] std::optional<Join> find_join(std::size_t p, std::size_t q) const {
     const auto size = [&](std::size_t component) { return layout_.members(component).size(); };
     if (std::pair(size(p), q) < std::pair(size(q), p)) std::swap(p, q);
-    const JoinHypothesis best = best_hypothesis(layout_, p, q);
+    const JoinHypothesis best = find_best_hypothesis(layout_, p, q);
     const auto misplaced = static_cast<double>(size(q));
     if (best.evidence < std::log(min_join_odds * misplaced)) return std::nullopt;
     return Join{best.evidence, p, q, best.p_from_q};
   }
-  void consider(std::size_t p, std::size_t q) {
+  void push_join_if_likely(std::size_t p, std::size_t q) {
     if (const auto found = find_join(p, q)) open_.push(*found);
   }
-  void consider_all() {
+  void push_all_joins() {
     for (std::size_t p = 0; p < layout_.size(); ++p) {
       for (const auto& [q, links] : layout_.neighbours(p)) {
-        if (q > p) consider(p, q);
+        if (q > p) push_join_if_likely(p, q);
       }
     }
   }
@@ -84,7 +83,7 @@ class Grower {
     while (!open_.empty()) {
       const Join next = open_.top();
       open_.pop();
-      // What has been joined or averaged since may have changed it.
+      // Later joins and averages may have changed it.
       if (!layout_.neighbours(next.p).contains(next.q)) continue;
       const auto found = find_join(next.p, next.q);
       if (!found) continue;
@@ -94,11 +93,11 @@ class Grower {
       }
       const auto changed = layout_.join(found->p, found->q, found->p_from_q);
       if (watch_) watch_(layout_.poses(), layout_.components());
-      for (const std::size_t other : changed) consider(found->p, other);
+      for (const std::size_t other : changed) push_join_if_likely(found->p, other);
     }
   }
 
-  /// Attaches views that are left over where there is more for than against it.
+  /// Attaches remaining single views where the evidence is positive.
   void attach_single_views() {
     std::vector<Join> found;
     for (std::size_t view = 0; view < layout_.size(); ++view) {
@@ -106,7 +105,7 @@ class Grower {
       std::optional<Join> best;
       for (const auto& [p, unused] : layout_.neighbours(view)) {
         if (layout_.members(p).size() < 2) continue;
-        const JoinHypothesis here = best_hypothesis(layout_, p, view);
+        const JoinHypothesis here = find_best_hypothesis(layout_, p, view);
         if (here.evidence < std::log(min_odds_of_single_views)) continue;
         if (!best || here.evidence > best->evidence) {
           best = Join{here.evidence, p, view, here.p_from_q};
@@ -117,14 +116,14 @@ class Grower {
     for (const Join& each : found) layout_.attach(each.p, each.q, each.p_from_q);
   }
 
-  /// Returns pairs of views that would lie near each other if the best relative pose of their
-  /// components were right, where there is more for than against it.
+  /// Returns pairs of views that would be near each other if the best relative pose of their
+  /// components were right, where the evidence for it is positive.
   [[nodiscard]] std::vector<NodePair> propose_pairs() const {
     std::vector<NodePair> proposals;
     for (std::size_t p = 0; p < layout_.size(); ++p) {
       for (const auto& [q, unused] : layout_.neighbours(p)) {
         if (q < p) continue;
-        const JoinHypothesis best = best_hypothesis(layout_, p, q);
+        const JoinHypothesis best = find_best_hypothesis(layout_, p, q);
         if (!(best.evidence > 0.0)) continue;
         const auto near = near_pairs(p, q, best.p_from_q);
         for (std::size_t i = 0; i < std::min(max_proposals, near.size()); ++i) {
@@ -155,9 +154,9 @@ class Grower {
     const auto poses = layout_.poses();
     for (const LatticeLink& link : layout_.links()) {
       if (!layout_.is_inside(link)) continue;
-      const Point2 said = (poses[link.a] * link.step).position();
+      const Point2 read = (poses[link.a] * link.step).position();
       const double gap =
-          distance(said, poses[link.b].position()) / (position_tolerance * link.length);
+          distance(read, poses[link.b].position()) / (position_tolerance * link.length);
       const double weight = 1.0 / ((1.0 + gap * gap) * (1.0 + gap * gap));
       result.weights.emplace(NodePair{link.a, link.b}, weight);
       result.energy += weight * gap * gap;
@@ -184,18 +183,18 @@ class Grower {
 
 }  // namespace
 
-bool fits(const Lattice::Spring& spring, double unit, const Pose2& a, const Pose2& b) {
-  if (!spring.phases || !agrees(spring)) return false;
-  const Pose2 said = spring.phases->a_from_b(unit);
-  const Pose2 laid_out = inverse(a) * b;
-  if (std::abs(angle_difference(said.heading_rad, laid_out.heading_rad)) > turn_tolerance_rad) {
+bool fits_layout(const Lattice::Spring& spring, double unit, const Pose2& a, const Pose2& b) {
+  if (!spring.phases || !has_agreeing_views(spring)) return false;
+  const Pose2 read = spring.phases->a_from_b(unit);
+  const Pose2 layout = inverse(a) * b;
+  if (std::abs(angle_difference(read.heading_rad, layout.heading_rad)) > turn_tolerance_rad) {
     return false;
   }
   if (!spring.phases->has_direction) return true;
-  const double direction_rad = std::atan2(said.y_m, said.x_m);
-  const double apart = std::hypot(laid_out.x_m, laid_out.y_m);
+  const double direction_rad = std::atan2(read.y_m, read.x_m);
+  const double apart = std::hypot(layout.x_m, layout.y_m);
   const double length = unit * spring.phases->length;
-  return std::abs(angle_difference(direction_rad, std::atan2(laid_out.y_m, laid_out.x_m))) <=
+  return std::abs(angle_difference(direction_rad, std::atan2(layout.y_m, layout.x_m))) <=
              direction_tolerance_rad &&
          apart <= length_tolerance_factor * length && length <= length_tolerance_factor * apart;
 }

@@ -13,9 +13,9 @@ namespace panonav {
 
 namespace {
 
-// Where no other source is given, values were chosen as `lattice_growth.hpp` says.
+// Values without another source were chosen on the worlds of `lattice_growth.hpp`.
 
-/// Links of smaller ranks make the triangles that support others: half of a view's 12 springs.
+/// Rank below which links form the triangles that support others: half of a view's 12 springs.
 constexpr std::size_t low_rank = 6;
 /// Largest gap of a triangle that closes, as a share of its longest side.
 constexpr double max_triangle_gap = 0.5;
@@ -24,7 +24,7 @@ constexpr double max_triangle_gap = 0.5;
 constexpr double min_probability = 0.01;
 constexpr double max_probability_by_rank = 0.985;
 constexpr double max_probability = 0.999;
-/// Links of the lowest ranks that stand for right ones: so many, and of each view.
+/// Number of links of the lowest ranks that represent right ones: a constant, and for each view.
 constexpr double min_reference_links = 20.0;
 constexpr double reference_links_per_node = 0.1;
 /// Bounds of the share of right links whose triangles close, and of wrong ones.
@@ -32,13 +32,13 @@ constexpr double min_closing_share = 0.3;
 constexpr double max_closing_share = 0.98;
 constexpr double min_chance_share = 0.02;
 constexpr double max_chance_share = 0.5;
-/// Share of what the spacing of the views differs from the median that is taken for a difference of
-/// the unit. In `garden` 0 leaves a shape difference of 0.042, 0.5 of 0.027, 1 of 0.033.
+/// Share of the difference of a spacing from the median that counts as a difference of the unit. In
+/// `garden` 0 leaves a shape difference of 0.042, 0.5 of 0.027, 1 of 0.033.
 constexpr double spacing_share = 0.5;
-/// Links of known length from which the spacing around a view is read: the second shortest of them.
+/// Links of known length needed for the spacing around a view, which is the second shortest.
 constexpr std::size_t min_spacing_links = 3;
 
-/// For each link the larger one of its ranks at its two views by residual.
+/// Returns for each link the larger one of its ranks by residual at its two views.
 std::vector<std::size_t> mutual_ranks(std::size_t nodes, std::span<const LatticeLink> links) {
   auto of = links_by_node(nodes, links);
   std::vector<std::size_t> ranks(links.size(), 0);
@@ -70,7 +70,7 @@ std::vector<unsigned char> find_supported(std::size_t nodes, std::span<const Lat
   return supported;
 }
 
-/// Links of one rank, or of several pooled ones.
+/// The links of one rank, or of several pooled ones.
 struct RankPool {
   double closing, count;
   std::size_t ranks = 1;
@@ -88,12 +88,13 @@ std::vector<RankPool> count_ranks(std::span<const std::size_t> ranks,
   return counts;
 }
 
-/// Returns the share of right links that are supported: links of the lowest ranks stand for right
-/// ones, which have no triangle everywhere either.
+/// Returns the share of right links that are supported, by the links of the lowest ranks: right
+/// ones need not have a triangle either.
 double closing_share_of_right(std::span<const RankPool> counts, std::size_t nodes) {
-  const double enough = min_reference_links + reference_links_per_node * static_cast<double>(nodes);
+  const double min_count =
+      min_reference_links + reference_links_per_node * static_cast<double>(nodes);
   RankPool lowest{0.0, 0.0};
-  for (std::size_t r = 0; r < counts.size() && lowest.count < enough; ++r) {
+  for (std::size_t r = 0; r < counts.size() && lowest.count < min_count; ++r) {
     lowest.count += counts[r].count;
     lowest.closing += counts[r].closing;
   }
@@ -116,8 +117,8 @@ std::vector<RankPool> pool_ranks(std::span<const RankPool> counts, double refere
   return pools;
 }
 
-/// Sets the probability of each link by its rank, then by whether a triangle closes (Bayes), which
-/// happens by chance as often as at the rank that is least certain. Two views have no triangles.
+/// Sets the probability of each link by its rank, then by whether it closes a triangle (Bayes),
+/// which happens by chance as often as at the least certain rank. Two views have no triangles.
 void learn_probabilities(std::size_t nodes, std::vector<LatticeLink>& links) {
   const auto ranks = mutual_ranks(nodes, links);
   const auto supported = find_supported(nodes, links, ranks);
@@ -143,11 +144,10 @@ void learn_probabilities(std::size_t nodes, std::vector<LatticeLink>& links) {
   }
 }
 
-/// Rescales links to the spacing of the views around. The phases count in the distance of the
-/// things around, which is large in halls and small in corridors. As little is known of how evenly
-/// the views lie: half of what the spacing (in that unit) differs from the median one is taken for
-/// a difference of the unit.
-void count_in_spacings(std::size_t nodes, std::vector<LatticeLink>& links) {
+/// Rescales links to the spacing of the views around. The unit of phases is the distance of the
+/// things around, which is large in halls and small in corridors; but spacings may differ, too. So
+/// half of the difference of a spacing (in that unit) from the median counts as one of the unit.
+void rescale_to_spacings(std::size_t nodes, std::vector<LatticeLink>& links) {
   const auto of = links_by_node(nodes, links);
   std::vector<double> spacings(nodes, 0.0);
   std::vector<double> known;
@@ -176,21 +176,21 @@ void count_in_spacings(std::size_t nodes, std::vector<LatticeLink>& links) {
 
 }  // namespace
 
-bool is_near(const Pose2& a, const Pose2& b, double within) {
+bool is_near(const Pose2& a, const Pose2& b, double max_distance) {
   return std::abs(angle_difference(a.heading_rad, b.heading_rad)) <= turn_tolerance_rad &&
-         distance(a.position(), b.position()) <= within;
+         distance(a.position(), b.position()) <= max_distance;
 }
 
 std::vector<LatticeLink> make_links(std::size_t nodes, std::span<const Lattice::Spring> springs,
                                     double unit) {
   std::vector<LatticeLink> links;
   for (const Lattice::Spring& spring : springs) {
-    if (!spring.phases || !agrees(spring)) continue;
+    if (!spring.phases || !has_agreeing_views(spring)) continue;
     links.push_back({spring.a, spring.b, spring.phases->a_from_b(unit),
                      unit * spring.phases->length, spring.phases->residual, 0.0});
   }
   learn_probabilities(nodes, links);
-  count_in_spacings(nodes, links);
+  rescale_to_spacings(nodes, links);
   return links;
 }
 

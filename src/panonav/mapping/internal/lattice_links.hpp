@@ -9,10 +9,11 @@
 
 namespace panonav {
 
-/// Largest difference between a turn read from phases and the same turn in the layout: three times
-/// the error of phases between places that are the same.
+/// Largest difference between a turn by phases and in the layout: three times the error of phases
+/// between adjacent places.
 inline constexpr double turn_tolerance_rad = 15.0 * std::numbers::pi / 180.0;
-/// The same of a position, as a share of the link's length. Chosen as `lattice_growth.hpp` says.
+/// The same of a position, as a share of the link's length; chosen on the worlds of
+/// `lattice_growth.hpp`.
 inline constexpr double position_tolerance = 0.6;
 
 /// A spring whose two views agree, as a relative pose that may be wrong.
@@ -20,19 +21,19 @@ struct LatticeLink {
   std::size_t a, b;
   Pose2 step;  ///< a_from_b
   double length, residual;
-  double probability;  ///< that it joins views that lie so
+  double probability;  ///< that the relative pose is right
 };
 
-/// Whether two poses have the same heading within the tolerance, and positions within `within`.
-[[nodiscard]] bool is_near(const Pose2& a, const Pose2& b, double within);
+/// True if two headings differ by at most the tolerance, and two positions by `max_distance`.
+[[nodiscard]] bool is_near(const Pose2& a, const Pose2& b, double max_distance);
 
-/// The springs whose views agree, with probabilities learnt from their ranks and triangles, and
-/// with lengths in the spacing of the views around. Links of no length stay so.
+/// Makes links of the springs whose views agree, with probabilities learnt from their ranks and
+/// triangles, and with lengths in the spacing of the views around. Lengths of 0 stay.
 [[nodiscard]] std::vector<LatticeLink> make_links(std::size_t nodes,
                                                   std::span<const Lattice::Spring> springs,
                                                   double unit);
 
-/// For each node the numbers of its links.
+/// Returns for each node the numbers of its links.
 [[nodiscard]] std::vector<std::vector<std::size_t>> links_by_node(
     std::size_t nodes, std::span<const LatticeLink> links);
 

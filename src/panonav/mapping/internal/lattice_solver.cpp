@@ -15,21 +15,23 @@ namespace panonav {
 
 namespace {
 
-// Width of the losses in deviations, where a spring begins to be rejected: what normal errors
-// exceed once in 370 times.
+/// Width of the losses in deviations, beyond which springs are rejected: normal errors exceed it
+/// once in 370 times.
 constexpr double final_width = 3.0;
+/// Largest number of steps at each width.
 constexpr int max_steps_per_width = 20;
-// Relative decrease of the energy below which a width is done with: positions then move by less
-// than 1e-4 of a spring. While widths are still narrowed the next one corrects what is left.
+// Smallest relative decrease of the energy for another step: below it positions move by less than
+// 1e-4 of a spring. At all but the last width the next one corrects the rest.
 constexpr double min_final_decrease = 1e-7;
 constexpr double min_decrease_while_narrowing = 1e-3;
 
-using Row = std::array<double, 6>;  // derivatives by x, y, heading of a and of b
+/// Derivatives by x, y, heading of a and of b.
+using Row = std::array<double, 6>;
 
-/// What a spring tells, in groups that are right or wrong together.
+/// The measurements of a spring, in groups that are right or wrong together.
 enum Group : std::size_t { phases, length, length_by_phases, groups };
-/// Median of the squared strain of a group when deviations are right (chi-squared of two rows and
-/// of one).
+/// Median of the squared strain of a group with right deviations (chi-squared of two rows and of
+/// one).
 constexpr std::array<double, groups> median_square{1.386, 0.455, 0.455};
 
 /// The strain of one spring in deviations, and its derivatives.
@@ -47,7 +49,7 @@ struct Strain {
     entries[rows++] = {group, strain / deviation, slope};
   }
   [[nodiscard]] std::span<const Entry> used() const { return std::span(entries).first(rows); }
-  /// Squared strain of each group; empty where the spring tells nothing.
+  /// Returns the squared strain of each group; nullopt where the spring has none.
   [[nodiscard]] std::array<std::optional<double>, groups> squares() const {
     std::array<std::optional<double>, groups> sums;
     for (const Entry& entry : used()) {
@@ -57,7 +59,7 @@ struct Strain {
   }
 };
 
-Strain strain_of(const SpringTerm& spring, const Pose2& a, const Pose2& b) {
+Strain compute_strain(const SpringTerm& spring, const Pose2& a, const Pose2& b) {
   Strain strain;
   const double dx = b.x_m - a.x_m;
   const double dy = b.y_m - a.y_m;
@@ -65,17 +67,17 @@ Strain strain_of(const SpringTerm& spring, const Pose2& a, const Pose2& b) {
     strain.add(length, dx, {-1.0, 0.0, 0.0, 1.0, 0.0, 0.0}, spring.length_deviation);
     strain.add(length, dy, {0.0, -1.0, 0.0, 0.0, 1.0, 0.0}, spring.length_deviation);
   } else {
-    const double way = std::hypot(dx, dy);
-    // On the spot any direction is as good as another.
-    const double ux = way > 0.0 ? dx / way : 1.0;
-    const double uy = way > 0.0 ? dy / way : 0.0;
+    const double distance = std::hypot(dx, dy);
+    // Where the nodes coincide any direction will do.
+    const double ux = distance > 0.0 ? dx / distance : 1.0;
+    const double uy = distance > 0.0 ? dy / distance : 0.0;
     const Row slope{-ux, -uy, 0.0, ux, uy, 0.0};
-    strain.add(length, way - spring.length, slope, spring.length_deviation);
+    strain.add(length, distance - spring.length, slope, spring.length_deviation);
     if (spring.along_direction) {
-      strain.add(length_by_phases, way - spring.along_direction->length, slope,
+      strain.add(length_by_phases, distance - spring.along_direction->length, slope,
                  spring.along_direction->deviation);
     }
-    if (spring.direction && way > 0.0) {
+    if (spring.direction && distance > 0.0) {
       const SpringDirection& known = *spring.direction;
       double world_rad = a.heading_rad + known.from_a_rad;
       double share_a = 1.0;
@@ -84,17 +86,17 @@ Strain strain_of(const SpringTerm& spring, const Pose2& a, const Pose2& b) {
         world_rad += 0.5 * wrap_angle(back_rad - world_rad);
         share_a = 0.5;
       }
-      // Nodes that nearly coincide turn about each other without end: the slope is that of a way
-      // of some length.
-      const double lever = std::max(way, 0.1 * spring.length);
+      // Nodes that nearly coincide would rotate about each other without end: the slope is that at
+      // a minimum distance.
+      const double lever = std::max(distance, 0.1 * spring.length);
       strain.add(phases, wrap_angle(std::atan2(dy, dx) - world_rad),
                  {uy / lever, -ux / lever, -share_a, -uy / lever, ux / lever, share_a - 1.0},
                  known.deviation_rad);
     }
   }
   if (spring.turn) {
-    const double missed = angle_difference(b.heading_rad - a.heading_rad, spring.turn->turn_rad);
-    strain.add(phases, missed, {0.0, 0.0, -1.0, 0.0, 0.0, 1.0}, spring.turn->deviation_rad);
+    const double error = angle_difference(b.heading_rad - a.heading_rad, spring.turn->turn_rad);
+    strain.add(phases, error, {0.0, 0.0, -1.0, 0.0, 0.0, 1.0}, spring.turn->deviation_rad);
   }
   return strain;
 }
@@ -135,28 +137,28 @@ void check(std::span<const SpringTerm> springs, std::span<const Pose2> poses,
   }
 }
 
-/// The energy of the springs as `minimise` sees it: poses, robust weights and their widths.
+/// The energy of the springs as a problem for `minimise`: poses, robust weights and their widths.
 class SpringEnergy {
  public:
   SpringEnergy(std::span<const SpringTerm> springs, std::span<Pose2> poses,
-               std::span<const unsigned char> moving, const std::function<void()>& moved)
-      : moved_(moved), springs_(springs), poses_(poses), unknown_(poses.size(), -1) {
+               std::span<const unsigned char> moving, const std::function<void()>& on_step)
+      : on_step_(on_step), springs_(springs), poses_(poses), unknown_(poses.size(), -1) {
     for (std::size_t i = 0; i < poses.size(); ++i) {
       if (moving.empty() || moving[i] != 0) {
         unknown_[i] = unknowns_;
         unknowns_ += 3;
       }
     }
-    trust_.resize(springs.size());
+    length_weights_.resize(springs.size());
   }
 
   [[nodiscard]] bool has_unknowns() const { return unknowns_ > 0 && !springs_.empty(); }
 
   /// Widens the losses until no spring is beyond half of them.
-  void widen() {
+  void widen_losses() {
     widths_.fill(final_width);
     for (const SpringTerm& spring : springs_) {
-      if (spring.certain) continue;
+      if (spring.is_certain) continue;
       const auto squares = squares_of(spring);
       for (std::size_t g = 0; g < groups; ++g) {
         widths_[g] = std::max(widths_[g], 2.0 * std::sqrt(squares[g].value_or(0.0)));
@@ -164,12 +166,12 @@ class SpringEnergy {
     }
   }
 
-  /// Halves the widths, down to three deviations, which the median strain corrects where they were
-  /// given too small. False when all are there.
-  bool narrow() {
+  /// Halves the widths, down to three deviations, or more where the median strain shows that these
+  /// are too small. False when all are there.
+  bool narrow_losses() {
     std::array<std::vector<double>, groups> squares;
     for (const SpringTerm& spring : springs_) {
-      if (spring.certain) continue;
+      if (spring.is_certain) continue;
       const auto all = squares_of(spring);
       for (std::size_t g = 0; g < groups; ++g) {
         if (all[g]) squares[g].push_back(*all[g]);
@@ -177,19 +179,19 @@ class SpringEnergy {
     }
     bool narrowed = false;
     for (std::size_t g = 0; g < groups; ++g) {
-      double least = final_width;
+      double min_width = final_width;
       if (!squares[g].empty()) {
         const double middle = upper_median_in_place(std::span(squares[g]));
-        least *= std::max(1.0, std::sqrt(middle / median_square[g]));
+        min_width *= std::max(1.0, std::sqrt(middle / median_square[g]));
       }
-      if (widths_[g] <= least) continue;
-      widths_[g] = std::max(least, 0.5 * widths_[g]);
+      if (widths_[g] <= min_width) continue;
+      widths_[g] = std::max(min_width, 0.5 * widths_[g]);
       narrowed = true;
     }
     return narrowed;
   }
 
-  /// The weight of each spring in the end, by its phases where it has them.
+  /// Returns the final weight of each spring, by its phases where it has them.
   [[nodiscard]] std::vector<double> weights() const {
     std::vector<double> result(springs_.size(), 1.0);
     for (std::size_t s = 0; s < springs_.size(); ++s) {
@@ -202,16 +204,16 @@ class SpringEnergy {
 
   bool linearise(SparseEquations& equations) {
     start_.assign(poses_.begin(), poses_.end());
-    set_trust();
+    update_length_weights();
     equations.reset(unknowns_);
-    // Every diagonal entry is there, whatever the springs touch.
+    // Every diagonal entry exists, also of nodes without springs.
     for (int i = 0; i < unknowns_; ++i) equations.add(i, i, 0.0);
     for (std::size_t s = 0; s < springs_.size(); ++s) add_spring(s, equations);
     equations.assemble();
     return true;
   }
 
-  /// The loss that the weights belong to.
+  /// Returns the loss from which the weights derive.
   [[nodiscard]] double cost() const {
     double sum = 0.0;
     for (std::size_t s = 0; s < springs_.size(); ++s) {
@@ -220,12 +222,12 @@ class SpringEnergy {
         if (!squares[group]) continue;
         const double width = widths_[group] * widths_[group];
         const double share = *squares[group] / width;
-        if (springs_[s].certain) {
+        if (springs_[s].is_certain) {
           sum += *squares[group];
-        } else if (group == phases || !trust_[s]) {
+        } else if (group == phases || !length_weights_[s]) {
           sum += *squares[group] / (1.0 + share);
         } else {
-          sum += *trust_[s] * 2.0 * width * (std::sqrt(1.0 + share) - 1.0);
+          sum += *length_weights_[s] * 2.0 * width * (std::sqrt(1.0 + share) - 1.0);
         }
       }
     }
@@ -243,29 +245,29 @@ class SpringEnergy {
   }
   void undo() { std::ranges::copy(start_, poses_.begin()); }
   void accept() {
-    if (moved_) moved_();
+    if (on_step_) on_step_();
   }
 
  private:
   [[nodiscard]] std::array<std::optional<double>, groups> squares_of(
       const SpringTerm& spring) const {
-    return strain_of(spring, poses_[spring.a], poses_[spring.b]).squares();
+    return compute_strain(spring, poses_[spring.a], poses_[spring.b]).squares();
   }
 
-  /// Returns the weight of a group of a spring's strains. Where the views tell direction and turn,
-  /// lengths are believed as far as these are, and then pull for ever: else a node could leave
-  /// along a direction.
+  /// Returns the weight of a group of a spring's strains. Where the views show direction and turn,
+  /// lengths count as far as these do, and are never rejected by themselves: else a node could
+  /// leave along a direction.
   [[nodiscard]] double weight(std::size_t s, Group group, double square) const {
-    if (springs_[s].certain) return 1.0;
+    if (springs_[s].is_certain) return 1.0;
     const double share = square / (widths_[group] * widths_[group]);
-    if (group == phases || !trust_[s]) return geman_mcclure_weight(share);
-    return *trust_[s] / std::sqrt(1.0 + share);
+    if (group == phases || !length_weights_[s]) return geman_mcclure_weight(share);
+    return *length_weights_[s] / std::sqrt(1.0 + share);
   }
-  /// Sets how far the lengths of each spring with phases are believed.
-  void set_trust() {
+  /// Updates the weights with which the lengths of springs with phases count.
+  void update_length_weights() {
     for (std::size_t s = 0; s < springs_.size(); ++s) {
       const auto square = squares_of(springs_[s])[phases];
-      trust_[s] = square ? std::optional(weight(s, phases, *square)) : std::nullopt;
+      length_weights_[s] = square ? std::optional(weight(s, phases, *square)) : std::nullopt;
     }
   }
 
@@ -274,7 +276,7 @@ class SpringEnergy {
     const int first = unknown_[spring.a];
     const int second = unknown_[spring.b];
     if (first < 0 && second < 0) return;
-    const Strain strain = strain_of(spring, poses_[spring.a], poses_[spring.b]);
+    const Strain strain = compute_strain(spring, poses_[spring.a], poses_[spring.b]);
     const auto squares = strain.squares();
     const auto column = [&](int i) {
       const int base = i < 3 ? first : second;
@@ -296,13 +298,13 @@ class SpringEnergy {
     }
   }
 
-  const std::function<void()>& moved_;
+  const std::function<void()>& on_step_;
   std::span<const SpringTerm> springs_;
   std::span<Pose2> poses_;
-  std::vector<Pose2> start_;  // of the present step
+  std::vector<Pose2> start_;  // before the present step
   std::vector<int> unknown_;  // first unknown of each pose, -1: it stays
   int unknowns_ = 0;
-  std::vector<std::optional<double>> trust_;  // in the lengths of each spring with phases
+  std::vector<std::optional<double>> length_weights_;  // of springs with phases
   std::array<double, groups> widths_{final_width, final_width, final_width};
 };
 
@@ -310,21 +312,21 @@ class SpringEnergy {
 
 LatticeSolution solve_lattice(std::span<const SpringTerm> springs, std::span<Pose2> poses,
                               std::span<const unsigned char> moving,
-                              const std::function<void()>& moved) {
+                              const std::function<void()>& on_step) {
   check(springs, poses, moving);
-  SpringEnergy energy(springs, poses, moving, moved);
+  SpringEnergy energy(springs, poses, moving, on_step);
   LatticeSolution solution;
   SparseEquations equations;
   const auto relax = [&](double min_relative_decrease) {
     solution.iterations += minimise(energy, equations,
                                     {.max_steps = max_steps_per_width,
-                                     .damping = 1e-6,  // springs hold most nodes well
+                                     .damping = 1e-6,  // small: springs determine most nodes well
                                      .min_relative_decrease = min_relative_decrease})
                                .steps;
   };
   if (energy.has_unknowns()) {
-    energy.widen();
-    while (energy.narrow()) relax(min_decrease_while_narrowing);
+    energy.widen_losses();
+    while (energy.narrow_losses()) relax(min_decrease_while_narrowing);
     relax(min_final_decrease);
   }
   solution.energy = energy.cost();

@@ -10,25 +10,26 @@
 
 namespace panonav {
 
-/// A direction known in the frame of a robot.
+/// A direction of a spring in the frame of a robot.
 struct SpringDirection {
   double from_a_rad = 0.0;           ///< towards b, in the frame of a
-  std::optional<double> from_b_rad;  ///< towards a, in the frame of b, where that is known too
+  std::optional<double> from_b_rad;  ///< towards a, in the frame of b; nullopt: not known
   double deviation_rad = 0.1;        ///< > 0
 };
+/// A turn of a spring.
 struct SpringTurn {
   double turn_rad = 0.0;       ///< heading of b minus heading of a
   double deviation_rad = 0.1;  ///< > 0
 };
 
-/// A length that was read in another way than the rest length.
+/// A length of a spring from another source than the rest length.
 struct SpringLength {
   double length = 1.0;     ///< >= 0
   double deviation = 0.1;  ///< > 0
 };
 
-/// One spring of the lattice as the solver sees it: what is known of the way from node a to node b,
-/// each with its standard deviation.
+/// One spring of the lattice as an equation of the solver: measurements of the motion from node a
+/// to node b, each with its standard deviation.
 struct SpringTerm {
   std::size_t a = 0;
   std::size_t b = 0;
@@ -37,11 +38,12 @@ struct SpringTerm {
   std::optional<SpringDirection> direction;
   std::optional<SpringLength> along_direction;  ///< counts with a direction only
   std::optional<SpringTurn> turn;
-  bool certain = false;  ///< never rejected, however far it is stretched
+  bool is_certain = false;  ///< never rejected, however far it is stretched
 };
 
+/// The result of `solve_lattice`.
 struct LatticeSolution {
-  /// What is left of each spring, by its direction and turn where it has them, else by its length,
+  /// Robust weight of each spring, by its direction and turn where it has them, else by its length,
   /// 1 .. 0: near 0 it was rejected, as it contradicts the others.
   std::vector<double> weights;
   double energy = 0.0;  ///< sum over springs of weight times squared strain in deviations
@@ -49,16 +51,16 @@ struct LatticeSolution {
 };
 
 /// Moves the poses to the least energy of the springs [M04 section 3.2], by sparse non-linear least
-/// squares with damping. What contradicts the rest is rejected little by little: Geman-McClure loss
-/// whose width shrinks from that of the worst spring to three deviations, or more where the median
-/// strain says that deviations were given too small (graduated non-convexity). So the result
+/// squares with damping. Springs that contradict the rest are rejected gradually: Geman-McClure
+/// loss whose width shrinks from that of the worst spring to three deviations, or more where the
+/// median strain shows that the deviations are too small (graduated non-convexity). So the result
 /// depends little on the start. Direction and turn are rejected together, lengths each by itself:
-/// far views tell direction well and distance badly. `moving`: one entry per pose, 0 keeps the
-/// pose; empty: all move. A component without a fixed pose stays about where it was. Throws
-/// ContractError on indices or numbers out of range. `moved`: called after each step that moved the
-/// poses. The same input gives the same bits. Cost per iteration: one sparse factorisation.
+/// far views show the direction well and the distance badly. `moving`: one entry per pose, 0 fixes
+/// the pose; empty: all move. A component without a fixed pose stays about where it was. Throws
+/// ContractError on indices or numbers out of range. `on_step`: called after each step that moved
+/// the poses. The same input gives the same bits. Cost per iteration: one sparse factorisation.
 LatticeSolution solve_lattice(std::span<const SpringTerm> springs, std::span<Pose2> poses,
                               std::span<const unsigned char> moving = {},
-                              const std::function<void()>& moved = {});
+                              const std::function<void()>& on_step = {});
 
 }  // namespace panonav

@@ -16,16 +16,16 @@ namespace panonav {
 
 namespace {
 
-/// Answers of two views that differ by more say nothing. Unrelated views agree so well in direction
-/// and turn by chance once in 16 times.
+/// Largest disagreement of two views: unrelated ones agree so well in direction and turn by chance
+/// once in 16 times.
 constexpr double max_disagreement_rad = 0.25 * std::numbers::pi;
-/// Largest sum of three turns that cancel: those of phases err by some 5 degrees each.
+/// Largest sum of three turns that cancel: those by phases err by some 5 degrees each.
 constexpr double turn_closing_rad = 10.0 * std::numbers::pi / 180.0;
-/// The same of three displacements, as a share of the longest, whose lengths err by a quarter.
+/// The same of three displacements as a share of the longest: lengths err by a quarter.
 constexpr double displacement_closing = 0.5;
-/// Error of a length as a share of it, before the curve is known.
+/// Error of a length as a share of it, before the curve is known: that by phases.
 constexpr double default_length_error = 0.25;
-/// Least deviation of an angle, 0.2 degrees: rounding of packed phases, whose steps of 0.025 rad
+/// Smallest deviation of an angle, 0.2 degrees: rounding of packed phases, whose steps of 0.025 rad
 /// leave 0.4 degrees each, averaged over the components.
 constexpr double min_angle_deviation_rad = 0.0035;
 
@@ -47,13 +47,13 @@ SpringViews::SpringViews(const VisualMemory& memory, const LatticeOptions& optio
   for (const ViewId view : memory.views()) {
     packed_.push_back(memory.packed(view));
     if (!options.phases) continue;
-    const HomingView seen = homing_view(memory, view);
-    homing_.push_back(components_ > 0 ? first_components(seen, components_) : seen);
+    const HomingView coefficients = homing_view(memory, view);
+    homing_.push_back(components_ > 0 ? first_components(coefficients, components_) : coefficients);
   }
 }
 
-std::vector<NodePair> SpringViews::most_similar(const LatticeOptions& options,
-                                                Executor& executor) const {
+std::vector<NodePair> SpringViews::find_most_similar(const LatticeOptions& options,
+                                                     Executor& executor) const {
   const auto views = memory_->views();
   std::vector<std::vector<NodePair>> found(views.size());
   executor.for_chunks(views.size(), 16, [&](std::size_t begin, std::size_t end, std::size_t) {
@@ -68,7 +68,7 @@ std::vector<NodePair> SpringViews::most_similar(const LatticeOptions& options,
     }
   });
   std::vector<NodePair> pairs;
-  for (const auto& some : found) pairs.insert(pairs.end(), some.begin(), some.end());
+  for (const auto& of_view : found) pairs.insert(pairs.end(), of_view.begin(), of_view.end());
   std::ranges::sort(pairs);
   pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
   return pairs;
@@ -79,13 +79,13 @@ double SpringViews::dissimilarity(NodePair pair) const {
 }
 
 Lattice::Spring SpringViews::measure(NodePair pair,
-                                     const std::optional<HeadingWindow>& hint) const {
+                                     const std::optional<HeadingWindow>& window) const {
   Lattice::Spring spring{.a = pair.first, .b = pair.second, .dissimilarity = dissimilarity(pair)};
-  if (!homing_.empty()) spring.phases = read_phases(homing_[spring.a], homing_[spring.b], hint);
+  if (!homing_.empty()) spring.phases = read_phases(homing_[spring.a], homing_[spring.b], window);
   return spring;
 }
 
-bool agrees(const Lattice::Spring& spring) {
+bool has_agreeing_views(const Lattice::Spring& spring) {
   if (!spring.phases) return true;
   return spring.phases->disagreement_rad <= max_disagreement_rad &&
          spring.phases->turn_disagreement_rad <= max_disagreement_rad;
@@ -102,7 +102,7 @@ void learn_errors(std::span<const Lattice::Spring> springs, const DissimilarityC
     disagreements.push_back(spring.phases->disagreement_rad);
     turn_disagreements.push_back(spring.phases->turn_disagreement_rad);
   }
-  // The median spring errs by E, the others as their stiffness says [M04 eq. 5].
+  // The median spring errs by E, the others by their stiffness [M04 eq. 5].
   const double middle = lengths.empty() ? 1.0 : upper_median(lengths);
   double error = curve.error(middle);
   if (!(error > 0.0)) error = default_length_error * (middle > 0.0 ? middle : 1.0);
@@ -116,8 +116,8 @@ void learn_errors(std::span<const Lattice::Spring> springs, const DissimilarityC
   errors.turn_rad = deviation(turn_disagreements);
 }
 
-SpringTerm spring_term(const Lattice::Spring& spring, const Lattice::Errors& errors,
-                       bool phase_lengths) {
+SpringTerm make_spring_term(const Lattice::Spring& spring, const Lattice::Errors& errors,
+                            bool phase_lengths) {
   SpringTerm term{.a = spring.a,
                   .b = spring.b,
                   .length = spring.length,
@@ -136,7 +136,8 @@ SpringTerm spring_term(const Lattice::Spring& spring, const Lattice::Errors& err
   return term;
 }
 
-std::vector<double> closing_triangles(std::size_t nodes, std::span<const Lattice::Spring> springs) {
+std::vector<double> closing_triangle_shares(std::size_t nodes,
+                                            std::span<const Lattice::Spring> springs) {
   std::vector<GraphEdge> edges;
   for (const auto& spring : springs) edges.push_back({spring.a, spring.b, spring.length});
   std::vector<double> all(springs.size());
@@ -169,8 +170,9 @@ std::vector<double> closing_triangles(std::size_t nodes, std::span<const Lattice
   return closing;
 }
 
-void keep_confirmed(std::size_t nodes, double min_closing, std::vector<Lattice::Spring>& springs) {
-  const auto closes = closing_triangles(nodes, springs);
+void drop_unconfirmed(std::size_t nodes, double min_closing,
+                      std::vector<Lattice::Spring>& springs) {
+  const auto closes = closing_triangle_shares(nodes, springs);
   std::vector<GraphEdge> confirmed;
   std::vector<unsigned char> has_support(nodes);
   for (std::size_t s = 0; s < springs.size(); ++s) {
@@ -180,14 +182,15 @@ void keep_confirmed(std::size_t nodes, double min_closing, std::vector<Lattice::
     has_support[springs[s].b] = 1;
   }
   const auto components = LatticeGraph(nodes, confirmed).components();
-  std::vector<std::map<std::size_t, std::size_t>> leads_to(nodes);
+  std::vector<std::map<std::size_t, std::size_t>> links_to_component(nodes);
   for (const Lattice::Spring& spring : springs) {
-    if (has_support[spring.b] != 0) ++leads_to[spring.a][components[spring.b]];
-    if (has_support[spring.a] != 0) ++leads_to[spring.b][components[spring.a]];
+    if (has_support[spring.b] != 0) ++links_to_component[spring.a][components[spring.b]];
+    if (has_support[spring.a] != 0) ++links_to_component[spring.b][components[spring.a]];
   }
   const auto main_component = [&](std::size_t node) -> std::optional<std::size_t> {
-    if (leads_to[node].empty()) return std::nullopt;
-    return std::ranges::max_element(leads_to[node], {}, [](const auto& p) { return p.second; })
+    if (links_to_component[node].empty()) return std::nullopt;
+    return std::ranges::max_element(links_to_component[node], {},
+                                    [](const auto& p) { return p.second; })
         ->first;
   };
   std::vector<Lattice::Spring> kept;
@@ -195,11 +198,11 @@ void keep_confirmed(std::size_t nodes, double min_closing, std::vector<Lattice::
     const auto [a, b] = std::pair{springs[s].a, springs[s].b};
     const bool supported_a = has_support[a] != 0;
     const bool supported_b = has_support[b] != 0;
-    const bool keep = closes[s] > min_closing ||
-                      (!supported_a && supported_b && main_component(a) == components[b]) ||
-                      (supported_a && !supported_b && main_component(b) == components[a]) ||
-                      (!supported_a && !supported_b && !main_component(a) && !main_component(b));
-    if (keep) kept.push_back(springs[s]);
+    const bool is_kept = closes[s] > min_closing ||
+                         (!supported_a && supported_b && main_component(a) == components[b]) ||
+                         (supported_a && !supported_b && main_component(b) == components[a]) ||
+                         (!supported_a && !supported_b && !main_component(a) && !main_component(b));
+    if (is_kept) kept.push_back(springs[s]);
   }
   springs = std::move(kept);
 }

@@ -27,8 +27,8 @@ std::vector<std::vector<std::size_t>> members_of(const std::vector<std::size_t>&
   return members;
 }
 
-/// Headings from the springs whose views agree best: a spanning tree of least disagreement. The
-/// first view of each component has heading 0.
+/// Sets headings along the springs whose views agree best: a spanning tree of least disagreement.
+/// The first view of each component has heading 0.
 void set_headings(const LatticeGraph& graph, std::span<const Lattice::Spring> springs,
                   std::vector<Pose2>& poses) {
   using Open = std::tuple<double, std::size_t, std::size_t>;  // disagreement, spring, node
@@ -60,7 +60,8 @@ void set_headings(const LatticeGraph& graph, std::span<const Lattice::Spring> sp
   }
 }
 
-/// Points whose ways to each other stand for all others: each is the farthest from those before.
+/// Chooses landmarks, each the farthest from those before, and appends their distances to all
+/// nodes.
 std::vector<std::size_t> choose_landmarks(const LatticeGraph& graph, std::size_t count,
                                           std::vector<double>& distances) {
   std::vector<std::size_t> landmarks;
@@ -77,13 +78,13 @@ std::vector<std::size_t> choose_landmarks(const LatticeGraph& graph, std::size_t
   return landmarks;
 }
 
-/// Turns, and mirrors if that fits better, the positions of one component until its springs point
-/// where the views say. False when no spring points anywhere.
-bool turn_to_directions(const std::vector<std::size_t>& members,
-                        const std::vector<std::size_t>& components,
-                        std::span<const Lattice::Spring> springs, std::vector<Pose2>& poses) {
-  std::vector<Point2> laid_out;
-  std::vector<Point2> seen;
+/// Rotates, and mirrors if that fits better, the positions of one component to the directions of
+/// its springs. False when no spring has a direction.
+bool align_to_directions(const std::vector<std::size_t>& members,
+                         const std::vector<std::size_t>& components,
+                         std::span<const Lattice::Spring> springs, std::vector<Pose2>& poses) {
+  std::vector<Point2> layout;
+  std::vector<Point2> measured;
   const std::size_t component = components[members.front()];
   for (const Lattice::Spring& spring : springs) {
     if (components[spring.a] != component || !spring.phases || !spring.phases->has_direction)
@@ -93,14 +94,14 @@ bool turn_to_directions(const std::vector<std::size_t>& members,
     const double length = distance(a.position(), b.position());
     if (!(length > 0.0)) continue;
     const double world_rad = a.heading_rad + spring.phases->direction_a_rad;
-    // Both ways, so that neither set has a centre of its own.
+    // Both signs, so that both sets are centred on 0.
     for (const double sign : {1.0, -1.0}) {
-      laid_out.push_back({sign * (b.x_m - a.x_m) / length, sign * (b.y_m - a.y_m) / length});
-      seen.push_back({sign * std::cos(world_rad), sign * std::sin(world_rad)});
+      layout.push_back({sign * (b.x_m - a.x_m) / length, sign * (b.y_m - a.y_m) / length});
+      measured.push_back({sign * std::cos(world_rad), sign * std::sin(world_rad)});
     }
   }
-  if (seen.empty()) return false;
-  const Alignment turned = align(laid_out, seen, {.allow_reflection = true});
+  if (measured.empty()) return false;
+  const Alignment turned = align(layout, measured, {.allow_reflection = true});
   for (const std::size_t node : members) {
     const Point2 p = turned.apply(poses[node].position());
     poses[node].x_m = p.x_m;
@@ -135,7 +136,7 @@ LatticeStart lay_out_by_springs(std::size_t nodes, std::span<const Lattice::Spri
       start.poses[members[i]].y_m = points[i].y_m;
     }
     start.handedness_known.push_back(
-        turn_to_directions(members, start.components, springs, start.poses) ? 1 : 0);
+        align_to_directions(members, start.components, springs, start.poses) ? 1 : 0);
   }
   return start;
 }
@@ -153,9 +154,9 @@ bool is_compatible(const PhaseReading& phases, const CoarseMotion& motion) {
 
 LatticeStart lay_out_by_motion(std::size_t nodes, std::span<const NodeMotion> motions,
                                std::span<const Lattice::Spring> springs) {
-  std::map<std::pair<std::size_t, std::size_t>, const Lattice::Spring*> seen;
+  std::map<std::pair<std::size_t, std::size_t>, const Lattice::Spring*> spring_between;
   for (const Lattice::Spring& spring : springs) {
-    if (spring.phases) seen[{spring.a, spring.b}] = &spring;
+    if (spring.phases) spring_between[{spring.a, spring.b}] = &spring;
   }
   std::vector<GraphEdge> edges;
   for (const auto& motion : motions) edges.push_back({motion.a, motion.b, 1.0});
@@ -165,7 +166,7 @@ LatticeStart lay_out_by_motion(std::size_t nodes, std::span<const NodeMotion> mo
   start.handedness_known.assign(members_of(start.components).size(), 0);
   for (std::size_t first = 0; first < nodes; ++first) {
     if (done[first] != 0) continue;
-    // Breadth first: as few steps as can be add up their errors.
+    // Breadth first, so that errors of as few steps as possible add up.
     std::queue<std::size_t> open;
     open.push(first);
     done[first] = 1;
@@ -176,8 +177,8 @@ LatticeStart lay_out_by_motion(std::size_t nodes, std::span<const NodeMotion> mo
         if (done[neighbour.node] != 0) continue;
         const NodeMotion& moved = motions[neighbour.edge];
         Pose2 step = moved.motion.step;  // in the frame of the motion's first node
-        const auto found = seen.find(std::minmax(moved.a, moved.b));
-        if (found != seen.end()) {
+        const auto found = spring_between.find(std::minmax(moved.a, moved.b));
+        if (found != spring_between.end()) {
           const Lattice::Spring& spring = *found->second;
           const PhaseReading phases =
               moved.a == spring.a ? *spring.phases : spring.phases->reversed();

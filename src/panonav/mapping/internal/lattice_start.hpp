@@ -15,7 +15,7 @@ struct NodeMotion {
   CoarseMotion motion;
 };
 
-/// Where relaxing starts.
+/// The poses from which relaxation starts.
 struct LatticeStart {
   std::vector<Pose2> poses;
   std::vector<std::size_t> components;          ///< number of each node's component
@@ -23,19 +23,18 @@ struct LatticeStart {
 };
 
 /// Lays out `nodes` views by the rest lengths of the springs: multidimensional scaling of the
-/// shortest ways, component by component; headings along the springs whose views agree best; the
+/// shortest paths, component by component; headings along the springs whose views agree best; the
 /// mirror image that fits the directions better. Cost: landmarks * (springs log n) + landmarks^3.
 [[nodiscard]] LatticeStart lay_out_by_springs(std::size_t nodes,
                                               std::span<const Lattice::Spring> springs,
                                               int landmarks);
 
-/// Follows the motions from node to node, component by component; where a spring of `springs` joins
-/// the same two nodes and what its phases say is compatible with the motion, it gives turn and
-/// direction.
+/// Follows the motions from node to node, component by component; a spring between the same two
+/// nodes gives turn and direction where its phases are compatible with the motion.
 [[nodiscard]] LatticeStart lay_out_by_motion(std::size_t nodes, std::span<const NodeMotion> motions,
                                              std::span<const Lattice::Spring> springs);
 
-/// Whether what the phases say lies within three deviations of the motion.
+/// True if the phases lie within three deviations of the motion.
 [[nodiscard]] bool is_compatible(const PhaseReading& phases, const CoarseMotion& motion);
 
 }  // namespace panonav

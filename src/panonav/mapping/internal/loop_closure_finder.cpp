@@ -11,11 +11,11 @@ namespace panonav {
 
 namespace {
 
-/// Views that are searched for each place: several of one place are found.
+/// Views searched for each place, as several of one place are found.
 constexpr int views_per_candidate = 4;
-/// Of the shortest loop; candidates nearer to each other along the path are one place.
+/// Share of the shortest loop within which candidates along the path are one place.
 constexpr double place_share_of_loop = 0.25;
-/// Share of the drift per metre that is left where closures have been found since.
+/// Share of the drift per metre that remains where closures have been found since.
 constexpr double drift_share_within_closed = 0.2;
 /// Error of odometry over a metre or two, as a share of the path.
 constexpr double local_drift = 0.1;
@@ -59,8 +59,8 @@ LoopClosureFinder::LoopClosureFinder(const VisualMemory& memory, const LoopClosu
   odometry_.max_residual = options.max_residual;
 }
 
-std::vector<ViewId> LoopClosureFinder::excluded_for(std::span<const PassedNode> nodes,
-                                                    std::size_t node) const {
+std::vector<ViewId> LoopClosureFinder::find_excluded(std::span<const PassedNode> nodes,
+                                                     std::size_t node) const {
   std::vector<ViewId> views;
   if (scope_ == ClosureScope::other_components) {
     for (const PassedNode& other : nodes) {
@@ -68,14 +68,14 @@ std::vector<ViewId> LoopClosureFinder::excluded_for(std::span<const PassedNode> 
     }
     return views;
   }
-  const double here_m = nodes[node].way_m;
+  const double here_m = nodes[node].path_m;
   for (std::size_t i = node;; --i) {
-    if (here_m - nodes[i].way_m > options_.min_loop_m) break;
+    if (here_m - nodes[i].path_m > options_.min_loop_m) break;
     views.push_back(nodes[i].view);
     if (i == 0) break;
   }
   for (std::size_t i = node + 1; i < nodes.size(); ++i) {
-    if (nodes[i].way_m - here_m > options_.min_loop_m) break;
+    if (nodes[i].path_m - here_m > options_.min_loop_m) break;
     views.push_back(nodes[i].view);
   }
   return views;
@@ -109,27 +109,27 @@ std::optional<LoopClosure> LoopClosureFinder::compare(std::size_t earlier, std::
   return LoopClosure{earlier, later, there->before_from_after, there->residual};
 }
 
-std::optional<LoopClosure> LoopClosureFinder::best_closure(std::span<const PassedNode> nodes,
-                                                           std::span<const Pose2> poses,
-                                                           const OdometryView& view) const {
+std::optional<LoopClosure> LoopClosureFinder::find_best_closure(std::span<const PassedNode> nodes,
+                                                                std::span<const Pose2> poses,
+                                                                const OdometryView& view) const {
   const std::size_t here = nodes.size() - 1;
-  const auto excluded = excluded_for(nodes, here);
+  const auto excluded = find_excluded(nodes, here);
   const auto found = memory_->search(memory_->packed(nodes[here].view),
                                      {.top = options_.candidates * views_per_candidate},
                                      {.excluded_views = excluded});
-  std::vector<std::size_t> looked_at;
+  std::vector<std::size_t> compared;
   std::vector<LoopClosure> closures;
   for (const Match& match : found.matches) {
     const auto candidate = node_of(nodes, match.view);
     if (!candidate) continue;
-    // Of neighbours on the way the first, which is the most similar, stands for the place.
-    const bool known = std::ranges::any_of(looked_at, [&](std::size_t i) {
-      return std::abs(nodes[i].way_m - nodes[*candidate].way_m) <
+    // The first of neighbours along the path, the most similar one, represents the place.
+    const bool known = std::ranges::any_of(compared, [&](std::size_t i) {
+      return std::abs(nodes[i].path_m - nodes[*candidate].path_m) <
              place_share_of_loop * options_.min_loop_m;
     });
     if (known) continue;
-    if (static_cast<int>(looked_at.size()) == options_.candidates) break;
-    looked_at.push_back(*candidate);
+    if (static_cast<int>(compared.size()) == options_.candidates) break;
+    compared.push_back(*candidate);
     const auto closure =
         compare(*candidate, here, OdometryView(memory_->signature(match.view)), view);
     if (closure) closures.push_back(*closure);
@@ -138,7 +138,7 @@ std::optional<LoopClosure> LoopClosureFinder::best_closure(std::span<const Passe
   const LoopClosure& best = *std::ranges::min_element(closures, {}, &LoopClosure::residual);
   const Pose2 place = poses[best.earlier] * best.earlier_from_later;
   const bool ambiguous = std::ranges::any_of(closures, [&](const LoopClosure& other) {
-    // Another passage through the same place speaks for it, not against.
+    // Another passage through the same place is no contradiction.
     return other.residual < options_.distinctness * best.residual &&
            gap(place, poses[other.earlier] * other.earlier_from_later) >
                options_.max_length * odometry_.scale_m;
@@ -150,14 +150,14 @@ std::optional<LoopClosure> LoopClosureFinder::best_closure(std::span<const Passe
 bool LoopClosureFinder::is_reciprocal(std::span<const PassedNode> nodes,
                                       std::span<const Pose2> poses,
                                       const LoopClosure& closure) const {
-  const auto excluded = excluded_for(nodes, closure.earlier);
+  const auto excluded = find_excluded(nodes, closure.earlier);
   const auto found =
       memory_->search(memory_->packed(nodes[closure.earlier].view),
                       {.top = options_.reciprocal_rank}, {.excluded_views = excluded});
   return std::ranges::any_of(found.matches, [&](const Match& match) {
     const auto node = node_of(nodes, match.view);
     if (!node) return false;
-    return nodes[closure.later].way_m - nodes[*node].way_m < options_.min_loop_m ||
+    return nodes[closure.later].path_m - nodes[*node].path_m < options_.min_loop_m ||
            (nodes[*node].component == nodes[closure.earlier].component &&
             gap(poses[*node], poses[closure.earlier]) < options_.max_length * odometry_.scale_m);
   });
@@ -167,9 +167,9 @@ bool LoopClosureFinder::is_in_reach(std::span<const PassedNode> nodes, std::span
                                     const LoopClosure& closure) const {
   // No drift leads from one connected component to another.
   if (nodes[closure.earlier].component != nodes[closure.later].component) return true;
-  const double here_m = nodes[closure.later].way_m;
-  const double loop_m = here_m - nodes[closure.earlier].way_m;
-  const double since_m = std::min(loop_m, here_m - closed_way_m_);
+  const double here_m = nodes[closure.later].path_m;
+  const double loop_m = here_m - nodes[closure.earlier].path_m;
+  const double since_m = std::min(loop_m, here_m - last_closure_path_m_);
   const double allowed_m =
       odometry_.scale_m +
       options_.max_drift * (since_m + drift_share_within_closed * (loop_m - since_m));
@@ -183,12 +183,12 @@ bool LoopClosureFinder::is_in_reach(std::span<const PassedNode> nodes, std::span
 
 bool LoopClosureFinder::agree(const LoopClosure& a, const LoopClosure& b,
                               std::span<const Pose2> poses) const {
-  // From a's later node to b's: along the way, and through the earlier passage.
+  // The motion from a's later node to b's: along the path, and through the earlier passage.
   const Pose2 along = inverse(poses[a.later]) * poses[b.later];
   const Pose2 across = inverse(a.earlier_from_later) *
                        (inverse(poses[a.earlier]) * poses[b.earlier]) * b.earlier_from_later;
   const Pose2 difference = inverse(along) * across;
-  // What views leave unexplained shortens the displacement between them.
+  // Residuals shorten the displacement between views.
   const double allowed_m =
       (options_.return_tolerance + a.residual + b.residual) * odometry_.scale_m +
       local_drift * std::hypot(along.x_m, along.y_m);
@@ -203,10 +203,10 @@ std::vector<LoopClosure> LoopClosureFinder::find(std::span<const PassedNode> nod
           static_cast<double>(poses.size()), "as many as nodes, and at least one");
   odometry_.scale_m = scale_m;
   const std::size_t here = nodes.size() - 1;
-  // Views may fail a check within a sequence.
+  // Single views of a sequence may fail a check.
   const auto oldest = static_cast<std::size_t>(2 * options_.sequence);
   while (!pending_.empty() && here - pending_.front().closure.later > oldest) pending_.pop_front();
-  const auto closure = best_closure(nodes, poses, view);
+  const auto closure = find_best_closure(nodes, poses, view);
   if (!closure || !is_in_reach(nodes, poses, *closure) || !is_reciprocal(nodes, poses, *closure)) {
     return {};
   }
@@ -218,15 +218,15 @@ std::vector<LoopClosure> LoopClosureFinder::find(std::span<const PassedNode> nod
   }
   std::vector<LoopClosure> certain;
   if (static_cast<int>(agreeing.size()) < options_.sequence) return certain;
-  const double here_m = nodes[here].way_m;
-  if (continues && here_m - closed_way_m_ < options_.spacing_m) return certain;
-  // Where a passage begins, every view of the sequence counts; later the latest does.
+  const double here_m = nodes[here].path_m;
+  if (continues && here_m - last_closure_path_m_ < options_.spacing_m) return certain;
+  // At the begin of a passage every view of the sequence counts; later only the latest.
   for (Pending* pending : agreeing) {
     if (continues && pending != agreeing.back()) continue;
     certain.push_back(pending->closure);
     pending->reported = true;
   }
-  closed_way_m_ = here_m;
+  last_closure_path_m_ = here_m;
   return certain;
 }
 

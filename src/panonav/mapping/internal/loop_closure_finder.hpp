@@ -12,14 +12,14 @@
 
 namespace panonav {
 
-/// A node of the map for the search for closures.
+/// A node of the map in the search for closures.
 struct PassedNode {
   ViewId view;                ///< an id of the memory
-  double way_m = 0.0;         ///< along the way of the robot from its first view to here
+  double path_m = 0.0;        ///< path length of the robot from its first view
   std::size_t component = 0;  ///< its connected component, in whose frame its pose is
 };
 
-/// Among which nodes the finder looks.
+/// The nodes among which closures are searched.
 enum class ClosureScope {
   everywhere,        ///< all nodes of the map
   other_components,  ///< not in the connected component of the latest node
@@ -27,7 +27,7 @@ enum class ClosureScope {
 
 /// Finds loop closures while the robot drives. Candidates come from the memory's search. Home
 /// vectors in both directions must agree with the compass and be each other's inverse; the search
-/// from the candidate must lead back to here; no other place may explain the view as well; the
+/// from the candidate must find the present view; no other place may explain the view as well; the
 /// drift of the odometry must allow it; and a sequence of views must agree.
 class LoopClosureFinder {
  public:
@@ -36,19 +36,19 @@ class LoopClosureFinder {
                     const VisualOdometryOptions& odometry,
                     ClosureScope scope = ClosureScope::everywhere);
 
-  /// The last of `nodes` is new and its view is in the memory; `poses` is the map so far, by which
-  /// places are told from each other and the sequence is judged. `scale_m` as of the odometry.
-  /// Returns the closures that have become certain with this view: none, or those of the whole
-  /// sequence. Throws ContractError on different numbers of nodes and poses. Cost: two searches of
-  /// the memory and, where there are candidates, 0.3 ms for each.
+  /// Returns the closures that have become certain with the last of `nodes`, whose view is new in
+  /// the memory: none, or those of the whole sequence. `poses`: of the map so far, by which places
+  /// are distinguished and the sequence is checked. `scale_m` as of the odometry. Throws
+  /// ContractError on different numbers of nodes and poses. Cost: two searches of the memory and,
+  /// where there are candidates, 0.3 ms for each.
   [[nodiscard]] std::vector<LoopClosure> find(std::span<const PassedNode> nodes,
                                               std::span<const Pose2> poses,
                                               const OdometryView& view, double scale_m);
 
  private:
-  [[nodiscard]] std::optional<LoopClosure> best_closure(std::span<const PassedNode> nodes,
-                                                        std::span<const Pose2> poses,
-                                                        const OdometryView& view) const;
+  [[nodiscard]] std::optional<LoopClosure> find_best_closure(std::span<const PassedNode> nodes,
+                                                             std::span<const Pose2> poses,
+                                                             const OdometryView& view) const;
   [[nodiscard]] std::optional<LoopClosure> compare(std::size_t earlier, std::size_t later,
                                                    const OdometryView& earlier_view,
                                                    const OdometryView& later_view) const;
@@ -58,9 +58,9 @@ class LoopClosureFinder {
                                  const LoopClosure& closure) const;
   [[nodiscard]] bool agree(const LoopClosure& a, const LoopClosure& b,
                            std::span<const Pose2> poses) const;
-  /// Views that are no candidates for a closure with the node.
-  [[nodiscard]] std::vector<ViewId> excluded_for(std::span<const PassedNode> nodes,
-                                                 std::size_t node) const;
+  /// Returns the views that are no candidates for a closure with the node.
+  [[nodiscard]] std::vector<ViewId> find_excluded(std::span<const PassedNode> nodes,
+                                                  std::size_t node) const;
   [[nodiscard]] std::optional<std::size_t> node_of(std::span<const PassedNode> nodes,
                                                    ViewId view) const;
 
@@ -68,7 +68,7 @@ class LoopClosureFinder {
   LoopClosureOptions options_;
   VisualOdometryOptions odometry_;
   ClosureScope scope_;
-  double closed_way_m_ = 0.0;  // where the last closure was
+  double last_closure_path_m_ = 0.0;  // path length at the last closure
   struct Pending {
     LoopClosure closure;
     bool reported = false;

@@ -43,12 +43,12 @@ NodeMotions::NodeMotions(const VisualMemory& memory, std::span<const CoarseMotio
   }
 }
 
-const NodeMotion* NodeMotions::between(NodePair pair) const {
+const NodeMotion* NodeMotions::find(NodePair pair) const {
   const auto found = first_.find(pair);
   return found == first_.end() ? nullptr : &motions_[found->second];
 }
 
-bool NodeMotions::connect(std::size_t nodes) const {
+bool NodeMotions::connect_all(std::size_t nodes) const {
   if (motions_.empty()) return false;
   std::vector<GraphEdge> edges;
   for (const NodeMotion& motion : motions_) edges.push_back({motion.a, motion.b, 1.0});
@@ -57,7 +57,7 @@ bool NodeMotions::connect(std::size_t nodes) const {
 }
 
 std::optional<HeadingWindow> NodeMotions::heading_between(NodePair pair) const {
-  const NodeMotion* moved = between(pair);
+  const NodeMotion* moved = find(pair);
   if (moved == nullptr) return std::nullopt;
   const double turn_rad = moved->motion.step.heading_rad;
   return HeadingWindow{
@@ -66,7 +66,7 @@ std::optional<HeadingWindow> NodeMotions::heading_between(NodePair pair) const {
           std::min(std::numbers::pi, max_heading_deviations * moved->motion.turn_deviation_rad))};
 }
 
-std::vector<SpringTerm> NodeMotions::terms() const {
+std::vector<SpringTerm> NodeMotions::spring_terms() const {
   std::vector<SpringTerm> terms;
   for (const NodeMotion& moved : motions_) {
     const CoarseMotion& motion = moved.motion;
@@ -75,7 +75,7 @@ std::vector<SpringTerm> NodeMotions::terms() const {
                     .length = travel(moved),
                     .length_deviation = motion.distance_deviation_m,
                     .turn = SpringTurn{motion.step.heading_rad, motion.turn_deviation_rad},
-                    .certain = true};
+                    .is_certain = true};
     if (term.length > 0.0) {
       term.direction = SpringDirection{std::atan2(motion.step.y_m, motion.step.x_m), std::nullopt,
                                        motion.direction_deviation_rad};
@@ -85,7 +85,7 @@ std::vector<SpringTerm> NodeMotions::terms() const {
   return terms;
 }
 
-std::optional<double> NodeMotions::scale_of(std::span<const Pose2> poses) const {
+std::optional<double> NodeMotions::layout_scale(std::span<const Pose2> poses) const {
   double moved = 0.0;
   double laid = 0.0;
   for (const NodeMotion& motion : motions_) {

@@ -9,11 +9,11 @@ namespace panonav {
 
 namespace {
 
-/// Correlation of both views in component k, and the energies of each.
+/// Correlation of both views in one component, and the energy of each.
 struct Coherence {
   float common = 0.0F, home = 0.0F, current = 0.0F;
 };
-Coherence coherence_of(PairCoefficients& c, int k, std::size_t rows) {
+Coherence sum_coherence(PairCoefficients& c, int k, std::size_t rows) {
   const float* const ha = c.home_a(k);
   const float* const hb = c.home_b(k);
   const float* const ca = c.current_a(k);
@@ -29,13 +29,13 @@ Coherence coherence_of(PairCoefficients& c, int k, std::size_t rows) {
 
 /// Returns the Gaussian exp(-k^2 / (2 width^2)) that is nearest to the coherences in least squares,
 /// up to its height: noise lowers all coherences, distance the high ones first. One row gives
-/// little more than a sign for each frequency, so only one number is asked of all of them.
+/// little more than a sign for each frequency, so only the width is fitted to all of them.
 PerFrequency fit_gaussian(const PerFrequency& coherences, int highest) {
   PerFrequency best{};
-  double most = -std::numeric_limits<double>::infinity();
-  constexpr double narrowest = 1.5;    // the first frequency counts four fifths
+  double best_gain = -std::numeric_limits<double>::infinity();
+  constexpr double min_width = 1.5;    // the first frequency counts four fifths
   constexpr double width_step = 1.19;  // a quarter of an octave
-  for (double width = narrowest; width < 3.0 * highest; width *= width_step) {
+  for (double width = min_width; width < 3.0 * highest; width *= width_step) {
     PerFrequency gaussian{};
     const double step = std::exp(-0.5 / (width * width));
     double value = step;
@@ -51,8 +51,8 @@ PerFrequency fit_gaussian(const PerFrequency& coherences, int highest) {
       ratio *= step * step;
     }
     const double gain = common / std::sqrt(square);
-    if (gain > most) {
-      most = gain;
+    if (gain > best_gain) {
+      best_gain = gain;
       best = gaussian;
     }
   }
@@ -62,13 +62,13 @@ PerFrequency fit_gaussian(const PerFrequency& coherences, int highest) {
 /// Divides weights by amplitudes; their sum stays. `power`: the mean of the powers.
 void whiten_weights(PerFrequency& weights, const PerFrequency& powers, double power, int highest) {
   if (!(power > 0.0)) return;
-  constexpr double faint = 0.02;  // of the mean: fainter ones are mostly noise
+  constexpr double noise_share = 0.02;  // of the mean power: weaker components are mostly noise
   double before = 0.0;
   double after = 0.0;
   for (int k = 1; k <= highest; ++k) {
     const auto i = static_cast<std::size_t>(k);
     before += weights[i];
-    weights[i] /= std::sqrt(powers[i] / power + faint);
+    weights[i] /= std::sqrt(powers[i] / power + noise_share);
     after += weights[i];
   }
   for (int k = 1; k <= highest; ++k) weights[static_cast<std::size_t>(k)] *= before / after;
@@ -82,9 +82,11 @@ PerFrequency weigh_components(PairCoefficients& coefficients, int highest, std::
   double power = 0.0;
   for (int k = 1; k <= highest; ++k) {
     const auto i = static_cast<std::size_t>(k);
-    const Coherence sum = coherence_of(coefficients, k, rows);
-    const float most = std::sqrt(sum.home) * std::sqrt(sum.current);
-    if (most > 0.0F) coherences[i] = static_cast<double>(sum.common / most);
+    const Coherence sum = sum_coherence(coefficients, k, rows);
+    const float max_correlation = std::sqrt(sum.home) * std::sqrt(sum.current);
+    if (max_correlation > 0.0F) {
+      coherences[i] = static_cast<double>(sum.common / max_correlation);
+    }
     powers[i] = static_cast<double>(sum.home + sum.current);
     power += powers[i] / highest;
   }
@@ -113,9 +115,10 @@ std::vector<float> weigh_rows(PairCoefficients& coefficients, int highest, std::
   constexpr double min_weight = 0.05;  // no row is left out, so that a bad compass can recover
   std::vector<float> result(rows);
   for (std::size_t y = 0; y < rows; ++y) {
-    const double most = std::sqrt(home[y]) * std::sqrt(current[y]);
-    result[y] =
-        static_cast<float>(most > 0.0 ? std::clamp(common[y] / most, min_weight, 1.0) : min_weight);
+    const double max_correlation = std::sqrt(home[y]) * std::sqrt(current[y]);
+    result[y] = static_cast<float>(max_correlation > 0.0
+                                       ? std::clamp(common[y] / max_correlation, min_weight, 1.0)
+                                       : min_weight);
   }
   return result;
 }

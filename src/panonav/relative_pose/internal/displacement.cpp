@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <numbers>
 #include <vector>
 
@@ -13,43 +14,45 @@ namespace panonav {
 
 namespace {
 
+/// Frequencies of the tables, 0 included.
 constexpr std::size_t size = max_displaced_frequencies + 1;
 
-// Displacements by n rings must leave n^2 % less than none.
-// Chosen between 0, 1 and 3 % on the arena (seed 501), the lab and the office (seed 901).
+/// Share by which displacements by one ring must differ less than none; by n rings n^2 times it.
+/// Chosen between 0, 1 and 3 % on the arena (seed 501), the lab and the office (seed 901).
 constexpr float far_penalty = 0.01F;
 
-double radius(int ring) {
+double ring_radius(int ring) {
   return ring / 6.0;
 }
 
-// What a displacement straight ahead does to cosines and to sines. The expected image is
-// symmetrical about the direction of the displacement, so neither becomes the other. Row m, column
-// k: the part of frequency k of the view in frequency m of the expected image.
-struct Operator {
+/// The effect of a displacement straight ahead on cosines and on sines. The expected image is
+/// symmetrical about the direction of the displacement, so they do not mix. Row m, column k: the
+/// part of frequency k of the view in frequency m of the expected image.
+struct DisplacementMatrix {
   std::array<float, size * size> cosines{};
   std::array<float, size * size> sines{};
 };
 
 struct Tables {
-  std::array<Operator, Displacement::rings> operators;
-  // cos and sin of k times each direction.
+  std::array<DisplacementMatrix, Displacement::rings> matrices;
+  // Cosine and sine of k times each direction.
   std::array<std::array<float, size>, Displacement::directions> cosines{};
   std::array<std::array<float, size>, Displacement::directions> sines{};
 };
 
-void fill(Operator& filled, double rho) {
+// Integrates the matrix of a displacement by rho [S06 eq. 3].
+void fill_matrix(DisplacementMatrix& matrix, double rho) {
   constexpr std::size_t points = 4 * size;  // exact for products of two frequencies, nearly
   std::vector<float> from_cosine(points * size), from_sine(points * size);
   std::vector<float> to_cosine(points * size), to_sine(points * size);
   for (std::size_t i = 0; i < points; ++i) {
     const double phi =
         2.0 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(points);
-    const double seen = phi - std::asin(rho * std::sin(phi));
+    const double source = phi - std::asin(rho * std::sin(phi));
     for (std::size_t k = 0; k < size; ++k) {
       const auto frequency = static_cast<double>(k);
-      from_cosine[i * size + k] = static_cast<float>(std::cos(frequency * seen));
-      from_sine[i * size + k] = static_cast<float>(std::sin(frequency * seen));
+      from_cosine[i * size + k] = static_cast<float>(std::cos(frequency * source));
+      from_sine[i * size + k] = static_cast<float>(std::sin(frequency * source));
       to_cosine[i * size + k] = static_cast<float>(std::cos(frequency * phi));
       to_sine[i * size + k] = static_cast<float>(std::sin(frequency * phi));
     }
@@ -59,9 +62,9 @@ void fill(Operator& filled, double rho) {
     for (std::size_t m = 1; m < size; ++m) {
       const float c = share * to_cosine[i * size + m];
       const float s = share * to_sine[i * size + m];
-      float* const cosines = filled.cosines.data() + m * size;
-      float* const sines = filled.sines.data() + m * size;
-      // Frequency 0 of a view shows nothing, wherever it is seen from.
+      float* const cosines = matrix.cosines.data() + m * size;
+      float* const sines = matrix.sines.data() + m * size;
+      // Frequency 0 of a view shows no structure.
       for (std::size_t k = 1; k < size; ++k) {
         cosines[k] += c * from_cosine[i * size + k];
         sines[k] += s * from_sine[i * size + k];
@@ -71,28 +74,28 @@ void fill(Operator& filled, double rho) {
 }
 
 const Tables& tables() {
-  static const std::vector<Tables> made = [] {
-    std::vector<Tables> one(1);
+  static const std::unique_ptr<const Tables> made = [] {
+    auto tables = std::make_unique<Tables>();
     for (int ring = 1; ring <= Displacement::rings; ++ring) {
-      fill(one[0].operators[static_cast<std::size_t>(ring - 1)], radius(ring));
+      fill_matrix(tables->matrices[static_cast<std::size_t>(ring - 1)], ring_radius(ring));
     }
     for (std::size_t d = 0; d < Displacement::directions; ++d) {
       for (std::size_t k = 0; k < size; ++k) {
         const double angle = 2.0 * std::numbers::pi * static_cast<double>(d * k) /
                              static_cast<double>(Displacement::directions);
-        one[0].cosines[d][k] = static_cast<float>(std::cos(angle));
-        one[0].sines[d][k] = static_cast<float>(std::sin(angle));
+        tables->cosines[d][k] = static_cast<float>(std::cos(angle));
+        tables->sines[d][k] = static_cast<float>(std::sin(angle));
       }
     }
-    return one;
+    return tables;
   }();
-  return made[0];
+  return *made;
 }
 
 }  // namespace
 
 double Displacement::length() const noexcept {
-  return radius(ring);
+  return ring_radius(ring);
 }
 
 double Displacement::direction_rad() const noexcept {
@@ -112,10 +115,10 @@ void displace(Displacement displacement, std::span<const float> from_a,
     return;
   }
   const Tables& all = tables();
-  const Operator& moved = all.operators[static_cast<std::size_t>(displacement.ring - 1)];
+  const DisplacementMatrix& matrix = all.matrices[static_cast<std::size_t>(displacement.ring - 1)];
   const auto& cosine = all.cosines[static_cast<std::size_t>(displacement.direction)];
   const auto& sine = all.sines[static_cast<std::size_t>(displacement.direction)];
-  // As if the robot had turned into the direction.
+  // In the frame of a robot that faces the direction.
   std::array<float, size> a;
   std::array<float, size> b;
   for (std::size_t k = 0; k < from; ++k) {
@@ -127,8 +130,8 @@ void displace(Displacement displacement, std::span<const float> from_a,
     to_b[0] = 0.0F;
   }
   for (std::size_t m = 1; m < to; ++m) {
-    const float* const cosines = moved.cosines.data() + m * size;
-    const float* const sines = moved.sines.data() + m * size;
+    const float* const cosines = matrix.cosines.data() + m * size;
+    const float* const sines = matrix.sines.data() + m * size;
     float moved_a = 0.0F;
     float moved_b = 0.0F;
     for (std::size_t k = 1; k < from; ++k) {
@@ -140,13 +143,13 @@ void displace(Displacement displacement, std::span<const float> from_a,
   }
 }
 
-BestDisplacement best_displacement(std::span<const float> home_a, std::span<const float> home_b,
+BestDisplacement find_displacement(std::span<const float> home_a, std::span<const float> home_b,
                                    std::span<const float> current_a,
                                    std::span<const float> current_b, int rows, int frequencies,
                                    const HeadingWindow& window) {
   const auto stride = static_cast<std::size_t>(frequencies) + 1;
   BestDisplacement best;
-  float least = std::numeric_limits<float>::infinity();
+  float min_difference = std::numeric_limits<float>::infinity();
   std::array<float, size> a;
   std::array<float, size> b;
   const auto compared = static_cast<std::size_t>(std::min(frequencies, searched_frequencies)) + 1;
@@ -178,13 +181,12 @@ BestDisplacement best_displacement(std::span<const float> home_a, std::span<cons
       }
       std::array<float, 1> turn{};
       if (find_highest_peaks(correlation, turn, window) == 0) continue;
-      // A far displacement must explain more than a near one: of two that explain the views alike
-      // the nearer is the likelier.
+      // Of two displacements that explain the views equally the nearer is more likely.
       const auto ring_square = static_cast<float>(ring * ring);
       const float difference = (home_energy + energy - 2.0F * correlation.at(turn[0])) *
                                (1.0F + far_penalty * ring_square);
-      if (difference < least) {
-        least = difference;
+      if (difference < min_difference) {
+        min_difference = difference;
         best = {displacement, turn[0]};
       }
     }
@@ -196,7 +198,7 @@ DisplacementStart find_start(const HomingView& home, const HomingView& current, 
                              const HeadingWindow& window) {
   constexpr std::size_t max_bands = 8;
   const auto rows = static_cast<std::size_t>(home.rows());
-  // The current view is known to more frequencies than are compared.
+  // Expected images need more frequencies of the current view than are compared.
   const int frequencies = std::min(known, 2 * searched_frequencies);
   const std::size_t bands = std::min(max_bands, rows);
   const auto stride = static_cast<std::size_t>(frequencies) + 1;
@@ -227,7 +229,7 @@ DisplacementStart find_start(const HomingView& home, const HomingView& current, 
              ahead_rad);
   }
   const BestDisplacement best =
-      best_displacement(part(0), part(1), part(2), part(3), static_cast<int>(bands), frequencies,
+      find_displacement(part(0), part(1), part(2), part(3), static_cast<int>(bands), frequencies,
                         {window.middle_rad - static_cast<float>(ahead_rad), window.half_width_rad});
   return {best.displacement, ahead_rad, static_cast<double>(best.turn_rad) + ahead_rad};
 }

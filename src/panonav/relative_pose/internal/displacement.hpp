@@ -8,10 +8,10 @@
 
 namespace panonav {
 
-/// One of the displacements that are tried before the least squares: the present place, or one of
-/// twelve directions at a sixth, a third, a half or two thirds of R [S06 section 3 tries about 200
-/// within two thirds]. Neighbours are at most a sixth of R apart, outwards, or 0.35 R, along the
-/// outermost ring: the least squares reach that far with the frequencies searched.
+/// One of the displacements that are tried before the least squares: none, or one of twelve
+/// directions at a sixth, a third, a half or two thirds of R [S06 section 3 tries about 200 within
+/// two thirds]. Neighbours are at most a sixth of R apart, outwards, or 0.35 R, along the outermost
+/// ring: the least squares converge that far with the frequencies searched.
 struct Displacement {
   static constexpr int rings = 4;
   static constexpr int directions = 12;
@@ -22,17 +22,17 @@ struct Displacement {
   [[nodiscard]] double direction_rad() const noexcept;
 };
 
-/// Frequencies that the search compares, at most: at half the distance between two rings, a twelfth
-/// of R, the phase of frequency 8 is off by at most 8 / 12, well within its linear range.
+/// Frequencies that the search compares at most: half way between two rings, a twelfth of R, the
+/// phase of frequency 8 is off by at most 8 / 12, well within its linear range.
 inline constexpr int searched_frequencies = 8;
 
-/// The highest frequency that `displace` can take or give.
+/// Highest frequency of `displace`.
 inline constexpr int max_displaced_frequencies = 63;
 
-/// The coefficients of the expected image [S06 eq. 3, no turn] for one row: what a robot sees there
-/// when all things are at distance R. `from_a`, `from_b`: frequencies 0 .. from_a.size() - 1 of the
-/// current view; fills as many as `to_a` holds. Frequency 0 is kept: it counts for nothing. Throws
-/// nothing. Cost: 2 from to multiplications.
+/// Computes the coefficients of the expected image [S06 eq. 3, no turn] for one row: the view at
+/// the displacement when all things are at distance R. `from_a`, `from_b`: frequencies 0 ..
+/// from_a.size() - 1 of the current view; fills all of `to_a`, `to_b`. Frequency 0 does not change.
+/// Throws nothing. Cost: 2 from to multiplications.
 void displace(Displacement displacement, std::span<const float> from_a,
               std::span<const float> from_b, std::span<float> to_a, std::span<float> to_b) noexcept;
 
@@ -42,28 +42,28 @@ struct BestDisplacement {
   float turn_rad = 0.0F;  ///< heading of home minus heading of the current view
 };
 
-/// The displacement whose expected image differs least from the home view at its best turn within
-/// the window: hs_ei [S06 section 2.2] in the Fourier domain; far ones must differ a little less
-/// than near ones. `rows` rows of `frequencies` + 1 coefficients each, one row after the other.
-/// Cost: for one row 49 expected images of 8 frequencies, about 15 microseconds; each further row
-/// adds as much as a fifth.
-[[nodiscard]] BestDisplacement best_displacement(std::span<const float> home_a,
+/// Finds the displacement whose expected image differs least from the home view at its best turn
+/// within the window: hs_ei [S06 section 2.2] in the Fourier domain; far ones must differ a little
+/// less than near ones. `rows` rows of `frequencies` + 1 coefficients each, one row after the
+/// other. Cost: for one row 49 expected images of 8 frequencies, about 15 microseconds; a fifth of
+/// that for each further row.
+[[nodiscard]] BestDisplacement find_displacement(std::span<const float> home_a,
                                                  std::span<const float> home_b,
                                                  std::span<const float> current_a,
                                                  std::span<const float> current_b, int rows,
                                                  int frequencies, const HeadingWindow& window = {});
 
-/// Where the least squares of two views start, with the heading that fits there.
+/// The start of the least squares of two views, with the heading that fits there.
 struct DisplacementStart {
   Displacement displacement;
-  double ahead_rad = 0.0;  ///< from which the displacement's direction is counted
+  double ahead_rad = 0.0;  ///< origin of the displacement's direction
   double turn_rad = 0.0;   ///< heading of home minus heading of the current view
 };
 
-/// The same for two views, whose rows are averaged to a few bands: things move less than a band up
-/// or down, and coarse structure decides. Directions are counted from where the first frequency of
-/// the current view has its maximum, so that a turn of the robot changes nothing. `known`: the
-/// highest frequency that both have.
+/// Finds the displacement between two views whose rows are averaged to a few bands: things move up
+/// or down by less than a band, and coarse structure decides. Directions are counted from the
+/// maximum of the first frequency of the current view, so that the robot's heading does not matter.
+/// `known`: the highest frequency that both have.
 [[nodiscard]] DisplacementStart find_start(const HomingView& home, const HomingView& current,
                                            int known, const HeadingWindow& window);
 

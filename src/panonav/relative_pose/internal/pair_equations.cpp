@@ -6,16 +6,17 @@ namespace panonav {
 
 namespace {
 
-// How a component changes in one row with a turn (t), a way forward and to the left (x, y), and how
-// it moves up with the same two directions (r, s); each for cosines (a) and sines (b).
+/// Derivatives of a component in one row by turn (t) and displacement forwards and to the left (x,
+/// y); each for cosines (a) and sines (b).
 struct RowSlopes {
   float ta, tb, xa, xb, ya, yb;
 };
+/// Derivatives by elevation in the same two directions (r, s).
 struct RowRises {
   float ra, rb, sa, sb;
 };
 
-// The rows of component k and of its neighbours.
+/// The rows of component k and of its neighbours.
 class ComponentRows {
  public:
   ComponentRows(PairCoefficients& c, int k)
@@ -61,8 +62,8 @@ class ComponentRows {
   float frequency_;
 };
 
-// Things off the horizon rise as the robot comes nearer.
-RowSlopes with_approach(RowSlopes slopes, const RowRises& rises, float approach) noexcept {
+// Adds that things off the horizon rise as the robot approaches.
+RowSlopes add_approach(RowSlopes slopes, const RowRises& rises, float approach) noexcept {
   slopes.xa -= approach * rises.ra;
   slopes.xb -= approach * rises.rb;
   slopes.ya -= approach * rises.sa;
@@ -83,14 +84,14 @@ void TiltEquations::add(const TiltEquations& other, double weight) noexcept {
   for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += weight * other.sums[i];
 }
 
-PairEquations pair_equations(PairCoefficients& coefficients, int k, std::size_t rows,
-                             const RowTerms& terms) {
+PairEquations sum_equations(PairCoefficients& coefficients, int k, std::size_t rows,
+                            const RowTerms& terms) {
   const ComponentRows at(coefficients, k);
   float m00 = 0, m01 = 0, m02 = 0, m11 = 0, m12 = 0, m22 = 0, v0 = 0, v1 = 0, v2 = 0, energy = 0,
         both = 0;
   for (std::size_t y = 0; y < rows; ++y) {
     RowSlopes s = at.slopes(y);
-    if (!terms.approach.empty()) s = with_approach(s, at.rises(y), terms.approach[y]);
+    if (!terms.approach.empty()) s = add_approach(s, at.rises(y), terms.approach[y]);
     const float ea = at.ha[y] - at.ca[y];
     const float eb = at.hb[y] - at.cb[y];
     const float weight = terms.weights.empty() ? 1.0F : terms.weights[y];
@@ -110,15 +111,15 @@ PairEquations pair_equations(PairCoefficients& coefficients, int k, std::size_t 
   return {{m00, m01, m02, m11, m12, m22}, {v0, v1, v2}, energy, both};
 }
 
-TiltEquations tilt_equations(PairCoefficients& coefficients, int k, std::size_t rows,
-                             const RowTerms& terms) {
+TiltEquations sum_tilt_equations(PairCoefficients& coefficients, int k, std::size_t rows,
+                                 const RowTerms& terms) {
   const ComponentRows at(coefficients, k);
   std::array<float, 11> sums{};
   for (std::size_t y = 0; y < rows; ++y) {
     const RowSlopes flat = at.slopes(y);
     const RowRises rises = at.rises(y);
     const RowSlopes s =
-        terms.approach.empty() ? flat : with_approach(flat, rises, terms.approach[y]);
+        terms.approach.empty() ? flat : add_approach(flat, rises, terms.approach[y]);
     const float pa = terms.tangent[y] * flat.xa - rises.ra;
     const float pb = terms.tangent[y] * flat.xb - rises.rb;
     const float qa = terms.tangent[y] * flat.ya - rises.sa;
@@ -143,11 +144,11 @@ TiltEquations tilt_equations(PairCoefficients& coefficients, int k, std::size_t 
   return equations;
 }
 
-PairEquations without_tilt(PairEquations equations, const TiltEquations& tilt,
-                           double certain) noexcept {
+PairEquations eliminate_tilt(PairEquations equations, const TiltEquations& tilt,
+                             double certainty) noexcept {
   const auto& s = tilt.sums;
-  const double pp = s[6] + certain;
-  const double qq = s[8] + certain;
+  const double pp = s[6] + certainty;
+  const double qq = s[8] + certainty;
   const double determinant = pp * qq - s[7] * s[7];
   if (!(determinant > 0.0)) return equations;
   const auto product = [&](double p1, double q1, double p2, double q2) {
@@ -164,21 +165,21 @@ PairEquations without_tilt(PairEquations equations, const TiltEquations& tilt,
   return equations;
 }
 
-// Cholesky's rule.
+// By Cholesky's decomposition [S06 eq. 30].
 PairSolution solve(const PairEquations& equations) noexcept {
   const auto& m = equations.matrix;
-  // Below this share of its own size a pivot is rounding.
-  constexpr double least = 1e-6;
+  // A pivot below this share of its own size is rounding.
+  constexpr double min_pivot = 1e-6;
   std::array<double, 3> d{};
   const double d0 = m[0];
   d[0] = d0 > 0.0 ? 1.0 / d0 : 0.0;
   const double l10 = m[1] * d[0];
   const double l20 = m[2] * d[0];
   const double d1 = m[3] - l10 * m[1];
-  d[1] = d1 > least * m[3] && d1 > 0.0 ? 1.0 / d1 : 0.0;
+  d[1] = d1 > min_pivot * m[3] && d1 > 0.0 ? 1.0 / d1 : 0.0;
   const double l21 = (m[4] - l20 * m[1]) * d[1];
   const double d2 = m[5] - l20 * m[2] - l21 * (m[4] - l20 * m[1]);
-  d[2] = d2 > least * m[5] && d2 > 0.0 ? 1.0 / d2 : 0.0;
+  d[2] = d2 > min_pivot * m[5] && d2 > 0.0 ? 1.0 / d2 : 0.0;
   const double y0 = equations.right[0];
   const double y1 = equations.right[1] - l10 * y0;
   const double y2 = equations.right[2] - l20 * y0 - l21 * y1;
@@ -187,7 +188,7 @@ PairSolution solve(const PairEquations& equations) noexcept {
   s.xi = y1 * d[1] - l21 * s.eta;
   s.turn = y0 * d[0] - l10 * s.xi - l20 * s.eta;
   s.explained = y0 * y0 * d[0] + y1 * y1 * d[1] + y2 * y2 * d[2];
-  // The lower right block of the inverse.
+  // The trace of the lower right block of the inverse.
   s.variance = d[1] + l21 * l21 * d[2] + d[2];
   return s;
 }

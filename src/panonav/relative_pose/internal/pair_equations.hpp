@@ -7,12 +7,10 @@
 
 #include "panonav/relative_pose/turn_correlation.hpp"
 
-// The least squares of Fourier homing: inside of fourier_homing.cpp, not for users.
-
 namespace panonav {
 
-/// What is computed for one pair of views, component-major like HomingView: component k of all rows
-/// lies together. One row lives on the stack, more rows on the heap.
+/// The coefficients of one pair of views, component-major like HomingView: those of component k of
+/// all rows are contiguous. One row is on the stack, more rows are on the heap.
 class PairCoefficients {
  public:
   PairCoefficients(std::size_t rows, std::size_t components)
@@ -20,16 +18,15 @@ class PairCoefficients {
     if (arrays * size_ > on_stack_.size()) on_heap_.resize(arrays * size_);
   }
 
-  [[nodiscard]] float* home_a(int k) noexcept {
-    return at(0, k);
-  }  ///< turned as the robot faces now
+  /// The home view, rotated to the present heading.
+  [[nodiscard]] float* home_a(int k) noexcept { return at(0, k); }
   [[nodiscard]] float* home_b(int k) noexcept { return at(1, k); }
   [[nodiscard]] float* current_a(int k) noexcept { return at(2, k); }
   [[nodiscard]] float* current_b(int k) noexcept { return at(3, k); }
-  /// The view whose slope counts.
+  /// The view whose derivatives count.
   [[nodiscard]] float* middle_a(int k) noexcept { return at(4, k); }
   [[nodiscard]] float* middle_b(int k) noexcept { return at(5, k); }
-  /// Its change with elevation.
+  /// Its derivative by elevation.
   [[nodiscard]] float* rise_a(int k) noexcept { return at(6, k); }
   [[nodiscard]] float* rise_b(int k) noexcept { return at(7, k); }
 
@@ -46,53 +43,54 @@ class PairCoefficients {
   std::vector<float> on_heap_;
 };
 
-/// Of each row, what is the same for all components.
+/// Terms of each row that are the same for all components.
 struct RowTerms {
-  std::span<const float> weights;   ///< empty: all alike
-  std::span<const float> approach;  ///< how fast things rise as the robot comes nearer; empty: not
-  std::span<const float> tangent;   ///< of the elevation; for `tilt_equations` only
+  std::span<const float> weights;   ///< empty: all equal
+  std::span<const float> approach;  ///< how fast things rise as the robot approaches; empty: 0
+  std::span<const float> tangent;   ///< of the elevation; for `sum_tilt_equations` only
 };
 
 /// Normal equations of the correction of the heading, xi and eta, in this order [S06 eq. 30].
 struct PairEquations {
   std::array<double, 6> matrix{};  ///< 00 01 02 11 12 22
   std::array<double, 3> right{};
-  double energy = 0.0;           ///< of what is to be explained
-  double energy_of_views = 0.0;  ///< of both
+  double energy = 0.0;           ///< of the difference of the views
+  double energy_of_views = 0.0;  ///< of both views
 
   void add(const PairEquations& other, double weight) noexcept;
 };
 
-/// What a tilt in two directions, P and Q, adds to them: PD Px Pe, QD Qx Qe, PP PQ QQ, right sides
-/// P Q.
+/// The additional sums of a tilt in two directions, P and Q: PD Px Pe, QD Qx Qe, PP PQ QQ, right
+/// sides P Q.
 struct TiltEquations {
   std::array<double, 11> sums{};
 
   void add(const TiltEquations& other, double weight) noexcept;
 };
 
-/// What component k of all rows contributes.
-[[nodiscard]] PairEquations pair_equations(PairCoefficients& coefficients, int k, std::size_t rows,
-                                           const RowTerms& terms);
-/// The same of a tilt of the robot, which moves things up and down by P cos phi + Q sin phi, and
+/// Sums the equations of component k over all rows [S06 eq. 17-20].
+[[nodiscard]] PairEquations sum_equations(PairCoefficients& coefficients, int k, std::size_t rows,
+                                          const RowTerms& terms);
+/// Sums those of a tilt of the robot, which moves things up and down by P cos phi + Q sin phi, and
 /// those off the horizon to the side by tan(elevation) (P sin phi - Q cos phi).
-[[nodiscard]] TiltEquations tilt_equations(PairCoefficients& coefficients, int k, std::size_t rows,
-                                           const RowTerms& terms);
+[[nodiscard]] TiltEquations sum_tilt_equations(PairCoefficients& coefficients, int k,
+                                               std::size_t rows, const RowTerms& terms);
 
-/// The normal equations once the tilt that fits best is taken out. `certain`: the inverse variance
-/// of the tilt, in units of that of an equation.
-[[nodiscard]] PairEquations without_tilt(PairEquations equations, const TiltEquations& tilt,
-                                         double certain) noexcept;
+/// Eliminates the tilt from the normal equations. `certainty`: the inverse variance of the tilt, in
+/// units of that of an equation.
+[[nodiscard]] PairEquations eliminate_tilt(PairEquations equations, const TiltEquations& tilt,
+                                           double certainty) noexcept;
 
+/// The solution of the normal equations.
 struct PairSolution {
   double turn = 0.0;
   double xi = 0.0;
   double eta = 0.0;
-  double explained = 0.0;
-  double variance = 0.0;  ///< of xi and eta, for unit variance of an equation
+  double explained = 0.0;  ///< energy
+  double variance = 0.0;   ///< of xi and eta, for unit variance of an equation
 };
 
-/// Directions in which the views tell nothing stay 0.
+/// Solves the normal equations; unknowns on which the views do not depend stay 0.
 [[nodiscard]] PairSolution solve(const PairEquations& equations) noexcept;
 
 }  // namespace panonav

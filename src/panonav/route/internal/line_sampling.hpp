@@ -5,13 +5,13 @@
 
 namespace panonav {
 
-/// A closed line between its columns.
+/// An interpolated value of a closed line.
 struct LineSample {
   float value = 0.0F;
   float slope = 0.0F;  ///< per column
 };
 
-/// The line at any column, by the cubic of Catmull and Rom.
+/// Interpolates the line at any column by the cubic of Catmull and Rom.
 [[nodiscard]] inline LineSample sample_line(std::span<const float> line, double column) {
   const double whole = std::floor(column);
   const auto f = static_cast<float>(column - whole);
@@ -19,7 +19,8 @@ struct LineSample {
   auto i = static_cast<long long>(whole);
   if (i < 0) i += size;
   if (i >= size) i -= size;
-  if (i < 0 || i >= size) i = (i % size + size) % size;  // a division, which most columns can spare
+  if (i < 0 || i >= size)
+    i = (i % size + size) % size;  // a division, which most columns do not need
   const auto at = [&](long long k) {
     long long c = i + k;
     if (c < 0) c += size;
