@@ -238,7 +238,7 @@ bool RouteContours::fill_equations(const std::vector<Term>& terms, std::size_t a
   std::vector<double> sizes;
   for (const Term& term : std::span(terms).first(along_terms)) sizes.push_back(term.deviations);
   const double noise = std::max(0.1, 1.4826 * upper_median_in_place(std::span(sizes)));
-  equations.begin();
+  equations.set_zero();
   double left = 0.0;
   double weights = 0.0;
   for (std::size_t i = 0; i < terms.size(); ++i) {

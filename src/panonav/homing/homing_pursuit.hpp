@@ -14,10 +14,9 @@ struct HomingPursuitOptions {
   enum class Strategy {
     steady,          ///< those of the home vector's options throughout
     coarse_to_fine,  ///< few frequencies first; when homing stops, more [S06 section 5]
-    /// Ours: steady. Where homing stops and the difference of the views says that this is not home,
-    /// coarse to fine from there, and at last once more as the options say. The home vector weights
-    /// frequencies by their coherence, so a wrong end is mostly a place too far from home for any
-    /// but the lowest ones.
+    /// Ours: steady first. If homing stops where the difference of the views is too large for home,
+    /// coarse to fine from there, then steady once more. Such a wrong end is mostly too far from
+    /// home for any but the lowest frequencies.
     recovering,
   };
 

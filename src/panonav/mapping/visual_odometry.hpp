@@ -18,8 +18,7 @@ struct VisualOdometryOptions {
   /// How the motion between two views is estimated.
   enum class Rule {
     /// As published: the distance is that of the signatures [F11 eq. 2], the turn that of the
-    /// compass
-    /// [F11 section 3.2], and the robot goes the way it faces at the middle of the step.
+    /// compass [F11 section 3.2], and the robot goes the way it faces at the middle of the step.
     published,
     /// Ours: the home vector [S06] from the one view to the other gives direction, turn and length.
     /// A

@@ -31,8 +31,8 @@ std::vector<CoarseMotion> motions_between(const Dataset& recording, const Visual
     const auto view = memory.find(entry.file);
     if (!view || !entry.odometry) continue;
     if (before && before->first != *view) {
-      motions.push_back(
-          coarse_motion(before->first, *view, inverse(before->second) * *entry.odometry, options));
+      motions.push_back(make_coarse_motion(before->first, *view,
+                                           inverse(before->second) * *entry.odometry, options));
     }
     before = {*view, *entry.odometry};
   }

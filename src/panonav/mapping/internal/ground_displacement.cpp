@@ -167,7 +167,7 @@ class GroundProblem {
     for (const Equation& equation : equations_) sizes_.push_back(std::abs(equation.difference));
     middle_ = upper_median_in_place(std::span(sizes_));
     const double scale = 1.4826 * middle_ + 1e-9;
-    normal.begin();
+    normal.set_zero();
     double left = 0.0;
     double weights = 0.0;
     for (const Equation& equation : equations_) {
