@@ -19,9 +19,6 @@ constexpr double sure_probability = 0.9;
 constexpr double witness_reach_spacings = 8.0;
 /// Images kept before one that is decided, and after it.
 constexpr std::size_t max_witnesses = 64;
-/// Largest difference of a reference's heading from the certain one: four times the compass's
-/// error.
-constexpr double agreeing_heading_rad = radians(20.0);
 /// Share of the expected similarity from which on a view is explained.
 constexpr double explained_share = 0.5;
 /// Spacings between images that count: nearer ones see the same.

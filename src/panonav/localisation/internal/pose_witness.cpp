@@ -18,9 +18,6 @@ constexpr double agreeing_share = 0.8;
 /// Spacings by which the images of the witnesses lie apart at least, so that they do not all see
 /// the same references.
 constexpr double min_spread_spacings = 2.0;
-/// Largest difference of their headings: above the error of the compass between neighbours, far
-/// below the quarter turn after which rooms look alike.
-constexpr double agreeing_heading_rad = radians(20.0);
 /// Error of odometry, as a share of the distance travelled: wheels that slip.
 constexpr double travel_error = 0.05;
 

@@ -3,9 +3,14 @@
 #include <optional>
 #include <span>
 
+#include "panonav/geometry/angles.hpp"
 #include "panonav/geometry/pose2.hpp"
 
 namespace panonav {
+
+/// Largest difference of two headings that agree: four times the error of the compass between
+/// neighbouring views, far below the quarter rotation after which rooms look alike.
+inline constexpr double agreeing_heading_rad = radians(20.0);
 
 /// A sure answer to one image of a run, as evidence of where another image was taken.
 struct PoseWitness {
