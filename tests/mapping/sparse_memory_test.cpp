@@ -151,7 +151,7 @@ TEST(SparseMemory, WhatWasConnectedStaysConnected) {
 TEST(SparseMemory, DegenerateMemories) {
   VisualMemory memory = empty_memory();
   EXPECT_TRUE(select_references(memory).kept.empty());
-  EXPECT_EQ(measure_loss(memory, {}).asked, 0U);
+  EXPECT_EQ(measure_loss(memory, {}).queries, 0U);
   const ToyWorld room = round_room(radius_m, 6);
   const auto view = round_room_signature(room, {});
   memory.append(view, {.name = "one"});

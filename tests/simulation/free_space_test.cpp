@@ -1,4 +1,5 @@
 #include "panonav_simulation/free_space.hpp"
+#include "panonav/motion/path.hpp"
 
 #include <gtest/gtest.h>
 
