@@ -136,7 +136,7 @@ void read_recording(Bytes bytes) {
       for (const std::string& line : recorded.warnings) {
         expect_value_or_line([&] { throw FileError("recording", line); });
       }
-      (void)read_picture(recorded.dataset.entries.front());
+      (void)read_picture(recorded.entries.front());
     });
   });
 }

@@ -1,5 +1,4 @@
 #include "panonav_simulation/free_space.hpp"
-#include "panonav/motion/path.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,6 +7,7 @@
 #include <numbers>
 
 #include "panonav/core/error.hpp"
+#include "panonav/motion/path.hpp"
 #include "panonav_simulation/internal/affine3.hpp"
 #include "panonav_simulation/internal/mesh_library.hpp"
 #include "panonav_simulation/internal/occupancy.hpp"
