@@ -83,7 +83,7 @@ Corridor make_corridor() {
   Executor executor(0);
   Corridor corridor;
   corridor.place = record(seed, executor);
-  corridor.remembered = lab::remember_for_tracking(corridor.place, executor);
+  corridor.remembered = lab::make_tracking_place(corridor.place, executor);
   corridor.clean = walks(corridor, lab::clean_condition(), executor);
   corridor.hard = walks(corridor, lab::hard_condition(), executor);
   for (const simulation::PlacedView& reference : corridor.place.references) {
@@ -99,7 +99,7 @@ std::shared_ptr<const lab::TrackingPlace> corridors_with(const Corridor& corrido
   VisualMemory memory(first.shape(), first.full_scale(), first.elevations());
   const auto append = [&](const simulation::PlacedView& view, double offset_m) {
     if (memory.size() == count) return;
-    memory.append(lab::signature_for(view.panorama, first),
+    memory.append(lab::compute_packed_signature(view.panorama, first),
                   {std::to_string(memory.size()),
                    ReferencePose{view.pose.x_m + offset_m, view.pose.y_m, view.pose.heading_rad},
                    {}});

@@ -95,7 +95,7 @@ std::vector<Sample> ask(const std::vector<BuiltPlace>& places, const BuiltPlace&
   Random random(place.recording.seed, how.one_of);
   std::vector<Point2> kept;
   const VisualMemory all =
-      lab::memory_of_references(place.recording, executor, [&](Point2 position) {
+      lab::make_memory_of_references(place.recording, executor, [&](Point2 position) {
         if (random.index(how.one_of) != 0) return false;
         kept.push_back(position);
         return true;
@@ -106,7 +106,7 @@ std::vector<Sample> ask(const std::vector<BuiltPlace>& places, const BuiltPlace&
     memory.append(truncated(all.packed(view), shape), all.info(view));
   }
   Localiser localiser(memory);
-  localiser.use_features(lab::features_of_references(place.recording, memory, executor), false);
+  localiser.use_features(lab::extract_reference_features(place.recording, memory, executor), false);
   struct Query {
     const Panorama* view;
     Whose whose;
@@ -132,8 +132,9 @@ std::vector<Sample> ask(const std::vector<BuiltPlace>& places, const BuiltPlace&
     }
   }
   return simulation::make_each(executor, asked.size(), [&](std::size_t i) {
-    const PackedSignature query = truncated(lab::signature_for(*asked[i].view, all), shape);
-    return Sample{localiser.localise(query, {}, lab::features_of_query(*asked[i].view)).evidence,
+    const PackedSignature query =
+        truncated(lab::compute_packed_signature(*asked[i].view, all), shape);
+    return Sample{localiser.localise(query, {}, lab::make_query_features(*asked[i].view)).evidence,
                   asked[i].whose, place.kind, asked[i].disturbed, asked[i].for_features};
   });
 }

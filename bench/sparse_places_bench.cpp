@@ -151,7 +151,7 @@ void compare(const std::filesystem::path& folder) {
   lab::ElsewhereExperiments{{options, alone, result}}.reproduce_leave_one_out(folder,
                                                                               std::move(rivals));
   for (const lab::ResultRow& row : result.rows) {
-    std::printf("%s: %s%s%s\n", row.what.c_str(), lab::shown_figure(row).c_str(),
+    std::printf("%s: %s%s%s\n", row.what.c_str(), lab::format_figure(row).c_str(),
                 row.over.empty() ? "" : ", ", row.over.c_str());
   }
 }

@@ -27,7 +27,7 @@ ReproductionPlan plan_f11(const Experiments& context) {
                         {10.0 * options.scenes, [=] { f11.reproduce_second_set(); }},
                         {1.0, [=] { f11.measure_step_time(); }},
                         {15.0, [=] { f11.reproduce_identical_doors(); }}};
-  for (const std::string& name : simulation::worlds_in(options.data)) {
+  for (const std::string& name : simulation::find_worlds(options.data)) {
     plan.push_back({10.0 * options.runs, [=] { f11.reproduce_world(name); }});
   }
   plan.push_back({5.0, [=] { f11.reproduce_recordings(); }});
@@ -40,7 +40,7 @@ ReproductionPlan plan_navigation(const Experiments& context) {
   require_minima({{"scenes", options.scenes, 2}, {"runs", options.runs, options.scenes}});
   NavigationExperiments navigation{context};
   ReproductionPlan plan;
-  std::vector<std::string> scenes = simulation::worlds_in(options.data);
+  std::vector<std::string> scenes = simulation::find_worlds(options.data);
   scenes.insert(scenes.begin(), {"loop", "corridor"});
   for (const std::string& scene : scenes) {
     plan.push_back({6.0, [=] { navigation.reproduce_drive_missions(scene); }});
@@ -60,7 +60,7 @@ ReproductionPlan plan_y03(const Experiments& context) {
   const RouteExperiments y03{context};
   ReproductionPlan plan{{3.0 * options.scenes, [=] { y03.reproduce_lab_drives(); }},
                         {routes, [=] { y03.reproduce_loop_routes(); }}};
-  for (const std::string& world : simulation::worlds_in(options.data)) {
+  for (const std::string& world : simulation::find_worlds(options.data)) {
     plan.push_back({routes, [=] { y03.reproduce_world_routes(world); }});
   }
   if (simulation::has_data(options.data, "sussex_route")) {
@@ -102,7 +102,7 @@ ReproductionPlan plan_elsewhere(const Experiments& context) {
   }
   plan.push_back({200.0, [=] { elsewhere->reproduce_merging(); }});
   if (!options.floors) return plan;
-  for (const std::string& world : simulation::all_worlds_in(options.data)) {
+  for (const std::string& world : simulation::find_all_worlds(options.data)) {
     for (const double spacing_m : {0.5, 0.3}) {
       plan.push_back({60.0, [=] { elsewhere->reproduce_floor(world, spacing_m); }});
     }
@@ -136,7 +136,7 @@ ReproductionPlan plan_m03(const Experiments& context) {
   for (const char* const scene : {"hall", "loop"}) {
     add("leaving", 5.0 * scenes, [=] { m03->reproduce_leaving(scene); });
   }
-  for (const std::string& world : simulation::worlds_in(options.data)) {
+  for (const std::string& world : simulation::find_worlds(options.data)) {
     add("worlds", 50.0, [=] { m03->reproduce_gazebo_world(world); });
   }
   if (simulation::has_data(options.data, "sussex_route")) {

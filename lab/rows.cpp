@@ -56,14 +56,14 @@ void add_mean(Reproduction& result, const std::string& id, const std::string& wh
       "mean of " + std::to_string(values.size());
 }
 
-std::string centimetres(double distance_m) {
+std::string format_centimetres(double distance_m) {
   const auto millimetres = std::lround(1000.0 * distance_m);
   const auto whole = std::to_string(millimetres / 10);
   return (millimetres % 10 == 0 ? whole : whole + "." + std::to_string(millimetres % 10)) + " cm";
 }
 
-std::string centimetres_id(double distance_m) {
-  std::string text = centimetres(distance_m);
+std::string format_centimetres_id(double distance_m) {
+  std::string text = format_centimetres(distance_m);
   std::ranges::replace(text, '.', '_');
   text.erase(text.size() - 3, 1);
   return text;

@@ -51,9 +51,9 @@ void add_mean(Reproduction& result, const std::string& id, const std::string& wh
               const std::string& unit, std::span<const double> values);
 
 /// "2.5 cm".
-[[nodiscard]] std::string centimetres(double distance_m);
+[[nodiscard]] std::string format_centimetres(double distance_m);
 /// "2_5cm", for the names of rows.
-[[nodiscard]] std::string centimetres_id(double distance_m);
+[[nodiscard]] std::string format_centimetres_id(double distance_m);
 
 /// How many elements of a range fulfil a predicate.
 template <typename Range, typename Predicate>

@@ -55,7 +55,8 @@ class RememberedPlace {
         source, evaluate_features(*place_.ranking(), support, source).is_significantly_better());
   }
   [[nodiscard]] Place localise(const Panorama& view) const {
-    return localiser_.localise(signature_for(view, place_.memory()), {}, features_of_query(view));
+    return localiser_.localise(compute_packed_signature(view, place_.memory()), {},
+                               make_query_features(view));
   }
   [[nodiscard]] const TrackingPlace& place() const noexcept { return place_; }
   [[nodiscard]] const Features& features() const noexcept { return features_; }
@@ -67,14 +68,14 @@ class RememberedPlace {
 };
 
 /// A memory that is recorded again in a place as it is on that day.
-RememberedPlace recorded_again(simulation::PlaceRecording today, std::uint64_t seed,
-                               Executor& executor) {
+RememberedPlace record_again(simulation::PlaceRecording today, std::uint64_t seed,
+                             Executor& executor) {
   std::vector<Pose2> grid;
   for (const auto& point : today.free_space->grid(spacing_m)) {
     grid.push_back({point.position.x_m, point.position.y_m, 0.0});
   }
   today.references = simulation::take_views(today, today.rendering, grid, seed, {}, executor);
-  VisualMemory memory = memory_of_references(today, executor);
+  VisualMemory memory = make_memory_of_references(today, executor);
   const Features features = features_of(today, memory);
   return {std::move(memory), features};
 }
@@ -101,8 +102,8 @@ class DrivingRobot {
     while (static_cast<int>(path.size()) < pictures) {
       Point2 goal = space.random_pose(random).position();
       if (drive_ == DailyDrive::rounds) {
-        goal = longest_ago(grid, at).value_or(goal);
-        passed_[square_of(goal)] = day_;
+        goal = find_least_recent(grid, at).value_or(goal);
+        passed_[grid_square(goal)] = day_;
       }
       const auto way = space.shortest_path(at, goal);
       if (!way) continue;
@@ -115,7 +116,7 @@ class DrivingRobot {
           path.push_back({at.x_m, at.y_m, heading_rad});
           for (const simulation::GridPosition& place : grid) {
             if (distance(place.position, at) <= spacing_m) {
-              passed_[square_of(place.position)] = day_;
+              passed_[grid_square(place.position)] = day_;
             }
           }
           left_m = spacing_m;
@@ -129,16 +130,16 @@ class DrivingRobot {
 
  private:
   using Square = std::pair<long, long>;
-  static Square square_of(Point2 p) {
+  static Square grid_square(Point2 p) {
     return {std::lround(p.x_m / spacing_m), std::lround(p.y_m / spacing_m)};
   }
   /// Empty where the robot is at the only place that there is.
-  [[nodiscard]] std::optional<Point2> longest_ago(const std::vector<simulation::GridPosition>& grid,
-                                                  Point2 at) const {
+  [[nodiscard]] std::optional<Point2> find_least_recent(
+      const std::vector<simulation::GridPosition>& grid, Point2 at) const {
     std::optional<Point2> best;
     std::pair<int, double> least;
     for (const simulation::GridPosition& place : grid) {
-      const auto found = passed_.find(square_of(place.position));
+      const auto found = passed_.find(grid_square(place.position));
       const double distance_m = distance(place.position, at);
       const std::pair rank(found == passed_.end() ? 0 : found->second, distance_m);
       if (distance_m < 0.5 * spacing_m || (best && least <= rank)) continue;
@@ -175,8 +176,8 @@ DayAnswers ask(const RememberedPlace& remembered, const std::vector<simulation::
   return result;
 }
 
-MemoryUpdate::AnsweredView run_view(const Pose2& odometry, const PackedSignature& signature,
-                                    const Place& answer) {
+MemoryUpdate::AnsweredView make_run_view(const Pose2& odometry, const PackedSignature& signature,
+                                         const Place& answer) {
   MemoryUpdate::AnsweredView view{odometry, signature, answer.known_probability, std::nullopt,
                                   std::nullopt};
   if (answer.position && answer.heading_rad) {
@@ -211,8 +212,8 @@ class LearningRobot {
     std::vector<PackedSignature> signatures;
     for (std::size_t i = 0; i < seen.size(); ++i) {
       if (i > 0) odometry.advance(inverse(seen[i - 1].pose) * seen[i].pose);
-      signatures.push_back(signature_for(seen[i].panorama, memory_));
-      update.add(run_view(odometry.pose(), signatures.back(), answers[i]));
+      signatures.push_back(compute_packed_signature(seen[i].panorama, memory_));
+      update.add(make_run_view(odometry.pose(), signatures.back(), answers[i]));
     }
     MemoryUpdate::Changes changes = update.finish();
     use_ = std::move(changes.use);
@@ -268,9 +269,9 @@ class Days {
                                          .columns = columns},
                                         elsewhere.executor)),
         changing_(place_.scene, options_.seed),
-        memory_(memory_of_references(place_, elsewhere.executor)),
+        memory_(make_memory_of_references(place_, elsewhere.executor)),
         features_(features_of(place_, memory_)),
-        still_(memory_, features_) {
+        unchanged_(memory_, features_) {
     for (const auto& [id, what, drive] :
          {std::tuple{".with", "learning on errands", DailyDrive::errands},
           {".rounds", "learning on rounds", DailyDrive::rounds}}) {
@@ -329,7 +330,7 @@ class Days {
 
  private:
   [[nodiscard]] simulation::Scene first_scene() const {
-    simulation::Scene scene = simulation::scene_named(options_.data, name_, options_.seed);
+    simulation::Scene scene = simulation::make_or_read_scene(options_.data, name_, options_.seed);
     scene.name = name_;
     return scene;
   }
@@ -350,14 +351,14 @@ class Days {
       poses.push_back(today.free_space->random_pose(random));
     const auto queries =
         simulation::take_views(today, place_.rendering, poses, seed + 500, {}, executor());
-    without_ = ask(still_, queries, executor());
+    without_ = ask(unchanged_, queries, executor());
     add_point(without_learning_, day, success_rate(without_.right, asked()));
     for (DailyRobot& robot : robots_) {
       robot.answers = ask(robot.learning.remembered(), queries, executor());
       add_point(robot.series, day, success_rate(robot.answers.right, asked()));
     }
     if (day == options_.days) {
-      rerecorded_ = ask(recorded_again(today, seed + 50'000, executor()), queries, executor());
+      rerecorded_ = ask(record_again(today, seed + 50'000, executor()), queries, executor());
     }
   }
 
@@ -390,7 +391,7 @@ class Days {
   simulation::ChangingScene changing_;
   VisualMemory memory_;
   Features features_;
-  RememberedPlace still_;
+  RememberedPlace unchanged_;
   std::vector<DailyRobot> robots_;
   viewer::Series without_learning_{.label = "without learning"};
   DayAnswers without_;

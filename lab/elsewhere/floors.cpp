@@ -67,9 +67,9 @@ void ElsewhereExperiments::reproduce_floor(const std::string& world, double spac
   const simulation::RememberedPlace remembered =
       simulation::remember_grid(place, spacing_m, Random(options.seed, 1).next(), executor);
   const std::size_t views = remembered.truth.size();
-  const std::string id = "elsewhere.arrange." + world + "." + centimetres_id(spacing_m);
+  const std::string id = "elsewhere.arrange." + world + "." + format_centimetres_id(spacing_m);
   const std::string what = world + ", " + std::to_string(views) + " views every " +
-                           centimetres(spacing_m) + " arranged by their similarity alone";
+                           format_centimetres(spacing_m) + " arranged by their similarity alone";
   std::vector<Point2> estimate;
   std::vector<Point2> truth;
   for (std::size_t i = 0; i < views; ++i) {
@@ -85,24 +85,24 @@ void ElsewhereExperiments::reproduce_floor(const std::string& world, double spac
       .reason = "the trustworthiness of its neighbourhoods is " + format_fixed(trustworthiness, 3);
   add_row(result, id + ".trustworthiness", what + ": trustworthiness of its neighbourhoods",
           trustworthiness, "");
-  const auto missions = simulation::random_missions(place, remembered, {.count = options.runs},
-                                                    Random(options.seed, 2).next());
+  const auto missions = simulation::draw_missions(place, remembered, {.count = options.runs},
+                                                  Random(options.seed, 2).next());
   const auto runs = simulation::run_missions(place, remembered, missions, {},
                                              Random(options.seed, 3).next(), executor);
   const FloorMissions count = count_missions(remembered, missions, runs, spacing_m);
   add_rate(result, id + ".missions", what + ": missions that arrive within half the spacing",
            count.arrived, runs.size(), at_least(0.95));
-  result.rows.back().reason = simulation::other_ends(count.ends, count.wrongly) + "; of the " +
-                              std::to_string(count.within) +
+  result.rows.back().reason = simulation::explain_other_ends(count.ends, count.wrongly) +
+                              "; of the " + std::to_string(count.within) +
                               " missions from the largest component to a view in it, " +
                               std::to_string(count.arrived_within) + " arrive";
   std::vector<viewer::MapLayer> layers = viewer::scene_layers(place.scene);
   layers.push_back({.label = "where the views were taken", .dots = truth});
   layers.push_back({.label = "arranged, after the best rotation and scale",
                     .colour = viewer::PlotColour::orange,
-                    .dots = simulation::laid_over(estimate, truth)});
-  add_plot(result, "elsewhere_arrange_" + world + "_" + centimetres_id(spacing_m) + ".svg", what,
-           viewer::MapPlot{.title = world, .layers = std::move(layers)});
+                    .dots = simulation::align_to(estimate, truth)});
+  add_plot(result, "elsewhere_arrange_" + world + "_" + format_centimetres_id(spacing_m) + ".svg",
+           what, viewer::MapPlot{.title = world, .layers = std::move(layers)});
 }
 
 }  // namespace panonav::lab

@@ -32,7 +32,7 @@ struct HomeAnswered {
   double probability = 0.0;
 };
 
-HomeAnswered ask_home(const Panorama& goal, const Panorama& current) {
+HomeAnswered find_home(const Panorama& goal, const Panorama& current) {
   const HomingGuide guide(Observation(goal), PictureSource{});
   const WayHome way = guide.home(Observation(current));
   return {way.direction_rad.has_value(), way.direction_rad.value_or(0.0), way.probability};
@@ -44,8 +44,8 @@ double off_rad(double direction_rad, const Pose2& from, const Pose2& to) {
   return std::abs(angle_difference(direction_rad + from.heading_rad, truth));
 }
 
-HomeAnswered ask_home(const simulation::PlacedView& goal, const simulation::PlacedView& current) {
-  HomeAnswered answer = ask_home(goal.panorama, current.panorama);
+HomeAnswered find_home(const simulation::PlacedView& goal, const simulation::PlacedView& current) {
+  HomeAnswered answer = find_home(goal.panorama, current.panorama);
   answer.off_rad = off_rad(answer.off_rad, current.pose, goal.pose);
   return answer;
 }
@@ -68,7 +68,7 @@ Panorama noise(int rows, int columns, int smoothed, std::uint64_t seed) {
   return view;
 }
 
-std::vector<const simulation::PlacedView*> views_of(const simulation::PlaceRecording& place) {
+std::vector<const simulation::PlacedView*> collect_views(const simulation::PlaceRecording& place) {
   std::vector<const simulation::PlacedView*> views;
   for (const simulation::PlacedView& view : place.references) views.push_back(&view);
   for (const simulation::PlacedView& view : place.queries) views.push_back(&view);
@@ -76,7 +76,7 @@ std::vector<const simulation::PlacedView*> views_of(const simulation::PlaceRecor
 }
 
 /// What was measured of the runs that do not come home, beside how many level robots do.
-std::string ends_elsewhere(const std::vector<HomingRun>& runs, std::size_t level_home) {
+std::string explain_failures(const std::vector<HomingRun>& runs, std::size_t level_home) {
   std::size_t others = 0;
   std::size_t away = 0;
   std::size_t alike = 0;
@@ -112,7 +112,7 @@ struct Range {
 };
 
 /// Two views of which one is to lead to the other's place, and where both were taken.
-struct AskedPair {
+struct ViewPair {
   const simulation::PlacedView* goal;
   const simulation::PlacedView* current;
   const RecordedGround* ground;
@@ -130,7 +130,7 @@ class HomeVectors {
     const auto asked = draw_pairs(range);
     const auto answers = simulation::make_each(
         elsewhere_.executor, asked.size(),
-        [&](std::size_t i) { return ask_home(*asked[i].goal, *asked[i].current); });
+        [&](std::size_t i) { return find_home(*asked[i].goal, *asked[i].current); });
     std::size_t off = 0;
     std::map<std::string, std::size_t> off_in;
     for (std::size_t i = 0; i < answers.size(); ++i) {
@@ -144,8 +144,8 @@ class HomeVectors {
       ++off_in[asked[i].ground->name];
     }
     const std::string id = "elsewhere.home." + range.id;
-    const std::string what = "views " + centimetres(range.low_m) + " to " +
-                             centimetres(range.high_m) + " apart, the straight way free: ";
+    const std::string what = "views " + format_centimetres(range.low_m) + " to " +
+                             format_centimetres(range.high_m) + " apart, the straight way free: ";
     Reproduction& result = elsewhere_.result;
     add_answers(result, id + ".answered", what + "home vectors with a direction", answers,
                 std::nullopt);
@@ -174,8 +174,8 @@ class HomeVectors {
     for (const RecordedGround& a : elsewhere_.grounds) {
       for (const RecordedGround& b : elsewhere_.grounds) {
         if (&a == &b) continue;
-        const auto goals = views_of(a.variants.front());
-        const auto currents = views_of(b.variants.front());
+        const auto goals = collect_views(a.variants.front());
+        const auto currents = collect_views(b.variants.front());
         for (std::size_t i = 0; i < pairs_; i += 4) foreign.emplace_back(any(goals), any(currents));
       }
     }
@@ -184,8 +184,8 @@ class HomeVectors {
                 "views of two scenes or worlds: home vectors with a direction",
                 simulation::make_each(elsewhere_.executor, foreign.size(),
                                       [&](std::size_t i) {
-                                        return ask_home(foreign[i].first->panorama,
-                                                        foreign[i].second->panorama);
+                                        return find_home(foreign[i].first->panorama,
+                                                         foreign[i].second->panorama);
                                       }),
                 at_most(0.02));
   }
@@ -202,7 +202,7 @@ class HomeVectors {
                     ": home vectors with a direction",
                 simulation::make_each(
                     elsewhere_.executor, pairs_,
-                    [&](std::size_t i) { return ask_home(noise_of(2 * i), noise_of(2 * i + 1)); }),
+                    [&](std::size_t i) { return find_home(noise_of(2 * i), noise_of(2 * i + 1)); }),
                 at_most(0.02));
   }
 
@@ -211,11 +211,11 @@ class HomeVectors {
     return views[random_.index(views.size())];
   }
 
-  std::vector<AskedPair> draw_pairs(const Range& range) {
-    std::vector<AskedPair> asked;
+  std::vector<ViewPair> draw_pairs(const Range& range) {
+    std::vector<ViewPair> asked;
     for (const RecordedGround& ground : elsewhere_.grounds) {
       const auto& place = ground.variants.front();
-      const auto views = views_of(place);
+      const auto views = collect_views(place);
       std::size_t tries = 0;
       for (std::size_t found = 0; found < pairs_ && tries < 200 * pairs_; ++tries) {
         const simulation::PlacedView* goal = any(views);
@@ -255,9 +255,9 @@ void ElsewhereExperiments::reproduce_home_vectors() {
 
 void ElsewhereExperiments::reproduce_tilted_homing() {
   for (const std::string& name : ground_names()) {
-    HomingPlace place =
-        make_homing_place(simulation::scene_named(options.data, name, options.seed), {}, executor);
-    const auto tasks = random_homing_tasks(place, options.runs, homing_radius_m, options.seed);
+    HomingPlace place = make_homing_place(
+        simulation::make_or_read_scene(options.data, name, options.seed), {}, executor);
+    const auto tasks = draw_homing_tasks(place, options.runs, homing_radius_m, options.seed);
     struct Condition {
       int tilt_deg;
       bool measured;
@@ -284,10 +284,10 @@ void ElsewhereExperiments::reproduce_tilted_homing() {
       add_rate(
           result,
           "elsewhere.tilt." + name + "." + std::to_string(tilt_deg) + (measured ? "_measured" : ""),
-          name + ", starts within " + centimetres(homing_radius_m) + ", " + how + ": home within " +
-              centimetres(arrived_m),
+          name + ", starts within " + format_centimetres(homing_radius_m) + ", " + how +
+              ": home within " + format_centimetres(arrived_m),
           home, runs.size(), target);
-      result.rows.back().reason = ends_elsewhere(runs, level_home);
+      result.rows.back().reason = explain_failures(runs, level_home);
     }
   }
 }

@@ -37,7 +37,7 @@ constexpr std::size_t first_views = 100;  // of which a new memory's scale is le
 struct Session {
   std::filesystem::path memory;
   std::map<std::string, Point2> truth;  ///< by the names of its views
-  [[nodiscard]] double share_beside(const Session& other) const {
+  [[nodiscard]] double share_near(const Session& other) const {
     const auto beside = std::ranges::count_if(truth, [&](const auto& view) {
       return std::ranges::any_of(other.truth, [&](const auto& one) {
         return distance(one.second, view.second) <= beside_m;
@@ -47,8 +47,8 @@ struct Session {
   }
 };
 
-Session walk_through(const simulation::PlaceRecording& place, const std::string& name, int pictures,
-                     const std::filesystem::path& folder, std::uint64_t seed, Executor& executor) {
+Session record_walk(const simulation::PlaceRecording& place, const std::string& name, int pictures,
+                    const std::filesystem::path& folder, std::uint64_t seed, Executor& executor) {
   const auto planned = simulation::plan_recording(place.scene, *place.free_space,
                                                   {.path = simulation::RecordingPath::walk,
                                                    .heading = simulation::RecordingHeading::path,
@@ -127,7 +127,7 @@ void report_place(const std::string& name, const std::vector<Session>& walks,
   for (std::size_t i = 0; i < walks.size(); ++i) {
     const Session& first = walks[i];
     const Session& second = walks[(i + 1) % walks.size()];
-    const double share = std::max(first.share_beside(second), second.share_beside(first));
+    const double share = std::max(first.share_near(second), second.share_near(first));
     const auto found = join(first, second, folder);
     Pairs& alike = share >= shared_much ? sharing : share < shared_hardly ? apart : between;
     ++alike.all;
@@ -162,12 +162,13 @@ void ElsewhereExperiments::reproduce_merging() {
   std::map<std::string, std::vector<Session>> sessions;
   for (const char* const name : {"loop", "small_warehouse", "small_house"}) {
     if (!simulation::has_scene(options.data, name)) continue;
-    const simulation::PlaceRecording place = simulation::empty_place(
-        simulation::scene_named(options.data, name, options.seed), options.seed, 512, executor);
+    const simulation::PlaceRecording place = simulation::make_empty_place(
+        simulation::make_or_read_scene(options.data, name, options.seed), options.seed, 512,
+        executor);
     for (int i = 0; i < options.walks; ++i) {
       sessions[name].push_back(
-          walk_through(place, std::string(name) + "_" + std::to_string(i), options.walk_pictures,
-                       folder, options.seed + 100U + static_cast<std::uint64_t>(i), executor));
+          record_walk(place, std::string(name) + "_" + std::to_string(i), options.walk_pictures,
+                      folder, options.seed + 100U + static_cast<std::uint64_t>(i), executor));
     }
   }
   for (const auto& [name, walks] : sessions) report_place(name, walks, folder, result);

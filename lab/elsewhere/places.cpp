@@ -82,8 +82,8 @@ void add_own_places(const ElsewhereExperiments& elsewhere, const RecordedGround&
   Reproduction& result = elsewhere.result;
   for (std::size_t c = 0; c < conditions.size(); ++c) {
     const std::string id = "elsewhere.places." + ground.name + "." + ids[c];
-    const std::string where =
-        ground.name + ", references every " + centimetres(spacing_m) + ", " + conditions[c].name;
+    const std::string where = ground.name + ", references every " + format_centimetres(spacing_m) +
+                              ", " + conditions[c].name;
     add_rates(result, id + ".known", where + ": own places known", known[c], at_least(targets[c]));
     add_rates(result, id + ".near",
               where + ": the best match is the nearest reference or beside it", near[c],
@@ -100,7 +100,7 @@ void add_own_places(const ElsewhereExperiments& elsewhere, const RecordedGround&
 
 std::vector<std::string> ElsewhereExperiments::ground_names() const {
   std::vector<std::string> names = options.built_in;
-  for (const std::string& world : simulation::all_worlds_in(options.data)) names.push_back(world);
+  for (const std::string& world : simulation::find_all_worlds(options.data)) names.push_back(world);
   return names;
 }
 
@@ -110,7 +110,7 @@ void ElsewhereExperiments::record_ground(const std::string& name) {
       std::ranges::find(simulation::scene_names(), name) != simulation::scene_names().end();
   for (int i = 0; i < (is_built_in ? options.scenes : 1); ++i) {
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
-    simulation::Scene scene = simulation::scene_named(options.data, name, seed);
+    simulation::Scene scene = simulation::make_or_read_scene(options.data, name, seed);
     scene.name = name;
     ground.variants.push_back(simulation::record_place(std::move(scene),
                                                        {.seed = seed,
@@ -154,7 +154,7 @@ void ElsewhereExperiments::reproduce_tracked_poses() {
   constexpr double quantile_50 = 1.386;
   for (const RecordedGround& ground : grounds) {
     const simulation::PlaceRecording& place = ground.variants.front();
-    const auto remembered = remember_for_tracking(place, executor);
+    const auto remembered = make_tracking_place(place, executor);
     const auto walks = record_walks(
         place, *remembered, clean_condition(),
         {.variants = 1, .runs_each = std::max(1, options.runs / 2), .seed = options.seed},

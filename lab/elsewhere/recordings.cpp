@@ -61,11 +61,11 @@ PlaceRecogniser memorise(const std::filesystem::path& file, const Dataset& datas
 }
 
 /// Removes a memory file when nobody reads it any more.
-struct RemovedInTheEnd {
-  explicit RemovedInTheEnd(std::filesystem::path path) : file(std::move(path)) {}
-  RemovedInTheEnd(const RemovedInTheEnd&) = delete;
-  RemovedInTheEnd& operator=(const RemovedInTheEnd&) = delete;
-  ~RemovedInTheEnd() {
+struct TemporaryFile {
+  explicit TemporaryFile(std::filesystem::path path) : file(std::move(path)) {}
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+  ~TemporaryFile() {
     std::error_code ignored;
     std::filesystem::remove(file, ignored);
   }
@@ -221,7 +221,7 @@ void ElsewhereExperiments::reproduce_leave_one_out(
     const std::filesystem::path& recording, std::vector<std::unique_ptr<RivalRecogniser>> rivals) {
   const Dataset dataset = read_dataset(recording);
   const std::string name = recording.filename().string();
-  const RemovedInTheEnd memory{result.out / (name + ".panonav")};
+  const TemporaryFile memory{result.out / (name + ".panonav")};
   const PlaceRecogniser by_columns = memorise(memory.file, dataset, false, executor);
   const PlaceRecogniser recogniser = memorise(memory.file, dataset, true, executor);
   const LeaveOneOut pictures(*this, dataset, recogniser, name);

@@ -43,7 +43,7 @@ constexpr std::array<int, 5> other_components{6, 10, 20, 32, 64};
 using Grid = std::map<std::pair<int, int>, std::vector<double>>;
 
 // Distances depend on k1 alone and turns on k2 alone, so each is read once.
-void add_published(const simulation::MappingRecording& recording, Grid& grid) {
+void add_published_errors(const simulation::MappingRecording& recording, Grid& grid) {
   const std::size_t steps = recording.views.size() - 1;
   std::map<int, std::vector<double>> lengths;
   std::map<int, std::vector<double>> turns;
@@ -72,7 +72,7 @@ void add_published(const simulation::MappingRecording& recording, Grid& grid) {
   }
 }
 
-std::pair<std::pair<int, int>, double> best_of(const Grid& grid) {
+std::pair<std::pair<int, int>, double> find_best(const Grid& grid) {
   std::pair<std::pair<int, int>, double> best{{0, 0}, 2.0};
   for (const auto& [key, values] : grid) {
     const double middle = median(values);
@@ -94,8 +94,8 @@ viewer::LinePlot plot_grid(const Grid& grid, const std::string& title) {
   return plot;
 }
 
-std::vector<Point2> wheels_of(const simulation::MappingRecording& recording,
-                              const simulation::MappedRecording& mapped) {
+std::vector<Point2> select_wheel_positions(const simulation::MappingRecording& recording,
+                                           const simulation::MappedRecording& mapped) {
   std::vector<Point2> wheels;
   for (const std::size_t i : mapped.number) wheels.push_back(recording.wheels[i].position());
   return wheels;
@@ -125,7 +125,7 @@ struct MappedSet {
     open.push_back(simulation::shape_error(without.estimate, without.truth));
     closed.push_back(simulation::shape_error(with.estimate, with.truth));
     closed_with_wheels.push_back(simulation::shape_error(with_wheels.estimate, with_wheels.truth));
-    wheels.push_back(simulation::shape_error(wheels_of(recording, with), with.truth));
+    wheels.push_back(simulation::shape_error(select_wheel_positions(recording, with), with.truth));
     right += with.right_closures + with_wheels.right_closures;
     wrong += with.wrong_closures + with_wheels.wrong_closures;
     missing += with.right_closures == 0 ? 1 : 0;
@@ -168,7 +168,7 @@ struct MappedSet {
              right, std::max<std::size_t>(1, right + wrong));
     add_rate(result, id + ".unclosed", what + ": recordings in which no loop was closed", missing,
              open.size());
-    const auto best = best_of(grid).first;
+    const auto best = find_best(grid).first;
     const auto with = [](std::pair<int, int> k) {
       return "k1 = " + std::to_string(k.first) + ", k2 = " + std::to_string(k.second);
     };
@@ -185,15 +185,16 @@ struct MappedSet {
     const auto& truth = without.truth;
     plot.layers.push_back(
         {.label = "ground truth", .colour = viewer::PlotColour::black, .lines = {truth}});
-    plot.layers.push_back({.label = "wheels",
-                           .colour = viewer::PlotColour::vermilion,
-                           .lines = {simulation::laid_over(wheels_of(recording, without), truth)}});
+    plot.layers.push_back(
+        {.label = "wheels",
+         .colour = viewer::PlotColour::vermilion,
+         .lines = {simulation::align_to(select_wheel_positions(recording, without), truth)}});
     plot.layers.push_back({.label = "visual odometry",
                            .colour = viewer::PlotColour::blue,
-                           .lines = {simulation::laid_over(without.estimate, truth)}});
+                           .lines = {simulation::align_to(without.estimate, truth)}});
     plot.layers.push_back({.label = "loops closed",
                            .colour = viewer::PlotColour::green,
-                           .lines = {simulation::laid_over(with.estimate, with.truth)}});
+                           .lines = {simulation::align_to(with.estimate, with.truth)}});
     maps.push_back(std::move(plot));
   }
 };
@@ -268,8 +269,8 @@ struct FirstSetVariations {
 simulation::PlaceRecording MappingExperiments::make_variant(const std::string& scene,
                                                             int number) const {
   const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(number);
-  return simulation::empty_place(simulation::make_scene(scene, {.seed = seed}), seed,
-                                 options.columns, executor);
+  return simulation::make_empty_place(simulation::make_scene(scene, {.seed = seed}), seed,
+                                      options.columns, executor);
 }
 
 void MappingExperiments::reproduce_first_set() const {
@@ -282,7 +283,7 @@ void MappingExperiments::reproduce_first_set() const {
         place, drive(place, {}, first_spacing_m, static_cast<std::size_t>(options.views)),
         max_components + 2, simulation::cheap_wheels(), 1000 * place.seed, executor);
     set.add(place, recording, {});
-    add_published(recording, set.grid);
+    add_published_errors(recording, set.grid);
     variations.add(recording, set.open.back(), set.closed.back());
   }
   set.report({.open = at_most(0.02),
@@ -323,7 +324,7 @@ void MappingExperiments::reproduce_second_set() const {
       captured.wheels.push_back(recording.wheels[i]);
       captured.views.push_back(recording.views[i]);
     }
-    add_published(captured, set.grid);
+    add_published_errors(captured, set.grid);
   }
   add_median(result, "f11.lab.views", set.what + ": views", "views", nodes, std::nullopt,
              std::pair(150.0, 150.0));

@@ -47,8 +47,8 @@ double rms_m(std::span<const Point2> estimate, std::span<const Point2> truth, bo
 }
 
 /// Two loops that share their start, driven again and again up to `length_m`.
-std::vector<Pose2> two_loops(const simulation::PlaceRecording& place, double length_m,
-                             double spacing_m, Random& random) {
+std::vector<Pose2> plan_two_loops(const simulation::PlaceRecording& place, double length_m,
+                                  double spacing_m, Random& random) {
   const simulation::FreeSpace& space = *place.free_space;
   constexpr double min_side_m = 2.0;
   const auto far_from = [&](const std::vector<Point2>& others) {
@@ -91,8 +91,8 @@ simulation::MappingRecording read_recording(const std::filesystem::path& folder,
 }
 
 /// Pairs of views, one over the other, three pairs in a row.
-viewer::PicturePlot pairs_picture(const std::string& title,
-                                  const std::vector<std::pair<Panorama, Panorama>>& pairs) {
+viewer::PicturePlot draw_pairs(const std::string& title,
+                               const std::vector<std::pair<Panorama, Panorama>>& pairs) {
   constexpr int gap = 8;
   constexpr int across = 3;
   const int rows = pairs.front().first.rows();
@@ -126,7 +126,7 @@ viewer::PicturePlot pairs_picture(const std::string& title,
   return plot;
 }
 
-std::vector<MapEdge> closures_of(const simulation::MappedRecording& mapped) {
+std::vector<MapEdge> filter_closures(const simulation::MappedRecording& mapped) {
   std::vector<MapEdge> closures;
   std::ranges::copy_if(mapped.map.edges, std::back_inserter(closures),
                        [](const MapEdge& edge) { return edge.kind == LinkKind::closure; });
@@ -138,7 +138,7 @@ viewer::MapPlot plot_indoor_walk(const simulation::MappedRecording& bridged) {
   const auto position_of = [&](ViewId view) {
     return bridged.estimate[view.value - bridged.map.nodes[0].view.value];
   };
-  for (const MapEdge& edge : closures_of(bridged)) {
+  for (const MapEdge& edge : filter_closures(bridged)) {
     lines.lines.push_back({position_of(edge.a), position_of(edge.b)});
   }
   return {.title = "indoor_walk_360, no positions known",
@@ -162,11 +162,11 @@ void map_indoor_walk(const MappingExperiments& f11) {
           "indoor_walk_360: consecutive pictures linked by a step read from them",
           linked / static_cast<double>(walk.views.size() - 1), "");
   add_row(f11.result, "f11.indoor_walk.closures", "indoor_walk_360: loops closed",
-          static_cast<double>(closures_of(bridged).size()), "closures");
+          static_cast<double>(filter_closures(bridged).size()), "closures");
   // What single views would close: for the eye.
   const auto single = simulation::map_recording(
       walk, {.mapping = {.bridge_m = 1.5}, .closure = {.sequence = 1, .max_drift = 100.0}});
-  auto refused = closures_of(single);
+  auto refused = filter_closures(single);
   add_row(f11.result, "f11.indoor_walk.without_sequence",
           "indoor_walk_360: loops that single views would close, were no sequence asked for",
           static_cast<double>(refused.size()), "closures");
@@ -187,7 +187,7 @@ void map_indoor_walk(const MappingExperiments& f11) {
   add_plot(f11.result, "f11_indoor_walk_pairs.svg",
            "Pairs of pictures (one over the other) that pass every check of a loop closure but the "
            "sequence: corridors of one kind on several floors. None of them becomes a closure",
-           pairs_picture("indoor_walk_360: pairs that no sequence of views confirms", pairs));
+           draw_pairs("indoor_walk_360: pairs that no sequence of views confirms", pairs));
 }
 
 /// Mirror images along the round trip of the loop, and how they are unwrapped.
@@ -219,7 +219,7 @@ struct StepTimes {
   double odometry_ms = 0.0;  ///< from the signature
 };
 
-StepTimes time_steps(const MirrorImages& seen, int count) {
+StepTimes measure_step_times(const MirrorImages& seen, int count) {
   const SignatureExtractor extractor({80, 512}, count);
   SignatureExtractor::Workspace workspace;
   VisualOdometry odometry;
@@ -279,13 +279,13 @@ struct WorldErrors {
     draw("ground truth", viewer::PlotColour::black, truth);
     draw("wheels", viewer::PlotColour::vermilion, std::move(wheel_line));
     draw("views alone", viewer::PlotColour::blue,
-         simulation::laid_over(ground_map.estimate, ground_map.truth));
+         simulation::align_to(ground_map.estimate, ground_map.truth));
     draw("views, steps from wheels", viewer::PlotColour::green,
-         simulation::laid_over(wheels_map.estimate, wheels_map.truth));
+         simulation::align_to(wheels_map.estimate, wheels_map.truth));
   }
 
   /// On how many paths these errors are smaller than those of the wheels.
-  [[nodiscard]] std::size_t better(const std::vector<double>& errors) const {
+  [[nodiscard]] std::size_t count_better_than_wheels(const std::vector<double>& errors) const {
     std::size_t count = 0;
     for (std::size_t i = 0; i < errors.size(); ++i) count += errors[i] < wheels[i] ? 1 : 0;
     return count;
@@ -296,7 +296,7 @@ struct WorldErrors {
 
 void MappingExperiments::measure_step_time() const {
   const MirrorImages seen = take_mirror_images(*this);
-  const StepTimes usual = time_steps(seen, components);
+  const StepTimes usual = measure_step_times(seen, components);
   add_row(result, "f11.time.step",
           "time of a step from a mirror image of 640 x 480 to a pose, median", usual.all_ms, "ms",
           at_most(0.3), std::pair(54.0, 153.0));
@@ -304,7 +304,7 @@ void MappingExperiments::measure_step_time() const {
   // Figure 6 shows the influence of the components on the time, too.
   viewer::Series times{.label = "signature to pose"};
   for (const int count : {6, 10, 15, 20, 32, 64}) {
-    times.add(count, time_steps(seen, count).odometry_ms);
+    times.add(count, measure_step_times(seen, count).odometry_ms);
     add_row(result, "f11.time.components_" + std::to_string(count),
             "from signature to pose with " + std::to_string(count) + " components", times.y.back(),
             "ms");
@@ -353,13 +353,13 @@ void MappingExperiments::reproduce_identical_doors() const {
 void MappingExperiments::reproduce_world(const std::string& name) const {
   constexpr double length_m = 60.0;
   constexpr double spacing_m = 0.15;
-  const simulation::PlaceRecording place = simulation::empty_place(
+  const simulation::PlaceRecording place = simulation::make_empty_place(
       simulation::read_world(options.data, name), options.seed, options.columns, executor);
   WorldErrors errors;
   for (int run = 0; run < options.runs; ++run) {
     Random random(options.seed, 300 + static_cast<std::uint64_t>(run));
     const auto recording = simulation::record_for_mapping(
-        place, two_loops(place, length_m, spacing_m, random), components + 2,
+        place, plan_two_loops(place, length_m, spacing_m, random), components + 2,
         simulation::cheap_wheels(),
         1000 * options.seed + 10'000 * static_cast<std::uint64_t>(run + 1), executor);
     errors.add(place, recording, name);
@@ -379,10 +379,10 @@ void MappingExperiments::reproduce_world(const std::string& name) const {
   add(".ground", "of the views alone, height of the camera known, loops closed", errors.ground);
   add(".closed_wheels", "with steps from these wheels, loops closed", errors.with_wheels);
   add_rate(result, id + ".better", what + "paths on which ours, steps from wheels, is better",
-           errors.better(errors.with_wheels), runs, at_least(0.5));
+           errors.count_better_than_wheels(errors.with_wheels), runs, at_least(0.5));
   add_rate(result, id + ".better_without",
            what + "paths on which ours, views and height of the camera alone, is better",
-           errors.better(errors.ground), runs);
+           errors.count_better_than_wheels(errors.ground), runs);
   add_rate(result, id + ".right_closures", what + "closures between views at most 1 m apart",
            errors.right, std::max<std::size_t>(1, errors.right + errors.wrong));
   add_plot(result, "f11_" + name + ".svg",
@@ -406,7 +406,7 @@ void MappingExperiments::reproduce_recordings() const {
                 {.label = "tracker", .colour = viewer::PlotColour::black, .lines = {mapped.truth}},
                 {.label = "visual odometry",
                  .colour = viewer::PlotColour::blue,
-                 .lines = {simulation::laid_over(mapped.estimate, mapped.truth)}}}});
+                 .lines = {simulation::align_to(mapped.estimate, mapped.truth)}}}});
   }
   if (simulation::has_data(options.data, "indoor_walk_360")) map_indoor_walk(*this);
 }
@@ -414,7 +414,7 @@ void MappingExperiments::reproduce_recordings() const {
 void MappingExperiments::measure_large_maps() const {
   // Round after round, each a little beside the others.
   constexpr int columns = 256;
-  const simulation::PlaceRecording place = simulation::empty_place(
+  const simulation::PlaceRecording place = simulation::make_empty_place(
       simulation::make_scene("loop", {.seed = options.seed}), options.seed, columns, executor);
   Random random(options.seed, 400);
   std::vector<Point2> way;

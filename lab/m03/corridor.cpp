@@ -37,7 +37,7 @@ struct Box {
 };
 
 /// The things that stand only once in the corridor.
-std::vector<Box> distinct_things(const simulation::Scene& scene) {
+std::vector<Box> find_distinct_objects(const simulation::Scene& scene) {
   std::vector<Box> boxes;
   for (const std::string_view name : {"window", "notice board", "plant"}) {
     Box box;
@@ -77,7 +77,7 @@ bool is_distinct(const simulation::PlaceRecording& place, std::span<const Box> t
 }
 
 /// Along the ring, from anywhere, in either direction, up to 0.3 m beside the middle.
-std::vector<Pose2> drive_around(const simulation::Scene& scene, Random& random) {
+std::vector<Pose2> plan_ring_drive(const simulation::Scene& scene, Random& random) {
   const double aside = random.uniform(-0.3, 0.3);
   const bool backwards = random.index(2) == 1;
   Point2 middle;
@@ -127,13 +127,13 @@ CorridorRuns record_corridors(const TrackingExperiments& m03) {
     const simulation::PlaceRecording place =
         m03.record_variant("corridor", s, m03_spacing_m, options.columns / 2);
     const std::uint64_t seed = place.seed;
-    const auto remembered = remember_for_tracking(place, executor);
-    const auto things = distinct_things(place.scene);
+    const auto remembered = make_tracking_place(place, executor);
+    const auto things = find_distinct_objects(place.scene);
     std::vector<std::vector<Pose2>> ways(static_cast<std::size_t>(runs_each));
     std::vector<std::optional<std::size_t>> first(ways.size());
     executor.for_chunks(ways.size(), 1, [&](std::size_t r, std::size_t, std::size_t) {
       Random random(seed * 1000003U + 70U, r);
-      ways[r] = drive_around(place.scene, random);
+      ways[r] = plan_ring_drive(place.scene, random);
       for (std::size_t i = 0; i < ways[r].size(); ++i) {
         if (!is_distinct(place, things, ways[r][i].position())) continue;
         first[r] = i;
@@ -144,7 +144,7 @@ CorridorRuns record_corridors(const TrackingExperiments& m03) {
     corridors.first_distinct.insert(corridors.first_distinct.end(), first.begin(), first.end());
     corridors.sets.push_back(make_run_set(
         remembered,
-        record_along(ways, place, *place.renderer, *remembered, {}, seed * 100003U, executor),
+        record_runs(ways, place, *place.renderer, *remembered, {}, seed * 100003U, executor),
         executor));
     if (s == 0) {
       viewer::MapLayer layer{.label = "stands only once", .colour = viewer::PlotColour::green};
@@ -210,7 +210,7 @@ void TrackingExperiments::reproduce_corridor() {
                  " degrees of the view; before it, images after which a mode is within 0.5 m of "
                  "the truth",
              of.kept, of.before, at_least(0.99));
-    rows.tell_single_images();
+    rows.append_single_image_rates();
     add_rate(result, "m03.corridor.sure_before",
              "corridor: before the first distinct place, images at which it says localised",
              of.sure_before, of.before);
@@ -236,8 +236,8 @@ void TrackingExperiments::reproduce_corridor() {
   add_plot(result, "corridor.svg",
            "A corridor of identical doors: the particles keep to places that look alike until "
            "something that stands only once comes into view.",
-           particle_maps(*shown.place, corridors.things, shown.runs.front(), setting,
-                         seed_of_corridor, steps, "Corridor"),
+           make_particle_maps(*shown.place, corridors.things, shown.runs.front(), setting,
+                              seed_of_corridor, steps, "Corridor"),
            2);
 }
 

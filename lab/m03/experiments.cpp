@@ -27,18 +27,18 @@ SingleImages sum_single_images(std::span<const RunSet> sets) {
   return sum;
 }
 
-std::vector<double> capped_images(std::span<const TrackedRun> runs, double radius_m,
-                                  std::size_t first_step) {
+std::vector<double> capped_images_until_localised(std::span<const TrackedRun> runs, double radius_m,
+                                                  std::size_t first_step) {
   std::vector<double> images;
   for (const TrackedRun& run : runs) {
-    const int count = images_until_localised(run, radius_m, first_step).value_or(m03_most_images);
-    images.push_back(std::min(count, m03_most_images));
+    const int count = images_until_localised(run, radius_m, first_step).value_or(m03_max_images);
+    images.push_back(std::min(count, m03_max_images));
   }
   return images;
 }
 
-std::size_t localised_within(std::span<const TrackedRun> runs, double radius_m, int images,
-                             std::size_t first_step) {
+std::size_t count_localised_within(std::span<const TrackedRun> runs, double radius_m, int images,
+                                   std::size_t first_step) {
   return count_where(runs, [&](const TrackedRun& run) {
     const auto count = images_until_localised(run, radius_m, first_step);
     return count && *count <= images;
@@ -57,7 +57,7 @@ std::vector<double> errors_after(std::span<const TrackedRun> runs, std::size_t i
   return errors;
 }
 
-viewer::Series error_over_images(const std::string& label, std::span<const TrackedRun> runs,
+viewer::Series make_error_series(const std::string& label, std::span<const TrackedRun> runs,
                                  std::size_t images, std::size_t first_step, double shift) {
   viewer::Series series{.label = label};
   for (std::size_t i = 1; i <= images; ++i) {
@@ -72,22 +72,23 @@ viewer::Series error_over_images(const std::string& label, std::span<const Track
 
 void RunRows::add_images(std::optional<Target> target,
                          std::optional<std::pair<double, double>> published) const {
-  add_median(result, id + ".images",
-             what + ": images until the error is below " + centimetres(radius_m) + " from then on",
-             "images", capped_images(runs, radius_m, first_step), judged ? target : std::nullopt,
-             published);
-  tell_single_images();
+  add_median(
+      result, id + ".images",
+      what + ": images until the error is below " + format_centimetres(radius_m) + " from then on",
+      "images", capped_images_until_localised(runs, radius_m, first_step),
+      judged ? target : std::nullopt, published);
+  append_single_image_rates();
 }
 
 void RunRows::add_images_mean() const {
   add_mean(result, id + ".images_mean", what + ": images", "images",
-           capped_images(runs, radius_m, first_step));
+           capped_images_until_localised(runs, radius_m, first_step));
 }
 
 void RunRows::add_within(int images, std::optional<Target> target) const {
   const std::string count = std::to_string(images);
   add_rate(result, id + ".within_" + count, what + ": runs localised within " + count + " images",
-           localised_within(runs, radius_m, images, first_step), runs.size(),
+           count_localised_within(runs, radius_m, images, first_step), runs.size(),
            judged ? target : std::nullopt);
 }
 
@@ -110,18 +111,18 @@ void RunRows::add_wrong(std::optional<Target> target) const {
            target);
 }
 
-void RunRows::tell_single_images() const {
+void RunRows::append_single_image_rates() const {
   const SingleImages sum = sum_single_images(sets);
   const auto percent = [&](std::size_t count) {
     return std::to_string(
         std::lround(100.0 * static_cast<double>(count) / static_cast<double>(sum.asked)));
   };
   result.rows.back().over +=
-      sum.asked == 0
-          ? "; no image alone"
-          : "; one image alone: right " + percent(sum.right) + " % (by dissimilarity only " +
-                percent(sum.right_by_dissimilarity) + " %), within " +
-                centimetres(sets.front().place->spacing_m()) + " " + percent(sum.near) + " %";
+      sum.asked == 0 ? "; no image alone"
+                     : "; one image alone: right " + percent(sum.right) +
+                           " % (by dissimilarity only " + percent(sum.right_by_dissimilarity) +
+                           " %), within " + format_centimetres(sets.front().place->spacing_m()) +
+                           " " + percent(sum.near) + " %";
 }
 
 namespace {
@@ -146,11 +147,12 @@ std::vector<viewer::MapLayer> particle_layers(const TrackingPlace& place, const 
 
 }  // namespace
 
-std::vector<viewer::MapPlot> particle_maps(const TrackingPlace& place,
-                                           std::span<const viewer::MapLayer> furniture,
-                                           const TrackingRun& run, const FilterSetting& setting,
-                                           std::uint64_t seed, std::span<const std::size_t> steps,
-                                           const std::string& title) {
+std::vector<viewer::MapPlot> make_particle_maps(const TrackingPlace& place,
+                                                std::span<const viewer::MapLayer> furniture,
+                                                const TrackingRun& run,
+                                                const FilterSetting& setting, std::uint64_t seed,
+                                                std::span<const std::size_t> steps,
+                                                const std::string& title) {
   std::vector<viewer::MapPlot> maps;
   // The estimate's line is cut where the robot was kidnapped.
   std::vector<std::vector<Point2>> truths;
@@ -203,7 +205,7 @@ std::vector<TrackedRun> TrackingExperiments::track(std::span<const RunSet> sets,
   return all;
 }
 
-std::vector<RunSet> TrackingExperiments::sets_of(RunSet OfficeRuns::*set) const {
+std::vector<RunSet> TrackingExperiments::collect_sets(RunSet OfficeRuns::*set) const {
   std::vector<RunSet> sets;
   for (const OfficeRuns& office : offices) sets.push_back(office.*set);
   return sets;

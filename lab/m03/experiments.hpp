@@ -16,7 +16,7 @@ namespace panonav::lab {
 /// Side of the references' grid in the office, and the way between two images.
 inline constexpr double m03_spacing_m = 0.25;
 /// Runs that are not localised within so many images, or not at all, count as this many.
-inline constexpr int m03_most_images = 15;
+inline constexpr int m03_max_images = 15;
 /// A pose that is off by more is plainly wrong.
 inline constexpr double m03_wrong_m = 1.0;
 inline constexpr std::size_t m03_images_before_kidnapping = 10;
@@ -40,22 +40,23 @@ struct OfficeRuns {
   RunSet kidnapped;  ///< hard; 10 images, then kidnapped by at least 1 m
 };
 
-/// Images until localised, each at most `m03_most_images`.
-[[nodiscard]] std::vector<double> capped_images(std::span<const TrackedRun> runs, double radius_m,
-                                                std::size_t first_step = 0);
+/// Images until localised, each at most `m03_max_images`.
+[[nodiscard]] std::vector<double> capped_images_until_localised(std::span<const TrackedRun> runs,
+                                                                double radius_m,
+                                                                std::size_t first_step = 0);
 /// How many runs are localised within so many images.
-[[nodiscard]] std::size_t localised_within(std::span<const TrackedRun> runs, double radius_m,
-                                           int images, std::size_t first_step = 0);
+[[nodiscard]] std::size_t count_localised_within(std::span<const TrackedRun> runs, double radius_m,
+                                                 int images, std::size_t first_step = 0);
 /// Error after so many images, counted from `first_step`; runs that ended before are left out.
 [[nodiscard]] std::vector<double> errors_after(std::span<const TrackedRun> runs, std::size_t images,
                                                std::size_t first_step = 0);
 /// Median error over the images with the 5 % and 95 % quantiles as bars, `shift` to the right.
-[[nodiscard]] viewer::Series error_over_images(const std::string& label,
+[[nodiscard]] viewer::Series make_error_series(const std::string& label,
                                                std::span<const TrackedRun> runs, std::size_t images,
                                                std::size_t first_step, double shift);
 
 /// A filter's particles over a run, as in [M03] figures 7 to 9: panels at the chosen steps.
-[[nodiscard]] std::vector<viewer::MapPlot> particle_maps(
+[[nodiscard]] std::vector<viewer::MapPlot> make_particle_maps(
     const TrackingPlace& place, std::span<const viewer::MapLayer> furniture, const TrackingRun& run,
     const FilterSetting& setting, std::uint64_t seed, std::span<const std::size_t> steps,
     const std::string& title);
@@ -81,7 +82,7 @@ struct RunRows {
   void add_wrong(std::optional<Target> target = std::nullopt) const;
   /// Adds what one image alone gives to what the last row was taken over: "one image alone: right
   /// 74 % (by dissimilarity only 54 %), within 25 cm 96 %".
-  void tell_single_images() const;
+  void append_single_image_rates() const;
 };
 
 /// The experiments of [M03] and what its authors only announced.
@@ -119,7 +120,7 @@ struct TrackingExperiments : Experiments {
                                               const FilterSetting& setting,
                                               std::uint64_t seed) const;
   /// One set of runs of each office.
-  [[nodiscard]] std::vector<RunSet> sets_of(RunSet OfficeRuns::*set) const;
+  [[nodiscard]] std::vector<RunSet> collect_sets(RunSet OfficeRuns::*set) const;
 };
 
 }  // namespace panonav::lab

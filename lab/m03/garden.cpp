@@ -38,7 +38,7 @@ GardenRuns record_gardens(const TrackingExperiments& m03) {
     const simulation::PlaceRecording place =
         m03.record_variant("garden", s, garden_spacing_m, options.columns / 2);
     const std::uint64_t seed = place.seed;
-    const auto remembered = remember_for_tracking(place, executor);
+    const auto remembered = make_tracking_place(place, executor);
     std::vector<std::vector<Pose2>> ways;
     for (int r = 0; r < runs_each; ++r) {
       Random random(seed * 1000003U + 80U, static_cast<std::uint64_t>(r));
@@ -52,8 +52,8 @@ GardenRuns record_gardens(const TrackingExperiments& m03) {
       const simulation::Scene scene =
           simulation::make_scene("garden", {.seed = seed, .light = lights[l]});
       const simulation::Renderer renderer(scene, simulation::RendererOptions{}, executor);
-      runs[l] = record_along(ways, place, renderer, *remembered, {}, seed * 100003U + 20'000U * l,
-                             executor);
+      runs[l] = record_runs(ways, place, renderer, *remembered, {}, seed * 100003U + 20'000U * l,
+                            executor);
     }
     std::vector<TrackingRun> under_clouds = runs[0];
     for (std::size_t r = 0; r < under_clouds.size(); ++r) {
@@ -97,11 +97,12 @@ void TrackingExperiments::reproduce_garden() {
     add_point(right, lights[l], success_rate(single.right, single.asked));
     add_point(near, lights[l], success_rate(single.near, single.asked));
     const auto share_within = [&](int images) {
-      return success_rate(localised_within(runs, garden_spacing_m, images), runs.size());
+      return success_rate(count_localised_within(runs, garden_spacing_m, images), runs.size());
     };
     add_point(success, lights[l], share_within(10));
     add_point(first, lights[l], share_within(1));
-    add_point(needed, lights[l], mean_figure(capped_images(runs, garden_spacing_m)));
+    add_point(needed, lights[l],
+              mean_figure(capped_images_until_localised(runs, garden_spacing_m)));
   }
   (void)add_rows("light_changing", "light that changes at each image between 0.50 and 2.00",
                  gardens.changing);

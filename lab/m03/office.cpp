@@ -37,7 +37,7 @@ const Rule paper_injection{InjectionMethod::topological, "topological", "the pap
 const Rule own_injection{InjectionMethod::explained, "explained", "our rule of injection"};
 
 void add_paper_rows(const TrackingExperiments& m03) {
-  const auto sets = m03.sets_of(&OfficeRuns::constant_heading);
+  const auto sets = m03.collect_sets(&OfficeRuns::constant_heading);
   for (const Rule& rule : {no_injection, paper_injection}) {
     FilterSetting setting = paper_setting();
     setting.injection = rule.injection;
@@ -79,7 +79,7 @@ void add_hard_rows(const TrackingExperiments& m03, std::span<const RunSet> sets,
            rows.what + ": runs with an error below 25 cm at the first image",
            count_where(runs,
                        [](const TrackedRun& run) {
-                         return images_until_first_right(run, m03_spacing_m).value_or(2) <= 1;
+                         return images_until_first_fix(run, m03_spacing_m).value_or(2) <= 1;
                        }),
            runs.size());
   rows.add_wrong();
@@ -91,7 +91,7 @@ void add_ratio_row(const Rule& rule, const std::vector<double>& with,
   for (std::size_t i = 0; i < with.size(); ++i) saved.push_back(with[i] / mean(without));
   add_row(result, "m03.global.hard.ratio." + rule.id,
           "global localisation on hard: mean number of images with " + rule.name +
-              ", over that with nothing injected (" + std::to_string(m03_most_images) +
+              ", over that with nothing injected (" + std::to_string(m03_max_images) +
               " for runs that need more)",
           mean_figure(saved), "",
           rule.injection == InjectionMethod::uniform ? std::nullopt : std::optional(at_most(0.5)),
@@ -106,13 +106,13 @@ FilterSetting large_error_setting(InjectionMethod injection) {
   setting.odometry.translation_scale_error = 0.2;
   setting.odometry.rotation_from_translation = radians(10.0);
   // The filter has no model of a wrong scale: it is told of as much random error instead.
-  setting.told_odometry.translation_from_translation = 0.25;
-  setting.told_odometry.rotation_from_translation = radians(10.0);
+  setting.assumed_odometry.translation_from_translation = 0.25;
+  setting.assumed_odometry.rotation_from_translation = radians(10.0);
   return setting;
 }
 
 // Runs that knew the place before the blind stretch; others have nothing to keep.
-std::vector<TrackedRun> known_before(std::span<const TrackedRun> runs) {
+std::vector<TrackedRun> filter_known_before_blind(std::span<const TrackedRun> runs) {
   std::vector<TrackedRun> known;
   for (const TrackedRun& run : runs) {
     if (run.at(images_before_blind - 1).is_within(m03_spacing_m)) known.push_back(run);
@@ -132,16 +132,16 @@ void add_tracking_rows(const TrackingExperiments& m03, std::span<const RunSet> s
            known.size(), runs.size());
   if (known.empty()) return;
   const auto is_back = [](const TrackedRun& run) {
-    return images_until_first_right(run, m03_spacing_m, first_after_blind).value_or(3) <= 2;
+    return images_until_first_fix(run, m03_spacing_m, first_after_blind).value_or(3) <= 2;
   };
   add_rate(m03.result, row + ".back_2", what + ": error below 25 cm at the first or second image",
            count_where(known, is_back), known.size(),
            rule.injection == InjectionMethod::none ? std::nullopt : std::optional(at_least(0.99)));
   const RunRows rows{.result = m03.result, .id = row, .what = what, .sets = sets, .runs = runs};
-  rows.tell_single_images();
+  rows.append_single_image_rates();
   add_rate(m03.result, row + ".back_2_for_good",
            what + ": error below 25 cm within 2 images and from then on",
-           localised_within(known, m03_spacing_m, 2, first_after_blind), known.size());
+           count_localised_within(known, m03_spacing_m, 2, first_after_blind), known.size());
   add_median(m03.result, row + ".error_1", what + ": error at the first image after", "m",
              errors_after(known, 1, first_after_blind));
   rows.add_wrong();
@@ -164,7 +164,8 @@ void add_kidnapping_rows(const TrackingExperiments& m03, std::span<const RunSet>
   rows.add_within(8, at_least(0.99));
   rows.add_wrong();
   if (rule.injection != InjectionMethod::explained) return;
-  std::vector<double> difference = capped_images(runs, m03_spacing_m, rows.first_step);
+  std::vector<double> difference =
+      capped_images_until_localised(runs, m03_spacing_m, rows.first_step);
   for (std::size_t i = 0; i < difference.size(); ++i) difference[i] -= images_of_paper[i];
   add_row(m03.result, rows.id + ".images_less",
           "kidnapped, hard: images with our rule less those with the paper's injection (mean, same "
@@ -179,8 +180,9 @@ struct SweepCurve {
 
   explicit SweepCurve(const std::string& label) : success{.label = label}, images{.label = label} {}
   void add(double x, std::span<const TrackedRun> runs) {
-    add_point(success, x, success_rate(localised_within(runs, m03_spacing_m, 10), runs.size()));
-    add_point(images, x, mean_figure(capped_images(runs, m03_spacing_m)));
+    add_point(success, x,
+              success_rate(count_localised_within(runs, m03_spacing_m, 10), runs.size()));
+    add_point(images, x, mean_figure(capped_images_until_localised(runs, m03_spacing_m)));
   }
 };
 
@@ -218,7 +220,7 @@ void scale_noise(OdometryNoise& noise, double factor) {
 void TrackingExperiments::record_office(int number) {
   const simulation::PlaceRecording place =
       record_variant("office", number, m03_spacing_m, options.columns);
-  const auto remembered = remember_for_tracking(place, executor);
+  const auto remembered = make_tracking_place(place, executor);
   const auto walk = [&](const RunCondition& condition, const WalkOptions& walks) {
     return make_run_set(remembered, record_walks(place, *remembered, condition, walks, executor),
                         executor);
@@ -238,8 +240,8 @@ void TrackingExperiments::record_office(int number) {
     const std::size_t first = i / each * each;
     for (std::size_t k = 1; k < each; ++k) {
       const TrackingRun& other = office.hard.runs[first + (i - first + k) % each];
-      if (auto run = kidnapped(office.hard.runs[i], other, m03_images_before_kidnapping, 1.0,
-                               static_cast<std::size_t>(m03_most_images))) {
+      if (auto run = make_kidnapped_run(office.hard.runs[i], other, m03_images_before_kidnapping,
+                                        1.0, static_cast<std::size_t>(m03_max_images))) {
         carried.push_back(std::move(*run));
         break;
       }
@@ -251,7 +253,7 @@ void TrackingExperiments::record_office(int number) {
 
 void TrackingExperiments::reproduce_global_localisation() {
   add_paper_rows(*this);
-  const auto hard = sets_of(&OfficeRuns::hard);
+  const auto hard = collect_sets(&OfficeRuns::hard);
   viewer::LinePlot curves{
       .title = "Global localisation on hard: error over images (bars: 5 to 95 %)",
       .x_label = "images",
@@ -262,13 +264,13 @@ void TrackingExperiments::reproduce_global_localisation() {
   for (const Rule& rule : {no_injection, anywhere_injection, paper_injection, own_injection}) {
     const auto runs = track(hard, compass_setting(rule.injection), seed_of_hard);
     add_hard_rows(*this, hard, rule, runs);
-    const auto images = capped_images(runs, m03_spacing_m);
+    const auto images = capped_images_until_localised(runs, m03_spacing_m);
     if (rule.injection == InjectionMethod::none) {
       without = images;
     } else {
       add_ratio_row(rule, images, without, result);
     }
-    curves.series.push_back(error_over_images(rule.name, runs, m03_most_images, 0,
+    curves.series.push_back(make_error_series(rule.name, runs, m03_max_images, 0,
                                               0.08 * static_cast<double>(curves.series.size())));
   }
   add_plot(result, "global_error.svg",
@@ -280,9 +282,9 @@ void TrackingExperiments::reproduce_global_localisation() {
   add_plot(result, "fig07_global_localisation.svg",
            "Global localisation with as many particles as references and nothing injected, heading "
            "unknown, hard ([M03] figure 7, 1 to 3).",
-           particle_maps(*shown.hard.place, shown.furniture, shown.hard.runs.front(),
-                         compass_setting(InjectionMethod::none), seed_of_hard, steps,
-                         "Global localisation"),
+           make_particle_maps(*shown.hard.place, shown.furniture, shown.hard.runs.front(),
+                              compass_setting(InjectionMethod::none), seed_of_hard, steps,
+                              "Global localisation"),
            3);
 }
 
@@ -292,7 +294,7 @@ void TrackingExperiments::reproduce_position_tracking() {
     RunSet set{office.hard.place, {}, office.hard.single_images};
     for (const TrackingRun& run : office.hard.runs) {
       if (run.steps.size() <= first_after_blind + 2) continue;
-      set.runs.push_back(without_images(run, images_before_blind, blind_steps));
+      set.runs.push_back(drop_images(run, images_before_blind, blind_steps));
     }
     sets.push_back(std::move(set));
   }
@@ -302,10 +304,10 @@ void TrackingExperiments::reproduce_position_tracking() {
                           .x_range = std::pair{0.5, 5.5}};
   for (const Rule& rule : {paper_injection, own_injection, no_injection}) {
     const auto runs = track(sets, large_error_setting(rule.injection), seed_of_tracking);
-    const auto known = known_before(runs);
+    const auto known = filter_known_before_blind(runs);
     add_tracking_rows(*this, sets, rule, runs, known);
     if (known.empty()) continue;
-    curves.series.push_back(error_over_images(rule.name, known, 5, first_after_blind,
+    curves.series.push_back(make_error_series(rule.name, known, 5, first_after_blind,
                                               0.05 * static_cast<double>(curves.series.size())));
   }
   add_plot(result, "tracking_error.svg", "Error of the heaviest mode after 2 m of dead reckoning.",
@@ -317,14 +319,14 @@ void TrackingExperiments::reproduce_position_tracking() {
       result, "fig07_position_tracking.svg",
       "Position tracking: before, at the end of, and one image after 2 m without images ([M03] "
       "figure 7, 4 to 6).",
-      particle_maps(*sets.front().place, offices.front().furniture, sets.front().runs.front(),
-                    large_error_setting(InjectionMethod::explained), seed_of_tracking, steps,
-                    "Tracking"),
+      make_particle_maps(*sets.front().place, offices.front().furniture, sets.front().runs.front(),
+                         large_error_setting(InjectionMethod::explained), seed_of_tracking, steps,
+                         "Tracking"),
       3);
 }
 
 void TrackingExperiments::reproduce_kidnapping() {
-  const auto sets = sets_of(&OfficeRuns::kidnapped);
+  const auto sets = collect_sets(&OfficeRuns::kidnapped);
   constexpr std::size_t first = m03_images_before_kidnapping;
   if (std::ranges::all_of(sets, [](const RunSet& set) { return set.runs.empty(); })) return;
   viewer::LinePlot curves{.title = "Kidnapped robot, hard: error over images (bars: 5 to 95 %)",
@@ -337,17 +339,18 @@ void TrackingExperiments::reproduce_kidnapping() {
     const FilterSetting setting = compass_setting(rule.injection);
     const auto runs = track(sets, setting, seed_of_kidnapping);
     if (rule.injection == InjectionMethod::topological) {
-      images_of_paper = capped_images(runs, m03_spacing_m, first);
+      images_of_paper = capped_images_until_localised(runs, m03_spacing_m, first);
     }
     add_kidnapping_rows(*this, sets, rule, runs, images_of_paper);
-    curves.series.push_back(error_over_images(rule.name, runs, m03_most_images, first,
+    curves.series.push_back(make_error_series(rule.name, runs, m03_max_images, first,
                                               0.08 * static_cast<double>(curves.series.size())));
     const RunSet& shown = sets.front();
     if (shown.runs.empty()) continue;
     const std::array<std::size_t, 3> steps{first, first + 2, first + 5};
-    std::ranges::move(particle_maps(*shown.place, offices.front().furniture, shown.runs.front(),
-                                    setting, seed_of_kidnapping, steps, rule.name),
-                      std::back_inserter(maps));
+    std::ranges::move(
+        make_particle_maps(*shown.place, offices.front().furniture, shown.runs.front(), setting,
+                           seed_of_kidnapping, steps, rule.name),
+        std::back_inserter(maps));
   }
   add_plot(result, "kidnapped_error.svg",
            "Error of the heaviest mode after the robot was kidnapped by at least 1 m away.",
@@ -367,12 +370,12 @@ void TrackingExperiments::reproduce_sweeps() {
     std::vector<RunSet> sets;
     FilterSetting setting;
   };
-  const auto hard = sets_of(&OfficeRuns::hard);
+  const auto hard = collect_sets(&OfficeRuns::hard);
   std::vector<SweepCurve> particles;
   std::vector<SweepCurve> odometry;
   for (const Kind& kind :
        {Kind{"paper", "as the paper, clean", "as the paper, clean",
-             sets_of(&OfficeRuns::constant_heading), paper_setting()},
+             collect_sets(&OfficeRuns::constant_heading), paper_setting()},
         Kind{"topological", "compass and the paper's injection, hard", "paper's injection, hard",
              hard, compass_setting(InjectionMethod::topological)},
         Kind{"explained", "compass and our rule of injection, hard", "our rule, hard", hard,
@@ -397,7 +400,7 @@ void TrackingExperiments::reproduce_sweeps() {
     for (const double factor : {0.5, 1.0, 2.0, 4.0, 8.0}) {
       FilterSetting setting = kind.setting;
       scale_noise(setting.odometry, factor);
-      scale_noise(setting.told_odometry, factor);
+      scale_noise(setting.assumed_odometry, factor);
       try_out("odometry", "odometry with " + format_number(factor) + " times the usual noise",
               seed_of_odometry, setting, factor, odometry.back());
     }

@@ -28,8 +28,8 @@ struct OutsideRuns {
 };
 
 /// A free place in a strip of the scene.
-Point2 place_between(const simulation::FreeSpace& space, double low_x, double high_x,
-                     Random& random) {
+Point2 sample_place_between(const simulation::FreeSpace& space, double low_x, double high_x,
+                            Random& random) {
   for (;;) {
     const Pose2 pose = space.random_pose(random);
     if (pose.x_m >= low_x && pose.x_m <= high_x) return pose.position();
@@ -37,12 +37,13 @@ Point2 place_between(const simulation::FreeSpace& space, double low_x, double hi
 }
 
 /// From inside to far outside and back to another place inside, facing the way.
-std::vector<Pose2> excursion(const simulation::FreeSpace& space, double border_m, Random& random) {
+std::vector<Pose2> plan_excursion(const simulation::FreeSpace& space, double border_m,
+                                  Random& random) {
   const double low = space.low().x_m;
   const double high = space.high().x_m;
-  const Point2 from = place_between(space, low, border_m - 0.5, random);
-  const Point2 out = place_between(space, border_m + 2.0, high, random);
-  const Point2 to = place_between(space, low, border_m - 0.5, random);
+  const Point2 from = sample_place_between(space, low, border_m - 0.5, random);
+  const Point2 out = sample_place_between(space, border_m + 2.0, high, random);
+  const Point2 to = sample_place_between(space, low, border_m - 0.5, random);
   std::vector<Pose2> way;
   for (const auto& [a, b] : {std::pair{from, out}, {out, to}}) {
     for (const Point2 p : space.shortest_path(a, b).value_or(std::vector<Point2>{a, b})) {
@@ -67,11 +68,11 @@ OutsideRuns record_excursions(const TrackingExperiments& m03, const std::string&
     const std::uint64_t seed = place.seed;
     const double border = 0.5 * (place.scene.floor_low.x_m + place.scene.floor_high.x_m);
     const auto remembered =
-        remember_for_tracking(place, executor, [&](Point2 p) { return p.x_m < border; });
+        make_tracking_place(place, executor, [&](Point2 p) { return p.x_m < border; });
     std::vector<std::vector<Pose2>> ways;
     for (int r = 0; r < runs_each; ++r) {
       Random random(seed * 1000003U + 120U, static_cast<std::uint64_t>(r));
-      ways.push_back(excursion(*place.free_space, border, random));
+      ways.push_back(plan_excursion(*place.free_space, border, random));
     }
     const auto references = remembered->reference_positions();
     for (const auto& way : ways) {
@@ -83,10 +84,9 @@ OutsideRuns record_excursions(const TrackingExperiments& m03, const std::string&
       }
       outside.ways_m.push_back(std::move(ways_m));
     }
-    RunSet set{
-        remembered,
-        record_along(ways, place, *place.renderer, *remembered, {}, seed * 100003U, executor),
-        {}};
+    RunSet set{remembered,
+               record_runs(ways, place, *place.renderer, *remembered, {}, seed * 100003U, executor),
+               {}};
     // Single images are asked of places that the memory holds.
     std::vector<TrackingRun> inside = set.runs;
     for (std::size_t r = 0; r < inside.size(); ++r) {
@@ -153,7 +153,7 @@ void add_run(Reports& reports, const TrackedRun& run, std::span<const double> wa
     }
   }
   const auto capped = [](bool said, int images) {
-    return static_cast<double>(said ? std::min(images, m03_most_images) : m03_most_images);
+    return static_cast<double>(said ? std::min(images, m03_max_images) : m03_max_images);
   };
   if (left) reports.until_lost.push_back(capped(said_lost, images_outside));
   if (back) reports.until_found.push_back(capped(said_found, images_back));
@@ -165,7 +165,7 @@ void add_rows(const RunRows& rows, const Reports& reports) {
     add_rate(result, id + ".lost_inside",
              what + ": images before it leaves, from the sixth on, that are called lost",
              reports.lost_inside, reports.inside);
-    rows.tell_single_images();
+    rows.append_single_image_rates();
   }
   if (reports.outside > 0) {
     add_rate(result, id + ".lost_outside",

@@ -39,7 +39,7 @@ std::vector<RecordedView> read_views(const std::filesystem::path& folder) {
 
 /// Headings along the path, whose positions jitter by more than lies between two of them: those of
 /// a straight line fitted to the positions within `half` before and after.
-std::vector<double> tangents(const std::vector<RecordedView>& views, std::size_t half) {
+std::vector<double> fit_tangents(const std::vector<RecordedView>& views, std::size_t half) {
   std::vector<double> headings;
   for (std::size_t i = 0; i < views.size(); ++i) {
     const std::size_t begin = i > half ? i - half : 0;
@@ -66,8 +66,8 @@ void add_rows(const RunRows& rows) {
 
 /// A walk from place to neighbouring place that comes to none twice; as long as it can be, up to
 /// `images`.
-std::vector<std::size_t> walk_over(const std::vector<RecordedView>& views, double spacing_m,
-                                   std::size_t images, Random& random) {
+std::vector<std::size_t> plan_grid_walk(const std::vector<RecordedView>& views, double spacing_m,
+                                        std::size_t images, Random& random) {
   std::vector<std::size_t> walk{static_cast<std::size_t>(random.index(views.size()))};
   std::vector<bool> visited(views.size());
   visited[walk.front()] = true;
@@ -96,7 +96,7 @@ void TrackingExperiments::reproduce_gazebo_world(const std::string& name) {
                                 .rows = options.rows,
                                 .columns = options.columns / 2},
                                executor);
-  const auto remembered = remember_for_tracking(place, executor);
+  const auto remembered = make_tracking_place(place, executor);
   RunCondition noisy = clean_condition();
   noisy.id = "noisy";
   noisy.name = "the sensor noise of hard";
@@ -119,11 +119,11 @@ void TrackingExperiments::reproduce_gazebo_world(const std::string& name) {
                        .radius_m = 1.0};
     add_rate(result, rows.id + ".within_15",
              rows.what + ": runs with an error below 1 m within 15 images and from then on",
-             localised_within(runs, 1.0, 15), runs.size(),
+             count_localised_within(runs, 1.0, 15), runs.size(),
              name == "small_warehouse" && condition.id == "clean" ? std::optional(at_least(0.95))
                                                                   : std::nullopt);
-    rows.tell_single_images();
-    const auto needed = capped_images(runs, 1.0);
+    rows.append_single_image_rates();
+    const auto needed = capped_images_until_localised(runs, 1.0);
     const std::string images = rows.what + ": images until the error is below 1 m from then on";
     add_median(result, rows.id + ".images", images, "images", needed);
     add_mean(result, rows.id + ".images_mean", images, "images", needed);
@@ -138,7 +138,7 @@ void TrackingExperiments::reproduce_recorded_route() {
   constexpr std::size_t stride = 8;  // images of a run are 12 cm apart
   constexpr std::size_t images = 20;
   constexpr double spacing_m = 0.1;
-  const auto headings = tangents(views, around);
+  const auto headings = fit_tangents(views, around);
   std::vector<ReferencePose> poses;
   std::vector<const Panorama*> references;
   for (std::size_t i = 0; i < views.size(); i += 2) {
@@ -147,8 +147,8 @@ void TrackingExperiments::reproduce_recorded_route() {
   }
   auto facing = poses;
   for (std::size_t k = 0; k < facing.size(); ++k) facing[k].heading_rad = headings[2 * k];
-  const auto plain = remember_views(poses, references, spacing_m, executor);
-  const auto with_headings = remember_views(facing, references, spacing_m, executor);
+  const auto plain = make_tracking_place(poses, references, spacing_m, executor);
+  const auto with_headings = make_tracking_place(facing, references, spacing_m, executor);
   std::vector<TrackingRun> runs;
   for (std::size_t start = 1; start + stride * (images - 1) < views.size(); start += 4) {
     std::vector<Pose2> truth;
@@ -156,13 +156,13 @@ void TrackingExperiments::reproduce_recorded_route() {
     for (std::size_t k = 0; k < images; ++k) {
       const std::size_t i = start + stride * k;
       truth.push_back({views[i].pose.x_m, views[i].pose.y_m, headings[i]});
-      seen.push_back(signature_for(views[i].panorama, plain->memory()));
+      seen.push_back(compute_packed_signature(views[i].panorama, plain->memory()));
     }
-    runs.push_back(run_through(truth, std::move(seen)));
+    runs.push_back(make_tracking_run(truth, std::move(seen)));
   }
   // The tracked positions jitter by some millimetres, and the tangent is not the heading.
   FilterSetting setting;
-  setting.odometry.rotation_from_translation = setting.told_odometry.rotation_from_translation =
+  setting.odometry.rotation_from_translation = setting.assumed_odometry.rotation_from_translation =
       0.1;
   for (const bool compass : {false, true}) {
     const std::vector<RunSet> sets{make_run_set(compass ? with_headings : plain, runs, executor)};
@@ -184,11 +184,11 @@ void TrackingExperiments::reproduce_gantry() {
   const std::size_t wanted =
       5 * static_cast<std::size_t>(options.variants) * static_cast<std::size_t>(options.runs);
   FilterSetting setting;
-  setting.odometry.drive = setting.told_odometry.drive = DriveKind::holonomic;
+  setting.odometry.drive = setting.assumed_odometry.drive = DriveKind::holonomic;
   std::vector<RunSet> sets;
   for (std::uint64_t attempt = 0; sets.size() < wanted && attempt < 20 * wanted; ++attempt) {
     Random random(options.seed, attempt);
-    const auto walk = walk_over(views, spacing_m, images, random);
+    const auto walk = plan_grid_walk(views, spacing_m, images, random);
     if (walk.size() < images) continue;
     std::vector<ReferencePose> poses;
     std::vector<const Panorama*> references;
@@ -197,15 +197,15 @@ void TrackingExperiments::reproduce_gantry() {
       poses.push_back(views[i].pose);
       references.push_back(&views[i].panorama);
     }
-    const auto remembered = remember_views(poses, references, spacing_m, executor);
+    const auto remembered = make_tracking_place(poses, references, spacing_m, executor);
     std::vector<Pose2> truth;
     std::vector<PackedSignature> seen;
     for (const std::size_t i : walk) {
       const ReferencePose& pose = views[i].pose;
       truth.push_back({pose.x_m, pose.y_m, pose.heading_rad.value_or(0.0)});
-      seen.push_back(signature_for(views[i].panorama, remembered->memory()));
+      seen.push_back(compute_packed_signature(views[i].panorama, remembered->memory()));
     }
-    sets.push_back(make_run_set(remembered, {run_through(truth, std::move(seen))}, executor));
+    sets.push_back(make_run_set(remembered, {make_tracking_run(truth, std::move(seen))}, executor));
   }
   const auto tracked = track(sets, setting, seed_of_gantry);
   add_rows({result, "m03.gantry_plants",

@@ -26,18 +26,18 @@ namespace {
 
 // A finer grid than the paper's, so that an area of 1 m^2 has a shape; and fewer pixels, because 15
 // components need no more.
-constexpr double kSpacingM = 0.125;
-constexpr int kRows = 40;
-constexpr int kColumns = 256;
+constexpr double area_spacing_m = 0.125;
+constexpr int max_view_rows = 40;
+constexpr int view_columns = 256;
 // The shape is looked at where the area is broad, and again where it no longer reaches the border
 // of the grid.
-constexpr std::array kComponents{3, 6};
-constexpr std::size_t kLevels = kComponents.size();
-constexpr double kTolerance = 0.25;
+constexpr std::array component_counts{3, 6};
+constexpr std::size_t level_count = component_counts.size();
+constexpr double area_tolerance = 0.25;
 // The same places in every scene.
-constexpr std::size_t kPlacesX = 6;
-constexpr std::size_t kPlacesY = 3;
-constexpr std::size_t kPlaces = kPlacesX * kPlacesY;
+constexpr std::size_t places_along_x = 6;
+constexpr std::size_t places_along_y = 3;
+constexpr std::size_t place_count = places_along_x * places_along_y;
 
 // Size and shape of something around a place: its mean over the directions, and each direction
 // over that mean.
@@ -46,7 +46,7 @@ struct Shape {
   Directional relative{};
 };
 
-Shape shape_of(const Directional& values) {
+Shape normalise_shape(const Directional& values) {
   Shape shape;
   shape.size = std::accumulate(values.begin(), values.end(), 0.0) / shape_directions;
   for (std::size_t i = 0; i < shape_directions; ++i) {
@@ -57,22 +57,23 @@ Shape shape_of(const Directional& values) {
 
 // What was found at one place of one scene.
 struct Observation {
-  std::array<Shape, kLevels> area;       // equivalent radius of the area in each sector
-  Shape free;                            // free distance
-  Shape parallax;                        // distance for equal parallax
-  std::array<Shape, kLevels> predicted;  // distance for an equal change of the components
+  std::array<Shape, level_count> area;       // equivalent radius of the area in each sector
+  Shape free;                                // free distance
+  Shape parallax;                            // distance for equal parallax
+  std::array<Shape, level_count> predicted;  // distance for an equal change of the components
 };
 // By place; empty where furniture stands.
-using SceneObservations = std::array<std::optional<Observation>, kPlaces>;
+using SceneObservations = std::array<std::optional<Observation>, place_count>;
 
 // Radius of the circle whose sector of 45 degrees has the area of the candidates' cells there.
-Directional extents_of(const VisualMemory& memory, const ReferenceAreas& areas, Point2 robot,
-                       const std::vector<Match>& candidates) {
+Directional compute_sector_extents(const VisualMemory& memory, const ReferenceAreas& areas,
+                                   Point2 robot, const std::vector<Match>& candidates) {
   Directional area_m2{};
   for (const Match& match : candidates) {
     const Point2 at = memory.info(match.view).pose->position();
     const auto cell = areas.cell(match.view);
-    area_m2[sector_of(std::atan2(at.y_m - robot.y_m, at.x_m - robot.x_m))] += polygon_area_m2(cell);
+    area_m2[find_sector(std::atan2(at.y_m - robot.y_m, at.x_m - robot.x_m))] +=
+        polygon_area_m2(cell);
   }
   Directional extents{};
   for (std::size_t i = 0; i < shape_directions; ++i) {
@@ -144,12 +145,12 @@ struct Residuals {
   std::vector<std::vector<double>> surroundings;
 };
 
-std::vector<std::vector<double>> residuals_of(const std::vector<SceneObservations>& scenes,
-                                              Property property, std::size_t level,
-                                              std::size_t directions) {
-  std::vector<std::vector<double>> result(scenes.size(),
-                                          std::vector<double>(kPlaces * directions, std::nan("")));
-  for (std::size_t p = 0; p < kPlaces; ++p) {
+std::vector<std::vector<double>> compute_residuals(const std::vector<SceneObservations>& scenes,
+                                                   Property property, std::size_t level,
+                                                   std::size_t directions) {
+  std::vector<std::vector<double>> result(
+      scenes.size(), std::vector<double>(place_count * directions, std::nan("")));
+  for (std::size_t p = 0; p < place_count; ++p) {
     for (std::size_t d = 0; d < directions; ++d) {
       double sum = 0.0;
       double count = 0.0;
@@ -186,10 +187,11 @@ double correlation(const Residuals& residuals, const std::vector<std::size_t>& s
   return area.size() >= 3 ? rank_correlation(area, around) : 0.0;
 }
 
-viewer::MapPlot plan_of(const simulation::PlaceRecording& place, const ReferenceAreas& areas,
-                        Point2 robot, const std::vector<Match>& candidates, std::size_t number) {
+viewer::MapPlot draw_area_map(const simulation::PlaceRecording& place, const ReferenceAreas& areas,
+                              Point2 robot, const std::vector<Match>& candidates,
+                              std::size_t number) {
   viewer::MapPlot map{.title = "place " + std::to_string(number) + ", " +
-                               std::to_string(kComponents.front()) + " components",
+                               std::to_string(component_counts.front()) + " components",
                       .layers = viewer::scene_layers(place.scene)};
   viewer::MapLayer area{.label = "where it may be", .colour = viewer::PlotColour::blue};
   for (const Match& match : candidates) area.filled_polygons.push_back(areas.cell(match.view));
@@ -203,25 +205,27 @@ viewer::MapPlot plan_of(const simulation::PlaceRecording& place, const Reference
 class AreaShape final : public Experiment {
  public:
   void add(const simulation::PlaceRecording& place, Executor& executor) override {
-    const simulation::PanoramaRendering rendering{.rows = std::min(kRows, place.rendering.rows),
-                                                  .columns = kColumns,
-                                                  .elevations = place.rendering.elevations,
-                                                  .rays_per_axis = 1};
+    const simulation::PanoramaRendering rendering{
+        .rows = std::min(max_view_rows, place.rendering.rows),
+        .columns = view_columns,
+        .elevations = place.rendering.elevations,
+        .rays_per_axis = 1};
     std::vector<Pose2> grid;
-    for (const auto& point : place.free_space->grid(kSpacingM)) {
+    for (const auto& point : place.free_space->grid(area_spacing_m)) {
       grid.push_back({point.position.x_m, point.position.y_m, 0.0});
     }
     const std::uint64_t noise = place.seed * 100003U + 80000U;
     const auto views = simulation::take_views(place, rendering, grid, noise, {}, executor);
-    const VisualMemory memory = memory_of(views, signatures_of(views, m04_components, executor));
+    const VisualMemory memory =
+        make_memory(views, compute_signatures(views, m04_components, executor));
     const ReferenceAreas areas(memory);
     Random random(place.seed, 80);
     SceneObservations here;
     const Point2 low = place.scene.floor_low;
     const Point2 high = place.scene.floor_high;
-    for (std::size_t p = 0; p < kPlaces; ++p) {
-      const double share_x = (static_cast<double>(p % kPlacesX) + 0.5) / kPlacesX;
-      const double share_y = (static_cast<double>(p / kPlacesX) + 0.5) / kPlacesY;
+    for (std::size_t p = 0; p < place_count; ++p) {
+      const double share_x = (static_cast<double>(p % places_along_x) + 0.5) / places_along_x;
+      const double share_y = (static_cast<double>(p / places_along_x) + 0.5) / places_along_y;
       const Pose2 robot{low.x_m + share_x * (high.x_m - low.x_m),
                         low.y_m + share_y * (high.y_m - low.y_m),
                         random.uniform(-std::numbers::pi, std::numbers::pi)};
@@ -229,17 +233,20 @@ class AreaShape final : public Experiment {
       const Panorama view = simulation::take_view(place, rendering, robot, noise + grid.size() + p);
       const auto levels = localise_hierarchically(
           memory, areas, pack(compute_signature(view, m04_components), memory.full_scale()),
-          {.tolerance = kTolerance});
-      const Surroundings around = surroundings_of(place, robot.position());
-      Observation seen{{}, shape_of(around.free_m), shape_of(around.parallax_m), {}};
-      for (std::size_t level = 0; level < kLevels; ++level) {
+          {.tolerance = area_tolerance});
+      const Surroundings around = measure_surroundings(place, robot.position());
+      Observation seen{{}, normalise_shape(around.free_m), normalise_shape(around.parallax_m), {}};
+      for (std::size_t level = 0; level < level_count; ++level) {
         const auto& candidates =
-            levels.at(static_cast<std::size_t>(kComponents[level] - 1)).candidates;
-        seen.predicted[level] = shape_of(predicted_extents(place, robot, view, kComponents[level]));
-        seen.area[level] = shape_of(extents_of(memory, areas, robot.position(), candidates));
+            levels.at(static_cast<std::size_t>(component_counts[level] - 1)).candidates;
+        seen.predicted[level] =
+            normalise_shape(predict_extents(place, robot, view, component_counts[level]));
+        seen.area[level] =
+            normalise_shape(compute_sector_extents(memory, areas, robot.position(), candidates));
         if (scenes_.empty() && level == 0 &&
-            kShownPlaces.end() != std::ranges::find(kShownPlaces, p)) {
-          shown_.push_back(plan_of(place, areas, robot.position(), candidates, shown_.size() + 1));
+            shown_places.end() != std::ranges::find(shown_places, p)) {
+          shown_.push_back(
+              draw_area_map(place, areas, robot.position(), candidates, shown_.size() + 1));
         }
       }
       here[p] = seen;
@@ -261,14 +268,14 @@ class AreaShape final : public Experiment {
                           .x_label = "surroundings in that direction [tenths of all]",
                           .y_label = "extent of the area, against other offices [share]",
                           .series = {}};
-    for (std::size_t level = 0; level < kLevels; ++level) {
+    for (std::size_t level = 0; level < level_count; ++level) {
       for (const Relation& relation : relations()) {
         const Residuals residuals{
-            residuals_of(scenes_, relation.area, level, relation.directions),
-            residuals_of(scenes_, relation.surroundings, level, relation.directions)};
+            compute_residuals(scenes_, relation.area, level, relation.directions),
+            compute_residuals(scenes_, relation.surroundings, level, relation.directions)};
         add_rows(relation, level, residuals, all, result);
         if (relation.directions > 1 && relation.id != "shape_against_parallax") {
-          plot.series.push_back(tenths(relation, level, residuals));
+          plot.series.push_back(mean_by_decile(relation, level, residuals));
         }
       }
     }
@@ -280,17 +287,17 @@ class AreaShape final : public Experiment {
   }
 
  private:
-  static constexpr std::array<std::size_t, 4> kShownPlaces{1, 4, 8, 15};
-  static constexpr int kDraws = 500;
+  static constexpr std::array<std::size_t, 4> shown_places{1, 4, 8, 15};
+  static constexpr int bootstrap_draws = 500;
 
   static void add_rows(const Relation& relation, std::size_t level, const Residuals& residuals,
                        const std::vector<std::size_t>& all, Reproduction& result) {
-    const std::string components = std::to_string(kComponents[level]);
+    const std::string components = std::to_string(component_counts[level]);
     const std::string id = "m04.fig10." + relation.id + "_" + components;
     Random random(1, 81);
     std::vector<double> drawn;
     std::vector<double> shuffled;
-    for (int draw = 0; draw < kDraws; ++draw) {
+    for (int draw = 0; draw < bootstrap_draws; ++draw) {
       std::vector<std::size_t> scenes(all.size());
       for (auto& scene : scenes) scene = random.index(all.size());
       drawn.push_back(correlation(residuals, scenes, scenes));
@@ -316,8 +323,8 @@ class AreaShape final : public Experiment {
   }
 
   // Mean residual of the area in each tenth of the residuals of the surroundings.
-  static viewer::Series tenths(const Relation& relation, std::size_t level,
-                               const Residuals& residuals) {
+  static viewer::Series mean_by_decile(const Relation& relation, std::size_t level,
+                                       const Residuals& residuals) {
     std::vector<std::pair<double, double>> pairs;
     for (std::size_t s = 0; s < residuals.area.size(); ++s) {
       for (std::size_t j = 0; j < residuals.area[s].size(); ++j) {
@@ -327,12 +334,13 @@ class AreaShape final : public Experiment {
       }
     }
     std::ranges::stable_sort(pairs, {}, &std::pair<double, double>::first);
-    viewer::Series series{.label = relation.label + ", " + std::to_string(kComponents[level]) +
+    viewer::Series series{.label = relation.label + ", " + std::to_string(component_counts[level]) +
                                    " components"};
-    constexpr std::size_t kTenths = 10;
-    for (std::size_t t = 0; t < kTenths; ++t) {
+    constexpr std::size_t tenth_count = 10;
+    for (std::size_t t = 0; t < tenth_count; ++t) {
       std::vector<double> values;
-      for (std::size_t i = t * pairs.size() / kTenths; i < (t + 1) * pairs.size() / kTenths; ++i) {
+      for (std::size_t i = t * pairs.size() / tenth_count; i < (t + 1) * pairs.size() / tenth_count;
+           ++i) {
         values.push_back(pairs[i].second);
       }
       if (values.empty()) continue;

@@ -18,23 +18,23 @@ namespace panonav::lab {
 
 namespace {
 
-constexpr std::array kComponents{2, 5, 15, 50, 256};
-constexpr std::size_t kCounts = kComponents.size();
-constexpr std::size_t kFifteen = 2;
-constexpr std::size_t kConditions = 3;
-constexpr std::size_t kHidden = 1;
-constexpr std::size_t kBands = 4;  // components 0 and 1, 2 .. 14, 15 .. 49, 50 .. 255
+constexpr std::array component_counts{2, 5, 15, 50, 256};
+constexpr std::size_t count_number = component_counts.size();
+constexpr std::size_t index_of_fifteen = 2;
+constexpr std::size_t condition_count = 3;
+constexpr std::size_t hidden_condition = 1;
+constexpr std::size_t band_count = 4;  // components 0 and 1, 2 .. 14, 15 .. 49, 50 .. 255
 
 // Dissimilarities of one query to all references, for every number of components at once.
-std::array<std::vector<double>, kCounts> dissimilarities(
+std::array<std::vector<double>, count_number> dissimilarities(
     const FourierSignature& query, const std::vector<FourierSignature>& references) {
-  std::array<std::vector<double>, kCounts> values;
+  std::array<std::vector<double>, count_number> values;
   for (const auto& reference : references) {
     const auto parts = dissimilarity_by_component(query, reference);
     double sum = 0.0;
     std::size_t k = 0;
-    for (std::size_t c = 0; c < kCounts; ++c) {
-      for (; k < static_cast<std::size_t>(kComponents[c]); ++k) sum += parts[k];
+    for (std::size_t c = 0; c < count_number; ++c) {
+      for (; k < static_cast<std::size_t>(component_counts[c]); ++k) sum += parts[k];
       values[c].push_back(sum);
     }
   }
@@ -62,24 +62,24 @@ double peak_sharpness(const simulation::PlaceRecording& place, std::size_t neare
 class Discrimination final : public Experiment {
  public:
   void add(const simulation::PlaceRecording& place, Executor& executor) override {
-    require(place.rendering.columns >= 2 * kComponents.back(), "columns", place.rendering.columns,
-            ">= 512: figure 6 compares 256 components");
-    const auto references = signatures_of(place.references, kComponents.back(), executor);
-    const auto clean = signatures_of(place.queries, kComponents.back(), executor);
-    std::vector<double> sharpness(kCounts);
-    std::vector<double> contrast(kCounts);
-    for (std::size_t condition = 0; condition < kConditions; ++condition) {
-      const auto views = queries_under(place, view_conditions()[condition], executor);
-      const auto queries = signatures_of(views, kComponents.back(), executor);
+    require(place.rendering.columns >= 2 * component_counts.back(), "columns",
+            place.rendering.columns, ">= 512: figure 6 compares 256 components");
+    const auto references = compute_signatures(place.references, component_counts.back(), executor);
+    const auto clean = compute_signatures(place.queries, component_counts.back(), executor);
+    std::vector<double> sharpness(count_number);
+    std::vector<double> contrast(count_number);
+    for (std::size_t condition = 0; condition < condition_count; ++condition) {
+      const auto views = take_queries(place, view_conditions()[condition], executor);
+      const auto queries = compute_signatures(views, component_counts.back(), executor);
       auto values = simulation::make_each(executor, queries.size(), [&](std::size_t q) {
         return dissimilarities(queries[q], references);
       });
-      std::array<double, kCounts> right{};
+      std::array<double, count_number> right{};
       const auto n = static_cast<double>(queries.size());
       for (std::size_t q = 0; q < queries.size(); ++q) {
         const Point2 position = views[q].pose.position();
         const std::size_t nearest = place.nearest_reference(position);
-        for (std::size_t c = 0; c < kCounts; ++c) {
+        for (std::size_t c = 0; c < count_number; ++c) {
           const std::size_t found = index_of_smallest(values[q][c]);
           right[c] += found == nearest ? 1.0 / n : 0.0;
           found_[condition][c] += found == nearest ? 1 : 0;
@@ -92,13 +92,13 @@ class Discrimination final : public Experiment {
         }
       }
       trials_ += condition == 0 ? queries.size() : 0;
-      for (std::size_t c = 0; c < kCounts; ++c) {
+      for (std::size_t c = 0; c < count_number; ++c) {
         success_by_scene_[condition][c].push_back(right[c]);
       }
       if (condition == 0 && profile_.empty()) keep_profile(place, values.front());
-      if (condition == kHidden) compare_disturbance(place, clean, queries, references);
+      if (condition == hidden_condition) compare_disturbance(place, clean, queries, references);
     }
-    for (std::size_t c = 0; c < kCounts; ++c) {
+    for (std::size_t c = 0; c < count_number; ++c) {
       sharpness_by_scene_[c].push_back(sharpness[c]);
       contrast_by_scene_[c].push_back(contrast[c]);
     }
@@ -107,28 +107,28 @@ class Discrimination final : public Experiment {
   void report(Reproduction& result) const override {
     require(trials_ >= 1, "queries", 0.0, ">= 1");
     draw(result);
-    for (std::size_t condition = 0; condition < kConditions; ++condition) {
+    for (std::size_t condition = 0; condition < condition_count; ++condition) {
       const std::string& name = view_conditions()[condition].name;
       const std::string& id = view_conditions()[condition].id;
-      for (std::size_t c = 0; c < kCounts; ++c) {
+      for (std::size_t c = 0; c < count_number; ++c) {
         const Proportion found = success_rate(found_[condition][c], trials_);
         add_row(result, "m04.fig6." + id + ".found_" + text(c),
                 "figure 6: nearest reference found with " + text(c) + " components, " + name, found,
                 "");
       }
-      for (const std::size_t more : {kFifteen + 1, kFifteen + 2}) {
+      for (const std::size_t more : {index_of_fifteen + 1, index_of_fifteen + 2}) {
         add_difference(condition, "fifteen_against_" + text(more),
                        "15 components less that with " + text(more), more, at_least(-0.02), result);
-        if (id == "hidden") result.rows.back().reason = reason_of_disturbance();
+        if (id == "hidden") result.rows.back().reason = explain_disturbance();
       }
       add_difference(condition, "fifteen_against_2", "15 components less that with 2", 0,
                      at_least(0.0), result);
       add_row(
           result, "m04.fig6." + id + ".error_15",
           "figure 6: distance to the reference found, 15 components, 25 cm grid (median), " + name,
-          median_figure(errors_m_[condition][kFifteen]), "m", at_most(0.177));
+          median_figure(errors_m_[condition][index_of_fifteen]), "m", at_most(0.177));
     }
-    for (std::size_t c = 0; c < kCounts; ++c) {
+    for (std::size_t c = 0; c < count_number; ++c) {
       add_row(result, "m04.fig6.sharpness_" + text(c),
               "figure 6: fall of similarity from the right reference to its neighbours, " +
                   text(c) + " components (share of the whole range; more is sharper)",
@@ -138,22 +138,22 @@ class Discrimination final : public Experiment {
                   text(c) + " components (less is better)",
               mean_figure(contrast_by_scene_[c]), "");
     }
-    constexpr std::array kBandNames{"0 and 1", "2 to 14", "15 to 49", "50 to 255"};
-    for (std::size_t band = 0; band < kBands; ++band) {
+    constexpr std::array band_names{"0 and 1", "2 to 14", "15 to 49", "50 to 255"};
+    for (std::size_t band = 0; band < band_count; ++band) {
       if (disturbance_[band].empty()) continue;
       add_row(result, "m04.fig6.hidden.disturbance_" + std::to_string(band + 1),
               std::string("figure 6: what hiding 10 % of the azimuths changes in components ") +
-                  kBandNames[band] + ", over what a step of 25 cm changes there",
+                  band_names[band] + ", over what a step of 25 cm changes there",
               mean_figure(disturbance_[band]), "");
     }
     add_row(result, "m04.fig6.sharpness_fifteen_against_2",
             "figure 6: sharpness with 15 components less that with 2",
-            mean_figure(difference(sharpness_by_scene_[kFifteen], sharpness_by_scene_[0])), "",
-            at_least(0.0));
+            mean_figure(difference(sharpness_by_scene_[index_of_fifteen], sharpness_by_scene_[0])),
+            "", at_least(0.0));
   }
 
  private:
-  static std::string text(std::size_t c) { return std::to_string(kComponents[c]); }
+  static std::string text(std::size_t c) { return std::to_string(component_counts[c]); }
 
   static std::vector<double> difference(const std::vector<double>& a,
                                         const std::vector<double>& b) {
@@ -165,15 +165,15 @@ class Discrimination final : public Experiment {
   // Differences are paired: the same queries in the same scenes.
   void add_difference(std::size_t condition, const std::string& id, const std::string& what,
                       std::size_t other, Target target, Reproduction& result) const {
-    const auto values =
-        difference(success_by_scene_[condition][kFifteen], success_by_scene_[condition][other]);
+    const auto values = difference(success_by_scene_[condition][index_of_fifteen],
+                                   success_by_scene_[condition][other]);
     add_row(result, "m04.fig6." + view_conditions()[condition].id + "." + id,
             "figure 6: share found with " + what + ", " + view_conditions()[condition].name,
             mean_figure(values), "", target);
   }
 
   // Why more components help with azimuths hidden, where the measured disturbance says so.
-  [[nodiscard]] std::string reason_of_disturbance() const {
+  [[nodiscard]] std::string explain_disturbance() const {
     if (disturbance_[1].empty()) return "";
     const double low = mean(disturbance_[1]);
     const double high = mean(disturbance_[3]);
@@ -191,8 +191,8 @@ class Discrimination final : public Experiment {
                            const std::vector<FourierSignature>& hidden,
                            const std::vector<FourierSignature>& references) {
     if (references.size() < 2) return;
-    std::array<double, kBands> by_people{};
-    std::array<double, kBands> by_step{};
+    std::array<double, band_count> by_people{};
+    std::array<double, band_count> by_step{};
     for (std::size_t q = 0; q < clean.size(); ++q) {
       const std::size_t nearest = place.nearest_reference(place.queries[q].pose.position());
       const auto people = dissimilarity_by_component(clean[q], hidden[q]);
@@ -209,17 +209,17 @@ class Discrimination final : public Experiment {
         by_step[band] += step[k];
       }
     }
-    for (std::size_t band = 0; band < kBands; ++band) {
+    for (std::size_t band = 0; band < band_count; ++band) {
       if (by_step[band] > 0.0) disturbance_[band].push_back(by_people[band] / by_step[band]);
     }
   }
 
   void keep_profile(const simulation::PlaceRecording& place,
-                    const std::array<std::vector<double>, kCounts>& values) {
+                    const std::array<std::vector<double>, count_number>& values) {
     const simulation::PlacedView& query = place.queries.front();
     const std::size_t nearest = place.nearest_reference(query.pose.position());
     const double row_y_m = place.references[nearest].pose.y_m;
-    for (std::size_t c = 0; c < kCounts; ++c) {
+    for (std::size_t c = 0; c < count_number; ++c) {
       const auto scaled = similarities(values[c]);
       viewer::Series line{.label = text(c) + " components"};
       for (std::size_t i = 0; i < place.references.size(); ++i) {
@@ -253,12 +253,12 @@ class Discrimination final : public Experiment {
                            .series = {},
                            .log_x = true,
                            .x_range = std::pair{1.5, 400.0}};
-    for (std::size_t condition = 0; condition < kConditions; ++condition) {
+    for (std::size_t condition = 0; condition < condition_count; ++condition) {
       viewer::Series line{.label = view_conditions()[condition].name};
-      for (std::size_t c = 0; c < kCounts; ++c) {
+      for (std::size_t c = 0; c < count_number; ++c) {
         const Proportion found = success_rate(found_[condition][c], trials_);
         // Moved a little apart, so that error bars do not hide each other.
-        line.add(kComponents[c] * (1.0 + 0.03 * static_cast<double>(condition)), found.value);
+        line.add(component_counts[c] * (1.0 + 0.03 * static_cast<double>(condition)), found.value);
         line.y_low.push_back(found.low);
         line.y_high.push_back(found.high);
       }
@@ -271,12 +271,12 @@ class Discrimination final : public Experiment {
   }
 
   std::size_t trials_ = 0;
-  std::array<std::array<std::size_t, kCounts>, kConditions> found_{};
-  std::array<std::array<std::vector<double>, kCounts>, kConditions> errors_m_;
-  std::array<std::array<std::vector<double>, kCounts>, kConditions> success_by_scene_;
-  std::array<std::vector<double>, kCounts> sharpness_by_scene_;
-  std::array<std::vector<double>, kCounts> contrast_by_scene_;
-  std::array<std::vector<double>, kBands> disturbance_;
+  std::array<std::array<std::size_t, count_number>, condition_count> found_{};
+  std::array<std::array<std::vector<double>, count_number>, condition_count> errors_m_;
+  std::array<std::array<std::vector<double>, count_number>, condition_count> success_by_scene_;
+  std::array<std::vector<double>, count_number> sharpness_by_scene_;
+  std::array<std::vector<double>, count_number> contrast_by_scene_;
+  std::array<std::vector<double>, band_count> disturbance_;
   std::vector<viewer::Series> profile_;
 };
 

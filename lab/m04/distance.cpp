@@ -16,14 +16,14 @@ namespace panonav::lab {
 
 namespace {
 
-constexpr double kStepM = 0.02;
-constexpr double kLineM = 4.0;
+constexpr double line_step_m = 0.02;
+constexpr double line_length_m = 4.0;
 
-// Values at 0, kStepM, 2 kStepM, ..
+// Values at 0, line_step_m, 2 line_step_m, ..
 using Curve = std::vector<double>;
 
-double distance_of(std::size_t bin) {
-  return kStepM * static_cast<double>(bin);
+double bin_distance_m(std::size_t bin) {
+  return line_step_m * static_cast<double>(bin);
 }
 
 // Largest deviation of the first `count` values from the line of least squares through them.
@@ -34,7 +34,7 @@ double deviation_from_line(const Curve& curve, std::size_t count) {
   double sxx = 0.0;
   double sxy = 0.0;
   for (std::size_t i = 0; i < count; ++i) {
-    const double x = distance_of(i);
+    const double x = bin_distance_m(i);
     sx += x;
     sy += curve[i];
     sxx += x * x;
@@ -44,7 +44,7 @@ double deviation_from_line(const Curve& curve, std::size_t count) {
   const double start = (sy - slope * sx) / n;
   double largest = 0.0;
   for (std::size_t i = 0; i < count; ++i) {
-    largest = std::max(largest, std::abs(curve[i] - start - slope * distance_of(i)));
+    largest = std::max(largest, std::abs(curve[i] - start - slope * bin_distance_m(i)));
   }
   return largest;
 }
@@ -56,24 +56,25 @@ double linear_range_m(const Curve& curve, double tolerance) {
     if (deviation_from_line(curve, count) > tolerance) break;
     last = count - 1;
   }
-  return distance_of(last);
+  return bin_distance_m(last);
 }
 
-double first_above_m(const Curve& curve, double value) {
+double find_first_above_m(const Curve& curve, double value) {
   const auto found = std::ranges::find_if(curve, [&](double v) { return v >= value; });
-  return distance_of(static_cast<std::size_t>(found - curve.begin()) - (found == curve.end()));
+  return bin_distance_m(static_cast<std::size_t>(found - curve.begin()) - (found == curve.end()));
 }
 
-// A straight way of length kLineM with free floor all along, or the longest of the ways drawn.
-std::pair<Point2, Point2> draw_line(const simulation::FreeSpace& space, Random& random) {
+// A straight way of length line_length_m with free floor all along, or the longest of the ways
+// drawn.
+std::pair<Point2, Point2> sample_straight_line(const simulation::FreeSpace& space, Random& random) {
   std::optional<std::pair<Point2, Point2>> best;
-  constexpr int kDraws = 200;
-  for (int draw = 0; draw < kDraws; ++draw) {
+  constexpr int line_draws = 200;
+  for (int draw = 0; draw < line_draws; ++draw) {
     const Pose2 start = space.random_pose(random);
     double length = 0.0;
     Point2 end = start.position();
-    while (length < kLineM - 1e-9) {
-      const double next = length + kStepM;
+    while (length < line_length_m - 1e-9) {
+      const double next = length + line_step_m;
       const Point2 there{start.x_m + next * std::cos(start.heading_rad),
                          start.y_m + next * std::sin(start.heading_rad)};
       if (!space.is_free_between(end, there)) break;
@@ -81,7 +82,7 @@ std::pair<Point2, Point2> draw_line(const simulation::FreeSpace& space, Random& 
       length = next;
     }
     if (!best || length > distance(best->first, best->second)) best = {start.position(), end};
-    if (length >= kLineM - 1e-9) break;
+    if (length >= line_length_m - 1e-9) break;
   }
   return *best;
 }
@@ -111,12 +112,12 @@ class DistanceCurve final : public Experiment {
   void add(const simulation::PlaceRecording& place, Executor& executor) override {
     Random random(place.seed, 79);
     CurveSums sums;
-    for (std::size_t line = 0; line < kLines; ++line) {
-      const auto [from, to] = draw_line(*place.free_space, random);
+    for (std::size_t line = 0; line < lines_per_scene; ++line) {
+      const auto [from, to] = sample_straight_line(*place.free_space, random);
       add_line(place, from, to, line, sums, executor);
     }
     Curve curve = sums.mean();
-    require(curve.size() >= 50, "length of the straight ways [m]", distance_of(curve.size() - 1),
+    require(curve.size() >= 50, "length of the straight ways [m]", bin_distance_m(curve.size() - 1),
             ">= 1 m");
     // The absolute value depends on the place and carries no meaning [M04 section 2.2]: 1 is the
     // level of far views, the mean over the farther half of all distances.
@@ -129,10 +130,10 @@ class DistanceCurve final : public Experiment {
       for (double& value : single_.back().y) value /= level;
     }
     noise_.push_back(curve[0]);
-    linear_m_.push_back(linear_range_m(curve, kTolerance));
-    saturation_m_.push_back(first_above_m(curve, 0.95));
-    half_m_.push_back(first_above_m(curve, 0.5));
-    at_grid_.push_back(curve[static_cast<std::size_t>(std::lround(place.spacing_m / kStepM))]);
+    linear_m_.push_back(linear_range_m(curve, linearity_tolerance));
+    saturation_m_.push_back(find_first_above_m(curve, 0.95));
+    half_m_.push_back(find_first_above_m(curve, 0.5));
+    at_grid_.push_back(curve[static_cast<std::size_t>(std::lround(place.spacing_m / line_step_m))]);
     const auto quarter = static_cast<std::ptrdiff_t>(far.size() / 2);
     rise_.push_back(mean(Curve(far.begin() + quarter, far.end())) /
                     mean(Curve(far.begin(), far.begin() + quarter)));
@@ -146,10 +147,10 @@ class DistanceCurve final : public Experiment {
     std::size_t shared = curves_.front().size();
     for (const Curve& curve : curves_) shared = std::min(shared, curve.size());
     // Every point up to 30 cm, then one each 10 cm, so that error bars can be told apart.
-    for (std::size_t bin = 0; bin < shared; bin += distance_of(bin) < 0.299 ? 1 : 5) {
+    for (std::size_t bin = 0; bin < shared; bin += bin_distance_m(bin) < 0.299 ? 1 : 5) {
       std::vector<double> here;
       for (const Curve& curve : curves_) here.push_back(curve[bin]);
-      add_point(average, distance_of(bin), mean_figure(here));
+      add_point(average, bin_distance_m(bin), mean_figure(here));
     }
     viewer::LinePlot plot{.title = "Dissimilarity against distance ([M04] figure 7)",
                           .x_label = "distance between the views [m]",
@@ -186,7 +187,7 @@ class DistanceCurve final : public Experiment {
   // All pairs of views along one straight way.
   void add_line(const simulation::PlaceRecording& place, Point2 from, Point2 to, std::size_t line,
                 CurveSums& sums, Executor& executor) {
-    const auto steps = static_cast<std::size_t>(std::lround(distance(from, to) / kStepM));
+    const auto steps = static_cast<std::size_t>(std::lround(distance(from, to) / line_step_m));
     std::vector<Pose2> poses;
     std::vector<Pose2> some;
     for (std::size_t i = 0; i <= steps; ++i) {
@@ -194,11 +195,11 @@ class DistanceCurve final : public Experiment {
       // Any heading: magnitudes do not depend on it.
       poses.push_back(
           {from.x_m + share * (to.x_m - from.x_m), from.y_m + share * (to.y_m - from.y_m), 0.0});
-      if (i % kAgain == 0) some.push_back(poses.back());
+      if (i % repeat_interval == 0) some.push_back(poses.back());
     }
     const std::uint64_t noise = place.seed * 100003U + 70000U + 5000U * line;
     const auto see = [&](const std::vector<Pose2>& from_here, std::uint64_t seed) {
-      return signatures_of(
+      return compute_signatures(
           simulation::take_views(place, place.rendering, from_here, seed, {}, executor),
           m04_components, executor);
     };
@@ -206,25 +207,26 @@ class DistanceCurve final : public Experiment {
     const auto again = see(some, noise + 2500U);
     for (std::size_t i = 0; i < views.size(); ++i) {
       // At distance 0 two pictures differ by noise alone.
-      if (i % kAgain == 0) sums.add(0, dissimilarity_l1(views[i], again[i / kAgain]));
+      if (i % repeat_interval == 0)
+        sums.add(0, dissimilarity_l1(views[i], again[i / repeat_interval]));
       for (std::size_t j = i + 1; j < views.size(); ++j) {
         sums.add(j - i, dissimilarity_l1(views[i], views[j]));
       }
     }
     // The paper shows single pairs: one reference, one robot that drives away from it.
-    if (line > 0 || single_.size() >= kShown) return;
+    if (line > 0 || single_.size() >= shown_pairs) return;
     viewer::Series one{.label = "pair " + std::to_string(single_.size() + 1),
                        .style = viewer::SeriesStyle::lines};
     for (std::size_t j = 0; j < views.size(); ++j) {
-      one.add(distance_of(j), dissimilarity_l1(views[0], j == 0 ? again[0] : views[j]));
+      one.add(bin_distance_m(j), dissimilarity_l1(views[0], j == 0 ? again[0] : views[j]));
     }
     single_.push_back(std::move(one));
   }
 
-  static constexpr std::size_t kLines = 2;
-  static constexpr std::size_t kAgain = 10;  // one view in so many is taken twice
-  static constexpr std::size_t kShown = 5;
-  static constexpr double kTolerance = 0.02;
+  static constexpr std::size_t lines_per_scene = 2;
+  static constexpr std::size_t repeat_interval = 10;  // one view in so many is taken twice
+  static constexpr std::size_t shown_pairs = 5;
+  static constexpr double linearity_tolerance = 0.02;
 
   std::vector<Curve> curves_;
   std::vector<viewer::Series> single_;
@@ -240,7 +242,7 @@ class DistanceCurve final : public Experiment {
 class SimilaritySurface final : public Experiment {
  public:
   void add(const simulation::PlaceRecording& place, Executor& executor) override {
-    const auto references = signatures_of(place.references, m04_components, executor);
+    const auto references = compute_signatures(place.references, m04_components, executor);
     for (const auto& query : place.queries) {
       const auto wanted = compute_signature(query.panorama, m04_components);
       std::vector<double> values;
@@ -251,7 +253,7 @@ class SimilaritySurface final : public Experiment {
       }
       const auto scaled = similarities(values);
       correlations_.push_back(rank_correlation(scaled, distances));
-      if (!map_) map_ = surface(place, query.pose.position(), scaled);
+      if (!map_) map_ = make_similarity_map(place, query.pose.position(), scaled);
     }
   }
 
@@ -268,8 +270,8 @@ class SimilaritySurface final : public Experiment {
   }
 
  private:
-  static viewer::HeatMap surface(const simulation::PlaceRecording& place, Point2 robot,
-                                 const std::vector<double>& scaled) {
+  static viewer::HeatMap make_similarity_map(const simulation::PlaceRecording& place, Point2 robot,
+                                             const std::vector<double>& scaled) {
     Point2 low = place.references.front().pose.position();
     Point2 high = low;
     for (const auto& reference : place.references) {

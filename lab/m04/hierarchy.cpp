@@ -15,16 +15,16 @@ namespace panonav::lab {
 
 namespace {
 
-constexpr std::size_t kLevels = m04_components;
+constexpr std::size_t level_count = m04_components;
 // Views within 25 % of the best known dissimilarity stay candidates: wide enough that the place
 // itself is not dropped by noise at one component, narrow enough that areas shrink visibly. The
 // rows report what it costs and misses.
-constexpr double kTolerance = 0.25;
-constexpr double kWantedRadiusM = 0.5;
+constexpr double tolerance = 0.25;
+constexpr double target_radius_m = 0.5;
 
-viewer::MapPlot area_map(const simulation::Scene& scene, const VisualMemory& memory,
-                         const ReferenceAreas& areas, Point2 robot,
-                         const LocalisationLevel& level) {
+viewer::MapPlot draw_area_map(const simulation::Scene& scene, const VisualMemory& memory,
+                              const ReferenceAreas& areas, Point2 robot,
+                              const LocalisationLevel& level) {
   viewer::MapPlot map{.title = std::to_string(level.components) +
                                (level.components == 1 ? " component" : " components"),
                       .layers = viewer::scene_layers(scene)};
@@ -61,14 +61,14 @@ bool is_nested(const std::vector<LocalisationLevel>& levels) {
 class HierarchicalAreas final : public Experiment {
  public:
   void add(const simulation::PlaceRecording& place, Executor& executor) override {
-    const auto signatures = signatures_of(place.references, m04_components, executor);
-    const VisualMemory memory = memory_of(place.references, signatures);
+    const auto signatures = compute_signatures(place.references, m04_components, executor);
+    const VisualMemory memory = make_memory(place.references, signatures);
     const ReferenceAreas areas(memory);
     for (const simulation::PlacedView& query : place.queries) {
       const Point2 robot = query.pose.position();
       const auto packed =
           pack(compute_signature(query.panorama, m04_components), memory.full_scale());
-      const auto levels = localise_hierarchically(memory, areas, packed, {.tolerance = kTolerance});
+      const auto levels = localise_hierarchically(memory, areas, packed, {.tolerance = tolerance});
       const ViewId nearest = memory.views()[place.nearest_reference(robot)];
       ++trials_;
       nested_ += is_nested(levels) ? 1 : 0;
@@ -77,14 +77,14 @@ class HierarchicalAreas final : public Experiment {
         holding_[m] += contains(levels[m].candidates, nearest) ? 1 : 0;
       }
       const auto coarse = localise_hierarchically(
-          memory, areas, packed, {.radius_m = kWantedRadiusM, .tolerance = kTolerance});
+          memory, areas, packed, {.radius_m = target_radius_m, .tolerance = tolerance});
       components_needed_.push_back(coarse.back().components);
       const std::size_t scan = memory.size() * memory.shape().size();
       bytes_shares_.push_back(static_cast<double>(coarse.back().bytes_read) /
                               static_cast<double>(scan));
       if (shown_.empty()) {
         for (const std::size_t m : {0U, 2U, 5U, 14U}) {
-          shown_.push_back(area_map(place.scene, memory, areas, robot, levels.at(m)));
+          shown_.push_back(draw_area_map(place.scene, memory, areas, robot, levels.at(m)));
         }
       }
     }
@@ -100,11 +100,11 @@ class HierarchicalAreas final : public Experiment {
                            .x_label = "number of components compared",
                            .y_label = "area [m^2]",
                            .series = {viewer::Series{.label = "median of all queries"}}};
-    for (std::size_t m = 0; m < kLevels; ++m) {
+    for (std::size_t m = 0; m < level_count; ++m) {
       add_point(curve.series[0], static_cast<double>(m + 1), median_figure(areas_m2_[m]));
     }
     add_plot(result, "fig09_area_curve.svg", "The median area over all queries and scenes.", curve);
-    for (const std::size_t m : {std::size_t{1}, std::size_t{3}, kLevels}) {
+    for (const std::size_t m : {std::size_t{1}, std::size_t{3}, level_count}) {
       const std::string text = std::to_string(m);
       add_row(result, "m04.fig9.area_" + text,
               "figure 9: area where the robot may be after " + text +
@@ -131,8 +131,8 @@ class HierarchicalAreas final : public Experiment {
  private:
   std::size_t trials_ = 0;
   std::size_t nested_ = 0;
-  std::array<std::vector<double>, kLevels> areas_m2_;
-  std::array<std::size_t, kLevels> holding_{};
+  std::array<std::vector<double>, level_count> areas_m2_;
+  std::array<std::size_t, level_count> holding_{};
   std::vector<double> components_needed_;
   std::vector<double> bytes_shares_;
   std::vector<viewer::MapPlot> shown_;

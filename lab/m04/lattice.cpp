@@ -22,14 +22,14 @@ namespace panonav::lab {
 namespace {
 
 // The paper's uncertainty of motion: of the distance, and of half a turn.
-constexpr double kDistanceShare = 0.10;
-constexpr double kDirectionShare = 0.15;
+constexpr double distance_error_share = 0.10;
+constexpr double direction_error_share = 0.15;
 // Springs of the plain lattice: with more, views on opposite sides of a hall that look alike by
 // their magnitudes fold it. Chosen on other scenes (seeds 201 to 205).
-constexpr int kPlainNeighbours = 4;
+constexpr int plain_neighbours = 4;
 
 LatticeOptions plain_options() {
-  return {.neighbours = kPlainNeighbours, .phases = false};
+  return {.neighbours = plain_neighbours, .phases = false};
 }
 
 /// What is measured of one way of arranging, over scenes.
@@ -60,15 +60,15 @@ void add_rows(const std::string& id, const std::string& what, const Arrangements
           median_figure(measured.border_pull), "spacings");
 }
 
-viewer::MapPlot map_of(const std::string& title, const ViewGrid& grid,
-                       std::span<const Point2> positions) {
+viewer::MapPlot make_map(const std::string& title, const ViewGrid& grid,
+                         std::span<const Point2> positions) {
   viewer::MapLayer lines{
       .label = "", .colour = viewer::PlotColour::grey, .lines = grid_lines(grid, positions)};
   viewer::MapLayer views{.label = "views", .circles = {positions.begin(), positions.end()}};
   return {.title = title, .layers = {lines, views}};
 }
 
-std::string with_mu(const std::string& title, double mu) {
+std::string append_mu(const std::string& title, double mu) {
   return title + ", mu " + format_fixed(mu, 4);
 }
 
@@ -80,11 +80,11 @@ class LatticeExperiment {
   void run_scene(int scene) {
     const std::uint64_t seed = options_.seed + static_cast<std::uint64_t>(scene);
     const bool first = scene == 0;
-    unordered_in_hall(seed, first);
-    unordered_in_small_room(seed);
-    with_motion(seed, 10, 0.6, coarse_, coarse_without_phases_, first);
+    arrange_hall(seed, first);
+    arrange_small_room(seed);
+    arrange_with_motion(seed, 10, 0.6, coarse_, coarse_without_phases_, first);
     if (options_.fine_lattice_every > 0 && scene % options_.fine_lattice_every == 0) {
-      with_motion(seed, 19, 0.3, fine_, fine_without_phases_, first);
+      arrange_with_motion(seed, 19, 0.3, fine_, fine_without_phases_, first);
     }
   }
 
@@ -100,10 +100,10 @@ class LatticeExperiment {
             "the median; published: about 10 %)",
             median_figure(turn_error_deg_), "deg", at_most(2.0), std::pair{18.0, 36.0});
     for (std::size_t i = 0; i < error_.size(); ++i) {
-      add_row(
-          result_, "m04.fig12.error_" + std::to_string(i),
-          "figure 12: error of a distance read as " + to_text(kErrorsAt[i]) + " spacings of 30 cm",
-          median_figure(error_[i]), "spacings");
+      add_row(result_, "m04.fig12.error_" + std::to_string(i),
+              "figure 12: error of a distance read as " + to_text(error_distances[i]) +
+                  " spacings of 30 cm",
+              median_figure(error_[i]), "spacings");
     }
     add_row(result_, "m04.fig12.range",
             "figure 12: largest distance at which views correlate (x_1)", median_figure(range_),
@@ -127,16 +127,16 @@ class LatticeExperiment {
   }
 
  private:
-  [[nodiscard]] simulation::PlaceRecording place_of(simulation::Scene scene,
-                                                    std::uint64_t seed) const {
-    auto place = simulation::empty_place(std::move(scene), seed, 256, executor_);
+  [[nodiscard]] simulation::PlaceRecording make_place(simulation::Scene scene,
+                                                      std::uint64_t seed) const {
+    auto place = simulation::make_empty_place(std::move(scene), seed, 256, executor_);
     place.rendering.rows = options_.rows;
     return place;
   }
 
-  void unordered_in_hall(std::uint64_t seed, bool drawn) {
-    const auto place = place_of(simulation::make_scene("hall", {.seed = seed}), seed);
-    const ViewGrid grid = take_grid(place, 10, 8, 0.3, GridHeadings::random, executor_);
+  void arrange_hall(std::uint64_t seed, bool drawn) {
+    const auto place = make_place(simulation::make_scene("hall", {.seed = seed}), seed);
+    const ViewGrid grid = record_grid(place, 10, 8, 0.3, GridHeadings::random, executor_);
     const auto start = std::chrono::steady_clock::now();
     const Lattice arranged = arrange(grid.memory, {}, {}, executor_);
     time_ms_.push_back(
@@ -149,32 +149,34 @@ class LatticeExperiment {
     plain_.add(published, true);
     const auto errors = turn_errors(grid, arranged);
     if (!errors.empty()) turn_error_deg_.push_back(degrees(median(errors)));
-    const DissimilarityCurve curve = curve_of_all_pairs(grid, arranged);
+    const DissimilarityCurve curve = compute_curve_of_all_pairs(grid, arranged);
     range_.push_back(curve.range());
-    for (std::size_t i = 0; i < error_.size(); ++i) error_[i].push_back(curve.error(kErrorsAt[i]));
+    for (std::size_t i = 0; i < error_.size(); ++i)
+      error_[i].push_back(curve.error(error_distances[i]));
     if (!drawn) return;
     draw("fig15_lattice.svg",
          "Views of the hall as they were taken and as they arrange themselves, unordered and "
          "without motion: by phases, and by dissimilarity alone as published.",
-         {map_of("as taken", grid, positions_of(grid.poses)),
-          map_of(with_mu("phases", ours.shape_difference), grid, ours.aligned),
-          map_of(with_mu("dissimilarity alone", published.with_reflection), grid,
-                 published.aligned)});
+         {make_map("as taken", grid, positions_of(grid.poses)),
+          make_map(append_mu("phases", ours.shape_difference), grid, ours.aligned),
+          make_map(append_mu("dissimilarity alone", published.with_reflection), grid,
+                   published.aligned)});
     draw_curve(curve);
   }
 
-  void unordered_in_small_room(std::uint64_t seed) {
-    const auto place = place_of(small_room(seed), seed);
-    const ViewGrid grid = take_grid(place, 10, 8, 0.3, GridHeadings::random, executor_);
+  void arrange_small_room(std::uint64_t seed) {
+    const auto place = make_place(make_small_room(seed), seed);
+    const ViewGrid grid = record_grid(place, 10, 8, 0.3, GridHeadings::random, executor_);
     small_room_.add(compare_with_grid(grid, arrange(grid.memory, {}, {}, executor_)), false);
   }
 
-  void with_motion(std::uint64_t seed, int side, double spacing_m, Arrangements& with,
-                   Arrangements& without, bool drawn) {
-    const auto place = place_of(simulation::make_scene("hall_periodic", {.seed = seed}), seed);
+  void arrange_with_motion(std::uint64_t seed, int side, double spacing_m, Arrangements& with,
+                           Arrangements& without, bool drawn) {
+    const auto place = make_place(simulation::make_scene("hall_periodic", {.seed = seed}), seed);
     const ViewGrid grid =
-        take_grid(place, side, side, spacing_m, GridHeadings::along_path, executor_);
-    const auto motion = coarse_motion(grid, kDistanceShare, kDirectionShare, seed);
+        record_grid(place, side, side, spacing_m, GridHeadings::along_path, executor_);
+    const auto motion =
+        simulate_coarse_motion(grid, distance_error_share, direction_error_share, seed);
     const auto ours = compare_with_grid(grid, arrange(grid.memory, {}, motion, executor_));
     const auto blind =
         compare_with_grid(grid, arrange(grid.memory, plain_options(), motion, executor_));
@@ -182,14 +184,14 @@ class LatticeExperiment {
     without.add(blind, true);
     const bool coarse = side == 10;
     std::vector<viewer::MapPlot> panels{
-        map_of(with_mu("motion and phases", ours.shape_difference), grid, ours.aligned),
-        map_of(with_mu("motion without phases", blind.with_reflection), grid, blind.aligned)};
+        make_map(append_mu("motion and phases", ours.shape_difference), grid, ours.aligned),
+        make_map(append_mu("motion without phases", blind.with_reflection), grid, blind.aligned)};
     if (coarse) {
       const auto plain =
           compare_with_grid(grid, arrange(grid.memory, plain_options(), {}, executor_));
       folded_.add(plain, true);
       panels.push_back(
-          map_of(with_mu("dissimilarity alone", plain.with_reflection), grid, plain.aligned));
+          make_map(append_mu("dissimilarity alone", plain.with_reflection), grid, plain.aligned));
     }
     if (!drawn) return;
     if (coarse) draw_path(grid);
@@ -200,8 +202,8 @@ class LatticeExperiment {
   }
 
   /// Distance and error over all pairs of the views, as [M04] figure 12 shows them.
-  [[nodiscard]] static DissimilarityCurve curve_of_all_pairs(const ViewGrid& grid,
-                                                             const Lattice& lattice) {
+  [[nodiscard]] static DissimilarityCurve compute_curve_of_all_pairs(const ViewGrid& grid,
+                                                                     const Lattice& lattice) {
     const auto views = grid.memory.views();
     std::vector<PackedSignature> packed;
     for (const ViewId view : views) packed.push_back(grid.memory.packed(view));
@@ -257,7 +259,7 @@ class LatticeExperiment {
                  .series = {error, stiffness}});
   }
 
-  static constexpr std::array<double, 3> kErrorsAt{1.0, 2.0, 3.0};
+  static constexpr std::array<double, 3> error_distances{1.0, 2.0, 3.0};
 
   const ReproductionOptions& options_;
   Executor& executor_;
@@ -265,7 +267,7 @@ class LatticeExperiment {
   Arrangements phases_, plain_, small_room_, coarse_, coarse_without_phases_, folded_, fine_,
       fine_without_phases_;
   std::vector<double> turn_error_deg_, range_, time_ms_;
-  std::array<std::vector<double>, kErrorsAt.size()> error_;
+  std::array<std::vector<double>, error_distances.size()> error_;
 };
 
 }  // namespace

@@ -22,7 +22,7 @@ struct GridPlace {
   int j = 0;
 };
 
-GridPlace place_in(const ViewGrid& grid, std::size_t view) {
+GridPlace locate_in_grid(const ViewGrid& grid, std::size_t view) {
   const int j = static_cast<int>(view) / grid.columns;
   const int along = static_cast<int>(view) % grid.columns;
   return {j % 2 == 0 ? along : grid.columns - 1 - along, j};
@@ -39,8 +39,8 @@ bool is_inside(const ViewGrid& grid, GridPlace place) {
 
 /// The alignment with the scale that makes both sets equally large: least squares would shrink a
 /// set that does not fit.
-Alignment with_extent_of(std::span<const Point2> truth, std::span<const Point2> arranged,
-                         Alignment alignment) {
+Alignment match_extent(std::span<const Point2> truth, std::span<const Point2> arranged,
+                       Alignment alignment) {
   const auto centre = [](std::span<const Point2> points) {
     Point2 sum;
     for (const Point2 p : points) sum = {sum.x_m + p.x_m, sum.y_m + p.y_m};
@@ -60,14 +60,14 @@ Alignment with_extent_of(std::span<const Point2> truth, std::span<const Point2> 
   return alignment;
 }
 
-bool coincide(std::span<const Point2> points) {
+bool are_coincident(std::span<const Point2> points) {
   return std::ranges::all_of(points, [&](Point2 p) { return distance(p, points.front()) == 0.0; });
 }
 
 }  // namespace
 
-ViewGrid take_grid(const simulation::PlaceRecording& place, int columns, int rows, double spacing_m,
-                   GridHeadings headings, Executor& executor) {
+ViewGrid record_grid(const simulation::PlaceRecording& place, int columns, int rows,
+                     double spacing_m, GridHeadings headings, Executor& executor) {
   ViewGrid grid{.columns = columns,
                 .rows = rows,
                 .spacing_m = spacing_m,
@@ -77,7 +77,7 @@ ViewGrid take_grid(const simulation::PlaceRecording& place, int columns, int row
   const double middle_y = 0.5 * (scene.floor_low.y_m + scene.floor_high.y_m);
   Random random(place.seed, 91);
   for (int view = 0; view < columns * rows; ++view) {
-    const GridPlace at = place_in(grid, static_cast<std::size_t>(view));
+    const GridPlace at = locate_in_grid(grid, static_cast<std::size_t>(view));
     grid.poses.push_back({middle_x + (at.i - 0.5 * (columns - 1)) * spacing_m,
                           middle_y + (at.j - 0.5 * (rows - 1)) * spacing_m,
                           random.uniform(-std::numbers::pi, std::numbers::pi)});
@@ -85,27 +85,27 @@ ViewGrid take_grid(const simulation::PlaceRecording& place, int columns, int row
   if (headings == GridHeadings::along_path) simulation::face_path(grid.poses);
   const auto views = simulation::take_views(place, place.rendering, grid.poses,
                                             place.seed * 100003U + 90000U, {}, executor);
-  grid.memory = memory_of(views, signatures_of(views, m04_components, executor));
+  grid.memory = make_memory(views, compute_signatures(views, m04_components, executor));
   return grid;
 }
 
-simulation::Scene small_room(std::uint64_t seed) {
+simulation::Scene make_small_room(std::uint64_t seed) {
   simulation::SceneBuilder builder("small_room", {.seed = seed});
   simulation::Scene& scene = builder.scene();
   scene.floor_low = {0.0, 0.0};
   scene.floor_high = {4.0, 3.5};
   scene.ambient = 0.4F;
-  constexpr double kHeight = 2.6;
-  simulation::furnish_room_shell(builder, {{0.0, 0.0}, {4.0, 3.5}}, kHeight);
+  constexpr double room_height_m = 2.6;
+  simulation::furnish_room_shell(builder, {{0.0, 0.0}, {4.0, 3.5}}, room_height_m);
   for (const double x_m : {1.2, 2.8}) {
-    builder.lamp({x_m, 1.75, kHeight - 0.2},
+    builder.lamp({x_m, 1.75, room_height_m - 0.2},
                  static_cast<float>(builder.random().uniform(0.3, 0.8)));
   }
   return builder.finish();
 }
 
-std::vector<CoarseMotion> coarse_motion(const ViewGrid& grid, double distance_share,
-                                        double direction_share, std::uint64_t seed) {
+std::vector<CoarseMotion> simulate_coarse_motion(const ViewGrid& grid, double distance_share,
+                                                 double direction_share, std::uint64_t seed) {
   Random random(seed, 92);
   // Deviation of what is spread evenly over -1 .. 1.
   const double even = 1.0 / std::sqrt(3.0);
@@ -137,16 +137,16 @@ GridComparison compare_with_grid(const ViewGrid& grid, const Lattice& lattice) {
     arranged.push_back(node.component == 0 ? node.pose.position() : Point2{});
   }
   GridComparison result;
-  if (coincide(arranged)) {
+  if (are_coincident(arranged)) {
     result.aligned = std::vector<Point2>(truth.size(), truth.front());
     return result;
   }
   const ShapeDifference difference = shape_difference(arranged, truth);
   result.shape_difference = difference.value;
   result.with_reflection = difference.with_reflection;
-  Alignment laid_over = align(arranged, truth, {.allow_scale = true, .allow_reflection = true});
-  laid_over = with_extent_of(truth, arranged, laid_over);
-  for (const Point2 p : arranged) result.aligned.push_back(laid_over.apply(p));
+  Alignment align_to = align(arranged, truth, {.allow_scale = true, .allow_reflection = true});
+  align_to = match_extent(truth, arranged, align_to);
+  for (const Point2 p : arranged) result.aligned.push_back(align_to.apply(p));
 
   const std::vector<std::size_t> together(truth.size(), 0);
   const auto near = nearest_points(arranged, together, 8);
@@ -158,7 +158,7 @@ GridComparison compare_with_grid(const ViewGrid& grid, const Lattice& lattice) {
   double pulled_m = 0.0;
   double sides = 0.0;
   for (std::size_t view = 0; view < truth.size(); ++view) {
-    const GridPlace at = place_in(grid, view);
+    const GridPlace at = locate_in_grid(grid, view);
     if (is_inside(grid, at)) {
       ++inner;
       bool all = lattice.nodes[view].component == 0;

@@ -21,17 +21,19 @@ struct ViewGrid {
 enum class GridHeadings { random, along_path };
 
 /// Takes the views. `place` needs no references.
-[[nodiscard]] ViewGrid take_grid(const simulation::PlaceRecording& place, int columns, int rows,
-                                 double spacing_m, GridHeadings headings, Executor& executor);
+[[nodiscard]] ViewGrid record_grid(const simulation::PlaceRecording& place, int columns, int rows,
+                                   double spacing_m, GridHeadings headings, Executor& executor);
 
 /// An empty room of 4 x 3.5 m with pictures, windows and a door on its walls.
-[[nodiscard]] simulation::Scene small_room(std::uint64_t seed);
+[[nodiscard]] simulation::Scene make_small_room(std::uint64_t seed);
 
 /// What a robot with coarse sense of its motion says of the path: distance and direction of each
 /// step off by up to so much of their size and of half a turn, evenly, and its turn like its
 /// direction [M04 section 3.4].
-[[nodiscard]] std::vector<CoarseMotion> coarse_motion(const ViewGrid& grid, double distance_share,
-                                                      double direction_share, std::uint64_t seed);
+[[nodiscard]] std::vector<CoarseMotion> simulate_coarse_motion(const ViewGrid& grid,
+                                                               double distance_share,
+                                                               double direction_share,
+                                                               std::uint64_t seed);
 
 /// How an arrangement compares with the grid that it came from.
 struct GridComparison {

@@ -69,7 +69,7 @@ double signal_to_noise(const Moments& moments, std::span<const double> weights) 
 
 // Minimises the mean of (1 - w . margin)^2 + penalty * sum of (w_k - mean w)^2 over w >= 0, one
 // weight at a time, which converges because the sum is convex. Scaled to mean 1.
-std::vector<double> best_weights(const Moments& moments, double penalty) {
+std::vector<double> solve_weights(const Moments& moments, double penalty) {
   const std::size_t size = moments.first.size();
   std::vector<double> weights(size, 1.0);
   if (!std::isfinite(penalty)) return weights;
@@ -192,7 +192,7 @@ std::optional<ComponentWeights> learn_component_weights(const VisualMemory& memo
       for (std::size_t f = 0; f < folds; ++f) {
         if (f != out) others.add(fold[f]);
       }
-      sum += signal_to_noise(fold[out], best_weights(others, penalty)) / folds;
+      sum += signal_to_noise(fold[out], solve_weights(others, penalty)) / folds;
     }
     return sum;
   };
@@ -208,7 +208,7 @@ std::optional<ComponentWeights> learn_component_weights(const VisualMemory& memo
       best_penalty = penalty;
     }
   }
-  result.weights = best_weights(all, best_penalty);
+  result.weights = solve_weights(all, best_penalty);
   return result;
 }
 

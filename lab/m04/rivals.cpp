@@ -22,15 +22,15 @@ namespace panonav::lab {
 namespace {
 
 using MakeRecogniser = std::unique_ptr<RivalRecogniser> (*)();
-constexpr std::array<MakeRecogniser, 6> kMakers{
+constexpr std::array<MakeRecogniser, 6> rival_factories{
     [] { return fourier_signature_recogniser(m04_components); },
     [] { return grey_histogram_recogniser(); }, [] { return colour_histogram_recogniser(); },
     // As many numbers a view as the signature has components in a row.
     [] { return eigenimage_recogniser(m04_components); }, [] { return zero_phase_recogniser(); },
     [] { return pixels_over_all_turns_recogniser(); }};
-constexpr std::size_t kRivals = kMakers.size();
+constexpr std::size_t rival_count = rival_factories.size();
 // Pixels over all turns take long: so many queries of each scene are enough.
-constexpr std::size_t kQueries = 20;
+constexpr std::size_t max_queries = 20;
 
 // The conditions of the other experiments, and less light. No view is preprocessed: the ways differ
 // in what they need, and none gets an advantage.
@@ -55,23 +55,24 @@ class Rivals final : public Experiment {
  public:
   void add(const simulation::PlaceRecording& place, Executor& executor) override {
     const simulation::Renderer in_colour(place.scene, {.channels = 3}, executor);
-    const auto references = with_colour(place, in_colour, place.references, {}, 90000U, executor);
+    const auto references =
+        render_in_colour(place, in_colour, place.references, {}, 90000U, executor);
     for (const auto& view : references) colourfulness_.push_back(mean_colourfulness(view.picture));
-    std::array<std::unique_ptr<RivalRecogniser>, kRivals> recognisers;
-    for (std::size_t r = 0; r < kRivals; ++r) {
-      recognisers[r] = kMakers[r]();
+    std::array<std::unique_ptr<RivalRecogniser>, rival_count> recognisers;
+    for (std::size_t r = 0; r < rival_count; ++r) {
+      recognisers[r] = rival_factories[r]();
       recognisers[r]->memorise(references);
       names_[r] = recognisers[r]->name();
       bytes_[r] = recognisers[r]->bytes_per_view();
     }
     const auto conditions = rival_conditions();
     for (std::size_t condition = 0; condition < conditions.size(); ++condition) {
-      auto views = queries_under(place, conditions[condition], executor);
-      views.resize(std::min(views.size(), kQueries), views.front());
+      auto views = take_queries(place, conditions[condition], executor);
+      views.resize(std::min(views.size(), max_queries), views.front());
       const auto queries =
-          with_colour(place, in_colour, views, conditions[condition].sensor, 95000U, executor);
+          render_in_colour(place, in_colour, views, conditions[condition].sensor, 95000U, executor);
       if (condition == 0) trials_ += queries.size();
-      for (std::size_t r = 0; r < kRivals; ++r) {
+      for (std::size_t r = 0; r < rival_count; ++r) {
         std::vector<std::size_t> found(queries.size());
         auto seconds = simulation::make_each(executor, queries.size(), [&](std::size_t q) {
           const double start = simulation::thread_seconds();
@@ -97,13 +98,13 @@ class Rivals final : public Experiment {
                           .x_label = "",
                           .y_label = "share of queries",
                           .series = {},
-                          .x_range = std::pair{-0.6, static_cast<double>(kRivals) - 0.4},
+                          .x_range = std::pair{-0.6, static_cast<double>(rival_count) - 0.4},
                           .y_range = std::pair{0.0, 1.05}};
     plot.x_tick_labels.assign(names_.begin(), names_.end());
     for (std::size_t condition = 0; condition < conditions.size(); ++condition) {
       viewer::Series marks{.label = conditions[condition].name,
                            .style = viewer::SeriesStyle::points};
-      for (std::size_t r = 0; r < kRivals; ++r) {
+      for (std::size_t r = 0; r < rival_count; ++r) {
         const Proportion exact = success_rate(found_[condition][r], trials_);
         const Proportion near = success_rate(near_[condition][r], trials_);
         add_point(marks, static_cast<double>(r) + 0.12 * (static_cast<double>(condition) - 1.5),
@@ -116,7 +117,7 @@ class Rivals final : public Experiment {
       }
       plot.series.push_back(std::move(marks));
     }
-    for (std::size_t r = 0; r < kRivals; ++r) {
+    for (std::size_t r = 0; r < rival_count; ++r) {
       add_rival_row(r, "bytes", "bytes a view", bytes_[r], "B", result);
       add_rival_row(r, "time", "processor time a query, image to answer (median)",
                     median(milliseconds_[r]), "ms", result);
@@ -131,14 +132,14 @@ class Rivals final : public Experiment {
   }
 
  private:
-  static constexpr std::size_t kConditions = 4;
+  static constexpr std::size_t rival_condition_count = 4;
 
   // The views with their picture in colour, taken at the same pose by the same kind of sensor.
-  static std::vector<RivalView> with_colour(const simulation::PlaceRecording& place,
-                                            const simulation::Renderer& in_colour,
-                                            const std::vector<simulation::PlacedView>& views,
-                                            const simulation::SensorOptions& sensor,
-                                            std::uint64_t noise, Executor& executor) {
+  static std::vector<RivalView> render_in_colour(const simulation::PlaceRecording& place,
+                                                 const simulation::Renderer& in_colour,
+                                                 const std::vector<simulation::PlacedView>& views,
+                                                 const simulation::SensorOptions& sensor,
+                                                 std::uint64_t noise, Executor& executor) {
     const Camera camera{.model = EquirectangularModel{place.rendering.elevations.bottom_rad,
                                                       place.rendering.elevations.top_rad},
                         .image_size = {place.rendering.columns, place.rendering.rows}};
@@ -162,11 +163,11 @@ class Rivals final : public Experiment {
   }
 
   std::size_t trials_ = 0;
-  std::array<std::string, kRivals> names_;
-  std::array<double, kRivals> bytes_{};
-  std::array<std::array<std::size_t, kRivals>, kConditions> found_{};
-  std::array<std::array<std::size_t, kRivals>, kConditions> near_{};
-  std::array<std::vector<double>, kRivals> milliseconds_;
+  std::array<std::string, rival_count> names_;
+  std::array<double, rival_count> bytes_{};
+  std::array<std::array<std::size_t, rival_count>, rival_condition_count> found_{};
+  std::array<std::array<std::size_t, rival_count>, rival_condition_count> near_{};
+  std::array<std::vector<double>, rival_count> milliseconds_;
   std::vector<double> colourfulness_;
 };
 

@@ -55,7 +55,7 @@ class RotationalInvariance final : public Experiment {
   void add(const simulation::PlaceRecording& place, Executor& executor) override {
     // Pairs of references one spacing apart; in the raster the next one is, but for row ends.
     std::vector<std::size_t> firsts;
-    for (std::size_t i = 0; i + 1 < place.references.size() && firsts.size() < kPlaces; ++i) {
+    for (std::size_t i = 0; i + 1 < place.references.size() && firsts.size() < max_places; ++i) {
       const double step =
           distance(place.references[i].pose.position(), place.references[i + 1].pose.position());
       if (step < 1.01 * place.spacing_m) firsts.push_back(i);
@@ -71,9 +71,9 @@ class RotationalInvariance final : public Experiment {
     }
     // A second picture at the same place: other noise and another heading, not a shifted copy.
     const auto again =
-        signatures_of(simulation::take_views(place, place.rendering, turned,
-                                             place.seed * 100003U + 60000U, {}, executor),
-                      m04_components, executor);
+        compute_signatures(simulation::take_views(place, place.rendering, turned,
+                                                  place.seed * 100003U + 60000U, {}, executor),
+                           m04_components, executor);
     for (std::size_t i = 0; i < firsts.size(); ++i) {
       const auto here = compute_signature(place.references[firsts[i]].panorama, m04_components);
       const auto there =
@@ -84,7 +84,7 @@ class RotationalInvariance final : public Experiment {
             degrees(std::abs(angle_difference(reading->heading_rad, turns_rad[i]))));
       }
       const auto across = compass(again[i], there);
-      if (across && std::abs(turns_rad[i]) > kLeastTurnRad) {
+      if (across && std::abs(turns_rad[i]) > min_turn_rad) {
         relative_errors_.push_back(
             std::abs(angle_difference(across->heading_rad, turns_rad[i]) / turns_rad[i]));
       }
@@ -106,8 +106,8 @@ class RotationalInvariance final : public Experiment {
   }
 
  private:
-  static constexpr std::size_t kPlaces = 40;
-  static constexpr double kLeastTurnRad = 0.1;  // below it a share says nothing
+  static constexpr std::size_t max_places = 40;
+  static constexpr double min_turn_rad = 0.1;  // below it a share says nothing
   std::vector<double> ratios_;
   std::vector<double> relative_errors_;
   std::vector<double> heading_errors_deg_;
@@ -142,7 +142,7 @@ class PowerSpectrum final : public Experiment {
         .log_y = true};
     viewer::Series single{.label = "one view", .style = viewer::SeriesStyle::lines_and_points};
     viewer::Series average{.label = "mean of " + std::to_string(shares_.size()) + " views"};
-    for (int k = 1; k <= kShown; ++k) {
+    for (int k = 1; k <= shown_frequencies; ++k) {
       single.add(k, one_[static_cast<std::size_t>(k)]);
       average.add(k, total_[static_cast<std::size_t>(k)] / static_cast<double>(shares_.size()));
     }
@@ -154,11 +154,11 @@ class PowerSpectrum final : public Experiment {
             median_figure(shares_), "", at_least(0.5));
     add_row(result, "m04.fig5.slope",
             "slope of the power spectrum, k = 1 .. 30 ([S06] reports about 1.8)",
-            -spectrum_slope(total_, kShown), "", std::nullopt, std::pair{1.8, 1.8});
+            -spectrum_slope(total_, shown_frequencies), "", std::nullopt, std::pair{1.8, 1.8});
   }
 
  private:
-  static constexpr int kShown = 30;
+  static constexpr int shown_frequencies = 30;
   std::vector<double> total_;
   std::vector<double> one_;
   std::vector<double> shares_;

@@ -17,16 +17,16 @@ const std::array<ViewCondition, 3>& view_conditions() {
   return conditions;
 }
 
-std::vector<simulation::PlacedView> queries_under(const simulation::PlaceRecording& place,
-                                                  const ViewCondition& condition,
-                                                  Executor& executor) {
+std::vector<simulation::PlacedView> take_queries(const simulation::PlaceRecording& place,
+                                                 const ViewCondition& condition,
+                                                 Executor& executor) {
   if (condition.id == view_conditions().front().id) return place.queries;
   return simulation::retake_queries(place, condition.sensor, place.seed * 100003U + 50000U,
                                     executor);
 }
 
-std::vector<FourierSignature> signatures_of(const std::vector<simulation::PlacedView>& views,
-                                            int components, Executor& executor) {
+std::vector<FourierSignature> compute_signatures(const std::vector<simulation::PlacedView>& views,
+                                                 int components, Executor& executor) {
   return simulation::make_each(executor, views.size(), [&](std::size_t i) {
     return compute_signature(views[i].panorama, components);
   });
@@ -52,8 +52,8 @@ std::size_t index_of_smallest(std::span<const double> values) {
   return static_cast<std::size_t>(std::ranges::min_element(values) - values.begin());
 }
 
-VisualMemory memory_of(const std::vector<simulation::PlacedView>& views,
-                       const std::vector<FourierSignature>& signatures) {
+VisualMemory make_memory(const std::vector<simulation::PlacedView>& views,
+                         const std::vector<FourierSignature>& signatures) {
   require(!signatures.empty() && signatures.size() == views.size(), "number of signatures",
           static_cast<double>(signatures.size()), ">= 1, that of the views");
   float largest = 1e-6F;

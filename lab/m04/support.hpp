@@ -29,10 +29,10 @@ struct ViewCondition {
 [[nodiscard]] const std::array<ViewCondition, 3>& view_conditions();
 
 /// The queries of the place under `condition`; those of the recording itself for the first one.
-[[nodiscard]] std::vector<simulation::PlacedView> queries_under(
+[[nodiscard]] std::vector<simulation::PlacedView> take_queries(
     const simulation::PlaceRecording& place, const ViewCondition& condition, Executor& executor);
 
-[[nodiscard]] std::vector<FourierSignature> signatures_of(
+[[nodiscard]] std::vector<FourierSignature> compute_signatures(
     const std::vector<simulation::PlacedView>& views, int components, Executor& executor);
 
 /// Dissimilarity of every component by itself: the terms of [M04 eq. 6] without their weights.
@@ -43,7 +43,7 @@ struct ViewCondition {
 [[nodiscard]] std::size_t index_of_smallest(std::span<const double> values);
 
 /// A memory of posed views, in their order, packed so that the largest magnitude just fits.
-[[nodiscard]] VisualMemory memory_of(const std::vector<simulation::PlacedView>& views,
-                                     const std::vector<FourierSignature>& signatures);
+[[nodiscard]] VisualMemory make_memory(const std::vector<simulation::PlacedView>& views,
+                                       const std::vector<FourierSignature>& signatures);
 
 }  // namespace panonav::lab

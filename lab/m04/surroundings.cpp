@@ -19,26 +19,26 @@ constexpr double sector_rad = 2.0 * std::numbers::pi / shape_directions;
 
 }  // namespace
 
-std::size_t sector_of(double azimuth_rad) {
+std::size_t find_sector(double azimuth_rad) {
   const auto steps = std::lround(azimuth_rad / sector_rad);
   constexpr long count = shape_directions;
   return static_cast<std::size_t>(((steps % count) + count) % count);
 }
 
-Surroundings surroundings_of(const simulation::PlaceRecording& place, Point2 position) {
-  constexpr std::size_t kRays = 120;
-  constexpr std::array kHeightsM{0.3, 0.6, 0.9};
+Surroundings measure_surroundings(const simulation::PlaceRecording& place, Point2 position) {
+  constexpr std::size_t ray_count = 120;
+  constexpr std::array heights_m{0.3, 0.6, 0.9};
   Surroundings result;
   Directional nearness{};
   Directional rays{};
   Directional shift{};
-  for (std::size_t ray = 0; ray < kRays; ++ray) {
-    const double azimuth = 2.0 * std::numbers::pi * static_cast<double>(ray) / kRays;
-    for (const double height : kHeightsM) {
+  for (std::size_t ray = 0; ray < ray_count; ++ray) {
+    const double azimuth = 2.0 * std::numbers::pi * static_cast<double>(ray) / ray_count;
+    for (const double height : heights_m) {
       const double free_m = place.renderer->distance_along({position.x_m, position.y_m, height},
                                                            Direction3::from_angles(azimuth, 0.0));
       const double near = std::isfinite(free_m) ? 1.0 / std::max(free_m, 0.01) : 0.0;
-      const std::size_t sector = sector_of(azimuth);
+      const std::size_t sector = find_sector(azimuth);
       nearness[sector] += near;
       rays[sector] += 1.0;
       for (std::size_t direction = 0; direction < shape_directions; ++direction) {
@@ -49,16 +49,16 @@ Surroundings surroundings_of(const simulation::PlaceRecording& place, Point2 pos
   }
   for (std::size_t i = 0; i < shape_directions; ++i) {
     // Nothing all around, as outdoors: farther than any room.
-    constexpr double kFarM = 1000.0;
-    result.free_m[i] = nearness[i] > 0.0 ? rays[i] / nearness[i] : kFarM;
+    constexpr double far_m = 1000.0;
+    result.free_m[i] = nearness[i] > 0.0 ? rays[i] / nearness[i] : far_m;
     result.parallax_m[i] =
-        shift[i] > 0.0 ? static_cast<double>(kRays * kHeightsM.size()) / shift[i] : kFarM;
+        shift[i] > 0.0 ? static_cast<double>(ray_count * heights_m.size()) / shift[i] : far_m;
   }
   return result;
 }
 
-Directional predicted_extents(const simulation::PlaceRecording& place, const Pose2& pose,
-                              const Panorama& view, int components) {
+Directional predict_extents(const simulation::PlaceRecording& place, const Pose2& pose,
+                            const Panorama& view, int components) {
   require(view.elevations().has_value(), "elevations of the view", 0.0, "known");
   using Complex = std::complex<double>;
   const FourierSignature signature = compute_signature(view, components);

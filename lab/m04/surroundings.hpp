@@ -21,8 +21,8 @@ struct Surroundings {
   /// direction phi at distance d by |sin(phi - theta)| / d. The inverse of the mean shift.
   Directional parallax_m{};
 };
-[[nodiscard]] Surroundings surroundings_of(const simulation::PlaceRecording& place,
-                                           Point2 position);
+[[nodiscard]] Surroundings measure_surroundings(const simulation::PlaceRecording& place,
+                                                Point2 position);
 
 /// How far the robot can drive in each direction until the first components of its view have
 /// changed by a fixed amount, to first order, for a view taken at `pose` with the place's heights
@@ -30,11 +30,10 @@ struct Surroundings {
 /// from the distance of what the pixel shows, transformed, and projected on each magnitude. Only
 /// ratios have a meaning. Directions are those of the scene. Throws ContractError on a view without
 /// elevations.
-[[nodiscard]] Directional predicted_extents(const simulation::PlaceRecording& place,
-                                            const Pose2& pose, const Panorama& view,
-                                            int components);
+[[nodiscard]] Directional predict_extents(const simulation::PlaceRecording& place,
+                                          const Pose2& pose, const Panorama& view, int components);
 
 /// The sector of a direction, 0 .. shape_directions - 1.
-[[nodiscard]] std::size_t sector_of(double azimuth_rad);
+[[nodiscard]] std::size_t find_sector(double azimuth_rad);
 
 }  // namespace panonav::lab

@@ -18,15 +18,15 @@ namespace panonav::lab {
 
 namespace {
 
-constexpr std::size_t kConditions = 3;
+constexpr std::size_t view_condition_count = 3;
 enum Weighting : std::size_t { equal, learnt, weightings };
 
 class WeightsOfComponents final : public Experiment {
  public:
   void add(const simulation::PlaceRecording& place, Executor& executor) override {
-    const auto references = signatures_of(place.references, m04_components, executor);
+    const auto references = compute_signatures(place.references, m04_components, executor);
     if (before_) compare(place, references, executor);
-    const auto learnt_here = learn_component_weights(memory_of(place.references, references));
+    const auto learnt_here = learn_component_weights(make_memory(place.references, references));
     if (!learnt_here) return;
     before_ = learnt_here->weights;
     margins_[equal].push_back(learnt_here->margin_of_equal_weights);
@@ -52,7 +52,7 @@ class WeightsOfComponents final : public Experiment {
             .x_label = "component k [cycles per turn]",
             .y_label = "weight (mean 1)",
             .series = {line, ones}});
-    for (std::size_t condition = 0; condition < kConditions; ++condition) {
+    for (std::size_t condition = 0; condition < view_condition_count; ++condition) {
       const ViewCondition& under = view_conditions()[condition];
       for (const std::size_t w : {equal, learnt}) {
         const Proportion found = success_rate(found_[condition][w], trials_);
@@ -80,9 +80,9 @@ class WeightsOfComponents final : public Experiment {
                const std::vector<FourierSignature>& references, Executor& executor) {
     const std::array<std::vector<double>, weightings> weights{
         std::vector<double>(before_->size(), 1.0), *before_};
-    for (std::size_t condition = 0; condition < kConditions; ++condition) {
-      const auto views = queries_under(place, view_conditions()[condition], executor);
-      const auto queries = signatures_of(views, m04_components, executor);
+    for (std::size_t condition = 0; condition < view_condition_count; ++condition) {
+      const auto views = take_queries(place, view_conditions()[condition], executor);
+      const auto queries = compute_signatures(views, m04_components, executor);
       std::array<double, weightings> right{};
       for (std::size_t q = 0; q < queries.size(); ++q) {
         const std::size_t nearest = place.nearest_reference(views[q].pose.position());
@@ -105,8 +105,8 @@ class WeightsOfComponents final : public Experiment {
   std::array<std::vector<double>, m04_components> weights_;
   std::array<std::vector<double>, weightings> margins_;
   std::size_t trials_ = 0;
-  std::array<std::array<std::size_t, weightings>, kConditions> found_{};
-  std::array<std::vector<double>, kConditions> gain_;
+  std::array<std::array<std::size_t, weightings>, view_condition_count> found_{};
+  std::array<std::vector<double>, view_condition_count> gain_;
 };
 
 }  // namespace

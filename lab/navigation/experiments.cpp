@@ -72,7 +72,7 @@ void report(const std::string& id, const std::string& what, const Measures& meas
             std::optional<Target> arrival, std::optional<Target> length, Reproduction& result) {
   add_rate(result, id + ".arrived", what + ": arrive within half the reference spacing",
            measured.arrived, measured.runs, arrival);
-  result.rows.back().reason = simulation::other_ends(measured.ends, measured.wrongly);
+  result.rows.back().reason = simulation::explain_other_ends(measured.ends, measured.wrongly);
   if (!measured.lengths.empty()) {
     add_median(result, id + ".length", what + ": way driven against the shortest", "",
                measured.lengths, length);
@@ -87,13 +87,13 @@ void report(const std::string& id, const std::string& what, const Measures& meas
   add_median(result, id + ".steps", what + ": steps", "", measured.steps);
 }
 
-int runs_of(const ReproductionOptions& options, int scene) {
+int count_runs(const ReproductionOptions& options, int scene) {
   return options.runs / options.scenes + (scene < options.runs % options.scenes ? 1 : 0);
 }
 
-void draw(const std::string& name, const simulation::MissionPlace& place,
-          const simulation::RememberedPlace& remembered, const simulation::Mission& mission,
-          const simulation::MissionRun& run, Reproduction& result) {
+void draw_mission(const std::string& name, const simulation::MissionPlace& place,
+                  const simulation::RememberedPlace& remembered, const simulation::Mission& mission,
+                  const simulation::MissionRun& run, Reproduction& result) {
   const std::string file = "mission_" + name + ".svg";
   viewer::write_mission_picture(result.out / file, name, place, remembered, {}, mission.goal, run);
   result.pictures.push_back(
@@ -102,8 +102,8 @@ void draw(const std::string& name, const simulation::MissionPlace& place,
                  "the direction of the one it is nearest to and looks again."});
 }
 
-simulation::Scene scene_of(const ReproductionOptions& options, const std::string& name,
-                           const simulation::SceneVariation& variation) {
+simulation::Scene make_or_read_scene(const ReproductionOptions& options, const std::string& name,
+                                     const simulation::SceneVariation& variation) {
   const auto names = simulation::scene_names();
   if (std::ranges::find(names, name) != names.end()) return simulation::make_scene(name, variation);
   simulation::Scene scene = simulation::read_world(options.data, name);
@@ -113,7 +113,7 @@ simulation::Scene scene_of(const ReproductionOptions& options, const std::string
 
 // A drive of `drive_m`: the scene's round trip again and again, or ways between random places with
 // 10 cm to spare beside the robot.
-std::vector<Pose2> exploring_drive(const simulation::MissionPlace& place, std::uint64_t seed) {
+std::vector<Pose2> plan_exploring_drive(const simulation::MissionPlace& place, std::uint64_t seed) {
   Random random(seed, 5);
   simulation::FreeSpaceOptions roomy = simulation::free_space_options(place.scene);
   roomy.robot_radius_m += 0.1;
@@ -140,18 +140,18 @@ std::vector<Pose2> exploring_drive(const simulation::MissionPlace& place, std::u
 }
 
 // The scene with screens as high as a robot across the way.
-simulation::Scene with_screens(simulation::Scene scene, std::span<const Pose2> across,
-                               double width_m) {
+simulation::Scene add_screens(simulation::Scene scene, std::span<const Pose2> across,
+                              double width_m) {
   for (const Pose2& at : across) simulation::add_screen(scene, at, width_m, 1.0);
   return scene;
 }
 
 // How wide screens must be so that no way leads past them; empty: none of these widths does it and
 // leaves room at both ends. At a corner a way leads past screens that shut a straight way.
-std::optional<double> shutting_width_m(const simulation::Scene& scene,
-                                       std::span<const Pose2> across, Point2 from, Point2 to) {
+std::optional<double> find_blocking_width_m(const simulation::Scene& scene,
+                                            std::span<const Pose2> across, Point2 from, Point2 to) {
   for (const double width_m : {2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0}) {
-    const simulation::Scene shut = with_screens(scene, across, width_m);
+    const simulation::Scene shut = add_screens(scene, across, width_m);
     const simulation::FreeSpaceOptions room = simulation::free_space_options(shut);
     const simulation::FreeSpace largest(shut, room);
     const double min_m = room.robot_radius_m + 2.0 * room.cell_m;
@@ -172,17 +172,17 @@ void NavigationExperiments::reproduce_grid_missions(const std::string& scene,
         simulation::make_mission_place(simulation::make_scene(scene, {.seed = seed}), executor);
     const simulation::RememberedPlace remembered =
         simulation::remember_grid(place, spacing_m, Random(seed, 1).next(), executor);
-    const auto missions = simulation::random_missions(
-        place, remembered, {.count = runs_of(options, i)}, Random(seed, 2).next());
+    const auto missions = simulation::draw_missions(
+        place, remembered, {.count = count_runs(options, i)}, Random(seed, 2).next());
     simulation::MissionOptions mission;
     mission.base.drive = i % 2 == 0 ? DriveKind::differential : DriveKind::holonomic;
     const auto runs = simulation::run_missions(place, remembered, missions, mission,
                                                Random(seed, 3).next(), executor);
     measured.add(runs, 0.5 * spacing_m);
-    if (i == 0) draw(scene, place, remembered, missions.front(), runs.front(), result);
+    if (i == 0) draw_mission(scene, place, remembered, missions.front(), runs.front(), result);
   }
   report("m04.fig18." + scene,
-         "figure 18: " + scene + ", references every " + centimetres(spacing_m) +
+         "figure 18: " + scene + ", references every " + format_centimetres(spacing_m) +
              " arranged by similarity alone",
          measured, at_least(0.98), at_most(1.3), result);
 }
@@ -196,29 +196,29 @@ void NavigationExperiments::reproduce_drive_missions(const std::string& scene) c
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
     simulation::SceneVariation variation{.seed = seed};
     const simulation::MissionPlace place =
-        simulation::make_mission_place(scene_of(options, scene, variation), executor);
+        simulation::make_mission_place(make_or_read_scene(options, scene, variation), executor);
     const simulation::RememberedPlace remembered =
-        simulation::remember_drive(place, exploring_drive(place, seed), simulation::cheap_wheels(),
-                                   Random(seed, 1).next(), executor);
+        simulation::remember_drive(place, plan_exploring_drive(place, seed),
+                                   simulation::cheap_wheels(), Random(seed, 1).next(), executor);
     variation.light = i % 2 == 0 ? 1.0 - light_change : 1.0 + light_change;
     variation.moved_objects = moved_objects_share;
     variation.moved_seed = Random(seed, 4).next();
     const simulation::MissionPlace other =
-        simulation::make_mission_place(scene_of(options, scene, variation), executor);
+        simulation::make_mission_place(make_or_read_scene(options, scene, variation), executor);
     simulation::MissionOptions mission;
     mission.base.drive = i % 2 == 0 ? DriveKind::differential : DriveKind::holonomic;
     const double radius_m = 0.5 * remembered.spacing_m;
     const auto run = [&](const simulation::MissionPlace& where, bool is_kidnapped,
                          std::uint64_t stream, Measures& measures) {
-      const auto missions = simulation::random_missions(
+      const auto missions = simulation::draw_missions(
           where, remembered,
-          {.count = runs_of(options, i), .beside_m = beside_drive_m, .kidnapped = is_kidnapped},
+          {.count = count_runs(options, i), .beside_m = beside_drive_m, .kidnapped = is_kidnapped},
           Random(seed, stream).next());
       const auto runs = simulation::run_missions(where, remembered, missions, mission,
                                                  Random(seed, stream + 1).next(), executor);
       measures.add(runs, radius_m);
       if (i == 0 && &measures == &same) {
-        draw(scene, where, remembered, missions.front(), runs.front(), result);
+        draw_mission(scene, where, remembered, missions.front(), runs.front(), result);
       }
     };
     run(place, false, 5, same);
@@ -267,12 +267,12 @@ void NavigationExperiments::reproduce_tours() const {
     const simulation::MissionPlace place =
         simulation::make_mission_place(simulation::make_scene("loop", {.seed = seed}), executor);
     const simulation::RememberedPlace remembered =
-        simulation::remember_drive(place, exploring_drive(place, seed), simulation::cheap_wheels(),
-                                   Random(seed, 1).next(), executor);
+        simulation::remember_drive(place, plan_exploring_drive(place, seed),
+                                   simulation::cheap_wheels(), Random(seed, 1).next(), executor);
     const AreaPlanner planner(remembered.graph);
     const MemoryViewSource source(remembered.memory);
-    const int tours = (runs_of(options, i) + goals_a_tour - 1) / goals_a_tour;
-    const auto missions = simulation::random_missions(
+    const int tours = (count_runs(options, i) + goals_a_tour - 1) / goals_a_tour;
+    const auto missions = simulation::draw_missions(
         place, remembered, {.count = tours * goals_a_tour, .beside_m = beside_drive_m},
         Random(seed, 12).next());
     for (Kind& kind : kinds) {
@@ -315,12 +315,12 @@ void NavigationExperiments::reproduce_route_missions() const {
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
     simulation::MissionPlace place =
         simulation::make_mission_place(simulation::make_scene("loop", {.seed = seed}), executor);
-    place.line = simulation::mirror_lines(place);
-    const auto drive = exploring_drive(place, seed);
+    place.line = simulation::make_line_sensor(place);
+    const auto drive = plan_exploring_drive(place, seed);
     simulation::RememberedPlace remembered = simulation::remember_drive(
         place, drive, simulation::cheap_wheels(), Random(seed, 1).next(), executor);
-    const auto missions = simulation::random_missions(
-        place, remembered, {.count = runs_of(options, i), .beside_m = beside_drive_m},
+    const auto missions = simulation::draw_missions(
+        place, remembered, {.count = count_runs(options, i), .beside_m = beside_drive_m},
         Random(seed, 13).next());
     for (Kind& kind : kinds) {
       const auto runs = simulation::run_missions(place, remembered, missions, {},
@@ -362,7 +362,7 @@ void NavigationExperiments::reproduce_blocked_missions() const {
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
     const simulation::Scene scene = simulation::make_scene("loop", {.seed = seed});
     const simulation::MissionPlace place = simulation::make_mission_place(scene, executor);
-    const auto way = exploring_drive(place, seed);
+    const auto way = plan_exploring_drive(place, seed);
     const simulation::RememberedPlace remembered = simulation::remember_drive(
         place, way, simulation::cheap_wheels(), Random(seed, 1).next(), executor);
     double tour_m = 0.0;
@@ -371,7 +371,7 @@ void NavigationExperiments::reproduce_blocked_missions() const {
     }
     const auto round = static_cast<std::size_t>(tour_m / drive_spacing_m);
     Random random(seed, 11);
-    for (int k = 0; k < runs_of(options, i);) {
+    for (int k = 0; k < count_runs(options, i);) {
       // A quarter of the round trip apart, the screen half way between; the other one on the
       // opposite side.
       const std::size_t start = random.index(round);
@@ -380,18 +380,18 @@ void NavigationExperiments::reproduce_blocked_missions() const {
                                          way[(start + round / 8 + round / 2) % round]};
       const simulation::Mission mission{remembered.graph.view(goal), way[start], {}};
       const auto width_m =
-          shutting_width_m(scene, screens, mission.start.position(), way[goal].position());
+          find_blocking_width_m(scene, screens, mission.start.position(), way[goal].position());
       if (!width_m) continue;
       for (const bool both : {false, true}) {
         const simulation::MissionPlace now = simulation::make_mission_place(
-            with_screens(scene, std::span(screens).first(both ? 2 : 1), *width_m), executor,
+            add_screens(scene, std::span(screens).first(both ? 2 : 1), *width_m), executor,
             mission.start.position());
         const auto runs = simulation::run_missions(
             now, remembered, {mission}, {},
             Random(seed, 100 + static_cast<std::uint64_t>(k)).next(), executor);
         (both ? shut : around).add(runs, 0.5 * remembered.spacing_m);
         if (i == 0 && k == 0 && !both) {
-          draw("loop_blocked", now, remembered, mission, runs.front(), result);
+          draw_mission("loop_blocked", now, remembered, mission, runs.front(), result);
         }
       }
       ++k;
@@ -403,7 +403,7 @@ void NavigationExperiments::reproduce_blocked_missions() const {
   add_rate(result, "navigation.shut.unreachable", what + " on both sides: told unreachable",
            shut.ends[NavigationState::unreachable], shut.runs, at_least(0.9));
   result.rows.back().reason =
-      simulation::other_ends(shut.ends, shut.wrongly, NavigationState::unreachable);
+      simulation::explain_other_ends(shut.ends, shut.wrongly, NavigationState::unreachable);
   add_rate(result, "navigation.shut.arrived", what + " on both sides: say that they arrived",
            shut.ends[NavigationState::arrived], shut.runs);
   add_median(result, "navigation.shut.steps", what + " on both sides: steps until told", "",

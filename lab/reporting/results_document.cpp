@@ -67,19 +67,19 @@ TargetCount count_targets(const ResultsDocument& document) {
   return all;
 }
 
-std::size_t put_targets_first(std::vector<ResultRow>& rows) {
+std::size_t move_targets_first(std::vector<ResultRow>& rows) {
   const auto others = std::stable_partition(
       rows.begin(), rows.end(), [](const ResultRow& row) { return row.target.has_value(); });
   return static_cast<std::size_t>(others - rows.begin());
 }
 
-std::vector<std::string> miss_lines(const ResultsDocument& document) {
+std::vector<std::string> list_misses(const ResultsDocument& document) {
   std::vector<std::string> lines;
   for (const PaperResults& paper : document.papers) {
     for (const ResultRow& row : paper.rows) {
       if (!row.target || row.holds()) continue;
-      lines.push_back(paper.paper + ": " + row.what + ": " + shown_figure(row) + ", target " +
-                      shown_target(row) + ": missed " + miss_text(row) + ".");
+      lines.push_back(paper.paper + ": " + row.what + ": " + format_figure(row) + ", target " +
+                      format_target(row) + ": missed " + explain_miss(row) + ".");
     }
   }
   return lines;
@@ -114,7 +114,7 @@ std::string to_markdown(const ResultsDocument& document) {
             std::to_string(of_paper.judged) + " | " + std::to_string(of_paper.held) + " |\n";
   }
   text += "\n## Rows that do not hold\n\n";
-  const auto misses = miss_lines(document);
+  const auto misses = list_misses(document);
   for (const std::string& line : misses) text += list_item(plain(line));
   if (misses.empty()) text += "None.\n";
   for (const PaperResults& paper : document.papers) {

@@ -26,10 +26,10 @@ struct ResultsDocument {
 [[nodiscard]] TargetCount count_targets(const ResultsDocument& document);
 
 /// Every row that misses its target, a sentence each: what, ours against the target, and why.
-[[nodiscard]] std::vector<std::string> miss_lines(const ResultsDocument& document);
+[[nodiscard]] std::vector<std::string> list_misses(const ResultsDocument& document);
 
 /// The rows with a target first, in their order; then the others. Gives how many have one.
-std::size_t put_targets_first(std::vector<ResultRow>& rows);
+std::size_t move_targets_first(std::vector<ResultRow>& rows);
 
 /// One object: `version`, `command`, `targets`, `held`, `papers` (by name, an array of rows each).
 [[nodiscard]] std::string to_json(const ResultsDocument& document);

@@ -47,23 +47,23 @@ TargetCount count_targets(std::span<const ResultRow> rows) {
   return count;
 }
 
-std::string shown_figure(const ResultRow& row) {
+std::string format_figure(const ResultRow& row) {
   return row.unit.empty() ? figure_text(row) : figure_text(row) + " " + row.unit;
 }
 
-std::string shown_published(const ResultRow& row) {
+std::string format_published(const ResultRow& row) {
   if (!row.published) return "-";
   const auto& [low, high] = *row.published;
   return shown(low, row.unit) + (low == high ? "" : " .. " + shown(high, row.unit));
 }
 
-std::string shown_target(const ResultRow& row) {
+std::string format_target(const ResultRow& row) {
   if (!row.target) return "-";
   return (row.target->comparison == Comparison::at_most ? "at most " : "at least ") +
          shown(row.target->value, row.unit);
 }
 
-std::string miss_text(const ResultRow& row) {
+std::string explain_miss(const ResultRow& row) {
   if (!row.target) return "it has no target";
   if (!std::isfinite(row.ours)) {
     return row.reason.empty() ? "nothing could be measured" : row.reason;
@@ -95,10 +95,10 @@ std::span<const std::string> table_header() {
 
 std::vector<std::string> table_cells(const ResultRow& row) {
   return {row.over.empty() ? row.what : row.what + " (" + row.over + ")",
-          shown_published(row),
+          format_published(row),
           figure_text(row),
           row.unit.empty() ? "-" : row.unit,
-          shown_target(row),
+          format_target(row),
           !row.target   ? "-"
           : row.holds() ? "yes"
                         : "no"};

@@ -48,14 +48,14 @@ struct TargetCount {
 [[nodiscard]] TargetCount count_targets(std::span<const ResultRow> rows);
 
 /// Our figure for people, with its interval and unit: "0.02 (0.012 .. 0.036) m".
-[[nodiscard]] std::string shown_figure(const ResultRow& row);
+[[nodiscard]] std::string format_figure(const ResultRow& row);
 /// "5 .. 6", or "-" where the paper gives nothing.
-[[nodiscard]] std::string shown_published(const ResultRow& row);
+[[nodiscard]] std::string format_published(const ResultRow& row);
 /// "at most 0.02", or "-" for none.
-[[nodiscard]] std::string shown_target(const ResultRow& row);
+[[nodiscard]] std::string format_target(const ResultRow& row);
 /// By how much a row misses its target, and why: the known reason, else what the figures tell, else
 /// that none is known; of a time (ms, us) that it is this machine's.
-[[nodiscard]] std::string miss_text(const ResultRow& row);
+[[nodiscard]] std::string explain_miss(const ResultRow& row);
 
 /// Titles of the columns that `table_cells` fills: what, published, ours, unit, target, holds.
 [[nodiscard]] std::span<const std::string> table_header();

@@ -22,15 +22,16 @@ namespace {
 class AskedPlace {
  public:
   AskedPlace(const simulation::PlaceRecording& place, Executor& executor)
-      : memory_(memory_of_references(place, executor)), localiser_(memory_) {
-    localiser_.use_features(features_of_references(place, memory_, executor), false);
+      : memory_(make_memory_of_references(place, executor)), localiser_(memory_) {
+    localiser_.use_features(extract_reference_features(place, memory_, executor), false);
   }
   AskedPlace(const AskedPlace&) = delete;
   AskedPlace& operator=(const AskedPlace&) = delete;
 
   [[nodiscard]] const VisualMemory& memory() const noexcept { return memory_; }
   [[nodiscard]] Place ask(const Panorama& view) const {
-    return localiser_.localise(signature_for(view, memory_), {}, features_of_query(view));
+    return localiser_.localise(compute_packed_signature(view, memory_), {},
+                               make_query_features(view));
   }
 
  private:
@@ -76,7 +77,7 @@ std::vector<PlaceResult> run_place_experiment(const simulation::PlaceRecording& 
       const Panorama seen =
           simulation::take_panorama(*place.renderer, place.queries[begin].pose, place.rendering,
                                     frame, condition.sensor, seed + begin, here);
-      const Tilt measured = condition.levelled ? frame_tilt(frame, seed + begin) : Tilt{};
+      const Tilt measured = condition.levelled ? draw_tilt(frame, seed + begin) : Tilt{};
       answers[begin] = remembered.ask(level_panorama(seen, measured));
     });
     seed += asked;

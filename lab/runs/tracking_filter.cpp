@@ -17,7 +17,7 @@ FilterSetting paper_setting() {
   setting.injection = InjectionMethod::none;
   setting.particles_per_reference = 1.0;
   setting.odometry.drive = DriveKind::holonomic;
-  setting.told_odometry.drive = DriveKind::holonomic;
+  setting.assumed_odometry.drive = DriveKind::holonomic;
   setting.heading_known = true;
   return setting;
 }
@@ -43,7 +43,7 @@ TrackedRun track_run(const TrackingPlace& place, const TrackingRun& run,
     options.min_particles = options.max_particles =
         std::max(1, static_cast<int>(std::lround(wanted)));
   }
-  MonteCarloLocaliser filter(place.ranking(), place.model(), options, setting.told_odometry);
+  MonteCarloLocaliser filter(place.ranking(), place.model(), options, setting.assumed_odometry);
   use_injection(filter, setting.injection, place.ranking());
   if (setting.heading_known && !run.steps.empty()) {
     filter.start_globally(run.steps.front().truth.heading_rad);
@@ -112,8 +112,8 @@ std::optional<int> images_until_localised(const TrackedRun& run, double radius_m
   return found;
 }
 
-std::optional<int> images_until_first_right(const TrackedRun& run, double radius_m,
-                                            std::size_t first_step) {
+std::optional<int> images_until_first_fix(const TrackedRun& run, double radius_m,
+                                          std::size_t first_step) {
   int images = 0;
   for (const TrackedImage& image : run) {
     if (image.step < first_step) continue;

@@ -42,9 +42,9 @@ struct FilterSetting {
   InjectionMethod injection = InjectionMethod::explained;
   /// As many particles as this times the references, at all times; empty: as the options say.
   std::optional<double> particles_per_reference;
-  OdometryNoise odometry;       ///< of the robot
-  OdometryNoise told_odometry;  ///< what the filter takes it for
-  bool heading_known = false;   ///< at the start
+  OdometryNoise odometry;          ///< of the robot
+  OdometryNoise assumed_odometry;  ///< what the filter takes it for
+  bool heading_known = false;      ///< at the start
 };
 
 /// The paper's robot: holonomic, heading known and kept, no compass, as many particles as
@@ -74,7 +74,7 @@ using StepObserver = std::function<void(std::size_t step, const MonteCarloLocali
 [[nodiscard]] std::optional<int> images_until_localised(const TrackedRun& run, double radius_m,
                                                         std::size_t first_step = 0);
 /// The same until the first answer within `radius_m`, whatever follows.
-[[nodiscard]] std::optional<int> images_until_first_right(const TrackedRun& run, double radius_m,
-                                                          std::size_t first_step = 0);
+[[nodiscard]] std::optional<int> images_until_first_fix(const TrackedRun& run, double radius_m,
+                                                        std::size_t first_step = 0);
 
 }  // namespace panonav::lab

@@ -24,7 +24,7 @@ FourierSignature signature_of(const Panorama& view) {
 }
 
 // A number for each of its parts: different parts give different numbers, far apart.
-std::uint64_t mixed(std::uint64_t a, std::uint64_t b) {
+std::uint64_t mix_seeds(std::uint64_t a, std::uint64_t b) {
   return a * 1000003U + b;
 }
 
@@ -47,8 +47,8 @@ std::vector<Point2> TrackingPlace::reference_positions() const {
   return positions;
 }
 
-VisualMemory memory_of_views(std::span<const ReferencePose> poses,
-                             std::span<const Panorama* const> views, Executor& executor) {
+VisualMemory make_memory_of_views(std::span<const ReferencePose> poses,
+                                  std::span<const Panorama* const> views, Executor& executor) {
   require(!views.empty() && views.size() == poses.size(), "reference views",
           static_cast<double>(views.size()), ">= 1, as many as poses");
   const auto signatures = simulation::make_each(
@@ -67,8 +67,8 @@ VisualMemory memory_of_views(std::span<const ReferencePose> poses,
   return memory;
 }
 
-VisualMemory memory_of_references(const simulation::PlaceRecording& place, Executor& executor,
-                                  const std::function<bool(Point2)>& kept) {
+VisualMemory make_memory_of_references(const simulation::PlaceRecording& place, Executor& executor,
+                                       const std::function<bool(Point2)>& kept) {
   std::vector<ReferencePose> poses;
   std::vector<const Panorama*> views;
   for (const simulation::PlacedView& view : place.references) {
@@ -76,11 +76,11 @@ VisualMemory memory_of_references(const simulation::PlaceRecording& place, Execu
     poses.push_back({view.pose.x_m, view.pose.y_m, view.pose.heading_rad});
     views.push_back(&view.panorama);
   }
-  return memory_of_views(poses, views, executor);
+  return make_memory_of_views(poses, views, executor);
 }
 
-FeatureSource features_of_references(const simulation::PlaceRecording& place,
-                                     const VisualMemory& memory, Executor& executor) {
+FeatureSource extract_reference_features(const simulation::PlaceRecording& place,
+                                         const VisualMemory& memory, Executor& executor) {
   const std::span<const ViewId> views = memory.views();
   auto features = simulation::make_each(executor, views.size(), [&](std::size_t i) {
     const Point2 at = memory.info(views[i]).pose->position();
@@ -91,30 +91,31 @@ FeatureSource features_of_references(const simulation::PlaceRecording& place,
   return [kept](ViewId view) { return kept->at(view); };
 }
 
-QueryFeatures features_of_query(const Panorama& view) {
+QueryFeatures make_query_features(const Panorama& view) {
   return [&view](Handedness handedness) {
     return extract_features(handedness == Handedness::as_seen ? view : mirrored(view));
   };
 }
 
-std::shared_ptr<const TrackingPlace> remember_views(std::span<const ReferencePose> poses,
-                                                    std::span<const Panorama* const> views,
-                                                    double spacing_m, Executor& executor) {
-  return std::make_shared<const TrackingPlace>(memory_of_views(poses, views, executor), spacing_m);
+std::shared_ptr<const TrackingPlace> make_tracking_place(std::span<const ReferencePose> poses,
+                                                         std::span<const Panorama* const> views,
+                                                         double spacing_m, Executor& executor) {
+  return std::make_shared<const TrackingPlace>(make_memory_of_views(poses, views, executor),
+                                               spacing_m);
 }
 
-std::shared_ptr<const TrackingPlace> remember_for_tracking(
-    const simulation::PlaceRecording& place, Executor& executor,
-    const std::function<bool(Point2)>& kept) {
-  return std::make_shared<const TrackingPlace>(memory_of_references(place, executor, kept),
+std::shared_ptr<const TrackingPlace> make_tracking_place(const simulation::PlaceRecording& place,
+                                                         Executor& executor,
+                                                         const std::function<bool(Point2)>& kept) {
+  return std::make_shared<const TrackingPlace>(make_memory_of_references(place, executor, kept),
                                                place.spacing_m);
 }
 
-PackedSignature signature_for(const Panorama& panorama, const VisualMemory& memory) {
+PackedSignature compute_packed_signature(const Panorama& panorama, const VisualMemory& memory) {
   return pack(signature_of(panorama), memory.full_scale());
 }
 
-TrackingRun run_through(std::span<const Pose2> poses, std::vector<PackedSignature> views) {
+TrackingRun make_tracking_run(std::span<const Pose2> poses, std::vector<PackedSignature> views) {
   require(poses.size() == views.size(), "number of views", static_cast<double>(views.size()),
           "that of the poses");
   TrackingRun run;
@@ -126,9 +127,9 @@ TrackingRun run_through(std::span<const Pose2> poses, std::vector<PackedSignatur
   return run;
 }
 
-std::optional<TrackingRun> kidnapped(const TrackingRun& before, const TrackingRun& after,
-                                     std::size_t images, double distance_m,
-                                     std::size_t min_images) {
+std::optional<TrackingRun> make_kidnapped_run(const TrackingRun& before, const TrackingRun& after,
+                                              std::size_t images, double distance_m,
+                                              std::size_t min_images) {
   if (before.steps.size() < images || images == 0) return std::nullopt;
   const Point2 left = before.steps[images - 1].truth.position();
   const auto found = std::ranges::find_if(after.steps, [&](const TrackingStep& step) {
@@ -143,7 +144,7 @@ std::optional<TrackingRun> kidnapped(const TrackingRun& before, const TrackingRu
   return run;
 }
 
-TrackingRun without_images(TrackingRun run, std::size_t first, std::size_t count) {
+TrackingRun drop_images(TrackingRun run, std::size_t first, std::size_t count) {
   for (std::size_t i = first; i < std::min(first + count, run.steps.size()); ++i) {
     run.steps[i].view.reset();
   }
@@ -162,12 +163,12 @@ RunCondition hard_condition() {
           .sensor = {.read_noise = 0.3}};
 }
 
-std::vector<TrackingRun> record_along(const std::vector<std::vector<Pose2>>& poses,
-                                      const simulation::PlaceRecording& place,
-                                      const simulation::Renderer& renderer,
-                                      const TrackingPlace& remembered,
-                                      const simulation::SensorOptions& sensor, std::uint64_t seed,
-                                      Executor& executor) {
+std::vector<TrackingRun> record_runs(const std::vector<std::vector<Pose2>>& poses,
+                                     const simulation::PlaceRecording& place,
+                                     const simulation::Renderer& renderer,
+                                     const TrackingPlace& remembered,
+                                     const simulation::SensorOptions& sensor, std::uint64_t seed,
+                                     Executor& executor) {
   std::vector<std::pair<std::size_t, std::size_t>> jobs;
   std::vector<std::vector<PackedSignature>> views(poses.size());
   for (std::size_t r = 0; r < poses.size(); ++r) {
@@ -180,14 +181,14 @@ std::vector<TrackingRun> record_along(const std::vector<std::vector<Pose2>>& pos
       const auto [r, i] = jobs[j];
       Panorama view = renderer.render_panorama(
           {.pose = poses[r][i], .height_m = place.scene.camera_height_m}, place.rendering, here);
-      views[r][i] =
-          signature_for(simulation::apply_sensor(std::move(view), sensor, seed + 1000 * r + i),
-                        remembered.memory());
+      views[r][i] = compute_packed_signature(
+          simulation::apply_sensor(std::move(view), sensor, seed + 1000 * r + i),
+          remembered.memory());
     }
   });
   std::vector<TrackingRun> runs;
   for (std::size_t r = 0; r < poses.size(); ++r) {
-    runs.push_back(run_through(poses[r], std::move(views[r])));
+    runs.push_back(make_tracking_run(poses[r], std::move(views[r])));
   }
   return runs;
 }
@@ -203,7 +204,7 @@ std::vector<TrackingRun> record_walks(const simulation::PlaceRecording& place,
   std::vector<TrackingRun> runs;
   for (int v = 0; v < options.variants; ++v) {
     const std::uint64_t seed =
-        mixed(mixed(options.seed, place.seed), static_cast<std::uint64_t>(v));
+        mix_seeds(mix_seeds(options.seed, place.seed), static_cast<std::uint64_t>(v));
     Random random(seed);
     simulation::SimulatedPlace now = place;
     if (changed) {
@@ -228,8 +229,8 @@ std::vector<TrackingRun> record_walks(const simulation::PlaceRecording& place,
       }
       poses.push_back(std::move(path));
     }
-    auto recorded = record_along(poses, place, *now.renderer, remembered, condition.sensor,
-                                 mixed(seed, 50000), executor);
+    auto recorded = record_runs(poses, place, *now.renderer, remembered, condition.sensor,
+                                mix_seeds(seed, 50000), executor);
     std::ranges::move(recorded, std::back_inserter(runs));
   }
   return runs;

@@ -50,31 +50,33 @@ class TrackingPlace {
 
 /// Views as a memory, as the command's defaults have it. Throws ContractError on numbers of poses
 /// and views that differ, or no view.
-[[nodiscard]] VisualMemory memory_of_views(std::span<const ReferencePose> poses,
-                                           std::span<const Panorama* const> views,
-                                           Executor& executor);
+[[nodiscard]] VisualMemory make_memory_of_views(std::span<const ReferencePose> poses,
+                                                std::span<const Panorama* const> views,
+                                                Executor& executor);
 /// The same of the references of a recorded place; `kept` chooses which of them; empty: all.
-[[nodiscard]] VisualMemory memory_of_references(const simulation::PlaceRecording& place,
-                                                Executor& executor,
-                                                const std::function<bool(Point2)>& kept = nullptr);
+[[nodiscard]] VisualMemory make_memory_of_references(
+    const simulation::PlaceRecording& place, Executor& executor,
+    const std::function<bool(Point2)>& kept = nullptr);
 
 /// The local features of the references that this memory holds.
-[[nodiscard]] FeatureSource features_of_references(const simulation::PlaceRecording& place,
-                                                   const VisualMemory& memory, Executor& executor);
+[[nodiscard]] FeatureSource extract_reference_features(const simulation::PlaceRecording& place,
+                                                       const VisualMemory& memory,
+                                                       Executor& executor);
 /// What `Localiser::localise` asks for. The view must outlive it.
-[[nodiscard]] QueryFeatures features_of_query(const Panorama& view);
+[[nodiscard]] QueryFeatures make_query_features(const Panorama& view);
 
 /// The same with all that localises in them. `spacing_m` as TrackingPlace.
-[[nodiscard]] std::shared_ptr<const TrackingPlace> remember_views(
+[[nodiscard]] std::shared_ptr<const TrackingPlace> make_tracking_place(
     std::span<const ReferencePose> poses, std::span<const Panorama* const> views, double spacing_m,
     Executor& executor);
 
-[[nodiscard]] std::shared_ptr<const TrackingPlace> remember_for_tracking(
+[[nodiscard]] std::shared_ptr<const TrackingPlace> make_tracking_place(
     const simulation::PlaceRecording& place, Executor& executor,
     const std::function<bool(Point2)>& kept = nullptr);
 
 /// The signature that a robot with this memory takes of a panorama: the command's defaults.
-[[nodiscard]] PackedSignature signature_for(const Panorama& panorama, const VisualMemory& memory);
+[[nodiscard]] PackedSignature compute_packed_signature(const Panorama& panorama,
+                                                       const VisualMemory& memory);
 
 /// One step of a run.
 struct TrackingStep {
@@ -92,18 +94,19 @@ struct TrackingRun {
 };
 
 /// A run through `poses` with a view at each of them.
-[[nodiscard]] TrackingRun run_through(std::span<const Pose2> poses,
-                                      std::vector<PackedSignature> views);
+[[nodiscard]] TrackingRun make_tracking_run(std::span<const Pose2> poses,
+                                            std::vector<PackedSignature> views);
 
 /// The first `images` steps of `before`; then the robot is put down at the first step of `after`
 /// that is at least `distance_m` away, and goes on there. Empty when no such step leaves
 /// `min_images`.
-[[nodiscard]] std::optional<TrackingRun> kidnapped(const TrackingRun& before,
-                                                   const TrackingRun& after, std::size_t images,
-                                                   double distance_m, std::size_t min_images);
+[[nodiscard]] std::optional<TrackingRun> make_kidnapped_run(const TrackingRun& before,
+                                                            const TrackingRun& after,
+                                                            std::size_t images, double distance_m,
+                                                            std::size_t min_images);
 
 /// The same run without the pictures of steps first .. first + count - 1.
-[[nodiscard]] TrackingRun without_images(TrackingRun run, std::size_t first, std::size_t count);
+[[nodiscard]] TrackingRun drop_images(TrackingRun run, std::size_t first, std::size_t count);
 
 /// How runs differ from memorising.
 struct RunCondition {
@@ -140,12 +143,12 @@ struct WalkOptions {
 
 /// Views along given poses, all through one renderer (of the place's own or a changed scene); view
 /// i of pose list r has the noise seed `seed` + 1000 r + i.
-[[nodiscard]] std::vector<TrackingRun> record_along(const std::vector<std::vector<Pose2>>& poses,
-                                                    const simulation::PlaceRecording& place,
-                                                    const simulation::Renderer& renderer,
-                                                    const TrackingPlace& remembered,
-                                                    const simulation::SensorOptions& sensor,
-                                                    std::uint64_t seed, Executor& executor);
+[[nodiscard]] std::vector<TrackingRun> record_runs(const std::vector<std::vector<Pose2>>& poses,
+                                                   const simulation::PlaceRecording& place,
+                                                   const simulation::Renderer& renderer,
+                                                   const TrackingPlace& remembered,
+                                                   const simulation::SensorOptions& sensor,
+                                                   std::uint64_t seed, Executor& executor);
 
 /// How well single images of runs are localised, each by itself.
 struct SingleImages {

@@ -30,7 +30,7 @@ double best_single(const CatchmentAreas& areas, std::size_t accepted) {
 
 }  // namespace
 
-CatchmentAreas catchment_areas(ArenaSurveys& surveys) {
+CatchmentAreas measure_catchment_areas(ArenaSurveys& surveys) {
   std::vector<HomingStrategy> strategies{
       expected_image_strategy(), own_strategy(), published_strategy({2, 4, 10}),
       published_strategy({10, 4, 2}), published_strategy({1, 2, 3, 4, 6, 10})};
@@ -52,8 +52,8 @@ void compare_catchment_areas(std::span<const CatchmentAreas> arenas, const Exper
   const std::string images = expected_image_strategy().label;
   const std::string many_stages = published_strategy({1, 2, 3, 4, 6, 10}).label;
   for (std::size_t i = 0; i < s06_accepted_m.size(); ++i) {
-    const std::string id = centimetres_id(s06_accepted_m[i]);
-    const std::string within = ", runs that end within " + centimetres(s06_accepted_m[i]);
+    const std::string id = format_centimetres_id(s06_accepted_m[i]);
+    const std::string within = ", runs that end within " + format_centimetres(s06_accepted_m[i]);
     const auto add = [&](const std::string& name, const std::string& what, const std::string& unit,
                          auto figure, std::optional<Target> target,
                          std::optional<std::pair<double, double>> published = std::nullopt) {
@@ -108,14 +108,15 @@ void compare_catchment_areas(std::span<const CatchmentAreas> arenas, const Exper
 void report_variant(const std::string& id, const std::string& what, const CatchmentAreas& areas,
                     Reproduction& result) {
   for (std::size_t i = 0; i < s06_accepted_m.size(); ++i) {
-    const std::string within = ", runs that end within " + centimetres(s06_accepted_m[i]);
+    const std::string within = ", runs that end within " + format_centimetres(s06_accepted_m[i]);
     const double own = areas.at(own_strategy().label)[i];
+    add_row(
+        result,
+        "s06." + id + ".own_against_expected_images_" + format_centimetres_id(s06_accepted_m[i]),
+        what + ": mean catchment area, our rule over expected images" + within,
+        own / areas.at(expected_image_strategy().label)[i], "");
     add_row(result,
-            "s06." + id + ".own_against_expected_images_" + centimetres_id(s06_accepted_m[i]),
-            what + ": mean catchment area, our rule over expected images" + within,
-            own / areas.at(expected_image_strategy().label)[i], "");
-    add_row(result,
-            "s06." + id + ".own_against_coarse_to_fine_" + centimetres_id(s06_accepted_m[i]),
+            "s06." + id + ".own_against_coarse_to_fine_" + format_centimetres_id(s06_accepted_m[i]),
             what + ": mean catchment area, our rule over " + coarse_to_fine + within,
             own / areas.at(coarse_to_fine)[i], "");
   }

@@ -38,7 +38,7 @@ ArenaRecording record(const simulation::Renderer& renderer, const simulation::Sc
       const Pose2 truth{position.x_m + options.position_noise_m * error_x,
                         position.y_m + options.position_noise_m * error_y,
                         wrap_angle(heading + options.heading_noise_rad * error_heading)};
-      rows[i] = arena_row(renderer, scene, truth, random.next(), here);
+      rows[i] = render_arena_row(renderer, scene, truth, random.next(), here);
       const Panorama one_row(1, s06_columns, std::nullopt, rows[i]);
       views[i] = ArenaView{{position.x_m, position.y_m, heading},
                            homing_view(compute_signature(one_row, s06_components))};
@@ -58,8 +58,9 @@ std::vector<Pose2> poses_of(const ArenaRecording& recording) {
 
 }  // namespace
 
-std::vector<float> arena_row(const simulation::Renderer& renderer, const simulation::Scene& scene,
-                             const Pose2& pose, std::uint64_t seed, Executor& executor) {
+std::vector<float> render_arena_row(const simulation::Renderer& renderer,
+                                    const simulation::Scene& scene, const Pose2& pose,
+                                    std::uint64_t seed, Executor& executor) {
   const simulation::PanoramaRendering rendering{.rows = camera_rows,
                                                 .columns = camera_columns,
                                                 .elevations = {-half_band_rad, half_band_rad},

@@ -65,9 +65,9 @@ struct Arena : simulation::SimulatedPlace {
 
 /// The row of one place of the scene through a camera with noise: 360 pixels of 1 degree and 10
 /// rows, averaged to 72.
-[[nodiscard]] std::vector<float> arena_row(const simulation::Renderer& renderer,
-                                           const simulation::Scene& scene, const Pose2& pose,
-                                           std::uint64_t seed, Executor& executor);
+[[nodiscard]] std::vector<float> render_arena_row(const simulation::Renderer& renderer,
+                                                  const simulation::Scene& scene, const Pose2& pose,
+                                                  std::uint64_t seed, Executor& executor);
 
 /// Runs as in [S06 section 4.4], for the spacing of the arena.
 [[nodiscard]] HomingSurveyOptions survey_options(const Arena& arena);

@@ -32,9 +32,9 @@ HomingCamera chain_camera() {
   return camera;
 }
 
-std::vector<std::vector<Pose2>> random_routes(const simulation::FreeSpace& space, int count,
-                                              double length_m, double spacing_m,
-                                              std::uint64_t seed) {
+std::vector<std::vector<Pose2>> plan_random_routes(const simulation::FreeSpace& space, int count,
+                                                   double length_m, double spacing_m,
+                                                   std::uint64_t seed) {
   require(length_m > 0.0, "length of a route", length_m, "> 0");
   require(spacing_m > 0.0, "spacing of a route", spacing_m, "> 0");
   std::vector<std::vector<Pose2>> routes;
@@ -73,7 +73,7 @@ SnapshotChain record_chain(const HomingPlace& place, std::span<const Pose2> rout
   return recorder.finish();
 }
 
-bool ChainRun::completes(double radius_m) const noexcept {
+bool ChainRun::has_completed(double radius_m) const noexcept {
   return state == ChainState::finished && end_distance_m <= radius_m;
 }
 
@@ -113,7 +113,7 @@ void reproduce_snapshot_chains(const HomingPlace& place, const std::string& name
                                std::uint64_t seed, int routes, Executor& executor,
                                Reproduction& reproduction) {
   require(routes >= 1, "routes", routes, ">= 1");
-  const auto ways = random_routes(*place.free_space, routes, route_m, pose_spacing_m, seed);
+  const auto ways = plan_random_routes(*place.free_space, routes, route_m, pose_spacing_m, seed);
   constexpr std::size_t directions = 2;
   std::vector<SnapshotChain> chains(ways.size());
   std::vector<ChainRun> runs(ways.size() * directions);
@@ -131,7 +131,7 @@ void reproduce_snapshot_chains(const HomingPlace& place, const std::string& name
   std::vector<double> mean_m;
   std::vector<double> worst_m;
   for (const ChainRun& run : runs) {
-    completed += run.completes(completed_m) ? 1 : 0;
+    completed += run.has_completed(completed_m) ? 1 : 0;
     double sum_m = 0.0;
     for (const double lateral_m : run.lateral_m) sum_m += lateral_m;
     mean_m.push_back(sum_m / static_cast<double>(run.lateral_m.size()));

@@ -18,9 +18,10 @@ namespace panonav::lab {
 /// Routes of at least `length_m` through the free places: shortest ways between random places, one
 /// after the other, heading along the way, poses every `spacing_m`. Throws ContractError unless
 /// both are above 0.
-[[nodiscard]] std::vector<std::vector<Pose2>> random_routes(const simulation::FreeSpace& space,
-                                                            int count, double length_m,
-                                                            double spacing_m, std::uint64_t seed);
+[[nodiscard]] std::vector<std::vector<Pose2>> plan_random_routes(const simulation::FreeSpace& space,
+                                                                 int count, double length_m,
+                                                                 double spacing_m,
+                                                                 std::uint64_t seed);
 
 /// The chain that a robot records on its way along `route` (a view at each pose, which need not be
 /// far apart), with errors of its odometry. The same seed gives the same chain.
@@ -36,7 +37,7 @@ struct ChainRun {
   std::vector<double> lateral_m;
 
   /// The robot says that it has finished, this near to the end of the route.
-  [[nodiscard]] bool completes(double radius_m) const noexcept;
+  [[nodiscard]] bool has_completed(double radius_m) const noexcept;
 };
 
 /// Sends a differential robot along the chain from the first or the last pose of `route`, the true

@@ -35,7 +35,7 @@ class GoalPictures {
     }
     return values;
   }
-  [[nodiscard]] std::vector<double> final_distances_of(const HomingStrategy& strategy) {
+  [[nodiscard]] std::vector<double> compute_final_distances(const HomingStrategy& strategy) {
     const auto stages = surveys_.stages(strategy);
     std::vector<double> values;
     for (const std::uint32_t end : final_places(stages, goal_, survey_options(arena_))) {
@@ -43,12 +43,12 @@ class GoalPictures {
     }
     return values;
   }
-  [[nodiscard]] std::vector<viewer::MapLayer> shaded(const std::vector<double>& values,
-                                                     const std::vector<double>& limits) const;
-  [[nodiscard]] viewer::MapLayer vectors(const FourierHomingOptions& homing) const;
-  [[nodiscard]] viewer::MapLayer border(const std::vector<double>& ends_m) const;
-  [[nodiscard]] viewer::MapLayer goal_mark() const;
-  [[nodiscard]] viewer::MapLayer most_similar(const std::vector<double>& differences) const;
+  [[nodiscard]] std::vector<viewer::MapLayer> shade_cells(const std::vector<double>& values,
+                                                          const std::vector<double>& limits) const;
+  [[nodiscard]] viewer::MapLayer draw_home_vectors(const FourierHomingOptions& homing) const;
+  [[nodiscard]] viewer::MapLayer outline_catchment(const std::vector<double>& ends_m) const;
+  [[nodiscard]] viewer::MapLayer mark_goal() const;
+  [[nodiscard]] viewer::MapLayer mark_most_similar(const std::vector<double>& differences) const;
 
  private:
   ArenaSurveys& surveys_;
@@ -57,8 +57,8 @@ class GoalPictures {
 };
 
 // One layer of cells for each range between limits, the highest values darkest.
-std::vector<viewer::MapLayer> GoalPictures::shaded(const std::vector<double>& values,
-                                                   const std::vector<double>& limits) const {
+std::vector<viewer::MapLayer> GoalPictures::shade_cells(const std::vector<double>& values,
+                                                        const std::vector<double>& limits) const {
   constexpr std::array greys{viewer::PlotColour::yellow,     viewer::PlotColour::pale_grey,
                              viewer::PlotColour::light_grey, viewer::PlotColour::grey,
                              viewer::PlotColour::dark_grey,  viewer::PlotColour::black};
@@ -80,7 +80,7 @@ std::vector<viewer::MapLayer> GoalPictures::shaded(const std::vector<double>& va
 }
 
 // A stroke from each place towards home, a dot where it begins.
-viewer::MapLayer GoalPictures::vectors(const FourierHomingOptions& homing) const {
+viewer::MapLayer GoalPictures::draw_home_vectors(const FourierHomingOptions& homing) const {
   viewer::MapLayer layer{.colour = viewer::PlotColour::blue};
   for (const auto& placed : arena_.currents.views) {
     const HomeVector vector = home_vector(home(), placed.view, homing);
@@ -96,7 +96,7 @@ viewer::MapLayer GoalPictures::vectors(const FourierHomingOptions& homing) const
 }
 
 // The edges between cells from which runs end within 10 cm of the goal and all others.
-viewer::MapLayer GoalPictures::border(const std::vector<double>& ends_m) const {
+viewer::MapLayer GoalPictures::outline_catchment(const std::vector<double>& ends_m) const {
   viewer::MapLayer layer{.colour = viewer::PlotColour::vermilion};
   const double spacing_m = arena_.options.spacing_m;
   const auto is_inside = [&](double x_m, double y_m) {
@@ -123,11 +123,11 @@ viewer::MapLayer GoalPictures::border(const std::vector<double>& ends_m) const {
   return layer;
 }
 
-viewer::MapLayer GoalPictures::goal_mark() const {
+viewer::MapLayer GoalPictures::mark_goal() const {
   return {.label = "goal", .colour = viewer::PlotColour::purple, .squares = {position()}};
 }
 
-viewer::MapLayer GoalPictures::most_similar(const std::vector<double>& differences) const {
+viewer::MapLayer GoalPictures::mark_most_similar(const std::vector<double>& differences) const {
   const auto best = std::ranges::min_element(differences) - differences.begin();
   return {.label = "most similar",
           .colour = viewer::PlotColour::green,
@@ -135,15 +135,16 @@ viewer::MapLayer GoalPictures::most_similar(const std::vector<double>& differenc
 }
 
 template <typename... Layers>
-viewer::MapPlot map_of(const std::string& title, std::vector<viewer::MapLayer> layers,
-                       Layers... more) {
+viewer::MapPlot make_map(const std::string& title, std::vector<viewer::MapLayer> layers,
+                         Layers... more) {
   (layers.push_back(std::move(more)), ...);
   return {title, std::move(layers)};
 }
 
 // Differences along the line of places with the goal's y, or x.
-viewer::Series transect(const Arena& arena, Point2 goal, const std::vector<double>& differences,
-                        bool along_x, const std::string& label) {
+viewer::Series make_transect(const Arena& arena, Point2 goal,
+                             const std::vector<double>& differences, bool along_x,
+                             const std::string& label) {
   std::vector<std::pair<double, double>> points;
   for (std::size_t p = 0; p < differences.size(); ++p) {
     const Point2 at = arena.currents.views[p].pose.position();
@@ -172,15 +173,15 @@ std::size_t choose_goal(const HomingSurvey& survey) {
 // Figure 9.
 void draw_vectors(GoalPictures& of, Reproduction& result) {
   const auto differences = of.differences(5);
-  const auto ends = of.final_distances_of(published_strategy({5}));
+  const auto ends = of.compute_final_distances(published_strategy({5}));
   add_plot(result, "figure_09_vectors.svg",
            "[S06] figure 9: home vectors to one goal (strokes from the dots), the darker the less "
            "similar "
            "the views. Other valleys lead astray.",
-           map_of("Home vectors, K = 5; orange: catchment area at 10 cm",
-                  of.shaded(differences, difference_limits),
-                  of.vectors(published_homing_options(5, s06_iterations)), of.border(ends),
-                  of.goal_mark(), of.most_similar(differences)));
+           make_map("Home vectors, K = 5; orange: catchment area at 10 cm",
+                    of.shade_cells(differences, difference_limits),
+                    of.draw_home_vectors(published_homing_options(5, s06_iterations)),
+                    of.outline_catchment(ends), of.mark_goal(), of.mark_most_similar(differences)));
 }
 
 // Figure 14.
@@ -189,13 +190,14 @@ void draw_stages(GoalPictures& of, Reproduction& result) {
   for (const int highest : {2, 4, 10}) {
     const std::string k = "K = " + std::to_string(highest);
     const auto differences = of.differences(highest);
-    const auto ends = of.final_distances_of(published_strategy({highest}));
-    panels.push_back(map_of(k + ": image difference, home vectors",
-                            of.shaded(differences, difference_limits),
-                            of.vectors(published_homing_options(highest, s06_iterations)),
-                            of.goal_mark(), of.most_similar(differences)));
-    panels.push_back(map_of(k + ": where runs end; yellow: at the goal, dark: beyond 40 cm",
-                            of.shaded(ends, distance_limits), of.border(ends), of.goal_mark()));
+    const auto ends = of.compute_final_distances(published_strategy({highest}));
+    panels.push_back(make_map(
+        k + ": image difference, home vectors", of.shade_cells(differences, difference_limits),
+        of.draw_home_vectors(published_homing_options(highest, s06_iterations)), of.mark_goal(),
+        of.mark_most_similar(differences)));
+    panels.push_back(make_map(k + ": where runs end; yellow: at the goal, dark: beyond 40 cm",
+                              of.shade_cells(ends, distance_limits), of.outline_catchment(ends),
+                              of.mark_goal()));
   }
   add_plot(result, "figure_14_stages.svg",
            "[S06] figure 14: the same goal with K = 2, 4 and 10. Left: image difference and home "
@@ -208,9 +210,9 @@ void draw_areas_of_rules(GoalPictures& of, Reproduction& result) {
   std::vector<viewer::MapPlot> panels;
   for (const HomingStrategy& strategy :
        {published_strategy({2, 4, 10}), own_strategy(), expected_image_strategy()}) {
-    const auto ends = of.final_distances_of(strategy);
-    panels.push_back(
-        map_of(strategy.label, of.shaded(ends, distance_limits), of.border(ends), of.goal_mark()));
+    const auto ends = of.compute_final_distances(strategy);
+    panels.push_back(make_map(strategy.label, of.shade_cells(ends, distance_limits),
+                              of.outline_catchment(ends), of.mark_goal()));
   }
   add_plot(
       result, "figure_15_areas.svg",
@@ -226,8 +228,8 @@ void draw_transects(const Arena& arena, const GoalPictures& of, Reproduction& re
                            .x_label = "distance from the goal [m]",
                            .y_label = "share of the energy of both views"};
     for (const int highest : {2, 4, 10}) {
-      lines.series.push_back(transect(arena, of.position(), of.differences(highest), along_x,
-                                      "K = " + std::to_string(highest)));
+      lines.series.push_back(make_transect(arena, of.position(), of.differences(highest), along_x,
+                                           "K = " + std::to_string(highest)));
     }
     return lines;
   };

@@ -11,8 +11,8 @@ namespace panonav::lab {
 
 namespace {
 
-viewer::Series homeward_series(const std::string& label, const HomingSurvey& survey,
-                               double spacing_m) {
+viewer::Series make_homeward_series(const std::string& label, const HomingSurvey& survey,
+                                    double spacing_m) {
   viewer::Series series{.label = label};
   for (const HomingSurvey::Bin& bin : homeward_by_distance(survey, spacing_m)) {
     if (bin.pairs < 20 || bin.distance_m > 0.8) continue;
@@ -21,7 +21,7 @@ viewer::Series homeward_series(const std::string& label, const HomingSurvey& sur
   return series;
 }
 
-viewer::LinePlot homeward_plot(const std::string& title) {
+viewer::LinePlot make_homeward_plot(const std::string& title) {
   return {.title = title,
           .x_label = "distance to the goal [m]",
           .y_label = "average homeward component",
@@ -31,20 +31,20 @@ viewer::LinePlot homeward_plot(const std::string& title) {
 // Figure 10.
 void draw_homeward(ArenaSurveys& surveys, Executor& executor, Reproduction& result) {
   const double spacing_m = surveys.arena().options.spacing_m;
-  viewer::LinePlot by_highest = homeward_plot("One home vector, no iteration");
+  viewer::LinePlot by_highest = make_homeward_plot("One home vector, no iteration");
   for (const int highest : {1, 2, 3, 5, 10}) {
-    by_highest.series.push_back(homeward_series("K = " + std::to_string(highest),
-                                                surveys.published(highest, 0), spacing_m));
+    by_highest.series.push_back(make_homeward_series("K = " + std::to_string(highest),
+                                                     surveys.published(highest, 0), spacing_m));
   }
   by_highest.series.push_back(
-      homeward_series("expected images", surveys.expected_images(), spacing_m));
-  by_highest.series.push_back(homeward_series("our rule, K = 10", surveys.own(10), spacing_m));
+      make_homeward_series("expected images", surveys.expected_images(), spacing_m));
+  by_highest.series.push_back(make_homeward_series("our rule, K = 10", surveys.own(10), spacing_m));
   add_plot(result, "figure_10_homeward.svg",
            "[S06] figure 10a: how far home vectors point home, by the distance: few frequencies "
            "from afar, many close by.",
            by_highest);
 
-  viewer::LinePlot by_iterations = homeward_plot("Iterations, K = 2 and K = 10");
+  viewer::LinePlot by_iterations = make_homeward_plot("Iterations, K = 2 and K = 10");
   for (const int highest : {2, 10}) {
     for (const int iterations : {0, 1, 4, 9}) {
       const std::string label =
@@ -52,7 +52,7 @@ void draw_homeward(ArenaSurveys& surveys, Executor& executor, Reproduction& resu
       const HomingSurvey survey =
           survey_arena(surveys.arena(), published_homing_options(highest, iterations), executor,
                        2 * surveys.goals_every());
-      by_iterations.series.push_back(homeward_series(label, survey, spacing_m));
+      by_iterations.series.push_back(make_homeward_series(label, survey, spacing_m));
     }
   }
   add_plot(result, "figure_10_iterations.svg", "[S06] figure 10b: the same with iterations.",
@@ -66,8 +66,9 @@ void draw_homeward(ArenaSurveys& surveys, Executor& executor, Reproduction& resu
       return std::nan("");
     };
     const auto add = [&](const std::string& name, const std::string& what, double value) {
-      add_row(result, "s06.homeward." + name + "_" + centimetres_id(away_m),
-              "average homeward component at " + centimetres(away_m) + ", " + what, value, "");
+      add_row(result, "s06.homeward." + name + "_" + format_centimetres_id(away_m),
+              "average homeward component at " + format_centimetres(away_m) + ", " + what, value,
+              "");
     };
     add("k2", "K = 2, no iteration", at(surveys.published(2, 0)));
     add("k10", "K = 10, no iteration", at(surveys.published(10, 0)));
@@ -82,14 +83,14 @@ std::vector<double> accepted_distances() {
   return accepted;
 }
 
-viewer::Series area_series(ArenaSurveys& surveys, const HomingStrategy& strategy) {
+viewer::Series make_area_series(ArenaSurveys& surveys, const HomingStrategy& strategy) {
   return {.label = strategy.label,
           .x = accepted_distances(),
           .y = surveys.areas(strategy, accepted_distances()),
           .style = viewer::SeriesStyle::lines};
 }
 
-viewer::LinePlot area_plot(const std::string& title) {
+viewer::LinePlot make_area_plot(const std::string& title) {
   return {.title = title,
           .x_label = "accepted distance of the end of a run from the goal [m]",
           .y_label = "mean catchment area [places]",
@@ -98,7 +99,7 @@ viewer::LinePlot area_plot(const std::string& title) {
 }
 
 // Places that are near the goal without any run.
-viewer::Series no_run(const HomingSurvey& survey) {
+viewer::Series make_no_run_series(const HomingSurvey& survey) {
   viewer::Series series{.label = "no run", .style = viewer::SeriesStyle::lines};
   for (const double accepted : accepted_distances()) {
     double places = 0.0;
@@ -114,22 +115,22 @@ viewer::Series no_run(const HomingSurvey& survey) {
 
 // Figures 11 and 13.
 void draw_areas(ArenaSurveys& surveys, Reproduction& result) {
-  viewer::LinePlot single = area_plot("Catchment area, one K, 3 solutions a vector");
+  viewer::LinePlot single = make_area_plot("Catchment area, one K, 3 solutions a vector");
   for (const int highest : {1, 2, 3, 5, 10}) {
-    single.series.push_back(area_series(surveys, published_strategy({highest})));
+    single.series.push_back(make_area_series(surveys, published_strategy({highest})));
   }
-  single.series.push_back(area_series(surveys, expected_image_strategy()));
-  single.series.push_back(no_run(surveys.expected_images()));
+  single.series.push_back(make_area_series(surveys, expected_image_strategy()));
+  single.series.push_back(make_no_run_series(surveys.expected_images()));
   add_plot(result, "figure_11_areas.svg",
            "[S06] figure 11: mean number of places from which runs end near the goal.", single);
 
-  viewer::LinePlot staged = area_plot("Catchment area, K rising in stages");
+  viewer::LinePlot staged = make_area_plot("Catchment area, K rising in stages");
   const std::vector<std::vector<int>> sequences{{2}, {2, 4}, {2, 4, 10}, {1, 2, 4, 10}, {10, 4, 2}};
   for (const auto& sequence : sequences) {
-    staged.series.push_back(area_series(surveys, published_strategy(sequence)));
+    staged.series.push_back(make_area_series(surveys, published_strategy(sequence)));
   }
-  staged.series.push_back(area_series(surveys, expected_image_strategy()));
-  staged.series.push_back(area_series(surveys, own_strategy()));
+  staged.series.push_back(make_area_series(surveys, expected_image_strategy()));
+  staged.series.push_back(make_area_series(surveys, own_strategy()));
   add_plot(result, "figure_13_stages.svg",
            "[S06] figure 13: the same when more frequencies count where homing stops, and our rule "
            "in its stages.",

@@ -39,7 +39,7 @@ struct ArenaExperiments : Experiments {
 
   CatchmentAreas survey_further(const Arena& arena) const {
     ArenaSurveys of_arena(arena, static_cast<std::size_t>(options.goals_every_further), executor);
-    return catchment_areas(of_arena);
+    return measure_catchment_areas(of_arena);
   }
 
   void add_variant(int number) {
@@ -84,7 +84,8 @@ ReproductionPlan plan_s06(const Experiments& context) {
       {6.0, [=] { arenas->record_first(); }},
       {4.0, [=] { reproduce_view_figures(*arenas->first, context); }},
       {60.0 * all_goals, [=] { (void)arenas->surveys->expected_images(); }},
-      {40.0 * all_goals, [=] { arenas->areas.push_back(catchment_areas(*arenas->surveys)); }},
+      {40.0 * all_goals,
+       [=] { arenas->areas.push_back(measure_catchment_areas(*arenas->surveys)); }},
       {60.0 * all_goals, [=] { reproduce_homing_figures(*arenas->surveys, context); }},
       {4.0, [=] { arenas->finish_first(); }}};
   for (int scene = 1; scene < options.scenes; ++scene) {
@@ -97,7 +98,7 @@ ReproductionPlan plan_s06(const Experiments& context) {
   plan.push_back({2.0 * few_starts, [=] { reproduce_homing_in_scenes(few_starts, context); }});
   plan.push_back(
       {10.0, [=] { reproduce_snapshot_chains((context.options.starts + 99) / 100, context); }});
-  for (const std::string& name : simulation::worlds_in(options.data)) {
+  for (const std::string& name : simulation::find_worlds(options.data)) {
     plan.push_back({0.1 * options.starts, [=] { reproduce_homing_in_world(name, context); }});
   }
   return plan;

@@ -42,7 +42,7 @@ double length(const Pose2& step) {
 }
 
 // Whether the home vector from one view to another agrees with odometry.
-bool points_along(const HomingView& from, const HomingView& to, const Pose2& from_to) {
+bool agrees_with_odometry(const HomingView& from, const HomingView& to, const Pose2& from_to) {
   if (length(from_to) < too_near_to_compare_m) return true;
   const HomeVector vector = home_vector(to, from);
   if (vector.length() == 0.0) return false;
@@ -73,8 +73,8 @@ ChainRecorder::ChainRecorder(double max_spacing_m) : max_spacing_m_(max_spacing_
 // candidate has asked already for the direction back.
 bool ChainRecorder::is_reachable(const Passed& candidate) const {
   const auto points_from_to = [](const Passed& from, const Passed& to) {
-    return points_along(from.view, to.view,
-                        inverse(from.snapshot_from_this) * to.snapshot_from_this);
+    return agrees_with_odometry(from.view, to.view,
+                                inverse(from.snapshot_from_this) * to.snapshot_from_this);
   };
   if (!points_from_to(candidate, passed_.front())) return false;
   return std::all_of(passed_.begin(), passed_.end(), [&](const Passed& view) {
@@ -172,7 +172,7 @@ ChainDecision ChainFollower::approach_last(const HomingView& current) {
   return decision;
 }
 
-void ChainFollower::start_at_most_similar(const HomingView& current) {
+void ChainFollower::start_at_nearest_snapshot(const HomingView& current) {
   double min_difference = 3.0;
   target_ = 0;
   for (std::size_t i = 0; i < chain_.size(); ++i) {
@@ -230,7 +230,7 @@ std::optional<ChainDecision> ChainFollower::follow_odometry_if_needed(const Home
 
 ChainDecision ChainFollower::decide(const HomingView& current, const Pose2& moved) {
   if (!target_) {
-    start_at_most_similar(current);
+    start_at_nearest_snapshot(current);
   } else if (target_from_robot_) {
     target_from_robot_ = *target_from_robot_ * moved;
     unseen_m_ += length(moved);

@@ -109,7 +109,7 @@ class ChainFollower {
  private:
   [[nodiscard]] bool is_last(std::size_t target) const noexcept;
   [[nodiscard]] std::size_t next(std::size_t target) const noexcept;
-  void start_at_most_similar(const HomingView& current);
+  void start_at_nearest_snapshot(const HomingView& current);
   bool aim_at_next_if_reached(const HomingView& current, const HomeVector& vector);
   std::optional<ChainDecision> follow_odometry_if_needed(const HomeVector& vector);
   [[nodiscard]] bool contradicts_odometry(const HomeVector& vector) const noexcept;

@@ -53,7 +53,7 @@ const HomingSurvey& ArenaSurveys::own(int highest) {
   return survey("own " + std::to_string(highest), FourierHomingOptions{.highest = highest});
 }
 
-const HomingSurvey& ArenaSurveys::own_again(int highest) {
+const HomingSurvey& ArenaSurveys::own_without_search(int highest) {
   const FourierHomingOptions coarse{.highest = highest, .displacement_search = false};
   const FourierHomingOptions fine{.highest = own_highest, .displacement_search = false};
   const auto rule = [&](std::size_t goal, std::size_t place) {
@@ -75,7 +75,7 @@ std::vector<const HomingSurvey*> ArenaSurveys::stages(const HomingStrategy& stra
   if (strategy.rule == HomingStrategy::Rule::own) {
     stages.push_back(&own(own_highest));
     for (int round = 0; round < own_rounds; ++round) {
-      for (const int highest : own_stages) stages.push_back(&own_again(highest));
+      for (const int highest : own_stages) stages.push_back(&own_without_search(highest));
     }
     stages.push_back(&own(own_highest));
   }

@@ -52,7 +52,7 @@ class ArenaSurveys {
   /// Default options.
   [[nodiscard]] const HomingSurvey& own(int highest);
   /// Without the search of displacements; K = 10 instead of `highest` where it looks like home.
-  [[nodiscard]] const HomingSurvey& own_again(int highest);
+  [[nodiscard]] const HomingSurvey& own_without_search(int highest);
   [[nodiscard]] const HomingSurvey& expected_images();
   [[nodiscard]] std::vector<const HomingSurvey*> stages(const HomingStrategy& strategy);
   /// Goal after goal.
@@ -85,7 +85,7 @@ void reproduce_snapshot_bytes(ArenaSurveys& surveys, Reproduction& result);
 
 /// Mean catchment areas of one arena at `s06_accepted_m`.
 using CatchmentAreas = std::map<std::string, std::array<double, s06_accepted_m.size()>>;
-[[nodiscard]] CatchmentAreas catchment_areas(ArenaSurveys& surveys);
+[[nodiscard]] CatchmentAreas measure_catchment_areas(ArenaSurveys& surveys);
 /// How the rules compare, over arenas.
 void compare_catchment_areas(std::span<const CatchmentAreas> arenas, const Experiments& context);
 /// The same two recordings with the tracker's noise, or all at one heading: rows only.

@@ -222,7 +222,7 @@ viewer::Series curve_by_distance(const Arena& arena, const PairSums& sums, doubl
 }
 
 // All at one heading, as in the paper.
-std::vector<HomingView> turned_north(const ArenaRecording& recording) {
+std::vector<HomingView> rotate_to_north(const ArenaRecording& recording) {
   std::vector<HomingView> views;
   for (const auto& placed : recording.views) {
     views.push_back(rotate(placed.view, -placed.pose.heading_rad));
@@ -233,8 +233,8 @@ std::vector<HomingView> turned_north(const ArenaRecording& recording) {
 // Figure 7.
 void draw_changes(const Arena& arena, Executor& executor, Reproduction& result) {
   constexpr std::array<int, 6> shown{1, 2, 3, 5, 10, 20};
-  const auto homes = turned_north(arena.homes);
-  const auto currents = turned_north(arena.currents);
+  const auto homes = rotate_to_north(arena.homes);
+  const auto currents = rotate_to_north(arena.currents);
   const auto sums = sum_pairs(
       arena, shown.size() + 1, executor, [&](std::size_t g, std::size_t p, Values& values) {
         double all = 0.0;
@@ -284,7 +284,7 @@ void draw_changes(const Arena& arena, Executor& executor, Reproduction& result) 
 
 // Of each home and current view, the shift by whole pixels at which they correlate most: one home
 // view against all current ones at once.
-std::vector<std::vector<std::uint8_t>> best_shifts(const Arena& arena, Executor& executor) {
+std::vector<std::vector<std::uint8_t>> find_best_shifts(const Arena& arena, Executor& executor) {
   const auto& currents = arena.currents.rows;
   std::vector<float> rows;
   for (const auto& row : currents) {
@@ -322,7 +322,7 @@ double deviation_deg(const std::pair<double, double>& sums, double count) {
 // Figure 8.
 void draw_headings(const Arena& arena, Executor& executor, Reproduction& result) {
   constexpr std::array<int, 5> shown{1, 2, 3, 5, 15};
-  const auto shifts = best_shifts(arena, executor);
+  const auto shifts = find_best_shifts(arena, executor);
   const auto sums = sum_pairs(
       arena, shown.size() + 1, executor, [&](std::size_t g, std::size_t p, Values& values) {
         const double truth = true_turn(arena, g, p);

@@ -20,11 +20,12 @@ namespace panonav::lab {
 
 namespace {
 
-std::size_t successes(const std::vector<HomingRun>& runs) {
+std::size_t count_successes(const std::vector<HomingRun>& runs) {
   return count_where(runs, [](const HomingRun& run) { return run.succeeds(homing_success_m); });
 }
 
-viewer::MapPlot map_of_failure(const HomingPlace& place, const HomingRun& run, std::size_t number) {
+viewer::MapPlot draw_failed_run(const HomingPlace& place, const HomingRun& run,
+                                std::size_t number) {
   constexpr double margin_m = 0.6;
   Point2 low = run.goal.position();
   Point2 high = low;
@@ -32,7 +33,7 @@ viewer::MapPlot map_of_failure(const HomingPlace& place, const HomingRun& run, s
     low = {std::min(low.x_m, pose.x_m), std::min(low.y_m, pose.y_m)};
     high = {std::max(high.x_m, pose.x_m), std::max(high.y_m, pose.y_m)};
   }
-  viewer::MapPlot map{.title = "run " + std::to_string(number) + ": " + reason_of_failure(run),
+  viewer::MapPlot map{.title = "run " + std::to_string(number) + ": " + explain_failure(run),
                       .layers = viewer::scene_layers(place.scene)};
   map.shown = std::pair(Point2{low.x_m - margin_m, low.y_m - margin_m},
                         Point2{high.x_m + margin_m, high.y_m + margin_m});
@@ -49,8 +50,8 @@ viewer::MapPlot map_of_failure(const HomingPlace& place, const HomingRun& run, s
   return map;
 }
 
-viewer::MapPlot map_of_all(const HomingPlace& place, const std::vector<HomingRun>& runs,
-                           const std::string& name) {
+viewer::MapPlot draw_all_runs(const HomingPlace& place, const std::vector<HomingRun>& runs,
+                              const std::string& name) {
   viewer::MapPlot map{.title = "Runs home in " + name, .layers = viewer::scene_layers(place.scene)};
   viewer::MapLayer reached{.label = "reached home", .colour = viewer::PlotColour::blue};
   viewer::MapLayer failed{.label = "did not", .colour = viewer::PlotColour::vermilion};
@@ -93,7 +94,7 @@ struct Ends {
 
 }  // namespace
 
-std::string reason_of_failure(const HomingRun& run) {
+std::string explain_failure(const HomingRun& run) {
   if (run.succeeds(homing_success_m)) return "";
   const std::string where = std::to_string(std::lround(100.0 * run.end_distance_m)) + " cm off";
   switch (run.end) {
@@ -119,12 +120,12 @@ void reproduce_homing_in_world(const std::string& name, const Experiments& conte
   const std::uint64_t seed = options.seed;
   const HomingPlace place =
       make_homing_place(simulation::read_world(options.data, name), {}, executor);
-  const auto tasks = random_homing_tasks(place, options.starts, homing_start_radius_m, seed);
+  const auto tasks = draw_homing_tasks(place, options.starts, homing_start_radius_m, seed);
   const auto runs = run_home(place, tasks, {}, seed, executor);
 
   const std::string id = "s06.world." + name;
   const std::string what = name + ", starts within 1.5 m";
-  add_rate(reproduction, id + ".success", what + ": home within 10 cm", successes(runs),
+  add_rate(reproduction, id + ".success", what + ": home within 10 cm", count_successes(runs),
            runs.size(), at_least(0.9));
   std::vector<HomingRun> in_sight;
   std::vector<double> steps;
@@ -136,7 +137,7 @@ void reproduce_homing_in_world(const std::string& name, const Experiments& conte
   }
   if (!in_sight.empty()) {
     add_rate(reproduction, id + ".success_in_sight",
-             what + ", the straight way free: home within 10 cm", successes(in_sight),
+             what + ", the straight way free: home within 10 cm", count_successes(in_sight),
              in_sight.size());
   }
   add_noticed(reproduction, id + ".noticed", what, runs);
@@ -145,7 +146,7 @@ void reproduce_homing_in_world(const std::string& name, const Experiments& conte
   const auto add_other = [&](const std::string& key, const std::string& text,
                              const HomingRunOptions& changed) {
     add_rate(reproduction, id + key, what + ", " + text + ": home within 10 cm",
-             successes(run_home(place, tasks, changed, seed, executor)), runs.size());
+             count_successes(run_home(place, tasks, changed, seed, executor)), runs.size());
   };
   HomingRunOptions published;
   published.vector = published_homing_options(5);
@@ -163,10 +164,10 @@ void reproduce_homing_in_world(const std::string& name, const Experiments& conte
   const std::string prefix = "s06_world_" + name;
   add_plot(reproduction, prefix + ".svg",
            "Homing runs in " + name + " from starts within 1.5 m of random goals",
-           map_of_all(place, runs, name));
+           draw_all_runs(place, runs, name));
   for (std::size_t i = 0; i < runs.size(); ++i) {
     if (runs[i].succeeds(homing_success_m)) continue;
-    const viewer::MapPlot map = map_of_failure(place, runs[i], i);
+    const viewer::MapPlot map = draw_failed_run(place, runs[i], i);
     const std::string file = prefix + "_failure_" + std::to_string(i) + ".svg";
     add_plot(reproduction, file, name + ", " + map.title, map);
   }
@@ -187,7 +188,7 @@ void reproduce_homing_in_scenes(int starts, const Experiments& context) {
       const std::uint64_t number = seed + variant;
       HomingPlace place =
           make_homing_place(simulation::make_scene(name, {.seed = number}), {}, executor);
-      const auto tasks = random_homing_tasks(place, starts, homing_start_radius_m, number);
+      const auto tasks = draw_homing_tasks(place, starts, homing_start_radius_m, number);
       const auto append = [&](std::vector<HomingRun>& all, const HomingRunOptions& changed) {
         for (HomingRun& run : run_home(place, tasks, changed, number, executor)) {
           all.push_back(std::move(run));
@@ -202,13 +203,13 @@ void reproduce_homing_in_scenes(int starts, const Experiments& context) {
     }
     const std::string id = std::string("s06.scene.") + name;
     const std::string what = std::string(name) + ", starts within 1.5 m";
-    add_rate(reproduction, id + ".success", what + ": home within 10 cm", successes(flat),
+    add_rate(reproduction, id + ".success", what + ": home within 10 cm", count_successes(flat),
              flat.size());
     add_rate(reproduction, id + ".holonomic", what + ", a holonomic robot: home within 10 cm",
-             successes(sideways), sideways.size());
+             count_successes(sideways), sideways.size());
     add_rate(reproduction, id + ".tilt",
              what + ", tilted by 3 degrees in a random direction at each view: home within 10 cm",
-             successes(tilted), tilted.size());
+             count_successes(tilted), tilted.size());
     std::vector<double> distances_m;
     for (const HomingRun& run : tilted) distances_m.push_back(run.end_distance_m);
     add_median(reproduction, id + ".tilt_error", what + ", tilted: distance from home at the end",

@@ -17,7 +17,7 @@ inline constexpr double homing_start_radius_m = 1.5;
 
 /// Why a run home failed, for people: "an obstacle stopped it", "stopped at another local minimum
 /// and says so". Empty for a success.
-[[nodiscard]] std::string reason_of_failure(const HomingRun& run);
+[[nodiscard]] std::string explain_failure(const HomingRun& run);
 
 /// Runs home in the Gazebo world `name` of `data`, from `starts` random starts around random goals:
 /// rows "s06.world.NAME.*" of the success from all starts and from those in sight of the goal, of

@@ -99,7 +99,7 @@ struct Variant {
 
 // Median over the lines of a drive, each from where odometry puts it.
 template <typename Fit>
-double time_of_fit_ms(const LineDrive& drive, const Fit& fit) {
+double measure_fit_ms(const LineDrive& drive, const Fit& fit) {
   std::vector<double> times_ms;
   constexpr int rounds = 3;
   for (int round = 0; round < rounds; ++round) {
@@ -114,30 +114,31 @@ double time_of_fit_ms(const LineDrive& drive, const Fit& fit) {
   return times_ms.empty() ? 0.0 : median(times_ms);
 }
 
-Variant examine(const LabRoute& lab, bool sweeps) {
+Variant localise_drives(const LabRoute& lab, bool sweeps) {
   Variant variant;
   const RouteLines lines(lab.route);
   const RouteContours contours(lab.route);
   variant.drives = {
-      {"straight.fit", drive_by_fit(lines, lab.across)},
-      {"straight.contours", drive_by_contours(contours, lab.across)},
-      {"changed.fit", drive_by_fit(lines, lab.across_changed)},
-      {"changed.plain", drive_by_fit(RouteLines(lab.route, {.robust = false}), lab.across_changed)},
-      {"changed.contours", drive_by_contours(contours, lab.across_changed)},
-      {"sparse.fit", drive_by_fit(RouteLines(thinned(lab.route, 5)), lab.across)},
-      {"scale.fit", drive_by_fit(RouteLines(scaled(lab.route, 1.01)), lab.across)}};
+      {"straight.fit", follow_by_fit(lines, lab.across)},
+      {"straight.contours", follow_by_contours(contours, lab.across)},
+      {"changed.fit", follow_by_fit(lines, lab.across_changed)},
+      {"changed.plain",
+       follow_by_fit(RouteLines(lab.route, {.robust = false}), lab.across_changed)},
+      {"changed.contours", follow_by_contours(contours, lab.across_changed)},
+      {"sparse.fit", follow_by_fit(RouteLines(thin_route(lab.route, 5)), lab.across)},
+      {"scale.fit", follow_by_fit(RouteLines(scale_route(lab.route, 1.01)), lab.across)}};
   variant.goal = run_to_goals(lab, lines, lab.seed * 31 + 5);
   if (!sweeps) return variant;
   for (const std::size_t every : thinnings) {
     variant.sweeps["spacing"].push_back(
-        drive_by_fit(RouteLines(thinned(lab.route, every)), lab.across));
+        follow_by_fit(RouteLines(thin_route(lab.route, every)), lab.across));
   }
   for (const LineDrive& drive : lab.beside) {
-    variant.sweeps["offset"].push_back(drive_by_fit(lines, drive));
+    variant.sweeps["offset"].push_back(follow_by_fit(lines, drive));
   }
   for (const double margin_m : margins_m) {
     variant.sweeps["margin"].push_back(
-        drive_by_contours(RouteContours(lab.route, margin_m), lab.across));
+        follow_by_contours(RouteContours(lab.route, margin_m), lab.across));
   }
   return variant;
 }
@@ -158,7 +159,7 @@ class LabMeasures {
     arrived_ += variant.goal.arrived ? 1 : 0;
     changed_percent_.push_back(100.0 * lab.changed_share);
     const auto time_ms = [&](const auto& route) {
-      return time_of_fit_ms(lab.across,
+      return measure_fit_ms(lab.across,
                             [&](const std::vector<float>& line, const Pose2& predicted) {
                               return route.fit(line, predicted);
                             });
@@ -291,7 +292,7 @@ void RouteExperiments::reproduce_lab_drives() const {
                                       executor));
     }
     const auto variants = simulation::make_each(executor, labs.size(), [&](std::size_t i) {
-      return examine(labs[i], begin + static_cast<int>(i) < options.swept);
+      return localise_drives(labs[i], begin + static_cast<int>(i) < options.swept);
     });
     // One after the other, so that nothing else works while fits are timed.
     for (std::size_t i = 0; i < labs.size(); ++i) measures.add(labs[i], variants[i]);

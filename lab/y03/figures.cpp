@@ -19,24 +19,25 @@ namespace panonav::lab {
 
 namespace {
 
-viewer::MapLayer line_layer(const std::string& label, viewer::PlotColour colour,
-                            const std::vector<Pose2>& poses) {
+viewer::MapLayer make_line_layer(const std::string& label, viewer::PlotColour colour,
+                                 const std::vector<Pose2>& poses) {
   return {.label = label, .colour = colour, .lines = {positions_of(poses)}};
 }
 
-std::vector<Pose2> in_path_frame(const LabRoute& lab, const std::vector<Pose2>& poses) {
+std::vector<Pose2> to_path_frame(const LabRoute& lab, const std::vector<Pose2>& poses) {
   std::vector<Pose2> result;
   for (const Pose2& pose : poses) result.push_back(inverse(lab.world_from_path) * pose);
   return result;
 }
 
-viewer::MapLayer path_layer(const LabRoute& lab) {
-  return line_layer("memorised path", viewer::PlotColour::grey,
-                    in_path_frame(lab, {lab.route.poses().begin(), lab.route.poses().end()}));
+viewer::MapLayer make_path_layer(const LabRoute& lab) {
+  return make_line_layer("memorised path", viewer::PlotColour::grey,
+                         to_path_frame(lab, {lab.route.poses().begin(), lab.route.poses().end()}));
 }
 
 // The lab from above, as it was memorised, in the frame of the path.
-std::vector<viewer::MapLayer> with_room(const LabRoute& lab, std::vector<viewer::MapLayer> layers) {
+std::vector<viewer::MapLayer> prepend_room(const LabRoute& lab,
+                                           std::vector<viewer::MapLayer> layers) {
   std::vector<viewer::MapLayer> all =
       viewer::scene_layers(simulation::make_scene("lab", {.seed = lab.seed}));
   const Pose2 path_from_world = inverse(lab.world_from_path);
@@ -145,13 +146,13 @@ void draw_drives(const LabRoute& lab, const LocalisedDrives& drives, Reproductio
                          const DriveErrors& contours) {
     return viewer::MapPlot{
         title,
-        with_room(
-            lab,
-            {path_layer(lab),
-             line_layer("true", viewer::PlotColour::black, in_path_frame(lab, drive.truth)),
-             line_layer("contours, as published", viewer::PlotColour::vermilion,
-                        in_path_frame(lab, contours.poses)),
-             line_layer("direct fit", viewer::PlotColour::blue, in_path_frame(lab, fit.poses))})};
+        prepend_room(lab, {make_path_layer(lab),
+                           make_line_layer("true", viewer::PlotColour::black,
+                                           to_path_frame(lab, drive.truth)),
+                           make_line_layer("contours, as published", viewer::PlotColour::vermilion,
+                                           to_path_frame(lab, contours.poses)),
+                           make_line_layer("direct fit", viewer::PlotColour::blue,
+                                           to_path_frame(lab, fit.poses))})};
   };
   const std::string file = "figure_09_drives.svg";
   add_plot(result, file,
@@ -188,12 +189,12 @@ void draw_goal_run(const LabRoute& lab, const GoalRun& run, Reproduction& result
            "Closed loop under proportional control [Y03 figure 10]; the estimate lies on the true "
            "drive.",
            viewer::MapPlot{"To a goal over a sub-goal off the path",
-                           with_room(lab, {path_layer(lab),
-                                           line_layer("true", viewer::PlotColour::black,
-                                                      in_path_frame(lab, run.truth)),
-                                           line_layer("estimate", viewer::PlotColour::blue,
-                                                      in_path_frame(lab, run.estimate)),
-                                           goals})});
+                           prepend_room(lab, {make_path_layer(lab),
+                                              make_line_layer("true", viewer::PlotColour::black,
+                                                              to_path_frame(lab, run.truth)),
+                                              make_line_layer("estimate", viewer::PlotColour::blue,
+                                                              to_path_frame(lab, run.estimate)),
+                                              goals})});
 }
 
 }  // namespace panonav::lab

@@ -51,7 +51,7 @@ LineDrive take_drive(const simulation::Renderer& renderer, std::vector<Pose2> po
   return drive;
 }
 
-std::vector<Pose2> straight(const Pose2& start, double length_m, double step_m) {
+std::vector<Pose2> make_straight_path(const Pose2& start, double length_m, double step_m) {
   std::vector<Pose2> poses;
   const auto steps = static_cast<int>(std::lround(length_m / step_m));
   for (int i = 0; i <= steps; ++i) poses.push_back(start * Pose2{i * step_m, 0.0, 0.0});
@@ -59,7 +59,7 @@ std::vector<Pose2> straight(const Pose2& start, double length_m, double step_m) 
 }
 
 // Along the length of the room, as near to its middle as the robot can drive.
-std::optional<Pose2> path_start(const simulation::FreeSpace& space) {
+std::optional<Pose2> find_path_start(const simulation::FreeSpace& space) {
   const double x_m = 0.5 * (space.low().x_m + space.high().x_m) - 0.5 * lab_path_m;
   const double middle_m = 0.5 * (space.low().y_m + space.high().y_m);
   for (int i = 0; i <= 30; ++i) {
@@ -74,14 +74,14 @@ std::optional<Pose2> path_start(const simulation::FreeSpace& space) {
 }
 
 // The first prediction.
-Pose2 roughly(const Pose2& truth) {
+Pose2 perturb_pose(const Pose2& truth) {
   return truth * Pose2{0.03, -0.04, radians(2.0)};
 }
 
 template <typename Fit>
 DriveErrors follow(const LineDrive& drive, const Fit& fit) {
   DriveErrors errors;
-  Pose2 pose = roughly(drive.truth.front());
+  Pose2 pose = perturb_pose(drive.truth.front());
   for (std::size_t i = 0; i < drive.truth.size(); ++i) {
     if (i > 0) pose = pose * drive.steps[i];
     const std::optional<Pose2> found = fit(drive.lines[i], pose);
@@ -161,8 +161,8 @@ LabRoute record_lab_route(std::uint64_t seed, const std::vector<double>& lateral
   // Where things stand in the way the camera goes over them: the line is of its height.
   const double middle_m = 0.5 * (space.low().y_m + space.high().y_m);
   const double begin_m = 0.5 * (space.low().x_m + space.high().x_m) - 0.5 * lab_path_m;
-  lab.world_from_path = path_start(space).value_or(Pose2{begin_m, middle_m, 0.0});
-  const auto path = straight(lab.world_from_path, lab_path_m, lab_spacing_m);
+  lab.world_from_path = find_path_start(space).value_or(Pose2{begin_m, middle_m, 0.0});
+  const auto path = make_straight_path(lab.world_from_path, lab_path_m, lab_spacing_m);
   const auto lines = take_lines(renderer, path, camera, seed * 7 + 1, executor);
   for (std::size_t i = 0; i < path.size(); ++i) lab.route.append(path[i], lines[i]);
 
@@ -170,27 +170,27 @@ LabRoute record_lab_route(std::uint64_t seed, const std::vector<double>& lateral
   const double turn = radians(30.0);
   const Pose2 start =
       lab.world_from_path * Pose2{0.5 * lab_path_m, 0.0, turn} * Pose2{-1.0, 0.0, 0.0};
-  const auto across = straight(start, 2.0, drive_step_m);
+  const auto across = make_straight_path(start, 2.0, drive_step_m);
   lab.across = take_drive(renderer, across, camera, seed * 7 + 2, executor);
   const ChangedLab changed = change_lab(seed, renderer, across, camera, executor);
   lab.across_changed = take_drive(*changed.renderer, across, camera, seed * 7 + 3, executor);
   lab.changed_share = changed.share;
   for (std::size_t i = 0; i < lateral_m.size(); ++i) {
     const Pose2 begin = lab.world_from_path * Pose2{0.3 * lab_path_m, lateral_m[i], 0.0};
-    lab.beside.push_back(
-        take_drive(renderer, straight(begin, 1.8, 0.2), camera, seed * 7 + 4 + i, executor));
+    lab.beside.push_back(take_drive(renderer, make_straight_path(begin, 1.8, 0.2), camera,
+                                    seed * 7 + 4 + i, executor));
   }
   return lab;
 }
 
-RoutePanorama thinned(const RoutePanorama& route, std::size_t every) {
+RoutePanorama thin_route(const RoutePanorama& route, std::size_t every) {
   RoutePanorama result(route.columns());
   for (std::size_t i = 0; i < route.size(); i += every)
     result.append(route.poses()[i], route.line(i));
   return result;
 }
 
-RoutePanorama scaled(const RoutePanorama& route, double factor) {
+RoutePanorama scale_route(const RoutePanorama& route, double factor) {
   RoutePanorama result(route.columns());
   const Point2 first = route.poses().front().position();
   for (std::size_t i = 0; i < route.size(); ++i) {
@@ -202,7 +202,7 @@ RoutePanorama scaled(const RoutePanorama& route, double factor) {
   return result;
 }
 
-DriveErrors drive_by_fit(const RouteLines& lines, const LineDrive& drive) {
+DriveErrors follow_by_fit(const RouteLines& lines, const LineDrive& drive) {
   RouteChanges changes;
   std::size_t changed = 0;
   DriveErrors errors = follow(drive, [&](const std::vector<float>& line, const Pose2& predicted) {
@@ -218,7 +218,7 @@ DriveErrors drive_by_fit(const RouteLines& lines, const LineDrive& drive) {
   return errors;
 }
 
-DriveErrors drive_by_contours(const RouteContours& contours, const LineDrive& drive) {
+DriveErrors follow_by_contours(const RouteContours& contours, const LineDrive& drive) {
   return follow(drive, [&](const std::vector<float>& line, const Pose2& predicted) {
     const auto fix = contours.fit(line, predicted);
     return fix && fix->converged ? std::optional(fix->pose) : std::nullopt;
@@ -236,7 +236,7 @@ GoalRun run_to_goals(const LabRoute& lab, const RouteLines& lines, std::uint64_t
   std::vector<Point2> goals;
   for (const Point2 point : goal_run_points()) goals.push_back(lab.world_from_path * point);
   Pose2 robot{goals[0].x_m, goals[0].y_m, lab.world_from_path.heading_rad};
-  Pose2 estimate = roughly(robot);
+  Pose2 estimate = perturb_pose(robot);
   GoalRun run;
   constexpr double arrived_m = 0.005;
   constexpr int max_steps = 200;

@@ -46,9 +46,9 @@ inline constexpr double lab_spacing_m = 0.02;
                                         Executor& executor);
 
 /// Every n-th line.
-[[nodiscard]] RoutePanorama thinned(const RoutePanorama& route, std::size_t every);
+[[nodiscard]] RoutePanorama thin_route(const RoutePanorama& route, std::size_t every);
 /// As odometry with a wrong scale would have placed it, right at the first line.
-[[nodiscard]] RoutePanorama scaled(const RoutePanorama& route, double factor);
+[[nodiscard]] RoutePanorama scale_route(const RoutePanorama& route, double factor);
 
 /// How far off poses are.
 struct DriveErrors {
@@ -61,9 +61,9 @@ struct DriveErrors {
 
 /// The direct fit along a drive, each from the last and odometry; the first from a prediction that
 /// is off by 5 cm and 2 degrees [Y03 section 4.1].
-[[nodiscard]] DriveErrors drive_by_fit(const RouteLines& lines, const LineDrive& drive);
+[[nodiscard]] DriveErrors follow_by_fit(const RouteLines& lines, const LineDrive& drive);
 /// The same by the dual contours; where they do not converge, odometry goes on.
-[[nodiscard]] DriveErrors drive_by_contours(const RouteContours& contours, const LineDrive& drive);
+[[nodiscard]] DriveErrors follow_by_contours(const RouteContours& contours, const LineDrive& drive);
 
 /// A run to sub-goals off the path under proportional control [Y03 section 5.2].
 struct GoalRun {

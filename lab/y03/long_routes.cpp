@@ -45,10 +45,10 @@ struct RepeatedRoute {
   std::vector<RouteRun> runs;
 };
 
-RepeatedRoute repeat_one(const RouteScene& place, int runs, std::uint64_t seed,
-                         Executor& executor) {
+RepeatedRoute record_and_repeat_route(const RouteScene& place, int runs, std::uint64_t seed,
+                                      Executor& executor) {
   RepeatedRoute repeated;
-  repeated.way = curved_route(place, long_route_m, spacing_m, seed);
+  repeated.way = plan_curved_route(place, long_route_m, spacing_m, seed);
   repeated.panorama = record_route(place, repeated.way, Random(seed, 7).next(), executor);
   const RouteTracker tracker(repeated.panorama);
   repeated.runs =
@@ -75,7 +75,7 @@ struct RouteMeasures {
     if (is_back) lateral_back_cm.push_back(mean_cm);
     worst_cm.push_back(100.0 * quantile(run.lateral_m, 0.95));
     if (!run.position_m.empty()) fix_cm.push_back(100.0 * median(run.position_m));
-    completed += run.completes() ? 1 : 0;
+    completed += run.has_completed() ? 1 : 0;
     lines += run.truth.size();
     off_route += run.off_route;
     turned_aside += run.turned_aside;
@@ -111,7 +111,7 @@ void report_routes(const ReproductionOptions& options, const std::string& name,
   add_rate(result, id + ".turned_aside", what + ": steps at which something was in the way",
            of.turned_aside, of.lines);
   viewer::MapPlot map{.title = first_place.name, .layers = viewer::scene_layers(first_place.scene)};
-  std::ranges::move(route_layers(routes.front().way, routes.front().runs),
+  std::ranges::move(make_route_layers(routes.front().way, routes.front().runs),
                     std::back_inserter(map.layers));
   add_plot(result, "route_" + name + ".svg",
            "A route of 60 m through " + name +
@@ -165,7 +165,7 @@ void measure_file(const ReproductionOptions& options, const std::vector<Repeated
           megabytes_per_km * static_cast<double>(stored), "MB");
 }
 
-int routes_of(const ReproductionOptions& options) {
+int count_routes(const ReproductionOptions& options) {
   return std::max(1, options.runs / runs_each);
 }
 
@@ -174,11 +174,12 @@ int routes_of(const ReproductionOptions& options) {
 void RouteExperiments::reproduce_loop_routes() const {
   std::vector<RepeatedRoute> routes;
   std::optional<RouteScene> first;
-  for (int i = 0; i < routes_of(options); ++i) {
+  for (int i = 0; i < count_routes(options); ++i) {
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
     RouteScene place =
         make_route_scene(simulation::make_scene("loop", {.seed = seed}), "loop", executor);
-    routes.push_back(repeat_one(place, std::min(runs_each, options.runs), seed, executor));
+    routes.push_back(
+        record_and_repeat_route(place, std::min(runs_each, options.runs), seed, executor));
     if (!first) first = std::move(place);
   }
   report_routes(options, "loop", *first, routes, result);
@@ -189,9 +190,10 @@ void RouteExperiments::reproduce_world_routes(const std::string& name) const {
   const RouteScene place =
       make_route_scene(simulation::read_world(options.data, name), name, executor);
   std::vector<RepeatedRoute> routes;
-  for (int i = 0; i < routes_of(options); ++i) {
-    routes.push_back(repeat_one(place, std::min(runs_each, options.runs),
-                                options.seed + static_cast<std::uint64_t>(i), executor));
+  for (int i = 0; i < count_routes(options); ++i) {
+    routes.push_back(record_and_repeat_route(place, std::min(runs_each, options.runs),
+                                             options.seed + static_cast<std::uint64_t>(i),
+                                             executor));
   }
   report_routes(options, name, place, routes, result);
 }

@@ -25,7 +25,7 @@ namespace {
 constexpr double side_room_m = 0.1;
 
 // Where the robot has room; where the place has no such part, all that is free.
-simulation::FreeSpace roomy_space(const RouteScene& place) {
+simulation::FreeSpace make_roomy_space(const RouteScene& place) {
   simulation::FreeSpaceOptions options = simulation::free_space_options(place.scene);
   options.robot_radius_m += side_room_m;
   try {
@@ -36,7 +36,7 @@ simulation::FreeSpace roomy_space(const RouteScene& place) {
 }
 
 // Each place the mean of those within `reach` to either side, the ends as they are.
-std::vector<Pose2> rounded(const std::vector<Pose2>& way, std::size_t reach) {
+std::vector<Pose2> smooth_path(const std::vector<Pose2>& way, std::size_t reach) {
   std::vector<Pose2> result = way;
   for (std::size_t i = 0; i < way.size(); ++i) {
     const std::size_t half = std::min({reach, i, way.size() - 1 - i});
@@ -53,7 +53,7 @@ std::vector<Pose2> rounded(const std::vector<Pose2>& way, std::size_t reach) {
 }
 
 // Straight from one place to another, the robot touches nothing.
-bool reaches(const RouteScene& place, Point2 from, Point2 to) {
+bool has_clear_line(const RouteScene& place, Point2 from, Point2 to) {
   constexpr double fine_m = 0.025;
   return place.free_space->clearance_m(from) >= place.scene.robot_radius_m &&
          simulation::has_room_between(*place.free_space, place.scene.robot_radius_m, from, to,
@@ -75,7 +75,7 @@ double direction(Point2 from, Point2 to) {
 
 // Distance from the part of the way, in the order of the drive, that is at most 1.5 m from where
 // the robot believes to be: a route may pass by itself.
-double off_part_m(Point2 robot, std::span<const Pose2> way, double along_m) {
+double distance_from_expected_part_m(Point2 robot, std::span<const Pose2> way, double along_m) {
   constexpr double reach_m = 1.5;
   std::size_t begin = 0;
   std::size_t end = way.size();
@@ -93,8 +93,8 @@ double off_part_m(Point2 robot, std::span<const Pose2> way, double along_m) {
 
 // To the side of the start where there is room, also for the straight way onto the route; else any
 // other way off it.
-Pose2 start_beside(const RouteScene& place, std::span<const Point2> path, const Pose2& start,
-                   double off_m, Random& random) {
+Pose2 sample_start_with_offset(const RouteScene& place, std::span<const Point2> path,
+                               const Pose2& start, double off_m, Random& random) {
   const std::size_t ahead = std::min<std::size_t>(3, path.size() - 1);
   const double side = random.uniform() < 0.5 ? 1.0 : -1.0;
   for (const double angle :
@@ -103,8 +103,8 @@ Pose2 start_beside(const RouteScene& place, std::span<const Point2> path, const 
     const Pose2 there =
         start * Pose2{off_m * std::cos(side * angle), off_m * std::sin(side * angle),
                       random.normal(0.0, radians(5.0))};
-    if (reaches(place, there.position(), path.front()) &&
-        reaches(place, there.position(), path[ahead])) {
+    if (has_clear_line(place, there.position(), path.front()) &&
+        has_clear_line(place, there.position(), path[ahead])) {
       return there;
     }
   }
@@ -113,16 +113,19 @@ Pose2 start_beside(const RouteScene& place, std::span<const Point2> path, const 
 
 // Past what stands in the way: the nearest direction to the wanted one, 15 degrees apart, in which
 // half of the step is free; empty when there is none. A differential drive turns, then drives.
-std::optional<Pose2> step_past(const RouteScene& place, const Pose2& robot, const Pose2& wanted) {
-  if (reaches(place, robot.position(), (robot * wanted).position())) return wanted;
+std::optional<Pose2> find_step_past_obstacle(const RouteScene& place, const Pose2& robot,
+                                             const Pose2& wanted) {
+  if (has_clear_line(place, robot.position(), (robot * wanted).position())) return wanted;
   const double half_m = 0.5 * std::hypot(wanted.x_m, wanted.y_m);
   constexpr int feelers_each_side = 11;
   const auto step_along = [&](double direction_rad) {
     return Pose2{0.0, 0.0, direction_rad} * Pose2{half_m, 0.0, 0.0};
   };
-  const auto aside = simulation::feel_aside(0.0, feelers_each_side, 0, [&](double direction_rad) {
-    return reaches(place, robot.position(), (robot * step_along(direction_rad)).position());
-  });
+  const auto aside =
+      simulation::find_open_direction(0.0, feelers_each_side, 0, [&](double direction_rad) {
+        return has_clear_line(place, robot.position(),
+                              (robot * step_along(direction_rad)).position());
+      });
   return aside ? std::optional(step_along(aside->direction_rad)) : std::nullopt;
 }
 
@@ -141,11 +144,11 @@ RouteScene make_route_scene(simulation::Scene scene, const std::string& name, Ex
           simulation::make_line_camera(height_m)};
 }
 
-std::vector<Pose2> curved_route(const RouteScene& place, double length_m, double spacing_m,
-                                std::uint64_t seed) {
+std::vector<Pose2> plan_curved_route(const RouteScene& place, double length_m, double spacing_m,
+                                     std::uint64_t seed) {
   require(length_m > 0.0, "length of a route", length_m, "> 0");
   require(spacing_m > 0.0, "spacing of a route", spacing_m, "> 0");
-  const simulation::FreeSpace space = roomy_space(place);
+  const simulation::FreeSpace space = make_roomy_space(place);
   Random random(seed, 1);
   std::vector<Pose2> corners{space.random_pose(random)};
   double heading = corners.front().heading_rad;
@@ -174,7 +177,7 @@ std::vector<Pose2> curved_route(const RouteScene& place, double length_m, double
                                       place.scene.robot_radius_m + side_room_m - cell_m);
   std::vector<Pose2> way = sharp;
   for (const std::size_t reach : {10U, 7U, 5U, 3U, 2U}) {
-    std::vector<Pose2> round = rounded(rounded(sharp, reach), reach);
+    std::vector<Pose2> round = smooth_path(smooth_path(sharp, reach), reach);
     if (min_clearance_m(place, round) < room_kept_m) continue;
     way = std::move(round);
     break;
@@ -220,7 +223,7 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
   DriftingWheels wheels;
   wheels.travel = scale();
   wheels.turn = scale();
-  Pose2 robot = start_beside(place, path, start, options.start_off_m, random);
+  Pose2 robot = sample_start_with_offset(place, path, start, options.start_off_m, random);
   tracker.set_pose(start);
   PathFollower follower(path);
   const auto max_steps = static_cast<int>(3.0 * follower.length_m() / options.step_m) + 50;
@@ -234,7 +237,8 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
         simulation::take_line(*place.renderer, robot, place.camera, noise_of_lines.next());
     const auto found = tracker.track(line, told);
     run.truth.push_back(robot);
-    run.lateral_m.push_back(off_part_m(robot.position(), way, follower.along_m()));
+    run.lateral_m.push_back(
+        distance_from_expected_part_m(robot.position(), way, follower.along_m()));
     unknown = found ? 0 : unknown + 1;
     run.sightings.emplace_back();
     if (found) {
@@ -252,7 +256,7 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
     const Pose2 wanted = unknown < patience
                              ? steer_to(estimate, *target, {.step_m = options.step_m})
                              : spiral_step(unknown - patience);
-    const auto free_step = step_past(place, robot, wanted);
+    const auto free_step = find_step_past_obstacle(place, robot, wanted);
     if (!free_step) {
       run.blocked = true;
       break;
@@ -261,7 +265,7 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
     run.turned_aside += static_cast<std::size_t>(told != wanted);
     const Pose2 there = robot * wheels.true_step(told, random);
     // Where the wheels led it astray it touches something: it turns, but does not move.
-    if (reaches(place, robot.position(), there.position())) {
+    if (has_clear_line(place, robot.position(), there.position())) {
       robot = there;
     } else {
       robot.heading_rad = there.heading_rad;
@@ -272,8 +276,8 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
   return run;
 }
 
-std::vector<viewer::MapLayer> route_layers(std::span<const Pose2> way,
-                                           std::span<const RouteRun> runs) {
+std::vector<viewer::MapLayer> make_route_layers(std::span<const Pose2> way,
+                                                std::span<const RouteRun> runs) {
   viewer::MapLayer route{.label = "remembered route",
                          .colour = viewer::PlotColour::black,
                          .lines = {positions_of(way)}};
@@ -284,7 +288,7 @@ std::vector<viewer::MapLayer> route_layers(std::span<const Pose2> way,
   for (std::size_t i = 0; i < runs.size(); ++i) {
     (i % 2 == 0 ? forward : back).lines.push_back(positions_of(runs[i].truth));
     starts.circles.push_back(runs[i].truth.front().position());
-    if (!runs[i].completes()) lost.crosses.push_back(runs[i].truth.back().position());
+    if (!runs[i].has_completed()) lost.crosses.push_back(runs[i].truth.back().position());
   }
   return {route, forward, back, starts, lost};
 }

@@ -29,8 +29,8 @@ struct RouteScene : simulation::SimulatedPlace {
 /// where the place has that much: shortest ways, round where they had corners, which do not turn
 /// back on the spot. Poses every `spacing_m`, headings along the way. The same seed gives the same
 /// way. Throws ContractError unless both are above 0.
-[[nodiscard]] std::vector<Pose2> curved_route(const RouteScene& place, double length_m,
-                                              double spacing_m, std::uint64_t seed);
+[[nodiscard]] std::vector<Pose2> plan_curved_route(const RouteScene& place, double length_m,
+                                                   double spacing_m, std::uint64_t seed);
 
 /// What a robot sees along a way.
 [[nodiscard]] RoutePanorama record_route(const RouteScene& place, const std::vector<Pose2>& way,
@@ -70,7 +70,7 @@ struct RouteRun {
   double end_distance_m = 0.0;     ///< from the end of the route
 
   /// Not stopped, and at the end of the route where it says so.
-  [[nodiscard]] bool completes() const noexcept {
+  [[nodiscard]] bool has_completed() const noexcept {
     return arrived && !blocked && end_distance_m <= 0.2;
   }
 };
@@ -84,7 +84,7 @@ struct RouteRun {
                                     const RouteRunOptions& options, std::uint64_t seed);
 
 /// The route and the robots that repeated it, every second one back, for a map.
-[[nodiscard]] std::vector<viewer::MapLayer> route_layers(std::span<const Pose2> way,
-                                                         std::span<const RouteRun> runs);
+[[nodiscard]] std::vector<viewer::MapLayer> make_route_layers(std::span<const Pose2> way,
+                                                              std::span<const RouteRun> runs);
 
 }  // namespace panonav::lab

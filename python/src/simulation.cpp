@@ -39,7 +39,7 @@ simulation::SimulatedWorldOptions recording_options(Keywords& taken) {
   simulation::SimulatedWorldOptions wanted;
   taken.options(wanted.recording);
   if (!taken.given("heading")) {
-    wanted.recording.heading = simulation::usual_heading(wanted.recording.path);
+    wanted.recording.heading = simulation::default_heading(wanted.recording.path);
   }
   return wanted;
 }

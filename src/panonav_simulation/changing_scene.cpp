@@ -76,7 +76,7 @@ std::size_t ChangingScene::moved() const noexcept {
       objects_, [](const Object& object) { return object.centre != object.first_centre; }));
 }
 
-bool ChangingScene::may_stand(const Object& object, Point2 centre) const {
+bool ChangingScene::can_stand(const Object& object, Point2 centre) const {
   const double r = object.radius_m;
   // Furniture of built-in scenes stands around the floor that is driven on.
   const FloorArea& room = scene_.drivable.empty() ? floor_ : all_;
@@ -103,7 +103,7 @@ void ChangingScene::pass_day(double share) {
       if (!moves || placed) continue;
       const Point2 centre{object.centre.x_m + step * std::cos(angle),
                           object.centre.y_m + step * std::sin(angle)};
-      if (!may_stand(object, centre)) continue;
+      if (!can_stand(object, centre)) continue;
       object.centre = centre;
       object.turn_rad += turn;
       placed = true;

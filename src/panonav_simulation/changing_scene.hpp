@@ -38,7 +38,7 @@ class ChangingScene {
     Point2 centre;
     double turn_rad = 0.0;
   };
-  [[nodiscard]] bool may_stand(const Object& object, Point2 centre) const;
+  [[nodiscard]] bool can_stand(const Object& object, Point2 centre) const;
 
   Scene scene_;
   FloorArea floor_;

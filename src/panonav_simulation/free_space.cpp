@@ -31,7 +31,7 @@ constexpr std::array<Neighbour, 8> neighbours{{{1, 0, 1.0F},
                                                {-1, 1, diagonal},
                                                {-1, -1, diagonal}}};
 
-bool drivable(const Scene& scene, Point2 p) {
+bool is_drivable(const Scene& scene, Point2 p) {
   return scene.drivable.empty() ||
          std::any_of(scene.drivable.begin(), scene.drivable.end(), [p](const FloorArea& area) {
            return p.x_m >= area.low.x_m && p.x_m <= area.high.x_m && p.y_m >= area.low.y_m &&
@@ -39,7 +39,7 @@ bool drivable(const Scene& scene, Point2 p) {
          });
 }
 
-std::string text(Point2 p) {
+std::string format_point(Point2 p) {
   return "(" + to_text(p.x_m) + ", " + to_text(p.y_m) + ")";
 }
 
@@ -117,7 +117,7 @@ FreeSpace::FreeSpace(const Scene& scene, const FreeSpaceOptions& options,
           cell_m_ * (static_cast<double>(distances[inner(cell)]) - std::numbers::sqrt2);
       clearance_m_[k] = static_cast<float>(std::max(0.0, clearance));
       free_[k] = clearance >= options.robot_radius_m && obstacle_[k] == 0 &&
-                 (!has_floor || floor[inner(cell)] != 0) && drivable(scene, centre(cell));
+                 (!has_floor || floor[inner(cell)] != 0) && is_drivable(scene, centre(cell));
     }
   }
   keep_connected_component(seed);
@@ -154,13 +154,14 @@ void FreeSpace::keep_connected_component(std::optional<Point2> seed) {
     const auto cell = cell_at(*seed);
     if (cell) kept = component[index(*cell)];
     if (kept == 0)
-      throw ContractError("seed of the free space", text(*seed),
+      throw ContractError("seed of the free space", format_point(*seed),
                           "a place where the robot can stand");
   } else {
     kept = static_cast<std::uint32_t>(std::max_element(sizes.begin(), sizes.end()) - sizes.begin());
     if (kept == 0) {
-      throw ContractError("free places between " + text(low_) + " and " + text(high_), 0.0,
-                          ">= 1; the robot stands nowhere");
+      throw ContractError(
+          "free places between " + format_point(low_) + " and " + format_point(high_), 0.0,
+          ">= 1; the robot stands nowhere");
     }
   }
   for (std::size_t k = 0; k < free_.size(); ++k) {
@@ -298,10 +299,10 @@ std::optional<std::vector<Point2>> FreeSpace::shortest_path(Point2 a, Point2 b) 
   cells.back() = a;
   std::reverse(cells.begin(), cells.end());
   if (cells.size() == 1) cells.push_back(b);
-  return pulled_tight(cells);
+  return shorten_path(cells);
 }
 
-std::vector<Point2> FreeSpace::pulled_tight(std::vector<Point2> path) const {
+std::vector<Point2> FreeSpace::shorten_path(std::vector<Point2> path) const {
   // From each way point to the last one that is seen before the view is blocked; then the same from
   // the other end with new points between, until the path hardly becomes shorter.
   constexpr int max_rounds = 20;

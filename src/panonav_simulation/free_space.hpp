@@ -84,7 +84,7 @@ class FreeSpace {
            static_cast<std::size_t>(cell.i);
   }
   [[nodiscard]] Point2 centre(Cell cell) const noexcept;
-  [[nodiscard]] std::vector<Point2> pulled_tight(std::vector<Point2> path) const;
+  [[nodiscard]] std::vector<Point2> shorten_path(std::vector<Point2> path) const;
   void keep_connected_component(std::optional<Point2> seed);
 
   Point2 low_, high_;

@@ -25,7 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Affine3 affine(const aiMatrix4x4& m) {
+Affine3 to_affine(const aiMatrix4x4& m) {
   return {{m.a1, m.a2, m.a3, m.b1, m.b2, m.b3, m.c1, m.c2, m.c3}, {m.a4, m.b4, m.c4}};
 }
 
@@ -34,7 +34,7 @@ std::string lower_ending(const fs::path& path) {
 }
 
 // What turns the importer's axes into z up. It has turned COLLADA files to y up already.
-Affine3 upright(UpAxis up, const fs::path& path) {
+Affine3 correct_up_axis(UpAxis up, const fs::path& path) {
   const std::string ending = lower_ending(path);
   const bool y_up_format = ending == ".dae" || ending == ".gltf" || ending == ".glb";
   const bool y_up = up == UpAxis::y || (up == UpAxis::of_format && y_up_format);
@@ -42,17 +42,18 @@ Affine3 upright(UpAxis up, const fs::path& path) {
   return {{1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0}, {}};
 }
 
-std::array<float, 3> colour(const aiColor3D& c) {
+std::array<float, 3> to_colour(const aiColor3D& c) {
   const auto clamp = [](float value) {
     return std::isfinite(value) ? std::clamp(value, 0.0F, 1.0F) : 0.0F;
   };
   return {clamp(c.r), clamp(c.g), clamp(c.b)};
 }
 
-Material material_of(const aiMaterial& source, const fs::path& path, TextureStore& textures) {
+Material convert_material(const aiMaterial& source, const fs::path& path, TextureStore& textures) {
   Material material;
   aiColor3D diffuse;
-  if (source.Get(AI_MATKEY_COLOR_DIFFUSE, diffuse) == AI_SUCCESS) material.colour = colour(diffuse);
+  if (source.Get(AI_MATKEY_COLOR_DIFFUSE, diffuse) == AI_SUCCESS)
+    material.colour = to_colour(diffuse);
   aiString file;
   for (const aiTextureType type : {aiTextureType_DIFFUSE, aiTextureType_BASE_COLOR}) {
     if (material.texture || source.GetTexture(type, 0, &file) != AI_SUCCESS) continue;
@@ -63,7 +64,7 @@ Material material_of(const aiMaterial& source, const fs::path& path, TextureStor
   if (material.texture) material.colour = {1.0F, 1.0F, 1.0F};
   aiColor3D emissive;
   if (!material.texture && source.Get(AI_MATKEY_COLOR_EMISSIVE, emissive) == AI_SUCCESS) {
-    const auto shine = colour(emissive);
+    const auto shine = to_colour(emissive);
     const float strength = std::max({shine[0], shine[1], shine[2]});
     const float body = std::max({material.colour[0], material.colour[1], material.colour[2]});
     if (strength > body) {
@@ -74,7 +75,7 @@ Material material_of(const aiMaterial& source, const fs::path& path, TextureStor
   return material;
 }
 
-Mesh mesh_of(const aiMesh& source, const Affine3& world_from_mesh) {
+Mesh convert_mesh(const aiMesh& source, const Affine3& world_from_mesh) {
   Mesh mesh;
   mesh.vertices.reserve(source.mNumVertices);
   for (unsigned i = 0; i < source.mNumVertices; ++i) {
@@ -112,11 +113,11 @@ struct Collector {
   std::vector<FileMesh> meshes;
 
   void visit(const aiNode& node, const Affine3& world_from_parent) {
-    const Affine3 world_from_node = world_from_parent * affine(node.mTransformation);
+    const Affine3 world_from_node = world_from_parent * to_affine(node.mTransformation);
     for (unsigned i = 0; i < node.mNumMeshes; ++i) {
       const aiMesh& mesh = *source.mMeshes[node.mMeshes[i]];
       FileMesh result{node.mName.C_Str(), mesh.mName.C_Str(), materials.at(mesh.mMaterialIndex),
-                      mesh_of(mesh, world_from_node)};
+                      convert_mesh(mesh, world_from_node)};
       if (result.mesh.triangles.empty()) continue;
       if (!all_finite(result.mesh)) {
         throw FileError(path.string(), "mesh \"" + result.geometry +
@@ -333,9 +334,9 @@ std::vector<FileMesh> MeshLibrary::read_new(const fs::path& path, UpAxis up) {
     throw FileError(path.string(), "not a readable mesh file: " + to_readable_line(fault));
   Collector collector{*source, path, {}, {}};
   for (unsigned i = 0; i < source->mNumMaterials; ++i) {
-    collector.materials.push_back(material_of(*source->mMaterials[i], path, textures_));
+    collector.materials.push_back(convert_material(*source->mMaterials[i], path, textures_));
   }
-  collector.visit(*source->mRootNode, upright(up, path));
+  collector.visit(*source->mRootNode, correct_up_axis(up, path));
   if (collector.meshes.empty()) throw FileError(path.string(), "holds no triangles");
   return std::move(collector.meshes);
 }

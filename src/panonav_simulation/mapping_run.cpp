@@ -39,7 +39,7 @@ float largest_structure(const MappingRecording& recording, int components) {
 
 }  // namespace
 
-PlaceRecording empty_place(Scene scene, std::uint64_t seed, int columns, Executor& executor) {
+PlaceRecording make_empty_place(Scene scene, std::uint64_t seed, int columns, Executor& executor) {
   PlaceRecording place{make_place(std::move(scene), executor), seed};
   place.rendering = {.rows = 80, .columns = columns, .rays_per_axis = 1};
   return place;
@@ -159,7 +159,7 @@ double shape_error(std::span<const Point2> estimate, std::span<const Point2> tru
   return shape_difference(estimate, truth).value;
 }
 
-std::vector<Point2> laid_over(std::span<const Point2> estimate, std::span<const Point2> truth) {
+std::vector<Point2> align_to(std::span<const Point2> estimate, std::span<const Point2> truth) {
   const Alignment alignment = align(estimate, truth, {.allow_scale = true});
   std::vector<Point2> points;
   for (const Point2& p : estimate) points.push_back(alignment.apply(p));

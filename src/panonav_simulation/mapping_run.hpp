@@ -17,8 +17,8 @@
 namespace panonav::simulation {
 
 /// A place to drive through, without any reference views.
-[[nodiscard]] PlaceRecording empty_place(Scene scene, std::uint64_t seed, int columns,
-                                         Executor& executor);
+[[nodiscard]] PlaceRecording make_empty_place(Scene scene, std::uint64_t seed, int columns,
+                                              Executor& executor);
 
 /// What a robot saw along its way, and where it was.
 struct MappingRecording {
@@ -77,7 +77,7 @@ struct MappingRunOptions {
 [[nodiscard]] double shape_error(std::span<const Point2> estimate, std::span<const Point2> truth);
 
 /// Points of a map laid over the truth, for pictures.
-[[nodiscard]] std::vector<Point2> laid_over(std::span<const Point2> estimate,
-                                            std::span<const Point2> truth);
+[[nodiscard]] std::vector<Point2> align_to(std::span<const Point2> estimate,
+                                           std::span<const Point2> truth);
 
 }  // namespace panonav::simulation

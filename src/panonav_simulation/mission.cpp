@@ -29,8 +29,9 @@ constexpr double room_m = 0.2;
 // Between the lines of a route at most.
 constexpr double line_spacing_m = 0.1;
 
-std::vector<FourierSignature> see_all(const MissionPlace& place, const std::vector<Pose2>& poses,
-                                      std::uint64_t seed, Executor& executor) {
+std::vector<FourierSignature> observe_all(const MissionPlace& place,
+                                          const std::vector<Pose2>& poses, std::uint64_t seed,
+                                          Executor& executor) {
   return make_each(executor, poses.size(),
                    [&](std::size_t i) { return see(place, poses[i], Random(seed, i).next()); });
 }
@@ -86,7 +87,7 @@ RoutePanorama record_route(const MissionPlace& place, const std::vector<Pose2>& 
 }
 
 // The shortest way, or the straight one where the map of free places has none.
-double shortest_way_m(const FreeSpace& space, Point2 from, Point2 to) {
+double shortest_path_m(const FreeSpace& space, Point2 from, Point2 to) {
   if (!std::isfinite(to.x_m) || !std::isfinite(to.y_m)) return distance(from, to);
   const auto way = space.shortest_path(from, to);
   return way ? path_length_m(*way) : distance(from, to);
@@ -98,7 +99,7 @@ MissionPlace make_mission_place(Scene scene, Executor& executor, std::optional<P
   return {make_place(std::move(scene), executor, inside)};
 }
 
-std::function<std::vector<float>(const Pose2& pose, std::uint64_t seed)> mirror_lines(
+std::function<std::vector<float>(const Pose2& pose, std::uint64_t seed)> make_line_sensor(
     const MissionPlace& place) {
   const auto camera =
       std::make_shared<const LineCamera>(make_line_camera(place.scene.camera_height_m));
@@ -128,7 +129,7 @@ RememberedPlace remember_grid(const MissionPlace& place, double spacing_m, std::
     if (place.free_space->clearance_m(at.position) < place.scene.robot_radius_m + room_m) continue;
     poses.push_back({at.position.x_m, at.position.y_m, heading_rad});
   }
-  const auto views = see_all(place, poses, seed, executor);
+  const auto views = observe_all(place, poses, seed, executor);
   VisualMemory memory = empty_memory(views);
   for (std::size_t i = 0; i < views.size(); ++i) {
     static_cast<void>(memory.append(views[i], {.name = std::to_string(i)}));
@@ -146,7 +147,7 @@ RememberedPlace remember_grid(const MissionPlace& place, double spacing_m, std::
 RememberedPlace remember_drive(const MissionPlace& place, const std::vector<Pose2>& poses,
                                const OdometryNoise& wheels, std::uint64_t seed,
                                Executor& executor) {
-  const auto views = see_all(place, poses, seed, executor);
+  const auto views = observe_all(place, poses, seed, executor);
   const auto told = simulate_odometry(poses, wheels, seed);
   VisualMemory memory = empty_memory(views);
   TopologicalMapper mapper(memory);
@@ -239,15 +240,15 @@ std::optional<double> MissionRobot::free_direction(double wanted_rad, double dis
   }
   // Farther round it would turn back: whoever sends it must know that the way is shut.
   constexpr int feelers_each_side = 6;
-  const auto aside = feel_aside(wanted_rad, feelers_each_side, side_, [&](double direction_rad) {
-    return is_open(direction_rad, 0.5 * distance_m);
-  });
+  const auto aside = find_open_direction(
+      wanted_rad, feelers_each_side, side_,
+      [&](double direction_rad) { return is_open(direction_rad, 0.5 * distance_m); });
   side_ = aside ? aside->side : -side_;
   if (!aside) return std::nullopt;
   return wrap_angle(aside->direction_rad);
 }
 
-bool MissionRobot::take_obstacle() noexcept {
+bool MissionRobot::take_contact() noexcept {
   return std::exchange(obstacle_, false);
 }
 
@@ -266,7 +267,7 @@ bool drive(MissionRobot& robot, const BaseOptions& base, double direction_rad, d
     const Velocity velocity =
         compute_command_towards(std::atan2(target.y_m, target.x_m), left_m, base);
     robot.command(velocity);
-    if (robot.take_obstacle()) return true;
+    if (robot.take_contact()) return true;
     target = inverse(integrate_velocity(velocity, base.period_s)) * target;
   }
   return false;
@@ -320,7 +321,7 @@ class Voyage {
     Point2 goal = remembered_.truth.at(*remembered_.graph.node_of(goal_view)).position();
     const FreeSpace& space = *place_.free_space;
     MissionRun run;
-    run.shortest_m = shortest_way_m(space, robot_.pose().position(), goal);
+    run.shortest_m = shortest_path_m(space, robot_.pose().position(), goal);
     const double begins_at_m = robot_.travelled_m();
     const double kidnapped_at_m = begins_at_m + 0.5 * run.shortest_m;
     navigator.set_goal(goal_view);
@@ -336,15 +337,15 @@ class Voyage {
       if (const auto other = other_goal ? other_goal() : std::nullopt) {
         const Point2 here = robot_.pose().position();
         const Point2 there = remembered_.truth.at(*remembered_.graph.node_of(*other)).position();
-        run.shortest_m += shortest_way_m(space, here, there) - shortest_way_m(space, here, goal);
+        run.shortest_m += shortest_path_m(space, here, there) - shortest_path_m(space, here, goal);
         goal = there;
         continue;  // it looks again from here
       }
       move(decision);
       if (kidnapped_to && !run.kidnapped_at && robot_.travelled_m() >= kidnapped_at_m) {
         run.kidnapped_at = run.path.size() - 1;
-        run.shortest_m += shortest_way_m(space, kidnapped_to->position(), goal) -
-                          shortest_way_m(space, robot_.pose().position(), goal);
+        run.shortest_m += shortest_path_m(space, kidnapped_to->position(), goal) -
+                          shortest_path_m(space, robot_.pose().position(), goal);
         robot_.carry_to(*kidnapped_to);
         obstacle_ = false;
       }
@@ -410,8 +411,8 @@ void require_goal(const RememberedPlace& remembered, ViewId goal) {
 
 }  // namespace
 
-std::string other_ends(const std::map<NavigationState, std::size_t>& ends, std::size_t wrongly,
-                       NavigationState wanted) {
+std::string explain_other_ends(const std::map<NavigationState, std::size_t>& ends,
+                               std::size_t wrongly, NavigationState wanted) {
   std::string text;
   const auto add = [&](std::size_t count, const std::string& end) {
     if (count == 0) return;
@@ -463,8 +464,8 @@ std::vector<MissionRun> run_missions(const MissionPlace& place, const Remembered
   });
 }
 
-std::vector<Mission> random_missions(const MissionPlace& place, const RememberedPlace& remembered,
-                                     const RandomMissionOptions& options, std::uint64_t seed) {
+std::vector<Mission> draw_missions(const MissionPlace& place, const RememberedPlace& remembered,
+                                   const RandomMissionOptions& options, std::uint64_t seed) {
   require(options.count >= 0, "missions", options.count, ">= 0");
   require(options.beside_m > 0.0, "distance from a reference", options.beside_m, "> 0");
   Random random(seed, 3);

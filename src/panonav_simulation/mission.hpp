@@ -42,8 +42,8 @@ struct MissionPlace : SimulatedPlace {
 
 /// Lines through the simulated mirror camera (line_camera.hpp), as the experiments of [Y03] have
 /// them: for `MissionPlace::line`. People who walk about are not in them.
-[[nodiscard]] std::function<std::vector<float>(const Pose2& pose, std::uint64_t seed)> mirror_lines(
-    const MissionPlace& place);
+[[nodiscard]] std::function<std::vector<float>(const Pose2& pose, std::uint64_t seed)>
+make_line_sensor(const MissionPlace& place);
 
 /// What a robot there sees: the place's `sight`, or a panorama rendered directly, with the people
 /// that are there, and preprocessed as the command's defaults have it. The same pose, seed and
@@ -95,7 +95,7 @@ class MissionRobot final : public RobotBase {
   /// it turns.
   [[nodiscard]] std::optional<double> free_direction(double wanted_rad, double distance_m);
   /// Since the last time: whether something stopped it.
-  [[nodiscard]] bool take_obstacle() noexcept;
+  [[nodiscard]] bool take_contact() noexcept;
   /// Stands still.
   void wait(double seconds);
   /// Somebody carries it away; its wheels do not tell.
@@ -149,10 +149,10 @@ struct RandomMissionOptions {
 
 /// Missions from random free places, in any heading, to references at random that are at least two
 /// spacings away.
-[[nodiscard]] std::vector<Mission> random_missions(const MissionPlace& place,
-                                                   const RememberedPlace& remembered,
-                                                   const RandomMissionOptions& options,
-                                                   std::uint64_t seed);
+[[nodiscard]] std::vector<Mission> draw_missions(const MissionPlace& place,
+                                                 const RememberedPlace& remembered,
+                                                 const RandomMissionOptions& options,
+                                                 std::uint64_t seed);
 
 struct MissionRun {
   NavigationState end = NavigationState::moving;
@@ -173,9 +173,9 @@ struct MissionRun {
 
 /// How missions end that do not end as `wanted`: what is known of a target that is missed. `ends`
 /// counts them all, `wrongly` those that report an arrival but are farther off.
-[[nodiscard]] std::string other_ends(const std::map<NavigationState, std::size_t>& ends,
-                                     std::size_t wrongly,
-                                     NavigationState wanted = NavigationState::arrived);
+[[nodiscard]] std::string explain_other_ends(const std::map<NavigationState, std::size_t>& ends,
+                                             std::size_t wrongly,
+                                             NavigationState wanted = NavigationState::arrived);
 
 /// Called after each step, with the true pose.
 using StepReport = std::function<void(const NavigationDecision& decision, const Pose2& pose)>;

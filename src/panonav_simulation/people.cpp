@@ -47,7 +47,7 @@ bool People::touch(Point2 position, double at_most_m) const {
   });
 }
 
-void People::choose_way(Person& person) {
+void People::choose_path(Person& person) {
   person.waited_s = 0.0;
   const auto way = space_->shortest_path(person.position, space_->random_pose(random_).position());
   person.way = way.value_or(std::vector<Point2>{});
@@ -56,7 +56,7 @@ void People::choose_way(Person& person) {
 
 void People::pass(double seconds, Point2 robot, double robot_radius_m) {
   for (Person& person : people_) {
-    if (person.way.empty()) choose_way(person);
+    if (person.way.empty()) choose_path(person);
     double left_m = pace_m_s * seconds;
     while (left_m > 0.0 && !person.way.empty()) {
       const Point2 to = person.way.back();
@@ -69,7 +69,7 @@ void People::pass(double seconds, Point2 robot, double robot_radius_m) {
       if (apart_m < robot_radius_m + radius_m + distance_kept_m &&
           apart_m < distance(person.position, robot)) {
         person.waited_s += seconds;
-        if (person.waited_s > patience_s) choose_way(person);
+        if (person.waited_s > patience_s) choose_path(person);
         break;
       }
       person.position = there;

@@ -37,7 +37,7 @@ class People {
     float brightness = 0.0F;  // of what is worn
     double waited_s = 0.0;
   };
-  void choose_way(Person& person);
+  void choose_path(Person& person);
 
   std::shared_ptr<const FreeSpace> space_;
   std::vector<Person> people_;

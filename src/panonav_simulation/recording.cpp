@@ -23,12 +23,12 @@ double direction(Point2 from, Point2 to) {
   return std::atan2(to.y_m - from.y_m, to.x_m - from.x_m);
 }
 
-std::string text(Point2 p) {
+std::string format_point(Point2 p) {
   return "(" + to_text(p.x_m) + ", " + to_text(p.y_m) + ")";
 }
 
-std::vector<Pose2> tour_poses(const Scene& scene, const FreeSpace& space,
-                              std::span<const Point2> way_points, double spacing_m) {
+std::vector<Pose2> plan_tour(const Scene& scene, const FreeSpace& space,
+                             std::span<const Point2> way_points, double spacing_m) {
   std::vector<Point2> stations(way_points.begin(), way_points.end());
   if (stations.empty() && !scene.tour.empty()) {
     stations = scene.tour;
@@ -43,16 +43,16 @@ std::vector<Pose2> tour_poses(const Scene& scene, const FreeSpace& space,
                          : space.shortest_path(stations[i - 1], stations[i]);
     if (!way) {
       const Point2 blocked = space.is_free(stations[i]) ? stations[i - 1] : stations[i];
-      throw ContractError("way point", text(blocked), "a free place of the scene");
+      throw ContractError("way point", format_point(blocked), "a free place of the scene");
     }
     for (const Point2 point : *way) line.push_back({point.x_m, point.y_m, 0.0});
   }
   return resample(line, spacing_m);
 }
 
-std::vector<Pose2> places(const Scene& scene, const FreeSpace& space,
-                          const RecordingOptions& options, std::span<const Point2> way_points,
-                          Random& random) {
+std::vector<Pose2> plan_positions(const Scene& scene, const FreeSpace& space,
+                                  const RecordingOptions& options,
+                                  std::span<const Point2> way_points, Random& random) {
   std::vector<Pose2> poses;
   switch (options.path) {
     case RecordingPath::grid:
@@ -67,7 +67,7 @@ std::vector<Pose2> places(const Scene& scene, const FreeSpace& space,
       return poses;
     }
     case RecordingPath::tour:
-      return tour_poses(scene, space, way_points, options.spacing_m);
+      return plan_tour(scene, space, way_points, options.spacing_m);
     case RecordingPath::walk: {
       const FreePredicate is_free = [&space](Point2 p) { return space.is_free(p); };
       return random_walk(space.random_pose(random), is_free,
@@ -104,8 +104,8 @@ void set_headings(std::vector<Pose2>& poses, const RecordingOptions& options, Ra
   }
 }
 
-Viewpoint viewpoint(const Pose2& pose, const FrameOptions& options, std::uint64_t seed) {
-  const Tilt tilt = frame_tilt(options, seed);
+Viewpoint make_viewpoint(const Pose2& pose, const FrameOptions& options, std::uint64_t seed) {
+  const Tilt tilt = draw_tilt(options, seed);
   return {.pose = pose,
           .height_m = options.camera_height_m,
           .roll_rad = tilt.roll_rad,
@@ -138,7 +138,7 @@ void visit_options(FrameOptions& options, OptionVisitor& visitor) {
   table.visit(options, visitor);
 }
 
-Tilt frame_tilt(const FrameOptions& options, std::uint64_t seed) {
+Tilt draw_tilt(const FrameOptions& options, std::uint64_t seed) {
   Random random(seed, 1);
   const double towards = random.uniform(-std::numbers::pi, std::numbers::pi);
   return {options.tilt_rad * std::sin(towards), options.tilt_rad * std::cos(towards)};
@@ -151,7 +151,7 @@ std::vector<RecordedPose> plan_recording(const Scene& scene, const FreeSpace& sp
   validate(options);
   Random pose_random(seed, pose_stream);
   Random heading_random(seed, heading_stream);
-  std::vector<Pose2> poses = places(scene, space, options, way_points, pose_random);
+  std::vector<Pose2> poses = plan_positions(scene, space, options, way_points, pose_random);
   set_headings(poses, options, heading_random);
   const std::vector<Pose2> readings = simulate_odometry(poses, odometry, seed);
   std::vector<RecordedPose> result;
@@ -178,8 +178,9 @@ Panorama take_panorama(const Renderer& renderer, const Pose2& pose,
                        const PanoramaRendering& rendering, const FrameOptions& options,
                        const SensorOptions& sensor, std::uint64_t seed, Executor& executor) {
   validate(options);
-  return apply_sensor(renderer.render_panorama(viewpoint(pose, options, seed), rendering, executor),
-                      sensor, seed);
+  return apply_sensor(
+      renderer.render_panorama(make_viewpoint(pose, options, seed), rendering, executor), sensor,
+      seed);
 }
 
 Image take_picture(const Renderer& renderer, const Pose2& pose, const RecordingCamera& camera,
@@ -190,7 +191,7 @@ Image take_picture(const Renderer& renderer, const Pose2& pose, const RecordingC
   }
   validate(options);
   const auto& through = std::get<Camera>(camera);
-  return apply_sensor(renderer.render_image(viewpoint(pose, options, seed), through,
+  return apply_sensor(renderer.render_image(make_viewpoint(pose, options, seed), through,
                                             options.rays_per_axis, executor),
                       through, sensor, seed);
 }
@@ -203,7 +204,7 @@ void record(const Renderer& renderer, std::span<const RecordedPose> poses,
     const std::uint64_t seed_of_frame = frame_seed(seed, i);
     const Image picture =
         take_picture(renderer, poses[i].pose, camera, options, sensor, seed_of_frame, executor);
-    frame({i, poses[i], frame_tilt(options, seed_of_frame), picture});
+    frame({i, poses[i], draw_tilt(options, seed_of_frame), picture});
   }
 }
 

@@ -79,7 +79,7 @@ struct FrameOptions {
 void visit_options(FrameOptions& options, OptionVisitor& visitor);
 
 /// How the robot is tilted in the picture of this seed.
-[[nodiscard]] Tilt frame_tilt(const FrameOptions& options, std::uint64_t seed);
+[[nodiscard]] Tilt draw_tilt(const FrameOptions& options, std::uint64_t seed);
 
 /// The picture that the robot takes: a panorama for people (see `to_picture`), or the camera's
 /// image. The same options and seed give the same picture; give each frame its own seed.

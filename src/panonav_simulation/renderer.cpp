@@ -19,9 +19,9 @@ namespace panonav::simulation {
 
 namespace {
 
-constexpr float kHousing = 0.02F;
-constexpr float kCameraBody = 0.05F;
-constexpr float kLens = 0.01F;
+constexpr float housing_brightness = 0.02F;
+constexpr float body_brightness = 0.05F;
+constexpr float lens_brightness = 0.01F;
 
 // Rotation and place of the robot in the scene, applied to many rays.
 class RayMaker {
@@ -65,10 +65,10 @@ void validate(const Viewpoint& viewpoint) {
   require(std::isfinite(viewpoint.pitch_rad), "pitch_rad", viewpoint.pitch_rad, "finite");
 }
 
-constexpr int kMostRays = 8;
+constexpr int max_rays_per_axis = 8;
 
 void require_rays(int rays_per_axis) {
-  require(rays_per_axis >= 1 && rays_per_axis <= kMostRays, "rays_per_axis", rays_per_axis,
+  require(rays_per_axis >= 1 && rays_per_axis <= max_rays_per_axis, "rays_per_axis", rays_per_axis,
           "1 .. 8");
 }
 
@@ -108,7 +108,7 @@ struct Renderer::Implementation {
   }
 
   void shade(const Ray& ray, const RayHit& hit, float spread_rad, float* colour) const {
-    if (hit.triangle == RayHit::kNothing) {
+    if (hit.triangle == RayHit::no_triangle) {
       std::copy_n(background.data(), channels, colour);
       return;
     }
@@ -218,7 +218,7 @@ float Renderer::radiance(const Viewpoint& viewpoint, const Direction3& direction
 
 double Renderer::distance_along(const Vector3& origin, const Direction3& direction) const {
   const RayHit hit = implementation_->tracer.first_hit(unit_ray(origin, direction));
-  if (hit.triangle == RayHit::kNothing) return std::numeric_limits<double>::infinity();
+  if (hit.triangle == RayHit::no_triangle) return std::numeric_limits<double>::infinity();
   return hit.distance_m;
 }
 
@@ -256,7 +256,7 @@ Panorama Renderer::render_panorama(const Viewpoint& viewpoint, const PanoramaRen
     for (std::size_t y = begin; y < end; ++y) {
       std::fill(row.begin(), row.end(), 0.0F);
       for (int j = 0; j < n; ++j) {
-        std::array<std::array<double, 2>, kMostRays> elevations{};
+        std::array<std::array<double, 2>, max_rays_per_axis> elevations{};
         for (int i = 0; i < n; ++i) {
           const double elevation = rendering.elevations.top_rad -
                                    (static_cast<double>(y) + sub_pixel(i, j, n).v) * row_rad;
@@ -308,7 +308,10 @@ class CameraRays {
       const MirrorRay ray = mirror_->trace(point);
       if (ray.target == MirrorTarget::world) return {make_ray_(ray.origin, ray.direction), {}};
       const bool housing = ray.target == MirrorTarget::housing;
-      return {{}, housing ? kHousing : ray.body_radius < 0.3 ? kLens : kCameraBody};
+      return {{},
+              housing                 ? housing_brightness
+              : ray.body_radius < 0.3 ? lens_brightness
+                                      : body_brightness};
     }
     const auto direction = unproject(camera_, point);
     if (!direction) return {};

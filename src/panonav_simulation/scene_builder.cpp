@@ -123,30 +123,30 @@ void SceneBuilder::cylinder(const std::string& object, int material, Point2 cent
 
 void SceneBuilder::blob(const std::string& object, int material, Vector3 centre, Vector3 radii,
                         double roughness) {
-  constexpr int kFacets = 10;
-  constexpr int kRings = 6;
+  constexpr int blob_facets = 10;
+  constexpr int blob_rings = 6;
   Mesh& mesh = mesh_of(object, material);
   const auto base = static_cast<std::uint32_t>(mesh.vertices.size());
-  for (int ring = 0; ring <= kRings; ++ring) {
-    const double elevation = std::numbers::pi * (static_cast<double>(ring) / kRings - 0.5);
+  for (int ring = 0; ring <= blob_rings; ++ring) {
+    const double elevation = std::numbers::pi * (static_cast<double>(ring) / blob_rings - 0.5);
     double first = 1.0;
-    for (int i = 0; i <= kFacets; ++i) {
+    for (int i = 0; i <= blob_facets; ++i) {
       const double bump = std::max(0.3, random_.normal(1.0, roughness));
       if (i == 0) first = bump;
       // The seam closes, and the poles are one point each.
-      const double r = ring == 0 || ring == kRings ? 1.0 : i == kFacets ? first : bump;
-      const double angle = 2.0 * std::numbers::pi * i / kFacets;
+      const double r = ring == 0 || ring == blob_rings ? 1.0 : i == blob_facets ? first : bump;
+      const double angle = 2.0 * std::numbers::pi * i / blob_facets;
       mesh.vertices.push_back({centre.x_m + radii.x_m * r * std::cos(elevation) * std::cos(angle),
                                centre.y_m + radii.y_m * r * std::cos(elevation) * std::sin(angle),
                                centre.z_m + radii.z_m * r * std::sin(elevation)});
       mesh.texture_coordinates.push_back(
-          {2.0F * static_cast<float>(i) / kFacets, static_cast<float>(ring) / kRings});
+          {2.0F * static_cast<float>(i) / blob_facets, static_cast<float>(ring) / blob_rings});
     }
   }
-  for (int ring = 0; ring < kRings; ++ring) {
-    for (int i = 0; i < kFacets; ++i) {
-      const std::uint32_t a = base + static_cast<std::uint32_t>(ring * (kFacets + 1) + i);
-      const std::uint32_t b = a + kFacets + 1;
+  for (int ring = 0; ring < blob_rings; ++ring) {
+    for (int i = 0; i < blob_facets; ++i) {
+      const std::uint32_t a = base + static_cast<std::uint32_t>(ring * (blob_facets + 1) + i);
+      const std::uint32_t b = a + blob_facets + 1;
       mesh.triangles.push_back({a, a + 1, b + 1});
       mesh.triangles.push_back({a, b + 1, b});
     }

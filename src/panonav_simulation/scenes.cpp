@@ -10,13 +10,13 @@ namespace panonav::simulation {
 
 namespace {
 
-constexpr std::array<std::string_view, 8> kNames{"office", "hall", "hall_periodic", "arena",
-                                                 "lab",    "loop", "corridor",      "garden"};
+constexpr std::array<std::string_view, 8> built_in_names{
+    "office", "hall", "hall_periodic", "arena", "lab", "loop", "corridor", "garden"};
 
 }  // namespace
 
 std::span<const std::string_view> scene_names() {
-  return kNames;
+  return built_in_names;
 }
 
 Scene make_scene(std::string_view name, const SceneVariation& variation) {
@@ -33,7 +33,7 @@ Scene make_scene(std::string_view name, const SceneVariation& variation) {
   if (name == "corridor") return make_corridor(variation);
   if (name == "garden") return make_garden(variation);
   std::string known;
-  for (const auto& each : kNames) known += (known.empty() ? "" : ", ") + std::string(each);
+  for (const auto& each : built_in_names) known += (known.empty() ? "" : ", ") + std::string(each);
   throw ContractError("scene", name, known);
 }
 

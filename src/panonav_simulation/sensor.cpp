@@ -15,7 +15,7 @@ namespace panonav::simulation {
 
 namespace {
 
-constexpr double kFullTurn = 2.0 * std::numbers::pi;
+constexpr double full_turn_rad = 2.0 * std::numbers::pi;
 
 // Streams of the seed, so that occluders stay where they are when the noise changes its length.
 enum Stream : std::uint64_t { noise_stream = 31, occluder_stream = 32 };
@@ -26,14 +26,14 @@ class Occluders {
   Occluders(const SensorOptions& options, std::uint64_t seed) {
     if (options.occluded_fraction <= 0.0) return;
     Random random(seed, occluder_stream);
-    const double first = random.uniform(0.0, kFullTurn);
-    const double sector = kFullTurn / options.occluders;
+    const double first = random.uniform(0.0, full_turn_rad);
+    const double sector = full_turn_rad / options.occluders;
     width_rad_ = options.occluded_fraction * sector;
     for (int i = 0; i < options.occluders; ++i) {
       // One in each sector: they never overlap, so the hidden share is exact.
       Occluder occluder;
       occluder.start_rad =
-          std::fmod(first + sector * i + random.uniform(0.0, sector - width_rad_), kFullTurn);
+          std::fmod(first + sector * i + random.uniform(0.0, sector - width_rad_), full_turn_rad);
       for (float& band : occluder.bands) band = static_cast<float>(random.uniform(0.03, 0.7));
       occluders_.push_back(occluder);
     }
@@ -43,7 +43,7 @@ class Occluders {
   [[nodiscard]] std::optional<float> at(double azimuth_rad, double height) const {
     for (const Occluder& occluder : occluders_) {
       const double within =
-          std::fmod(azimuth_rad - occluder.start_rad + 2.0 * kFullTurn, kFullTurn);
+          std::fmod(azimuth_rad - occluder.start_rad + 2.0 * full_turn_rad, full_turn_rad);
       if (within < width_rad_) {
         const auto band = static_cast<std::size_t>(std::clamp(height * 3.0, 0.0, 2.0));
         return occluder.bands[band];
@@ -97,7 +97,7 @@ void visit_options(SensorOptions& options, OptionVisitor& visitor) {
       option<&T::vignetting>("share of light lost at the mirror's rim", 0, 1),
       option<&T::directional_light>("share by which things on the light's side are brighter", 0, 1),
       option<&T::light_azimuth_rad>("direction of that light, counter-clockwise from the heading",
-                                    -kFullTurn, kFullTurn),
+                                    -full_turn_rad, full_turn_rad),
       option<&T::occluded_fraction>("share of all azimuths that people or things hide", 0, 1),
       option<&T::occluders>("number of people or things that hide it, equally wide", 1, 1000),
       option<&T::eight_bit>("round values to multiples of 1/255"),

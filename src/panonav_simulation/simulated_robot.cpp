@@ -18,7 +18,7 @@ Point2 ahead(const Pose2& pose, double direction_rad, double distance_m) {
 }
 
 // Length of the free part of the straight way, at most `distance_m`.
-double free_way_m(const FreeSpace& space, Point2 from, Point2 to) {
+double free_length_m(const FreeSpace& space, Point2 from, Point2 to) {
   if (space.is_free_between(from, to)) return distance(from, to);
   double low = 0.0;
   double high = 1.0;
@@ -63,14 +63,14 @@ bool has_room_between(const FreeSpace& space, double robot_radius_m, Point2 from
   return true;
 }
 
-std::optional<AsideDirection> feel_aside(double wanted_rad, int feelers_each_side, int side,
-                                         const std::function<bool(double)>& is_open) {
+std::optional<OpenDirection> find_open_direction(double wanted_rad, int feelers_each_side, int side,
+                                                 const std::function<bool(double)>& is_open) {
   constexpr double apart_rad = std::numbers::pi / 12.0;
   for (int i = 1; i <= feelers_each_side; ++i) {
     for (const int tried : {1, -1}) {
       if (side != 0 && tried != side) continue;
       const double direction_rad = wanted_rad + tried * i * apart_rad;
-      if (is_open(direction_rad)) return AsideDirection{direction_rad, tried};
+      if (is_open(direction_rad)) return OpenDirection{direction_rad, tried};
     }
   }
   return std::nullopt;
@@ -96,7 +96,7 @@ std::optional<double> SimulatedRobot::free_direction(double wanted_rad, double a
   }
   if (obstacles_ == ObstacleRule::stop) return std::nullopt;
   const auto feel = [&] {
-    return feel_aside(wanted_rad, feelers_each_side, side_, [&](double direction_rad) {
+    return find_open_direction(wanted_rad, feelers_each_side, side_, [&](double direction_rad) {
       return is_open(direction_rad, 0.5 * advance_m);
     });
   };
@@ -123,7 +123,7 @@ bool SimulatedRobot::go(double direction_rad, double advance_m) {
                                  motion_, random_);
   }
   const double way_m = distance(before.position(), after.position());
-  const double free_m = free_way_m(*space_, before.position(), after.position());
+  const double free_m = free_length_m(*space_, before.position(), after.position());
   if (free_m >= way_m) {
     pose_ = after;
     return true;

@@ -21,13 +21,13 @@ namespace panonav::simulation {
 [[nodiscard]] double distance_from_route_m(Point2 place, std::span<const Pose2> route);
 
 /// A direction beside the wanted one, on the left (1) or the right (-1) of it.
-struct AsideDirection {
+struct OpenDirection {
   double direction_rad = 0.0;
   int side = 0;
 };
 /// With feelers left and right of the wanted direction, 15 degrees apart: the nearest direction
 /// that is open; on one side only, unless `side` is 0. Empty: none is.
-[[nodiscard]] std::optional<AsideDirection> feel_aside(
+[[nodiscard]] std::optional<OpenDirection> find_open_direction(
     double wanted_rad, int feelers_each_side, int side,
     const std::function<bool(double direction_rad)>& is_open);
 

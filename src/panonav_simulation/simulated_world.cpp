@@ -141,14 +141,14 @@ Scene load_scene(const std::string& name, const SceneOptions& options, const Giv
   return scene;
 }
 
-std::string picture_name(std::size_t index) {
+std::string image_file_name(std::size_t index) {
   const std::string digits = std::to_string(index);
   constexpr std::size_t width = 5;
   return "view_" + std::string(width - std::min(width, digits.size()), '0') + digits + ".png";
 }
 
 /// Takes a data set away that could not be finished.
-void discard(const Dataset& dataset, bool with_folder) {
+void remove_dataset(const Dataset& dataset, bool with_folder) {
   std::error_code ignored;
   for (const auto& entry : dataset.entries) fs::remove(entry.path, ignored);
   for (const char* name : {"poses.csv", "camera.toml"}) fs::remove(dataset.folder / name, ignored);
@@ -188,7 +188,7 @@ void visit_options(SimulationOptions& options, OptionVisitor& visitor) {
   table.visit(options, visitor);
 }
 
-RecordingHeading usual_heading(RecordingPath path) noexcept {
+RecordingHeading default_heading(RecordingPath path) noexcept {
   switch (path) {
     case RecordingPath::tour:
     case RecordingPath::walk:
@@ -296,7 +296,7 @@ Dataset record_dataset(const SimulatedWorld& world, const fs::path& folder,
            [&](const RecordedFrame& frame) {
              const RecordedPose& recorded = frame.pose;
              DatasetEntry entry;
-             entry.file = picture_name(frame.number);
+             entry.file = image_file_name(frame.number);
              entry.path = folder / entry.file;
              entry.pose =
                  ReferencePose{recorded.pose.x_m, recorded.pose.y_m, recorded.pose.heading_rad};
@@ -311,7 +311,7 @@ Dataset record_dataset(const SimulatedWorld& world, const fs::path& folder,
            });
     write_dataset(dataset);
   } catch (...) {
-    discard(dataset, made_folder);
+    remove_dataset(dataset, made_folder);
     throw;
   }
   return dataset;

@@ -59,7 +59,7 @@ using GivenOption =
     std::function<std::optional<std::string>(const std::string& section, const std::string& name)>;
 
 /// The heading that a path has unless somebody asks for another.
-[[nodiscard]] RecordingHeading usual_heading(RecordingPath path) noexcept;
+[[nodiscard]] RecordingHeading default_heading(RecordingPath path) noexcept;
 
 /// A scene with a robot in it.
 class SimulatedWorld {

@@ -122,15 +122,15 @@ Image wood_texture(Random& random, int size, Colour base) {
   Image image(size, size, 3);
   const LatticeNoise grain(random, std::min(size, 64), 4);
   const LatticeNoise fine(random, std::min(size, 256), 8);
-  constexpr int kBoards = 4;
-  std::vector<float> tone(kBoards);
+  constexpr int board_count = 4;
+  std::vector<float> tone(board_count);
   for (auto& t : tone) t = static_cast<float>(random.uniform(0.8, 1.2));
   for (int v = 0; v < size; ++v) {
     for (int u = 0; u < size; ++u) {
       const double s = static_cast<double>(u) / size;
       const double t = static_cast<double>(v) / size;
-      const int board = static_cast<int>(s * kBoards);
-      const double within = s * kBoards - board;
+      const int board = static_cast<int>(s * board_count);
+      const double within = s * board_count - board;
       float factor = tone[static_cast<std::size_t>(board)] *
                      (1.0F + 0.10F * grain.at(s, t) + 0.06F * fine.at(s, t));
       if (within < 0.02) factor *= 0.5F;

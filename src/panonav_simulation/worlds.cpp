@@ -14,8 +14,8 @@ bool has_data(const std::filesystem::path& data, const std::filesystem::path& pa
 
 namespace {
 
-std::vector<std::string> those_in(const std::filesystem::path& data,
-                                  std::vector<std::string> worlds) {
+std::vector<std::string> filter_available_worlds(const std::filesystem::path& data,
+                                                 std::vector<std::string> worlds) {
   std::erase_if(worlds, [&](const std::string& name) {
     return !has_data(data, std::filesystem::path("scenes") / name);
   });
@@ -24,12 +24,12 @@ std::vector<std::string> those_in(const std::filesystem::path& data,
 
 }  // namespace
 
-std::vector<std::string> worlds_in(const std::filesystem::path& data) {
-  return those_in(data, {"small_warehouse", "small_house"});
+std::vector<std::string> find_worlds(const std::filesystem::path& data) {
+  return filter_available_worlds(data, {"small_warehouse", "small_house"});
 }
 
-std::vector<std::string> all_worlds_in(const std::filesystem::path& data) {
-  return those_in(data, {"small_warehouse", "small_house", "industrial_warehouse"});
+std::vector<std::string> find_all_worlds(const std::filesystem::path& data) {
+  return filter_available_worlds(data, {"small_warehouse", "small_house", "industrial_warehouse"});
 }
 
 Scene read_world(const std::filesystem::path& data, const std::string& name) {
@@ -56,10 +56,11 @@ bool is_built_in(const std::string& name) {
 }  // namespace
 
 bool has_scene(const std::filesystem::path& data, const std::string& name) {
-  return is_built_in(name) || !those_in(data, {name}).empty();
+  return is_built_in(name) || !filter_available_worlds(data, {name}).empty();
 }
 
-Scene scene_named(const std::filesystem::path& data, const std::string& name, std::uint64_t seed) {
+Scene make_or_read_scene(const std::filesystem::path& data, const std::string& name,
+                         std::uint64_t seed) {
   return is_built_in(name) ? make_scene(name, {.seed = seed}) : read_world(data, name);
 }
 

@@ -114,18 +114,18 @@ TEST(PlaceExperiment, LocalFeaturesKnowOwnPlacesAtWhichColumnsLeaveDoubt) {
         executor);
   };
   const simulation::PlaceRecording place = record("loop", 41, 40);
-  const VisualMemory memory = memory_of_references(place, executor);
+  const VisualMemory memory = make_memory_of_references(place, executor);
   const Localiser plain(memory);
   Localiser informed = plain;
-  informed.use_features(features_of_references(place, memory, executor), false);
+  informed.use_features(extract_reference_features(place, memory, executor), false);
   int known_by_columns = 0;
   const auto known = [&](const Panorama& view) {
     int computed = 0;
-    const QueryFeatures features = [&, make = features_of_query(view)](Handedness handedness) {
+    const QueryFeatures features = [&, make = make_query_features(view)](Handedness handedness) {
       ++computed;
       return make(handedness);
     };
-    const PackedSignature query = signature_for(view, memory);
+    const PackedSignature query = compute_packed_signature(view, memory);
     const Place by_columns = plain.localise(query);
     known_by_columns += by_columns.known ? 1 : 0;
     // A memory without features, or a query without: the same bits.

@@ -40,7 +40,7 @@ TEST(ResultsDocument, CountsOverAllPapers) {
 
 TEST(ResultsDocument, PutsTargetsFirstAndKeepsTheirOrder) {
   auto rows = document().papers[0].rows;
-  EXPECT_EQ(put_targets_first(rows), 2U);
+  EXPECT_EQ(move_targets_first(rows), 2U);
   EXPECT_EQ(rows[0].what, "far_off");
   EXPECT_EQ(rows[1].what, "kept");
   EXPECT_EQ(rows[2].what, "reported");
@@ -61,8 +61,8 @@ TEST(ResultsDocument, JsonHasTheRowsOfEveryPaper) {
 
 TEST(ResultsDocument, MarkdownHasEveryMissAndThenAllRowsWithATarget) {
   const auto made = document();
-  ASSERT_EQ(miss_lines(made).size(), 1U);
-  EXPECT_EQ(miss_lines(made)[0],
+  ASSERT_EQ(list_misses(made).size(), 1U);
+  EXPECT_EQ(list_misses(made)[0],
             "a01: far_off: 3 m, target at most 1: missed by 2; the floor is *wet*.");
   const std::string text = to_markdown(made);
   EXPECT_EQ(text.rfind("# Results", 0), 0U);
@@ -96,7 +96,7 @@ TEST(ResultsDocument, MarkdownHoldsAllOfARow) {
 TEST(ResultsDocument, SaysSoWhenNothingIsMissed) {
   ResultsDocument made = document();
   made.papers[0].rows[1].ours = 0.5;
-  EXPECT_TRUE(miss_lines(made).empty());
+  EXPECT_TRUE(list_misses(made).empty());
   EXPECT_TRUE(contains(to_markdown(made), "## Rows that do not hold\n\nNone.\n"));
 }
 

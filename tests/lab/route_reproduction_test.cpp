@@ -51,7 +51,7 @@ TEST(RouteRuns, ACurvedRouteIsRepeatedWithPoorWheels) {
   Executor executor(2);
   const RouteScene place =
       make_route_scene(simulation::make_scene("loop", {.seed = 6}), "loop", executor);
-  const auto way = curved_route(place, 4.0, 0.1, 3);
+  const auto way = plan_curved_route(place, 4.0, 0.1, 3);
   ASSERT_GE(way.size(), 30U);
   EXPECT_LE(way.size(), 41U);
   for (std::size_t i = 1; i < way.size(); ++i) {
@@ -60,12 +60,12 @@ TEST(RouteRuns, ACurvedRouteIsRepeatedWithPoorWheels) {
   const RouteTracker tracker(record_route(place, way, 4, executor));
   for (const bool back : {false, true}) {
     const RouteRun run = repeat_route(place, tracker, {.back = back}, 9);
-    EXPECT_TRUE(run.completes());
+    EXPECT_TRUE(run.has_completed());
     EXPECT_NEAR(run.lateral_m.front(), 0.3, 0.02);
     EXPECT_LT(run.lateral_m.back(), 0.05);
     EXPECT_LT(4 * run.off_route, run.truth.size());
   }
-  EXPECT_THROW((void)curved_route(place, 0.0, 0.1, 1), ContractError);
+  EXPECT_THROW((void)plan_curved_route(place, 0.0, 0.1, 1), ContractError);
 }
 
 TEST(RouteReproduction, TheFitIsBetterThanTheContoursAndMaskingHelps) {

@@ -24,16 +24,16 @@ TEST(S06Worlds, EveryEndHasItsReason) {
   run.end = HomingRunEnd::arrived;
   run.end_distance_m = 0.05;
   EXPECT_TRUE(run.succeeds(0.1));
-  EXPECT_EQ(reason_of_failure(run), "");
+  EXPECT_EQ(explain_failure(run), "");
   run.end_distance_m = 0.2;
-  EXPECT_EQ(reason_of_failure(run), "stopped short, 20 cm off");
+  EXPECT_EQ(explain_failure(run), "stopped short, 20 cm off");
   std::set<std::string> reasons;
   run.end_distance_m = 0.8;
   for (const auto end : {HomingRunEnd::arrived, HomingRunEnd::wrong_place, HomingRunEnd::blocked,
                          HomingRunEnd::exhausted}) {
     run.end = end;
     EXPECT_FALSE(run.succeeds(0.1));
-    reasons.insert(reason_of_failure(run));
+    reasons.insert(explain_failure(run));
   }
   EXPECT_EQ(reasons.size(), 4U);
 }

@@ -179,9 +179,9 @@ TEST(ChainRun, ARouteOfTwentyMetresIsDrivenAgainInBothDirections) {
   const HomingPlace place =
       make_homing_place(simulation::make_scene("loop"), chain_camera(), executor);
   const simulation::FreeSpace& space = *place.free_space;
-  EXPECT_THROW((void)random_routes(space, 1, 0.0, 0.1, 1), ContractError);
-  EXPECT_THROW((void)random_routes(space, 1, 5.0, 0.0, 1), ContractError);
-  const auto routes = random_routes(space, 3, 20.0, 0.1, 5);
+  EXPECT_THROW((void)plan_random_routes(space, 1, 0.0, 0.1, 1), ContractError);
+  EXPECT_THROW((void)plan_random_routes(space, 1, 5.0, 0.0, 1), ContractError);
+  const auto routes = plan_random_routes(space, 3, 20.0, 0.1, 5);
   ASSERT_EQ(routes.size(), 3U);
   int completed = 0;
   for (std::size_t r = 0; r < routes.size(); ++r) {
@@ -191,7 +191,7 @@ TEST(ChainRun, ARouteOfTwentyMetresIsDrivenAgainInBothDirections) {
     EXPECT_LT(chain.size(), routes[r].size() / 2);
     for (const auto direction : {ChainDirection::forward, ChainDirection::back}) {
       const ChainRun run = follow_chain(place, chain, routes[r], direction, r);
-      completed += run.completes(0.2);
+      completed += run.has_completed(0.2);
       ASSERT_EQ(run.path.size(), run.lateral_m.size());
       for (const Pose2& pose : run.path) EXPECT_TRUE(space.is_free(pose.position()));
       EXPECT_EQ(run.path, follow_chain(place, chain, routes[r], direction, r).path)

@@ -26,9 +26,9 @@ simulation::PlaceRecording small_office() {
 TEST(Surroundings, SectorsAreCentredOnTheirDirections) {
   for (std::size_t i = 0; i < shape_directions; ++i) {
     const double azimuth = wrap_angle(static_cast<double>(i) * std::numbers::pi / 4.0);
-    EXPECT_EQ(sector_of(azimuth), i);
-    EXPECT_EQ(sector_of(azimuth + 0.38), i);
-    EXPECT_EQ(sector_of(azimuth - 0.38), i);
+    EXPECT_EQ(find_sector(azimuth), i);
+    EXPECT_EQ(find_sector(azimuth + 0.38), i);
+    EXPECT_EQ(find_sector(azimuth - 0.38), i);
   }
 }
 
@@ -54,7 +54,7 @@ TEST(Surroundings, FreeDistanceIsThatToTheWallsOfAnEmptyRoom) {
   scene.floor_low = {-x, -y};
   scene.floor_high = {x, y};
   place.renderer = std::make_shared<const simulation::Renderer>(scene);
-  const Surroundings around = surroundings_of(place, {0.0, 0.0});
+  const Surroundings around = measure_surroundings(place, {0.0, 0.0});
   // Along the room the walls are farther than across; opposite directions are alike.
   EXPECT_NEAR(around.free_m[2], 2.1, 0.1);
   EXPECT_GT(around.free_m[0], 3.5);
@@ -82,18 +82,18 @@ TEST(PredictedExtents, AgreeWithStepsThatAreReallyTaken) {
   for (int i = 0; i < 10; ++i) {
     const Pose2 pose = place.free_space->random_pose(random);
     const Panorama view = simulation::take_view(place, rendering, pose, 1, no_noise);
-    const Directional extents = predicted_extents(place, pose, view, components);
+    const Directional extents = predict_extents(place, pose, view, components);
     for (std::size_t d = 0; d < shape_directions / 2; ++d) {
       const double theta = static_cast<double>(d) * std::numbers::pi / 4.0;
-      constexpr double kStepM = 0.02;
-      const auto seen_after = [&](double step_m) {
-        const Pose2 there{pose.x_m + step_m * std::cos(theta), pose.y_m + step_m * std::sin(theta),
+      constexpr double step_m = 0.02;
+      const auto observe_after = [&](double way_m) {
+        const Pose2 there{pose.x_m + way_m * std::cos(theta), pose.y_m + way_m * std::sin(theta),
                           pose.heading_rad};
         return compute_signature(simulation::take_view(place, rendering, there, 1, no_noise),
                                  components);
       };
       // From one side to the other, so that what grows with the square of the step falls out.
-      taken.push_back(dissimilarity_l1(seen_after(kStepM), seen_after(-kStepM)));
+      taken.push_back(dissimilarity_l1(observe_after(step_m), observe_after(-step_m)));
       predicted.push_back(1.0 / extents[d]);
       // A step back changes as much, to first order.
       EXPECT_NEAR(extents[d], extents[d + 4], 1e-9 * extents[d]);

@@ -47,12 +47,12 @@ TEST(ResultRow, JsonIsTheDocumentedArray) {
 TEST(ResultRow, FiguresAreAsPeopleWriteThem) {
   ResultRow rate = row(0.0, Comparison::at_most, 0.00005);
   rate.interval = std::pair{1.735e-18, 0.0369935};
-  EXPECT_EQ(shown_figure(rate), "0 (0 .. 0.03699) m");
-  EXPECT_EQ(shown_target(rate), "at most 0.00005");
+  EXPECT_EQ(format_figure(rate), "0 (0 .. 0.03699) m");
+  EXPECT_EQ(format_target(rate), "at most 0.00005");
   EXPECT_EQ(table_cells(rate)[2], "0 (0 .. 0.03699)");
   rate.ours = -1e-17;
   rate.interval = std::nullopt;
-  EXPECT_EQ(shown_figure(rate), "0 m");
+  EXPECT_EQ(format_figure(rate), "0 m");
 }
 
 ResultRow missed() {
@@ -163,22 +163,22 @@ TEST(ResultRow, ReadingNamesFileRowAndField) {
 
 TEST(ResultRow, TellsByHowMuchAndWhyItIsMissed) {
   ResultRow one = missed();
-  EXPECT_EQ(miss_text(one), "by 1; wheels \"slip\"");
+  EXPECT_EQ(explain_miss(one), "by 1; wheels \"slip\"");
   one.reason = "";
-  EXPECT_EQ(miss_text(one), "by 1; no reason is known");
+  EXPECT_EQ(explain_miss(one), "by 1; no reason is known");
   one.interval = std::pair{0.9, 2.5};
-  EXPECT_EQ(miss_text(one), "by 1; the 95 % interval reaches the target");
+  EXPECT_EQ(explain_miss(one), "by 1; the 95 % interval reaches the target");
   one.target = Target{Comparison::at_least, 2.25};
-  EXPECT_EQ(miss_text(one), "by 0.25; the 95 % interval reaches the target");
+  EXPECT_EQ(explain_miss(one), "by 0.25; the 95 % interval reaches the target");
   one.reason = "it rains";
-  EXPECT_EQ(miss_text(one), "by 0.25; the 95 % interval reaches the target; it rains");
+  EXPECT_EQ(explain_miss(one), "by 0.25; the 95 % interval reaches the target; it rains");
   one.reason = "";
   one.interval = std::pair{0.9, 2.2};
-  EXPECT_EQ(miss_text(one), "by 0.25; no reason is known");
+  EXPECT_EQ(explain_miss(one), "by 0.25; no reason is known");
   one.unit = "ms";
-  EXPECT_EQ(miss_text(one), "by 0.25; a time depends on the machine and on its other load");
+  EXPECT_EQ(explain_miss(one), "by 0.25; a time depends on the machine and on its other load");
   one.ours = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(miss_text(one), "nothing could be measured");
+  EXPECT_EQ(explain_miss(one), "nothing could be measured");
 }
 
 TEST(ResultRow, CellsTellWhatTheFigureWasTakenOver) {

@@ -28,12 +28,12 @@ TrackedRun run_with_errors(const std::vector<double>& errors_m) {
 TEST(TrackedRun, CountsImagesUntilTheErrorStaysBelow) {
   const TrackedRun run = run_with_errors({2.0, 0.1, 0.9, 0.2, 0.1});
   EXPECT_EQ(images_until_localised(run, 0.25), 4);
-  EXPECT_EQ(images_until_first_right(run, 0.25), 2);
+  EXPECT_EQ(images_until_first_fix(run, 0.25), 2);
   EXPECT_EQ(images_until_localised(run, 0.25, 2), 2) << "counted from step 2 on";
   EXPECT_EQ(images_until_localised(run, 3.0), 1);
   EXPECT_EQ(images_until_localised(run_with_errors({0.1, 0.1, 0.3}), 0.25), std::nullopt)
       << "the last one is not below";
-  EXPECT_EQ(images_until_first_right(run_with_errors({0.3, 0.25}), 0.25), std::nullopt);
+  EXPECT_EQ(images_until_first_fix(run_with_errors({0.3, 0.25}), 0.25), std::nullopt);
   EXPECT_EQ(images_until_localised({}, 0.25), std::nullopt);
 }
 
@@ -52,12 +52,12 @@ TEST(TrackedRun, NoAnswerIsNeverRightAndOnlySureAnswersAreConfidentlyWrong) {
 TrackingRun straight_run(Point2 from, int steps) {
   std::vector<Pose2> poses;
   for (int i = 0; i < steps; ++i) poses.push_back({from.x_m + 0.5 * i, from.y_m, 0.0});
-  return run_through(poses, std::vector<PackedSignature>(poses.size()));
+  return make_tracking_run(poses, std::vector<PackedSignature>(poses.size()));
 }
 
 TEST(TrackingRun, StepsLeadFromPoseToPose) {
   const std::vector<Pose2> poses{{1.0, 2.0, 0.5}, {1.3, 2.4, -2.0}, {0.0, 0.0, 3.0}};
-  const TrackingRun run = run_through(poses, std::vector<PackedSignature>(3));
+  const TrackingRun run = make_tracking_run(poses, std::vector<PackedSignature>(3));
   ASSERT_EQ(run.steps.size(), 3U);
   EXPECT_FALSE(run.steps[0].moved);
   for (std::size_t i = 1; i < poses.size(); ++i) {
@@ -66,26 +66,26 @@ TEST(TrackingRun, StepsLeadFromPoseToPose) {
     EXPECT_NEAR(reached.y_m, poses[i].y_m, 1e-12);
     EXPECT_NEAR(reached.heading_rad, poses[i].heading_rad, 1e-12);
   }
-  EXPECT_THROW((void)run_through(poses, std::vector<PackedSignature>(2)), ContractError);
+  EXPECT_THROW((void)make_tracking_run(poses, std::vector<PackedSignature>(2)), ContractError);
 }
 
 TEST(TrackingRun, IsCarriedAwayUnnoticedAndFarEnough) {
   const TrackingRun before = straight_run({0.0, 0.0}, 10);
   const TrackingRun after = straight_run({0.0, 0.0}, 10);
-  const auto run = kidnapped(before, after, 3, 1.5, 4);  // at 1.0 when it is taken
+  const auto run = make_kidnapped_run(before, after, 3, 1.5, 4);  // at 1.0 when it is taken
   ASSERT_TRUE(run);
   ASSERT_EQ(run->steps.size(), 3U + 5U);
   EXPECT_EQ(run->steps[3].truth.x_m, 2.5) << "the first place 1.5 m from x = 1";
   EXPECT_FALSE(run->steps[3].moved);
   EXPECT_TRUE(run->steps[2].moved);
   EXPECT_TRUE(run->steps[4].moved);
-  EXPECT_FALSE(kidnapped(before, after, 3, 1.5, 6)) << "only five steps are left";
-  EXPECT_FALSE(kidnapped(before, after, 3, 50.0, 1));
-  EXPECT_FALSE(kidnapped(before, after, 11, 0.1, 1));
+  EXPECT_FALSE(make_kidnapped_run(before, after, 3, 1.5, 6)) << "only five steps are left";
+  EXPECT_FALSE(make_kidnapped_run(before, after, 3, 50.0, 1));
+  EXPECT_FALSE(make_kidnapped_run(before, after, 11, 0.1, 1));
 }
 
 TEST(TrackingRun, GoesBlindForAStretch) {
-  const TrackingRun run = without_images(straight_run({0.0, 0.0}, 6), 2, 3);
+  const TrackingRun run = drop_images(straight_run({0.0, 0.0}, 6), 2, 3);
   for (std::size_t i = 0; i < 6; ++i) {
     EXPECT_EQ(run.steps[i].view.has_value(), i < 2 || i > 4) << i;
     EXPECT_EQ(run.steps[i].moved.has_value(), i > 0) << i;
@@ -99,7 +99,7 @@ TEST(Tracking, FindsTheRobotInAnOfficeTheSameOnAnyNumberOfThreads) {
   const simulation::PlaceRecording place = simulation::record_place(
       {.scene = "office", .seed = 701, .spacing_m = 0.5, .queries = 1, .rows = 24, .columns = 128},
       two);
-  const auto remembered = remember_for_tracking(place, two);
+  const auto remembered = make_tracking_place(place, two);
   ASSERT_GE(remembered->memory().size(), 30U);
   EXPECT_EQ(remembered->reference_positions().size(), remembered->memory().size());
   const WalkOptions walks{.variants = 1, .runs_each = 6, .images = 12, .seed = 4};
@@ -141,7 +141,7 @@ TEST(Tracking, HardRunsSeeAChangedOfficeThatStaysTheSameForMoreRuns) {
   const simulation::PlaceRecording place = simulation::record_place(
       {.scene = "office", .seed = 702, .spacing_m = 0.5, .queries = 1, .rows = 8, .columns = 64},
       two);
-  const auto remembered = remember_for_tracking(place, two);
+  const auto remembered = make_tracking_place(place, two);
   WalkOptions walks{.variants = 1, .runs_each = 1, .images = 4, .seed = 4};
   const auto clean = record_walks(place, *remembered, clean_condition(), walks, two);
   const auto hard = record_walks(place, *remembered, hard_condition(), walks, two);

@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 
 const fs::path golden = fs::path(__FILE__).parent_path() / "data/golden";
 
-constexpr char kInstructions[] = "sse4.2";
+constexpr char instructions[] = "sse4.2";
 
 // The simulated mirror camera with a quarter of its pixels along each side.
 Camera small_mirror_camera() {
@@ -96,7 +96,7 @@ void compare(const Image& picture, const fs::path& file) {
 
 TEST_P(GoldenPicture, IsRenderedAgainAndSmallChangesWouldBeNoticed) {
   const std::string name(GetParam());
-  const RendererOptions options{.instructions = kInstructions};
+  const RendererOptions options{.instructions = instructions};
   const Scene scene = make_scene(name);
   const Renderer renderer(scene, options);
   const Viewpoint viewpoint = viewpoint_in(scene);

@@ -33,11 +33,11 @@ TEST(MissionRobot, StopsWhereSomethingIsInItsWayAndFeelsItsWayPast) {
     bool stopped = false;
     for (int step = 0; step < 2000 && !stopped; ++step) {
       robot.command({.forward_m_s = base.speed_m_s});
-      stopped = robot.take_obstacle();
+      stopped = robot.take_contact();
       ASSERT_GE(place.free_space->clearance_m(robot.pose().position()), place.scene.robot_radius_m);
     }
     EXPECT_TRUE(stopped) << k;
-    EXPECT_FALSE(robot.take_obstacle());
+    EXPECT_FALSE(robot.take_contact());
     // Ahead is no way; where there is one it is at most 90 degrees aside.
     const auto aside = robot.free_direction(0.0, 0.3);
     if (!aside) continue;
@@ -77,7 +77,7 @@ TEST(Missions, ArriveOverAMemoryWithoutPositionsAndAreRepeatable) {
   const RememberedPlace remembered = remember_grid(place, 0.4, 5, two);
   ASSERT_GT(remembered.truth.size(), 40U);
   ASSERT_EQ(remembered.graph.size(), remembered.truth.size());
-  const auto missions = random_missions(place, remembered, {.count = 8}, 3);
+  const auto missions = draw_missions(place, remembered, {.count = 8}, 3);
   const auto runs = run_missions(place, remembered, missions, {}, 9, two);
   int arrived = 0;
   for (const MissionRun& run : runs) {
@@ -102,7 +102,7 @@ TEST(Missions, ARobotThatIsCarriedAwayFindsItsGoalAllTheSame) {
   Executor executor(2);
   const MissionPlace place = make_mission_place(make_scene("office", {.seed = 72}), executor);
   const RememberedPlace remembered = remember_grid(place, 0.4, 5, executor);
-  const auto missions = random_missions(place, remembered, {.count = 8, .kidnapped = true}, 4);
+  const auto missions = draw_missions(place, remembered, {.count = 8, .kidnapped = true}, 4);
   const auto runs = run_missions(place, remembered, missions, {}, 10, executor);
   int carried = 0;
   int arrived = 0;
@@ -172,7 +172,7 @@ TEST(Missions, ADriveWithLinesRecordsARouteThatIsRepeated) {
     way.push_back({from.x_m + share * (to.x_m - from.x_m), from.y_m + share * (to.y_m - from.y_m),
                    std::atan2(to.y_m - from.y_m, to.x_m - from.x_m)});
   }
-  place.line = mirror_lines(place);
+  place.line = make_line_sensor(place);
   const RememberedPlace remembered = remember_drive(place, way, {}, 5, executor);
   ASSERT_EQ(remembered.routes.size(), 1U);
   const KnownRoute& route = remembered.routes.front();
@@ -199,8 +199,8 @@ TEST(Missions, RefuseWhatMakesNoSense) {
   Executor executor(2);
   const MissionPlace& place = office();
   const RememberedPlace remembered = remember_grid(place, 1.0, 5, executor);
-  EXPECT_THROW((void)random_missions(place, remembered, {.count = -1}, 1), ContractError);
-  EXPECT_THROW((void)random_missions(place, remembered, {.beside_m = 0.0}, 1), ContractError);
+  EXPECT_THROW((void)draw_missions(place, remembered, {.count = -1}, 1), ContractError);
+  EXPECT_THROW((void)draw_missions(place, remembered, {.beside_m = 0.0}, 1), ContractError);
   const MemoryViewSource source(remembered.memory);
   Navigator navigator(source, AreaPlanner(remembered.graph));
   EXPECT_THROW((void)run_mission(place, remembered, navigator, {ViewId{9999}, {}, {}}, {}, 1),
@@ -208,15 +208,15 @@ TEST(Missions, RefuseWhatMakesNoSense) {
 }
 
 TEST(Mission, OtherEndsSayHowRunsEndThatDoNotArrive) {
-  EXPECT_EQ(other_ends({{NavigationState::arrived, 5}}, 0), "");
-  EXPECT_EQ(other_ends({{NavigationState::arrived, 5},
-                        {NavigationState::lost, 1},
-                        {NavigationState::unreachable, 3}},
-                       2),
+  EXPECT_EQ(explain_other_ends({{NavigationState::arrived, 5}}, 0), "");
+  EXPECT_EQ(explain_other_ends({{NavigationState::arrived, 5},
+                                {NavigationState::lost, 1},
+                                {NavigationState::unreachable, 3}},
+                               2),
             "of the other runs, 2 report an arrival but are farther off, 1 end as lost, 3 end as "
             "unreachable");
-  EXPECT_EQ(other_ends({{NavigationState::arrived, 1}, {NavigationState::unreachable, 3}}, 1,
-                       NavigationState::unreachable),
+  EXPECT_EQ(explain_other_ends({{NavigationState::arrived, 1}, {NavigationState::unreachable, 3}},
+                               1, NavigationState::unreachable),
             "of the other runs, 1 end as arrived");
 }
 

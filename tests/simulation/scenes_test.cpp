@@ -19,8 +19,8 @@ namespace panonav::simulation {
 using namespace testing;
 namespace {
 
-constexpr std::uint64_t kSeeds[] = {1, 2, 300};
-constexpr PanoramaRendering kSmall{.rows = 20, .columns = 128, .rays_per_axis = 1};
+constexpr std::uint64_t tested_seeds[] = {1, 2, 300};
+constexpr PanoramaRendering small{.rows = 20, .columns = 128, .rays_per_axis = 1};
 
 class EveryScene : public ::testing::TestWithParam<std::string_view> {
  protected:
@@ -51,7 +51,7 @@ double standard_deviation(const Panorama& view) {
 }
 
 TEST_P(EveryScene, HasRoomForItsRobotAllOverItsRoundTrip) {
-  for (const std::uint64_t seed : kSeeds) {
+  for (const std::uint64_t seed : tested_seeds) {
     const Scene world = scene(seed);
     EXPECT_EQ(world.name, GetParam());
     EXPECT_TRUE(world.warnings.empty());
@@ -76,20 +76,20 @@ TEST_P(EveryScene, LooksDifferentFromSeedToSeedAndTheSameForASeed) {
   Executor one(1);
   Executor two(2);
   std::vector<Panorama> views;
-  for (const std::uint64_t seed : kSeeds) {
+  for (const std::uint64_t seed : tested_seeds) {
     const Scene world = scene(seed);
     const Viewpoint viewpoint = viewpoint_in(world);
     views.push_back(
-        Renderer(world, {.shadows = false}, one).render_panorama(viewpoint, kSmall, one));
+        Renderer(world, {.shadows = false}, one).render_panorama(viewpoint, small, one));
     // Something is to be seen, and the light neither drowns nor blinds.
     EXPECT_GT(standard_deviation(views.back()), 0.08) << "seed " << seed;
     const auto values = views.back().values();
     const auto clipped = std::ranges::count_if(values, [](float v) { return v >= 1.0F; });
     EXPECT_LT(static_cast<double>(clipped), 0.1 * static_cast<double>(values.size()))
         << "seed " << seed;
-    if (seed == kSeeds[0]) {
-      EXPECT_EQ(Renderer(scene(seed), {}, two).render_panorama(viewpoint, kSmall, two),
-                Renderer(world, {}, one).render_panorama(viewpoint, kSmall, one));
+    if (seed == tested_seeds[0]) {
+      EXPECT_EQ(Renderer(scene(seed), {}, two).render_panorama(viewpoint, small, two),
+                Renderer(world, {}, one).render_panorama(viewpoint, small, one));
     }
   }
   for (std::size_t i = 0; i < views.size(); ++i) {
@@ -142,11 +142,11 @@ TEST_P(EveryScene, MovedObjectsMoveAndNothingElseDoes) {
   EXPECT_GT(all.size(), 3U);
   std::set<std::set<std::string>> choices;
   double share = 0.0;
-  constexpr int kChoices = 5;
-  for (std::uint64_t seed = 1; seed <= kChoices; ++seed) {
+  constexpr int max_seed = 5;
+  for (std::uint64_t seed = 1; seed <= max_seed; ++seed) {
     const auto some =
         moved_objects(make_scene(GetParam(), {.moved_objects = 0.4, .moved_seed = seed}));
-    share += static_cast<double>(some.size()) / static_cast<double>(all.size()) / kChoices;
+    share += static_cast<double>(some.size()) / static_cast<double>(all.size()) / max_seed;
     choices.insert(some);
   }
   // Not every object finds another place; of few objects the share strays by 0.1 and more.
@@ -159,7 +159,7 @@ TEST_P(EveryScene, MovedObjectsMoveAndNothingElseDoes) {
     EXPECT_FALSE(contains(object, "lamp")) << object;
   }
   // They stay out of the robot's way as they were.
-  for (const std::uint64_t seed : kSeeds) {
+  for (const std::uint64_t seed : tested_seeds) {
     const Scene other = make_scene(GetParam(), {.moved_objects = 1.0, .moved_seed = seed});
     EXPECT_GT(FreeSpace(other, free_space_options(other)).area_m2(),
               0.8 * FreeSpace(usual, free_space_options(usual)).area_m2());
@@ -193,7 +193,7 @@ TEST(Scenes, HaveTheStatedSizes) {
   for (const Size& stated : {Size{"office", 5.0, 2.0, 0.97}, Size{"hall", 7.0, 7.0, 0.97},
                              Size{"hall_periodic", 7.0, 7.0, 0.97}, Size{"lab", 7.0, 5.0, 0.3},
                              Size{"arena", 1.4, 1.2, 0.5}, Size{"garden", 12.0, 10.0, 0.7}}) {
-    for (const std::uint64_t seed : kSeeds) {
+    for (const std::uint64_t seed : tested_seeds) {
       const Scene scene = make_scene(stated.scene, {seed});
       EXPECT_NEAR(scene.floor_high.x_m - scene.floor_low.x_m, stated.width_m, 1e-9);
       EXPECT_NEAR(scene.floor_high.y_m - scene.floor_low.y_m, stated.depth_m, 1e-9);
@@ -203,7 +203,7 @@ TEST(Scenes, HaveTheStatedSizes) {
 }
 
 TEST(Scenes, TheLoopIsARoundTripOfTwentyMetres) {
-  for (const std::uint64_t seed : kSeeds) {
+  for (const std::uint64_t seed : tested_seeds) {
     const Scene scene = make_scene("loop", {seed});
     double length = 0.0;
     for (std::size_t i = 0; i < scene.tour.size(); ++i) {
@@ -225,7 +225,7 @@ TEST(Scenes, TheLoopIsARoundTripOfTwentyMetres) {
 
 TEST(Scenes, TheGardenHasASkyAHorizonAndTrees) {
   Executor executor;
-  for (const std::uint64_t seed : kSeeds) {
+  for (const std::uint64_t seed : tested_seeds) {
     const Scene scene = make_scene("garden", {seed});
     const Renderer renderer(scene, {.shadows = false}, executor);
     const Viewpoint eye = viewpoint_in(scene);
@@ -250,7 +250,7 @@ TEST(Scenes, TheGardenHasASkyAHorizonAndTrees) {
 }
 
 TEST(Scenes, AHouseStandsBetweenTheStreetsOfTheArena) {
-  for (const std::uint64_t seed : kSeeds) {
+  for (const std::uint64_t seed : tested_seeds) {
     const Scene scene = make_scene("arena", {seed});
     std::set<std::string> houses;
     for (const Mesh& mesh : scene.meshes) {
@@ -291,7 +291,7 @@ double similarity_of_opposite_places(const Scene& scene) {
 }
 
 TEST(Scenes, FarPlacesOfCorridorAndPeriodicHallLookAlike) {
-  for (const std::uint64_t seed : kSeeds) {
+  for (const std::uint64_t seed : tested_seeds) {
     // Alike, and yet not the same.
     for (const char* name : {"corridor", "hall_periodic"}) {
       const double similarity = similarity_of_opposite_places(make_scene(name, {seed}));

@@ -35,10 +35,10 @@ viewer::MapPlot map_of_drive(const simulation::PlaceRecording& place,
   plot.layers.push_back(
       {.label = "wheels alone",
        .colour = viewer::PlotColour::vermilion,
-       .lines = {simulation::laid_over(positions_of(recording.wheels), mapped.truth)}});
+       .lines = {simulation::align_to(positions_of(recording.wheels), mapped.truth)}});
   plot.layers.push_back({.label = "map from the views",
                          .colour = viewer::PlotColour::blue,
-                         .lines = {simulation::laid_over(mapped.estimate, mapped.truth)}});
+                         .lines = {simulation::align_to(mapped.estimate, mapped.truth)}});
   return plot;
 }
 
@@ -78,7 +78,7 @@ viewer::UnfoldingMap map_of_growth(const Lattice& arranged, const VisualMemory& 
     truth.push_back(office.info(node.view).pose->position());
     ends.push_back(node.pose.position());
   }
-  ends = simulation::laid_over(ends, truth);
+  ends = simulation::align_to(ends, truth);
   std::vector<Point2> anywhere = ends;
   Random random(seed, 1);
   for (std::size_t i = anywhere.size(); i > 1; --i) {
@@ -99,7 +99,7 @@ viewer::UnfoldingMap map_of_growth(const Lattice& arranged, const VisualMemory& 
         now.push_back(at.poses[view].position());
         end.push_back(ends[view]);
       }
-      now = simulation::laid_over(now, end);
+      now = simulation::align_to(now, end);
       for (std::size_t i = 0; i < views.size(); ++i) positions[views[i]] = now[i];
       found += views.size();
     }
@@ -177,7 +177,7 @@ DemoMaps show_maps(const VisualMemory& office, std::uint64_t seed, bool quick, S
               });
   maps.lattice = compare_with_ground_truth(maps.arranged, office);
 
-  const simulation::PlaceRecording place = simulation::empty_place(
+  const simulation::PlaceRecording place = simulation::make_empty_place(
       simulation::make_scene("loop", {.seed = seed}), seed, 256, session.executor());
   const simulation::MappingRecording recording = simulation::record_for_mapping(
       place, drive(place, {}, spacing_m, quick ? 60 : 200), components, simulation::cheap_wheels(),

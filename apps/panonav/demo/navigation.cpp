@@ -310,8 +310,8 @@ DemoNavigation show_navigation(const DemoOptions& options, const DemoRecordings&
   simulation::MissionPlace place = simulation::make_mission_place(*recordings.office_world);
   give_sight(place, recordings, pipeline);
   const auto random = [&](std::uint64_t stream, int count, bool kidnapped) {
-    return simulation::random_missions(place, remembered, {.count = count, .kidnapped = kidnapped},
-                                       Random(options.seed, stream).next());
+    return simulation::draw_missions(place, remembered, {.count = count, .kidnapped = kidnapped},
+                                     Random(options.seed, stream).next());
   };
   auto missions = random(mission_stream, options.missions(), false);
   missions.push_back(random(kidnapped_stream, 1, true).front());

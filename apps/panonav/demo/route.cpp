@@ -82,7 +82,7 @@ DemoRoute repeat_and_measure(const lab::RouteScene& place, const RoutePanorama& 
     }
   });
   for (const lab::RouteRun& run : route.runs) {
-    route.completed += run.completes() ? 1 : 0;
+    route.completed += run.has_completed() ? 1 : 0;
     double way_m = 0.0;
     for (std::size_t i = 0; i < run.truth.size(); ++i) {
       if (i > 0) way_m += distance(run.truth[i - 1].position(), run.truth[i].position());
@@ -102,12 +102,12 @@ DemoRoute show_route(const simulation::Scene& office, double length_m, std::uint
   lab::RouteScene place = lab::make_route_scene(office, "office", executor);
   // What automatic exposure would choose in these rooms.
   place.camera.sensor.exposure = 2.0;
-  const auto way = lab::curved_route(place, length_m, spacing_m, seed);
+  const auto way = lab::plan_curved_route(place, length_m, spacing_m, seed);
   const RoutePanorama panorama = lab::record_route(place, way, seed, executor);
   DemoRoute route = repeat_and_measure(place, panorama, seed, executor);
   viewer::MapPlot map{.title = "The route, and both drives",
                       .layers = viewer::scene_layers(office)};
-  std::ranges::move(lab::route_layers(way, route.runs), std::back_inserter(map.layers));
+  std::ranges::move(lab::make_route_layers(way, route.runs), std::back_inserter(map.layers));
 
   const auto median_cm = [](const std::vector<double>& values) {
     return values.empty() ? std::string("none") : format_fixed(100.0 * median(values), 1) + " cm";

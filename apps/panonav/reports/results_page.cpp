@@ -21,7 +21,7 @@ void add_table(viewer::ReportPage& page, std::span<const lab::ResultRow> rows) {
 
 // Those with a target first.
 void add_tables(viewer::ReportPage& page, std::vector<lab::ResultRow> rows) {
-  const std::size_t judged = lab::put_targets_first(rows);
+  const std::size_t judged = lab::move_targets_first(rows);
   const std::span<const lab::ResultRow> all(rows);
   if (judged > 0) add_table(page, all.first(judged));
   if (judged == all.size()) return;
@@ -37,7 +37,7 @@ void add_counts(viewer::ReportPage& page, const lab::TargetCount& count, std::si
 
 void add_misses(viewer::ReportPage& page, const lab::ResultsDocument& document) {
   page.section("Rows that do not hold");
-  const auto misses = lab::miss_lines(document);
+  const auto misses = lab::list_misses(document);
   for (const std::string& line : misses) page.text(line);
   if (misses.empty()) page.text("None.");
 }

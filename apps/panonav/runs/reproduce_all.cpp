@@ -164,7 +164,7 @@ ExitCode reproduce_all(const ReproduceArguments& wanted, Session& session) {
     session.print(json.substr(0, json.size() - 1));
     return ExitCode::done;
   }
-  for (const std::string& line : lab::miss_lines(document)) {
+  for (const std::string& line : lab::list_misses(document)) {
     session.print(session.bad("DOES NOT HOLD") + "  " + line);
   }
   const lab::TargetCount count = lab::count_targets(document);

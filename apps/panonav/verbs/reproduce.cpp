@@ -12,11 +12,11 @@ namespace {
 // "-0.056 (..)  holds", a line each.
 void print_rows(const lab::Reproduction& reproduction, Session& session) {
   for (const lab::ResultRow& row : reproduction.rows) {
-    std::string line = "  " + row.what + ": " + session.strong(lab::shown_figure(row));
+    std::string line = "  " + row.what + ": " + session.strong(lab::format_figure(row));
     if (row.target) {
-      line +=
-          "  " + (row.holds() ? session.good("holds")
-                              : session.bad("DOES NOT HOLD") + ", missed " + lab::miss_text(row));
+      line += "  " + (row.holds()
+                          ? session.good("holds")
+                          : session.bad("DOES NOT HOLD") + ", missed " + lab::explain_miss(row));
     }
     session.print(line);
   }

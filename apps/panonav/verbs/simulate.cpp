@@ -52,7 +52,7 @@ void apply_shorthands(const Arguments& arguments, SimulateArguments& wanted) {
     recording.poses = static_cast<int>(*wanted.random);
   }
   if (arguments.given("recording", "heading")) return;
-  recording.heading = simulation::usual_heading(recording.path);
+  recording.heading = simulation::default_heading(recording.path);
 }
 
 std::vector<simulation::RecordedPose> poses_of_file(const std::string& path,

@@ -44,11 +44,11 @@ void add_wall_with_doors(SceneBuilder& builder, const std::string& name, const C
     const bool along_x = from.y_m == to.y_m;
     const double a = along_x ? from.x_m : from.y_m;
     const double b = along_x ? to.x_m : to.y_m;
-    constexpr double kHalfDoor = 0.45;
-    for (double at = 2.0 * std::ceil(0.5 * (std::min(a, b) + kHalfDoor));
-         at <= std::max(a, b) - kHalfDoor; at += 2.0) {
-      builder.on_wall(name + " door", look.door, from, to, std::abs(at - a) - kHalfDoor,
-                      2.0 * kHalfDoor, 0.0, 2.05);
+    constexpr double half_door_m = 0.45;
+    for (double at = 2.0 * std::ceil(0.5 * (std::min(a, b) + half_door_m));
+         at <= std::max(a, b) - half_door_m; at += 2.0) {
+      builder.on_wall(name + " door", look.door, from, to, std::abs(at - a) - half_door_m,
+                      2.0 * half_door_m, 0.0, 2.05);
     }
   }
 }

@@ -89,7 +89,7 @@ void split(const Corners& corners, const Spacing& spacing, std::vector<Corners>&
 }
 
 // How far an obstacle may be to darken a surface, in spacings.
-constexpr double kReach = 5.0;
+constexpr double occlusion_spacings = 5.0;
 
 // Where light is computed: a point a little above one side of a surface.
 struct LightPoint {
@@ -117,7 +117,7 @@ struct PointKeyHash {
 
 // Points nearer to each other than a tenth of the spacing, on surfaces that look the same way,
 // share their light.
-PointKey key_of(const Float3& position, const Float3& normal, float spacing_m) {
+PointKey make_key(const Float3& position, const Float3& normal, float spacing_m) {
   PointKey key;
   for (int i = 0; i < 3; ++i) {
     key.cells[i] = static_cast<std::int32_t>(std::lround(position[i] * 10.0F / spacing_m));
@@ -149,7 +149,7 @@ class LightProbe {
         tracer_(tracer),
         lit_(lit),
         shadows_(shadows),
-        reach_m_(static_cast<float>(kReach * spacing_m)),
+        reach_m_(static_cast<float>(occlusion_spacings * spacing_m)),
         spacing_(scene, spacing_m),
         directions_(hemisphere(24)) {}
 
@@ -182,15 +182,15 @@ class LightProbe {
                               float distance_m) const {
     const float cosine = dot(normal, direction);
     if (cosine <= 0.0F) return 0.0F;
-    if (shadows_ && !passes({position, direction}, distance_m)) return 0.0F;
+    if (shadows_ && !is_unblocked({position, direction}, distance_m)) return 0.0F;
     return cosine;
   }
 
   // Lamps and skies do not throw shadows on what they light.
-  [[nodiscard]] bool passes(Ray ray, float distance_m) const {
+  [[nodiscard]] bool is_unblocked(Ray ray, float distance_m) const {
     for (int surfaces = 0; surfaces < 4; ++surfaces) {
       const RayHit hit = tracer_.first_hit(ray);
-      if (hit.triangle == RayHit::kNothing || hit.distance_m >= distance_m) return true;
+      if (hit.triangle == RayHit::no_triangle || hit.distance_m >= distance_m) return true;
       if (emission_of(hit) < 0.5F) return false;
       const float step = hit.distance_m + 1e-3F * reach_m_;
       ray.origin = ray.origin + step * ray.direction;
@@ -213,8 +213,8 @@ class LightProbe {
     for (const Float3& d : directions_) {
       const Float3 direction = d[0] * tangent + d[1] * bitangent + d[2] * normal;
       const RayHit hit = tracer_.first_hit({position, direction});
-      const bool open =
-          hit.triangle == RayHit::kNothing || hit.distance_m >= reach_m_ || emission_of(hit) > 0.5F;
+      const bool open = hit.triangle == RayHit::no_triangle || hit.distance_m >= reach_m_ ||
+                        emission_of(hit) > 0.5F;
       sum += open ? 1.0F : hit.distance_m / reach_m_;
     }
     return sum / static_cast<float>(directions_.size());
@@ -287,7 +287,7 @@ void bake_light(const Scene& scene, const RayTracer& tracer, bool shadows, doubl
   std::unordered_map<PointKey, std::uint32_t, PointKeyHash> known;
   std::vector<std::array<std::uint32_t, 6>> points_of(lit.triangles.size());
   const auto point_index = [&](const Float3& position, const Float3& normal) {
-    const auto [entry, fresh] = known.try_emplace(key_of(position, normal, spacing.at(position)),
+    const auto [entry, fresh] = known.try_emplace(make_key(position, normal, spacing.at(position)),
                                                   static_cast<std::uint32_t>(points.size()));
     if (fresh) points.push_back({position, normal});
     return entry->second;

@@ -44,7 +44,7 @@ constexpr std::array<NamedColour, 21> gazebo_colours{{
 }};
 
 // Words of a script; braces stand alone, comments are left out.
-std::vector<std::string> words_of(const fs::path& file) {
+std::vector<std::string> split_words(const fs::path& file) {
   require_scene_file(file);
   std::ifstream stream(file);
   std::vector<std::string> words;
@@ -67,8 +67,8 @@ std::vector<std::string> words_of(const fs::path& file) {
   return words;
 }
 
-std::optional<std::array<float, 3>> colour_at(const std::vector<std::string>& words,
-                                              std::size_t first) {
+std::optional<std::array<float, 3>> parse_colour(const std::vector<std::string>& words,
+                                                 std::size_t first) {
   std::array<float, 3> colour{};
   for (std::size_t i = 0; i < 3; ++i) {
     if (first + i >= words.size()) return std::nullopt;
@@ -80,7 +80,7 @@ std::optional<std::array<float, 3>> colour_at(const std::vector<std::string>& wo
 }
 
 std::optional<ScriptMaterial> find_in_file(std::string_view name, const fs::path& file) {
-  const std::vector<std::string> words = words_of(file);
+  const std::vector<std::string> words = split_words(file);
   for (std::size_t i = 0; i + 1 < words.size(); ++i) {
     if (words[i] != "material" || words[i + 1] != name) continue;
     ScriptMaterial material;
@@ -90,8 +90,9 @@ std::optional<ScriptMaterial> find_in_file(std::string_view name, const fs::path
       if (words[k] == "{") ++depth;
       if (words[k] == "}" && --depth <= 0) break;
       if (k + 1 >= words.size()) break;
-      if (words[k] == "diffuse" && !material.diffuse) material.diffuse = colour_at(words, k + 1);
-      if (words[k] == "emissive" && !material.emissive) material.emissive = colour_at(words, k + 1);
+      if (words[k] == "diffuse" && !material.diffuse) material.diffuse = parse_colour(words, k + 1);
+      if (words[k] == "emissive" && !material.emissive)
+        material.emissive = parse_colour(words, k + 1);
       if (words[k] == "texture" && material.texture.empty()) material.texture = words[k + 1];
     }
     return material;

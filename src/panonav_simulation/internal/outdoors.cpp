@@ -18,26 +18,26 @@ void add_sky(SceneBuilder& builder, Point2 centre, double radius_m) {
   Mesh mesh;
   mesh.object = "sky";
   mesh.material = builder.textured(sky_texture(builder.random(), 512, 256), 1.0F);
-  constexpr int kFacets = 48;
-  constexpr int kRings = 16;
-  constexpr double kLowest = -0.05;
-  for (int ring = 0; ring <= kRings; ++ring) {
-    const double share = static_cast<double>(ring) / kRings;
-    const double elevation = kLowest + share * (0.5 * std::numbers::pi - kLowest);
-    for (int i = 0; i <= kFacets; ++i) {
-      const double angle = 2.0 * std::numbers::pi * i / kFacets;
+  constexpr int facets = 48;
+  constexpr int rings = 16;
+  constexpr double lowest = -0.05;
+  for (int ring = 0; ring <= rings; ++ring) {
+    const double share = static_cast<double>(ring) / rings;
+    const double elevation = lowest + share * (0.5 * std::numbers::pi - lowest);
+    for (int i = 0; i <= facets; ++i) {
+      const double angle = 2.0 * std::numbers::pi * i / facets;
       const double flat_m = radius_m * std::cos(elevation);
       mesh.vertices.push_back({centre.x_m + flat_m * std::cos(angle),
                                centre.y_m + flat_m * std::sin(angle),
                                radius_m * std::sin(elevation)});
       mesh.texture_coordinates.push_back(
-          {static_cast<float>(i) / kFacets, static_cast<float>(0.01 + 0.98 * share)});
+          {static_cast<float>(i) / facets, static_cast<float>(0.01 + 0.98 * share)});
     }
   }
-  for (int ring = 0; ring < kRings; ++ring) {
-    for (int i = 0; i < kFacets; ++i) {
-      const auto a = static_cast<std::uint32_t>(ring * (kFacets + 1) + i);
-      const std::uint32_t b = a + kFacets + 1;
+  for (int ring = 0; ring < rings; ++ring) {
+    for (int i = 0; i < facets; ++i) {
+      const auto a = static_cast<std::uint32_t>(ring * (facets + 1) + i);
+      const std::uint32_t b = a + facets + 1;
       mesh.triangles.push_back({a, a + 1, b + 1});
       mesh.triangles.push_back({a, b + 1, b});
     }
@@ -139,18 +139,19 @@ void add_trees_and_boxes(SceneBuilder& builder, const FloorArea& plot) {
     } while (!builder.leaves_tour_free(at, radius_m));
     return at;
   };
-  constexpr double kTrunk = 0.4;
-  constexpr double kBox = 0.7;
+  constexpr double tree_clearance_m = 0.4;
+  constexpr double crate_clearance_m = 0.7;
   for (int i = 0; i < 7; ++i) {
-    const Footing wanted{place(kTrunk), 0.0};
+    const Footing wanted{place(tree_clearance_m), 0.0};
     const double height_m = random.uniform(2.0, 4.5);
     const TreeKind kind = make_tree_kind(builder);
     add_tree(builder, "tree " + std::to_string(i), kind,
-             builder.movable(wanted, kTrunk, plot).centre, height_m);
+             builder.movable(wanted, tree_clearance_m, plot).centre, height_m);
   }
   for (int i = 0; i < 5; ++i) {
-    const Footing wanted{place(kBox), random.uniform(-3.0, 3.0)};
-    add_crate(builder, "flower box " + std::to_string(i), builder.movable(wanted, kBox, plot),
+    const Footing wanted{place(crate_clearance_m), random.uniform(-3.0, 3.0)};
+    add_crate(builder, "flower box " + std::to_string(i),
+              builder.movable(wanted, crate_clearance_m, plot),
               {random.uniform(0.4, 1.2), random.uniform(0.3, 0.6), random.uniform(0.3, 0.8)});
   }
 }

@@ -16,7 +16,7 @@ namespace panonav::simulation {
 
 namespace {
 
-constexpr float kNoLimit = std::numeric_limits<float>::infinity();
+constexpr float unlimited_distance_m = std::numeric_limits<float>::infinity();
 
 // The calls that differ between the major versions.
 #if PANONAV_EMBREE_MAJOR >= 4
@@ -125,7 +125,7 @@ void RayTracer::trace(std::span<const Ray> rays, std::span<RayHit> hits) const {
       packet.ray.dir_y[i] = ray.direction[1];
       packet.ray.dir_z[i] = ray.direction[2];
       packet.ray.time[i] = 0.0F;
-      packet.ray.tfar[i] = kNoLimit;
+      packet.ray.tfar[i] = unlimited_distance_m;
       packet.ray.mask[i] = 0xFFFFFFFFU;
       packet.ray.id[i] = 0;
       packet.ray.flags[i] = 0;
@@ -144,7 +144,7 @@ void RayTracer::trace(std::span<const Ray> rays, std::span<RayHit> hits) const {
 
 RayHit RayTracer::first_hit(const Ray& ray) const {
   RTCRayHit r{};
-  r.ray = to_embree(ray, kNoLimit);
+  r.ray = to_embree(ray, unlimited_distance_m);
   r.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   r.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   intersect_one(handles_->scene, &r);

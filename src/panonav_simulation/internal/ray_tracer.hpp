@@ -15,11 +15,11 @@ struct Ray {
 };
 
 struct RayHit {
-  static constexpr std::uint32_t kNothing = 0xFFFFFFFFU;
+  static constexpr std::uint32_t no_triangle = 0xFFFFFFFFU;
   float distance_m = 0.0F;
   float u = 0.0F;  ///< weight of the triangle's second corner
   float v = 0.0F;  ///< weight of its third
-  std::uint32_t triangle = kNothing;
+  std::uint32_t triangle = no_triangle;
 };
 
 /// Embree behind plain values. Immutable once built, so any number of threads may trace.

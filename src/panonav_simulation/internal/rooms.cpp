@@ -14,11 +14,11 @@ namespace panonav::simulation {
 
 namespace {
 
-constexpr double kQuarterTurn = 0.5 * std::numbers::pi;
+constexpr double quarter_turn_rad = 0.5 * std::numbers::pi;
 
 // Numbers that stand for kinds of furniture in `furnish_row`.
-constexpr double kDesks = 0.15;
-constexpr double kShelves = 0.6;
+constexpr double desk_kind = 0.15;
+constexpr double shelf_kind = 0.6;
 
 // A row of furniture along a straight line, in random order and spacing, facing `turn_rad`. It
 // begins with things of `first_kind`, if that is given.
@@ -81,10 +81,10 @@ void furnish_walls(SceneBuilder& builder, const FloorArea& room, double depth_m,
   const Point2 b{room.high.x_m - depth_m, room.low.y_m + depth_m};
   const Point2 c{room.high.x_m - depth_m, room.high.y_m - depth_m};
   const Point2 d{room.low.x_m + depth_m, room.high.y_m - depth_m};
-  furnish_row(builder, room, "south", a, b, 2.0 * kQuarterTurn, beginnings.south);
-  furnish_row(builder, room, "east", b, c, -kQuarterTurn, std::nullopt);
+  furnish_row(builder, room, "south", a, b, 2.0 * quarter_turn_rad, beginnings.south);
+  furnish_row(builder, room, "east", b, c, -quarter_turn_rad, std::nullopt);
   furnish_row(builder, room, "north", c, d, 0.0, beginnings.north);
-  furnish_row(builder, room, "west", d, a, kQuarterTurn, std::nullopt);
+  furnish_row(builder, room, "west", d, a, quarter_turn_rad, std::nullopt);
 }
 
 // Some lamps shine and some hardly: from `weakest` to `strongest`.
@@ -150,11 +150,11 @@ Scene make_office(const SceneVariation& variation) {
   scene.drivable = {{{-0.25, -0.25}, {5.25, 2.25}}};
   scene.ambient = 0.4F;
   const FloorArea room{{-1.6, -1.5}, {6.6, 3.5}};
-  constexpr double kHeight = 2.6;
-  furnish_room_shell(builder, room, kHeight);
+  constexpr double room_height_m = 2.6;
+  furnish_room_shell(builder, room, room_height_m);
   // So near to the walls that the chairs before the desks leave the 5 x 2 m free.
-  furnish_walls(builder, room, 0.5, {kDesks, kShelves});
-  add_lamps(builder, room, kHeight, 2.5);
+  furnish_walls(builder, room, 0.5, {desk_kind, shelf_kind});
+  add_lamps(builder, room, room_height_m, 2.5);
   scene.tour = {{0.3, 0.3}, {4.7, 0.3}, {4.7, 1.7}, {0.3, 1.7}};
   return builder.finish();
 }
@@ -167,10 +167,10 @@ Scene make_lab(const SceneVariation& variation) {
   scene.drivable = {{{0.9, 1.2}, {6.1, 3.8}}};
   scene.ambient = 0.4F;
   const FloorArea room{{0.0, 0.0}, {7.0, 5.0}};
-  constexpr double kHeight = 2.8;
-  furnish_room_shell(builder, room, kHeight);
+  constexpr double room_height_m = 2.8;
+  furnish_room_shell(builder, room, room_height_m);
   furnish_walls(builder, room, 0.5);
-  add_lamps(builder, room, kHeight, 2.5);
+  add_lamps(builder, room, room_height_m, 2.5);
   scene.tour = {{1.6, 1.6}, {5.4, 1.6}, {5.4, 3.4}, {1.6, 3.4}};
   return builder.finish();
 }
@@ -184,11 +184,11 @@ Scene make_hall(const SceneVariation& variation, bool periodic) {
   scene.drivable = {{{-0.3, -0.3}, {7.3, 7.3}}};
   scene.ambient = 0.4F;
   const FloorArea room{{-2.0, -2.0}, {9.0, 9.0}};
-  constexpr double kHeight = 3.5;
+  constexpr double room_height_m = 3.5;
   if (!periodic) {
-    furnish_room_shell(builder, room, kHeight);
+    furnish_room_shell(builder, room, room_height_m);
     furnish_walls(builder, room, 0.9);
-    add_lamps(builder, room, kHeight, 3.0);
+    add_lamps(builder, room, room_height_m, 3.0);
     scene.tour = {{0.5, 0.5}, {6.5, 0.5}, {6.5, 6.5}, {0.5, 6.5}};
     return builder.finish();
   }
@@ -198,7 +198,7 @@ Scene make_hall(const SceneVariation& variation, bool periodic) {
   const Colour tile = tint(random, 0.3, 0.6, 0.1);
   builder.floor(builder.textured(brick_texture(random, 128, 2, 2, tile, joint)), room.low,
                 room.high, 1.0);
-  builder.ceiling(builder.plain({0.85F, 0.85F, 0.83F}), room.low, room.high, kHeight, 1.0);
+  builder.ceiling(builder.plain({0.85F, 0.85F, 0.83F}), room.low, room.high, room_height_m, 1.0);
   const int plaster =
       builder.textured(noise_texture(random, 128, tint(random, 0.45, 0.8, 0.1), 0.05));
   const int poster = builder.textured(poster_texture(random, 128));
@@ -207,12 +207,12 @@ Scene make_hall(const SceneVariation& variation, bool periodic) {
   const std::array<Point2, 4> corners{room.low, Point2{room.high.x_m, room.low.y_m}, room.high,
                                       Point2{room.low.x_m, room.high.y_m}};
   for (std::size_t i = 0; i < 4; ++i) {
-    add_periodic_wall(builder, {plaster, poster, door, stone, kHeight}, i, corners[i],
+    add_periodic_wall(builder, {plaster, poster, door, stone, room_height_m}, i, corners[i],
                       corners[(i + 1) % 4]);
   }
   builder.on_wall("clock", builder.textured(poster_texture(random, 64)), corners[2], corners[3],
                   4.65, 0.6, 2.0, 2.6);
-  add_lamps(builder, room, kHeight, 3.0, 0.6, 0.6);
+  add_lamps(builder, room, room_height_m, 3.0, 0.6, 0.6);
   scene.tour = {{0.5, 0.5}, {6.5, 0.5}, {6.5, 6.5}, {0.5, 6.5}};
   return builder.finish();
 }

@@ -7,10 +7,10 @@ namespace panonav::simulation {
 
 namespace {
 
-constexpr std::array<float, 3> kGreyWeights{0.299F, 0.587F, 0.114F};  // ITU-R BT.601
+constexpr std::array<float, 3> grey_weights{0.299F, 0.587F, 0.114F};  // ITU-R BT.601
 
 float grey(const std::array<float, 3>& colour) {
-  return kGreyWeights[0] * colour[0] + kGreyWeights[1] * colour[1] + kGreyWeights[2] * colour[2];
+  return grey_weights[0] * colour[0] + grey_weights[1] * colour[1] + grey_weights[2] * colour[2];
 }
 
 }  // namespace
