@@ -46,10 +46,10 @@ std::vector<Walk> walks(const Corridor& corridor, const lab::RunCondition& condi
       truth.push_back(step.truth);
       walk.scans.push_back(scan_at(*corridor.place.renderer, step.truth));
     }
-    const auto told = simulation::simulate_odometry(truth, OdometryNoise{}, seed + made.size());
+    const auto readings = simulation::simulate_odometry(truth, OdometryNoise{}, seed + made.size());
     walk.odometry.push_back({});
-    for (std::size_t i = 1; i < told.size(); ++i) {
-      walk.odometry.push_back(inverse(told[i - 1]) * told[i]);
+    for (std::size_t i = 1; i < readings.size(); ++i) {
+      walk.odometry.push_back(inverse(readings[i - 1]) * readings[i]);
     }
     walk.run = std::move(run);
     made.push_back(std::move(walk));

@@ -122,7 +122,7 @@ void time_first_image(benchmark::State& state, const lab::TrackingPlace& place,
   state.counters["compared"] = compared / static_cast<double>(state.iterations());
 }
 
-/// What an update holds beside the particles: the search of the memory alone.
+/// Measures the part of an update without particles: the search of the memory alone.
 void time_search(benchmark::State& state, const lab::TrackingPlace& place,
                  const std::vector<Walk>& walks) {
   std::size_t i = 0;

@@ -169,7 +169,7 @@ std::size_t exact_ef(const ViewSet& set, GraphRival& graph) {
   return 0;
 }
 
-/// What is not installed is null within.
+/// A rival; null if it is not installed.
 struct KeptRival {
   std::unique_ptr<Rival> rival;
   std::size_t ef = 0;

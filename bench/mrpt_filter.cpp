@@ -67,7 +67,7 @@ class MrptFilter final : public ScanFilter {
     algorithm_.m_options.BETA = 0.5;
     algorithm_.m_options.sampleSize = static_cast<unsigned>(particles);
     algorithm_.m_options.resamplingMethod = mrpt::bayes::CParticleFilter::prSystematic;
-    // As our own filter takes the same odometry.
+    // Our own filter uses the same odometry.
     const OdometryNoise noise;
     motion_.modelSelection = mrpt::obs::CActionRobotMovement2D::mmGaussian;
     motion_.gaussianModel = {noise.translation_from_translation,

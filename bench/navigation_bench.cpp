@@ -1,4 +1,4 @@
-// What planning and a step cost over 10,000 references in 50 rooms, and what is held in memory.
+// Measures planning and a step over 10,000 references in 50 rooms, and the memory that they use.
 #include <benchmark/benchmark.h>
 #include <unistd.h>
 

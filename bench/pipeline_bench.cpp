@@ -1,5 +1,5 @@
-// What the facade costs beside the methods under it: pictures a second, and the first answer of a
-// large memory file with everything that comes before it. One core.
+// Measures the facade: images per second, and the first answer of a large memory file with its
+// preparation. One core.
 
 #include <benchmark/benchmark.h>
 #include <unistd.h>
@@ -203,8 +203,8 @@ class LargeFile {
   std::filesystem::path path_;
 };
 
-/// From the path of a file in the system's cache to the first answer; with the models that the file
-/// keeps, or with models learnt anew, as for a file of an older version.
+/// Measures the time from a file in the system's cache to the first answer, with the models of the
+/// file or with models learnt again.
 void first_answer(benchmark::State& state, bool kept) {
   const LargeFile large(static_cast<int>(state.range(0)));
   MemoryFile file = MemoryFile::open(large.path(), Access::read_write);

@@ -42,15 +42,15 @@ struct Remembering {
 };
 constexpr std::array<Remembering, 5> rememberings{
     {{1, full_components}, {4, full_components}, {1, 6}, {4, 6}, {1, 2}}};
-// The logistic regression learns from memories of at least so many components. With fewer, it
+// Components of a memory from which the logistic regression learns, at least. With fewer, it
 // learns what built-in scenes differ in and others do not; the last coefficient is then chosen so
 // that of the places of other scenes at most this share is known.
 constexpr int min_learnt_components = 6;
 constexpr double max_others_known = 0.005;
 constexpr int queries = 40;
 constexpr std::size_t asked_of_others = 6;
-// Of variants, for what is learnt of features: hardly a sixth of them leave doubt, and most of
-// these are of one kind.
+// Queries of variants from which the feature model learns: hardly a sixth of them are inconclusive,
+// and most of these are of one kind.
 constexpr std::size_t asked_of_variants = 20;
 
 enum class Whose { own, variant, other };
@@ -145,7 +145,7 @@ std::array<double, 3> counts_of(const std::vector<Sample>& samples) {
   return counts;
 }
 
-// What one query teaches, and how much it counts.
+// Training sample of one query, with its weight.
 template <int size>
 struct Lesson {
   Vector<size> x;
@@ -154,7 +154,7 @@ struct Lesson {
   std::size_t kind;
 };
 
-// Of the samples with numbers; shares are those of all.
+// Returns the training samples of the samples with numbers; shares are those of all.
 template <int size>
 std::vector<Lesson<size>> lessons_of(
     const std::vector<Sample>& samples,
@@ -191,8 +191,8 @@ Vector<size> learn(const std::vector<Lesson<size>>& lessons) {
   return weights;
 }
 
-// What features tell differs more from one kind of scene to another than what columns tell. The log
-// odds are shrunk as much as those learnt without a kind must be to be right of it.
+// Learns from features, whose evidence differs more between kinds of scenes than that of columns.
+// The log odds are shrunk by the factor that corrects those learnt without a kind for it.
 Vector<feature_term_count> learn_of_features(
     const std::vector<Lesson<feature_term_count>>& lessons) {
   std::vector<Lesson<2>> left_out;
@@ -217,26 +217,26 @@ Vector<feature_term_count> learn_of_features(
   return weights;
 }
 
-// Of answers in each tenth: how many, weighted as in `learn`, and how many of them are own places;
-// and what is known of each scene.
+// Prints the weighted number of answers in each tenth, the share of own places, and the known share
+// of each scene.
 template <class Probability>
 void report(const char* title, const std::vector<Sample>& samples, const Probability& probability) {
   const std::array<double, 3> counts = counts_of(samples);
   std::array<std::array<double, 3>, 10> tenths{};
-  std::array<double, 3> taken{};
+  std::array<double, 3> known_rates{};
   std::array<std::array<std::array<int, 2>, 4>, kinds.size()> scenes{};  // asked, known
   for (const Sample& sample : samples) {
     const double p = probability(sample.evidence);
     const auto w = static_cast<std::size_t>(sample.whose);
-    taken[w] += (p >= 0.5 ? 1.0 : 0.0) / counts[w];
+    known_rates[w] += (p >= 0.5 ? 1.0 : 0.0) / counts[w];
     tenths[std::min<std::size_t>(9, static_cast<std::size_t>(10.0 * p))][w] +=
         1.0 / 3.0 / counts[w];
     const std::size_t column = sample.whose == Whose::own ? (sample.disturbed ? 1 : 0) : w + 1;
     ++scenes[sample.kind][column][0];
     scenes[sample.kind][column][1] += p >= 0.5 ? 1 : 0;
   }
-  std::printf("  %s: known are %.3f of own, %.3f of variants, %.4f of others\n", title, taken[0],
-              taken[1], taken[2]);
+  std::printf("  %s: known are %.3f of own, %.3f of variants, %.4f of others\n", title,
+              known_rates[0], known_rates[1], known_rates[2]);
   for (std::size_t t = 0; t < tenths.size(); ++t) {
     const double all = tenths[t][0] + tenths[t][1] + tenths[t][2];
     std::printf("    %.1f .. %.1f: %.4f of answers, %.2f of them own\n",

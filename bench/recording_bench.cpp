@@ -1,6 +1,6 @@
-// How fast recordings are read and written. Set TMPDIR to a folder in memory (/dev/shm), or writing
-// is as fast as the disk. Beside it, what `node tests/io/mcap_core.mjs speed FILE` says of the
-// reference library.
+// Measures reading and writing of recordings. Set TMPDIR to a folder in memory (/dev/shm), or
+// writing is as fast as the disk. Beside it, what `node tests/io/mcap_core.mjs speed FILE` says of
+// the reference library.
 #include <benchmark/benchmark.h>
 #include <unistd.h>
 

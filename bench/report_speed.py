@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """How fast a report opens and scrubs in Chromium: report_speed.py PANONAV [PICTURES]
 
-A drive of so many pictures (1000) through a hall, tracked; its page opened from its file until the first panorama is
+A drive of N pictures (1000) through a hall, tracked; its page opened from its file until the first panorama is
 drawn, the best of three, and its slider moved 150 times, once a frame. Needs the browser of tests/viewer.
 """
 import json

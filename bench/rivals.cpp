@@ -25,12 +25,12 @@ class Scan final : public Rival {
 
   std::vector<std::uint32_t> nearest(std::span<const std::uint8_t> query,
                                      std::size_t top) override {
-    const std::vector<Value> wanted(query.begin(), query.end());
+    const std::vector<Value> values(query.begin(), query.end());
     const std::size_t count = views_.size() / dimensions_;
     std::vector<std::pair<Sum, std::uint32_t>> heap;
     for (std::size_t i = 0; i < count; ++i) {
       const Value* const view = views_.data() + i * dimensions_;
-      const Value* const other = wanted.data();
+      const Value* const other = values.data();
       Sum sum = 0;
       for (std::size_t j = 0; j < dimensions_; ++j) {
         sum += static_cast<Sum>(std::abs(view[j] - other[j]));
@@ -77,10 +77,10 @@ class Faiss final : public Rival {
   }
   std::vector<std::uint32_t> nearest(std::span<const std::uint8_t> query,
                                      std::size_t top) override {
-    const std::vector<float> wanted(query.begin(), query.end());
+    const std::vector<float> values(query.begin(), query.end());
     std::vector<float> distances(top);
     std::vector<faiss::Index::idx_t> labels(top);
-    index_.search(1, wanted.data(), static_cast<faiss::Index::idx_t>(top), distances.data(),
+    index_.search(1, values.data(), static_cast<faiss::Index::idx_t>(top), distances.data(),
                   labels.data());
     return {labels.begin(), labels.end()};
   }

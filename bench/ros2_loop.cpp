@@ -187,11 +187,11 @@ struct Judge {
           }
           ++pictures;
         });
-    hear<recordings::ros::DiagnosticArray>("panonav/goal/result",
-                                           [this](const recordings::ros::DiagnosticArray& message) {
-                                             const std::string told = message.status.at(0).message;
-                                             if (told != "another goal") result = told;
-                                           });
+    hear<recordings::ros::DiagnosticArray>(
+        "panonav/goal/result", [this](const recordings::ros::DiagnosticArray& message) {
+          const std::string status = message.status.at(0).message;
+          if (status != "another goal") result = status;
+        });
     hear<recordings::ros::DiagnosticArray>(
         "panonav/goal/feedback", [this](const recordings::ros::DiagnosticArray& message) {
           ++feedback;
@@ -227,7 +227,7 @@ struct Judge {
     set_pose.publish(in_map(to));
     until(1.0, [] { return false; });
   }
-  [[nodiscard]] Pose2 told() const { return map_from_odom * odom_from_base; }
+  [[nodiscard]] Pose2 estimate() const { return map_from_odom * odom_from_base; }
 
   Participant participant;
   Publisher<recordings::ros::PoseStamped> set_pose{participant, "set_pose"},
@@ -261,7 +261,7 @@ std::vector<StampedPose> teach(Judge& judge, const std::vector<Point2>& path,
     if (judge.now_s < next_s) return false;
     next_s = judge.now_s + 0.05;
     if (by_odometry.empty() || judge.now_s > by_odometry.back().stamp_s) {
-      by_odometry.push_back({judge.now_s, judge.told()});
+      by_odometry.push_back({judge.now_s, judge.estimate()});
     }
     const auto aim = follower.next_target(judge.truth.position());
     Velocity velocity;
@@ -350,13 +350,13 @@ class Loop {
     return true;
   }
 
-  // Whether the node finds itself again after the robot was carried away.
+  // True if the node relocalises after the robot was carried away.
   bool kidnap(int number, Random& random) {
     const Taught& place = taught_[random.index(taught_.size())];
     judge_.carry(place.truth * Pose2{0.0, 0.0, random.uniform(-3.0, 3.0)});
     wait(1.0);
     const double start_s = judge_.now_s;
-    const auto off_m = [&] { return distance(judge_.told().position(), place.map.position()); };
+    const auto off_m = [&] { return distance(judge_.estimate().position(), place.map.position()); };
     const bool right =
         judge_.until(40.0, [&] { return judge_.state == "localised" && off_m() < 0.5; });
     printf("kidnapped %d: %s after %.1f s, %.2f m off, %s\n", number, right ? "found" : "not found",

@@ -182,7 +182,7 @@ std::string times(std::vector<double> ms) {
          " ms";
 }
 
-/// What is read from memory when nothing else is done.
+/// Measures the read bandwidth of the memory.
 double read_gb_per_s() {
   std::vector<std::uint64_t> bytes(std::size_t{64} << 20U, 1);
   double best = 0.0;

@@ -1,4 +1,4 @@
-// How long memories on a PostgreSQL server take: server_bench ADDRESS, without the parameter
+// Measures memories on a PostgreSQL server: server_bench ADDRESS, without the parameter
 // `memory`. Uploads 50,000 views of 80 x 15 in transactions of 1000, then reads areas of 200 views.
 // bench/server_bench.sh starts a server for it and keeps both on one core.
 #include <sys/resource.h>

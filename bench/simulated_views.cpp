@@ -51,20 +51,20 @@ struct Room {
   }
 };
 
-std::vector<Point2> grid_of(const Room& room, std::size_t most) {
+std::vector<Point2> grid_of(const Room& room, std::size_t max_places) {
   std::vector<Point2> places;
   for (double y = room.scene.floor_low.y_m; y <= room.scene.floor_high.y_m; y += spacing_m) {
     for (double x = room.scene.floor_low.x_m; x <= room.scene.floor_high.x_m; x += spacing_m) {
-      if (places.size() < most && room.is_free({x, y})) places.push_back({x, y});
+      if (places.size() < max_places && room.is_free({x, y})) places.push_back({x, y});
     }
   }
   return places;
 }
 
-std::vector<Point2> path_through(const Room& room, Random& random, std::size_t most) {
+std::vector<Point2> path_through(const Room& room, Random& random, std::size_t max_places) {
   std::vector<Point2> places{room.random_place(random)};
   double direction = random.uniform(0.0, 2.0 * std::numbers::pi);
-  while (places.size() < most) {
+  while (places.size() < max_places) {
     direction += random.uniform(-0.25, 0.25);
     const Point2 next{places.back().x_m + spacing_m * std::cos(direction),
                       places.back().y_m + spacing_m * std::sin(direction)};
@@ -117,9 +117,9 @@ ViewSet render(Places places, std::size_t views, std::size_t queries, std::uint6
   for (std::uint64_t seed = first_room; made < views; ++seed) {
     Random random(seed, 77);
     const Room room(kinds[seed % std::size(kinds)], seed);
-    const std::size_t most = std::min(max_per_room, views - made);
-    const std::vector<Point2> at =
-        places == Places::rooms ? grid_of(room, most) : path_through(room, random, most);
+    const std::size_t max_places = std::min(max_per_room, views - made);
+    const std::vector<Point2> at = places == Places::rooms ? grid_of(room, max_places)
+                                                           : path_through(room, random, max_places);
     for (const Point2 place : at) {
       const auto magnitudes = magnitudes_at(room, place, random, executor);
       view_magnitudes.insert(view_magnitudes.end(), magnitudes.begin(), magnitudes.end());
@@ -140,7 +140,7 @@ ViewSet render(Places places, std::size_t views, std::size_t queries, std::uint6
     std::fprintf(stderr, "\rrendered %zu of %zu views in %zu rooms ", made, views, rooms);
   }
   std::fprintf(stderr, "\n");
-  // As a memory does it: the scale comes from the first views, brighter ones saturate.
+  // The same as in a memory: the scale comes from the first views, brighter ones saturate.
   const auto first =
       static_cast<std::ptrdiff_t>(std::min(view_magnitudes.size(), 1000 * ViewSet::shape.size()));
   const float full_scale =

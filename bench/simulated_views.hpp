@@ -25,7 +25,7 @@ struct ViewSet {
   }
 };
 
-/// How the views of a set lie.
+/// Arrangement of the views of a set.
 enum class Places {
   rooms,   ///< 10 cm grids in 50 and more rooms
   paths,   ///< paths of hundreds of metres through rooms, one view every 10 cm

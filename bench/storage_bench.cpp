@@ -1,4 +1,4 @@
-// How long a memory file takes to load and to grow.
+// Measures loading and growing of a memory file.
 #include <benchmark/benchmark.h>
 #include <unistd.h>
 

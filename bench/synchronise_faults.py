@@ -151,7 +151,7 @@ class Server:
 
 
 class Ledger:
-    """What the robots told."""
+    """Changes that the robots reported."""
 
     def __init__(self):
         self.lock = threading.Lock()
@@ -246,7 +246,7 @@ def fill(folder):
 
 
 def told(program, memory):
-    """What a memory holds: name, signature, position, stamp, what lies beside it and links of each view."""
+    """Returns the contents of a memory: name, signature, position, stamp, what lies beside it and links of each view."""
     done = subprocess.run([program, "--gtest_filter=SynchronisedMemory.AMemoryIsTold"], capture_output=True, text=True,
                           env=os.environ | {"PANONAV_TEST_SERVER": "x", "PANONAV_TEST_TOLD": str(memory)})
     assert done.returncode == 0, done.stdout[-2000:]
@@ -374,7 +374,7 @@ def experiment(arguments, folder):
     doubled = [view for view, count in there.items() if count > 1]
     back = [view for view in ledger.removed if view in there]
     unknown = [view for view in there if view not in ledger.adding]
-    # Of views that one robot alone moved, and that are there: its last move counts, or one that it had begun since.
+    # Views moved by one robot alone that still exist: its last move counts, or one that it had begun since.
     moved, unmoved = 0, []
     for view, moves in ledger.moves.items():
         if view not in positions or len({robot for robot, _, _ in moves}) > 1 or not any(done for _, _, done in moves):

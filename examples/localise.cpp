@@ -1,4 +1,4 @@
-// Where was this picture taken?   localise office.panonav view.jpg
+// Localises an image:   localise office.panonav view.jpg
 #include <cstdio>
 #include <exception>
 

@@ -11,7 +11,7 @@
 
 namespace panonav::lab {
 
-/// What the experiments of all papers share. Each experiment appends rows and writes images.
+/// The context of all experiments. Each experiment appends rows and writes images.
 struct Experiments {
   const ReproductionOptions& options;
   Executor& executor;
@@ -59,8 +59,7 @@ struct MappingExperiments : Experiments {
   [[nodiscard]] simulation::PlaceRecording make_variant(const std::string& scene, int number) const;
 };
 
-/// Going somewhere over the memory. Each experiment appends rows and writes pictures into
-/// `options.out`.
+/// Navigation over the memory. Each experiment appends rows and writes pictures into
 struct NavigationExperiments : Experiments {
   /// [M04] figure 18: missions in a built-in scene whose references lie on a grid of `spacing_m`
   /// and are arranged by their similarity alone.

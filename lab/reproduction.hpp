@@ -19,7 +19,7 @@ struct MissionGrid {
   double spacing_m = 0.0;
 };
 
-/// How much of a paper's experiments is run. A paper reads the members that its experiments know;
+/// Extent of the experiments of a paper. A paper reads the members that its experiments know;
 /// `default_options` gives its own values.
 struct ReproductionOptions {
   std::filesystem::path out = {};  ///< folder for images; created if it does not exist
@@ -78,21 +78,11 @@ using ReproductionProgress = std::function<void(double fraction)>;
 /// Runs the experiments of a paper. Same options: same rows, except for times (units ms, us, s) and
 /// their ratios (unit x), and same images on any number of threads. Throws ContractError on an
 /// unknown paper or options out of range, OptionError, FileError.
-/// - m03: Monte-Carlo localisation as in [M03] section 4.1 and what its authors announced: global
-///   localisation, tracking without images, the kidnapped robot, numbers of particles and kinds of
-///   odometry; a corridor of identical doors, changing light outdoors, a robot that leaves the
-///   memorised area; Gazebo worlds and recordings
-/// - m04: localisation ([M04] figures 4 to 10, eq. 6) with table 1 of [M03] and the rivals in the
-///   office; the spring lattice (figures 12 and 15 to 17) in the hall; missions over such lattices
-///   (figure 18)
-/// - s06: visual homing ([S06] figures 3 and 6 to 16) over all pairs of places of the toy house
-///   arena, recorded twice; then closed-loop runs home in built-in scenes and Gazebo worlds, and
-///   chains of snapshots
-/// - f11: visual odometry and topological maps ([F11] figures 4 to 6), closed loops, maps of many
-///   views, other worlds and recordings
-/// - y03: route panoramas ([Y03] section 5): a drive across a straight path, in the scene as
-///   memorised and changed, by the direct fit and by the dual contours; sweeps; then routes of 60 m
-///   repeated in closed loop, their size in a file, a real route
+/// - m03: Monte-Carlo localisation [M03 section 4.1]
+/// - m04: localisation, the spring lattice and missions [M04]
+/// - s06: visual homing and chains of snapshots [S06]
+/// - f11: visual odometry and topological maps [F11]
+/// - y03: route panoramas [Y03]
 /// - navigation: what [M04] section 3.5 leaves to later work: drives mapped by visual odometry,
 /// other
 ///   light and moved objects, a kidnapped robot, tours, people, a recorded route, blocked edges

@@ -15,8 +15,6 @@
 
 namespace panonav::lab {
 
-// What the experiments report: rows of figures with their 95 % intervals, and pictures.
-
 /// A figure, with its interval where it is a statistic.
 struct Figure {
   double value = 0.0;
@@ -26,7 +24,7 @@ struct Figure {
   Figure(const Proportion& rate)  // NOLINT(google-explicit-constructor)
       : value(rate.value), interval(std::pair(rate.low, rate.high)) {}
 };
-/// With bootstrap intervals.
+/// Return mean and median with bootstrap intervals.
 [[nodiscard]] Figure mean_figure(std::span<const double> values, std::uint64_t seed = 1);
 [[nodiscard]] Figure median_figure(std::span<const double> values, std::uint64_t seed = 1);
 
@@ -37,31 +35,31 @@ ResultRow& add_row(Reproduction& result, const std::string& id, const std::strin
                    const Figure& ours, const std::string& unit,
                    std::optional<Target> target = std::nullopt,
                    std::optional<std::pair<double, double>> published = std::nullopt);
-/// A row of a rate with its Wilson interval; says of how many.
+/// Adds a rate with its Wilson interval and number of trials.
 void add_rate(Reproduction& result, const std::string& id, const std::string& what,
               std::size_t successes, std::size_t trials,
               std::optional<Target> target = std::nullopt);
-/// A row of a median; says of how many.
+/// Adds a median with its number of values.
 void add_median(Reproduction& result, const std::string& id, const std::string& what,
                 const std::string& unit, std::span<const double> values,
                 std::optional<Target> target = std::nullopt,
                 std::optional<std::pair<double, double>> published = std::nullopt);
-/// The same of a mean.
+/// Adds a mean with its number of values.
 void add_mean(Reproduction& result, const std::string& id, const std::string& what,
               const std::string& unit, std::span<const double> values);
 
-/// "2.5 cm".
+/// Returns "2.5 cm".
 [[nodiscard]] std::string format_centimetres(double distance_m);
-/// "2_5cm", for the names of rows.
+/// Returns "2_5cm", for the names of rows.
 [[nodiscard]] std::string format_centimetres_id(double distance_m);
 
-/// How many elements of a range fulfil a predicate.
+/// Counts the elements of a range that fulfil a predicate.
 template <typename Range, typename Predicate>
 [[nodiscard]] std::size_t count_where(const Range& range, Predicate predicate) {
   return static_cast<std::size_t>(std::ranges::count_if(range, predicate));
 }
 
-/// One more point of a curve, with its interval as error bar.
+/// Appends a point to a curve, with its interval as error bar.
 void add_point(viewer::Series& series, double x, const Figure& y);
 
 /// Writes a plot into the folder of the result and lists it.

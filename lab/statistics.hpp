@@ -7,25 +7,25 @@
 
 namespace panonav::lab {
 
-/// A share of trials and how certain it is.
+/// A share of trials with its interval.
 struct Proportion {
   double value = 0.0;  ///< successes / trials, 0 .. 1
   double low = 0.0;    ///< of the 95 % Wilson score interval
   double high = 0.0;   ///< of the same interval; exactly 1 where every trial succeeded
 };
-/// Throws ContractError unless 0 <= successes <= trials and trials >= 1.
+/// Computes a rate. Throws ContractError unless 0 <= successes <= trials and trials >= 1.
 [[nodiscard]] Proportion success_rate(std::size_t successes, std::size_t trials);
 
-/// 95 % percentile bootstrap interval of the median. Same seed, same bits.
+/// Returns the 95 % percentile bootstrap interval of the median. Same seed, same bits.
 [[nodiscard]] std::pair<double, double> median_interval(std::span<const double> values,
                                                         std::uint64_t seed, int samples = 1000);
 
-/// The same of the mean. For figures per scene: the scenes are what is drawn.
+/// Returns the same of the mean.
 [[nodiscard]] std::pair<double, double> mean_interval(std::span<const double> values,
                                                       std::uint64_t seed, int samples = 1000);
 
-/// Spearman's rank correlation, -1 .. 1; ties share their mean rank. Throws ContractError on
-/// different sizes or fewer than 3.
+/// Returns Spearman's rank correlation, -1 .. 1; ties share their mean rank. Throws ContractError
+/// on different sizes or fewer than 3.
 [[nodiscard]] double rank_correlation(std::span<const double> a, std::span<const double> b);
 
 }  // namespace panonav::lab

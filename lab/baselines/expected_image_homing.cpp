@@ -27,10 +27,10 @@ struct LatticePoint {
   [[nodiscard]] int square() const noexcept { return x * x + y * y; }
 };
 
-// Points of the square lattice by their distance from (0, 0), so many that more than `least` are
-// certain to be among them.
-std::vector<LatticePoint> lattice(int least) {
-  const int side = static_cast<int>(std::ceil(std::sqrt(static_cast<double>(least)))) + 1;
+// Returns points of the square lattice by their distance from (0, 0): more than `min_count` of
+// them.
+std::vector<LatticePoint> lattice(int min_count) {
+  const int side = static_cast<int>(std::ceil(std::sqrt(static_cast<double>(min_count)))) + 1;
   std::vector<LatticePoint> points;
   for (int y = -side; y <= side; ++y) {
     for (int x = -side; x <= side; ++x) {
@@ -183,7 +183,7 @@ HomeVector ExpectedImageHoming::home_vector(std::span<const float> home,
   vector.eta = static_cast<double>(positions_[best.position].eta);
   vector.heading_rad = wrap_angle(2.0 * std::numbers::pi * static_cast<double>(shift) / columns_);
   const double square = vector.xi * vector.xi + vector.eta * vector.eta;
-  // Of a position that may be anywhere in its square of the lattice.
+  // The position may be anywhere in its square of the lattice.
   vector.confidence = square / (square + spacing_ * spacing_ / 6.0);
   vector.frequencies = columns_ / 2.0;
   return vector;

@@ -27,12 +27,12 @@ class ExpectedImageHoming {
   explicit ExpectedImageHoming(int columns, int max_positions = 200);
 
   [[nodiscard]] int columns() const noexcept { return columns_; }
-  /// From (0, 0) outwards.
+  /// Returns the positions in order of their distance from (0, 0).
   [[nodiscard]] std::span<const Position> positions() const noexcept { return positions_; }
-  /// Of a square of the lattice, in units of R.
+  /// Returns the side of a square of the lattice, in units of R.
   [[nodiscard]] double spacing() const noexcept { return spacing_; }
 
-  /// The view from a position: entry i is the pixel of `current` that is seen at pixel i.
+  /// Returns the view from a position: entry i is the pixel of `current` that is seen at pixel i.
   [[nodiscard]] std::span<const std::uint16_t> pixels(std::size_t position) const noexcept {
     return std::span(table_).subspan(position * static_cast<std::size_t>(columns_),
                                      static_cast<std::size_t>(columns_));

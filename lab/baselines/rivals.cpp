@@ -26,7 +26,8 @@ void require_references(const std::vector<RivalView>& references) {
   }
 }
 
-// Index of the smallest value of `distance(i)`, the first of equals; `left_out` is not asked.
+// Returns the index of the smallest value of `distance(i)`, the first of equals, without
+// `left_out`.
 template <class Distance>
 std::size_t argmin(std::size_t count, std::optional<std::size_t> left_out,
                    const Distance& distance) {
@@ -112,8 +113,8 @@ Floats colour_histogram(const Image& view, int bins) {
   return counts;
 }
 
-// The zero-phase representation [Pajdla and Hlavac 1999]: the view is turned so that the phase of
-// its first harmonic, summed over rows, becomes zero.
+// Returns the zero-phase representation [Pajdla and Hlavac 1999]: the view is rotated so that the
+// phase of its first harmonic, summed over rows, becomes zero.
 Panorama turned_to_zero_phase(const Panorama& view) {
   std::complex<double> first{0.0, 0.0};
   for (int c = 0; c < view.columns(); ++c) {
@@ -126,8 +127,8 @@ Panorama turned_to_zero_phase(const Panorama& view) {
   return turn_columns(view, static_cast<int>(std::lround(-std::arg(first) * columns_per_radian)));
 }
 
-// Principal components of views turned to zero phase: eigenimages are not indifferent to a turn, so
-// the papers that use them turn the views to a canonical heading first.
+// Compares principal components of views rotated to zero phase. Eigenimages depend on the heading,
+// so the papers that use them rotate the views to a canonical heading first.
 class EigenimageRecogniser final : public RivalRecogniser {
  public:
   explicit EigenimageRecogniser(int dimensions) : dimensions_(dimensions) {
@@ -156,12 +157,12 @@ class EigenimageRecogniser final : public RivalRecogniser {
   }
   [[nodiscard]] std::size_t nearest(const RivalView& query,
                                     std::optional<std::size_t> left_out) const override {
-    const Eigen::VectorXf wanted = basis_.transpose() * (column(query.panorama) - mean_);
+    const Eigen::VectorXf coefficients = basis_.transpose() * (column(query.panorama) - mean_);
     return argmin(static_cast<std::size_t>(coefficients_.cols()), left_out, [&](std::size_t i) {
-      return (coefficients_.col(static_cast<Eigen::Index>(i)) - wanted).squaredNorm();
+      return (coefficients_.col(static_cast<Eigen::Index>(i)) - coefficients).squaredNorm();
     });
   }
-  /// Coefficients as floats, and this view's share of the eigenimages in bytes.
+  /// Returns the bytes of the coefficients and of this view's share of the eigenimages.
   [[nodiscard]] double bytes_per_view() const override {
     if (coefficients_.cols() == 0) return 0.0;
     return 4.0 * static_cast<double>(coefficients_.rows()) +
@@ -180,9 +181,8 @@ class EigenimageRecogniser final : public RivalRecogniser {
   Eigen::MatrixXf coefficients_;
 };
 
-// Every pixel, every turn by whole columns: the most that can be had from pixels, at the highest
-// price. The sum of squared differences over all turns comes from the full spectra, which is the
-// same and takes seconds instead of hours.
+// Compares all pixels at all rotations by whole columns. The sum of squared differences over all
+// rotations comes from the full spectra, which takes seconds instead of hours.
 class Spectra {
  public:
   struct Spectrum {
@@ -276,7 +276,7 @@ Panorama normalised(const Panorama& view) {
       }
       const double mean = sum / count;
       const double deviation = std::sqrt(std::max(0.0, squares / count - mean * mean));
-      // A patch without structure tells nothing.
+      // A patch without structure has no direction of change.
       result.at(y, c) =
           deviation > 1e-3 ? static_cast<float>((small.at(y, c) - mean) / deviation) : 0.0F;
     }
@@ -285,7 +285,7 @@ Panorama normalised(const Panorama& view) {
 }
 
 double difference(const Panorama& a, const Panorama& b) {
-  double least = std::numeric_limits<double>::infinity();
+  double min_difference = std::numeric_limits<double>::infinity();
   const auto columns = static_cast<std::size_t>(a.columns());
   for (std::size_t turn = 0; turn < columns; ++turn) {
     float sum = 0.0F;
@@ -299,9 +299,9 @@ double difference(const Panorama& a, const Panorama& b) {
         sum += std::abs(row_a[c + turn - columns] - row_b[c]);
       }
     }
-    least = std::min(least, static_cast<double>(sum));
+    min_difference = std::min(min_difference, static_cast<double>(sum));
   }
-  return least;
+  return min_difference;
 }
 
 }  // namespace

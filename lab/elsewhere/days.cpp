@@ -67,7 +67,7 @@ class RememberedPlace {
   Localiser localiser_;
 };
 
-/// A memory that is recorded again in a place as it is on that day.
+/// Records the memory again in the place as it is on that day.
 RememberedPlace record_again(simulation::PlaceRecording today, std::uint64_t seed,
                              Executor& executor) {
   std::vector<Pose2> grid;
@@ -80,10 +80,10 @@ RememberedPlace record_again(simulation::PlaceRecording today, std::uint64_t see
   return {std::move(memory), features};
 }
 
-/// How a robot spends its days.
+/// The daily path of a robot.
 enum class DailyDrive {
   errands,  ///< from one random place to the next
-  rounds,   ///< to the places that it has passed longest ago, the nearest of them first
+  rounds,   ///< to the least recently visited places, the nearest of them first
 };
 
 /// A robot that drives through a place day by day and takes a picture each spacing.
@@ -91,7 +91,7 @@ class DrivingRobot {
  public:
   explicit DrivingRobot(DailyDrive drive) : drive_(drive) {}
 
-  /// The poses of the day's pictures; the day begins anywhere.
+  /// Returns the poses of the images of a day, which begins at a random place.
   std::vector<Pose2> pass_day(const simulation::FreeSpace& space, int pictures, Random& random) {
     ++day_;
     std::vector<simulation::GridPosition> grid;
@@ -133,18 +133,18 @@ class DrivingRobot {
   static Square grid_square(Point2 p) {
     return {std::lround(p.x_m / spacing_m), std::lround(p.y_m / spacing_m)};
   }
-  /// Empty where the robot is at the only place that there is.
+  /// Returns the least recently visited place; nullopt where the robot is at the only place.
   [[nodiscard]] std::optional<Point2> find_least_recent(
       const std::vector<simulation::GridPosition>& grid, Point2 at) const {
     std::optional<Point2> best;
-    std::pair<int, double> least;
+    std::pair<int, double> best_rank;
     for (const simulation::GridPosition& place : grid) {
       const auto found = passed_.find(grid_square(place.position));
       const double distance_m = distance(place.position, at);
       const std::pair rank(found == passed_.end() ? 0 : found->second, distance_m);
-      if (distance_m < 0.5 * spacing_m || (best && least <= rank)) continue;
+      if (distance_m < 0.5 * spacing_m || (best && best_rank <= rank)) continue;
       best = place.position;
-      least = rank;
+      best_rank = rank;
     }
     return best;
   }
@@ -154,7 +154,7 @@ class DrivingRobot {
   std::map<Square, int> passed_;  ///< the day
 };
 
-/// Known places, and of these positions within one spacing of the truth.
+/// Positions of known places: within one spacing of the truth (right) or not.
 struct DayAnswers {
   std::size_t right = 0;
   std::size_t wrong = 0;
@@ -188,7 +188,7 @@ MemoryUpdate::AnsweredView make_run_view(const Pose2& odometry, const PackedSign
   return view;
 }
 
-/// What a robot learns in the course of the days.
+/// A robot that updates its memory day by day.
 class LearningRobot {
  public:
   LearningRobot(VisualMemory memory, Features features)
@@ -199,7 +199,7 @@ class LearningRobot {
   [[nodiscard]] std::size_t views() const noexcept { return memory_.size(); }
   [[nodiscard]] std::size_t added() const noexcept { return errors_m_.size(); }
   [[nodiscard]] std::size_t dropped() const noexcept { return dropped_; }
-  /// Of the poses with which views were learnt.
+  /// Returns the errors of the poses of learnt views, in metres.
   [[nodiscard]] const std::vector<double>& errors_m() const noexcept { return errors_m_; }
 
   void learn(const std::vector<simulation::PlacedView>& seen, std::uint64_t seed,
@@ -253,8 +253,8 @@ struct DailyRobot {
   viewer::Series series{};
 };
 
-/// A place over the days: a memory that stays as it was, robots that learn, and one more memory
-/// that is recorded on the last day.
+/// A place over the days: an unchanged memory, robots that learn, and a memory that is recorded
+/// again on the last day.
 class Days {
  public:
   Days(ElsewhereExperiments& elsewhere, const std::string& name)
@@ -308,9 +308,9 @@ class Days {
                              std::to_string(changing_.movable()) + " objects moved: ";
     Reproduction& result = elsewhere_.result;
     add_rate(result, id + ".without",
-             what + "single pictures localised within one spacing, without learning",
-             without_.right, asked());
-    add_rate(result, id + ".rerecorded", what + "the same with a memory recorded again that day",
+             what + "single images localised within one spacing, without learning", without_.right,
+             asked());
+    add_rate(result, id + ".rerecorded", what + "the same with a memory recorded again on that day",
              rerecorded_.right, asked());
     add_rate(result, id + ".wrong_without",
              what + "answers farther off than one spacing, without learning", without_.wrong,
@@ -321,7 +321,7 @@ class Days {
     }
     for (const DailyRobot& robot : robots_) report(robot, id + robot.id, what + robot.what + ", ");
     add_plot(result, "days_" + name_ + ".svg",
-             "Single pictures of " + name_ +
+             "Single images of " + name_ +
                  " that are localised within one spacing, while objects move and light changes.",
              viewer::LinePlot{.x_label = "day",
                               .y_label = "localised",
@@ -367,8 +367,8 @@ class Days {
     const LearningRobot& learning = robot.learning;
     add_rate(result, row, which + "localised within one spacing", robot.answers.right, asked(),
              at_least(0.98));
-    add_rate(result, row + ".wrong", which + "answers farther off than that", robot.answers.wrong,
-             asked());
+    add_rate(result, row + ".wrong", which + "answers farther off than one spacing",
+             robot.answers.wrong, asked());
     if (!robot.answers.errors_m.empty()) {
       add_median(result, row + ".error", which + "error of positions", "m", robot.answers.errors_m);
     }

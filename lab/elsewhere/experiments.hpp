@@ -18,32 +18,31 @@ struct RecordedGround {
       variants;  ///< references on a grid, queries at random poses
 };
 
-/// How well all of it does on ground where it was not made.
+/// Experiments in scenes, worlds and recordings that were not used for development.
 struct ElsewhereExperiments : Experiments {
   std::vector<RecordedGround> grounds{};  ///< that the next three experiments compare
 
-  /// All built-in scenes for robots on a floor; the worlds of `options.data` that are there.
+  /// Returns the built-in scenes of the options and the worlds that exist in `options.data`.
   [[nodiscard]] std::vector<std::string> ground_names() const;
   void record_ground(const std::string& name);
 
-  /// Own places known, places of other grounds taken for own, and the stated 95 % radius.
+  /// Measures recognised own places, places of other grounds taken for own, and the 95 % radius.
   void reproduce_known_places();
-  /// The covariance of the poses that tracking calls localised, on walks as memorised.
+  /// Measures the covariance of poses that tracking reports as localised.
   void reproduce_tracked_poses();
-  /// Home vectors between views of one ground, of two, and between noise.
+  /// Measures home vectors between views of one ground, of two, and between noise.
   void reproduce_home_vectors();
-  /// Runs home of a robot that tilts.
+  /// Measures runs home of a robot that tilts.
   void reproduce_tilted_homing();
-  /// The views of a world on a grid of `spacing_m`, arranged by their similarity alone, and
-  /// missions over that.
+  /// Arranges views of a world on a grid of `spacing_m` by their similarity alone, and runs
+  /// missions over the arrangement.
   void reproduce_floor(const std::string& world, double spacing_m);
-  /// A place whose furniture moves and whose light changes for days, asked of its memory with and
-  /// without learning.
+  /// Localises in a place whose furniture and light change for days, with and without learning.
   void reproduce_days(const std::string& place);
-  /// Memories of two walks each, through one place and through two, made into one.
+  /// Merges the memories of two walks, through one place and through two places.
   void reproduce_merging();
-  /// A recording, a data set's folder: each picture, turned, is asked of the memory of all others,
-  /// of panonav, of rivals that need no library, and of those that the caller has beside them.
+  /// Localises each rotated image of a recording (the folder of a data set) in the memory of all
+  /// others: by panonav, by the built-in rivals and by `rivals`.
   void reproduce_leave_one_out(const std::filesystem::path& recording,
                                std::vector<std::unique_ptr<RivalRecogniser>> rivals = {});
 };

@@ -30,7 +30,7 @@ struct FloorMissions {
   std::map<NavigationState, std::size_t> ends;
 };
 
-// Whether a way can lead from a place, as the nearest view has it.
+// True if the view nearest to the position lies in the largest component.
 bool is_in_largest_component(const simulation::RememberedPlace& remembered,
                              const Point2& position) {
   const auto nearest = std::ranges::min_element(

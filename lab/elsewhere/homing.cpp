@@ -25,7 +25,7 @@ namespace {
 constexpr double homing_radius_m = 1.5;
 constexpr double arrived_m = 0.1;
 
-/// An answer between two views, and how far the direction is off where there is a true one.
+/// A home vector between two views, and its angular error where the true direction is known.
 struct HomeAnswered {
   bool answered = false;
   double off_rad = 0.0;
@@ -38,7 +38,8 @@ HomeAnswered find_home(const Panorama& goal, const Panorama& current) {
   return {way.direction_rad.has_value(), way.direction_rad.value_or(0.0), way.probability};
 }
 
-/// How far `direction_rad`, in the frame of a robot at `from`, is from the direction of `to`.
+/// Returns the angle between `direction_rad`, in the frame of a robot at `from`, and the direction
+/// of `to`.
 double off_rad(double direction_rad, const Pose2& from, const Pose2& to) {
   const double truth = std::atan2(to.y_m - from.y_m, to.x_m - from.x_m);
   return std::abs(angle_difference(direction_rad + from.heading_rad, truth));
@@ -50,7 +51,7 @@ HomeAnswered find_home(const simulation::PlacedView& goal, const simulation::Pla
   return answer;
 }
 
-/// Neighbouring pixels alike, as in pictures: white noise smoothed along columns.
+/// Makes white noise, smoothed along columns so that neighbouring pixels are similar.
 Panorama noise(int rows, int columns, int smoothed, std::uint64_t seed) {
   Random random(seed, 5);
   Panorama view(rows, columns, ElevationBand{radians(-30.0), radians(40.0)});
@@ -75,7 +76,7 @@ std::vector<const simulation::PlacedView*> collect_views(const simulation::Place
   return views;
 }
 
-/// What was measured of the runs that do not come home, beside how many level robots do.
+/// Summarises the runs that do not end at home, next to the number of level robots that do.
 std::string explain_failures(const std::vector<HomingRun>& runs, std::size_t level_home) {
   std::size_t others = 0;
   std::size_t away = 0;
@@ -111,14 +112,14 @@ struct Range {
   double high_m;
 };
 
-/// Two views of which one is to lead to the other's place, and where both were taken.
+/// Two views of one ground; the home vector leads from `current` to `goal`.
 struct ViewPair {
   const simulation::PlacedView* goal;
   const simulation::PlacedView* current;
   const RecordedGround* ground;
 };
 
-/// Asks for home vectors between random views.
+/// Measures home vectors between random views.
 class HomeVectors {
  public:
   explicit HomeVectors(ElsewhereExperiments& elsewhere)
@@ -145,7 +146,7 @@ class HomeVectors {
     }
     const std::string id = "elsewhere.home." + range.id;
     const std::string what = "views " + format_centimetres(range.low_m) + " to " +
-                             format_centimetres(range.high_m) + " apart, the straight way free: ";
+                             format_centimetres(range.high_m) + " apart, the straight line free: ";
     Reproduction& result = elsewhere_.result;
     add_answers(result, id + ".answered", what + "home vectors with a direction", answers,
                 std::nullopt);
@@ -222,7 +223,7 @@ class HomeVectors {
         const simulation::PlacedView* current = any(views);
         const double far_m = distance(goal->pose.position(), current->pose.position());
         if (far_m < range.low_m || far_m >= range.high_m) continue;
-        // What a wall hides is another place.
+        // A view behind a wall shows another place.
         if (!place.free_space->is_free_between(goal->pose.position(), current->pose.position())) {
           continue;
         }

@@ -79,7 +79,7 @@ Session record_walk(const simulation::PlaceRecording& place, const std::string& 
   return session;
 }
 
-/// What became of two sessions; the map's errors where they were joined.
+/// Errors of the map that joins two sessions.
 struct Joined {
   double shape_difference = 1.0;
   double rms_m = 0.0;
@@ -143,15 +143,15 @@ void report_place(const std::string& name, const std::vector<Session>& walks,
     if (pairs.all == 0) return;
     add_rate(result, id + key, what + how + ": joined", pairs.joined, pairs.all, target);
   };
-  add_pairs(".joined", "share 13 % of the way or more", sharing, at_least(0.95));
+  add_pairs(".joined", "share 13 % of the path or more", sharing, at_least(0.95));
   if (const auto joined = sharing.joined + between.joined + apart.joined; joined > 0) {
     add_rate(result, id + ".wrong", what + "were joined: off by more than 2 m rms", wrong, joined,
              at_most(0.0));
     add_row(result, id + ".shape", what + "were joined: shape difference of the worst map",
             worst_shape, "", at_most(0.02));
   }
-  add_pairs(".between", "share 2 to 13 % of the way", between, std::nullopt);
-  add_pairs(".apart", "share less than 2 % of the way", apart, std::nullopt);
+  add_pairs(".between", "share 2 to 13 % of the path", between, std::nullopt);
+  add_pairs(".apart", "share less than 2 % of the path", apart, std::nullopt);
 }
 
 }  // namespace

@@ -50,7 +50,7 @@ struct Rates {
   }
 };
 
-/// The median over the variants, with the interval of all together.
+/// Adds the median over the variants, with the interval of all of them.
 void add_rates(Reproduction& result, const std::string& id, const std::string& what,
                const Rates& rates, Target target) {
   const Proportion all = success_rate(rates.successes, rates.trials);
@@ -60,7 +60,7 @@ void add_rates(Reproduction& result, const std::string& id, const std::string& w
              std::to_string(rates.trials) + " places in all; " + rates.extreme(false);
 }
 
-/// Own places of one ground, in both conditions.
+/// Adds rows of own places of one ground, in both conditions.
 void add_own_places(const ElsewhereExperiments& elsewhere, const RecordedGround& ground) {
   const auto all_conditions = place_conditions();
   const std::vector<PlaceCondition> conditions(all_conditions.begin(), all_conditions.begin() + 2);
@@ -138,18 +138,19 @@ void ElsewhereExperiments::reproduce_known_places() {
         .add(name, rate.known, static_cast<std::size_t>(options.queries));
   }
   const auto add_foreign = [&](const std::string& id, const std::string& what, const Rates& rates,
-                               double most) {
+                               double max_rate) {
     if (rates.trials == 0) return;
-    add_rate(result, "elsewhere.places." + id, what, rates.successes, rates.trials, at_most(most));
+    add_rate(result, "elsewhere.places." + id, what, rates.successes, rates.trials,
+             at_most(max_rate));
     result.rows.back().over += "; " + rates.extreme(true);
   };
-  add_foreign("other", "places of other scenes and worlds taken for own", other, 0.01);
-  add_foreign("variant", "places of another variant of the same scene taken for own", variant,
+  add_foreign("other", "places of other scenes and worlds recognised as own", other, 0.01);
+  add_foreign("variant", "places of another variant of the same scene recognised as own", variant,
               0.05);
 }
 
 void ElsewhereExperiments::reproduce_tracked_poses() {
-  // Of chi squared with two degrees of freedom.
+  // Quantiles of chi squared with two degrees of freedom.
   constexpr double quantile_95 = 5.991;
   constexpr double quantile_50 = 1.386;
   for (const RecordedGround& ground : grounds) {

@@ -21,7 +21,7 @@ namespace panonav::lab {
 namespace {
 
 constexpr std::size_t turns = 3;
-/// A match counts when it is at most so many times as far as the nearest view.
+/// Largest distance of a correct match, in distances of the nearest view.
 constexpr double near_factor = 1.5;
 
 struct Recorded {
@@ -31,8 +31,8 @@ struct Recorded {
   Panorama sharp;  ///< the same rows as fine as they were recorded; of a mirror the panorama
 };
 
-/// Whether `found` is near enough to `asked`: in metres, or in a recording without positions one of
-/// the two pictures beside it.
+/// True if `found` is near `asked`: in metres, or in a recording without positions the image before
+/// or after it.
 bool is_near(const std::vector<Recorded>& views, std::size_t asked, std::size_t found) {
   if (!views[asked].position) return found + 1 == asked || asked + 1 == found;
   double nearest_m = std::numeric_limits<double>::infinity();
@@ -43,7 +43,7 @@ bool is_near(const std::vector<Recorded>& views, std::size_t asked, std::size_t 
   return distance(*views[found].position, *views[asked].position) <= near_factor * nearest_m;
 }
 
-/// The memory of all pictures, as the command makes it by default but for what is said.
+/// Memorises all images with the defaults of the command.
 PlaceRecogniser memorise(const std::filesystem::path& file, const Dataset& dataset, bool features,
                          Executor& executor) {
   std::filesystem::remove(file);
@@ -60,7 +60,7 @@ PlaceRecogniser memorise(const std::filesystem::path& file, const Dataset& datas
   return PlaceRecogniser(file);
 }
 
-/// Removes a memory file when nobody reads it any more.
+/// Removes a file at the end of its scope.
 struct TemporaryFile {
   explicit TemporaryFile(std::filesystem::path path) : file(std::move(path)) {}
   TemporaryFile(const TemporaryFile&) = delete;
@@ -72,7 +72,7 @@ struct TemporaryFile {
   std::filesystem::path file;
 };
 
-/// The rows of the picture that the memory keeps, as fine as they were recorded.
+/// Returns the rows of the image that the memory keeps, at their recorded resolution.
 Panorama sharp_view(const DatasetEntry& entry, const PictureSource& source,
                     const Panorama& panorama) {
   const Observation seen = read_observation(entry);
@@ -81,13 +81,13 @@ Panorama sharp_view(const DatasetEntry& entry, const PictureSource& source,
   return panorama_from_picture(picture->view(), source.layout);
 }
 
-/// What one way of asking finds.
+/// The best match of a query.
 struct Found {
   std::size_t view = 0;
   double milliseconds = 0.0;
 };
 
-/// Each picture of a recording, turned at random, and its rows.
+/// Localises each image of a recording at random headings in the memory of the others.
 class LeaveOneOut {
  public:
   LeaveOneOut(const ElsewhereExperiments& elsewhere, const Dataset& dataset,
@@ -109,7 +109,7 @@ class LeaveOneOut {
 
   [[nodiscard]] std::size_t size() const { return views_.size(); }
 
-  /// Asks a memory of all pictures; its answers are kept in `places`.
+  /// Localises by a memory of all images; the answers are kept in `places`.
   std::vector<Found> ask(const PlaceRecogniser& ours, std::vector<Place>& places) const {
     places.resize(asked());
     return simulation::make_each(elsewhere_.executor, asked(), [&](std::size_t n) {
@@ -169,7 +169,7 @@ class LeaveOneOut {
             file_bytes / static_cast<double>(size()), "B", at_most(20'000.0));
   }
 
-  /// Adds the rows of another way of asking; returns its name and how often it was right.
+  /// Adds the rows of another method; returns its name and its number of correct matches.
   std::string add_other(const std::string& other, const std::vector<Found>& found,
                         double bytes) const {
     std::string key = other;

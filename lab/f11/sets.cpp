@@ -328,7 +328,7 @@ void MappingExperiments::reproduce_second_set() const {
   }
   add_median(result, "f11.lab.views", set.what + ": views", "views", nodes, std::nullopt,
              std::pair(150.0, 150.0));
-  add_median(result, "f11.lab.way", set.what + ": way", "m", ways_m);
+  add_median(result, "f11.lab.way", set.what + ": path length", "m", ways_m);
   // Loops that close take errors of length away, as those of heading.
   set.report({.open = at_most(0.01),
               .published = 0.015,

@@ -46,7 +46,7 @@ double rms_m(std::span<const Point2> estimate, std::span<const Point2> truth, bo
   return align(estimate, truth, {.allow_scale = scale}).rms_m;
 }
 
-/// Two loops that share their start, driven again and again up to `length_m`.
+/// Plans two loops that share their start, repeated up to `length_m`.
 std::vector<Pose2> plan_two_loops(const simulation::PlaceRecording& place, double length_m,
                                   double spacing_m, Random& random) {
   const simulation::FreeSpace& space = *place.free_space;
@@ -74,7 +74,7 @@ std::vector<Pose2> plan_two_loops(const simulation::PlaceRecording& place, doubl
   return drive(place, way, spacing_m, views);
 }
 
-/// A data set's views with their places where these are known.
+/// Reads the views of a data set, with their positions where these are known.
 simulation::MappingRecording read_recording(const std::filesystem::path& folder,
                                             PanoramaShape shape, Executor& executor) {
   const Dataset dataset = read_dataset(folder);
@@ -90,7 +90,7 @@ simulation::MappingRecording read_recording(const std::filesystem::path& folder,
   return recording;
 }
 
-/// Pairs of views, one over the other, three pairs in a row.
+/// Draws pairs of views, one above the other, three pairs in a row.
 viewer::PicturePlot draw_pairs(const std::string& title,
                                const std::vector<std::pair<Panorama, Panorama>>& pairs) {
   constexpr int gap = 8;
@@ -163,7 +163,7 @@ void map_indoor_walk(const MappingExperiments& f11) {
           linked / static_cast<double>(walk.views.size() - 1), "");
   add_row(f11.result, "f11.indoor_walk.closures", "indoor_walk_360: loops closed",
           static_cast<double>(filter_closures(bridged).size()), "closures");
-  // What single views would close: for the eye.
+  // Closures by single views, for comparison.
   const auto single = simulation::map_recording(
       walk, {.mapping = {.bridge_m = 1.5}, .closure = {.sequence = 1, .max_drift = 100.0}});
   auto refused = filter_closures(single);
@@ -284,7 +284,7 @@ struct WorldErrors {
          simulation::align_to(wheels_map.estimate, wheels_map.truth));
   }
 
-  /// On how many paths these errors are smaller than those of the wheels.
+  /// Counts the paths on which these errors are smaller than those of the wheels.
   [[nodiscard]] std::size_t count_better_than_wheels(const std::vector<double>& errors) const {
     std::size_t count = 0;
     for (std::size_t i = 0; i < errors.size(); ++i) count += errors[i] < wheels[i] ? 1 : 0;
@@ -412,7 +412,7 @@ void MappingExperiments::reproduce_recordings() const {
 }
 
 void MappingExperiments::measure_large_maps() const {
-  // Round after round, each a little beside the others.
+  // Each round has a small lateral offset.
   constexpr int columns = 256;
   const simulation::PlaceRecording place = simulation::make_empty_place(
       simulation::make_scene("loop", {.seed = options.seed}), options.seed, columns, executor);

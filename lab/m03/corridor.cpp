@@ -1,4 +1,5 @@
-// What [M03] section 4.1 announces: a long corridor with a loop, identical doors and junctions.
+// [M03] section 4.1, announced by its authors: a long corridor with a loop, identical doors and
+// junctions.
 
 #include <algorithm>
 #include <array>
@@ -36,7 +37,7 @@ struct Box {
   }
 };
 
-/// The things that stand only once in the corridor.
+/// Returns the boxes around the objects that exist only once in the corridor.
 std::vector<Box> find_distinct_objects(const simulation::Scene& scene) {
   std::vector<Box> boxes;
   for (const std::string_view name : {"window", "notice board", "plant"}) {
@@ -55,7 +56,7 @@ std::vector<Box> find_distinct_objects(const simulation::Scene& scene) {
   return boxes;
 }
 
-/// Whether one of the things covers enough of what is seen from here.
+/// True if one of the objects covers at least `distinct_degrees` of the view.
 bool is_distinct(const simulation::PlaceRecording& place, std::span<const Box> things, Point2 at) {
   const simulation::Vector3 eye{at.x_m, at.y_m, place.scene.camera_height_m};
   std::vector<int> covered(things.size());
@@ -76,7 +77,8 @@ bool is_distinct(const simulation::PlaceRecording& place, std::span<const Box> t
   return std::ranges::any_of(covered, [](int degrees) { return degrees >= distinct_degrees; });
 }
 
-/// Along the ring, from anywhere, in either direction, up to 0.3 m beside the middle.
+/// Plans a drive along the ring from a random start in a random direction, up to 0.3 m off the
+/// middle.
 std::vector<Pose2> plan_ring_drive(const simulation::Scene& scene, Random& random) {
   const double aside = random.uniform(-0.3, 0.3);
   const bool backwards = random.index(2) == 1;
@@ -159,7 +161,7 @@ CorridorRuns record_corridors(const TrackingExperiments& m03) {
   return corridors;
 }
 
-// What became of the hypotheses before and after the first distinct place.
+// Counts of hypotheses before and after the first distinct place.
 struct CorridorMeasures {
   std::size_t before = 0;  // images before it
   std::size_t kept = 0;    // of these, with a mode near the truth
@@ -203,16 +205,17 @@ void TrackingExperiments::reproduce_corridor() {
   for (std::size_t r = 0; r < runs.size(); ++r) of.add(runs[r], corridors.first_distinct[r]);
   const RunRows rows{result, "m03.corridor", "corridor", corridors.sets, runs};
   if (of.before > 0) {
-    add_rate(result, "m03.corridor.kept_before",
-             "corridor of identical doors, from anywhere along the ring; the first distinct place "
-             "is where the window, the notice board or the plant first covers " +
-                 std::to_string(distinct_degrees) +
-                 " degrees of the view; before it, images after which a mode is within 0.5 m of "
-                 "the truth",
-             of.kept, of.before, at_least(0.99));
+    add_rate(
+        result, "m03.corridor.kept_before",
+        "corridor of identical doors, from a random start on the ring; the first distinct place "
+        "is where the window, the notice board or the plant first covers " +
+            std::to_string(distinct_degrees) +
+            " degrees of the view; before it, images after which a mode is within 0.5 m of "
+            "the truth",
+        of.kept, of.before, at_least(0.99));
     rows.append_single_image_rates();
     add_rate(result, "m03.corridor.sure_before",
-             "corridor: before the first distinct place, images at which it says localised",
+             "corridor: before the first distinct place, images at which it reports localised",
              of.sure_before, of.before);
     add_mean(result, "m03.corridor.modes_before",
              "corridor: modes kept before the first distinct place", "modes", of.hypotheses);

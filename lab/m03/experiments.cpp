@@ -1,4 +1,4 @@
-// What the experiments of [M03] share, and their order.
+// Rows and images that the experiments of [M03] share.
 
 #include "lab/m03/experiments.hpp"
 
@@ -107,27 +107,27 @@ void RunRows::add_wrong(std::optional<Target> target) const {
         run, [](const TrackedImage& image) { return image.is_confidently_wrong(m03_wrong_m); });
   }
   add_rate(result, id + ".wrong",
-           what + ": images at which it says localised and is off by more than 1 m", wrong, images,
-           target);
+           what + ": images at which it reports localised and is off by more than 1 m", wrong,
+           images, target);
 }
 
 void RunRows::append_single_image_rates() const {
   const SingleImages sum = sum_single_images(sets);
   const auto percent = [&](std::size_t count) {
     return std::to_string(
-        std::lround(100.0 * static_cast<double>(count) / static_cast<double>(sum.asked)));
+        std::lround(100.0 * static_cast<double>(count) / static_cast<double>(sum.images)));
   };
   result.rows.back().over +=
-      sum.asked == 0 ? "; no image alone"
-                     : "; one image alone: right " + percent(sum.right) +
-                           " % (by dissimilarity only " + percent(sum.right_by_dissimilarity) +
-                           " %), within " + format_centimetres(sets.front().place->spacing_m()) +
-                           " " + percent(sum.near) + " %";
+      sum.images == 0 ? "; no image alone"
+                      : "; one image alone: right " + percent(sum.right) +
+                            " % (by dissimilarity only " + percent(sum.right_by_dissimilarity) +
+                            " %), within " + format_centimetres(sets.front().place->spacing_m()) +
+                            " " + percent(sum.near) + " %";
 }
 
 namespace {
 
-// The layers of one panel: what the filter holds and says at a step.
+// Returns the layers of one panel: particles and estimate of the filter at a step.
 std::vector<viewer::MapLayer> particle_layers(const TrackingPlace& place, const Pose2& truth,
                                               const MonteCarloLocaliser& filter,
                                               const MonteCarloEstimate& estimate) {

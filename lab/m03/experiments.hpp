@@ -13,11 +13,11 @@
 
 namespace panonav::lab {
 
-/// Side of the references' grid in the office, and the way between two images.
+/// Spacing of the references in the office, and distance between two images of a run.
 inline constexpr double m03_spacing_m = 0.25;
-/// Runs that are not localised within so many images, or not at all, count as this many.
+/// Number of images that counts for runs that need more or are never localised.
 inline constexpr int m03_max_images = 15;
-/// A pose that is off by more is plainly wrong.
+/// Error above which a pose is wrong.
 inline constexpr double m03_wrong_m = 1.0;
 inline constexpr std::size_t m03_images_before_kidnapping = 10;
 
@@ -29,7 +29,7 @@ struct RunSet {
 };
 [[nodiscard]] RunSet make_run_set(std::shared_ptr<const TrackingPlace> place,
                                   std::vector<TrackingRun> runs, Executor& executor);
-/// How single images of all sets are localised.
+/// Sums the localisation of single images over all sets.
 [[nodiscard]] SingleImages sum_single_images(std::span<const RunSet> sets);
 
 /// An office with everything that happens in it.
@@ -40,22 +40,23 @@ struct OfficeRuns {
   RunSet kidnapped;  ///< hard; 10 images, then kidnapped by at least 1 m
 };
 
-/// Images until localised, each at most `m03_max_images`.
+/// Returns the images until localised, each at most `m03_max_images`.
 [[nodiscard]] std::vector<double> capped_images_until_localised(std::span<const TrackedRun> runs,
                                                                 double radius_m,
                                                                 std::size_t first_step = 0);
-/// How many runs are localised within so many images.
+/// Counts the runs that are localised within `images` images.
 [[nodiscard]] std::size_t count_localised_within(std::span<const TrackedRun> runs, double radius_m,
                                                  int images, std::size_t first_step = 0);
-/// Error after so many images, counted from `first_step`; runs that ended before are left out.
+/// Returns the errors after `images` images from `first_step` on; shorter runs are left out.
 [[nodiscard]] std::vector<double> errors_after(std::span<const TrackedRun> runs, std::size_t images,
                                                std::size_t first_step = 0);
-/// Median error over the images with the 5 % and 95 % quantiles as bars, `shift` to the right.
+/// Makes the series of median errors over the images with the 5 % and 95 % quantiles as bars,
+/// shifted by `shift` along x.
 [[nodiscard]] viewer::Series make_error_series(const std::string& label,
                                                std::span<const TrackedRun> runs, std::size_t images,
                                                std::size_t first_step, double shift);
 
-/// A filter's particles over a run, as in [M03] figures 7 to 9: panels at the chosen steps.
+/// Draws the particles of a filter over a run at the chosen steps, as in [M03] figures 7 to 9.
 [[nodiscard]] std::vector<viewer::MapPlot> make_particle_maps(
     const TrackingPlace& place, std::span<const viewer::MapLayer> furniture, const TrackingRun& run,
     const FilterSetting& setting, std::uint64_t seed, std::span<const std::size_t> steps,
@@ -72,16 +73,16 @@ struct RunRows {
   std::size_t first_step = 0;       ///< from which images are counted
   bool judged = true;               ///< otherwise targets are left out
 
-  /// Images until localised, with what one image alone gives.
+  /// Adds the images until localised, with the rates of single images.
   void add_images(std::optional<Target> target = std::nullopt,
                   std::optional<std::pair<double, double>> published = std::nullopt) const;
   void add_images_mean() const;
   void add_within(int images, std::optional<Target> target = std::nullopt) const;
   void add_error_after(std::size_t images, std::optional<Target> target = std::nullopt) const;
-  /// How often the filter says "localised" and is wrong by more than `m03_wrong_m`.
+  /// Adds the rate at which the filter reports localised with an error above `m03_wrong_m`.
   void add_wrong(std::optional<Target> target = std::nullopt) const;
-  /// Adds what one image alone gives to what the last row was taken over: "one image alone: right
-  /// 74 % (by dissimilarity only 54 %), within 25 cm 96 %".
+  /// Appends the rates of single images to `over` of the last row: "one image alone: right 74 % (by
+  /// dissimilarity only 54 %), within 25 cm 96 %".
   void append_single_image_rates() const;
 };
 
@@ -96,30 +97,30 @@ struct TrackingExperiments : Experiments {
   void reproduce_position_tracking();
   /// [M03] section 4.1, Kidnapped Robot and figures 8 and 9.
   void reproduce_kidnapping();
-  /// Numbers of particles and kinds of odometry.
+  /// Varies numbers of particles and noise of odometry.
   void reproduce_sweeps();
   /// "A long indoor corridor with a loop where we face many false hypothesis": never surely wrong.
   void reproduce_corridor();
   /// "A large outdoor environment where we are investigating the different nature of brightness
   /// variations".
   void reproduce_garden();
-  /// A robot that leaves the memorised half of the scene `name` and returns.
+  /// Runs a robot that leaves the memorised half of the scene `name` and returns.
   void reproduce_leaving(const std::string& name);
   /// Global localisation in the world `name` of `options.data`. Throws FileError.
   void reproduce_gazebo_world(const std::string& name);
-  /// The recordings of `options.data`: sussex_route, gantry_plants. Throw FileError.
+  /// Localises in the recordings sussex_route and gantry_plants of `options.data`. Throw FileError.
   void reproduce_recorded_route();
   void reproduce_gantry();
 
-  /// Variant `number` of a built-in scene with its references.
+  /// Records variant `number` of a built-in scene with its references.
   [[nodiscard]] simulation::PlaceRecording record_variant(const std::string& scene, int number,
                                                           double spacing_m, int columns) const;
-  /// All runs of all sets through a filter, in their order. Runs of different sets have different
+  /// Tracks all runs of all sets by a filter, in order. Runs of different sets have different
   /// seeds.
   [[nodiscard]] std::vector<TrackedRun> track(std::span<const RunSet> sets,
                                               const FilterSetting& setting,
                                               std::uint64_t seed) const;
-  /// One set of runs of each office.
+  /// Returns one set of runs of each office.
   [[nodiscard]] std::vector<RunSet> collect_sets(RunSet OfficeRuns::*set) const;
 };
 

@@ -1,4 +1,4 @@
-// What [M03] section 4.1 announces: outdoors, and what changing brightness does there.
+// [M03] section 4.1, announced by its authors: changing brightness outdoors.
 
 #include <algorithm>
 #include <array>
@@ -94,8 +94,8 @@ void TrackingExperiments::reproduce_garden() {
                                "light " + format_fixed(lights[l], 2) + " times that of the memory",
                                gardens.constant[l]);
     const SingleImages single = sum_single_images(gardens.constant[l]);
-    add_point(right, lights[l], success_rate(single.right, single.asked));
-    add_point(near, lights[l], success_rate(single.near, single.asked));
+    add_point(right, lights[l], success_rate(single.right, single.images));
+    add_point(near, lights[l], success_rate(single.near, single.images));
     const auto share_within = [&](int images) {
       return success_rate(count_localised_within(runs, garden_spacing_m, images), runs.size());
     };

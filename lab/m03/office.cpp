@@ -111,7 +111,7 @@ FilterSetting large_error_setting(InjectionMethod injection) {
   return setting;
 }
 
-// Runs that knew the place before the blind stretch; others have nothing to keep.
+// Returns the runs that were localised before the stretch without images.
 std::vector<TrackedRun> filter_known_before_blind(std::span<const TrackedRun> runs) {
   std::vector<TrackedRun> known;
   for (const TrackedRun& run : runs) {
@@ -173,7 +173,7 @@ void add_kidnapping_rows(const TrackingExperiments& m03, std::span<const RunSet>
           mean_figure(difference), "images", at_most(0.0));
 }
 
-// How a filter does against something that is varied.
+// Success of a filter against a varied quantity.
 struct SweepCurve {
   viewer::Series success;
   viewer::Series images;

@@ -23,11 +23,11 @@ constexpr double outside_m = 1.0;  ///< from the nearest reference
 
 struct OutsideRuns {
   std::vector<RunSet> sets;
-  /// Of each image of each run: how far the nearest reference is.
+  /// Distance to the nearest reference, of each image of each run.
   std::vector<std::vector<double>> ways_m;
 };
 
-/// A free place in a strip of the scene.
+/// Draws a free place in a strip of the scene.
 Point2 sample_place_between(const simulation::FreeSpace& space, double low_x, double high_x,
                             Random& random) {
   for (;;) {
@@ -36,7 +36,8 @@ Point2 sample_place_between(const simulation::FreeSpace& space, double low_x, do
   }
 }
 
-/// From inside to far outside and back to another place inside, facing the way.
+/// Plans a path from inside to far outside and back to another place inside, heading along the
+/// path.
 std::vector<Pose2> plan_excursion(const simulation::FreeSpace& space, double border_m,
                                   Random& random) {
   const double low = space.low().x_m;
@@ -104,9 +105,9 @@ OutsideRuns record_excursions(const TrackingExperiments& m03, const std::string&
 constexpr double bin_m = 0.25;
 constexpr std::size_t bins = 16;
 
-/// What the filter says of itself over the runs.
+/// States that the filter reports over the runs.
 struct Reports {
-  // By the way to the nearest reference, from the sixth image on.
+  // By distance to the nearest reference, from the sixth image on.
   std::array<std::size_t, bins> asked{};
   std::array<std::size_t, bins> lost{};
   std::array<std::size_t, bins> localised{};
@@ -213,10 +214,9 @@ void TrackingExperiments::reproduce_leaving(const std::string& name) {
     }
   }
   const std::string file = "leaving_" + name + ".svg";
-  add_plot(result, file,
-           "What the filter says of itself, by how far the robot is from all references.",
+  add_plot(result, file, "States that the filter reports, by distance to the nearest reference.",
            viewer::LinePlot{.title = "Leaving the memorised half of " + name,
-                            .x_label = "way to the nearest reference [m]",
+                            .x_label = "distance to the nearest reference [m]",
                             .y_label = "share of the images",
                             .series = {lost_series, sure_series},
                             .y_range = std::pair{0.0, 1.02}});

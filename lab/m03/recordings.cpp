@@ -37,8 +37,8 @@ std::vector<RecordedView> read_views(const std::filesystem::path& folder) {
   return views;
 }
 
-/// Headings along the path, whose positions jitter by more than lies between two of them: those of
-/// a straight line fitted to the positions within `half` before and after.
+/// Fits headings along a path whose positions jitter by more than their spacing: those of a
+/// straight line through the positions within `half` before and after.
 std::vector<double> fit_tangents(const std::vector<RecordedView>& views, std::size_t half) {
   std::vector<double> headings;
   for (std::size_t i = 0; i < views.size(); ++i) {
@@ -64,8 +64,7 @@ void add_rows(const RunRows& rows) {
   rows.add_wrong();
 }
 
-/// A walk from place to neighbouring place that comes to none twice; as long as it can be, up to
-/// `images`.
+/// Plans a walk over neighbouring places that visits none twice, up to `images` long.
 std::vector<std::size_t> plan_grid_walk(const std::vector<RecordedView>& views, double spacing_m,
                                         std::size_t images, Random& random) {
   std::vector<std::size_t> walk{static_cast<std::size_t>(random.index(views.size()))};
@@ -181,12 +180,12 @@ void TrackingExperiments::reproduce_gantry() {
   const auto views = read_views(options.data / "gantry_plants");
   constexpr double spacing_m = 0.1;
   constexpr std::size_t images = 15;
-  const std::size_t wanted =
+  const std::size_t run_count =
       5 * static_cast<std::size_t>(options.variants) * static_cast<std::size_t>(options.runs);
   FilterSetting setting;
   setting.odometry.drive = setting.assumed_odometry.drive = DriveKind::holonomic;
   std::vector<RunSet> sets;
-  for (std::uint64_t attempt = 0; sets.size() < wanted && attempt < 20 * wanted; ++attempt) {
+  for (std::uint64_t attempt = 0; sets.size() < run_count && attempt < 20 * run_count; ++attempt) {
     Random random(options.seed, attempt);
     const auto walk = plan_grid_walk(views, spacing_m, images, random);
     if (walk.size() < images) continue;

@@ -39,8 +39,7 @@ constexpr std::size_t places_along_x = 6;
 constexpr std::size_t places_along_y = 3;
 constexpr std::size_t place_count = places_along_x * places_along_y;
 
-// Size and shape of something around a place: its mean over the directions, and each direction
-// over that mean.
+// Mean extent around a place over the directions, and the extent per direction over that mean.
 struct Shape {
   double size = 0.0;
   Directional relative{};
@@ -55,17 +54,18 @@ Shape normalise_shape(const Directional& values) {
   return shape;
 }
 
-// What was found at one place of one scene.
+// Shapes at one place of one scene.
 struct Observation {
   std::array<Shape, level_count> area;       // equivalent radius of the area in each sector
   Shape free;                                // free distance
   Shape parallax;                            // distance for equal parallax
   std::array<Shape, level_count> predicted;  // distance for an equal change of the components
 };
-// By place; empty where furniture stands.
+// Indexed by place; empty where furniture stands.
 using SceneObservations = std::array<std::optional<Observation>, place_count>;
 
-// Radius of the circle whose sector of 45 degrees has the area of the candidates' cells there.
+// Returns, for each sector of 45 degrees, the radius of the circle whose sector has the area of the
+// candidates' cells there.
 Directional compute_sector_extents(const VisualMemory& memory, const ReferenceAreas& areas,
                                    Point2 robot, const std::vector<Match>& candidates) {
   Directional area_m2{};
@@ -82,7 +82,7 @@ Directional compute_sector_extents(const VisualMemory& memory, const ReferenceAr
   return extents;
 }
 
-// Which surroundings and which property of them an area is compared with.
+// A property of an observation that is correlated with another.
 using Property = double (*)(const Observation&, std::size_t level, std::size_t direction);
 
 struct Relation {
@@ -137,8 +137,8 @@ const std::array<Relation, 5>& relations() {
   return all;
 }
 
-// Values of one relation less their mean over all scenes for the same place and direction: what
-// the shape of the room and of the grid does is the same in all scenes and falls out.
+// Values of one relation less their mean over all scenes for the same place and direction, which
+// removes the influence of the room and of the grid.
 struct Residuals {
   // [scene][place * directions + direction]; NaN where there is no observation.
   std::vector<std::vector<double>> area;
@@ -169,8 +169,8 @@ std::vector<std::vector<double>> compute_residuals(const std::vector<SceneObserv
   return result;
 }
 
-// Rank correlation of the areas of `scenes` with the surroundings of scenes[i] taken from
-// `partners[i]`; the same list for the true pairing.
+// Returns the rank correlation of the areas of scenes[i] with the surroundings of partners[i]; both
+// lists are equal for the true pairing.
 double correlation(const Residuals& residuals, const std::vector<std::size_t>& scenes,
                    const std::vector<std::size_t>& partners) {
   std::vector<double> area;
@@ -322,7 +322,7 @@ class AreaShape final : public Experiment {
         "");
   }
 
-  // Mean residual of the area in each tenth of the residuals of the surroundings.
+  // Returns the mean residual of the area in each tenth of the residuals of the surroundings.
   static viewer::Series mean_by_decile(const Relation& relation, std::size_t level,
                                        const Residuals& residuals) {
     std::vector<std::pair<double, double>> pairs;

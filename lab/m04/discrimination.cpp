@@ -25,7 +25,7 @@ constexpr std::size_t condition_count = 3;
 constexpr std::size_t hidden_condition = 1;
 constexpr std::size_t band_count = 4;  // components 0 and 1, 2 .. 14, 15 .. 49, 50 .. 255
 
-// Dissimilarities of one query to all references, for every number of components at once.
+// Returns the dissimilarities of one query to all references for every number of components.
 std::array<std::vector<double>, count_number> dissimilarities(
     const FourierSignature& query, const std::vector<FourierSignature>& references) {
   std::array<std::vector<double>, count_number> values;
@@ -41,8 +41,8 @@ std::array<std::vector<double>, count_number> dissimilarities(
   return values;
 }
 
-// How far the peak of the similarity profile falls from the right reference to those one spacing
-// away, as a share of its height over all references: 0 for a flat profile.
+// Returns the fall of the similarity from the right reference to those one spacing away, as a share
+// of its range over all references: 0 for a flat profile.
 double peak_sharpness(const simulation::PlaceRecording& place, std::size_t nearest,
                       const std::vector<double>& values) {
   const auto scaled = similarities(values);
@@ -172,7 +172,8 @@ class Discrimination final : public Experiment {
             mean_figure(values), "", target);
   }
 
-  // Why more components help with azimuths hidden, where the measured disturbance says so.
+  // Returns why more components help with azimuths hidden; empty where the measured disturbance
+  // does not explain it.
   [[nodiscard]] std::string explain_disturbance() const {
     if (disturbance_[1].empty()) return "";
     const double low = mean(disturbance_[1]);
@@ -184,8 +185,8 @@ class Discrimination final : public Experiment {
            hundredths(high) + " times as much; so more components help";
   }
 
-  // What the hidden azimuths change in a view, against what the way to a reference one spacing
-  // from the nearest changes: for the components of the signature and for those beyond.
+  // Compares the change of a view by hidden azimuths with the change by a step of one spacing, per
+  // band of components.
   void compare_disturbance(const simulation::PlaceRecording& place,
                            const std::vector<FourierSignature>& clean,
                            const std::vector<FourierSignature>& hidden,

@@ -26,7 +26,7 @@ double bin_distance_m(std::size_t bin) {
   return line_step_m * static_cast<double>(bin);
 }
 
-// Largest deviation of the first `count` values from the line of least squares through them.
+// Returns the largest deviation of the first `count` values from their least-squares line.
 double deviation_from_line(const Curve& curve, std::size_t count) {
   const auto n = static_cast<double>(count);
   double sx = 0.0;
@@ -49,7 +49,7 @@ double deviation_from_line(const Curve& curve, std::size_t count) {
   return largest;
 }
 
-// The largest distance such that the whole curve up to there stays within `tolerance` of one line.
+// Returns the largest distance up to which the whole curve stays within `tolerance` of one line.
 double linear_range_m(const Curve& curve, double tolerance) {
   std::size_t last = 2;
   for (std::size_t count = 4; count <= curve.size(); ++count) {
@@ -224,7 +224,7 @@ class DistanceCurve final : public Experiment {
   }
 
   static constexpr std::size_t lines_per_scene = 2;
-  static constexpr std::size_t repeat_interval = 10;  // one view in so many is taken twice
+  static constexpr std::size_t repeat_interval = 10;  // every n-th view is taken twice
   static constexpr std::size_t shown_pairs = 5;
   static constexpr double linearity_tolerance = 0.02;
 
@@ -244,11 +244,11 @@ class SimilaritySurface final : public Experiment {
   void add(const simulation::PlaceRecording& place, Executor& executor) override {
     const auto references = compute_signatures(place.references, m04_components, executor);
     for (const auto& query : place.queries) {
-      const auto wanted = compute_signature(query.panorama, m04_components);
+      const auto signature = compute_signature(query.panorama, m04_components);
       std::vector<double> values;
       std::vector<double> distances;
       for (std::size_t i = 0; i < references.size(); ++i) {
-        values.push_back(dissimilarity_l1(wanted, references[i]));
+        values.push_back(dissimilarity_l1(signature, references[i]));
         distances.push_back(-distance(place.references[i].pose.position(), query.pose.position()));
       }
       const auto scaled = similarities(values);

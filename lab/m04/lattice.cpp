@@ -32,7 +32,7 @@ LatticeOptions plain_options() {
   return {.neighbours = plain_neighbours, .phases = false};
 }
 
-/// What is measured of one way of arranging, over scenes.
+/// Measures of one method of arranging, over scenes.
 struct Arrangements {
   std::vector<double> shape;
   std::vector<double> four_of_eight;
@@ -201,7 +201,7 @@ class LatticeExperiment {
          panels);
   }
 
-  /// Distance and error over all pairs of the views, as [M04] figure 12 shows them.
+  /// Computes distance and error over all pairs of the views, as in [M04] figure 12.
   [[nodiscard]] static DissimilarityCurve compute_curve_of_all_pairs(const ViewGrid& grid,
                                                                      const Lattice& lattice) {
     const auto views = grid.memory.views();

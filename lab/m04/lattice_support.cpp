@@ -37,8 +37,8 @@ bool is_inside(const ViewGrid& grid, GridPlace place) {
   return place.i > 0 && place.j > 0 && place.i < grid.columns - 1 && place.j < grid.rows - 1;
 }
 
-/// The alignment with the scale that makes both sets equally large: least squares would shrink a
-/// set that does not fit.
+/// Returns the alignment with the scale that makes both sets equally large; least squares would
+/// shrink a set that does not fit.
 Alignment match_extent(std::span<const Point2> truth, std::span<const Point2> arranged,
                        Alignment alignment) {
   const auto centre = [](std::span<const Point2> points) {
@@ -55,8 +55,8 @@ Alignment match_extent(std::span<const Point2> truth, std::span<const Point2> ar
   alignment.scale = extent(truth) / extent(arranged);
   alignment.translation = {};
   const Point2 there = alignment.apply(centre(arranged));
-  const Point2 wanted = centre(truth);
-  alignment.translation = {wanted.x_m - there.x_m, wanted.y_m - there.y_m};
+  const Point2 target = centre(truth);
+  alignment.translation = {target.x_m - there.x_m, target.y_m - there.y_m};
   return alignment;
 }
 

@@ -20,22 +20,21 @@ struct ViewGrid {
 
 enum class GridHeadings { random, along_path };
 
-/// Takes the views. `place` needs no references.
+/// Records the views. `place` needs no references.
 [[nodiscard]] ViewGrid record_grid(const simulation::PlaceRecording& place, int columns, int rows,
                                    double spacing_m, GridHeadings headings, Executor& executor);
 
-/// An empty room of 4 x 3.5 m with pictures, windows and a door on its walls.
+/// Makes an empty room of 4 x 3.5 m with pictures, windows and a door on its walls.
 [[nodiscard]] simulation::Scene make_small_room(std::uint64_t seed);
 
-/// What a robot with coarse sense of its motion says of the path: distance and direction of each
-/// step off by up to so much of their size and of half a turn, evenly, and its turn like its
-/// direction [M04 section 3.4].
+/// Simulates coarse odometry along the path: uniform errors of up to `distance_share` of the
+/// distance and `direction_share` of half a turn in direction and heading [M04 section 3.4].
 [[nodiscard]] std::vector<CoarseMotion> simulate_coarse_motion(const ViewGrid& grid,
                                                                double distance_share,
                                                                double direction_share,
                                                                std::uint64_t seed);
 
-/// How an arrangement compares with the grid that it came from.
+/// Comparison of an arrangement with the true grid.
 struct GridComparison {
   double shape_difference = 1.0;  ///< as arranged, without a mirror image
   double with_reflection = 1.0;   ///< the same when a mirror image is allowed
@@ -43,14 +42,13 @@ struct GridComparison {
   double border_pull = 0.0;       ///< how far border views lie inwards, in spacings, mean
   std::vector<Point2> aligned;    ///< arranged positions laid over the true ones
 };
-/// Views that are not in the largest component lie where they lie in their own: they count as
-/// wrong.
+/// Compares positions with the true grid. Views outside the largest component count as wrong.
 [[nodiscard]] GridComparison compare_with_grid(const ViewGrid& grid, const Lattice& lattice);
 
-/// Error of the turns that phases tell between views one spacing apart, rad.
+/// Returns the errors of the turns that phases give between views one spacing apart, rad.
 [[nodiscard]] std::vector<double> turn_errors(const ViewGrid& grid, const Lattice& lattice);
 
-/// The lines between neighbours of the grid, for pictures.
+/// Returns the lines between neighbours of the grid, for images.
 [[nodiscard]] std::vector<std::vector<Point2>> grid_lines(const ViewGrid& grid,
                                                           std::span<const Point2> positions);
 

@@ -51,7 +51,7 @@ struct Moments {
   std::vector<double> second;
 };
 
-// Mean over standard deviation of the weighted margin.
+// Returns mean over standard deviation of the weighted margin.
 double signal_to_noise(const Moments& moments, std::span<const double> weights) {
   const std::size_t size = weights.size();
   const auto n = static_cast<double>(moments.count);
@@ -90,9 +90,9 @@ std::vector<double> solve_weights(const Moments& moments, double penalty) {
         if (j != i) rest -= curvature(i, j) * weights[j];
       }
       const double own = curvature(i, i);
-      const double wanted = own > 0.0 ? std::max(0.0, rest / own) : 0.0;
-      change = std::max(change, std::abs(wanted - weights[i]));
-      weights[i] = wanted;
+      const double optimum = own > 0.0 ? std::max(0.0, rest / own) : 0.0;
+      change = std::max(change, std::abs(optimum - weights[i]));
+      weights[i] = optimum;
     }
     if (change < 1e-9) break;
   }
@@ -108,7 +108,7 @@ struct PosedView {
   Point2 position;
 };
 
-// Adds the margins of one view; false when it has no near or no far views.
+// Adds the margins of one view; false if it has no near or no far views.
 bool add_margins(const VisualMemory& memory, std::span<const PosedView> posed, double spacing_m,
                  ViewId anchor, Moments& moments) {
   const Point2 here = memory.info(anchor).pose->position();

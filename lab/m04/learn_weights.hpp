@@ -22,7 +22,9 @@ struct ComponentWeights {
 /// For each sampled view, views within 1.25 spacings of it are near and views beyond 1.75 spacings
 /// are far; of the far ones, the most similar are used. The margin of (view, near, far) is the
 /// weighted dissimilarity to the far one less that to the near one, in units of the unweighted
-/// dissimilarity to the near ones. The weights minimise the mean square of (1 - margin), not below
+/// dissimilarity to the near ones.
+///
+/// The weights minimise the mean square of (1 - margin), not below
 /// 0: but for their scale this is the largest mean over standard deviation. They are drawn towards
 /// equal weights by a penalty; how strongly is chosen by leaving out a quarter of the views at a
 /// time, and equal weights are among the choices.

@@ -25,22 +25,22 @@ using MakeRecogniser = std::unique_ptr<RivalRecogniser> (*)();
 constexpr std::array<MakeRecogniser, 6> rival_factories{
     [] { return fourier_signature_recogniser(m04_components); },
     [] { return grey_histogram_recogniser(); }, [] { return colour_histogram_recogniser(); },
-    // As many numbers a view as the signature has components in a row.
+    // Each view has as many numbers as the signature has components in a row.
     [] { return eigenimage_recogniser(m04_components); }, [] { return zero_phase_recogniser(); },
     [] { return pixels_over_all_turns_recogniser(); }};
 constexpr std::size_t rival_count = rival_factories.size();
-// Pixels over all turns take long: so many queries of each scene are enough.
+// Queries of each scene, because pixels over all turns take long.
 constexpr std::size_t max_queries = 20;
 
-// The conditions of the other experiments, and less light. No view is preprocessed: the ways differ
-// in what they need, and none gets an advantage.
+// Returns the conditions of the other experiments, and less light. No view is preprocessed, so that
+// no method has an advantage.
 std::vector<ViewCondition> rival_conditions() {
   std::vector<ViewCondition> conditions(view_conditions().begin(), view_conditions().end());
   conditions.push_back({"dim", "30 % less light", {.exposure = 0.7}});
   return conditions;
 }
 
-// How far a colour is from grey: the difference between its channels, 0 .. 1.
+// Returns the mean difference between the channels of a pixel, 0 (grey) .. 1.
 double mean_colourfulness(const Image& view) {
   double sum = 0.0;
   const auto pixels = view.pixels();
@@ -134,7 +134,7 @@ class Rivals final : public Experiment {
  private:
   static constexpr std::size_t rival_condition_count = 4;
 
-  // The views with their picture in colour, taken at the same pose by the same kind of sensor.
+  // Renders the views also in colour, at the same pose through the same kind of sensor.
   static std::vector<RivalView> render_in_colour(const simulation::PlaceRecording& place,
                                                  const simulation::Renderer& in_colour,
                                                  const std::vector<simulation::PlacedView>& views,

@@ -14,35 +14,35 @@
 
 namespace panonav::lab {
 
-// What the experiments of [M04] share.
-
 /// The papers' number of components.
 inline constexpr int m04_components = 15;
 
-/// How queries are taken, beside the reference views' own camera.
+/// Sensor of the queries.
 struct ViewCondition {
   std::string id;
   std::string name;
   simulation::SensorOptions sensor;
 };
-/// As memorised; with a tenth of all azimuths hidden by people; with the noise of a bad camera.
+/// Returns three conditions: as memorised; a tenth of all azimuths hidden by people; the noise of a
+/// bad camera.
 [[nodiscard]] const std::array<ViewCondition, 3>& view_conditions();
 
-/// The queries of the place under `condition`; those of the recording itself for the first one.
+/// Takes the queries of the place under `condition`; for the first one returns those of the
+/// recording.
 [[nodiscard]] std::vector<simulation::PlacedView> take_queries(
     const simulation::PlaceRecording& place, const ViewCondition& condition, Executor& executor);
 
 [[nodiscard]] std::vector<FourierSignature> compute_signatures(
     const std::vector<simulation::PlacedView>& views, int components, Executor& executor);
 
-/// Dissimilarity of every component by itself: the terms of [M04 eq. 6] without their weights.
+/// Returns the dissimilarity of each component: the terms of [M04 eq. 6] without their weights.
 [[nodiscard]] std::vector<double> dissimilarity_by_component(const FourierSignature& a,
                                                              const FourierSignature& b);
 
-/// Index of the smallest value, the first of equals.
+/// Returns the index of the smallest value, the first of equals.
 [[nodiscard]] std::size_t index_of_smallest(std::span<const double> values);
 
-/// A memory of posed views, in their order, packed so that the largest magnitude just fits.
+/// Makes a memory of posed views, in their order, packed so that the largest magnitude just fits.
 [[nodiscard]] VisualMemory make_memory(const std::vector<simulation::PlacedView>& views,
                                        const std::vector<FourierSignature>& signatures);
 

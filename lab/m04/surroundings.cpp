@@ -70,7 +70,7 @@ Directional predict_extents(const simulation::PlaceRecording& place, const Pose2
     const double elevation = view.elevation_rad(y);
     const int above = std::max(y - 1, 0);
     const int below = std::min(y + 1, view.rows() - 1);
-    // How the components of this row change per metre along x and y of the robot.
+    // Change of the components of this row per metre along x and y of the robot.
     std::vector<Complex> along_x(count);
     std::vector<Complex> along_y(count);
     for (int c = 0; c < view.columns(); ++c) {

@@ -12,19 +12,18 @@ namespace panonav::lab {
 inline constexpr std::size_t shape_directions = 8;
 using Directional = std::array<double, shape_directions>;
 
-/// What stands around a position of the floor.
+/// Free distance and parallax around a position of the floor.
 struct Surroundings {
   /// Harmonic mean of the free distance, over the sector and over the heights 0.3, 0.6 and 0.9 m.
   Directional free_m{};
-  /// How far a robot can drive in this direction for the same change of its view, relative to the
-  /// other directions, when only parallax counts: a step in direction theta shifts a thing in
-  /// direction phi at distance d by |sin(phi - theta)| / d. The inverse of the mean shift.
+  /// Relative distance in this direction for equal parallax: a step in direction theta shifts a
+  /// thing in direction phi at distance d by |sin(phi - theta)| / d. The inverse of the mean shift.
   Directional parallax_m{};
 };
 [[nodiscard]] Surroundings measure_surroundings(const simulation::PlaceRecording& place,
                                                 Point2 position);
 
-/// How far the robot can drive in each direction until the first components of its view have
+/// Predicts the relative distance in each direction until the first components of the view have
 /// changed by a fixed amount, to first order, for a view taken at `pose` with the place's heights
 /// and elevations: every pixel's brightness gradient times its shift by parallax, the shift read
 /// from the distance of what the pixel shows, transformed, and projected on each magnitude. Only
@@ -33,7 +32,7 @@ struct Surroundings {
 [[nodiscard]] Directional predict_extents(const simulation::PlaceRecording& place,
                                           const Pose2& pose, const Panorama& view, int components);
 
-/// The sector of a direction, 0 .. shape_directions - 1.
+/// Returns the sector of a direction, 0 .. shape_directions - 1.
 [[nodiscard]] std::size_t find_sector(double azimuth_rad);
 
 }  // namespace panonav::lab

@@ -29,16 +29,16 @@ namespace panonav::lab {
 
 namespace {
 
-// Of every second variant; the others have as much more light.
+// Relative change of light: less in every second variant, more in the others.
 constexpr double light_change = 0.3;
 constexpr double moved_objects_share = 0.1;
 // References along a drive, and how long that is.
 constexpr double drive_spacing_m = 0.25;
 constexpr double drive_m = 60.0;
-// What a start beside a drive is off, as where a robot is set down by hand.
+// Largest distance of a start from a drive, as where a robot is set down by hand.
 constexpr double beside_drive_m = 0.3;
 
-// What is measured of missions of one kind.
+// Measures of missions of one kind.
 struct Measures {
   std::size_t runs = 0;
   std::size_t arrived = 0;
@@ -74,10 +74,10 @@ void report(const std::string& id, const std::string& what, const Measures& meas
            measured.arrived, measured.runs, arrival);
   result.rows.back().reason = simulation::explain_other_ends(measured.ends, measured.wrongly);
   if (!measured.lengths.empty()) {
-    add_median(result, id + ".length", what + ": way driven against the shortest", "",
+    add_median(result, id + ".length", what + ": path length against the shortest", "",
                measured.lengths, length);
   }
-  add_rate(result, id + ".wrongly", what + ": say that they arrived, and are farther off",
+  add_rate(result, id + ".wrongly", what + ": report an arrival but are farther off",
            measured.wrongly, measured.runs);
   for (const auto& [end, count] : measured.ends) {
     if (end == NavigationState::arrived) continue;
@@ -111,8 +111,8 @@ simulation::Scene make_or_read_scene(const ReproductionOptions& options, const s
   return scene;
 }
 
-// A drive of `drive_m`: the scene's round trip again and again, or ways between random places with
-// 10 cm to spare beside the robot.
+// Plans a drive of `drive_m`: repeated round trips of the scene, or paths between random places
+// with 10 cm to spare on both sides of the robot.
 std::vector<Pose2> plan_exploring_drive(const simulation::MissionPlace& place, std::uint64_t seed) {
   Random random(seed, 5);
   simulation::FreeSpaceOptions roomy = simulation::free_space_options(place.scene);
@@ -139,15 +139,15 @@ std::vector<Pose2> plan_exploring_drive(const simulation::MissionPlace& place, s
   return poses;
 }
 
-// The scene with screens as high as a robot across the way.
+// Returns the scene with screens as high as a robot across the path.
 simulation::Scene add_screens(simulation::Scene scene, std::span<const Pose2> across,
                               double width_m) {
   for (const Pose2& at : across) simulation::add_screen(scene, at, width_m, 1.0);
   return scene;
 }
 
-// How wide screens must be so that no way leads past them; empty: none of these widths does it and
-// leaves room at both ends. At a corner a way leads past screens that shut a straight way.
+// Returns the smallest width of screens that leaves no path past them; nullopt if none of the tried
+// widths does so and leaves room at both ends.
 std::optional<double> find_blocking_width_m(const simulation::Scene& scene,
                                             std::span<const Pose2> across, Point2 from, Point2 to) {
   for (const double width_m : {2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0}) {
@@ -343,7 +343,7 @@ void NavigationExperiments::reproduce_route_missions() const {
     report("navigation." + kind.id, map + kind.what, kind.measures, std::nullopt, std::nullopt,
            result);
     add_median(result, "navigation." + kind.id + ".off",
-               map + kind.what + ": distance from the way that was driven", "m", kind.off_m);
+               map + kind.what + ": distance from the recorded path", "m", kind.off_m);
   }
   const std::string what = map + kinds.front().what;
   add_rate(result, "navigation.route.share", what + ": steps on a leg along the route",
@@ -352,7 +352,7 @@ void NavigationExperiments::reproduce_route_missions() const {
   add_rate(result, "navigation.route.left", what + ": legs that did not come to their end",
            events[NavigationEvent::route_left], events[NavigationEvent::route]);
   add_median(result, "navigation.route.leg_off",
-             what + ": distance from the way that was driven, on a leg", "m", on_route_m);
+             what + ": distance from the recorded path, on a leg", "m", on_route_m);
 }
 
 void NavigationExperiments::reproduce_blocked_missions() const {
@@ -397,16 +397,16 @@ void NavigationExperiments::reproduce_blocked_missions() const {
       ++k;
     }
   }
-  const std::string what = "loop, a screen across the way";
-  report("navigation.blocked", what + ", another way round", around, at_least(0.9), std::nullopt,
+  const std::string what = "loop, a screen across the path";
+  report("navigation.blocked", what + ", with a detour", around, at_least(0.9), std::nullopt,
          result);
-  add_rate(result, "navigation.shut.unreachable", what + " on both sides: told unreachable",
+  add_rate(result, "navigation.shut.unreachable", what + " on both sides: reported unreachable",
            shut.ends[NavigationState::unreachable], shut.runs, at_least(0.9));
   result.rows.back().reason =
       simulation::explain_other_ends(shut.ends, shut.wrongly, NavigationState::unreachable);
-  add_rate(result, "navigation.shut.arrived", what + " on both sides: say that they arrived",
+  add_rate(result, "navigation.shut.arrived", what + " on both sides: report an arrival",
            shut.ends[NavigationState::arrived], shut.runs);
-  add_median(result, "navigation.shut.steps", what + " on both sides: steps until told", "",
+  add_median(result, "navigation.shut.steps", what + " on both sides: steps until reported", "",
              shut.steps);
   add_row(result, "navigation.shut.max_steps", what + " on both sides: steps, most",
           *std::ranges::max_element(shut.steps), "");

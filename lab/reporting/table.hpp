@@ -18,7 +18,7 @@ struct Target {
   friend bool operator==(const Target&, const Target&) = default;
 };
 
-/// One line of "published / ours / holds".
+/// A figure: published, ours, and whether it holds.
 struct ResultRow {
   std::string id;    ///< short and stable, "m04.fig6.success_15"
   std::string what;  ///< for people; the same in every run
@@ -29,17 +29,16 @@ struct ResultRow {
       interval;      ///< 95 % interval of `ours` where it is a statistic
   std::string unit;  ///< "" for pure numbers
   std::optional<Target> target;
-  /// What the figure was taken over, "median of 120", and what else belongs to it alone.
+  /// Sample of the figure, "median of 120", and further notes.
   std::string over = {};
-  /// Why the target is missed, as far as it is known: one plain sentence. Read only where the row
-  /// does not hold.
+  /// Reason of a missed target, if known: one plain sentence.
   std::string reason = {};
 
-  /// True when there is no target or `ours` meets it; false for NaN.
+  /// True if there is no target or `ours` meets it; false for NaN.
   [[nodiscard]] bool holds() const;
 };
 
-/// How many rows have a target, and how many of these meet it.
+/// Number of rows with a target, and of those that meet it.
 struct TargetCount {
   std::size_t judged = 0;
   std::size_t held = 0;
@@ -47,23 +46,24 @@ struct TargetCount {
 };
 [[nodiscard]] TargetCount count_targets(std::span<const ResultRow> rows);
 
-/// Our figure for people, with its interval and unit: "0.02 (0.012 .. 0.036) m".
+/// Returns our figure for people, with its interval and unit: "0.02 (0.012 .. 0.036) m".
 [[nodiscard]] std::string format_figure(const ResultRow& row);
-/// "5 .. 6", or "-" where the paper gives nothing.
+/// Returns "5 .. 6", or "-" where the paper gives nothing.
 [[nodiscard]] std::string format_published(const ResultRow& row);
-/// "at most 0.02", or "-" for none.
+/// Returns "at most 0.02", or "-" for none.
 [[nodiscard]] std::string format_target(const ResultRow& row);
-/// By how much a row misses its target, and why: the known reason, else what the figures tell, else
-/// that none is known; of a time (ms, us) that it is this machine's.
+/// Returns by how much a row misses its target, and why: the known reason, or that none is known; a
+/// time (ms, us) depends on the machine.
 [[nodiscard]] std::string explain_miss(const ResultRow& row);
 
-/// Titles of the columns that `table_cells` fills: what, published, ours, unit, target, holds.
+/// Returns the titles of the columns that `table_cells` fills: what, published, ours, unit, target,
+/// holds.
 [[nodiscard]] std::span<const std::string> table_header();
-/// The cells of a row, for people.
+/// Returns the cells of a row, for people.
 [[nodiscard]] std::vector<std::string> table_cells(const ResultRow& row);
 
-/// The array that `reproduce --json` prints (docs/formats.md). The reason of a row that holds is
-/// left out.
+/// Returns the array that `reproduce --json` prints (docs/formats.md). The reason of a row that
+/// holds is left out.
 [[nodiscard]] std::string to_json(std::span<const ResultRow> rows);
 /// Reads what `to_json` writes; rows without `over` or `reason` too. Throws FileError, which names
 /// `file`, the row and the field.

@@ -11,7 +11,7 @@ namespace {
 
 using nlohmann::json;
 
-// What a message shows of a value.
+// Returns the text of a value for messages, shortened.
 std::string excerpt(const json& value) {
   if (value.is_structured()) return "an " + std::string(value.type_name());
   constexpr std::size_t longest = 40;
@@ -19,7 +19,7 @@ std::string excerpt(const json& value) {
   return text.size() <= longest ? text : text.substr(0, longest) + "...";
 }
 
-// A row while it is read: what its errors name, and its checked fields.
+// Reads the fields of a row and names them in errors.
 class RowReader {
  public:
   RowReader(const json& row, std::size_t number, std::string_view file)
@@ -43,7 +43,7 @@ class RowReader {
     return row_[field];
   }
 
-  // What is not finite was written as null.
+  // Values that are not finite were written as null.
   [[nodiscard]] double number_or_null(const std::string& field, const json& value) const {
     if (value.is_null()) return std::numeric_limits<double>::quiet_NaN();
     if (!value.is_number())

@@ -95,10 +95,10 @@ std::vector<HomingTask> draw_homing_tasks(const HomingPlace& place, int count, d
     HomingTask task;
     task.goal = place.free_space->random_pose(random);
     do {
-      const double way_m = radius_m * std::sqrt(random.uniform());
+      const double offset_m = radius_m * std::sqrt(random.uniform());
       const double direction_rad = random.uniform(-std::numbers::pi, std::numbers::pi);
-      task.start = {task.goal.x_m + way_m * std::cos(direction_rad),
-                    task.goal.y_m + way_m * std::sin(direction_rad),
+      task.start = {task.goal.x_m + offset_m * std::cos(direction_rad),
+                    task.goal.y_m + offset_m * std::sin(direction_rad),
                     wrap_angle(random.uniform(-std::numbers::pi, std::numbers::pi))};
     } while (!place.free_space->is_free(task.start.position()));
     tasks.push_back(task);

@@ -15,7 +15,7 @@
 
 namespace panonav::lab {
 
-/// The camera of a homing robot and what it keeps of a picture.
+/// The camera of a homing robot and the components of its signatures.
 struct HomingCamera {
   simulation::PanoramaRendering rendering{.rows = 40, .columns = 256, .rays_per_axis = 1};
   simulation::FrameOptions frame;  ///< height above the floor, tilt
@@ -29,18 +29,18 @@ struct HomingPlace : simulation::SimulatedPlace {
   HomingCamera camera;
 };
 
-/// The place of a scene, with the camera at the height that the scene is made for. Throws
-/// ContractError as the parts.
+/// Makes the place of a scene, with the camera at the height of the scene. Throws ContractError as
+/// `make_place`.
 [[nodiscard]] HomingPlace make_homing_place(simulation::Scene scene, HomingCamera camera,
                                             Executor& executor);
 
-/// What a robot there sees. The same pose and seed give the same bits.
+/// Renders the view of a robot there. The same pose and seed give the same bits.
 [[nodiscard]] HomingView take_homing_view(const HomingPlace& place, const Pose2& pose,
                                           std::uint64_t seed);
 
 struct HomingRunOptions {
-  /// Error of what wheels do against what they were told; its drive says how the robot moves: a
-  /// differential robot turns, then drives; a holonomic one never turns, and drives sideways.
+  /// Error of the wheels. A differential robot turns, then drives; a holonomic one never turns, and
+  /// drives sideways.
   OdometryNoise motion;
   simulation::ObstacleRule obstacles = simulation::ObstacleRule::pass;
   HomingPursuitOptions pursuit;
@@ -51,24 +51,23 @@ enum class HomingRunEnd {
   arrived,      ///< the robot says that it is at home
   wrong_place,  ///< the robot says that it stopped somewhere else
   blocked,      ///< an obstacle stopped it
-  exhausted,    ///< the most steps were made
+  exhausted,    ///< the maximum number of steps was reached
 };
-/// "arrived", "wrong place", "blocked", "exhausted".
+/// Returns "arrived", "wrong place", "blocked" or "exhausted".
 [[nodiscard]] std::string_view name_of(HomingRunEnd end);
 
-/// What a robot did on its way home.
+/// A run home.
 struct HomingRun {
   Pose2 goal;
   std::vector<Pose2> path;          ///< true poses at the views, the start first; and the last one
   std::vector<HomeVector> vectors;  ///< at these poses
   HomingRunEnd end = HomingRunEnd::exhausted;
-  double end_distance_m = 0.0;  ///< from the goal
-  /// Of the first view and of the last one from home.
-  double start_difference = 0.0;
-  double end_difference = 0.0;
-  bool met_obstacle = false;  ///< at least one step was not the one wanted
+  double end_distance_m = 0.0;    ///< from the goal
+  double start_difference = 0.0;  ///< image difference of the first view from home
+  double end_difference = 0.0;    ///< image difference of the last view from home
+  bool met_obstacle = false;      ///< at least one step was not in the intended direction
 
-  /// The end is within `radius_m` of the goal, and the robot says that it arrived.
+  /// True if the robot reports an arrival within `radius_m` of the goal.
   [[nodiscard]] bool succeeds(double radius_m) const noexcept;
 };
 
@@ -79,19 +78,19 @@ struct HomingRun {
                                  const Pose2& goal, const Pose2& start,
                                  const HomingRunOptions& options, std::uint64_t seed);
 
-/// Where a run begins and what it is to reach.
+/// Start and goal of a run.
 struct HomingTask {
   Pose2 goal;
   Pose2 start;
 };
 
-/// Random goals in the free space, each with a start uniform over the free places within
+/// Draws random goals in the free space, each with a start uniform over the free places within
 /// `radius_m`, all headings random. Places as the scene has them: walls and things may stand in
 /// between. Throws ContractError unless count >= 1 and radius_m > 0.
 [[nodiscard]] std::vector<HomingTask> draw_homing_tasks(const HomingPlace& place, int count,
                                                         double radius_m, std::uint64_t seed);
 
-/// All runs, task by task; run i has the stream (seed, i).
+/// Runs all tasks; run i has the stream (seed, i).
 [[nodiscard]] std::vector<HomingRun> run_home(const HomingPlace& place,
                                               const std::vector<HomingTask>& tasks,
                                               const HomingRunOptions& options, std::uint64_t seed,

@@ -7,7 +7,7 @@
 
 namespace panonav::lab {
 
-/// How particles are injected in an experiment: by the filter's own ways or by a paper's.
+/// Rule by which an experiment injects particles: the filter's own or a paper's.
 enum class InjectionMethod {
   none,         ///< none
   uniform,      ///< a fixed number, anywhere in the memorised area: the standard way
@@ -15,15 +15,16 @@ enum class InjectionMethod {
   explained,    ///< `MonteCarloOptions::Injection::explained`
 };
 
-/// Replaces 50 particles at each image by new ones anywhere [M03 figure 8].
+/// Returns a rule that replaces 50 particles at each image by new ones anywhere [M03 figure 8].
 [[nodiscard]] MonteCarloLocaliser::InjectionRule uniform_injection();
 
-/// Replaces 10 % of the particles at each image by new ones around the topological localisations,
-/// the references whose dissimilarity is within a quarter of the best [M03 section 4.1].
+/// Returns a rule that replaces 10 % of the particles at each image by new ones around the
+/// topological localisations, the references whose dissimilarity is within a quarter of the best
+/// [M03 section 4.1].
 [[nodiscard]] MonteCarloLocaliser::InjectionRule topological_injection(
     std::shared_ptr<const ColumnRanking> ranking);
 
-/// Makes the filter over this ranking inject particles so, besides its own way.
+/// Sets the rule of a filter over this ranking; its own rule is an option of the filter.
 void use_injection(MonteCarloLocaliser& filter, InjectionMethod method,
                    const std::shared_ptr<const ColumnRanking>& ranking);
 

@@ -16,20 +16,20 @@ namespace panonav::lab {
 
 namespace {
 
-/// A recorded place in a memory, with what answers queries, as the command's defaults have it where
-/// columns find the places: local features are evidence, but do not rank.
-/// Neither copied nor moved: the localiser looks at the memory.
-class AskedPlace {
+/// A memory of a recorded place with its localiser, by the command's defaults: columns rank the
+/// places, local features are evidence only. Neither copied nor moved: the localiser refers to the
+/// memory.
+class MemorisedPlace {
  public:
-  AskedPlace(const simulation::PlaceRecording& place, Executor& executor)
+  MemorisedPlace(const simulation::PlaceRecording& place, Executor& executor)
       : memory_(make_memory_of_references(place, executor)), localiser_(memory_) {
     localiser_.use_features(extract_reference_features(place, memory_, executor), false);
   }
-  AskedPlace(const AskedPlace&) = delete;
-  AskedPlace& operator=(const AskedPlace&) = delete;
+  MemorisedPlace(const MemorisedPlace&) = delete;
+  MemorisedPlace& operator=(const MemorisedPlace&) = delete;
 
   [[nodiscard]] const VisualMemory& memory() const noexcept { return memory_; }
-  [[nodiscard]] Place ask(const Panorama& view) const {
+  [[nodiscard]] Place localise(const Panorama& view) const {
     return localiser_.localise(compute_packed_signature(view, memory_), {},
                                make_query_features(view));
   }
@@ -39,7 +39,7 @@ class AskedPlace {
   Localiser localiser_;
 };
 
-// Places in steps of the grid; rounding, as positions are not exact multiples.
+// True if two places are at most one step of the grid apart in x and in y.
 bool is_neighbour(Point2 a, Point2 b, double spacing_m) {
   return std::abs(std::lround((a.x_m - b.x_m) / spacing_m)) <= 1 &&
          std::abs(std::lround((a.y_m - b.y_m) / spacing_m)) <= 1;
@@ -64,7 +64,7 @@ std::vector<PlaceCondition> place_conditions() {
 std::vector<PlaceResult> run_place_experiment(const simulation::PlaceRecording& place,
                                               const std::vector<PlaceCondition>& conditions,
                                               Executor& executor) {
-  const AskedPlace remembered(place, executor);
+  const MemorisedPlace remembered(place, executor);
   std::vector<PlaceResult> results;
   std::uint64_t seed = place.seed * 1000003U;
   for (const PlaceCondition& condition : conditions) {
@@ -78,7 +78,7 @@ std::vector<PlaceResult> run_place_experiment(const simulation::PlaceRecording& 
           simulation::take_panorama(*place.renderer, place.queries[begin].pose, place.rendering,
                                     frame, condition.sensor, seed + begin, here);
       const Tilt measured = condition.levelled ? draw_tilt(frame, seed + begin) : Tilt{};
-      answers[begin] = remembered.ask(level_panorama(seen, measured));
+      answers[begin] = remembered.localise(level_panorama(seen, measured));
     });
     seed += asked;
     std::size_t nearest = 0;
@@ -92,12 +92,12 @@ std::vector<PlaceResult> run_place_experiment(const simulation::PlaceRecording& 
       const Place& answer = answers[i];
       const PlaceMatch& best = answer.matches.at(0);
       const ReferencePose& found = *remembered.memory().info(best.view).pose;
-      const Point2 wanted =
+      const Point2 nearest_position =
           place.references[place.nearest_reference(truth.position())].pose.position();
-      nearest += found.position() == wanted ? 1 : 0;
-      next += is_neighbour(found.position(), wanted, place.spacing_m) ? 1 : 0;
+      nearest += found.position() == nearest_position ? 1 : 0;
+      next += is_neighbour(found.position(), nearest_position, place.spacing_m) ? 1 : 0;
       known += answer.known ? 1 : 0;
-      // No reading is as wrong as can be.
+      // A missing reading counts as the largest error.
       heading_errors.push_back(best.heading_rad
                                    ? std::abs(angle_difference(
                                          *found.heading_rad + *best.heading_rad, truth.heading_rad))
@@ -122,11 +122,11 @@ std::vector<RecognitionRate> recognition_rates(
   std::vector<RecognitionRate> own;
   std::vector<RecognitionRate> others;
   for (const simulation::PlaceRecording* const place : places) {
-    const AskedPlace remembered(*place, executor);
+    const MemorisedPlace remembered(*place, executor);
     for (const simulation::PlaceRecording* const asked : places) {
       std::vector<std::uint8_t> known(asked->queries.size());
       executor.for_chunks(known.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
-        known[i] = remembered.ask(asked->queries[i].panorama).known ? 1 : 0;
+        known[i] = remembered.localise(asked->queries[i].panorama).known ? 1 : 0;
       });
       const auto count = static_cast<std::size_t>(std::ranges::count(known, 1));
       (place == asked ? own : others)

@@ -12,7 +12,7 @@
 
 namespace panonav::lab {
 
-/// What differs between memorising and asking.
+/// Differences between memorising and localising.
 struct PlaceCondition {
   std::string name;
   simulation::SensorOptions sensor;
@@ -20,11 +20,11 @@ struct PlaceCondition {
   bool levelled = false;  ///< an inertial sensor measures it, and views are turned upright
 };
 
-/// As memorised; light 30 % less and 30 % more, with a tenth of the columns hidden; 5 degrees of
-/// tilt.
+/// Returns four conditions: as memorised; light 30 % less and 30 % more, with a tenth of the
+/// columns hidden; 5 degrees of tilt.
 [[nodiscard]] std::vector<PlaceCondition> place_conditions();
 
-/// How one condition went.
+/// Results of one condition.
 struct PlaceResult {
   std::string condition;
   Proportion nearest;               ///< the best match is the nearest grid place
@@ -36,20 +36,21 @@ struct PlaceResult {
   Proportion inside;               ///< of those, within the stated 95 % radius
 };
 
-/// Memorises the references of the place and asks for the queries' poses, in all conditions. Throws
-/// what Renderer throws.
+/// Memorises the references of the place and localises the queries in all conditions. Throws as
+/// `Renderer`.
 [[nodiscard]] std::vector<PlaceResult> run_place_experiment(
     const simulation::PlaceRecording& place, const std::vector<PlaceCondition>& conditions,
     Executor& executor);
 
-/// Queries of one place asked of the memory of another, or of its own.
+/// Share of the queries of one place that the memory of a place knows.
 struct RecognitionRate {
   std::string memory;
   std::string queries;
   Proportion known;
 };
 
-/// Each place's memory is asked for the queries of all places. Rates of the same place come first.
+/// Localises the queries of all places in the memory of each place. Rates of the same place come
+/// first.
 [[nodiscard]] std::vector<RecognitionRate> recognition_rates(
     std::span<const simulation::PlaceRecording* const> places, Executor& executor);
 

@@ -38,10 +38,10 @@ TrackedRun track_run(const TrackingPlace& place, const TrackingRun& run,
                           ? MonteCarloOptions::Injection::explained
                           : MonteCarloOptions::Injection::none;
   if (setting.particles_per_reference) {
-    const double wanted =
+    const double particles =
         *setting.particles_per_reference * static_cast<double>(place.memory().size());
     options.min_particles = options.max_particles =
-        std::max(1, static_cast<int>(std::lround(wanted)));
+        std::max(1, static_cast<int>(std::lround(particles)));
   }
   MonteCarloLocaliser filter(place.ranking(), place.model(), options, setting.assumed_odometry);
   use_injection(filter, setting.injection, place.ranking());

@@ -15,7 +15,7 @@
 
 namespace panonav::lab {
 
-/// What one image left the filter with.
+/// State of the filter after one image.
 struct TrackedImage {
   std::size_t step = 0;  ///< of the run
   LocalisationState state = LocalisationState::lost;
@@ -27,9 +27,9 @@ struct TrackedImage {
   int particles = 0;
   int injected = 0;
 
-  /// A pose was given and it is within `radius_m`.
+  /// True if a pose was given and is within `radius_m`.
   [[nodiscard]] bool is_within(double radius_m) const { return answered && error_m < radius_m; }
-  /// Says "localised" and is wrong by more than `radius_m`.
+  /// True if the state is localised and the error above `radius_m`.
   [[nodiscard]] bool is_confidently_wrong(double radius_m) const {
     return state == LocalisationState::localised && !(error_m <= radius_m);
   }
@@ -43,37 +43,37 @@ struct FilterSetting {
   /// As many particles as this times the references, at all times; empty: as the options say.
   std::optional<double> particles_per_reference;
   OdometryNoise odometry;          ///< of the robot
-  OdometryNoise assumed_odometry;  ///< what the filter takes it for
+  OdometryNoise assumed_odometry;  ///< by the filter
   bool heading_known = false;      ///< at the start
 };
 
-/// The paper's robot: holonomic, heading known and kept, no compass, as many particles as
+/// Returns the paper's robot: holonomic, heading known and kept, no compass, as many particles as
 /// references, nothing injected.
 [[nodiscard]] FilterSetting paper_setting();
-/// Heading unknown, compass on, differential drive, as many particles as references.
+/// Returns a differential drive with unknown heading, compass on, as many particles as references.
 [[nodiscard]] FilterSetting compass_setting(InjectionMethod injection);
 
 /// Called after each step, also those without an image.
 using StepObserver = std::function<void(std::size_t step, const MonteCarloLocaliser& filter,
                                         const MonteCarloEstimate& estimate)>;
 
-/// One run through a filter. `seed` is that of the odometry and of the filter. Same arguments: same
-/// bits.
+/// Tracks one run by a filter. `seed` is that of the odometry and of the filter. Same arguments:
+/// same bits.
 [[nodiscard]] TrackedRun track_run(const TrackingPlace& place, const TrackingRun& run,
                                    const FilterSetting& setting, std::uint64_t seed,
                                    const StepObserver& observer = {});
 
-/// All runs; run i has the seed `first_seed` + i.
+/// Tracks all runs; run i has the seed `first_seed` + i.
 [[nodiscard]] std::vector<TrackedRun> track_runs(const TrackingPlace& place,
                                                  std::span<const TrackingRun> runs,
                                                  const FilterSetting& setting,
                                                  std::uint64_t first_seed, Executor& executor);
 
-/// How many images, counted from 1 at step `first_step`, until the answer is within `radius_m` and
+/// Counts the images, from 1 at step `first_step`, until the answer is within `radius_m` and
 /// stays so to the end of the run; empty when the last one is not.
 [[nodiscard]] std::optional<int> images_until_localised(const TrackedRun& run, double radius_m,
                                                         std::size_t first_step = 0);
-/// The same until the first answer within `radius_m`, whatever follows.
+/// Counts the images until the first answer within `radius_m`, whatever follows.
 [[nodiscard]] std::optional<int> images_until_first_fix(const TrackedRun& run, double radius_m,
                                                         std::size_t first_step = 0);
 

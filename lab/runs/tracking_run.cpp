@@ -17,13 +17,13 @@ namespace panonav::lab {
 namespace {
 
 constexpr int memory_components = 15;    // [M04]
-constexpr std::size_t first_views = 32;  // of which a memory learns its full scale
+constexpr std::size_t first_views = 32;  // that determine the full scale of a memory
 
 FourierSignature signature_of(const Panorama& view) {
   return compute_signature(preprocess(view, {}), memory_components);
 }
 
-// A number for each of its parts: different parts give different numbers, far apart.
+// Combines two seeds so that different pairs give different seeds, far apart.
 std::uint64_t mix_seeds(std::uint64_t a, std::uint64_t b) {
   return a * 1000003U + b;
 }
@@ -53,7 +53,7 @@ VisualMemory make_memory_of_views(std::span<const ReferencePose> poses,
           static_cast<double>(views.size()), ">= 1, as many as poses");
   const auto signatures = simulation::make_each(
       executor, views.size(), [&](std::size_t i) { return signature_of(*views[i]); });
-  // As the command does: of the first views, without component 0, which says how bright they are.
+  // Same as the command: the first views, without component 0, which is the brightness.
   float full_scale = 0.0F;
   for (std::size_t i = 0; i < std::min(first_views, signatures.size()); ++i) {
     const auto rows = static_cast<std::size_t>(signatures[i].rows());
@@ -237,7 +237,7 @@ std::vector<TrackingRun> record_walks(const simulation::PlaceRecording& place,
 }
 
 void SingleImages::add(const SingleImages& other) {
-  asked += other.asked;
+  images += other.images;
   right += other.right;
   near += other.near;
   right_by_dissimilarity += other.right_by_dissimilarity;
@@ -255,13 +255,14 @@ SingleImages localise_single_images(const TrackingPlace& place, std::span<const 
       for (const Point2 position : positions) {
         nearest = std::min(nearest, distance(position, truth));
       }
-      const auto way_to = [&](ViewId view) {
+      const auto distance_to = [&](ViewId view) {
         return distance(place.memory().info(view).pose->position(), truth);
       };
-      const double best = way_to(place.localiser().localise(*step.view).matches.at(0).view);
+      const double best = distance_to(place.localiser().localise(*step.view).matches.at(0).view);
       const auto found = place.memory().search(*step.view, {.top = 1});
-      ++parts[r].asked;
-      parts[r].right_by_dissimilarity += way_to(found.matches.at(0).view) <= nearest + 1e-9 ? 1 : 0;
+      ++parts[r].images;
+      parts[r].right_by_dissimilarity +=
+          distance_to(found.matches.at(0).view) <= nearest + 1e-9 ? 1 : 0;
       parts[r].right += best <= nearest + 1e-9 ? 1 : 0;
       parts[r].near += best <= place.spacing_m() ? 1 : 0;
     }

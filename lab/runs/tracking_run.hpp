@@ -20,8 +20,8 @@
 
 namespace panonav::lab {
 
-/// A memory of posed views with all that localises in it, learnt once and shared by any number of
-/// runs. Neither copied nor moved: its parts look at the memory.
+/// A memory of posed views with its localisers, shared by any number of runs. Neither copied nor
+/// moved: its parts refer to the memory.
 class TrackingPlace {
  public:
   /// `spacing_m`: of the grid of references, > 0: by it errors are judged. Throws ContractError as
@@ -37,7 +37,7 @@ class TrackingPlace {
   }
   [[nodiscard]] const ObservationModel& model() const noexcept { return model_; }
   [[nodiscard]] const Localiser& localiser() const noexcept { return localiser_; }
-  /// Of all posed views.
+  /// Returns the positions of all posed views.
   [[nodiscard]] std::vector<Point2> reference_positions() const;
 
  private:
@@ -48,24 +48,24 @@ class TrackingPlace {
   Localiser localiser_;
 };
 
-/// Views as a memory, as the command's defaults have it. Throws ContractError on numbers of poses
-/// and views that differ, or no view.
+/// Makes a memory of views by the command's defaults. Throws ContractError on different numbers of
+/// poses and views, or no view.
 [[nodiscard]] VisualMemory make_memory_of_views(std::span<const ReferencePose> poses,
                                                 std::span<const Panorama* const> views,
                                                 Executor& executor);
-/// The same of the references of a recorded place; `kept` chooses which of them; empty: all.
+/// Makes a memory of the references of a recorded place; `kept` selects some; empty: all.
 [[nodiscard]] VisualMemory make_memory_of_references(
     const simulation::PlaceRecording& place, Executor& executor,
     const std::function<bool(Point2)>& kept = nullptr);
 
-/// The local features of the references that this memory holds.
+/// Extracts the local features of the references in this memory.
 [[nodiscard]] FeatureSource extract_reference_features(const simulation::PlaceRecording& place,
                                                        const VisualMemory& memory,
                                                        Executor& executor);
-/// What `Localiser::localise` asks for. The view must outlive it.
+/// Returns the features of a query for `Localiser::localise`. The view must outlive them.
 [[nodiscard]] QueryFeatures make_query_features(const Panorama& view);
 
-/// The same with all that localises in them. `spacing_m` as TrackingPlace.
+/// Makes the place of views. `spacing_m` as TrackingPlace.
 [[nodiscard]] std::shared_ptr<const TrackingPlace> make_tracking_place(
     std::span<const ReferencePose> poses, std::span<const Panorama* const> views, double spacing_m,
     Executor& executor);
@@ -74,7 +74,7 @@ class TrackingPlace {
     const simulation::PlaceRecording& place, Executor& executor,
     const std::function<bool(Point2)>& kept = nullptr);
 
-/// The signature that a robot with this memory takes of a panorama: the command's defaults.
+/// Computes the signature of a panorama for this memory by the command's defaults.
 [[nodiscard]] PackedSignature compute_packed_signature(const Panorama& panorama,
                                                        const VisualMemory& memory);
 
@@ -87,28 +87,27 @@ struct TrackingStep {
   std::optional<PackedSignature> view;  ///< empty: no picture was taken
 };
 
-/// What a robot did and saw. Odometry is added when a filter runs, so that one run serves several
-/// kinds of it.
+/// True poses and views of a run. Odometry is simulated when a filter runs.
 struct TrackingRun {
   std::vector<TrackingStep> steps;
 };
 
-/// A run through `poses` with a view at each of them.
+/// Makes a run through `poses` with a view at each of them.
 [[nodiscard]] TrackingRun make_tracking_run(std::span<const Pose2> poses,
                                             std::vector<PackedSignature> views);
 
-/// The first `images` steps of `before`; then the robot is put down at the first step of `after`
-/// that is at least `distance_m` away, and goes on there. Empty when no such step leaves
+/// Joins the first `images` steps of `before` with those of `after` from the first step of `after`
+/// that is at least `distance_m` away, and continues there. Nullopt if no such step leaves
 /// `min_images`.
 [[nodiscard]] std::optional<TrackingRun> make_kidnapped_run(const TrackingRun& before,
                                                             const TrackingRun& after,
                                                             std::size_t images, double distance_m,
                                                             std::size_t min_images);
 
-/// The same run without the pictures of steps first .. first + count - 1.
+/// Returns the run without the images of steps first .. first + count - 1.
 [[nodiscard]] TrackingRun drop_images(TrackingRun run, std::size_t first, std::size_t count);
 
-/// How runs differ from memorising.
+/// Differences of runs from memorising.
 struct RunCondition {
   std::string id;
   std::string name;
@@ -117,10 +116,10 @@ struct RunCondition {
   simulation::SensorOptions sensor;
 };
 
-/// As memorised.
+/// Returns the condition of memorising.
 [[nodiscard]] RunCondition clean_condition();
-/// Light 30 % less to 30 % more, a tenth of the objects moved, and a sensor so noisy that a single
-/// image is right in 60 to 80 % of the cases.
+/// Returns light of 0.7 .. 1.3, a tenth of the objects moved, and sensor noise at which 60 to 80 %
+/// of single images are localised correctly.
 [[nodiscard]] RunCondition hard_condition();
 
 struct WalkOptions {
@@ -132,17 +131,17 @@ struct WalkOptions {
   std::uint64_t seed = 1;
 };
 
-/// Random walks through the place under a condition, variant by variant; variant v of condition and
-/// seed is the same whatever the number of runs. `place.scene.name` and `place.seed` name the
-/// scene, which must be a built-in one where the condition changes it. Cost: one renderer for each
-/// variant of a scene that changes, and one view for each image.
+/// Records random walks through the place under a condition, variant by variant; variant v of
+/// condition and seed is the same whatever the number of runs. `place.scene.name` and `place.seed`
+/// name the scene, which must be a built-in one where the condition changes it. Cost: one renderer
+/// for each variant of a scene that changes, and one view for each image.
 [[nodiscard]] std::vector<TrackingRun> record_walks(const simulation::PlaceRecording& place,
                                                     const TrackingPlace& remembered,
                                                     const RunCondition& condition,
                                                     const WalkOptions& options, Executor& executor);
 
-/// Views along given poses, all through one renderer (of the place's own or a changed scene); view
-/// i of pose list r has the noise seed `seed` + 1000 r + i.
+/// Records views along poses, all through one renderer (of the place's own or a changed scene);
+/// view i of pose list r has the noise seed `seed` + 1000 r + i.
 [[nodiscard]] std::vector<TrackingRun> record_runs(const std::vector<std::vector<Pose2>>& poses,
                                                    const simulation::PlaceRecording& place,
                                                    const simulation::Renderer& renderer,
@@ -150,12 +149,12 @@ struct WalkOptions {
                                                    const simulation::SensorOptions& sensor,
                                                    std::uint64_t seed, Executor& executor);
 
-/// How well single images of runs are localised, each by itself.
+/// Localisation of single images of runs.
 struct SingleImages {
-  std::size_t asked = 0;
+  std::size_t images = 0;
   std::size_t right = 0;  ///< the best match is the reference nearest to the truth
   std::size_t near = 0;   ///< the best match is within one spacing of the truth
-  /// The reference of least dissimilarity is the one nearest to the truth: the paper's way.
+  /// The reference of smallest dissimilarity is nearest to the truth: the paper's method.
   std::size_t right_by_dissimilarity = 0;
   void add(const SingleImages& other);
 };

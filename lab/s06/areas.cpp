@@ -69,13 +69,13 @@ void compare_catchment_areas(std::span<const CatchmentAreas> arenas, const Exper
           at_least(1.0));
     };
     add(
-        "area_expected_images", "places in the mean catchment area, expected images", "places",
+        "area_expected_images", "mean catchment area, expected images", "places",
         [&](const auto& a) { return a.at(images)[i]; }, std::nullopt);
     add(
-        "area_coarse_to_fine", "places in the mean catchment area, " + coarse_to_fine, "places",
+        "area_coarse_to_fine", "mean catchment area, " + coarse_to_fine, "places",
         [&](const auto& a) { return a.at(coarse_to_fine)[i]; }, std::nullopt);
     add(
-        "area_own", "places in the mean catchment area, our rule", "places",
+        "area_own", "mean catchment area, our rule", "places",
         [&](const auto& a) { return a.at(own)[i]; }, std::nullopt);
     add(
         "single_against_expected_images",
@@ -125,7 +125,7 @@ void report_variant(const std::string& id, const std::string& what, const Catchm
 void reproduce_snapshot_bytes(ArenaSurveys& surveys, Reproduction& result) {
   const std::size_t places = surveys.arena().currents.views.size();
   constexpr float accepted_m = 0.1F + 1e-6F;
-  // Whether each place lies in the catchment area of each goal.
+  // Returns for each goal whether each place lies in its catchment area.
   const auto inside = [&](const HomingStrategy& strategy) {
     const auto distances = surveys.distances(strategy);
     std::vector<std::vector<bool>> areas(distances.size() / places, std::vector<bool>(places));
@@ -185,8 +185,8 @@ void measure_homing_times(const Arena& arena, Reproduction& result) {
     for (int i = 0; i < repeats; ++i) {
       const auto begin = Clock::now();
       for (int call = 0; call < calls; ++call) work(static_cast<std::size_t>(call));
-      const std::chrono::duration<double, std::micro> taken = Clock::now() - begin;
-      best = std::min(best, taken.count() / calls);
+      const std::chrono::duration<double, std::micro> duration = Clock::now() - begin;
+      best = std::min(best, duration.count() / calls);
     }
     return best;
   };
@@ -206,7 +206,7 @@ void measure_homing_times(const Arena& arena, Reproduction& result) {
         home_vector_unchecked(homes.views[i % count].view, currents.views[7 * i % count].view, own)
             .xi;
   });
-  // What a row holds does not change the time: 72 pixels, each five times.
+  // The values of a row do not change the time: 72 pixels, each five times.
   constexpr int columns = 360;
   const auto widened = [](const std::vector<float>& row) {
     std::vector<float> wide;

@@ -108,7 +108,7 @@ Arena record_arena(const ArenaOptions& options, Executor& executor) {
 }
 
 HomingSurveyOptions survey_options(const Arena& arena) {
-  // What S06 used at 2.5 cm.
+  // The values of [S06] at 2.5 cm.
   return {.typical_distance_m = 0.5,
           .max_step_m = 2.0 * arena.options.spacing_m,
           .obstacle_m = 0.8 * arena.options.spacing_m};

@@ -11,8 +11,6 @@
 
 namespace panonav::lab {
 
-// The toy house arena of [S06 section 4], recorded twice.
-
 inline constexpr double s06_spacing_m = 0.025;
 /// No place is nearer to the border of the floor; so about 1250 places are free, the farthest two
 /// of them 1.4 m apart as in [S06 figure 11].
@@ -21,7 +19,7 @@ inline constexpr int s06_columns = 72;
 /// Components of a view of 72 pixels: k = 0 .. 35.
 inline constexpr int s06_components = s06_columns / 2;
 
-/// How the robot stands at the places of the grid.
+/// Headings of the robot at the places of the grid.
 enum class ArenaHeading {
   fixed,   ///< the same everywhere, as the published recordings were evaluated
   random,  ///< any: what a robot without a compass has
@@ -30,8 +28,7 @@ enum class ArenaHeading {
 struct ArenaOptions {
   std::uint64_t seed = 1;
   ArenaHeading heading = ArenaHeading::random;
-  /// Standard deviations of the tracking system [S06 figure 5]: the robot is elsewhere and turned
-  /// otherwise than is believed.
+  /// Standard deviations of the tracking system [S06 figure 5] from the true pose.
   double position_noise_m = 0.0;
   double heading_noise_rad = 0.0;
   /// Light of the second recording, that of the first being 1.
@@ -60,20 +57,21 @@ struct Arena : simulation::SimulatedPlace {
   ArenaRecording currents;  ///< second, at the same places
 };
 
-/// Throws ContractError when nothing is free at the spacing.
+/// Records the toy house arena of [S06 section 4] twice. Throws ContractError when nothing is free
+/// at the spacing.
 [[nodiscard]] Arena record_arena(const ArenaOptions& options, Executor& executor);
 
-/// The row of one place of the scene through a camera with noise: 360 pixels of 1 degree and 10
-/// rows, averaged to 72.
+/// Renders the row of one place of the scene through a camera with noise: 360 pixels of 1 degree
+/// and 10 rows, averaged to 72.
 [[nodiscard]] std::vector<float> render_arena_row(const simulation::Renderer& renderer,
                                                   const simulation::Scene& scene, const Pose2& pose,
                                                   std::uint64_t seed, Executor& executor);
 
-/// Runs as in [S06 section 4.4], for the spacing of the arena.
+/// Returns options of runs as in [S06 section 4.4], for the spacing of the arena.
 [[nodiscard]] HomingSurveyOptions survey_options(const Arena& arena);
 
-/// Homes of every `every`-th place of the first recording, current views of all places of the
-/// second. `rule` gets the numbers of the places.
+/// Surveys home views of every n-th place (`every`) of the first recording against all places of
+/// the second. `rule` receives the indices of the places.
 [[nodiscard]] HomingSurvey survey_arena(const Arena& arena, const HomingRule& rule,
                                         Executor& executor, std::size_t every = 1);
 [[nodiscard]] HomingSurvey survey_arena(const Arena& arena, const FourierHomingOptions& homing,

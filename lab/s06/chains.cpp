@@ -150,7 +150,7 @@ void reproduce_snapshot_chains(const HomingPlace& place, const std::string& name
   add_mean(reproduction, id + ".lateral", what + ": mean distance from the route", "m", mean_m);
   add_median(reproduction, id + ".lateral_worst", what + ": largest distance from the route", "m",
              worst_m);
-  add_mean(reproduction, id + ".spacing", what + ": way between snapshots", "m", spacing_m);
+  add_mean(reproduction, id + ".spacing", what + ": distance between snapshots", "m", spacing_m);
   add_mean(reproduction, id + ".bytes", what + ": size", "B/m", bytes);
 }
 

@@ -12,7 +12,7 @@ namespace panonav::lab {
 
 namespace {
 
-// Of the recorder. Vectors between a candidate and the last snapshot may be off by this much.
+// Recorder: vectors between a candidate and the last snapshot may be off by this much.
 constexpr double direction_tolerance_rad = 0.6;
 // A snapshot is taken at this share of the distance over which homing worked, so that a robot
 // beside the route or in other light still reaches it.
@@ -23,7 +23,7 @@ constexpr double too_near_to_compare_m = 0.15;
 // Between the views that are compared; a view nearer to the one before is skipped.
 constexpr double view_spacing_m = 0.1;
 
-// Of the follower. It continues to the next snapshot where the vector to the present one is shorter
+// Follower: it continues to the next snapshot where the vector to the present one is shorter
 // than this, in units of R.
 constexpr double switch_length = 0.1;
 // A vector that points farther from where odometry expects the snapshot is not followed.
@@ -41,7 +41,7 @@ double length(const Pose2& step) {
   return std::hypot(step.x_m, step.y_m);
 }
 
-// Whether the home vector from one view to another agrees with odometry.
+// True if the home vector from one view to another agrees with odometry.
 bool agrees_with_odometry(const HomingView& from, const HomingView& to, const Pose2& from_to) {
   if (length(from_to) < too_near_to_compare_m) return true;
   const HomeVector vector = home_vector(to, from);
@@ -97,9 +97,9 @@ std::size_t ChainRecorder::add(const HomingView& view, const Pose2& moved) {
   if (!too_far && is_reachable(passed_.back())) return chain_.size();
   // The last view that is not too far: a share of the way that worked, and at least the shortest.
   const double worked_m = passed_[passed_.size() - 2].way_m;
-  const double wanted_m = std::max(too_far ? worked_m : margin * worked_m, min_spacing_m);
+  const double max_way_m = std::max(too_far ? worked_m : margin * worked_m, min_spacing_m);
   std::size_t chosen = 0;
-  for (std::size_t i = 1; i < passed_.size() && passed_[i].way_m <= wanted_m; ++i) chosen = i;
+  for (std::size_t i = 1; i < passed_.size() && passed_[i].way_m <= max_way_m; ++i) chosen = i;
   if (chosen == 0 && way_m_ >= min_spacing_m) chosen = 1;
   if (chosen > 0) take_snapshot(chosen);
   return chain_.size();
@@ -184,7 +184,7 @@ void ChainFollower::start_at_nearest_snapshot(const HomingView& current) {
   max_steps_to_target_ = pursuit_options_.max_steps;
 }
 
-// What the views say counts where odometry does not exclude it.
+// Trusts the views where odometry does not exclude them.
 bool ChainFollower::aim_at_next_if_reached(const HomingView& current, const HomeVector& vector) {
   const double r_m = pursuit_options_.typical_distance_m;
   const bool contradicts = contradicts_odometry(vector);

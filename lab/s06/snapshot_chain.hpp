@@ -25,12 +25,12 @@ struct Snapshot {
 /// from its neighbours, in both directions.
 using SnapshotChain = std::vector<Snapshot>;
 
-/// Distance along the route from the first snapshot to the last; 0 for fewer than two.
+/// Returns the distance along the route from the first snapshot to the last; 0 for fewer than two.
 [[nodiscard]] double chain_length_m(const SnapshotChain& chain) noexcept;
 
-/// Size of the chain over its length; 0 where it has no length. A snapshot takes two floats for
-/// each row and frequency of its view, without the mean [S06 section 4.4], and four for the
-/// odometry.
+/// Returns the size of the chain over its length; 0 where it has no length. A snapshot takes two
+/// floats for each row and frequency of its view, without the mean [S06 section 4.4], and four for
+/// the odometry.
 [[nodiscard]] double bytes_per_metre(const SnapshotChain& chain) noexcept;
 
 /// Memorises a route while the robot drives it, and takes the next snapshot where homing between
@@ -43,19 +43,19 @@ using SnapshotChain = std::vector<Snapshot>;
 /// of these.
 class ChainRecorder {
  public:
-  /// Snapshots are at most this far apart along the way.
+  /// Sets the largest distance of snapshots along the path.
   explicit ChainRecorder(double max_spacing_m = 5.0);
 
-  /// The robot moved by `moved` (robot_old_from_robot_new, by its odometry; of no meaning for the
-  /// first view) and sees `view`. Returns how many snapshots the chain has now. Throws
-  /// ContractError on a view of another shape than those before.
+  /// Adds a view after the motion `moved` (robot_old_from_robot_new, by its odometry; of no meaning
+  /// for the first view). Returns the number of snapshots in the chain. Throws ContractError on a
+  /// view of another shape than those before.
   std::size_t add(const HomingView& view, const Pose2& moved);
 
-  /// The chain so far, and the place of the last view as its end. Empty chain without any view.
+  /// Returns the chain so far, with the last view as its end. Empty without any view.
   [[nodiscard]] SnapshotChain finish() const;
 
  private:
-  // A view since the last snapshot, in the frame of the robot there.
+  // View since the last snapshot, in the frame of the robot there.
   struct Passed {
     HomingView view;
     Pose2 snapshot_from_this;
@@ -91,19 +91,21 @@ struct ChainDecision {
 /// Repeats a route: homes to one snapshot after the other, in the order of recording or back. It
 /// begins with the snapshot that is most similar to the first view. It continues to the next
 /// snapshot where the present one is near (by the vector's length), or where the view has become
-/// more similar to the next one, so that a snapshot that was passed is not searched for. Odometry
-/// since the last snapshot is the second opinion, because it drifts little over that distance: a
-/// vector that contradicts it is not followed, a snapshot is not near while odometry expects more
-/// than half of the distance still to go, and a snapshot that is not found within three times the
-/// expected steps is skipped. The last snapshot is reached by a `HomingPursuit`.
+/// more similar to the next one.
+///
+/// Odometry since the last snapshot is the second opinion, because it drifts little over that
+/// distance: a vector that contradicts it is not followed, a snapshot is not near while odometry
+/// expects more than half of the distance still to go, and a snapshot that is not found within
+/// three times the expected steps is skipped. The last snapshot is reached by a `HomingPursuit`.
 class ChainFollower {
  public:
   /// Throws OptionError, and ContractError on an empty chain.
   ChainFollower(SnapshotChain chain, ChainDirection direction,
                 const HomingPursuitOptions& pursuit = {});
 
-  /// The robot moved by `moved` since the last view (robot_old_from_robot_new, by its odometry; of
-  /// no meaning for the first view). Throws ContractError as `home_vector`.
+  /// Decides the next motion after the motion `moved` since the last view
+  /// (robot_old_from_robot_new, by its odometry; of no meaning for the first view). Throws
+  /// ContractError as `home_vector`.
   [[nodiscard]] ChainDecision decide(const HomingView& current, const Pose2& moved);
 
  private:

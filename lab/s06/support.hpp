@@ -16,8 +16,6 @@
 
 namespace panonav::lab {
 
-// What the experiments of [S06] share.
-
 /// Distances from the goal at which a run may end.
 inline constexpr std::array<double, 3> s06_accepted_m{0.025, 0.05, 0.1};
 /// Iterations of the published rule in the runs: N_it + 1 = 3 [S06 figure 11].
@@ -26,7 +24,7 @@ inline constexpr int s06_iterations = 2;
 /// Image difference below which a place looks like home, K = 10.
 inline constexpr double s06_alike = 0.1;
 
-/// A way of homing: rules that follow each other whenever homing stops.
+/// A homing strategy: rules that follow each other whenever homing stops.
 struct HomingStrategy {
   enum class Rule { published, own, expected_images };
   std::string label;
@@ -49,13 +47,14 @@ class ArenaSurveys {
   [[nodiscard]] const Arena& arena() const noexcept { return arena_; }
   [[nodiscard]] std::size_t goals_every() const noexcept { return every_; }
   [[nodiscard]] const HomingSurvey& published(int highest, int iterations = s06_iterations);
-  /// Default options.
+  /// Surveys home vectors with default options.
   [[nodiscard]] const HomingSurvey& own(int highest);
-  /// Without the search of displacements; K = 10 instead of `highest` where it looks like home.
+  /// Surveys without the search of displacements; K = 10 instead of `highest` where it looks like
+  /// home.
   [[nodiscard]] const HomingSurvey& own_without_search(int highest);
   [[nodiscard]] const HomingSurvey& expected_images();
   [[nodiscard]] std::vector<const HomingSurvey*> stages(const HomingStrategy& strategy);
-  /// Goal after goal.
+  /// Returns the final distances of all runs, goal by goal.
   [[nodiscard]] std::vector<float> distances(const HomingStrategy& strategy);
   [[nodiscard]] std::vector<float> distances(std::span<const HomingSurvey* const> stages);
   [[nodiscard]] std::vector<double> areas(const HomingStrategy& strategy,
@@ -72,27 +71,27 @@ class ArenaSurveys {
   std::map<std::string, HomingSurvey> surveys_;
 };
 
-/// [S06] figures 3, 6, 7, 8.
+/// Reproduces [S06] figures 3, 6, 7 and 8.
 void reproduce_view_figures(const Arena& arena, const Experiments& context);
-/// Heading where both views are taken at the same place, with the tracker's noise: a row.
+/// Adds the heading error where both views are taken at the same place, with the tracker's noise.
 void reproduce_heading_with_pose_noise(const Arena& arena, Reproduction& result);
-/// [S06] figures 10 to 13.
+/// Reproduces [S06] figures 10 to 13.
 void reproduce_homing_figures(ArenaSurveys& surveys, const Experiments& context);
-/// [S06] figures 9, 14, 15, 16.
+/// Reproduces [S06] figures 9, 14, 15 and 16.
 void reproduce_goal_figures(ArenaSurveys& surveys, Reproduction& result);
-/// Three snapshots of K = 3 for the price of one image [S06 section 4.4].
+/// Compares three snapshots of K = 3 with one image of the same size [S06 section 4.4].
 void reproduce_snapshot_bytes(ArenaSurveys& surveys, Reproduction& result);
 
 /// Mean catchment areas of one arena at `s06_accepted_m`.
 using CatchmentAreas = std::map<std::string, std::array<double, s06_accepted_m.size()>>;
 [[nodiscard]] CatchmentAreas measure_catchment_areas(ArenaSurveys& surveys);
-/// How the rules compare, over arenas.
+/// Adds rows that compare the rules over arenas.
 void compare_catchment_areas(std::span<const CatchmentAreas> arenas, const Experiments& context);
-/// The same two recordings with the tracker's noise, or all at one heading: rows only.
+/// Adds rows of the same two recordings with the tracker's noise, or all at one heading.
 void report_variant(const std::string& id, const std::string& what, const CatchmentAreas& areas,
                     Reproduction& result);
 
-/// Time of one home vector and of its rival, N = 360.
+/// Measures the time of one home vector and of its rival, N = 360.
 void measure_homing_times(const Arena& arena, Reproduction& result);
 
 }  // namespace panonav::lab

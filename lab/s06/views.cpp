@@ -47,17 +47,17 @@ double true_turn(const Arena& arena, std::size_t goal, std::size_t place) {
 void draw_correlation(const Arena& arena, Reproduction& result) {
   // The place where the headings differ most nearly by 120 degrees, as in the paper.
   std::size_t shown = 0;
-  double least = 10.0;
+  double min_difference = 10.0;
   for (std::size_t i = 0; i < arena.homes.views.size(); ++i) {
     const double off = std::abs(std::abs(true_turn(arena, i, i)) - 2.0 * std::numbers::pi / 3.0);
-    if (off < least) {
-      least = off;
+    if (off < min_difference) {
+      min_difference = off;
       shown = i;
     }
   }
   const HomingView& home = arena.homes.views[shown].view;
   const HomingView& current = arena.currents.views[shown].view;
-  const double most = std::sqrt(energy(home) * energy(current));
+  const double max_correlation = std::sqrt(energy(home) * energy(current));
   const TurnCorrelation all = correlation_of(home, current, top);
   const double truth = true_turn(arena, shown, shown);
 
@@ -74,7 +74,7 @@ void draw_correlation(const Arena& arena, Reproduction& result) {
       for (int other = 1; k > 0 && other <= top; ++other) {
         if (other != k) one.real[other] = one.imaginary[other] = 0.0F;
       }
-      series.add(step, static_cast<double>(one.at(static_cast<float>(turn_rad))) / most);
+      series.add(step, static_cast<double>(one.at(static_cast<float>(turn_rad))) / max_correlation);
     }
     terms.series.push_back(std::move(series));
   }
@@ -282,8 +282,7 @@ void draw_changes(const Arena& arena, Executor& executor, Reproduction& result) 
            phases);
 }
 
-// Of each home and current view, the shift by whole pixels at which they correlate most: one home
-// view against all current ones at once.
+// Returns for each home and current view the shift by whole pixels of highest correlation.
 std::vector<std::vector<std::uint8_t>> find_best_shifts(const Arena& arena, Executor& executor) {
   const auto& currents = arena.currents.rows;
   std::vector<float> rows;

@@ -66,7 +66,7 @@ viewer::MapPlot draw_all_runs(const HomingPlace& place, const std::vector<Homing
   return map;
 }
 
-// How often a robot that ended elsewhere knows it.
+// Adds the rate at which robots that ended elsewhere report it.
 void add_noticed(Reproduction& result, const std::string& id, const std::string& what,
                  const std::vector<HomingRun>& runs) {
   std::size_t elsewhere = 0;
@@ -78,8 +78,8 @@ void add_noticed(Reproduction& result, const std::string& id, const std::string&
   }
   if (elsewhere == 0) return;
   add_rate(result, id,
-           what + ": ends farther than 10 cm from home that the robot knows not to be home",
-           noticed, elsewhere);
+           what + ": ends farther than 10 cm from home that the robot reports as not home", noticed,
+           elsewhere);
 }
 
 struct Ends {
@@ -137,7 +137,7 @@ void reproduce_homing_in_world(const std::string& name, const Experiments& conte
   }
   if (!in_sight.empty()) {
     add_rate(reproduction, id + ".success_in_sight",
-             what + ", the straight way free: home within 10 cm", count_successes(in_sight),
+             what + ", the straight line free: home within 10 cm", count_successes(in_sight),
              in_sight.size());
   }
   add_noticed(reproduction, id + ".noticed", what, runs);

@@ -15,18 +15,18 @@ inline constexpr double homing_success_m = 0.1;
 /// Starts lie within this distance of their goal.
 inline constexpr double homing_start_radius_m = 1.5;
 
-/// Why a run home failed, for people: "an obstacle stopped it", "stopped at another local minimum
-/// and says so". Empty for a success.
+/// Returns why a run home failed, for people: "an obstacle stopped it", "stopped at another local
+/// minimum and says so". Empty for a success.
 [[nodiscard]] std::string explain_failure(const HomingRun& run);
 
-/// Runs home in the Gazebo world `name` of `data`, from `starts` random starts around random goals:
-/// rows "s06.world.NAME.*" of the success from all starts and from those in sight of the goal, of
-/// wrong places noticed, and of the published rule; pictures in `out`: a map of all runs,
-/// and one of each failure with its reason. Same arguments: same rows and pictures on any number of
-/// threads. Throws FileError, ContractError.
+/// Measures runs home in the Gazebo world `name` of `data`, from `starts` random starts around
+/// random goals: rows "s06.world.NAME.*" of the success from all starts and from those in sight of
+/// the goal, of wrong places noticed, and of the published rule; pictures in `out`: a map of all
+/// runs, and one of each failure with its reason. Same arguments: same rows and pictures on any
+/// number of threads. Throws FileError, ContractError.
 void reproduce_homing_in_world(const std::string& name, const Experiments& context);
 
-/// The same figures over built-in scenes of several seeds: office, lab, hall, loop and garden, the
+/// Measures the same over built-in scenes of several seeds: office, lab, hall, loop and garden, the
 /// robot on flat ground and tilted by up to 3 degrees in a random direction at each view, and a
 /// holonomic robot; and how much views differ where runs end at home and where they end elsewhere:
 /// `HomingPursuitOptions::arrived_difference` is to stand between.

@@ -26,11 +26,11 @@ namespace {
 
 const std::vector<double> lateral_offsets_m{0.0, 0.1, 0.25, 0.5, 0.75, 1.0};
 const std::vector<std::size_t> thinnings{1, 2, 5, 10, 15, 25};
-// Of the drives beside the path, the one from which a view is synthesised for people.
+// Index of the drive with lateral offset from which a view is synthesised.
 constexpr std::size_t shown_offset = 3;
 const std::vector<double> margins_m{0.04, 0.08, 0.14, 0.24, 0.34};
 
-// Errors of one way of localising, over all variants.
+// Errors of one method of localising, over all variants.
 struct Errors {
   std::vector<double> mean_cm;                 // one a variant
   std::vector<std::vector<double>> images_cm;  // of each variant
@@ -60,7 +60,7 @@ struct Errors {
   }
 };
 
-// Of the images of these variants.
+// Returns the standard deviation over the images of the chosen variants.
 double deviation(const std::vector<std::vector<double>>& images,
                  const std::vector<std::size_t>& chosen) {
   double n = 0.0;
@@ -76,7 +76,7 @@ double deviation(const std::vector<std::vector<double>>& images,
   return std::sqrt(std::max(0.0, squares / n - sum * sum / (n * n)));
 }
 
-// 95 % bootstrap interval; the variants are what is drawn.
+// Returns the 95 % bootstrap interval over variants.
 std::pair<double, double> deviation_interval(const std::vector<std::vector<double>>& images,
                                              std::uint64_t seed) {
   constexpr int samples = 400;
@@ -90,14 +90,14 @@ std::pair<double, double> deviation_interval(const std::vector<std::vector<doubl
   return {quantile(values, 0.025), quantile(values, 0.975)};
 }
 
-// What each variant gives to the rows: drives as localised, by the ids of their rows, and sweeps.
+// Localised drives of a variant, by the ids of their rows, and sweeps.
 struct Variant {
   std::map<std::string, DriveErrors> drives;
   std::map<std::string, std::vector<DriveErrors>> sweeps;
   GoalRun goal;
 };
 
-// Median over the lines of a drive, each from where odometry puts it.
+// Returns the median over the lines of a drive, each predicted by odometry.
 template <typename Fit>
 double measure_fit_ms(const LineDrive& drive, const Fit& fit) {
   std::vector<double> times_ms;
@@ -106,9 +106,9 @@ double measure_fit_ms(const LineDrive& drive, const Fit& fit) {
     for (std::size_t i = 1; i < drive.lines.size(); ++i) {
       const auto begin = std::chrono::steady_clock::now();
       const auto fix = fit(drive.lines[i], drive.truth[i - 1] * drive.steps[i]);
-      const std::chrono::duration<double, std::milli> taken =
+      const std::chrono::duration<double, std::milli> duration =
           std::chrono::steady_clock::now() - begin;
-      if (fix) times_ms.push_back(taken.count());
+      if (fix) times_ms.push_back(duration.count());
     }
   }
   return times_ms.empty() ? 0.0 : median(times_ms);
@@ -143,7 +143,7 @@ Variant localise_drives(const LabRoute& lab, bool sweeps) {
   return variant;
 }
 
-// What is measured over all variants.
+// Measures over all variants.
 class LabMeasures {
  public:
   LabMeasures(const ReproductionOptions& options, Reproduction& result)
@@ -191,7 +191,7 @@ class LabMeasures {
     add_median(result_, "y03.goal.error",
                "closed loop (100, 0) to (200, -50) to (300, 0) cm: error at the goal", "cm",
                goal_cm_, at_most(2.0), std::pair(4.0, 4.0));
-    add_rate(result_, "y03.goal.arrived", "closed loop: the robot says that it arrived", arrived_,
+    add_rate(result_, "y03.goal.arrived", "closed loop: the robot reports its arrival", arrived_,
              goal_cm_.size());
     add_median(result_, "y03.time", "from horizon scanline to pose, one core, direct fit", "ms",
                fit_ms_, at_most(0.5), std::pair(200.0, 200.0));

@@ -74,8 +74,8 @@ viewer::PicturePlot panorama_plot(const LabRoute& lab, const std::string& title)
     }
   }
   // From black to white, for people.
-  const float most = std::max(1.0F, std::ranges::max(plot.values));
-  for (float& value : plot.values) value /= most;
+  const float max_value = std::max(1.0F, std::ranges::max(plot.values));
+  for (float& value : plot.values) value /= max_value;
   return plot;
 }
 

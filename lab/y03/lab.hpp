@@ -40,17 +40,17 @@ struct LabRoute {
 inline constexpr double lab_path_m = 5.0;
 inline constexpr double lab_spacing_m = 0.02;
 
-/// Renders it all: some 350 pictures. `lateral_m`: offsets of drives beside the path, 10 images
+/// Records a variant: some 350 images. `lateral_m`: offsets of drives beside the path, 10 images
 /// each.
 [[nodiscard]] LabRoute record_lab_route(std::uint64_t seed, const std::vector<double>& lateral_m,
                                         Executor& executor);
 
-/// Every n-th line.
+/// Returns every n-th line.
 [[nodiscard]] RoutePanorama thin_route(const RoutePanorama& route, std::size_t every);
-/// As odometry with a wrong scale would have placed it, right at the first line.
+/// Returns the route with positions scaled around the first line.
 [[nodiscard]] RoutePanorama scale_route(const RoutePanorama& route, double factor);
 
-/// How far off poses are.
+/// Errors of estimated poses.
 struct DriveErrors {
   std::vector<double> position_m;
   std::vector<double> heading_rad;  ///< absolute
@@ -59,10 +59,10 @@ struct DriveErrors {
   std::size_t changed = 0;          ///< images in which something is named as changed; direct fit
 };
 
-/// The direct fit along a drive, each from the last and odometry; the first from a prediction that
-/// is off by 5 cm and 2 degrees [Y03 section 4.1].
+/// Localises by the direct fit along a drive, each from the last and odometry; the first from a
+/// prediction that is off by 5 cm and 2 degrees [Y03 section 4.1].
 [[nodiscard]] DriveErrors follow_by_fit(const RouteLines& lines, const LineDrive& drive);
-/// The same by the dual contours; where they do not converge, odometry goes on.
+/// Localises by the dual contours; where they do not converge, odometry continues.
 [[nodiscard]] DriveErrors follow_by_contours(const RouteContours& contours, const LineDrive& drive);
 
 /// A run to sub-goals off the path under proportional control [Y03 section 5.2].
@@ -73,10 +73,10 @@ struct GoalRun {
   double error_m = 0.0;  ///< between goal and robot at the end
 };
 
-/// From (1, 0) over (2, -0.5) to (3, 0) m of the path's frame.
+/// Runs from (1, 0) over (2, -0.5) to (3, 0) m of the path's frame.
 [[nodiscard]] GoalRun run_to_goals(const LabRoute& lab, const RouteLines& lines,
                                    std::uint64_t seed);
-/// The way points, in the path's frame.
+/// Returns these points, in the path's frame.
 [[nodiscard]] std::vector<Point2> goal_run_points();
 
 }  // namespace panonav::lab

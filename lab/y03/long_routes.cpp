@@ -58,7 +58,7 @@ RepeatedRoute record_and_repeat_route(const RouteScene& place, int runs, std::ui
   return repeated;
 }
 
-// What is measured of the runs along some routes.
+// Measures of the runs along some routes.
 struct RouteMeasures {
   std::vector<double> lateral_cm;
   std::vector<double> lateral_back_cm;
@@ -106,7 +106,7 @@ void report_routes(const ReproductionOptions& options, const std::string& name,
   if (!of.fix_cm.empty()) {
     add_median(result, id + ".fix", what + ": error of a fix, median of a run", "cm", of.fix_cm);
   }
-  add_rate(result, id + ".off_route", what + ": lines taken for not on this route", of.off_route,
+  add_rate(result, id + ".off_route", what + ": lines reported as off the route", of.off_route,
            of.lines);
   add_rate(result, id + ".turned_aside", what + ": steps at which something was in the way",
            of.turned_aside, of.lines);
@@ -119,7 +119,7 @@ void report_routes(const ReproductionOptions& options, const std::string& name,
            map);
 }
 
-// Sizes on the disk, with nothing left in the write-ahead log.
+// Returns the size on the disk, with the write-ahead log.
 std::uint64_t file_bytes(const std::filesystem::path& path) {
   std::uint64_t bytes = std::filesystem::file_size(path);
   const std::filesystem::path log = path.string() + "-wal";

@@ -25,8 +25,8 @@ std::vector<float> slopes(std::span<const float> line) {
   return result;
 }
 
-// Local maxima of the slope's size that exceed its mean, the strongest first wins.
-std::vector<int> edge_columns(std::span<const float> edges, int most) {
+// Returns local maxima of the slope's size that exceed its mean; the strongest `max_count`.
+std::vector<int> edge_columns(std::span<const float> edges, int max_count) {
   double mean = 0.0;
   for (const float edge : edges)
     mean += static_cast<double>(std::abs(edge)) / static_cast<double>(edges.size());
@@ -41,8 +41,8 @@ std::vector<int> edge_columns(std::span<const float> edges, int most) {
   }
   std::ranges::stable_sort(columns, std::greater<>{},
                            [&](int c) { return std::abs(edges[static_cast<std::size_t>(c)]); });
-  if (columns.size() > static_cast<std::size_t>(most))
-    columns.resize(static_cast<std::size_t>(most));
+  if (columns.size() > static_cast<std::size_t>(max_count))
+    columns.resize(static_cast<std::size_t>(max_count));
   std::ranges::sort(columns);
   return columns;
 }
@@ -186,8 +186,8 @@ struct RouteContours::Term {
   double deviations = 0.0;  // size of the difference, in deviations
 };
 
-// What the contours say along the path [Y03 eq. 5], weighted by how well an azimuth tells the
-// place.
+// Returns the equations of the contours along the path [Y03 eq. 5], weighted by how well an azimuth
+// determines the place.
 std::vector<RouteContours::Term> RouteContours::path_terms(const RouteContourFix& fix) const {
   const auto size = static_cast<long long>(columns_);
   const double columns_per_rad = columns_ / (2.0 * std::numbers::pi);
@@ -217,8 +217,8 @@ std::vector<RouteContours::Term> RouteContours::path_terms(const RouteContourFix
   return terms;
 }
 
-// What the contours' azimuths say of the heading, to a column each. From the path itself all lines
-// of sight start at one place, and eq. 5 says nothing of it.
+// Adds the equations of the contours' azimuths for the heading, to a column each. On the path
+// itself all lines of sight start at one place, and eq. 5 does not determine it.
 void RouteContours::add_heading_terms(const RouteContourFix& fix, std::vector<Term>& terms) const {
   const double columns_per_rad = columns_ / (2.0 * std::numbers::pi);
   for (std::size_t i = 0; i < fix.columns.size(); ++i) {

@@ -24,7 +24,7 @@ namespace {
 
 constexpr double side_room_m = 0.1;
 
-// Where the robot has room; where the place has no such part, all that is free.
+// Returns the space where the robot has room on both sides; without any, all free space.
 simulation::FreeSpace make_roomy_space(const RouteScene& place) {
   simulation::FreeSpaceOptions options = simulation::free_space_options(place.scene);
   options.robot_radius_m += side_room_m;
@@ -35,7 +35,7 @@ simulation::FreeSpace make_roomy_space(const RouteScene& place) {
   }
 }
 
-// Each place the mean of those within `reach` to either side, the ends as they are.
+// Returns the path with each position the mean of those within `reach` on both sides.
 std::vector<Pose2> smooth_path(const std::vector<Pose2>& way, std::size_t reach) {
   std::vector<Pose2> result = way;
   for (std::size_t i = 0; i < way.size(); ++i) {
@@ -52,7 +52,7 @@ std::vector<Pose2> smooth_path(const std::vector<Pose2>& way, std::size_t reach)
   return result;
 }
 
-// Straight from one place to another, the robot touches nothing.
+// True if the robot touches nothing on the straight line.
 bool has_clear_line(const RouteScene& place, Point2 from, Point2 to) {
   constexpr double fine_m = 0.025;
   return place.free_space->clearance_m(from) >= place.scene.robot_radius_m &&
@@ -60,7 +60,7 @@ bool has_clear_line(const RouteScene& place, Point2 from, Point2 to) {
                                       fine_m);
 }
 
-// Of a way, at the place with the least room.
+// Returns the smallest clearance along a path.
 double min_clearance_m(const RouteScene& place, const std::vector<Pose2>& way) {
   double min_m = std::numeric_limits<double>::infinity();
   for (const Pose2& pose : way) {
@@ -73,8 +73,8 @@ double direction(Point2 from, Point2 to) {
   return std::atan2(to.y_m - from.y_m, to.x_m - from.x_m);
 }
 
-// Distance from the part of the way, in the order of the drive, that is at most 1.5 m from where
-// the robot believes to be: a route may pass by itself.
+// Returns the distance from the part of the path within 1.5 m of the estimated path length: a route
+// may pass by itself.
 double distance_from_expected_part_m(Point2 robot, std::span<const Pose2> way, double along_m) {
   constexpr double reach_m = 1.5;
   std::size_t begin = 0;
@@ -91,8 +91,8 @@ double distance_from_expected_part_m(Point2 robot, std::span<const Pose2> way, d
   return simulation::distance_from_route_m(robot, way.subspan(begin, end - begin));
 }
 
-// To the side of the start where there is room, also for the straight way onto the route; else any
-// other way off it.
+// Samples a start beside the route with a clear straight line onto it; the start itself if there is
+// none.
 Pose2 sample_start_with_offset(const RouteScene& place, std::span<const Point2> path,
                                const Pose2& start, double off_m, Random& random) {
   const std::size_t ahead = std::min<std::size_t>(3, path.size() - 1);
@@ -111,12 +111,12 @@ Pose2 sample_start_with_offset(const RouteScene& place, std::span<const Point2> 
   return start;
 }
 
-// Past what stands in the way: the nearest direction to the wanted one, 15 degrees apart, in which
-// half of the step is free; empty when there is none. A differential drive turns, then drives.
+// Returns a step past an obstacle: the nearest direction to the planned one, 15 degrees apart, in
+// which half of the step is free; nullopt if there is none.
 std::optional<Pose2> find_step_past_obstacle(const RouteScene& place, const Pose2& robot,
-                                             const Pose2& wanted) {
-  if (has_clear_line(place, robot.position(), (robot * wanted).position())) return wanted;
-  const double half_m = 0.5 * std::hypot(wanted.x_m, wanted.y_m);
+                                             const Pose2& planned) {
+  if (has_clear_line(place, robot.position(), (robot * planned).position())) return planned;
+  const double half_m = 0.5 * std::hypot(planned.x_m, planned.y_m);
   constexpr int feelers_each_side = 11;
   const auto step_along = [&](double direction_rad) {
     return Pose2{0.0, 0.0, direction_rad} * Pose2{half_m, 0.0, 0.0};
@@ -129,7 +129,7 @@ std::optional<Pose2> find_step_past_obstacle(const RouteScene& place, const Pose
   return aside ? std::optional(step_along(aside->direction_rad)) : std::nullopt;
 }
 
-// Looking for the route: ever wider around where the robot is, 0.5 m after some 25 steps.
+// Returns a step of a widening spiral in search of the route, 0.5 m wide after some 25 steps.
 Pose2 spiral_step(int step) {
   const double turn = 1.0 / (1.0 + 0.15 * step);
   constexpr double step_m = 0.1;
@@ -183,8 +183,8 @@ std::vector<Pose2> plan_curved_route(const RouteScene& place, double length_m, d
     break;
   }
   way = simulation::resample(way, spacing_m);
-  const auto most = static_cast<std::size_t>(std::floor(length_m / spacing_m)) + 1;
-  if (way.size() > most) way.resize(most);
+  const auto max_poses = static_cast<std::size_t>(std::floor(length_m / spacing_m)) + 1;
+  if (way.size() > max_poses) way.resize(max_poses);
   simulation::face_path(way);
   return way;
 }
@@ -201,9 +201,9 @@ RoutePanorama record_route(const RouteScene& place, const std::vector<Pose2>& wa
   return route;
 }
 
-Pose2 DriftingWheels::true_step(const Pose2& told, Random& random) const {
-  const double travel_m = travel * std::hypot(told.x_m, told.y_m);
-  const double turned = turn * told.heading_rad;
+Pose2 DriftingWheels::true_step(const Pose2& commanded, Random& random) const {
+  const double travel_m = travel * std::hypot(commanded.x_m, commanded.y_m);
+  const double turned = turn * commanded.heading_rad;
   const Pose2 step{travel_m * std::cos(0.5 * turned), travel_m * std::sin(0.5 * turned), turned};
   return sample_step(step, noise, random);
 }
@@ -228,14 +228,14 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
   PathFollower follower(path);
   const auto max_steps = static_cast<int>(3.0 * follower.length_m() / options.step_m) + 50;
   RouteRun run;
-  Pose2 told;
-  // Odometry carries over a few lines that tell nothing; after that the route must be looked for.
+  Pose2 commanded;
+  // Odometry bridges a few lines without a fix; then the robot searches for the route.
   constexpr int patience = 4;
   int unknown = 0;
   for (int step = 0; step < max_steps; ++step) {
     const auto line =
         simulation::take_line(*place.renderer, robot, place.camera, noise_of_lines.next());
-    const auto found = tracker.track(line, told);
+    const auto found = tracker.track(line, commanded);
     run.truth.push_back(robot);
     run.lateral_m.push_back(
         distance_from_expected_part_m(robot.position(), way, follower.along_m()));
@@ -253,18 +253,18 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
       run.arrived = true;
       break;
     }
-    const Pose2 wanted = unknown < patience
-                             ? steer_to(estimate, *target, {.step_m = options.step_m})
-                             : spiral_step(unknown - patience);
-    const auto free_step = find_step_past_obstacle(place, robot, wanted);
+    const Pose2 planned = unknown < patience
+                              ? steer_to(estimate, *target, {.step_m = options.step_m})
+                              : spiral_step(unknown - patience);
+    const auto free_step = find_step_past_obstacle(place, robot, planned);
     if (!free_step) {
       run.blocked = true;
       break;
     }
-    told = *free_step;
-    run.turned_aside += static_cast<std::size_t>(told != wanted);
-    const Pose2 there = robot * wheels.true_step(told, random);
-    // Where the wheels led it astray it touches something: it turns, but does not move.
+    commanded = *free_step;
+    run.turned_aside += static_cast<std::size_t>(commanded != planned);
+    const Pose2 there = robot * wheels.true_step(commanded, random);
+    // A robot that its wheels led astray touches something: it turns, but does not move.
     if (has_clear_line(place, robot.position(), there.position())) {
       robot = there;
     } else {

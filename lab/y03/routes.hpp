@@ -25,23 +25,23 @@ struct RouteScene : simulation::SimulatedPlace {
 [[nodiscard]] RouteScene make_route_scene(simulation::Scene scene, const std::string& name,
                                           Executor& executor);
 
-/// A way of about `length_m` through random places, with room of 10 cm to either side of the robot
-/// where the place has that much: shortest ways, round where they had corners, which do not turn
-/// back on the spot. Poses every `spacing_m`, headings along the way. The same seed gives the same
-/// way. Throws ContractError unless both are above 0.
+/// Plans a path of about `length_m` through random places, with room of 10 cm to either side of the
+/// robot where the place has that much: shortest paths with rounded corners, which do not turn back
+/// on the spot. Poses every `spacing_m`, headings along the path. The same seed gives the same
+/// path. Throws ContractError unless both are above 0.
 [[nodiscard]] std::vector<Pose2> plan_curved_route(const RouteScene& place, double length_m,
                                                    double spacing_m, std::uint64_t seed);
 
-/// What a robot sees along a way.
+/// Records the lines that a robot sees along a path.
 [[nodiscard]] RoutePanorama record_route(const RouteScene& place, const std::vector<Pose2>& way,
                                          std::uint64_t seed, Executor& executor);
 
-/// Wheels that do less or more than they are told, and tell what they were told.
+/// Wheels that move more or less than commanded, and report the command.
 struct DriftingWheels {
-  double travel = 1.0;  ///< true over told
+  double travel = 1.0;  ///< true over commanded
   double turn = 1.0;
   OdometryNoise noise;  ///< on top; only the random part
-  [[nodiscard]] Pose2 true_step(const Pose2& told, Random& random) const;
+  [[nodiscard]] Pose2 true_step(const Pose2& commanded, Random& random) const;
 };
 
 struct RouteRunOptions {
@@ -51,13 +51,13 @@ struct RouteRunOptions {
   double step_m = 0.15;      ///< driven between two lines
 };
 
-/// Where a line put a robot.
+/// A fix by a line.
 struct RouteSighting {
   Pose2 pose;
   double along_m = 0.0;  ///< way along the route
 };
 
-/// What a robot did that repeated a route.
+/// A run that repeated a route.
 struct RouteRun {
   std::vector<Pose2> truth;
   std::vector<std::optional<RouteSighting>> sightings;  ///< at these poses; empty: off the route
@@ -69,13 +69,13 @@ struct RouteRun {
   bool blocked = false;            ///< on all sides
   double end_distance_m = 0.0;     ///< from the end of the route
 
-  /// Not stopped, and at the end of the route where it says so.
+  /// True if the robot reports the end of the route within 0.2 m of it.
   [[nodiscard]] bool has_completed() const noexcept {
     return arrived && !blocked && end_distance_m <= 0.2;
   }
 };
 
-/// A robot repeats a route in closed loop: each line is fitted into the route panorama from where
+/// Repeats a route in closed loop: each line is fitted into the route panorama from where
 /// the wheels put it, and the robot steers to the place a little ahead on the path. It feels
 /// what is in its way and goes past, and drives a spiral when some lines one after the other are
 /// not of the route. `tracker` is one of this route. The same seed gives the same run. Cost: a line
@@ -83,7 +83,7 @@ struct RouteRun {
 [[nodiscard]] RouteRun repeat_route(const RouteScene& place, RouteTracker tracker,
                                     const RouteRunOptions& options, std::uint64_t seed);
 
-/// The route and the robots that repeated it, every second one back, for a map.
+/// Returns the layers of the route and of the runs, every second one back, for a map.
 [[nodiscard]] std::vector<viewer::MapLayer> make_route_layers(std::span<const Pose2> way,
                                                               std::span<const RouteRun> runs);
 

@@ -81,7 +81,7 @@ bool ChangingScene::can_stand(const Object& object, Point2 centre) const {
   // Furniture of built-in scenes stands around the floor that is driven on.
   const FloorArea& room = scene_.drivable.empty() ? floor_ : all_;
   if (gap_m(room, centre) > gap_m(room, object.centre)) return false;
-  // What already reaches into a drivable area may go on doing so, but no farther.
+  // An object that already reaches into a drivable area may stay there, but not move farther in.
   for (const FloorArea& area : scene_.drivable) {
     if (gap_m(area, centre) < std::min(r, gap_m(area, object.centre))) return false;
   }
@@ -93,7 +93,7 @@ bool ChangingScene::can_stand(const Object& object, Point2 centre) const {
 
 void ChangingScene::pass_day(double share) {
   for (Object& object : objects_) {
-    // Numbers are drawn for every object, so that one object's luck does not change the next one's.
+    // Numbers are drawn for every object, so that objects do not depend on each other.
     const bool moves = random_.uniform() < share;
     bool placed = false;
     for (int attempt = 0; attempt < 40; ++attempt) {

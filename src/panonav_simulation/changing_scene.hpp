@@ -18,16 +18,16 @@ class ChangingScene {
   ChangingScene(Scene scene, std::uint64_t seed);
 
   [[nodiscard]] std::size_t movable() const noexcept { return objects_.size(); }
-  /// Objects that do not stand where they stood at first.
+  /// Counts objects that do not stand at their first position.
   [[nodiscard]] std::size_t moved() const noexcept;
 
-  /// Each movable object is moved with this probability, from where it stands now: by 1.5 to 4
+  /// Moves each movable object with this probability, from where it stands now: by 1.5 to 4
   /// radii of the robot in any direction and turned by up to 0.6 rad, as `SceneVariation` moves
   /// things; within the floor, never into drivable areas or onto corners of the tour. One that
   /// finds no such place stays.
   void pass_day(double share);
 
-  /// As it is now, in light times `light`.
+  /// Returns the scene as it is now, in light times `light`.
   [[nodiscard]] Scene scene(double light) const;
 
  private:

@@ -303,8 +303,8 @@ std::optional<std::vector<Point2>> FreeSpace::shortest_path(Point2 a, Point2 b) 
 }
 
 std::vector<Point2> FreeSpace::shorten_path(std::vector<Point2> path) const {
-  // From each way point to the last one that is seen before the view is blocked; then the same from
-  // the other end with new points between, until the path hardly becomes shorter.
+  // Connects each way point with the last one visible from it; then the same from the other end
+  // with new points between, until the path becomes hardly shorter.
   constexpr int max_rounds = 20;
   constexpr double worthwhile = 1e-3;
   double length = path_length_m(path);

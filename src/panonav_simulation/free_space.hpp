@@ -14,7 +14,7 @@
 
 namespace panonav::simulation {
 
-/// What a robot fits through and drives over.
+/// Size of a robot and of the steps that it drives over.
 struct FreeSpaceOptions {
   double robot_radius_m = 0.2;  ///< >= 0; the robot is taken for a cylinder
   double robot_height_m =
@@ -25,14 +25,14 @@ struct FreeSpaceOptions {
 };
 void visit_options(FreeSpaceOptions& options, OptionVisitor& visitor);
 
-/// The options of a robot of this radius that is as high as its camera and drives over a twelfth of
-/// that.
+/// Returns the options of a robot of this radius that is as high as its camera and drives over a
+/// twelfth of that.
 [[nodiscard]] FreeSpaceOptions free_space_options(double robot_radius_m, double camera_height_m);
 
-/// The same for the robot that a scene is made for.
+/// Returns the options of the robot that a scene is made for.
 [[nodiscard]] FreeSpaceOptions free_space_options(const Scene& scene);
 
-/// Where a robot can stand and drive in a scene: inside `floor_low .. floor_high` and the
+/// The free space of a robot in a scene: inside `floor_low .. floor_high` and the
 /// `drivable` areas if there are any; on something to stand on (a surface within the step height of
 /// the floor), unless the scene has no floor at all; and with no surface within the robot's radius
 /// between step height and robot height. Only one connected component is kept, so that every free
@@ -47,29 +47,30 @@ class FreeSpace {
   explicit FreeSpace(const Scene& scene, const FreeSpaceOptions& options = {},
                      std::optional<Point2> seed = std::nullopt);
 
-  /// Whether the middle of the robot may be there. False outside the map.
+  /// True if the middle of the robot may be there. False outside the map.
   [[nodiscard]] bool is_free(Point2 position) const noexcept;
-  /// Lower bound of the distance from `position` to the nearest obstacle; 0 outside the map.
+  /// Returns a lower bound of the distance from `position` to the nearest obstacle; 0 outside the
+  /// map.
   [[nodiscard]] double clearance_m(Point2 position) const noexcept;
-  /// Whether every place on the straight line is free.
+  /// True if every place on the straight line is free.
   [[nodiscard]] bool is_free_between(Point2 a, Point2 b) const noexcept;
 
-  [[nodiscard]] double area_m2() const noexcept;  ///< Of all free cells together.
-  /// Lower left corner of the map: that of the scene's floor.
+  [[nodiscard]] double area_m2() const noexcept;  ///< of all free cells
+  /// Returns the lower left corner of the map: that of the scene's floor.
   [[nodiscard]] Point2 low() const noexcept { return low_; }
-  /// Upper right corner of the map: that of the scene's floor.
+  /// Returns the upper right corner of the map: that of the scene's floor.
   [[nodiscard]] Point2 high() const noexcept { return high_; }
 
-  /// The free places of a regular grid over the floor.
+  /// Returns the free places of a regular grid over the floor.
   [[nodiscard]] std::vector<GridPosition> grid(double spacing_m,
                                                GridOrder order = GridOrder::raster) const;
-  /// Uniform over the free area, any heading.
+  /// Draws a pose uniformly over the free area, any heading.
   [[nodiscard]] Pose2 random_pose(Random& random) const;
-  /// Way points of a short path through free places, first `a`, last `b`; empty when one of them is
-  /// not free. Shortest on the 8-connected map, then pulled tight. O(cells log cells).
+  /// Returns way points of a short path through free places, first `a`, last `b`; nullopt if one of
+  /// them is not free. Shortest on the 8-connected map, then pulled tight. O(cells log cells).
   [[nodiscard]] std::optional<std::vector<Point2>> shortest_path(Point2 a, Point2 b) const;
 
-  /// A map for people, one pixel a cell, y upwards: free white, too near to something grey,
+  /// Draws a map, one pixel a cell, y upwards: free white, too near to something grey,
   /// obstacles black, the rest dark grey.
   [[nodiscard]] Image picture() const;
 

@@ -8,7 +8,8 @@ namespace panonav::simulation {
 
 // Pieces that the built-in scenes share. Each draws its looks from the builder's random engine.
 
-/// Four plain walls around `room`, seen from inside, with pictures, a door and windows on them.
+/// Adds four plain walls around `room`, seen from inside, with pictures, a door and windows on
+/// them.
 void furnish_room_shell(SceneBuilder& builder, const FloorArea& room, double height_m);
 
 /// 1.4 x 0.7 m with drawers, a screen and papers on it.

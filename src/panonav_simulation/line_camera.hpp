@@ -27,11 +27,11 @@ struct LineCamera {
   std::vector<MirrorRay> rays;      ///< as many of each pixel
 };
 
-/// `height_m` above the floor, `columns` in a line, usual noise.
+/// Makes a camera `height_m` above the floor, `columns` in a line, default noise.
 [[nodiscard]] LineCamera make_line_camera(double height_m, int columns = 360);
 
-/// The horizon scanline of the picture that the robot takes at `pose`. The same pose and seed give
-/// the same bits. May be called from several threads. Cost: some milliseconds.
+/// Takes the horizon scanline of the image that the robot takes at `pose`. The same pose and seed
+/// give the same bits. May be called from several threads. Cost: some milliseconds.
 [[nodiscard]] std::vector<float> take_line(const Renderer& renderer, const Pose2& pose,
                                            const LineCamera& camera, std::uint64_t seed);
 

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 constexpr int max_sdf_depth = 32;  // of models in models and frames in frames; files have up to 5
 
-// Of a rotation and translation.
+// Inverts a rotation and translation.
 Affine3 inverse(const Affine3& b_from_a) {
   const auto& m = b_from_a.matrix;
   Affine3 result{{m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8]}, {}};
@@ -26,7 +26,8 @@ Affine3 inverse(const Affine3& b_from_a) {
   return result;
 }
 
-// "Ground Plane" and ".../ground_plane" are one: Gazebo's database and its servers differ.
+// Normalises names: "Ground Plane" and ".../ground_plane" are one: Gazebo's database and its
+// servers differ.
 std::string well_known_name(std::string_view uri) {
   std::string name(uri.substr(uri.find_last_of('/') + 1));
   for (auto at = name.find("%20"); at != std::string::npos; at = name.find("%20"))
@@ -35,7 +36,8 @@ std::string well_known_name(std::string_view uri) {
   return to_lower_case(name);
 }
 
-// The two models of Gazebo's database that nearly all worlds take from there; else null.
+// Returns one of the two models of Gazebo's database that nearly all worlds take from there; else
+// null.
 pugi::xml_node well_known_model(std::string_view uri) {
   static const pugi::xml_document sun = parse_xml(
       "<sdf><light name='sun' type='directional'><pose>0 0 10 0 0 0</pose>"
@@ -54,7 +56,7 @@ bool has_name_of(pugi::xml_node part, std::initializer_list<std::string_view> na
   return std::ranges::find(names, std::string_view(part.name())) != names.end();
 }
 
-// Where a frame of a model or world stands in it; empty when there is none of this name.
+// Returns the pose of a frame in its model or world; nullopt if there is none of this name.
 std::optional<Affine3> scope_from_frame(pugi::xml_node scope, std::string_view name,
                                         int depth = 0) {
   if (name.empty() || name == "__model__" || name == "world") return Affine3{};
@@ -81,7 +83,7 @@ bool can_be_shown(const Vector3& v) {
   return std::abs(v.x_m) <= reach_m && std::abs(v.y_m) <= reach_m && std::abs(v.z_m) <= reach_m;
 }
 
-// The light that the lamps throw on a point of the floor.
+// Returns the light of the lamps on a point of the floor.
 double light_on_floor(const Scene& scene, double x_m, double y_m, double floor_m) {
   double light = scene.ambient;
   for (const PointLight& lamp : scene.lights) {
@@ -114,8 +116,8 @@ void expose(Scene& scene) {
   for (DirectionalLight& sun : scene.directional_lights) sun.intensity *= scale;
 }
 
-// What stands in the world says where a robot may be; a ground plane of any size counts only where
-// there is nothing else.
+// Sets the floor to the extent of the bodies; a ground plane counts only where there is nothing
+// else.
 void set_floor(Scene& scene, const std::vector<std::size_t>& planes) {
   Scene bodies;
   for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
@@ -126,7 +128,7 @@ void set_floor(Scene& scene, const std::vector<std::size_t>& planes) {
   scene.floor_high = {bounds->second.x_m, bounds->second.y_m};
 }
 
-// Where an element of a world stands: what must be known to read it.
+// Context in which an element of a world is read.
 struct Place {
   pugi::xml_node scope;  // the model or world whose frames its pose may name
   Affine3 world_from_scope;
@@ -167,7 +169,7 @@ class WorldReader {
   }
 
  private:
-  // The pose of a part; `world_from_parent` where it names no frame.
+  // Returns the pose of a part; `world_from_parent` where it names no frame.
   Affine3 world_from(pugi::xml_node part, const Affine3& world_from_parent, const Place& place) {
     const std::string_view frame = frame_of_pose(part);
     const Affine3 written = read_pose(pose_element(part));
@@ -180,7 +182,7 @@ class WorldReader {
     return world_from_parent * written;
   }
 
-  // Models, lights and what is included, in the order of the file.
+  // Adds models, lights and includes, in the order of the file.
   void add_parts(pugi::xml_node parent, const Place& place) {
     for (const pugi::xml_node& part : parent) add_part(part, part, place);
   }
@@ -207,7 +209,8 @@ class WorldReader {
     }
   }
 
-  // The root of the file that an <include> names, and that file; none for well-known models.
+  // Returns the root of the file that an <include> names, and that file; none for well-known
+  // models.
   std::pair<pugi::xml_node, fs::path> open_include(const std::string& uri, const Place& place) {
     constexpr int max_includes = 100000;
     const auto found = context_.find(uri, place.origin);

@@ -8,7 +8,7 @@
 
 namespace panonav::simulation {
 
-/// How a Gazebo world becomes a scene.
+/// Options of reading a Gazebo world.
 struct GazeboOptions {
   TextureOptions textures{};  ///< how pictures on surfaces are read
   /// Folders in which `model://NAME` is looked for, before the usual places: `models` beside the
@@ -17,22 +17,19 @@ struct GazeboOptions {
   double camera_height_m = 0.6;  ///< for Scene::camera_height_m
 };
 
-/// Model folders that the user's Gazebo would use: GAZEBO_MODEL_PATH, GZ_SIM_RESOURCE_PATH,
-/// IGN_GAZEBO_RESOURCE_PATH and SDF_PATH of the environment, in this order.
+/// Returns the model folders that the user's Gazebo would use: GAZEBO_MODEL_PATH,
+/// GZ_SIM_RESOURCE_PATH, IGN_GAZEBO_RESOURCE_PATH and SDF_PATH of the environment, in this order.
 [[nodiscard]] std::vector<std::filesystem::path> gazebo_model_folders_of_environment();
 
-/// A scene from a Gazebo world (SDF 1.0 and later; a file with a single model as well): visuals
-/// with their poses, scales, colours and textures; one object per top-level model. Approximations:
-/// coloured lamps become white ones of the same brightness; point and spot lights shine to all
-/// sides; light that adds up beyond white on the floor is scaled down as a whole. Visuals that are
-/// more than half transparent and what is not seen (collisions, joints, plugins) are left out.
-///
-/// As Gazebo does, it goes on where something is missing or faulty: an include or a mesh that is
-/// not found or damaged, a model that includes itself, a shape without its size, actors, height
-/// maps. Each such thing is left out with a line in Scene::warnings that names the world, the
-/// models and the thing, once however often it occurs. Names whose letters only differ in case are
-/// found, with a warning. `model://sun` and `model://ground_plane` need no folder. Throws FileError
-/// on a world that is missing, no XML or shows nothing.
+/// Reads a scene from a Gazebo world (SDF 1.0 and later; a file with a single model as well):
+/// visuals with their poses, scales, colours and textures; one object per top-level model.
+/// Approximations: coloured lamps become white ones of the same brightness; point and spot lights
+/// shine to all sides; light that adds up beyond white on the floor is scaled down as a whole.
+/// Visuals that are more than half transparent and invisible parts (collisions, joints, plugins)
+/// are left out. Like Gazebo, it continues where something is missing, faulty or unknown (actors,
+/// height maps): each such thing is left out with one line in Scene::warnings. Names whose letters
+/// only differ in case are found, with a warning. `model://sun` and `model://ground_plane` need no
+/// folder. Throws FileError on a world that is missing, no XML or shows nothing.
 [[nodiscard]] Scene load_gazebo(const std::filesystem::path& world,
                                 const GazeboOptions& options = {});
 

@@ -33,7 +33,7 @@ std::string lower_ending(const fs::path& path) {
   return to_lower_case(path.extension().string());
 }
 
-// What turns the importer's axes into z up. It has turned COLLADA files to y up already.
+// Returns the rotation of the importer's axes to z up. COLLADA files are y up already.
 Affine3 correct_up_axis(UpAxis up, const fs::path& path) {
   const std::string ending = lower_ending(path);
   const bool y_up_format = ending == ".dae" || ending == ".gltf" || ending == ".glb";
@@ -206,7 +206,7 @@ class ColladaHoles {
     }
   }
 
-  // A polygon with holes becomes one without.
+  // Turns a polygon with holes into one without.
   void join_holes_of_one(pugi::xml_node polygon) const {
     Outline outline;
     for (const pugi::xml_node& ring : polygon.children("p")) outline = corners(ring);
@@ -236,7 +236,7 @@ class ColladaHoles {
     return {p[0], p[1], p[2]};
   }
 
-  // Twice the area times the normal.
+  // Returns twice the area times the normal.
   [[nodiscard]] Vector3 turn(const Outline& outline) const {
     Vector3 sum{};
     for (std::size_t i = 0; i < outline.size(); ++i) {

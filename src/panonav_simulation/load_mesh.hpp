@@ -14,7 +14,7 @@ enum class UpAxis {
   z,          ///< whatever the file says
 };
 
-/// How a mesh file becomes a scene.
+/// Options of reading a mesh file.
 struct MeshOptions {
   TextureOptions textures{};      ///< how pictures on surfaces are read
   UpAxis up = UpAxis::of_format;  ///< which axis becomes the scene's z
@@ -22,11 +22,11 @@ struct MeshOptions {
       1.0;  ///< metres for one unit of the file, after the unit that COLLADA files state; > 0
 };
 
-/// A scene from one mesh file of any format that assimp reads (COLLADA, OBJ, STL, glTF, ...): all
-/// its meshes with colours and textures, one object per node. Files carry no useful lights, so one
-/// lamp hangs below the top of the scene and `ambient` does the rest. `floor_low .. floor_high` is
-/// the extent of the meshes. Missing textures are warnings in the scene. Throws FileError on a file
-/// that is missing, damaged or without triangles; ContractError on options out of range.
+/// Reads a scene from one mesh file of any format that assimp reads (COLLADA, OBJ, STL, glTF, ...):
+/// all its meshes with colours and textures, one object per node. Files carry no useful lights, so
+/// one lamp hangs below the top of the scene and `ambient` does the rest. `floor_low .. floor_high`
+/// is the extent of the meshes. Missing textures are warnings in the scene. Throws FileError on a
+/// file that is missing, damaged or without triangles; ContractError on options out of range.
 [[nodiscard]] Scene load_mesh(const std::filesystem::path& path, const MeshOptions& options = {});
 
 }  // namespace panonav::simulation

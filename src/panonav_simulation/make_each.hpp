@@ -11,8 +11,8 @@
 
 namespace panonav::simulation {
 
-/// make(0) to make(count - 1), side by side on the executor's threads. What is made must depend on
-/// its number alone.
+/// Returns make(0) to make(count - 1), computed on the executor's threads. Each result must depend
+/// on its number alone.
 template <typename Make>
 auto make_each(Executor& executor, std::size_t count, Make make) {
   using Made = std::invoke_result_t<Make, std::size_t>;
@@ -26,7 +26,7 @@ auto make_each(Executor& executor, std::size_t count, Make make) {
   return made;
 }
 
-/// Processor time of the calling thread so far.
+/// Returns the processor time of the calling thread so far.
 [[nodiscard]] inline double thread_seconds() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);

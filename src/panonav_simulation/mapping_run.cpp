@@ -55,14 +55,14 @@ OdometryNoise cheap_wheels() {
 }
 
 std::vector<Pose2> drive(const PlaceRecording& place, std::span<const Point2> way_points,
-                         double spacing_m, std::size_t most) {
+                         double spacing_m, std::size_t max_poses) {
   const auto planned = plan_recording(
       place.scene, *place.free_space,
       {.path = RecordingPath::tour, .heading = RecordingHeading::path, .spacing_m = spacing_m}, {},
       place.seed, way_points);
   std::vector<Pose2> poses;
   for (const RecordedPose& pose : planned) {
-    if (poses.size() < most) poses.push_back(pose.pose);
+    if (poses.size() < max_poses) poses.push_back(pose.pose);
   }
   return poses;
 }

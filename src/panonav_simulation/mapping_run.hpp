@@ -16,37 +16,38 @@
 
 namespace panonav::simulation {
 
-/// A place to drive through, without any reference views.
+/// Makes a place to drive through, without any reference views.
 [[nodiscard]] PlaceRecording make_empty_place(Scene scene, std::uint64_t seed, int columns,
                                               Executor& executor);
 
-/// What a robot saw along its way, and where it was.
+/// True poses, odometry and views of a drive.
 struct MappingRecording {
   std::vector<Pose2> truth;
   std::vector<Pose2> wheels;  ///< odometry_from_robot
   std::vector<FourierSignature> views;
 };
 
-/// Odometry of a cheap robot: a few times the errors of `OdometryNoise`'s defaults.
+/// Returns the noise of a cheap robot: a few times the errors of `OdometryNoise`'s defaults.
 [[nodiscard]] OdometryNoise cheap_wheels();
 
-/// Poses every `spacing_m` along the way points, on straight free ways or the shortest ones,
-/// heading along the way; at most `most` poses. Throws ContractError as `plan_recording`.
+/// Plans poses every `spacing_m` along the way points, on straight free lines or shortest paths,
+/// heading along the path; at most `max_poses` poses. Throws ContractError as `plan_recording`.
 [[nodiscard]] std::vector<Pose2> drive(const PlaceRecording& place,
                                        std::span<const Point2> way_points, double spacing_m,
-                                       std::size_t most);
+                                       std::size_t max_poses);
 
-/// Views at all poses, preprocessed as the command's defaults have it, view i with the noise seed
+/// Records views at all poses, preprocessed by the command's defaults, view i with the noise seed
 /// `seed` + i; odometry of `wheels`.
 [[nodiscard]] MappingRecording record_for_mapping(const PlaceRecording& place,
                                                   std::vector<Pose2> poses, int components,
                                                   const OdometryNoise& wheels, std::uint64_t seed,
                                                   Executor& executor);
 
-/// The first components of a signature. Throws ContractError unless 1 <= components <= its own.
+/// Returns the first components of a signature. Throws ContractError unless 1 <= components <= its
+/// own.
 [[nodiscard]] FourierSignature first_components(const FourierSignature& signature, int components);
 
-/// Every so-many-th view.
+/// Returns every n-th view.
 [[nodiscard]] MappingRecording every_nth(const MappingRecording& recording, std::size_t n);
 
 /// A run through the mapper.
@@ -68,15 +69,15 @@ struct MappingRunOptions {
   LoopClosureOptions closure;
   int components = 15;
   bool wheels = false;        ///< steps of the wheels are known
-  std::size_t max_nodes = 0;  ///< the run ends with so many; 0: all views
+  std::size_t max_nodes = 0;  ///< the run ends at this number of nodes; 0: all views
 };
 [[nodiscard]] MappedRecording map_recording(const MappingRecording& recording,
                                             const MappingRunOptions& options);
 
-/// mu, or 1 where one of the sets is a single point.
+/// Returns mu, or 1 where one of the sets is a single point.
 [[nodiscard]] double shape_error(std::span<const Point2> estimate, std::span<const Point2> truth);
 
-/// Points of a map laid over the truth, for pictures.
+/// Returns the points of a map aligned to the truth with one scale, for images.
 [[nodiscard]] std::vector<Point2> align_to(std::span<const Point2> estimate,
                                            std::span<const Point2> truth);
 

@@ -79,7 +79,7 @@ std::function<FourierSignature(const Pose2& pose, std::uint64_t seed)> make_sigh
 }
 
 MissionPlace make_mission_place(const std::string& scene, SimulatedWorldOptions options,
-                                const RobotNavigator& robot, const GivenOption& given,
+                                const RobotNavigator& robot, const FindSetOption& given,
                                 Executor& executor, ImageReport report) {
   const MemoryHeader& header = robot.memory().header();
   const bool mirror = header.source.kind == PictureKind::mirror;

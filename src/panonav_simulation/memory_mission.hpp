@@ -36,7 +36,8 @@ using ImageReport = std::function<void(const Image& image, const Panorama& panor
 /// know which elevations its rows show; else as `SimulatedWorld`.
 [[nodiscard]] MissionPlace make_mission_place(const std::string& scene,
                                               SimulatedWorldOptions options,
-                                              const RobotNavigator& robot, const GivenOption& given,
-                                              Executor& executor, ImageReport report = {});
+                                              const RobotNavigator& robot,
+                                              const FindSetOption& given, Executor& executor,
+                                              ImageReport report = {});
 
 }  // namespace panonav::simulation

@@ -7,7 +7,7 @@
 
 namespace panonav::simulation {
 
-/// What a pixel of a mirror camera sees.
+/// Target of the light of a pixel of a mirror camera.
 enum class MirrorTarget {
   world,        ///< the world, along the reflected ray
   camera_body,  ///< the camera itself, reflected in the middle of the mirror
@@ -31,12 +31,11 @@ class HyperboloidalMirror {
   /// Throws ContractError unless the camera is valid and its model hyperboloidal.
   explicit HyperboloidalMirror(const Camera& camera);
 
-  /// Follows the light of a point of the picture. Points beyond the
-  /// mirror's rim see the housing.
+  /// Traces the light of a point of the image. Points beyond the mirror's rim see the housing.
   [[nodiscard]] MirrorRay trace(PixelPoint pixel) const;
-  /// Radius of the mirror's rim, and of the camera body that hides the middle.
+  /// Returns the radius of the mirror's rim.
   [[nodiscard]] double rim_radius_m() const noexcept { return rim_radius_mm_ * 1e-3; }
-  /// Radius of the camera body, 0: nothing is hidden.
+  /// Returns the radius of the camera body that hides the middle; 0: nothing is hidden.
   [[nodiscard]] double body_radius_m() const noexcept { return body_radius_mm_ * 1e-3; }
 
  private:
@@ -54,15 +53,15 @@ class HyperboloidalMirror {
   double body_radius_mm_ = 0.0;
 };
 
-/// The mirror camera that the simulated robot carries: 640 x 480 pixels, the shape of [Y03]'s
-/// mirror at a third of its size (5 cm across, so that it suits the smallest scene), from 58
-/// degrees below the horizon to 21 above.
+/// Returns the mirror camera that the simulated robot carries: 640 x 480 pixels, the shape of
+/// [Y03]'s mirror at a third of its size (5 cm across, so that it suits the smallest scene), from
+/// 58 degrees below the horizon to 21 above.
 [[nodiscard]] Camera simulated_mirror_camera();
 
-/// A 360 degree camera of two fisheye lenses, 1280 x 640 pixels, 190 degrees each, the left one
-/// forward. `lens_seed` 0: lenses as drawn. Any other: as made, with centres up to 5 px off, axes
-/// and rolls up to 2 degrees, focal lengths up to 2.5 %, a distortion of their own (k3 and k5 up to
-/// 0.01 and 0.002) and one of them up to a fifth darker.
+/// Returns a 360 degree camera of two fisheye lenses, 1280 x 640 pixels, 190 degrees each, the left
+/// one forward. `lens_seed` 0: lenses as drawn. Any other: as made, with centres up to 5 px off,
+/// axes and rolls up to 2 degrees, focal lengths up to 2.5 %, a distortion of their own (k3 and k5
+/// up to 0.01 and 0.002) and one of them up to a fifth darker.
 [[nodiscard]] Camera simulated_dual_fisheye(std::uint64_t lens_seed, double baseline_m = 0.0);
 
 }  // namespace panonav::simulation

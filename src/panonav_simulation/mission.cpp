@@ -24,9 +24,9 @@ namespace panonav::simulation {
 
 namespace {
 
-// Between robot and things where references are taken.
+// Smallest distance from obstacles at which references are recorded.
 constexpr double room_m = 0.2;
-// Between the lines of a route at most.
+// Largest distance between the lines of a route.
 constexpr double line_spacing_m = 0.1;
 
 std::vector<FourierSignature> observe_all(const MissionPlace& place,
@@ -36,7 +36,7 @@ std::vector<FourierSignature> observe_all(const MissionPlace& place,
                    [&](std::size_t i) { return see(place, poses[i], Random(seed, i).next()); });
 }
 
-// Without views; packs so that the largest magnitude of these just fits.
+// Makes a memory without views whose scale just fits the largest magnitude of these.
 VisualMemory empty_memory(const std::vector<FourierSignature>& views) {
   float largest = 0.0F;
   for (const FourierSignature& view : views) {
@@ -48,8 +48,8 @@ VisualMemory empty_memory(const std::vector<FourierSignature>& views) {
           views.front().elevations()};
 }
 
-// Of a drive whose poses the map has placed, from the first one in its largest component until one
-// is not.
+// Records a route along the poses that the map has placed, from the first one in its largest
+// component until one is not.
 RoutePanorama record_route(const MissionPlace& place, const std::vector<Pose2>& poses,
                            const TopologicalMap& map, std::uint64_t seed, Executor& executor) {
   struct Stop {
@@ -86,7 +86,7 @@ RoutePanorama record_route(const MissionPlace& place, const std::vector<Pose2>& 
   return route;
 }
 
-// The shortest way, or the straight one where the map of free places has none.
+// Returns the length of the shortest path, or the straight distance where there is none.
 double shortest_path_m(const FreeSpace& space, Point2 from, Point2 to) {
   if (!std::isfinite(to.x_m) || !std::isfinite(to.y_m)) return distance(from, to);
   const auto way = space.shortest_path(from, to);
@@ -148,12 +148,12 @@ RememberedPlace remember_drive(const MissionPlace& place, const std::vector<Pose
                                const OdometryNoise& wheels, std::uint64_t seed,
                                Executor& executor) {
   const auto views = observe_all(place, poses, seed, executor);
-  const auto told = simulate_odometry(poses, wheels, seed);
+  const auto odometry = simulate_odometry(poses, wheels, seed);
   VisualMemory memory = empty_memory(views);
   TopologicalMapper mapper(memory);
   for (std::size_t i = 0; i < views.size(); ++i) {
     std::optional<Pose2> moved;
-    if (i > 0) moved = inverse(told[i - 1]) * told[i];
+    if (i > 0) moved = inverse(odometry[i - 1]) * odometry[i];
     static_cast<void>(mapper.add(memory.append(views[i], {.name = std::to_string(i)}),
                                  OdometryView(views[i]), moved));
   }
@@ -196,7 +196,7 @@ MissionRobot::MissionRobot(const MissionPlace& place, const BaseOptions& base,
 }
 
 bool MissionRobot::is_clear(Point2 from, Point2 to) const {
-  // Who stands too near already must not keep it from going away.
+  // A person who is already too near must not block it from moving away.
   const bool somebody = people_.touch(to, robot_radius_m_) && !people_.touch(from, robot_radius_m_);
   constexpr double fine_m = 0.01;
   return !somebody && has_room_between(*space_, robot_radius_m_, from, to, fine_m);
@@ -207,41 +207,41 @@ void MissionRobot::wait(double seconds) {
 }
 
 Pose2 MissionRobot::take_odometry() noexcept {
-  return std::exchange(told_, Pose2{});
+  return std::exchange(odometry_, Pose2{});
 }
 
 void MissionRobot::command(const Velocity& velocity) {
   wait(base_.period_s);
-  const Pose2 told = integrate_velocity(velocity, base_.period_s);
-  const Pose2 step = sample_step(told, motion_, random_);
+  const Pose2 commanded = integrate_velocity(velocity, base_.period_s);
+  const Pose2 step = sample_step(commanded, motion_, random_);
   const Pose2 there = pose_ * step;
   if (!is_clear(pose_.position(), there.position())) {
     // It touches something: it turns, but does not move. Wheels that slip as it turns on the spot
     // say nothing of what stands ahead.
-    obstacle_ |= told.x_m != 0.0 || told.y_m != 0.0;
+    obstacle_ |= commanded.x_m != 0.0 || commanded.y_m != 0.0;
     pose_.heading_rad = there.heading_rad;
-    told_ = told_ * Pose2{0.0, 0.0, told.heading_rad};
+    odometry_ = odometry_ * Pose2{0.0, 0.0, commanded.heading_rad};
     return;
   }
-  told_ = told_ * told;
+  odometry_ = odometry_ * commanded;
   travelled_m_ += std::hypot(step.x_m, step.y_m);
   pose_ = there;
 }
 
-std::optional<double> MissionRobot::free_direction(double wanted_rad, double distance_m) {
+std::optional<double> MissionRobot::free_direction(double direct_rad, double distance_m) {
   const auto is_open = [&](double direction_rad, double way_m) {
     const Point2 there =
         pose_ * Point2{way_m * std::cos(direction_rad), way_m * std::sin(direction_rad)};
     return is_clear(pose_.position(), there);
   };
-  if (is_open(wanted_rad, distance_m)) {
+  if (is_open(direct_rad, distance_m)) {
     side_ = 0;
-    return wanted_rad;
+    return direct_rad;
   }
   // Farther round it would turn back: whoever sends it must know that the way is shut.
   constexpr int feelers_each_side = 6;
   const auto aside = find_open_direction(
-      wanted_rad, feelers_each_side, side_,
+      direct_rad, feelers_each_side, side_,
       [&](double direction_rad) { return is_open(direction_rad, 0.5 * distance_m); });
   side_ = aside ? aside->side : -side_;
   if (!aside) return std::nullopt;
@@ -254,8 +254,8 @@ bool MissionRobot::take_contact() noexcept {
 
 namespace {
 
-// To a point as far as the robot knows its own speeds, until it is there, something stops it or it
-// should long be there. Returns whether it was stopped.
+// Drives to a point by the nominal speeds until the robot is there, is stopped or runs out of time.
+// Returns true if it was stopped.
 bool drive(MissionRobot& robot, const BaseOptions& base, double direction_rad, double distance_m) {
   Point2 target{distance_m * std::cos(direction_rad), distance_m * std::sin(direction_rad)};
   constexpr double near_m = 0.003;
@@ -273,7 +273,7 @@ bool drive(MissionRobot& robot, const BaseOptions& base, double direction_rad, d
   return false;
 }
 
-/// Tells the reference where Monte-Carlo localisation has the robot, if it is certain.
+/// Returns the reference nearest to the Monte-Carlo estimate, if that is certain.
 class Estimator {
  public:
   Estimator(const VisualMemory& memory, const OdometryNoise& odometry)
@@ -302,7 +302,7 @@ class Estimator {
   MonteCarloLocaliser filter_;
 };
 
-/// A robot on its missions, one after the other.
+/// Runs missions of one robot one after the other.
 class Voyage {
  public:
   Voyage(const MissionPlace& place, const RememberedPlace& remembered, const Pose2& start,
@@ -362,7 +362,7 @@ class Voyage {
     RobotReport report{.obstacle = std::exchange(obstacle_, false)};
     const Pose2 moved = robot_.take_odometry();
     if (estimator_) {
-      // Views that tell the place by themselves tell it better.
+      // The navigator uses the estimate only where it is in doubt.
       const auto estimate = estimator_->observe(moved, view);
       if (in_doubt_) report.estimate = estimate;
     }
@@ -384,11 +384,11 @@ class Voyage {
     const auto free_rad = robot_.free_direction(decision.direction_rad, decision.advance_m);
     obstacle_ = !free_rad;
     if (free_rad) {
-      const bool wanted = *free_rad == decision.direction_rad;
+      const bool is_direct = *free_rad == decision.direction_rad;
       obstacle_ =
-          drive(robot_, options_.base, *free_rad, (wanted ? 1.0 : 0.5) * decision.advance_m);
+          drive(robot_, options_.base, *free_rad, (is_direct ? 1.0 : 0.5) * decision.advance_m);
     }
-    // Who is in the way may go.
+    // A person in the path may move away.
     constexpr double pause_s = 1.0;
     if (obstacle_ || decision.advance_m == 0.0) robot_.wait(pause_s);
   }
@@ -412,15 +412,15 @@ void require_goal(const RememberedPlace& remembered, ViewId goal) {
 }  // namespace
 
 std::string explain_other_ends(const std::map<NavigationState, std::size_t>& ends,
-                               std::size_t wrongly, NavigationState wanted) {
+                               std::size_t wrongly, NavigationState expected) {
   std::string text;
   const auto add = [&](std::size_t count, const std::string& end) {
     if (count == 0) return;
     text += (text.empty() ? "of the other runs, " : ", ") + std::to_string(count) + " " + end;
   };
-  if (wanted == NavigationState::arrived) add(wrongly, "report an arrival but are farther off");
+  if (expected == NavigationState::arrived) add(wrongly, "report an arrival but are farther off");
   for (const auto& [end, count] : ends) {
-    if (end != wanted) add(count, "end as " + std::string(name_of(end)));
+    if (end != expected) add(count, "end as " + std::string(name_of(end)));
   }
   return text;
 }

@@ -28,30 +28,30 @@ struct MissionPlace : SimulatedPlace {
   PanoramaRendering rendering{.rows = 40, .columns = 256, .rays_per_axis = 1};
   SensorOptions sensor;
   int components = 15;
-  /// What a robot sees through another camera or preprocessing than that of `see`, which then asks
-  /// this instead; any number of threads may ask. Empty: as `see` says.
+  /// Replaces the camera and preprocessing of `see`; called from any number of threads. Empty:
+  /// those of `see`.
   std::function<FourierSignature(const Pose2& pose, std::uint64_t seed)> sight;
   /// The horizon scanline that a robot takes at a pose, to record and to follow routes; any number
   /// of threads may ask. Empty: it takes none.
   std::function<std::vector<float>(const Pose2& pose, std::uint64_t seed)> line;
 };
 
-/// As `make_place`.
+/// Makes the place, see `make_place`.
 [[nodiscard]] MissionPlace make_mission_place(Scene scene, Executor& executor,
                                               std::optional<Point2> inside = std::nullopt);
 
-/// Lines through the simulated mirror camera (line_camera.hpp), as the experiments of [Y03] have
-/// them: for `MissionPlace::line`. People who walk about are not in them.
+/// Returns lines through the simulated mirror camera (line_camera.hpp), as the experiments of [Y03]
+/// have them: for `MissionPlace::line`. People who walk about are not in them.
 [[nodiscard]] std::function<std::vector<float>(const Pose2& pose, std::uint64_t seed)>
 make_line_sensor(const MissionPlace& place);
 
-/// What a robot there sees: the place's `sight`, or a panorama rendered directly, with the people
-/// that are there, and preprocessed as the command's defaults have it. The same pose, seed and
-/// people give the same bits.
+/// Computes the signature of the robot's view: the place's `sight`, or a panorama rendered
+/// directly, with the people that are there, and preprocessed as the command's defaults have it.
+/// The same pose, seed and people give the same bits.
 [[nodiscard]] FourierSignature see(const MissionPlace& place, const Pose2& pose, std::uint64_t seed,
                                    const People* people = nullptr);
 
-/// What a robot remembers of a place, and, for the record, where its views were taken.
+/// Memory and graph of a place, with the true poses of its views.
 struct RememberedPlace {
   VisualMemory memory;
   NavigationGraph graph;
@@ -63,12 +63,12 @@ struct RememberedPlace {
   std::vector<std::optional<Point2>> arranged{};
 };
 
-/// Views on a grid, 20 cm or more from all things, each in a heading at random, arranged by their
-/// similarity alone: no positions, no order, no motion [M04 section 3].
+/// Records views on a grid, 20 cm or more from all things, each in a heading at random, arranged by
+/// their similarity alone: no positions, no order, no motion [M04 section 3].
 [[nodiscard]] RememberedPlace remember_grid(const MissionPlace& place, double spacing_m,
                                             std::uint64_t seed, Executor& executor);
 
-/// Views along a drive, mapped by visual odometry and closure of loops, lengths by `wheels`
+/// Records views along a drive, mapped by visual odometry and closure of loops, lengths by `wheels`
 /// [F11 section 4]. The memory gets the poses of the map's largest component. Where the place has
 /// lines the robot records a route, too, as far as that component goes without a gap: a line every
 /// 10 cm at most [Y03 section 2.2], posed between the map's views, so that both lie in one frame.
@@ -90,17 +90,16 @@ class MissionRobot final : public RobotBase {
 
   [[nodiscard]] const Pose2& pose() const noexcept { return pose_; }
   [[nodiscard]] double travelled_m() const noexcept { return travelled_m_; }
-  /// The direction nearest to the wanted one, 15 degrees apart, in which half of the way is free;
-  /// as long as that one is not free it keeps to the side that it chose. Empty: none is, as far as
-  /// it turns.
-  [[nodiscard]] std::optional<double> free_direction(double wanted_rad, double distance_m);
-  /// Since the last time: whether something stopped it.
+  /// Finds the direction nearest to `direct_rad`, 15 degrees apart, in which half of the distance
+  /// is free; while the direct one is blocked it keeps its side. Nullopt if none is free.
+  [[nodiscard]] std::optional<double> free_direction(double direct_rad, double distance_m);
+  /// Returns true if something stopped the robot since the last call.
   [[nodiscard]] bool take_contact() noexcept;
-  /// Stands still.
+  /// Lets time pass.
   void wait(double seconds);
-  /// Somebody carries it away; its wheels do not tell.
+  /// Moves the robot unknown to its wheels.
   void carry_to(const Pose2& pose) noexcept { pose_ = pose; }
-  /// Since the last time: the motion that its wheels tell, robot_old_from_robot_new.
+  /// Returns the motion by its wheels since the last call, robot_old_from_robot_new.
   [[nodiscard]] Pose2 take_odometry() noexcept;
   [[nodiscard]] const People& people() const noexcept { return people_; }
 
@@ -117,7 +116,7 @@ class MissionRobot final : public RobotBase {
   int side_ = 0;  // on which it goes past something: 1 left, -1 right
   bool obstacle_ = false;
   double travelled_m_ = 0.0;
-  Pose2 told_;
+  Pose2 odometry_;
 };
 
 struct MissionOptions {
@@ -135,7 +134,7 @@ struct MissionOptions {
 struct Mission {
   ViewId goal;
   Pose2 start;
-  /// Where somebody carries the robot once half of the way is driven; empty: nobody does.
+  /// Pose to which the robot is carried after half of the path; empty: it is not kidnapped.
   std::optional<Pose2> kidnapped_to;
 };
 
@@ -147,8 +146,8 @@ struct RandomMissionOptions {
   bool kidnapped = false;  ///< somebody kidnaps the robot on its way
 };
 
-/// Missions from random free places, in any heading, to references at random that are at least two
-/// spacings away.
+/// Draws missions from random free places, in any heading, to references at random that are at
+/// least two spacings away.
 [[nodiscard]] std::vector<Mission> draw_missions(const MissionPlace& place,
                                                  const RememberedPlace& remembered,
                                                  const RandomMissionOptions& options,
@@ -165,25 +164,26 @@ struct MissionRun {
   /// unknown.
   double shortest_m = 0.0;
 
-  /// The robot says that it arrived, and is within `radius_m` of the goal.
+  /// True if the robot reports an arrival within `radius_m` of the goal.
   [[nodiscard]] bool arrives(double radius_m) const noexcept {
     return end == NavigationState::arrived && end_distance_m <= radius_m;
   }
 };
 
-/// How missions end that do not end as `wanted`: what is known of a target that is missed. `ends`
-/// counts them all, `wrongly` those that report an arrival but are farther off.
+/// Describes the missions that do not end as `expected`. `ends` counts all missions, `wrongly`
+/// those that report an arrival but are farther off.
 [[nodiscard]] std::string explain_other_ends(const std::map<NavigationState, std::size_t>& ends,
                                              std::size_t wrongly,
-                                             NavigationState wanted = NavigationState::arrived);
+                                             NavigationState expected = NavigationState::arrived);
 
 /// Called after each step, with the true pose.
 using StepReport = std::function<void(const NavigationDecision& decision, const Pose2& pose)>;
 
-/// Asked after each step that goes on: another goal, which the navigator has already; empty: none.
+/// Called after each step of a continuing mission. Returns another goal, which the navigator has
+/// already; nullopt: none.
 using GoalSource = std::function<std::optional<ViewId>()>;
 
-/// Sends a robot over what is remembered; `place` may differ from the place that was remembered.
+/// Runs a mission over a remembered place; `place` may differ from the place that was remembered.
 /// Where it is not known where the goal's view was taken, nobody carries the robot away. The robot
 /// takes lines when the navigator has routes. The same seed gives the same run. Cost: a picture a
 /// look.
@@ -193,16 +193,16 @@ using GoalSource = std::function<std::optional<ViewId>()>;
                                      const StepReport& report_step = {},
                                      const GoalSource& other_goal = {});
 
-/// One goal after the other: each run begins where the one before ended, with the place known that
-/// the robot then believes in. A goal that was not reached does not end the tour. Otherwise as
-/// `run_mission`.
+/// Runs to one goal after the other: each run begins where the one before ended, with the place
+/// known that the robot then believes in. A goal that was not reached does not end the tour.
+/// Otherwise as `run_mission`.
 [[nodiscard]] std::vector<MissionRun> run_tour(const MissionPlace& place,
                                                const RememberedPlace& remembered,
                                                Navigator& navigator, const Pose2& start,
                                                std::span<const ViewId> goals,
                                                const MissionOptions& options, std::uint64_t seed);
 
-/// All runs, mission by mission, each by a navigator of its own with the routes of what is
+/// Runs all missions, each by a navigator of its own with the routes of what is
 /// remembered; run i has the stream (seed, i).
 [[nodiscard]] std::vector<MissionRun> run_missions(const MissionPlace& place,
                                                    const RememberedPlace& remembered,

@@ -14,11 +14,11 @@ namespace {
 constexpr double radius_m = 0.22;
 constexpr double height_m = 1.7;
 constexpr double pace_m_s = 0.8;
-// What a person leaves between itself and a robot, and how long it waits before one.
+// Distance that a person keeps from a robot, and time that it waits in front of one.
 constexpr double distance_kept_m = 0.15;
 constexpr double patience_s = 2.0;
 
-// Nothing that a robot would touch stands on the straight line.
+// True if nothing that a robot would touch stands on the straight line.
 bool is_in_sight(const FreeSpace& space, Point2 from, Point2 to) {
   constexpr double step_m = 0.05;
   const int steps = static_cast<int>(std::ceil(distance(from, to) / step_m));
@@ -65,7 +65,7 @@ void People::pass(double seconds, Point2 robot, double robot_radius_m) {
       const Point2 there{person.position.x_m + share * (to.x_m - person.position.x_m),
                          person.position.y_m + share * (to.y_m - person.position.y_m)};
       const double apart_m = distance(there, robot);
-      // Who is near already may go away.
+      // A person who is already near may move away.
       if (apart_m < robot_radius_m + radius_m + distance_kept_m &&
           apart_m < distance(person.position, robot)) {
         person.waited_s += seconds;
@@ -81,7 +81,7 @@ void People::pass(double seconds, Point2 robot, double robot_radius_m) {
 
 void People::paint(Panorama& view, const Pose2& camera, double camera_height_m) const {
   if (!view.elevations()) return;
-  // The nearest last: they hide who is behind them.
+  // The nearest are painted last: they hide those behind them.
   std::vector<const Person*> seen;
   for (const Person& person : people_) {
     if (is_in_sight(*space_, camera.position(), person.position)) seen.push_back(&person);

@@ -22,12 +22,12 @@ class People {
 
   [[nodiscard]] std::size_t size() const noexcept { return people_.size(); }
   [[nodiscard]] Point2 position(std::size_t person) const { return people_.at(person).position; }
-  /// Whether somebody stands within `radius_m` of a position.
+  /// True if a person stands within `radius_m` of a position.
   [[nodiscard]] bool touch(Point2 position, double radius_m) const;
-  /// Time passes while a robot stands somewhere.
+  /// Moves all people for a time while a robot stands somewhere.
   void pass(double seconds, Point2 robot, double robot_radius_m);
-  /// As a camera `camera_height_m` above the floor sees them: those whom nothing hides that a robot
-  /// would touch. Changes nothing when elevations are unknown.
+  /// Paints the visible people into the view of a camera `camera_height_m` above the floor. Changes
+  /// nothing if elevations are unknown.
   void paint(Panorama& view, const Pose2& camera, double camera_height_m) const;
 
  private:

@@ -44,7 +44,7 @@ struct PlaceRecording : SimulatedPlace {
   std::vector<PlacedView> references;
   std::vector<PlacedView> queries;
 
-  /// Index of the reference view that is nearest in space.
+  /// Returns the index of the reference view that is nearest in space.
   [[nodiscard]] std::size_t nearest_reference(Point2 position) const;
 };
 
@@ -57,30 +57,30 @@ struct PlaceRecordingOptions {
   int columns = 512;
 };
 
-/// References with heading 0, queries at random headings, both with the sensor's noise.
+/// Records references with heading 0 and queries at random headings, both with the sensor's noise.
 [[nodiscard]] PlaceRecording record_place(const PlaceRecordingOptions& options, Executor& executor);
-/// The same in a scene that the caller made or read; `options.scene` does not count. Throws
+/// Records in a scene that the caller made or read; `options.scene` does not count. Throws
 /// ContractError when no place is free at this spacing.
 [[nodiscard]] PlaceRecording record_place(Scene scene, const PlaceRecordingOptions& options,
                                           Executor& executor);
 
-/// One picture more in that place, at its camera height. The same pose, seed and sensor give the
-/// same bits; views may be taken from several threads.
+/// Takes one more image in that place, at its camera height. The same pose, seed and sensor give
+/// the same bits; views may be taken from several threads.
 [[nodiscard]] Panorama take_view(const PlaceRecording& place, const Pose2& pose, std::uint64_t seed,
                                  const SensorOptions& sensor = {});
-/// The same with another number of rows and columns over the same elevations.
+/// Takes it with another number of rows and columns over the same elevations.
 [[nodiscard]] Panorama take_view(const PlaceRecording& place, const PanoramaRendering& rendering,
                                  const Pose2& pose, std::uint64_t seed,
                                  const SensorOptions& sensor = {});
 
-/// The views at all these poses; view i is taken with `first_seed` + i.
+/// Takes the views at all these poses; view i is taken with `first_seed` + i.
 [[nodiscard]] std::vector<PlacedView> take_views(const PlaceRecording& place,
                                                  const PanoramaRendering& rendering,
                                                  const std::vector<Pose2>& poses,
                                                  std::uint64_t first_seed,
                                                  const SensorOptions& sensor, Executor& executor);
 
-/// The queries once more through another sensor.
+/// Takes the queries again through another sensor.
 [[nodiscard]] std::vector<PlacedView> retake_queries(const PlaceRecording& place,
                                                      const SensorOptions& sensor,
                                                      std::uint64_t first_seed, Executor& executor);

@@ -18,7 +18,7 @@
 
 namespace panonav::simulation {
 
-/// Where a simulated robot takes its pictures.
+/// Poses at which a simulated robot takes its images.
 enum class RecordingPath {
   grid,    ///< every free place of a grid, row by row
   zigzag,  ///< the same, every second row backwards
@@ -34,7 +34,7 @@ enum class RecordingHeading {
   random,  ///< any
 };
 
-/// Where and how a robot takes its pictures.
+/// Poses and times of the images of a robot.
 struct RecordingOptions {
   RecordingPath path = RecordingPath::grid;            ///< from place to place
   RecordingHeading heading = RecordingHeading::fixed;  ///< at each place
@@ -45,7 +45,7 @@ struct RecordingOptions {
 };
 void visit_options(RecordingOptions& options, OptionVisitor& visitor);
 
-/// One place of a recording and what the robot knows of it.
+/// True pose and odometry of one image of a recording.
 struct RecordedPose {
   double stamp_s = 0.0;  ///< seconds, by way and speed; of a trajectory its own
   Pose2 pose;            ///< where it truly is
@@ -53,10 +53,10 @@ struct RecordedPose {
   friend bool operator==(const RecordedPose&, const RecordedPose&) = default;
 };
 
-/// The poses of a recording, all of them free. `way_points` replace the scene's tour. Straight
-/// lines that are not free are replaced by the shortest free paths. The same seed gives the same
-/// poses. Throws OptionError; ContractError when no place is free at this spacing, a way point is
-/// not free, or a tour is asked for where there is none.
+/// Plans the poses of a recording, all of them free. `way_points` replace the scene's tour.
+/// Straight lines that are not free are replaced by the shortest free paths. The same seed gives
+/// the same poses. Throws OptionError; ContractError when no place is free at this spacing, a way
+/// point is not free, or a tour is asked for where there is none.
 [[nodiscard]] std::vector<RecordedPose> plan_recording(const Scene& scene, const FreeSpace& space,
                                                        const RecordingOptions& options,
                                                        const OdometryNoise& odometry,
@@ -66,10 +66,10 @@ struct RecordedPose {
 /// Turns each pose towards the next one, -pi .. pi; the last keeps the heading of the one before.
 void face_path(std::vector<Pose2>& poses);
 
-/// What is rendered: a picture through a camera, or the panoramic cylinder directly.
+/// Camera of the rendered image: an image through a camera, or the panoramic cylinder directly.
 using RecordingCamera = std::variant<PanoramaRendering, Camera>;
 
-/// How each picture of a recording is taken.
+/// Viewpoint and rays of each image of a recording.
 struct FrameOptions {
   double camera_height_m = 0.6;  ///< of the viewpoint above the floor, > 0
   /// Tilt of the robot, in another random direction at each place.
@@ -78,10 +78,10 @@ struct FrameOptions {
 };
 void visit_options(FrameOptions& options, OptionVisitor& visitor);
 
-/// How the robot is tilted in the picture of this seed.
+/// Draws the tilt of the robot in the image of this seed.
 [[nodiscard]] Tilt draw_tilt(const FrameOptions& options, std::uint64_t seed);
 
-/// The picture that the robot takes: a panorama for people (see `to_picture`), or the camera's
+/// Takes the image of the robot: a panorama for people (see `to_picture`), or the camera's
 /// image. The same options and seed give the same picture; give each frame its own seed.
 /// Throws OptionError, and ContractError as the renderer does.
 [[nodiscard]] Image take_picture(const Renderer& renderer, const Pose2& pose,
@@ -89,7 +89,7 @@ void visit_options(FrameOptions& options, OptionVisitor& visitor);
                                  const SensorOptions& sensor, std::uint64_t seed,
                                  Executor& executor);
 
-/// The same as a panorama, without the detour through a picture.
+/// Takes the image as a panorama.
 [[nodiscard]] Panorama take_panorama(const Renderer& renderer, const Pose2& pose,
                                      const PanoramaRendering& rendering,
                                      const FrameOptions& options, const SensorOptions& sensor,

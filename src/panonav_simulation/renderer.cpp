@@ -81,7 +81,7 @@ LitTriangles checked_triangles(const Scene& scene) {
   return subdivide(scene, light_spacing_m(scene));
 }
 
-// Where ray (i, j) of n x n stands in its pixel: a regular grid, sheared both ways so that all n^2
+// Position of ray (i, j) of n x n in its pixel: a regular grid, sheared both ways so that all n^2
 // rays differ in u and in v.
 struct SubPixel {
   double u, v;
@@ -185,7 +185,7 @@ Direction3 scene_from_robot(const Viewpoint& viewpoint, const Direction3& in_rob
 
 namespace {
 
-// The ray with a direction of unit length.
+// Returns the ray with a direction of unit length.
 Ray unit_ray(const Vector3& origin, const Direction3& direction) {
   if (!is_in_reach(origin)) {
     throw ContractError("origin", "not finite or too far", "coordinates of -1e9 .. 1e9 m");
@@ -208,12 +208,6 @@ float Renderer::radiance_along(const Vector3& origin, const Direction3& directio
   implementation_->shade(ray, implementation_->tracer.first_hit(ray),
                          static_cast<float>(spread_rad), colour.data());
   return std::clamp(grey_of(colour.data(), implementation_->channels), 0.0F, 1.0F);
-}
-
-float Renderer::radiance(const Viewpoint& viewpoint, const Direction3& direction,
-                         double spread_rad) const {
-  return radiance_along({viewpoint.pose.x_m, viewpoint.pose.y_m, viewpoint.height_m},
-                        scene_from_robot(viewpoint, direction), spread_rad);
 }
 
 double Renderer::distance_along(const Vector3& origin, const Direction3& direction) const {
@@ -283,10 +277,10 @@ Panorama Renderer::render_panorama(const Viewpoint& viewpoint, const PanoramaRen
 
 namespace {
 
-// Through the lenses, or by way of the mirror: what a point of a picture shows.
+// Rays of the points of an image, through the lenses or the mirror.
 class CameraRays {
  public:
-  // What is seen there: along a ray, or the camera's own body; neither where nothing is.
+  // Target of a pixel: a ray, or the camera's own body; neither outside the image circle.
   struct Sight {
     std::optional<Ray> ray;
     std::optional<float> body;
@@ -319,7 +313,7 @@ class CameraRays {
     return {make_ray_(viewpoints_[lens_at(camera_, point)], *direction), {}};
   }
 
-  // How bright a column is drawn.
+  // Returns the gain of a column.
   [[nodiscard]] float gain(std::size_t column) const {
     if (!dual_) return 1.0F;
     return static_cast<float>(

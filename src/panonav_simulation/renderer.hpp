@@ -13,7 +13,7 @@
 
 namespace panonav::simulation {
 
-/// Where the camera is in the scene. Its axis is vertical unless the robot is tilted.
+/// Pose of the camera in the scene. Its axis is vertical unless the robot is tilted.
 struct Viewpoint {
   Pose2 pose;              ///< of the robot on the floor, in the scene's x and y
   double height_m = 0.6;   ///< of the single viewpoint above the floor
@@ -21,7 +21,7 @@ struct Viewpoint {
   double pitch_rad = 0.0;  ///< about its y axis; positive lowers the front
 };
 
-/// How a scene is rendered.
+/// Options of rendering a scene.
 struct RendererOptions {
   /// Embree's instruction set, for example "sse4.2" for pictures that must be the same on every
   /// machine. Empty: the widest that the processor has.
@@ -32,7 +32,7 @@ struct RendererOptions {
   int channels = 1;
 };
 
-/// How a panoramic cylinder is rendered.
+/// Size and rays of a rendered panoramic cylinder.
 struct PanoramaRendering {
   int rows = 80;                                                      ///< values of a column, >= 1
   int columns = 512;                                                  ///< values of a row, >= 4
@@ -42,7 +42,7 @@ struct PanoramaRendering {
   int rays_per_axis = 2;
 };
 
-/// What reaches the pixels of a camera before exposure and noise: linear, 1 is white in light 1,
+/// Light at the pixels of a camera before exposure and noise: linear, 1 is white in light 1,
 /// not clamped. Rows from the top, channels interleaved (1 grey by the weights of ITU-R BT.601, 3
 /// RGB).
 struct Radiance {
@@ -58,41 +58,37 @@ struct Radiance {
 /// number of threads. All members may be called from several threads at once.
 class Renderer {
  public:
-  /// Keeps what it needs of the scene. Throws ContractError on a scene that is not valid and on a
-  /// number of channels that is neither 1 nor 3. `executor` helps to compute the light.
+  /// Copies the parts of the scene that it needs. Throws ContractError on a scene that is not valid
+  /// and on a number of channels that is neither 1 nor 3. `executor` helps to compute the light.
   Renderer(const Scene& scene, const RendererOptions& options, Executor& executor);
-  /// The same with the light computed in the calling thread alone.
+  /// Builds it with the light computed in the calling thread alone.
   explicit Renderer(const Scene& scene, const RendererOptions& options = {});
   ~Renderer();
-  /// What is left of the other may only be destroyed or assigned to.
+  /// A moved-from renderer may only be destroyed or assigned to.
   Renderer(Renderer&&) noexcept;
   Renderer& operator=(Renderer&&) noexcept;
 
-  /// The brightness in 0 .. 1 that a noiseless grey camera sees along `direction` (robot frame)
-  /// from `viewpoint`. `spread_rad` is the angle between neighbouring rays; it chooses how much
-  /// textures are smoothed.
-  [[nodiscard]] float radiance(const Viewpoint& viewpoint, const Direction3& direction,
-                               double spread_rad) const;
-
-  /// Brightness along a ray from any point of the scene, in scene coordinates.
+  /// Returns the brightness in 0 .. 1 that a noiseless grey camera sees along a ray from any point,
+  /// in scene coordinates. Textures are smoothed over `spread_rad`, the angle between neighbouring
+  /// rays.
   [[nodiscard]] float radiance_along(const Vector3& origin, const Direction3& direction,
                                      double spread_rad) const;
 
-  /// The panoramic cylinder, rendered directly: no mirror, no sensor. Throws ContractError unless
+  /// Renders the panoramic cylinder directly: no mirror, no sensor. Throws ContractError unless
   /// rows >= 1, columns >= 4, rays_per_axis 1 .. 8.
   [[nodiscard]] Panorama render_panorama(const Viewpoint& viewpoint,
                                          const PanoramaRendering& rendering,
                                          Executor& executor) const;
 
-  /// What the camera sees. A hyperboloidal mirror is traced as the thing it is, with the camera's
-  /// body in the middle and dark housing beyond the rim (see HyperboloidalMirror); every other
-  /// camera by `unproject`, 0 where it sees nothing; the lenses of a dual fisheye camera from their
-  /// own viewpoints, times their gain. Throws ContractError unless the camera is
-  /// valid and rays_per_axis is 1 .. 8.
+  /// Renders the image of a camera. A hyperboloidal mirror is traced as a physical mirror, with the
+  /// camera's body in the middle and dark housing beyond the rim (see HyperboloidalMirror); every
+  /// other camera by `unproject`, 0 where it sees nothing; the lenses of a dual fisheye camera from
+  /// their own viewpoints, times their gain. Throws ContractError unless the camera is valid and
+  /// rays_per_axis is 1 .. 8.
   [[nodiscard]] Radiance render_image(const Viewpoint& viewpoint, const Camera& camera,
                                       int rays_per_axis, Executor& executor) const;
 
-  /// Metres to the nearest surface along the ray; infinity where there is none.
+  /// Returns the metres to the nearest surface along the ray; infinity where there is none.
   [[nodiscard]] double distance_along(const Vector3& origin, const Direction3& direction) const;
 
  private:
@@ -100,10 +96,10 @@ class Renderer {
   std::unique_ptr<Implementation> implementation_;
 };
 
-/// As 8-bit pixels: 1 becomes 255, rounded and clamped, without noise.
+/// Converts to 8-bit pixels: 1 becomes 255, rounded and clamped, without noise.
 [[nodiscard]] Image to_image(const Radiance& radiance);
 
-/// The direction `in_robot` in scene coordinates, for a robot with this heading and tilt.
+/// Returns the direction `in_robot` in scene coordinates, for a robot with this heading and tilt.
 [[nodiscard]] Direction3 scene_from_robot(const Viewpoint& viewpoint, const Direction3& in_robot);
 
 }  // namespace panonav::simulation

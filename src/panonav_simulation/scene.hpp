@@ -20,16 +20,16 @@ struct Vector3 {
   friend bool operator==(const Vector3&, const Vector3&) = default;
 };
 
-/// How far from the origin anything in a scene may be, the camera too. Far more than that leaves
-/// what the ray tracer can count with.
+/// Largest distance from the origin of anything in a scene, the camera too: beyond it the ray
+/// tracer loses its precision.
 inline constexpr double scene_reach_m = 1e9;
 
-/// Whether all coordinates are numbers within `scene_reach_m`.
+/// True if all coordinates are numbers within `scene_reach_m`.
 [[nodiscard]] bool is_in_reach(const Vector3& point) noexcept;
 
-/// How a surface looks: a colour times, where there is one, a texture that repeats every texture
-/// coordinate of 1. Texture coordinate (0, 0) is the lower left corner of the picture, u runs to
-/// the right and v upwards. Linear 0 .. 1; matt, seen from both sides.
+/// Appearance of a surface: a colour times, where there is one, a texture that repeats every
+/// texture coordinate of 1. Texture coordinate (0, 0) is the lower left corner of the picture, u
+/// runs to the right and v upwards. Linear 0 .. 1; matt, seen from both sides.
 struct Material {
   std::array<float, 3> colour{0.7F, 0.7F, 0.7F};  ///< red, green, blue, linear
   std::shared_ptr<const Image> texture;           ///< null: plain colour
@@ -93,7 +93,7 @@ struct Scene {
 void validate(const Scene& scene);
 using panonav::validate;  // for options
 
-/// All light times `factor`: lamps, far and ambient light, what shines by itself and the
+/// Scales all light by `factor`: lamps, far and ambient light, what shines by itself and the
 /// background. Every pixel's radiance is then `factor` times what it was. `factor` > 0.
 void scale_light(Scene& scene, double factor);
 

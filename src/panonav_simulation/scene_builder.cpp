@@ -10,7 +10,7 @@ namespace panonav::simulation {
 
 namespace {
 
-// How far a disc at `centre` stays away from an area; negative inside.
+// Returns the distance of a point from an area; 0 inside.
 double gap_to(const FloorArea& area, Point2 centre) {
   const double dx = std::max({area.low.x_m - centre.x_m, 0.0, centre.x_m - area.high.x_m});
   const double dy = std::max({area.low.y_m - centre.y_m, 0.0, centre.y_m - area.high.y_m});
@@ -186,23 +186,23 @@ void SceneBuilder::ceiling(int material, Point2 low, Point2 high, double height_
                 (high.x_m - low.x_m) / tile_m, (high.y_m - low.y_m) / tile_m);
 }
 
-Footing SceneBuilder::movable(const Footing& wanted, double radius_m, const FloorArea& room) {
+Footing SceneBuilder::movable(const Footing& planned, double radius_m, const FloorArea& room) {
   // Numbers are drawn for every object, so that one object's luck does not change the next one's.
   const bool moves = moved_.uniform() < variation_.moved_objects;
-  Footing found = wanted;
+  Footing found = planned;
   bool placed = false;
   for (int attempt = 0; attempt < 40; ++attempt) {
     const double angle = moved_.uniform(-std::numbers::pi, std::numbers::pi);
     const double step = moved_.uniform(1.5, 4.0) * scene_.robot_radius_m;
     const double turn = moved_.uniform(-0.6, 0.6);
     if (!moves || placed) continue;
-    const Point2 centre{wanted.centre.x_m + step * std::cos(angle),
-                        wanted.centre.y_m + step * std::sin(angle)};
+    const Point2 centre{planned.centre.x_m + step * std::cos(angle),
+                        planned.centre.y_m + step * std::sin(angle)};
     bool is_free = inside(room, centre, 0.5 * radius_m);
     for (const auto& area : scene_.drivable) is_free = is_free && gap_to(area, centre) >= radius_m;
     is_free = is_free && leaves_tour_free(centre, radius_m);
     if (is_free) {
-      found = {centre, wanted.turn_rad + turn};
+      found = {centre, planned.turn_rad + turn};
       placed = true;
     }
   }

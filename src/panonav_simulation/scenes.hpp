@@ -9,7 +9,7 @@
 
 namespace panonav::simulation {
 
-/// What may differ between two scenes of the same name. The same variation gives the same scene.
+/// Differences between two scenes of the same name. The same variation gives the same scene.
 struct SceneVariation {
   std::uint64_t seed = 1;        ///< textures, furniture and its places
   double moved_objects = 0.0;    ///< share of the movable objects that stand elsewhere, 0 .. 1
@@ -18,7 +18,7 @@ struct SceneVariation {
   friend bool operator==(const SceneVariation&, const SceneVariation&) = default;
 };
 
-/// Names of the built-in scenes:
+/// Returns the names of the built-in scenes:
 /// - office: 5 x 2 m of free floor amid desks and shelves, as in [M04] and [M03]
 /// - hall: 7 x 7 m of free floor in a hall with things along its walls
 /// - hall_periodic: the same with pillars and pictures that repeat every 2 m, so that far places
@@ -30,7 +30,7 @@ struct SceneVariation {
 /// - garden: outdoors, with hedges, trees, a house and a sky
 [[nodiscard]] std::span<const std::string_view> scene_names();
 
-/// Made in code, without any file. Throws ContractError for an unknown name (the message lists the
+/// Makes a built-in scene. Throws ContractError for an unknown name (the message lists the
 /// known ones) or a variation out of range.
 [[nodiscard]] Scene make_scene(std::string_view name, const SceneVariation& variation = {});
 

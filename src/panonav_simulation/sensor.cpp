@@ -20,7 +20,7 @@ constexpr double full_turn_rad = 2.0 * std::numbers::pi;
 // Streams of the seed, so that occluders stay where they are when the noise changes its length.
 enum Stream : std::uint64_t { noise_stream = 31, occluder_stream = 32 };
 
-// What stands around the robot and hides a sector of azimuths from top to bottom.
+// Occluders around the robot, each of which hides a sector of azimuths from top to bottom.
 class Occluders {
  public:
   Occluders(const SensorOptions& options, std::uint64_t seed) {
@@ -62,7 +62,7 @@ class Occluders {
   std::vector<Occluder> occluders_;
 };
 
-// From light to a digital value in 0 .. 1.
+// Converts light to a digital value in 0 .. 1.
 class Pixel {
  public:
   Pixel(const SensorOptions& options, std::uint64_t seed)

@@ -10,7 +10,7 @@
 
 namespace panonav::simulation {
 
-/// What a camera and passers-by do to the light of a rendered view. The defaults are those of a
+/// Faults of a camera and occluders in front of it. The defaults are those of a
 /// small 8-bit camera in a lit room. Light 1 at exposure 1 fills a pixel.
 struct SensorOptions {
   double exposure = 1.0;      ///< light collected, times that of a full exposure
@@ -30,13 +30,13 @@ struct SensorOptions {
 };
 void visit_options(SensorOptions& options, OptionVisitor& visitor);
 
-/// The panorama that a camera with this sensor gives, for a rendered one. The same options and seed
+/// Returns the panorama of a camera with this sensor, for a rendered one. The same options and seed
 /// give the same noise and occluders. `vignetting` has no meaning without a mirror and is left out.
 /// Throws OptionError.
 [[nodiscard]] Panorama apply_sensor(Panorama view, const SensorOptions& options,
                                     std::uint64_t seed);
 
-/// The image that a camera with this sensor gives, for one rendered through `camera`. Throws
+/// Returns the image of a camera with this sensor, for one rendered through `camera`. Throws
 /// OptionError, and ContractError when the sizes differ.
 [[nodiscard]] Image apply_sensor(const Radiance& view, const Camera& camera,
                                  const SensorOptions& options, std::uint64_t seed);

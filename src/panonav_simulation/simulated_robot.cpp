@@ -63,13 +63,13 @@ bool has_room_between(const FreeSpace& space, double robot_radius_m, Point2 from
   return true;
 }
 
-std::optional<OpenDirection> find_open_direction(double wanted_rad, int feelers_each_side, int side,
+std::optional<OpenDirection> find_open_direction(double direct_rad, int feelers_each_side, int side,
                                                  const std::function<bool(double)>& is_open) {
   constexpr double apart_rad = std::numbers::pi / 12.0;
   for (int i = 1; i <= feelers_each_side; ++i) {
     for (const int tried : {1, -1}) {
       if (side != 0 && tried != side) continue;
-      const double direction_rad = wanted_rad + tried * i * apart_rad;
+      const double direction_rad = direct_rad + tried * i * apart_rad;
       if (is_open(direction_rad)) return OpenDirection{direction_rad, tried};
     }
   }
@@ -89,14 +89,14 @@ bool SimulatedRobot::is_open(double direction_rad, double distance_m) const {
   return space_->is_free_between(pose_.position(), ahead(pose_, direction_rad, distance_m));
 }
 
-std::optional<double> SimulatedRobot::free_direction(double wanted_rad, double advance_m) {
-  if (is_open(wanted_rad, advance_m)) {
+std::optional<double> SimulatedRobot::free_direction(double direct_rad, double advance_m) {
+  if (is_open(direct_rad, advance_m)) {
     side_ = 0;
-    return wanted_rad;
+    return direct_rad;
   }
   if (obstacles_ == ObstacleRule::stop) return std::nullopt;
   const auto feel = [&] {
-    return find_open_direction(wanted_rad, feelers_each_side, side_, [&](double direction_rad) {
+    return find_open_direction(direct_rad, feelers_each_side, side_, [&](double direction_rad) {
       return is_open(direction_rad, 0.5 * advance_m);
     });
   };

@@ -12,26 +12,26 @@
 
 namespace panonav::simulation {
 
-/// Whether a robot touches nothing on the straight way, looked at every `spacing_m` beyond `from`.
-/// Scenes name areas to drive in, too, whose borders are nothing to touch.
+/// True if a robot touches nothing on the straight line, checked every `spacing_m` beyond `from`.
+/// Borders of drivable areas are no obstacles.
 [[nodiscard]] bool has_room_between(const FreeSpace& space, double robot_radius_m, Point2 from,
                                     Point2 to, double spacing_m);
 
-/// Distance from a place to the nearest one of the polyline through the poses; infinity for none.
+/// Returns the distance from a place to the polyline through the poses; infinity for none.
 [[nodiscard]] double distance_from_route_m(Point2 place, std::span<const Pose2> route);
 
-/// A direction beside the wanted one, on the left (1) or the right (-1) of it.
+/// A direction on the left (1) or the right (-1) of the intended one.
 struct OpenDirection {
   double direction_rad = 0.0;
   int side = 0;
 };
-/// With feelers left and right of the wanted direction, 15 degrees apart: the nearest direction
-/// that is open; on one side only, unless `side` is 0. Empty: none is.
+/// Finds the nearest open direction left and right of `direct_rad`, 15 degrees apart; on one side
+/// only, unless `side` is 0. Nullopt if none is open.
 [[nodiscard]] std::optional<OpenDirection> find_open_direction(
-    double wanted_rad, int feelers_each_side, int side,
+    double direct_rad, int feelers_each_side, int side,
     const std::function<bool(double direction_rad)>& is_open);
 
-/// What a robot does whose way is not free.
+/// Behaviour of a robot in front of an obstacle.
 enum class ObstacleRule {
   stop,  ///< it stops there, and the run ends
   /// It goes past: with feelers as long as the step, it tries directions left and right of the one
@@ -41,7 +41,7 @@ enum class ObstacleRule {
   pass,
 };
 
-/// A robot base in a simulated place: does what it is told as well as it can. Holds the true pose
+/// A robot base in a simulated place: executes commands with errors. Holds the true pose
 /// and the random stream of its errors.
 class SimulatedRobot {
  public:
@@ -52,11 +52,11 @@ class SimulatedRobot {
 
   [[nodiscard]] const Pose2& pose() const noexcept { return pose_; }
 
-  /// The direction in which the robot goes when it wants to go `advance_m` along `wanted_rad`, both
-  /// in its own frame; empty when an obstacle stops it. Remembers on which side it goes past.
-  [[nodiscard]] std::optional<double> free_direction(double wanted_rad, double advance_m);
+  /// Finds the direction of a step of `advance_m` towards `direct_rad` past obstacles, in the robot
+  /// frame; nullopt if it is stopped. Remembers the side on which it passes.
+  [[nodiscard]] std::optional<double> free_direction(double direct_rad, double advance_m);
 
-  /// Goes as far as nothing stands in the way. Returns whether that was all of it.
+  /// Moves as far as nothing stands in the way. Returns true if that was the whole step.
   bool go(double direction_rad, double advance_m);
 
  private:

@@ -27,18 +27,17 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What stands in a scene of a file is as the file says: options that vary built-in scenes would be
-/// ignored.
-void refuse_variations_of_file(const std::string& file, const GivenOption& given) {
+/// Refuses options that vary built-in scenes for a scene of a file, where they would be ignored.
+void refuse_variations_of_file(const std::string& file, const FindSetOption& find_set_option) {
   for (const char* name : {"scene_seed", "moved_objects", "moved_seed"}) {
-    if (const auto called = given("simulation", name)) {
-      throw OptionError(*called + " varies built-in scenes only; '" + file +
+    if (const auto name_of_user = find_set_option("simulation", name)) {
+      throw OptionError(*name_of_user + " varies built-in scenes only; '" + file +
                         "' is a file, leave it out");
     }
   }
 }
 
-/// What a world or a mesh may cost to read, in a process of its own.
+/// Limits of the process that reads a world or a mesh.
 constexpr unsigned scene_seconds = 60;
 constexpr rlim_t scene_bytes = rlim_t{4} << 30U;
 
@@ -106,7 +105,8 @@ Scene read_safely(const std::string& file, const ReadScene& read) {
   throw FileError(file, "is damaged: the reader of its format crashes on it");
 }
 
-Scene load_scene(const std::string& name, const SceneOptions& options, const GivenOption& given) {
+Scene load_scene(const std::string& name, const SceneOptions& options,
+                 const FindSetOption& find_set_option) {
   const auto names = scene_names();
   if (std::find(names.begin(), names.end(), name) != names.end()) {
     return make_scene(name, {.seed = static_cast<std::uint64_t>(options.scene_seed),
@@ -120,7 +120,7 @@ Scene load_scene(const std::string& name, const SceneOptions& options, const Giv
     for (const auto known : names) all += (all.empty() ? "" : ", ") + std::string(known);
     throw OptionError("'" + name + "' is neither a file nor a built-in scene; allowed: " + all);
   }
-  refuse_variations_of_file(name, given);
+  refuse_variations_of_file(name, find_set_option);
   Scene scene;
   const std::string ending = to_lower_case(fs::path(name).extension().string());
   if (ending == ".world" || ending == ".sdf") {
@@ -147,7 +147,7 @@ std::string image_file_name(std::size_t index) {
   return "view_" + std::string(width - std::min(width, digits.size()), '0') + digits + ".png";
 }
 
-/// Takes a data set away that could not be finished.
+/// Removes an unfinished data set.
 void remove_dataset(const Dataset& dataset, bool with_folder) {
   std::error_code ignored;
   for (const auto& entry : dataset.entries) fs::remove(entry.path, ignored);
@@ -202,38 +202,42 @@ RecordingHeading default_heading(RecordingPath path) noexcept {
   return RecordingHeading::fixed;
 }
 
-SimulatedWorld::SimulatedWorld(const std::string& scene, SimulatedWorldOptions wanted,
-                               const GivenOption& given, Executor& executor)
-    : wanted_(std::move(wanted)), scene_(load_scene(scene, wanted_.simulation.scene, given)) {
-  const auto& simulation = wanted_.simulation;
+SimulatedWorld::SimulatedWorld(const std::string& scene, SimulatedWorldOptions options,
+                               const FindSetOption& find_set_option, Executor& executor)
+    : options_(std::move(options)),
+      scene_(load_scene(scene, options_.simulation.scene, find_set_option)) {
+  const auto& simulation = options_.simulation;
   if (simulation.elevation_low_deg >= simulation.elevation_high_deg) {
     throw OptionError("elevation_low_deg is " + to_text(simulation.elevation_low_deg) +
                       "; allowed: below elevation_high_deg, which is " +
                       to_text(simulation.elevation_high_deg));
   }
-  if (!given("frame", "camera_height_m")) wanted_.frame.camera_height_m = scene_.camera_height_m;
-  // What is not said of the robot is as with the robot that the scene is made for.
-  const FreeSpaceOptions usual =
-      free_space_options(scene_.robot_radius_m, wanted_.frame.camera_height_m);
-  FreeSpaceOptions& robot = wanted_.free_space;
-  if (!given("free_space", "robot_radius_m")) robot.robot_radius_m = usual.robot_radius_m;
-  if (!given("free_space", "robot_height_m")) robot.robot_height_m = usual.robot_height_m;
-  if (!given("free_space", "step_height_m")) robot.step_height_m = usual.step_height_m;
-  if (!given("free_space", "cell_m")) robot.cell_m = usual.cell_m;
-  free_space_ = std::make_shared<const FreeSpace>(scene_, wanted_.free_space);
+  if (!find_set_option("frame", "camera_height_m"))
+    options_.frame.camera_height_m = scene_.camera_height_m;
+  // Options that the user did not set describe the robot that the scene is made for.
+  const FreeSpaceOptions defaults =
+      free_space_options(scene_.robot_radius_m, options_.frame.camera_height_m);
+  FreeSpaceOptions& robot = options_.free_space;
+  if (!find_set_option("free_space", "robot_radius_m"))
+    robot.robot_radius_m = defaults.robot_radius_m;
+  if (!find_set_option("free_space", "robot_height_m"))
+    robot.robot_height_m = defaults.robot_height_m;
+  if (!find_set_option("free_space", "step_height_m")) robot.step_height_m = defaults.step_height_m;
+  if (!find_set_option("free_space", "cell_m")) robot.cell_m = defaults.cell_m;
+  free_space_ = std::make_shared<const FreeSpace>(scene_, options_.free_space);
   renderer_ = std::make_shared<const Renderer>(scene_, RendererOptions{}, executor);
 }
 
 SimulatedWorld SimulatedWorld::with(const RecordingOptions& recording, int seed) const {
   SimulatedWorld world = *this;
-  world.wanted_.recording = recording;
-  world.wanted_.simulation.scene.seed = seed;
+  world.options_.recording = recording;
+  world.options_.simulation.scene.seed = seed;
   return world;
 }
 
 RecordingCamera SimulatedWorld::camera() const {
-  const auto& simulation = wanted_.simulation;
-  if (simulation.kind == 0) return wanted_.mirror.value_or(simulated_mirror_camera());
+  const auto& simulation = options_.simulation;
+  if (simulation.kind == 0) return options_.mirror.value_or(simulated_mirror_camera());
   if (simulation.kind == 2) {
     return simulated_dual_fisheye(static_cast<std::uint64_t>(simulation.lens_seed),
                                   simulation.lens_distance_m);
@@ -242,7 +246,7 @@ RecordingCamera SimulatedWorld::camera() const {
       .rows = simulation.rows,
       .columns = simulation.columns,
       .elevations = {radians(simulation.elevation_low_deg), radians(simulation.elevation_high_deg)},
-      .rays_per_axis = wanted_.frame.rays_per_axis};
+      .rays_per_axis = options_.frame.rays_per_axis};
 }
 
 PictureSource SimulatedWorld::source() const {
@@ -258,8 +262,8 @@ PictureSource SimulatedWorld::source() const {
 }
 
 std::vector<RecordedPose> SimulatedWorld::plan(std::span<const Point2> way_points) const {
-  return plan_recording(scene_, *free_space_, wanted_.recording, wanted_.odometry,
-                        static_cast<std::uint64_t>(wanted_.simulation.scene.seed), way_points);
+  return plan_recording(scene_, *free_space_, options_.recording, options_.odometry,
+                        static_cast<std::uint64_t>(options_.simulation.scene.seed), way_points);
 }
 
 std::vector<RecordedPose> SimulatedWorld::plan_along(
@@ -267,7 +271,7 @@ std::vector<RecordedPose> SimulatedWorld::plan_along(
   std::vector<Pose2> poses;
   for (const StampedPose& stamped : trajectory) poses.push_back(stamped.pose);
   const auto odometry = simulate_odometry(
-      poses, wanted_.odometry, static_cast<std::uint64_t>(wanted_.simulation.scene.seed));
+      poses, options_.odometry, static_cast<std::uint64_t>(options_.simulation.scene.seed));
   std::vector<RecordedPose> recorded;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     recorded.push_back({trajectory[i].stamp_s, poses[i], odometry[i]});
@@ -277,22 +281,22 @@ std::vector<RecordedPose> SimulatedWorld::plan_along(
 
 Image SimulatedWorld::take_picture(const Pose2& pose, std::uint64_t seed,
                                    Executor& executor) const {
-  return simulation::take_picture(*renderer_, pose, camera(), wanted_.frame, wanted_.sensor, seed,
+  return simulation::take_picture(*renderer_, pose, camera(), options_.frame, options_.sensor, seed,
                                   executor);
 }
 
 Dataset record_dataset(const SimulatedWorld& world, const fs::path& folder,
                        std::span<const RecordedPose> poses, bool with_path, Executor& executor,
-                       const std::function<void(const DatasetEntry&, const Image&)>& taken) {
+                       const std::function<void(const DatasetEntry&, const Image&)>& on_image) {
   std::error_code error;
   const bool made_folder = fs::create_directories(folder, error);
   if (error) throw FileError(folder.string(), "cannot be made: " + error.message());
 
   Dataset dataset{folder, world.source(), {}};
-  const auto& wanted = world.options();
+  const auto& options = world.options();
   try {
-    record(world.renderer(), poses, world.camera(), wanted.frame, wanted.sensor,
-           static_cast<std::uint64_t>(wanted.simulation.scene.seed), executor,
+    record(world.renderer(), poses, world.camera(), options.frame, options.sensor,
+           static_cast<std::uint64_t>(options.simulation.scene.seed), executor,
            [&](const RecordedFrame& frame) {
              const RecordedPose& recorded = frame.pose;
              DatasetEntry entry;
@@ -304,10 +308,10 @@ Dataset record_dataset(const SimulatedWorld& world, const fs::path& folder,
                entry.stamp_s = recorded.stamp_s;
                entry.odometry = recorded.odometry;
              }
-             if (wanted.frame.tilt_rad > 0.0) entry.tilt = frame.tilt;
+             if (options.frame.tilt_rad > 0.0) entry.tilt = frame.tilt;
              write_png(entry.path, frame.picture.view());
              dataset.entries.push_back(std::move(entry));
-             if (taken) taken(dataset.entries.back(), frame.picture);
+             if (on_image) on_image(dataset.entries.back(), frame.picture);
            });
     write_dataset(dataset);
   } catch (...) {

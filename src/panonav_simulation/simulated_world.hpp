@@ -19,7 +19,7 @@
 
 namespace panonav::simulation {
 
-/// How the scene differs from the plain one, and what is drawn at random.
+/// Variation of the scene and seeds of random draws.
 struct SceneOptions {
   int seed = 1;                ///< poses, noise, tilt, odometry
   int scene_seed = 1;          ///< textures and furniture of built-in scenes
@@ -53,12 +53,12 @@ struct SimulatedWorldOptions {
   std::optional<Camera> mirror;  ///< of mirror pictures; empty: `simulated_mirror_camera`
 };
 
-/// What the user calls an option that he chose himself; empty: he did not. `section`: "simulation",
-/// "frame" or "free_space".
-using GivenOption =
+/// Returns the name under which the user set an option; nullopt if he did not. `section`:
+/// "simulation", "frame" or "free_space".
+using FindSetOption =
     std::function<std::optional<std::string>(const std::string& section, const std::string& name)>;
 
-/// The heading that a path has unless somebody asks for another.
+/// Returns the default heading of a path.
 [[nodiscard]] RecordingHeading default_heading(RecordingPath path) noexcept;
 
 /// A scene with a robot in it.
@@ -68,48 +68,48 @@ class SimulatedWorld {
   /// of its own first. Throws OptionError on a name that is neither, and when the user chose what
   /// only varies built-in scenes (scene_seed, moved_objects, moved_seed) for a file; FileError;
   /// else as `FreeSpace` and `Renderer`.
-  SimulatedWorld(const std::string& scene, SimulatedWorldOptions wanted, const GivenOption& given,
-                 Executor& executor);
+  SimulatedWorld(const std::string& scene, SimulatedWorldOptions options,
+                 const FindSetOption& find_set_option, Executor& executor);
 
-  /// The same world for another recording: its poses, noise and odometry.
+  /// Returns the same world for another recording: its poses, noise and odometry.
   [[nodiscard]] SimulatedWorld with(const RecordingOptions& recording, int seed) const;
 
-  /// With its light and its moved objects.
+  /// Returns the scene with its light and its moved objects.
   [[nodiscard]] const Scene& scene() const noexcept { return scene_; }
-  /// Where the robot can stand and drive.
+  /// Returns the free space of the robot.
   [[nodiscard]] const FreeSpace& free_space() const noexcept { return *free_space_; }
-  /// Takes the pictures.
+  /// Returns the renderer of the images.
   [[nodiscard]] const Renderer& renderer() const noexcept { return *renderer_; }
-  /// The same for those who outlive the world.
+  /// Returns the shared free space.
   [[nodiscard]] std::shared_ptr<const FreeSpace> shared_free_space() const { return free_space_; }
-  /// As `shared_free_space`.
+  /// Returns the shared renderer.
   [[nodiscard]] std::shared_ptr<const Renderer> shared_renderer() const { return renderer_; }
-  /// With what is the scene's own filled in.
-  [[nodiscard]] const SimulatedWorldOptions& options() const noexcept { return wanted_; }
-  /// What its pictures are taken with: a panorama or a camera, as the options say.
+  /// Returns the options, completed by those of the scene.
+  [[nodiscard]] const SimulatedWorldOptions& options() const noexcept { return options_; }
+  /// Returns the camera of its images: a panorama or a camera, by the options.
   [[nodiscard]] RecordingCamera camera() const;
-  /// How the robot's pictures lie.
+  /// Returns the format of the robot's images.
   [[nodiscard]] PictureSource source() const;
 
-  /// The places of its recording, by its seed. Throws as `plan_recording`.
+  /// Plans the poses of its recording, by its seed. Throws as `plan_recording`.
   [[nodiscard]] std::vector<RecordedPose> plan(std::span<const Point2> way_points = {}) const;
-  /// The same along a trajectory, free or not. Throws OptionError.
+  /// Plans poses along a trajectory, free or not. Throws OptionError.
   [[nodiscard]] std::vector<RecordedPose> plan_along(std::span<const StampedPose> trajectory) const;
-  /// What the robot sees there; each picture gets a seed of its own. Throws as the renderer.
+  /// Takes the image at a pose; each image needs its own seed. Throws as the renderer.
   [[nodiscard]] Image take_picture(const Pose2& pose, std::uint64_t seed, Executor& executor) const;
 
  private:
-  SimulatedWorldOptions wanted_;
+  SimulatedWorldOptions options_;
   Scene scene_;
   std::shared_ptr<const FreeSpace> free_space_;
   std::shared_ptr<const Renderer> renderer_;
 };
 
 /// Writes a data set: pictures first, dataset.toml last. `with_path`: the poses are a path, so
-/// stamps and odometry mean something. `taken` is called after each picture. Throws FileError; what
-/// was written is then removed again.
+/// stamps and odometry mean something. `on_image` is called after each picture. Throws FileError;
+/// what was written is then removed again.
 Dataset record_dataset(const SimulatedWorld& world, const std::filesystem::path& folder,
                        std::span<const RecordedPose> poses, bool with_path, Executor& executor,
-                       const std::function<void(const DatasetEntry&, const Image&)>& taken = {});
+                       const std::function<void(const DatasetEntry&, const Image&)>& on_image = {});
 
 }  // namespace panonav::simulation

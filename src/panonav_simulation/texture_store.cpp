@@ -103,9 +103,9 @@ std::shared_ptr<const Image> TextureStore::find(std::string_view written,
     }
     return nullptr;
   }
-  const std::string taken = found->filename().string();
+  const std::string file_name = found->filename().string();
   const std::string name = fs::path(path).filename().string();
-  if (taken != name && to_lower_case(taken) == to_lower_case(name) &&
+  if (file_name != name && to_lower_case(file_name) == to_lower_case(name) &&
       reported_missing_.emplace(path, true).second) {
     warnings_.push_back(directory.string() + ": texture \"" + path +
                         "\" was not found; taken instead, with letters of other case: " +

@@ -16,7 +16,7 @@ namespace panonav::simulation {
 /// io fits.
 using TextureReader = std::function<Image(const std::filesystem::path&)>;
 
-/// Where files of a scene look for their pictures and how large these may be.
+/// Reader and size limit of the pictures of a scene.
 struct TextureOptions {
   TextureReader read;      ///< empty: every surface gets its plain colour
   int max_side_px = 1024;  ///< larger pictures are halved until they fit; >= 1
@@ -29,16 +29,16 @@ class TextureStore {
   /// Throws ContractError.
   explicit TextureStore(TextureOptions options);
 
-  /// The picture that a mesh or material file calls `written` (any slashes, absolute paths of
+  /// Finds the picture that a mesh or material file calls `written` (any slashes, absolute paths of
   /// foreign machines, `file://`). Looked for as written beside `directory`, then by its base name
   /// in the usual texture folders around `directory`, then with another ending (.png, .jpg, .jpeg)
   /// for the same base name; upper and lower case alike. A name that is not as written is a
-  /// warning. Null when there is none.
+  /// warning. Null if there is none.
   [[nodiscard]] std::shared_ptr<const Image> find(std::string_view written,
                                                   const std::filesystem::path& directory);
 
-  /// One line for every picture that was missing, found in another case or could not be read,
-  /// in order of first use.
+  /// Returns one line for every picture that was missing, found in another case or could not be
+  /// read, in order of first use.
   [[nodiscard]] const std::vector<std::string>& warnings() const& noexcept { return warnings_; }
 
  private:

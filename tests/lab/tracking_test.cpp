@@ -116,9 +116,9 @@ TEST(Tracking, FindsTheRobotInAnOfficeTheSameOnAnyNumberOfThreads) {
     }
   }
   const SingleImages single = localise_single_images(*remembered, clean, two);
-  EXPECT_GT(single.asked, 50U);
+  EXPECT_GT(single.images, 50U);
   EXPECT_LE(single.right, single.near);
-  EXPECT_GT(2 * single.right, single.asked);
+  EXPECT_GT(2 * single.right, single.images);
   const auto setting = compass_setting(InjectionMethod::explained);
   const auto tracked = track_runs(*remembered, clean, setting, 5, two);
   const auto repeated = track_runs(*remembered, clean, setting, 5, one);

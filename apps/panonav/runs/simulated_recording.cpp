@@ -39,7 +39,7 @@ void require_effects(Arguments& arguments, const simulation::SimulatedWorldOptio
       "on pictures, whose values always have eight bits");
 }
 
-simulation::GivenOption typed_options(const Arguments& arguments) {
+simulation::FindSetOption typed_options(const Arguments& arguments) {
   return [&arguments](const std::string& section,
                       const std::string& name) -> std::optional<std::string> {
     if (!arguments.given(section, name)) return std::nullopt;

@@ -10,6 +10,6 @@ void declare_simulation(Arguments& arguments, simulation::SimulatedWorldOptions&
 void require_effects(Arguments& arguments, const simulation::SimulatedWorldOptions& wanted);
 
 /// The options that the user typed.
-[[nodiscard]] simulation::GivenOption typed_options(const Arguments& arguments);
+[[nodiscard]] simulation::FindSetOption typed_options(const Arguments& arguments);
 
 }  // namespace panonav::command

@@ -31,8 +31,8 @@ struct CorridorStyle {
   double height_m;
 };
 
-// A closed run of walls parallel to the axes, seen from the left, with a rail all along. A door
-// stands at every even coordinate where there is room for it.
+// Adds a closed run of walls parallel to the axes, seen from the left, with a rail all along. A
+// door stands at every even coordinate where there is room for it.
 void add_wall_with_doors(SceneBuilder& builder, const std::string& name, const CorridorStyle& look,
                          std::span<const Point2> corners) {
   for (std::size_t i = 0; i < corners.size(); ++i) {
@@ -53,7 +53,7 @@ void add_wall_with_doors(SceneBuilder& builder, const std::string& name, const C
   }
 }
 
-// The wall above an opening.
+// Adds the wall above an opening.
 void add_lintel(SceneBuilder& builder, const CorridorStyle& look, Point2 from, Point2 to) {
   builder.wall("lintel", look.plaster, from, to, look.height_m, 2.0, 2.3);
 }
@@ -64,7 +64,7 @@ constexpr FloorArea loop_outside{{-1.5, -1.5}, {7.5, 5.5}};
 constexpr FloorArea loop_block{{1.0, 1.0}, {5.0, 3.0}};
 constexpr double loop_height_m = 2.5;
 
-// The block's walls, each with pictures of its own.
+// Adds the block's walls, each with pictures of its own.
 void add_block(SceneBuilder& builder) {
   Random& random = builder.random();
   const auto inner = corners_of(loop_block);
@@ -90,7 +90,7 @@ void add_block(SceneBuilder& builder) {
   }
 }
 
-// Walls with a doorway of 1.2 m, which part rooms from corridors.
+// Adds walls with a doorway of 1.2 m, which part rooms from corridors.
 void add_doorways(SceneBuilder& builder) {
   Random& random = builder.random();
   const int plaster = builder.textured(noise_texture(random, 128, {0.7F, 0.69F, 0.64F}, 0.06));
@@ -120,7 +120,7 @@ void add_doorways(SceneBuilder& builder) {
   }
 }
 
-// A piece of furniture of any kind.
+// Adds a piece of furniture of a random kind.
 void add_any_furniture(SceneBuilder& builder, const std::string& name, const Footing& footing) {
   Random& random = builder.random();
   switch (random.index(4)) {
@@ -138,7 +138,7 @@ void add_any_furniture(SceneBuilder& builder, const std::string& name, const Foo
   }
 }
 
-// Furniture along the outer walls.
+// Adds furniture along the outer walls.
 void furnish_loop(SceneBuilder& builder) {
   Random& random = builder.random();
   const FloorArea inside{{loop_outside.low.x_m + 0.1, loop_outside.low.y_m + 0.1},
@@ -187,7 +187,7 @@ Scene make_loop(const SceneVariation& variation) {
 namespace {
 
 // A ring of corridors, 2 m wide, whose middle lines are 12 m and 8 m long. Two narrower ones cross
-// the block inside and go on outside to a door: eight junctions that look alike.
+// the block inside and continue outside to a door: eight junctions that look alike.
 constexpr double ring_height_m = 2.5;
 constexpr double ring_half_m = 1.0;
 constexpr double ring_long_m = 12.0;
@@ -196,7 +196,7 @@ constexpr std::array<double, 2> crossings_m{4.0, 8.0};
 constexpr double half_crossing_m = 0.65;
 constexpr double dead_end_m = 2.0;
 
-// The outer wall, counter-clockwise as its inside is seen, with the dead ends.
+// Adds the outer wall, counter-clockwise as its inside is seen, with the dead ends.
 void add_outer_wall(SceneBuilder& builder, const CorridorStyle& look) {
   std::vector<Point2> outline;
   for (const double side : {1.0, -1.0}) {
@@ -215,7 +215,7 @@ void add_outer_wall(SceneBuilder& builder, const CorridorStyle& look) {
   add_wall_with_doors(builder, "outer wall", look, outline);
 }
 
-// The blocks between the corridors, clockwise.
+// Adds the blocks between the corridors, clockwise.
 void add_inner_blocks(SceneBuilder& builder, const CorridorStyle& look) {
   const std::array<double, 6> edges{ring_half_m,
                                     crossings_m[0] - half_crossing_m,
@@ -235,7 +235,7 @@ void add_inner_blocks(SceneBuilder& builder, const CorridorStyle& look) {
   }
 }
 
-// The few distinct places: a window, a notice board and a plant, each on a side of its own.
+// Adds the few distinct places: a window, a notice board and a plant, each on a side of its own.
 void add_distinct_places(SceneBuilder& builder) {
   Random& random = builder.random();
   builder.on_wall("window", builder.textured(window_texture(random, 128), 0.8F),

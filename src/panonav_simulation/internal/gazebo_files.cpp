@@ -20,7 +20,7 @@ bool is_there(const fs::path& path) {
   return fs::exists(path, code);
 }
 
-// The path below `base`, with the case of letters that the folders have; the first in the order of
+// Returns the path below `base` with the case of letters of the folders; the first in the order of
 // names where several fit.
 std::optional<fs::path> path_in_any_case(const fs::path& base, const fs::path& path) {
   fs::path found = base;
@@ -41,7 +41,7 @@ std::optional<fs::path> path_in_any_case(const fs::path& base, const fs::path& p
   return is_there(found) ? std::optional(found) : std::nullopt;
 }
 
-// NAME/FILE of https://SERVER/1.0/OWNER/models/NAME[/VERSION/files/FILE]; empty for other
+// Returns NAME/FILE of https://SERVER/1.0/OWNER/models/NAME[/VERSION/files/FILE]; empty for other
 // addresses.
 std::string path_of_fuel_model(std::string_view uri) {
   constexpr std::string_view folder = "/models/";

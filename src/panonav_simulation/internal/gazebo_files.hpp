@@ -15,10 +15,10 @@ namespace panonav::simulation {
 /// files, and devices and pipes have no end.
 void require_scene_file(const std::filesystem::path& file);
 
-/// The bytes of a file. Throws FileError as require_scene_file does.
+/// Reads the bytes of a file. Throws FileError as require_scene_file does.
 [[nodiscard]] std::string text_of_scene_file(const std::filesystem::path& file);
 
-/// Whether two texts differ at most in the case of their ASCII letters.
+/// True if two texts differ at most in the case of their ASCII letters.
 [[nodiscard]] bool same_but_for_case(std::string_view a, std::string_view b);
 
 struct FoundFile {
@@ -31,22 +31,22 @@ class GazeboFiles {
  public:
   GazeboFiles(std::filesystem::path world, std::vector<std::filesystem::path> model_folders);
 
-  /// The file or folder that `uri` means: `model://` and `package://` in the model folders, the
-  /// models of a Fuel server (`https://.../models/NAME`) as `model://NAME`, `file://` and plain
+  /// Finds the file or folder that `uri` means: `model://` and `package://` in the model folders,
+  /// the models of a Fuel server (`https://.../models/NAME`) as `model://NAME`, `file://` and plain
   /// paths absolute, beside `directory`, beside the world or in the model folders. Where none has
-  /// the name as it is written, one whose letters differ in case. Empty when there is none.
+  /// the name as it is written, one whose letters differ in case. Nullopt if there is none.
   [[nodiscard]] std::optional<FoundFile> resolve(std::string_view uri,
                                                  const std::filesystem::path& directory) const;
 
-  /// The model folders, for messages.
+  /// Returns the model folders, for messages.
   [[nodiscard]] std::string places() const;
 
-  /// The root element <sdf> or <gazebo> of a file, read once; valid as long as *this. Throws
-  /// FileError.
+  /// Returns the root element <sdf> or <gazebo> of a file, read once; valid as long as *this.
+  /// Throws FileError.
   pugi::xml_node sdf(const std::filesystem::path& file);
 
-  /// The model description in a folder: of those that `model.config` lists the one of the highest
-  /// version, else `model.sdf`, else the first *.sdf. Throws FileError.
+  /// Finds the model description in a folder: of those that `model.config` lists the one of the
+  /// highest version, else `model.sdf`, else the first *.sdf. Throws FileError.
   [[nodiscard]] static std::filesystem::path description_in(const std::filesystem::path& folder);
 
  private:

@@ -41,8 +41,8 @@ Corner middle(const Corner& a, const Corner& b) {
           {0.5F * (a.uv[0] + b.uv[0]), 0.5F * (a.uv[1] + b.uv[1])}};
 }
 
-// How fine light is computed where: `spacing_m` on the floor, coarser in proportion to the distance
-// from it.
+// Spacing at which light is computed: `spacing_m` on the floor, coarser in proportion to the
+// distance from it.
 class Spacing {
  public:
   Spacing(const Scene& scene, double spacing_m)
@@ -88,10 +88,10 @@ void split(const Corners& corners, const Spacing& spacing, std::vector<Corners>&
   }
 }
 
-// How far an obstacle may be to darken a surface, in spacings.
+// Largest distance of an obstacle that darkens a surface, in spacings.
 constexpr double occlusion_spacings = 5.0;
 
-// Where light is computed: a point a little above one side of a surface.
+// A point a little above one side of a surface, where light is computed.
 struct LightPoint {
   Float3 position;
   Float3 normal;
@@ -115,8 +115,8 @@ struct PointKeyHash {
   }
 };
 
-// Points nearer to each other than a tenth of the spacing, on surfaces that look the same way,
-// share their light.
+// Returns the key of a point. Points nearer to each other than a tenth of the spacing, on surfaces
+// of the same direction, share their light.
 PointKey make_key(const Float3& position, const Float3& normal, float spacing_m) {
   PointKey key;
   for (int i = 0; i < 3; ++i) {
@@ -126,8 +126,8 @@ PointKey make_key(const Float3& position, const Float3& normal, float spacing_m)
   return key;
 }
 
-// Directions of a hemisphere about z, as dense as the cosine: each counts the same for ambient
-// light.
+// Returns directions of a hemisphere about z, as dense as the cosine: each counts the same for
+// ambient light.
 std::vector<Float3> hemisphere(int count) {
   std::vector<Float3> directions;
   for (int i = 0; i < count; ++i) {
@@ -186,7 +186,7 @@ class LightProbe {
     return cosine;
   }
 
-  // Lamps and skies do not throw shadows on what they light.
+  // True if nothing but lamps and skies, which throw no shadows, stands within the distance.
   [[nodiscard]] bool is_unblocked(Ray ray, float distance_m) const {
     for (int surfaces = 0; surfaces < 4; ++surfaces) {
       const RayHit hit = tracer_.first_hit(ray);

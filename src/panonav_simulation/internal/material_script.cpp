@@ -43,7 +43,7 @@ constexpr std::array<NamedColour, 21> gazebo_colours{{
     {"Gazebo/Wood", {0.55F, 0.38F, 0.21F}},
 }};
 
-// Words of a script; braces stand alone, comments are left out.
+// Splits a script into words; braces stand alone, comments are left out.
 std::vector<std::string> split_words(const fs::path& file) {
   require_scene_file(file);
   std::ifstream stream(file);

@@ -9,7 +9,7 @@
 
 namespace panonav::simulation {
 
-/// What an OGRE material script says of one material, as far as a Scene can show it.
+/// One material of an OGRE script, as far as a Scene can show it.
 struct ScriptMaterial {
   std::optional<std::array<float, 3>> diffuse;
   std::optional<std::array<float, 3>> emissive;
@@ -17,8 +17,8 @@ struct ScriptMaterial {
   std::filesystem::path texture_directory;  ///< where to look for it
 };
 
-/// The material `name` in the script files and folders (`*.material`) given; of Gazebo's own
-/// materials only the plain colours ("Gazebo/Red") are known without a file. Empty when it is not
+/// Finds the material `name` in script files and folders (`*.material`); of Gazebo's own
+/// materials only the plain colours ("Gazebo/Red") are known without a file. Nullopt if it is not
 /// found.
 [[nodiscard]] std::optional<ScriptMaterial> find_script_material(
     std::string_view name, const std::vector<std::filesystem::path>& places);

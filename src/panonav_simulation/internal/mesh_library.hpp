@@ -46,7 +46,7 @@ class MeshLibrary {
 void place_mesh(Scene& scene, const Mesh& mesh, const Affine3& world_from_mesh, std::string object,
                 int material);
 
-/// Lowest and highest corner of the meshes from number `first_mesh` on; empty when there is no
+/// Returns the lowest and highest corner of the meshes from `first_mesh` on; nullopt if there is no
 /// vertex.
 [[nodiscard]] std::optional<std::pair<Vector3, Vector3>> extent(const Scene& scene,
                                                                 std::size_t first_mesh = 0);

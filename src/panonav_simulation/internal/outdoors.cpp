@@ -142,16 +142,16 @@ void add_trees_and_boxes(SceneBuilder& builder, const FloorArea& plot) {
   constexpr double tree_clearance_m = 0.4;
   constexpr double crate_clearance_m = 0.7;
   for (int i = 0; i < 7; ++i) {
-    const Footing wanted{place(tree_clearance_m), 0.0};
+    const Footing planned{place(tree_clearance_m), 0.0};
     const double height_m = random.uniform(2.0, 4.5);
     const TreeKind kind = make_tree_kind(builder);
     add_tree(builder, "tree " + std::to_string(i), kind,
-             builder.movable(wanted, tree_clearance_m, plot).centre, height_m);
+             builder.movable(planned, tree_clearance_m, plot).centre, height_m);
   }
   for (int i = 0; i < 5; ++i) {
-    const Footing wanted{place(crate_clearance_m), random.uniform(-3.0, 3.0)};
+    const Footing planned{place(crate_clearance_m), random.uniform(-3.0, 3.0)};
     add_crate(builder, "flower box " + std::to_string(i),
-              builder.movable(wanted, crate_clearance_m, plot),
+              builder.movable(planned, crate_clearance_m, plot),
               {random.uniform(0.4, 1.2), random.uniform(0.3, 0.6), random.uniform(0.3, 0.8)});
   }
 }

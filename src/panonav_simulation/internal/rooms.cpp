@@ -20,8 +20,8 @@ constexpr double quarter_turn_rad = 0.5 * std::numbers::pi;
 constexpr double desk_kind = 0.15;
 constexpr double shelf_kind = 0.6;
 
-// A row of furniture along a straight line, in random order and spacing, facing `turn_rad`. It
-// begins with things of `first_kind`, if that is given.
+// Adds a row of furniture along a straight line, in random order and spacing, facing `turn_rad`. It
+// begins with things of `first_kind`, if it has a value.
 void furnish_row(SceneBuilder& builder, const FloorArea& room, const std::string& name, Point2 from,
                  Point2 to, double turn_rad, std::optional<double> first_kind) {
   Random& random = builder.random();
@@ -44,9 +44,9 @@ void furnish_row(SceneBuilder& builder, const FloorArea& room, const std::string
                                        : 0.7;
     const Point2 at{from.x_m + ux * (along + 0.5 * width), from.y_m + uy * (along + 0.5 * width)};
     const std::string piece = name + " " + std::to_string(number++);
-    const Footing wanted{at, turn_rad + random.normal(0.0, 0.05)};
+    const Footing planned{at, turn_rad + random.normal(0.0, 0.05)};
     // Nobody moves a wardrobe.
-    const Footing footing = is_wardrobe ? wanted : builder.movable(wanted, 0.5 * width, room);
+    const Footing footing = is_wardrobe ? planned : builder.movable(planned, 0.5 * width, room);
     if (is_desk) {
       add_desk(builder, piece, footing);
       const Point2 before{footing.centre.x_m + 0.45 * std::sin(footing.turn_rad),
@@ -68,13 +68,13 @@ void furnish_row(SceneBuilder& builder, const FloorArea& room, const std::string
   }
 }
 
-// How the rows of furniture along the long walls begin; empty: with anything.
+// First kind of furniture in the rows along the long walls; empty: any.
 struct RowBeginnings {
   std::optional<double> south{};
   std::optional<double> north{};
 };
 
-// Furniture along all four walls, `depth_m` from them.
+// Adds furniture along all four walls, `depth_m` from them.
 void furnish_walls(SceneBuilder& builder, const FloorArea& room, double depth_m,
                    const RowBeginnings& beginnings = {}) {
   const Point2 a{room.low.x_m + depth_m, room.low.y_m + depth_m};
@@ -87,7 +87,7 @@ void furnish_walls(SceneBuilder& builder, const FloorArea& room, double depth_m,
   furnish_row(builder, room, "west", d, a, quarter_turn_rad, std::nullopt);
 }
 
-// Some lamps shine and some hardly: from `weakest` to `strongest`.
+// Adds lamps of intensities from `weakest` to `strongest`.
 void add_lamps(SceneBuilder& builder, const FloorArea& room, double height_m, double spacing_m,
                double weakest = 0.1, double strongest = 1.0) {
   const double width = room.high.x_m - room.low.x_m;
@@ -106,13 +106,13 @@ void add_lamps(SceneBuilder& builder, const FloorArea& room, double height_m, do
   }
 }
 
-// What the walls of the periodic hall are made of.
+// Materials of the walls of the periodic hall.
 struct PeriodicLook {
   int plaster, poster, door, stone;
   double height_m;
 };
 
-// A wall that carries the same picture and pillar every 2 m; the first one has a door.
+// Adds a wall that carries the same picture and pillar every 2 m; the first one has a door.
 void add_periodic_wall(SceneBuilder& builder, const PeriodicLook& look, std::size_t number,
                        Point2 from, Point2 to) {
   const std::string wall = "wall " + std::to_string(number);

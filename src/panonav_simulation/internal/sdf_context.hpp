@@ -15,13 +15,13 @@
 
 namespace panonav::simulation {
 
-/// Where a part of a world comes from.
+/// Origin of a part of a world.
 struct SdfOrigin {
   std::filesystem::path directory;  ///< of its file
   std::string object;  ///< the model at the top that it belongs to; empty in the world itself
 };
 
-/// What the readers of one Gazebo world share: the scene that grows, its files and pictures, and
+/// State of the readers of one Gazebo world: the growing scene, its files and pictures, and
 /// the warnings, each once however often its cause occurs.
 class SdfContext {
  public:
@@ -35,11 +35,11 @@ class SdfContext {
   /// Adds a warning that concerns the model `object`; "": the world itself.
   void warn(const std::string& object, const std::string& what);
 
-  /// Lines of all warnings, in the order of their first occurrence.
+  /// Returns the lines of all warnings, in the order of their first occurrence.
   [[nodiscard]] std::vector<std::string> warning_lines() const;
 
-  /// The file that `uri` names, as GazeboFiles::resolve finds it; warns where only the case of
-  /// letters differs.
+  /// Finds the file that `uri` names, as GazeboFiles::resolve finds it; warns where only the case
+  /// of letters differs.
   std::optional<std::filesystem::path> find(std::string_view uri, const SdfOrigin& origin);
 
   /// Calls `add`; what cannot be shown is left out with a warning, the rest of the world is read.

@@ -14,7 +14,7 @@ namespace panonav::simulation {
 /// Red, green, blue, 0 .. 1.
 using Colour = std::array<float, 3>;
 
-/// What is wrong with one thing of a world, which is left out for it.
+/// Fault of one thing of a world, which is therefore left out.
 struct Unusable {
   std::string why;
 };

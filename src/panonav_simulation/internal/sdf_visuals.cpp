@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A frame whose z axis is the plane's normal.
+// Returns a frame whose z axis is the plane's normal.
 Affine3 frame_along(const Vector3& normal) {
   const double length = std::hypot(normal.x_m, normal.y_m, normal.z_m);
   if (!(length > 0.0)) return {};
@@ -26,7 +26,8 @@ Affine3 frame_along(const Vector3& normal) {
   return {{x.x_m, y.x_m, z.x_m, x.y_m, y.y_m, z.y_m, x.z_m, y.z_m, z.z_m}, {}};
 }
 
-// The mesh of a shape of SDF around its own origin; `nullopt` for an empty one. Throws Unusable.
+// Makes the mesh of a shape of SDF around its own origin; `nullopt` for an empty one. Throws
+// Unusable.
 std::optional<Mesh> make_shape(pugi::xml_node shape) {
   const std::string_view kind = shape.name();
   if (kind == "box") {
@@ -54,7 +55,7 @@ std::optional<Mesh> make_shape(pugi::xml_node shape) {
   throw Unusable{"panonav does not show a geometry of the kind " + in_quotes(kind)};
 }
 
-// Moves the middle of these parts to the origin.
+// Returns the map that moves the middle of these parts to the origin.
 Affine3 centre_parts(const std::vector<const FileMesh*>& parts) {
   Scene together;
   for (const FileMesh* part : parts) together.meshes.push_back(part->mesh);
@@ -137,7 +138,7 @@ int SdfVisuals::get_or_add_material(const FileMesh& part, pugi::xml_node visual,
   return index;
 }
 
-// The material of a mesh with what the visual's <material> says on top.
+// Returns the material of a mesh, changed by the visual's <material>.
 Material SdfVisuals::dress(Material material, pugi::xml_node visual, const SdfOrigin& origin) {
   const pugi::xml_node said = visual.child("material");
   if (!said) return material;

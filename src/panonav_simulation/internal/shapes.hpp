@@ -7,13 +7,13 @@ namespace panonav::simulation {
 /// Meshes of simple shapes around the origin, z up; the texture covers each face or the whole
 /// round surface once. `object` and `material` are not set. Sizes must be > 0.
 [[nodiscard]] Mesh box_mesh(const Vector3& size_m);
-/// Along z, with both ends closed.
+/// Makes a cylinder along z, with both ends closed.
 [[nodiscard]] Mesh cylinder_mesh(double radius_m, double length_m);
-/// With three radii along x, y and z.
+/// Makes an ellipsoid with three radii along x, y and z.
 [[nodiscard]] Mesh ellipsoid_mesh(const Vector3& radii_m);
-/// A cylinder along z with half spheres at its ends; `length_m` is that of the cylinder.
+/// Makes a cylinder along z with half spheres at its ends; `length_m` is that of the cylinder.
 [[nodiscard]] Mesh capsule_mesh(double radius_m, double length_m);
-/// A rectangle in the plane z = 0; the texture repeats every metre.
+/// Makes a rectangle in the plane z = 0; the texture repeats every metre.
 [[nodiscard]] Mesh rectangle_mesh(double size_x_m, double size_y_m);
 
 }  // namespace panonav::simulation
