@@ -81,7 +81,7 @@ ReproductionPlan plan_elsewhere(const Experiments& context) {
   require(!options.built_in.empty(), "built-in scenes", 0.0, ">= 1");
   const auto elsewhere = std::make_shared<ElsewhereExperiments>(context);
   ReproductionPlan plan;
-  for (const std::string& name : elsewhere->ground_names()) {
+  for (const std::string& name : elsewhere->list_ground_names()) {
     plan.push_back({10.0, [=] { elsewhere->record_ground(name); }});
   }
   plan.push_back({100.0, [=] { elsewhere->reproduce_known_places(); }});

@@ -13,7 +13,7 @@ namespace panonav::lab {
 
 namespace {
 
-std::vector<double> ranks(std::span<const double> values) {
+std::vector<double> compute_ranks(std::span<const double> values) {
   std::vector<std::size_t> order(values.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(),
@@ -72,8 +72,8 @@ std::pair<double, double> mean_interval(std::span<const double> values, std::uin
 double rank_correlation(std::span<const double> a, std::span<const double> b) {
   require(a.size() == b.size() && a.size() >= 3, "number of pairs", static_cast<double>(a.size()),
           ">= 3, the same for both");
-  const auto rank_a = ranks(a);
-  const auto rank_b = ranks(b);
+  const auto rank_a = compute_ranks(a);
+  const auto rank_b = compute_ranks(b);
   const double middle = 0.5 * static_cast<double>(a.size() - 1);
   double ab = 0.0;
   double aa = 0.0;

@@ -29,7 +29,7 @@ struct LatticePoint {
 
 // Returns points of the square lattice by their distance from (0, 0): more than `min_count` of
 // them.
-std::vector<LatticePoint> lattice(int min_count) {
+std::vector<LatticePoint> make_lattice(int min_count) {
   const int side = static_cast<int>(std::ceil(std::sqrt(static_cast<double>(min_count)))) + 1;
   std::vector<LatticePoint> points;
   for (int y = -side; y <= side; ++y) {
@@ -41,7 +41,7 @@ std::vector<LatticePoint> lattice(int min_count) {
   return points;
 }
 
-double mean_of(std::span<const float> values) {
+double compute_mean(std::span<const float> values) {
   double sum = 0.0;
   for (const float value : values) sum += static_cast<double>(value);
   return sum / static_cast<double>(values.size());
@@ -53,7 +53,7 @@ ExpectedImageHoming::ExpectedImageHoming(int columns, int max_positions)
     : columns_(columns), spacing_(0.0) {
   require(columns >= 4 && columns <= 65536, "columns", columns, "4 .. 65536");
   require(max_positions >= 5 && max_positions <= 10000, "positions", max_positions, "5 .. 10000");
-  const auto points = lattice(max_positions);
+  const auto points = make_lattice(max_positions);
   // Whole rings of equally far points, the next of which would lie at the reach.
   std::size_t count = 0;
   while (true) {
@@ -87,7 +87,7 @@ struct FlatRow {
   double energy = 0.0;
 
   explicit FlatRow(std::span<const float> row) {
-    const double mean = mean_of(row);
+    const double mean = compute_mean(row);
     for (const float value : row) {
       values.push_back(static_cast<float>(static_cast<double>(value) - mean));
       energy += static_cast<double>(values.back()) * static_cast<double>(values.back());

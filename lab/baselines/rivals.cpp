@@ -83,16 +83,16 @@ std::unique_ptr<RivalRecogniser> make_recogniser(
   return std::make_unique<DescriptorRecogniser<Descriptor>>(std::move(method));
 }
 
-using Floats = std::vector<float>;
+using PixelValues = std::vector<float>;
 
-double l1(const Floats& a, const Floats& b) {
+double l1(const PixelValues& a, const PixelValues& b) {
   double sum = 0.0;
   for (std::size_t i = 0; i < a.size(); ++i) sum += std::abs(a[i] - b[i]);
   return sum;
 }
 
-Floats grey_histogram(const Panorama& view, int bins) {
-  Floats counts(static_cast<std::size_t>(bins));
+PixelValues grey_histogram(const Panorama& view, int bins) {
+  PixelValues counts(static_cast<std::size_t>(bins));
   for (const float value : view.values()) {
     const int bin = static_cast<int>(std::floor(value * static_cast<float>(bins)));
     counts[static_cast<std::size_t>(std::clamp(bin, 0, bins - 1))] += 1.0F;
@@ -101,9 +101,9 @@ Floats grey_histogram(const Panorama& view, int bins) {
   return counts;
 }
 
-Floats colour_histogram(const Image& view, int bins) {
+PixelValues colour_histogram(const Image& view, int bins) {
   require(view.channels() == 3, "channels of a view", view.channels(), "3");
-  Floats counts(static_cast<std::size_t>(bins) * bins * bins);
+  PixelValues counts(static_cast<std::size_t>(bins) * bins * bins);
   const auto pixels = view.pixels();
   const float share = 3.0F / static_cast<float>(pixels.size());
   for (std::size_t i = 0; i < pixels.size(); i += 3) {
@@ -115,7 +115,7 @@ Floats colour_histogram(const Image& view, int bins) {
 
 // Returns the zero-phase representation [Pajdla and Hlavac 1999]: the view is rotated so that the
 // phase of its first harmonic, summed over rows, becomes zero.
-Panorama turned_to_zero_phase(const Panorama& view) {
+Panorama rotate_to_zero_phase(const Panorama& view) {
   std::complex<double> first{0.0, 0.0};
   for (int c = 0; c < view.columns(); ++c) {
     double column = 0.0;
@@ -171,7 +171,7 @@ class EigenimageRecogniser final : public RivalRecogniser {
 
  private:
   static Eigen::VectorXf column(const Panorama& view) {
-    const Panorama turned = turned_to_zero_phase(view);
+    const Panorama turned = rotate_to_zero_phase(view);
     return Eigen::Map<const Eigen::VectorXf>(turned.values().data(),
                                              static_cast<Eigen::Index>(turned.values().size()));
   }
@@ -238,7 +238,7 @@ constexpr int small_columns = 128;
 constexpr int small_rows = 32;
 constexpr int half_patch = 4;
 
-Panorama shrunk(const Panorama& view) {
+Panorama shrink(const Panorama& view) {
   const int rows = std::min(view.rows(), small_rows);
   const int columns = std::min(view.columns(), small_columns);
   Panorama small(rows, columns, std::nullopt);
@@ -258,8 +258,8 @@ Panorama shrunk(const Panorama& view) {
   return small;
 }
 
-Panorama normalised(const Panorama& view) {
-  const Panorama small = shrunk(view);
+Panorama normalise_patches(const Panorama& view) {
+  const Panorama small = shrink(view);
   Panorama result = small;
   for (int y = 0; y < small.rows(); ++y) {
     for (int c = 0; c < small.columns(); ++c) {
@@ -317,19 +317,20 @@ std::unique_ptr<RivalRecogniser> fourier_signature_recogniser(int components) {
 // One histogram over the whole view: what Ulrich and Nourbakhsh use, in grey.
 std::unique_ptr<RivalRecogniser> grey_histogram_recogniser(int bins) {
   require(bins >= 2 && bins <= 256, "histogram bins", bins, "2 .. 256");
-  return make_recogniser<Floats>(
+  return make_recogniser<PixelValues>(
       {"grey histogram", [=](const RivalView& view) { return grey_histogram(view.panorama, bins); },
-       l1, [](const Floats& histogram) { return 2.0 * static_cast<double>(histogram.size()); }});
+       l1,
+       [](const PixelValues& histogram) { return 2.0 * static_cast<double>(histogram.size()); }});
 }
 
 // Colour needs no phases and no unwarping, and does not change when the robot turns.
 std::unique_ptr<RivalRecogniser> colour_histogram_recogniser(int bins_per_channel) {
   require(bins_per_channel >= 2 && bins_per_channel <= 32, "histogram bins per channel",
           bins_per_channel, "2 .. 32");
-  return make_recogniser<Floats>(
+  return make_recogniser<PixelValues>(
       {"colour histogram",
        [=](const RivalView& view) { return colour_histogram(view.picture, bins_per_channel); }, l1,
-       [](const Floats& histogram) { return 2.0 * static_cast<double>(histogram.size()); }});
+       [](const PixelValues& histogram) { return 2.0 * static_cast<double>(histogram.size()); }});
 }
 
 std::unique_ptr<RivalRecogniser> eigenimage_recogniser(int dimensions) {
@@ -337,13 +338,13 @@ std::unique_ptr<RivalRecogniser> eigenimage_recogniser(int dimensions) {
 }
 
 std::unique_ptr<RivalRecogniser> zero_phase_recogniser() {
-  return make_recogniser<Floats>(
+  return make_recogniser<PixelValues>(
       {"zero-phase representation",
        [](const RivalView& view) {
-         const Panorama turned = turned_to_zero_phase(view.panorama);
-         return Floats(turned.values().begin(), turned.values().end());
+         const Panorama turned = rotate_to_zero_phase(view.panorama);
+         return PixelValues(turned.values().begin(), turned.values().end());
        },
-       l1, [](const Floats& pixels) { return static_cast<double>(pixels.size()); }});
+       l1, [](const PixelValues& pixels) { return static_cast<double>(pixels.size()); }});
 }
 
 std::unique_ptr<RivalRecogniser> pixels_over_all_turns_recogniser() {
@@ -357,8 +358,9 @@ std::unique_ptr<RivalRecogniser> pixels_over_all_turns_recogniser() {
 
 std::unique_ptr<RivalRecogniser> patch_normalised_recogniser() {
   return make_recogniser<Panorama>(
-      {"patch-normalised pixels", [](const RivalView& view) { return normalised(view.panorama); },
-       difference, [](const Panorama& view) { return static_cast<double>(view.values().size()); }});
+      {"patch-normalised pixels",
+       [](const RivalView& view) { return normalise_patches(view.panorama); }, difference,
+       [](const Panorama& view) { return static_cast<double>(view.values().size()); }});
 }
 
 }  // namespace panonav::lab

@@ -19,10 +19,10 @@ struct Lanes {
 /// Correlates `row_count` rows at `vectors * lanes` turns from turn `t` on: all sums stay in
 /// registers, and each value that is loaded serves all rows or all turns.
 template <int lanes, int row_count, int vectors>
-[[gnu::always_inline]] inline void products_of_block(const float* rows, std::size_t columns,
-                                                     const float* periodic, std::size_t t,
-                                                     std::size_t stride, float* products,
-                                                     typename Lanes<lanes>::Floats* largest) {
+[[gnu::always_inline]] inline void correlate_block(const float* rows, std::size_t columns,
+                                                   const float* periodic, std::size_t t,
+                                                   std::size_t stride, float* products,
+                                                   typename Lanes<lanes>::Floats* largest) {
   using Floats = typename Lanes<lanes>::Floats;
   Floats sums[row_count][vectors] = {};
   for (std::size_t i = 0; i < columns; ++i) {
@@ -45,19 +45,19 @@ template <int lanes, int row_count, int vectors>
 }
 
 template <int lanes, int row_count, int vectors>
-[[gnu::always_inline]] inline void products_of_rows(const float* rows, std::size_t columns,
-                                                    const float* periodic, std::size_t stride,
-                                                    float* products, float* largest) {
+[[gnu::always_inline]] inline void correlate_rows(const float* rows, std::size_t columns,
+                                                  const float* periodic, std::size_t stride,
+                                                  float* products, float* largest) {
   using Floats = typename Lanes<lanes>::Floats;
   Floats greatest[row_count];
   for (Floats& row : greatest) row = Floats{} - std::numeric_limits<float>::max();
   std::size_t t = 0;
   for (; t + vectors * lanes <= stride; t += vectors * lanes) {
-    products_of_block<lanes, row_count, vectors>(rows, columns, periodic, t, stride, products,
-                                                 greatest);
+    correlate_block<lanes, row_count, vectors>(rows, columns, periodic, t, stride, products,
+                                               greatest);
   }
   for (; t < stride; t += lanes) {
-    products_of_block<lanes, row_count, 1>(rows, columns, periodic, t, stride, products, greatest);
+    correlate_block<lanes, row_count, 1>(rows, columns, periodic, t, stride, products, greatest);
   }
   for (int r = 0; r < row_count; ++r) {
     largest[r] = greatest[r][0];
@@ -69,32 +69,32 @@ template <int lanes, int row_count, int vectors>
 
 /// `vectors`: as many as leave registers for the rows.
 template <int lanes, int vectors>
-[[gnu::always_inline]] inline void all_products(const float* rows, std::size_t count,
-                                                std::size_t columns, const float* periodic,
-                                                float* products, float* largest) {
+[[gnu::always_inline]] inline void correlate_all(const float* rows, std::size_t count,
+                                                 std::size_t columns, const float* periodic,
+                                                 float* products, float* largest) {
   const std::size_t stride = turn_products_stride(columns);
   constexpr int row_count = 4;
   std::size_t r = 0;
   for (; r + row_count <= count; r += row_count) {
-    products_of_rows<lanes, row_count, vectors>(rows + r * columns, columns, periodic, stride,
-                                                products + r * stride, largest + r);
+    correlate_rows<lanes, row_count, vectors>(rows + r * columns, columns, periodic, stride,
+                                              products + r * stride, largest + r);
   }
   for (; r < count; ++r) {
-    products_of_rows<lanes, 1, vectors>(rows + r * columns, columns, periodic, stride,
-                                        products + r * stride, largest + r);
+    correlate_rows<lanes, 1, vectors>(rows + r * columns, columns, periodic, stride,
+                                      products + r * stride, largest + r);
   }
 }
 
 #if defined(__x86_64__)
 [[gnu::target("avx512f,avx512bw,avx512dq,avx512vl,fma,prefer-vector-width=512")]] void
-products_by_avx512(const float* rows, std::size_t count, std::size_t columns, const float* periodic,
-                   float* products, float* largest) {
-  all_products<16, 5>(rows, count, columns, periodic, products, largest);
+correlate_by_avx512(const float* rows, std::size_t count, std::size_t columns,
+                    const float* periodic, float* products, float* largest) {
+  correlate_all<16, 5>(rows, count, columns, periodic, products, largest);
 }
-[[gnu::target("avx2,fma")]] void products_by_avx2(const float* rows, std::size_t count,
-                                                  std::size_t columns, const float* periodic,
-                                                  float* products, float* largest) {
-  all_products<8, 2>(rows, count, columns, periodic, products, largest);
+[[gnu::target("avx2,fma")]] void correlate_by_avx2(const float* rows, std::size_t count,
+                                                   std::size_t columns, const float* periodic,
+                                                   float* products, float* largest) {
+  correlate_all<8, 2>(rows, count, columns, periodic, products, largest);
 }
 #endif
 
@@ -104,9 +104,9 @@ constexpr int vectors_of_four = 4;
 #else
 constexpr int vectors_of_four = 2;
 #endif
-void products_by_four(const float* rows, std::size_t count, std::size_t columns,
-                      const float* periodic, float* products, float* largest) {
-  all_products<4, vectors_of_four>(rows, count, columns, periodic, products, largest);
+void correlate_by_four(const float* rows, std::size_t count, std::size_t columns,
+                       const float* periodic, float* products, float* largest) {
+  correlate_all<4, vectors_of_four>(rows, count, columns, periodic, products, largest);
 }
 
 }  // namespace
@@ -128,10 +128,10 @@ void turn_products(std::span<const float> rows, std::size_t columns,
   check(rows.size(), count * columns, "values of the rows");
   check(periodic.size(), columns + stride, "values of the periodic row");
   check(products.size(), count * stride, "products");
-  auto* correlate = products_by_four;
+  auto* correlate = correlate_by_four;
 #if defined(__x86_64__)
-  if (instructions == kernels::Instructions::avx512) correlate = products_by_avx512;
-  if (instructions == kernels::Instructions::avx2) correlate = products_by_avx2;
+  if (instructions == kernels::Instructions::avx512) correlate = correlate_by_avx512;
+  if (instructions == kernels::Instructions::avx2) correlate = correlate_by_avx2;
 #endif
   correlate(rows.data(), count, columns, periodic.data(), products.data(), largest.data());
 }

@@ -33,7 +33,7 @@ constexpr double moved_share = 0.03;
 using FeatureMap = std::map<ViewId, std::optional<LocalFeatures>>;
 using Features = std::shared_ptr<const FeatureMap>;
 
-Features features_of(const simulation::PlaceRecording& place, const VisualMemory& memory) {
+Features extract_all_features(const simulation::PlaceRecording& place, const VisualMemory& memory) {
   auto features = std::make_shared<FeatureMap>();
   for (const ViewId view : memory.views()) {
     const Point2 at = memory.info(view).pose->position();
@@ -76,7 +76,7 @@ RememberedPlace record_again(simulation::PlaceRecording today, std::uint64_t see
   }
   today.references = simulation::take_views(today, today.rendering, grid, seed, {}, executor);
   VisualMemory memory = make_memory_of_references(today, executor);
-  const Features features = features_of(today, memory);
+  const Features features = extract_all_features(today, memory);
   return {std::move(memory), features};
 }
 
@@ -270,7 +270,7 @@ class Days {
                                         elsewhere.executor)),
         changing_(place_.scene, options_.seed),
         memory_(make_memory_of_references(place_, elsewhere.executor)),
-        features_(features_of(place_, memory_)),
+        features_(extract_all_features(place_, memory_)),
         unchanged_(memory_, features_) {
     for (const auto& [id, what, drive] :
          {std::tuple{".with", "learning on errands", DailyDrive::errands},

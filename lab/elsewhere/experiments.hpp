@@ -23,7 +23,7 @@ struct ElsewhereExperiments : Experiments {
   std::vector<RecordedGround> grounds{};  ///< that the next three experiments compare
 
   /// Returns the built-in scenes of the options and the worlds that exist in `options.data`.
-  [[nodiscard]] std::vector<std::string> ground_names() const;
+  [[nodiscard]] std::vector<std::string> list_ground_names() const;
   void record_ground(const std::string& name);
 
   /// Measures recognised own places, places of other grounds taken for own, and the 95 % radius.

@@ -65,7 +65,7 @@ void ElsewhereExperiments::reproduce_floor(const std::string& world, double spac
   const simulation::MissionPlace place =
       simulation::make_mission_place(simulation::read_world(options.data, world), executor);
   const simulation::RememberedPlace remembered =
-      simulation::remember_grid(place, spacing_m, Random(options.seed, 1).next(), executor);
+      simulation::memorise_grid(place, spacing_m, Random(options.seed, 1).next(), executor);
   const std::size_t views = remembered.truth.size();
   const std::string id = "elsewhere.arrange." + world + "." + format_centimetres_id(spacing_m);
   const std::string what = world + ", " + std::to_string(views) + " views every " +

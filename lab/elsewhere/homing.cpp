@@ -52,7 +52,7 @@ HomeAnswered find_home(const simulation::PlacedView& goal, const simulation::Pla
 }
 
 /// Makes white noise, smoothed along columns so that neighbouring pixels are similar.
-Panorama noise(int rows, int columns, int smoothed, std::uint64_t seed) {
+Panorama make_noise(int rows, int columns, int smoothed, std::uint64_t seed) {
   Random random(seed, 5);
   Panorama view(rows, columns, ElevationBand{radians(-30.0), radians(40.0)});
   std::vector<double> line(static_cast<std::size_t>(columns));
@@ -83,7 +83,7 @@ std::string explain_failures(const std::vector<HomingRun>& runs, std::size_t lev
   std::size_t alike = 0;
   std::size_t wrongly = 0;
   for (const HomingRun& run : runs) {
-    if (run.succeeds(arrived_m)) continue;
+    if (run.is_success(arrived_m)) continue;
     ++others;
     const double first_rad = run.vectors.front().direction_rad();
     away += off_rad(first_rad, run.path.front(), run.goal) > radians(90.0) ? 1 : 0;
@@ -194,7 +194,7 @@ class HomeVectors {
   void ask_between_noise(int smoothed) const {
     const Panorama& like = elsewhere_.grounds.front().variants.front().references.front().panorama;
     const auto noise_of = [&](std::size_t seed) {
-      return noise(like.rows(), like.columns(), smoothed, seed);
+      return make_noise(like.rows(), like.columns(), smoothed, seed);
     };
     add_answers(elsewhere_.result, "elsewhere.home.noise_" + std::to_string(smoothed),
                 "noise" +
@@ -255,7 +255,7 @@ void ElsewhereExperiments::reproduce_home_vectors() {
 }
 
 void ElsewhereExperiments::reproduce_tilted_homing() {
-  for (const std::string& name : ground_names()) {
+  for (const std::string& name : list_ground_names()) {
     HomingPlace place = make_homing_place(
         simulation::make_or_read_scene(options.data, name, options.seed), {}, executor);
     const auto tasks = draw_homing_tasks(place, options.runs, homing_radius_m, options.seed);
@@ -274,7 +274,7 @@ void ElsewhereExperiments::reproduce_tilted_homing() {
       place.camera.levelled = measured;
       const auto runs = run_home(place, tasks, {}, options.seed, executor);
       const auto home =
-          count_where(runs, [](const HomingRun& run) { return run.succeeds(arrived_m); });
+          count_where(runs, [](const HomingRun& run) { return run.is_success(arrived_m); });
       if (tilt_deg == 0) level_home = home;
       std::string how = "level robot";
       if (tilt_deg > 0) {

@@ -22,7 +22,7 @@ namespace {
 constexpr int columns = 256;
 constexpr double spacing_m = 0.5;
 
-std::string ground_of(const std::string& place) {
+std::string parse_ground(const std::string& place) {
   return place.substr(0, place.rfind(' '));
 }
 
@@ -98,7 +98,7 @@ void add_own_places(const ElsewhereExperiments& elsewhere, const RecordedGround&
 
 }  // namespace
 
-std::vector<std::string> ElsewhereExperiments::ground_names() const {
+std::vector<std::string> ElsewhereExperiments::list_ground_names() const {
   std::vector<std::string> names = options.built_in;
   for (const std::string& world : simulation::find_all_worlds(options.data)) names.push_back(world);
   return names;
@@ -134,7 +134,7 @@ void ElsewhereExperiments::reproduce_known_places() {
   for (const RecognitionRate& rate : recognition_rates(places, executor)) {
     if (rate.memory == rate.queries) continue;
     const std::string name = rate.queries + " in " + rate.memory;
-    (ground_of(rate.memory) == ground_of(rate.queries) ? variant : other)
+    (parse_ground(rate.memory) == parse_ground(rate.queries) ? variant : other)
         .add(name, rate.known, static_cast<std::size_t>(options.queries));
   }
   const auto add_foreign = [&](const std::string& id, const std::string& what, const Rates& rates,

@@ -73,8 +73,8 @@ struct TemporaryFile {
 };
 
 /// Returns the rows of the image that the memory keeps, at their recorded resolution.
-Panorama sharp_view(const DatasetEntry& entry, const PictureSource& source,
-                    const Panorama& panorama) {
+Panorama read_sharp_view(const DatasetEntry& entry, const PictureSource& source,
+                         const Panorama& panorama) {
   const Observation seen = read_observation(entry);
   const auto* const picture = std::get_if<Image>(&seen.picture);
   if (!picture || source.kind == PictureKind::mirror) return panorama;
@@ -95,7 +95,7 @@ class LeaveOneOut {
       : elsewhere_(elsewhere), id_("elsewhere." + name) {
     for (const DatasetEntry& entry : dataset.entries) {
       Panorama panorama = recogniser.encoder().panorama(read_observation(entry));
-      Panorama sharp = sharp_view(entry, dataset.source, panorama);
+      Panorama sharp = read_sharp_view(entry, dataset.source, panorama);
       views_.push_back({entry.file,
                         entry.pose ? std::optional(entry.pose->position()) : std::nullopt,
                         std::move(panorama), std::move(sharp)});

@@ -221,7 +221,7 @@ struct FirstSetVariations {
     by_spacing[1].push_back(open);
     closed_by_spacing[1].push_back(closed);
     for (const int every : {2, 3, 5}) {
-      const auto thinned = simulation::every_nth(recording, static_cast<std::size_t>(every));
+      const auto thinned = simulation::thin_recording(recording, static_cast<std::size_t>(every));
       by_spacing[every].push_back(error_of(thinned, {.mapping = {.close_loops = false}}));
       closed_by_spacing[every].push_back(error_of(thinned, {}));
     }

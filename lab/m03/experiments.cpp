@@ -128,9 +128,9 @@ void RunRows::append_single_image_rates() const {
 namespace {
 
 // Returns the layers of one panel: particles and estimate of the filter at a step.
-std::vector<viewer::MapLayer> particle_layers(const TrackingPlace& place, const Pose2& truth,
-                                              const MonteCarloLocaliser& filter,
-                                              const MonteCarloEstimate& estimate) {
+std::vector<viewer::MapLayer> make_particle_layers(const TrackingPlace& place, const Pose2& truth,
+                                                   const MonteCarloLocaliser& filter,
+                                                   const MonteCarloEstimate& estimate) {
   viewer::MapLayer particles{.label = "particles", .colour = viewer::PlotColour::vermilion};
   const Particles& held = filter.particles();
   for (std::size_t i = 0; i < held.size(); ++i) particles.dots.push_back(held.position(i));
@@ -169,7 +169,7 @@ std::vector<viewer::MapPlot> make_particle_maps(const TrackingPlace& place,
     }
     images += there.view ? 1 : 0;
     if (std::ranges::find(steps, step) == steps.end()) return;
-    auto layers = particle_layers(place, there.truth, filter, estimate);
+    auto layers = make_particle_layers(place, there.truth, filter, estimate);
     layers[2].lines = truths;
     layers[3].lines = estimates;
     layers.insert(layers.begin(), furniture.begin(), furniture.end());

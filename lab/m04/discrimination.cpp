@@ -80,7 +80,7 @@ class Discrimination final : public Experiment {
         const Point2 position = views[q].pose.position();
         const std::size_t nearest = place.nearest_reference(position);
         for (std::size_t c = 0; c < count_number; ++c) {
-          const std::size_t found = index_of_smallest(values[q][c]);
+          const std::size_t found = find_smallest(values[q][c]);
           right[c] += found == nearest ? 1.0 / n : 0.0;
           found_[condition][c] += found == nearest ? 1 : 0;
           errors_m_[condition][c].push_back(

@@ -28,7 +28,7 @@ GridPlace locate_in_grid(const ViewGrid& grid, std::size_t view) {
   return {j % 2 == 0 ? along : grid.columns - 1 - along, j};
 }
 
-std::size_t view_at(const ViewGrid& grid, GridPlace place) {
+std::size_t view_index(const ViewGrid& grid, GridPlace place) {
   const int along = place.j % 2 == 0 ? place.i : grid.columns - 1 - place.i;
   return static_cast<std::size_t>(place.j * grid.columns + along);
 }
@@ -98,8 +98,8 @@ simulation::Scene make_small_room(std::uint64_t seed) {
   constexpr double room_height_m = 2.6;
   simulation::furnish_room_shell(builder, {{0.0, 0.0}, {4.0, 3.5}}, room_height_m);
   for (const double x_m : {1.2, 2.8}) {
-    builder.lamp({x_m, 1.75, room_height_m - 0.2},
-                 static_cast<float>(builder.random().uniform(0.3, 0.8)));
+    builder.add_lamp({x_m, 1.75, room_height_m - 0.2},
+                     static_cast<float>(builder.random().uniform(0.3, 0.8)));
   }
   return builder.finish();
 }
@@ -151,8 +151,9 @@ GridComparison compare_with_grid(const ViewGrid& grid, const Lattice& lattice) {
   const std::vector<std::size_t> together(truth.size(), 0);
   const auto near = nearest_points(arranged, together, 8);
   const double middle_x =
-      0.5 * (truth.front().x_m + truth[view_at(grid, {grid.columns - 1, 0})].x_m);
-  const double middle_y = 0.5 * (truth.front().y_m + truth[view_at(grid, {0, grid.rows - 1})].y_m);
+      0.5 * (truth.front().x_m + truth[view_index(grid, {grid.columns - 1, 0})].x_m);
+  const double middle_y =
+      0.5 * (truth.front().y_m + truth[view_index(grid, {0, grid.rows - 1})].y_m);
   std::size_t inner = 0;
   std::size_t kept = 0;
   double pulled_m = 0.0;
@@ -164,7 +165,7 @@ GridComparison compare_with_grid(const ViewGrid& grid, const Lattice& lattice) {
       bool all = lattice.nodes[view].component == 0;
       for (const GridPlace next : {GridPlace{at.i - 1, at.j}, GridPlace{at.i + 1, at.j},
                                    GridPlace{at.i, at.j - 1}, GridPlace{at.i, at.j + 1}}) {
-        all = all && std::ranges::find(near[view], view_at(grid, next)) != near[view].end();
+        all = all && std::ranges::find(near[view], view_index(grid, next)) != near[view].end();
       }
       kept += all ? 1 : 0;
       continue;
@@ -203,11 +204,11 @@ std::vector<std::vector<Point2>> grid_lines(const ViewGrid& grid,
   std::vector<std::vector<Point2>> lines;
   for (int j = 0; j < grid.rows; ++j) {
     auto& line = lines.emplace_back();
-    for (int i = 0; i < grid.columns; ++i) line.push_back(positions[view_at(grid, {i, j})]);
+    for (int i = 0; i < grid.columns; ++i) line.push_back(positions[view_index(grid, {i, j})]);
   }
   for (int i = 0; i < grid.columns; ++i) {
     auto& line = lines.emplace_back();
-    for (int j = 0; j < grid.rows; ++j) line.push_back(positions[view_at(grid, {i, j})]);
+    for (int j = 0; j < grid.rows; ++j) line.push_back(positions[view_index(grid, {i, j})]);
   }
   return lines;
 }

@@ -48,7 +48,7 @@ std::vector<double> dissimilarity_by_component(const FourierSignature& a,
   return sums;
 }
 
-std::size_t index_of_smallest(std::span<const double> values) {
+std::size_t find_smallest(std::span<const double> values) {
   return static_cast<std::size_t>(std::ranges::min_element(values) - values.begin());
 }
 

@@ -40,7 +40,7 @@ struct ViewCondition {
                                                              const FourierSignature& b);
 
 /// Returns the index of the smallest value, the first of equals.
-[[nodiscard]] std::size_t index_of_smallest(std::span<const double> values);
+[[nodiscard]] std::size_t find_smallest(std::span<const double> values);
 
 /// Makes a memory of posed views, in their order, packed so that the largest magnitude just fits.
 [[nodiscard]] VisualMemory make_memory(const std::vector<simulation::PlacedView>& views,

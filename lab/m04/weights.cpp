@@ -91,7 +91,7 @@ class WeightsOfComponents final : public Experiment {
           for (const auto& reference : references) {
             values.push_back(dissimilarity_weighted(queries[q], reference, weights[w]));
           }
-          const bool found = index_of_smallest(values) == nearest;
+          const bool found = find_smallest(values) == nearest;
           found_[condition][w] += found ? 1 : 0;
           right[w] += found ? 1.0 / static_cast<double>(queries.size()) : 0.0;
         }

@@ -171,7 +171,7 @@ void NavigationExperiments::reproduce_grid_missions(const std::string& scene,
     const simulation::MissionPlace place =
         simulation::make_mission_place(simulation::make_scene(scene, {.seed = seed}), executor);
     const simulation::RememberedPlace remembered =
-        simulation::remember_grid(place, spacing_m, Random(seed, 1).next(), executor);
+        simulation::memorise_grid(place, spacing_m, Random(seed, 1).next(), executor);
     const auto missions = simulation::draw_missions(
         place, remembered, {.count = count_runs(options, i)}, Random(seed, 2).next());
     simulation::MissionOptions mission;
@@ -198,7 +198,7 @@ void NavigationExperiments::reproduce_drive_missions(const std::string& scene) c
     const simulation::MissionPlace place =
         simulation::make_mission_place(make_or_read_scene(options, scene, variation), executor);
     const simulation::RememberedPlace remembered =
-        simulation::remember_drive(place, plan_exploring_drive(place, seed),
+        simulation::memorise_drive(place, plan_exploring_drive(place, seed),
                                    simulation::cheap_wheels(), Random(seed, 1).next(), executor);
     variation.light = i % 2 == 0 ? 1.0 - light_change : 1.0 + light_change;
     variation.moved_objects = moved_objects_share;
@@ -267,7 +267,7 @@ void NavigationExperiments::reproduce_tours() const {
     const simulation::MissionPlace place =
         simulation::make_mission_place(simulation::make_scene("loop", {.seed = seed}), executor);
     const simulation::RememberedPlace remembered =
-        simulation::remember_drive(place, plan_exploring_drive(place, seed),
+        simulation::memorise_drive(place, plan_exploring_drive(place, seed),
                                    simulation::cheap_wheels(), Random(seed, 1).next(), executor);
     const AreaPlanner planner(remembered.graph);
     const MemoryViewSource source(remembered.memory);
@@ -317,7 +317,7 @@ void NavigationExperiments::reproduce_route_missions() const {
         simulation::make_mission_place(simulation::make_scene("loop", {.seed = seed}), executor);
     place.line = simulation::make_line_sensor(place);
     const auto drive = plan_exploring_drive(place, seed);
-    simulation::RememberedPlace remembered = simulation::remember_drive(
+    simulation::RememberedPlace remembered = simulation::memorise_drive(
         place, drive, simulation::cheap_wheels(), Random(seed, 1).next(), executor);
     const auto missions = simulation::draw_missions(
         place, remembered, {.count = count_runs(options, i), .beside_m = beside_drive_m},
@@ -363,7 +363,7 @@ void NavigationExperiments::reproduce_blocked_missions() const {
     const simulation::Scene scene = simulation::make_scene("loop", {.seed = seed});
     const simulation::MissionPlace place = simulation::make_mission_place(scene, executor);
     const auto way = plan_exploring_drive(place, seed);
-    const simulation::RememberedPlace remembered = simulation::remember_drive(
+    const simulation::RememberedPlace remembered = simulation::memorise_drive(
         place, way, simulation::cheap_wheels(), Random(seed, 1).next(), executor);
     double tour_m = 0.0;
     for (std::size_t k = 0; k < scene.tour.size(); ++k) {

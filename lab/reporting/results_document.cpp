@@ -8,12 +8,12 @@ namespace panonav::lab {
 
 namespace {
 
-std::string counted(std::size_t count, const std::string& one, const std::string& many) {
+std::string format_count(std::size_t count, const std::string& one, const std::string& many) {
   return std::to_string(count) + " " + (count == 1 ? one : many);
 }
 
 // Characters that Markdown would take for its own.
-std::string plain(const std::string& text) {
+std::string escape_markdown(const std::string& text) {
   std::string result;
   for (const char c : text) {
     if (std::string_view("\\`*_[]<>|").find(c) != std::string_view::npos) result += '\\';
@@ -42,7 +42,7 @@ std::string list_item(const std::string& text) {
 // One line of a table.
 std::string table_line(std::span<const std::string> cells) {
   std::string line = "|";
-  for (const std::string& cell : cells) line += " " + plain(cell) + " |";
+  for (const std::string& cell : cells) line += " " + escape_markdown(cell) + " |";
   return line + "\n";
 }
 
@@ -106,25 +106,25 @@ std::string to_markdown(const ResultsDocument& document) {
   std::string text = "# Results: published and measured\n\n";
   text += "Written by panonav " + document.version + ":\n\n    " + document.command + "\n\n";
   text += "**" + std::to_string(count.held) + " of " +
-          counted(count.judged, "target holds", "targets hold") + ".**\n\n";
+          format_count(count.judged, "target holds", "targets hold") + ".**\n\n";
   text += "| experiments | targets | hold |\n|---|---|---|\n";
   for (const PaperResults& paper : document.papers) {
     const TargetCount of_paper = count_targets(paper.rows);
-    text += "| [" + plain(paper.title) + "](#" + paper.paper + ") | " +
+    text += "| [" + escape_markdown(paper.title) + "](#" + paper.paper + ") | " +
             std::to_string(of_paper.judged) + " | " + std::to_string(of_paper.held) + " |\n";
   }
   text += "\n## Rows that do not hold\n\n";
   const auto misses = list_misses(document);
-  for (const std::string& line : misses) text += list_item(plain(line));
+  for (const std::string& line : misses) text += list_item(escape_markdown(line));
   if (misses.empty()) text += "None.\n";
   for (const PaperResults& paper : document.papers) {
-    text += "\n<a name=\"" + paper.paper + "\"></a>\n\n## " + plain(paper.title) + "\n\n";
+    text += "\n<a name=\"" + paper.paper + "\"></a>\n\n## " + escape_markdown(paper.title) + "\n\n";
     text += "`panonav reproduce " + paper.paper + "`\n\n";
     const bool is_judged = count_targets(paper.rows).judged > 0;
     text += is_judged ? target_table(paper.rows) : "No row has a target.\n";
   }
-  text +=
-      "\n`results.json` holds " + counted(rows, "row", "rows") + ", those without a target too.\n";
+  text += "\n`results.json` holds " + format_count(rows, "row", "rows") +
+          ", those without a target too.\n";
   return text;
 }
 

@@ -11,21 +11,21 @@ namespace panonav::lab {
 
 namespace {
 
-std::string_view symbol(Comparison comparison) {
+std::string_view to_symbol(Comparison comparison) {
   return comparison == Comparison::at_most ? "<=" : ">=";
 }
 
 // Four significant digits: what a person compares.
-std::string shown(double value, const std::string& unit) {
+std::string format_value(double value, const std::string& unit) {
   return format_number(value, unit, 4);
 }
 
 // With its interval, without its unit.
 std::string figure_text(const ResultRow& row) {
-  std::string text = shown(row.ours, row.unit);
+  std::string text = format_value(row.ours, row.unit);
   if (row.interval) {
-    text += " (" + shown(row.interval->first, row.unit) + " .. " +
-            shown(row.interval->second, row.unit) + ")";
+    text += " (" + format_value(row.interval->first, row.unit) + " .. " +
+            format_value(row.interval->second, row.unit) + ")";
   }
   return text;
 }
@@ -54,13 +54,13 @@ std::string format_figure(const ResultRow& row) {
 std::string format_published(const ResultRow& row) {
   if (!row.published) return "-";
   const auto& [low, high] = *row.published;
-  return shown(low, row.unit) + (low == high ? "" : " .. " + shown(high, row.unit));
+  return format_value(low, row.unit) + (low == high ? "" : " .. " + format_value(high, row.unit));
 }
 
 std::string format_target(const ResultRow& row) {
   if (!row.target) return "-";
   return (row.target->comparison == Comparison::at_most ? "at most " : "at least ") +
-         shown(row.target->value, row.unit);
+         format_value(row.target->value, row.unit);
 }
 
 std::string explain_miss(const ResultRow& row) {
@@ -68,7 +68,8 @@ std::string explain_miss(const ResultRow& row) {
   if (!std::isfinite(row.ours)) {
     return row.reason.empty() ? "nothing could be measured" : row.reason;
   }
-  std::vector<std::string> parts{"by " + shown(std::abs(row.ours - row.target->value), row.unit)};
+  std::vector<std::string> parts{"by " +
+                                 format_value(std::abs(row.ours - row.target->value), row.unit)};
   ResultRow reached = row;
   if (row.interval) {
     reached.ours =
@@ -126,7 +127,7 @@ std::string to_json(std::span<const ResultRow> rows) {
     }
     entry["unit"] = row.unit;
     if (row.target) {
-      entry["target"] = {{"op", symbol(row.target->comparison)}, {"value", row.target->value}};
+      entry["target"] = {{"op", to_symbol(row.target->comparison)}, {"value", row.target->value}};
     } else {
       entry["target"] = nullptr;
     }

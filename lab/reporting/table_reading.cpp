@@ -12,7 +12,7 @@ namespace {
 using nlohmann::json;
 
 // Returns the text of a value for messages, shortened.
-std::string excerpt(const json& value) {
+std::string shorten_value(const json& value) {
   if (value.is_structured()) return "an " + std::string(value.type_name());
   constexpr std::size_t longest = 40;
   const std::string text = value.dump();
@@ -25,11 +25,12 @@ class RowReader {
   RowReader(const json& row, std::size_t number, std::string_view file)
       : row_(row), name_("row " + std::to_string(number)), file_(file) {
     if (!row.is_object())
-      throw FileError(file_, name_ + " is " + excerpt(row) + "; allowed: an object");
+      throw FileError(file_, name_ + " is " + shorten_value(row) + "; allowed: an object");
   }
 
   [[noreturn]] void fail(const std::string& field, const std::string& allowed) const {
-    const std::string found = row_.contains(field) ? "is " + excerpt(row_[field]) : "is missing";
+    const std::string found =
+        row_.contains(field) ? "is " + shorten_value(row_[field]) : "is missing";
     throw FileError(file_, name_ + ": " + field + " " + found + "; allowed: " + allowed);
   }
 

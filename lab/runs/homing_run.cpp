@@ -26,7 +26,7 @@ HomingView take_homing_view(const HomingPlace& place, const Pose2& pose, std::ui
   return homing_view(compute_signature(level_panorama(seen, measured), camera.components));
 }
 
-std::string_view name_of(HomingRunEnd end) {
+std::string_view to_string(HomingRunEnd end) {
   switch (end) {
     case HomingRunEnd::arrived:
       return "arrived";
@@ -40,7 +40,7 @@ std::string_view name_of(HomingRunEnd end) {
   return "";
 }
 
-bool HomingRun::succeeds(double radius_m) const noexcept {
+bool HomingRun::is_success(double radius_m) const noexcept {
   return end == HomingRunEnd::arrived && end_distance_m <= radius_m;
 }
 
@@ -74,7 +74,7 @@ HomingRun run_home(const HomingPlace& place, const HomingView& home, const Pose2
       case HomingPursuit::State::exhausted:
         return finish(HomingRunEnd::exhausted);
     }
-    const auto direction_rad = robot.free_direction(decision.turn_rad, decision.advance_m);
+    const auto direction_rad = robot.find_free_direction(decision.turn_rad, decision.advance_m);
     run.met_obstacle = run.met_obstacle || direction_rad != decision.turn_rad;
     const bool moved = robot.go(direction_rad.value_or(decision.turn_rad), decision.advance_m);
     if (!direction_rad || (!moved && options.obstacles == simulation::ObstacleRule::stop)) {

@@ -54,7 +54,7 @@ enum class HomingRunEnd {
   exhausted,    ///< the maximum number of steps was reached
 };
 /// Returns "arrived", "wrong place", "blocked" or "exhausted".
-[[nodiscard]] std::string_view name_of(HomingRunEnd end);
+[[nodiscard]] std::string_view to_string(HomingRunEnd end);
 
 /// A run home.
 struct HomingRun {
@@ -68,7 +68,7 @@ struct HomingRun {
   bool met_obstacle = false;      ///< at least one step was not in the intended direction
 
   /// True if the robot reports an arrival within `radius_m` of the goal.
-  [[nodiscard]] bool succeeds(double radius_m) const noexcept;
+  [[nodiscard]] bool is_success(double radius_m) const noexcept;
 };
 
 /// Sends a robot from `start` to the place where `home` was seen, of which it knows that view alone

@@ -19,7 +19,7 @@ namespace {
 constexpr int memory_components = 15;    // [M04]
 constexpr std::size_t first_views = 32;  // that determine the full scale of a memory
 
-FourierSignature signature_of(const Panorama& view) {
+FourierSignature compute_default_signature(const Panorama& view) {
   return compute_signature(preprocess(view, {}), memory_components);
 }
 
@@ -52,7 +52,7 @@ VisualMemory make_memory_of_views(std::span<const ReferencePose> poses,
   require(!views.empty() && views.size() == poses.size(), "reference views",
           static_cast<double>(views.size()), ">= 1, as many as poses");
   const auto signatures = simulation::make_each(
-      executor, views.size(), [&](std::size_t i) { return signature_of(*views[i]); });
+      executor, views.size(), [&](std::size_t i) { return compute_default_signature(*views[i]); });
   // Same as the command: the first views, without component 0, which is the brightness.
   float full_scale = 0.0F;
   for (std::size_t i = 0; i < std::min(first_views, signatures.size()); ++i) {
@@ -112,7 +112,7 @@ std::shared_ptr<const TrackingPlace> make_tracking_place(const simulation::Place
 }
 
 PackedSignature compute_packed_signature(const Panorama& panorama, const VisualMemory& memory) {
-  return pack(signature_of(panorama), memory.full_scale());
+  return pack(compute_default_signature(panorama), memory.full_scale());
 }
 
 TrackingRun make_tracking_run(std::span<const Pose2> poses, std::vector<PackedSignature> views) {

@@ -37,11 +37,11 @@ CatchmentAreas measure_catchment_areas(ArenaSurveys& surveys) {
   for (const int highest : single_highest) strategies.push_back(published_strategy({highest}));
   CatchmentAreas areas;
   for (const auto& strategy : strategies) {
-    const auto values = surveys.areas(strategy, s06_accepted_m);
+    const auto values = surveys.compute_areas(strategy, s06_accepted_m);
     std::ranges::copy(values, areas[strategy.label].begin());
   }
-  const HomingSurvey* const alone = &surveys.own(10);
-  const auto values = mean_catchment_areas(surveys.distances(std::span(&alone, 1)),
+  const HomingSurvey* const alone = &surveys.survey_own(10);
+  const auto values = mean_catchment_areas(surveys.compute_final_distances(std::span(&alone, 1)),
                                            alone->goals.size(), s06_accepted_m);
   std::ranges::copy(values, areas[own_vector].begin());
   return areas;
@@ -127,7 +127,7 @@ void reproduce_snapshot_bytes(ArenaSurveys& surveys, Reproduction& result) {
   constexpr float accepted_m = 0.1F + 1e-6F;
   // Returns for each goal whether each place lies in its catchment area.
   const auto inside = [&](const HomingStrategy& strategy) {
-    const auto distances = surveys.distances(strategy);
+    const auto distances = surveys.compute_final_distances(strategy);
     std::vector<std::vector<bool>> areas(distances.size() / places, std::vector<bool>(places));
     for (std::size_t i = 0; i < distances.size(); ++i) {
       areas[i / places][i % places] = distances[i] <= accepted_m;

@@ -50,7 +50,7 @@ ArenaRecording record(const simulation::Renderer& renderer, const simulation::Sc
   return recording;
 }
 
-std::vector<Pose2> poses_of(const ArenaRecording& recording) {
+std::vector<Pose2> collect_poses(const ArenaRecording& recording) {
   std::vector<Pose2> poses;
   for (const auto& view : recording.views) poses.push_back(view.pose);
   return poses;
@@ -121,7 +121,7 @@ HomingSurvey survey_arena(const Arena& arena, const HomingRule& rule, Executor& 
     goals.push_back(arena.homes.views[g].pose);
   }
   return survey_homing(
-      goals, poses_of(arena.currents),
+      goals, collect_poses(arena.currents),
       [&](std::size_t goal, std::size_t place) { return rule(goal * every, place); },
       survey_options(arena), executor);
 }

@@ -97,7 +97,7 @@ ChainRun follow_chain(const HomingPlace& place, const SnapshotChain& chain,
         follower.decide(take_homing_view(place, robot.pose(), noise_of_views.next()), moved);
     run.state = decision.state;
     if (decision.state != ChainState::following) break;
-    const auto direction_rad = robot.free_direction(decision.turn_rad, decision.advance_m);
+    const auto direction_rad = robot.find_free_direction(decision.turn_rad, decision.advance_m);
     if (!direction_rad) break;
     const Pose2 true_before = robot.pose();
     const Pose2 shown_before = wheels.pose();

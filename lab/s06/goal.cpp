@@ -36,7 +36,7 @@ class GoalPictures {
     return values;
   }
   [[nodiscard]] std::vector<double> compute_final_distances(const HomingStrategy& strategy) {
-    const auto stages = surveys_.stages(strategy);
+    const auto stages = surveys_.survey_stages(strategy);
     std::vector<double> values;
     for (const std::uint32_t end : final_places(stages, goal_, survey_options(arena_))) {
       values.push_back(distance(position(), arena_.currents.views[end].pose.position()));
@@ -265,7 +265,7 @@ void draw_surface(const Arena& arena, const GoalPictures& of, Reproduction& resu
 }  // namespace
 
 void reproduce_goal_figures(ArenaSurveys& surveys, Reproduction& result) {
-  GoalPictures of(surveys, choose_goal(surveys.published(2)));
+  GoalPictures of(surveys, choose_goal(surveys.survey_published(2)));
   draw_vectors(of, result);
   draw_stages(of, result);
   draw_areas_of_rules(of, result);

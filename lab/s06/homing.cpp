@@ -33,12 +33,13 @@ void draw_homeward(ArenaSurveys& surveys, Executor& executor, Reproduction& resu
   const double spacing_m = surveys.arena().options.spacing_m;
   viewer::LinePlot by_highest = make_homeward_plot("One home vector, no iteration");
   for (const int highest : {1, 2, 3, 5, 10}) {
-    by_highest.series.push_back(make_homeward_series("K = " + std::to_string(highest),
-                                                     surveys.published(highest, 0), spacing_m));
+    by_highest.series.push_back(make_homeward_series(
+        "K = " + std::to_string(highest), surveys.survey_published(highest, 0), spacing_m));
   }
   by_highest.series.push_back(
-      make_homeward_series("expected images", surveys.expected_images(), spacing_m));
-  by_highest.series.push_back(make_homeward_series("our rule, K = 10", surveys.own(10), spacing_m));
+      make_homeward_series("expected images", surveys.survey_expected_images(), spacing_m));
+  by_highest.series.push_back(
+      make_homeward_series("our rule, K = 10", surveys.survey_own(10), spacing_m));
   add_plot(result, "figure_10_homeward.svg",
            "[S06] figure 10a: how far home vectors point home, by the distance: few frequencies "
            "from afar, many close by.",
@@ -70,10 +71,10 @@ void draw_homeward(ArenaSurveys& surveys, Executor& executor, Reproduction& resu
               "average homeward component at " + format_centimetres(away_m) + ", " + what, value,
               "");
     };
-    add("k2", "K = 2, no iteration", at(surveys.published(2, 0)));
-    add("k10", "K = 10, no iteration", at(surveys.published(10, 0)));
-    add("expected_images", "expected images", at(surveys.expected_images()));
-    add("own", "our rule, K = 10", at(surveys.own(10)));
+    add("k2", "K = 2, no iteration", at(surveys.survey_published(2, 0)));
+    add("k10", "K = 10, no iteration", at(surveys.survey_published(10, 0)));
+    add("expected_images", "expected images", at(surveys.survey_expected_images()));
+    add("own", "our rule, K = 10", at(surveys.survey_own(10)));
   }
 }
 
@@ -86,7 +87,7 @@ std::vector<double> accepted_distances() {
 viewer::Series make_area_series(ArenaSurveys& surveys, const HomingStrategy& strategy) {
   return {.label = strategy.label,
           .x = accepted_distances(),
-          .y = surveys.areas(strategy, accepted_distances()),
+          .y = surveys.compute_areas(strategy, accepted_distances()),
           .style = viewer::SeriesStyle::lines};
 }
 
@@ -120,7 +121,7 @@ void draw_areas(ArenaSurveys& surveys, Reproduction& result) {
     single.series.push_back(make_area_series(surveys, published_strategy({highest})));
   }
   single.series.push_back(make_area_series(surveys, expected_image_strategy()));
-  single.series.push_back(make_no_run_series(surveys.expected_images()));
+  single.series.push_back(make_no_run_series(surveys.survey_expected_images()));
   add_plot(result, "figure_11_areas.svg",
            "[S06] figure 11: mean number of places from which runs end near the goal.", single);
 

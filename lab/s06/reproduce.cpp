@@ -83,7 +83,7 @@ ReproductionPlan plan_s06(const Experiments& context) {
   ReproductionPlan plan{
       {6.0, [=] { arenas->record_first(); }},
       {4.0, [=] { reproduce_view_figures(*arenas->first, context); }},
-      {60.0 * all_goals, [=] { (void)arenas->surveys->expected_images(); }},
+      {60.0 * all_goals, [=] { (void)arenas->surveys->survey_expected_images(); }},
       {40.0 * all_goals,
        [=] { arenas->areas.push_back(measure_catchment_areas(*arenas->surveys)); }},
       {60.0 * all_goals, [=] { reproduce_homing_figures(*arenas->surveys, context); }},

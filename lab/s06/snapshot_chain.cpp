@@ -139,7 +139,7 @@ bool ChainFollower::is_last(std::size_t target) const noexcept {
   return direction_ == ChainDirection::forward ? target + 1 == chain_.size() : target == 0;
 }
 
-std::size_t ChainFollower::next(std::size_t target) const noexcept {
+std::size_t ChainFollower::next_snapshot(std::size_t target) const noexcept {
   return direction_ == ChainDirection::forward ? target + 1 : target - 1;
 }
 
@@ -148,7 +148,7 @@ void ChainFollower::aim_at_next(const Pose2& target_from_robot) {
                                      ? chain_[*target_ + 1].previous_from_this
                                      : inverse(chain_[*target_].previous_from_this);
   target_from_robot_ = inverse(target_from_next) * target_from_robot;
-  target_ = next(*target_);
+  target_ = next_snapshot(*target_);
   steps_to_target_ = 0;
   way_m_ = length(*target_from_robot_);
   max_steps_to_target_ = 3 + 3 * static_cast<int>(std::ceil(way_m_ / pursuit_options_.max_step_m));
@@ -193,7 +193,7 @@ bool ChainFollower::aim_at_next_if_reached(const HomingView& current, const Home
       (!contradicts && length(*target_from_robot_) <= std::max(near_m, 0.5 * way_m_));
   const bool is_near = plausible && vector.length() < switch_length;
   const bool passed = plausible && !is_near &&
-                      image_difference(chain_[next(*target_)].view, current) <
+                      image_difference(chain_[next_snapshot(*target_)].view, current) <
                           image_difference(chain_[*target_].view, current);
   const bool is_there_by_odometry =
       contradicts && length(*target_from_robot_) < r_m * switch_length;

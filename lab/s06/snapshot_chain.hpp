@@ -110,7 +110,7 @@ class ChainFollower {
 
  private:
   [[nodiscard]] bool is_last(std::size_t target) const noexcept;
-  [[nodiscard]] std::size_t next(std::size_t target) const noexcept;
+  [[nodiscard]] std::size_t next_snapshot(std::size_t target) const noexcept;
   void start_at_nearest_snapshot(const HomingView& current);
   bool aim_at_next_if_reached(const HomingView& current, const HomeVector& vector);
   std::optional<ChainDecision> follow_odometry_if_needed(const HomeVector& vector);

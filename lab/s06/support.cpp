@@ -8,7 +8,7 @@ constexpr std::array<int, 6> own_stages{1, 2, 3, 4, 6, 10};
 constexpr int own_rounds = 3;
 constexpr int own_highest = 10;
 
-std::string joined(std::span<const int> numbers) {
+std::string join_numbers(std::span<const int> numbers) {
   std::string text;
   for (const int number : numbers) {
     text += (text.empty() ? "" : ", ") + std::to_string(number);
@@ -19,7 +19,7 @@ std::string joined(std::span<const int> numbers) {
 }  // namespace
 
 HomingStrategy published_strategy(std::vector<int> highest) {
-  std::string label = "K = " + joined(highest);
+  std::string label = "K = " + join_numbers(highest);
   return {std::move(label), HomingStrategy::Rule::published, std::move(highest)};
 }
 
@@ -44,16 +44,16 @@ const HomingSurvey& ArenaSurveys::survey(const std::string& key, const Rule& rul
   return surveys_.emplace(key, survey_arena(arena_, rule, executor_, every_)).first->second;
 }
 
-const HomingSurvey& ArenaSurveys::published(int highest, int iterations) {
+const HomingSurvey& ArenaSurveys::survey_published(int highest, int iterations) {
   const std::string key = "published " + std::to_string(highest) + " " + std::to_string(iterations);
   return survey(key, published_homing_options(highest, iterations));
 }
 
-const HomingSurvey& ArenaSurveys::own(int highest) {
+const HomingSurvey& ArenaSurveys::survey_own(int highest) {
   return survey("own " + std::to_string(highest), FourierHomingOptions{.highest = highest});
 }
 
-const HomingSurvey& ArenaSurveys::own_without_search(int highest) {
+const HomingSurvey& ArenaSurveys::survey_own_without_search(int highest) {
   const FourierHomingOptions coarse{.highest = highest, .displacement_search = false};
   const FourierHomingOptions fine{.highest = own_highest, .displacement_search = false};
   const auto rule = [&](std::size_t goal, std::size_t place) {
@@ -65,35 +65,36 @@ const HomingSurvey& ArenaSurveys::own_without_search(int highest) {
   return survey("own again " + std::to_string(highest), HomingRule(rule));
 }
 
-const HomingSurvey& ArenaSurveys::expected_images() {
+const HomingSurvey& ArenaSurveys::survey_expected_images() {
   return survey("expected images", expected_image_homing_);
 }
 
-std::vector<const HomingSurvey*> ArenaSurveys::stages(const HomingStrategy& strategy) {
-  if (strategy.rule == HomingStrategy::Rule::expected_images) return {&expected_images()};
+std::vector<const HomingSurvey*> ArenaSurveys::survey_stages(const HomingStrategy& strategy) {
+  if (strategy.rule == HomingStrategy::Rule::expected_images) return {&survey_expected_images()};
   std::vector<const HomingSurvey*> stages;
   if (strategy.rule == HomingStrategy::Rule::own) {
-    stages.push_back(&own(own_highest));
+    stages.push_back(&survey_own(own_highest));
     for (int round = 0; round < own_rounds; ++round) {
-      for (const int highest : own_stages) stages.push_back(&own_without_search(highest));
+      for (const int highest : own_stages) stages.push_back(&survey_own_without_search(highest));
     }
-    stages.push_back(&own(own_highest));
+    stages.push_back(&survey_own(own_highest));
   }
-  for (const int highest : strategy.highest) stages.push_back(&published(highest));
+  for (const int highest : strategy.highest) stages.push_back(&survey_published(highest));
   return stages;
 }
 
-std::vector<float> ArenaSurveys::distances(const HomingStrategy& strategy) {
-  return final_distances(stages(strategy), survey_options(arena_), executor_);
+std::vector<float> ArenaSurveys::compute_final_distances(const HomingStrategy& strategy) {
+  return final_distances(survey_stages(strategy), survey_options(arena_), executor_);
 }
 
-std::vector<float> ArenaSurveys::distances(std::span<const HomingSurvey* const> stages) {
+std::vector<float> ArenaSurveys::compute_final_distances(
+    std::span<const HomingSurvey* const> stages) {
   return final_distances(stages, survey_options(arena_), executor_);
 }
 
-std::vector<double> ArenaSurveys::areas(const HomingStrategy& strategy,
-                                        std::span<const double> accepted_m) {
-  const auto stages_of_it = stages(strategy);
+std::vector<double> ArenaSurveys::compute_areas(const HomingStrategy& strategy,
+                                                std::span<const double> accepted_m) {
+  const auto stages_of_it = survey_stages(strategy);
   return mean_catchment_areas(final_distances(stages_of_it, survey_options(arena_), executor_),
                               stages_of_it[0]->goals.size(), accepted_m);
 }

@@ -46,19 +46,20 @@ class ArenaSurveys {
 
   [[nodiscard]] const Arena& arena() const noexcept { return arena_; }
   [[nodiscard]] std::size_t goals_every() const noexcept { return every_; }
-  [[nodiscard]] const HomingSurvey& published(int highest, int iterations = s06_iterations);
+  [[nodiscard]] const HomingSurvey& survey_published(int highest, int iterations = s06_iterations);
   /// Surveys home vectors with default options.
-  [[nodiscard]] const HomingSurvey& own(int highest);
+  [[nodiscard]] const HomingSurvey& survey_own(int highest);
   /// Surveys without the search of displacements; K = 10 instead of `highest` where it looks like
   /// home.
-  [[nodiscard]] const HomingSurvey& own_without_search(int highest);
-  [[nodiscard]] const HomingSurvey& expected_images();
-  [[nodiscard]] std::vector<const HomingSurvey*> stages(const HomingStrategy& strategy);
+  [[nodiscard]] const HomingSurvey& survey_own_without_search(int highest);
+  [[nodiscard]] const HomingSurvey& survey_expected_images();
+  [[nodiscard]] std::vector<const HomingSurvey*> survey_stages(const HomingStrategy& strategy);
   /// Returns the final distances of all runs, goal by goal.
-  [[nodiscard]] std::vector<float> distances(const HomingStrategy& strategy);
-  [[nodiscard]] std::vector<float> distances(std::span<const HomingSurvey* const> stages);
-  [[nodiscard]] std::vector<double> areas(const HomingStrategy& strategy,
-                                          std::span<const double> accepted_m);
+  [[nodiscard]] std::vector<float> compute_final_distances(const HomingStrategy& strategy);
+  [[nodiscard]] std::vector<float> compute_final_distances(
+      std::span<const HomingSurvey* const> stages);
+  [[nodiscard]] std::vector<double> compute_areas(const HomingStrategy& strategy,
+                                                  std::span<const double> accepted_m);
 
  private:
   template <typename Rule>

@@ -19,7 +19,7 @@ namespace {
 
 constexpr int top = s06_components - 1;  // highest frequency of a view of 72 pixels
 
-TurnCorrelation correlation_of(const HomingView& home, const HomingView& current, int highest) {
+TurnCorrelation correlate_views(const HomingView& home, const HomingView& current, int highest) {
   TurnCorrelation correlation;
   correlation.highest = highest;
   for (int k = 1; k <= highest; ++k) {
@@ -58,7 +58,7 @@ void draw_correlation(const Arena& arena, Reproduction& result) {
   const HomingView& home = arena.homes.views[shown].view;
   const HomingView& current = arena.currents.views[shown].view;
   const double max_correlation = std::sqrt(energy(home) * energy(current));
-  const TurnCorrelation all = correlation_of(home, current, top);
+  const TurnCorrelation all = correlate_views(home, current, top);
   const double truth = true_turn(arena, shown, shown);
 
   viewer::LinePlot terms{.title = "Terms of the correlation; true turn " +
@@ -89,7 +89,7 @@ void draw_correlation(const Arena& arena, Reproduction& result) {
   viewer::Series series;
   for (int highest = 1; highest <= 20; ++highest) {
     std::array<float, 1> turn{};
-    if (find_highest_peaks(correlation_of(home, current, highest), turn) == 0) continue;
+    if (find_highest_peaks(correlate_views(home, current, highest), turn) == 0) continue;
     series.add(highest, degrees(angle_difference(static_cast<double>(turn[0]), truth)));
   }
   maxima.series.push_back(std::move(series));
@@ -326,7 +326,7 @@ void draw_headings(const Arena& arena, Executor& executor, Reproduction& result)
       arena, shown.size() + 1, executor, [&](std::size_t g, std::size_t p, Values& values) {
         const double truth = true_turn(arena, g, p);
         TurnCorrelation correlation =
-            correlation_of(arena.homes.views[g].view, arena.currents.views[p].view, shown.back());
+            correlate_views(arena.homes.views[g].view, arena.currents.views[p].view, shown.back());
         for (std::size_t s = 0; s < shown.size(); ++s) {
           correlation.highest = shown[s];
           const double error = static_cast<double>(sequential_heading(correlation)) - truth;
@@ -374,7 +374,7 @@ void reproduce_heading_with_pose_noise(const Arena& arena, Reproduction& result)
   const std::size_t places = arena.homes.views.size();
   for (std::size_t i = 0; i < places; ++i) {
     const double turned = static_cast<double>(sequential_heading(
-        correlation_of(arena.homes.views[i].view, arena.currents.views[i].view, 15)));
+        correlate_views(arena.homes.views[i].view, arena.currents.views[i].view, 15)));
     const double error = turned - true_turn(arena, i, i);
     cosines += std::cos(error);
     sines += std::sin(error);

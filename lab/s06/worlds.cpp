@@ -21,7 +21,7 @@ namespace panonav::lab {
 namespace {
 
 std::size_t count_successes(const std::vector<HomingRun>& runs) {
-  return count_where(runs, [](const HomingRun& run) { return run.succeeds(homing_success_m); });
+  return count_where(runs, [](const HomingRun& run) { return run.is_success(homing_success_m); });
 }
 
 viewer::MapPlot draw_failed_run(const HomingPlace& place, const HomingRun& run,
@@ -57,7 +57,7 @@ viewer::MapPlot draw_all_runs(const HomingPlace& place, const std::vector<Homing
   viewer::MapLayer failed{.label = "did not", .colour = viewer::PlotColour::vermilion};
   viewer::MapLayer goals{.label = "goals", .colour = viewer::PlotColour::black};
   for (const HomingRun& run : runs) {
-    (run.succeeds(homing_success_m) ? reached : failed).lines.push_back(positions_of(run.path));
+    (run.is_success(homing_success_m) ? reached : failed).lines.push_back(positions_of(run.path));
     goals.squares.push_back(run.goal.position());
   }
   map.layers.push_back(std::move(reached));
@@ -95,7 +95,7 @@ struct Ends {
 }  // namespace
 
 std::string explain_failure(const HomingRun& run) {
-  if (run.succeeds(homing_success_m)) return "";
+  if (run.is_success(homing_success_m)) return "";
   const std::string where = std::to_string(std::lround(100.0 * run.end_distance_m)) + " cm off";
   switch (run.end) {
     case HomingRunEnd::blocked:
@@ -166,7 +166,7 @@ void reproduce_homing_in_world(const std::string& name, const Experiments& conte
            "Homing runs in " + name + " from starts within 1.5 m of random goals",
            draw_all_runs(place, runs, name));
   for (std::size_t i = 0; i < runs.size(); ++i) {
-    if (runs[i].succeeds(homing_success_m)) continue;
+    if (runs[i].is_success(homing_success_m)) continue;
     const viewer::MapPlot map = draw_failed_run(place, runs[i], i);
     const std::string file = prefix + "_failure_" + std::to_string(i) + ".svg";
     add_plot(reproduction, file, name + ", " + map.title, map);

@@ -57,7 +57,7 @@ std::size_t shown_column(std::size_t i, std::size_t columns) {
   return (2 * columns + columns / 2 - i) % columns;
 }
 
-viewer::PicturePlot panorama_plot(const LabRoute& lab, const std::string& title) {
+viewer::PicturePlot make_panorama_plot(const LabRoute& lab, const std::string& title) {
   const auto columns = static_cast<std::size_t>(lab.route.columns());
   viewer::PicturePlot plot{.title = title,
                            .x_label = "azimuth from straight ahead [degrees], left positive",
@@ -86,7 +86,7 @@ void draw_route_panorama(const LabRoute& lab, Reproduction& result) {
   add_plot(result, file,
            "The route panorama of the straight path [Y03 figure 3], the start at the bottom. "
            "Things ahead and behind keep their place, things beside the path wander by.",
-           panorama_plot(lab, "Route panorama: each row is the horizon at one place"));
+           make_panorama_plot(lab, "Route panorama: each row is the horizon at one place"));
 }
 
 void draw_virtual_view(const LabRoute& lab, const LineDrive& beside, Reproduction& result) {
@@ -97,7 +97,7 @@ void draw_virtual_view(const LabRoute& lab, const LineDrive& beside, Reproductio
   std::vector<RouteCrossing> crossings(columns);
   find_crossings(lab.route.poses(), 0, pose.position(), equal_directions(columns), crossings);
   viewer::PicturePlot plot =
-      panorama_plot(lab, "Light blue: where a viewpoint beside the path finds what it sees");
+      make_panorama_plot(lab, "Light blue: where a viewpoint beside the path finds what it sees");
   // Directions in the world; the path is straight, so that its heading turns all lines alike.
   const double turn =
       lab.world_from_path.heading_rad * static_cast<double>(columns) / radians(360.0);

@@ -15,7 +15,7 @@ namespace panonav::lab {
 
 namespace {
 
-std::vector<float> slopes(std::span<const float> line) {
+std::vector<float> compute_slopes(std::span<const float> line) {
   std::vector<float> result(line.size());
   for (std::size_t c = 0; c < line.size(); ++c) {
     const float left = line[(c + line.size() - 1) % line.size()];
@@ -26,7 +26,7 @@ std::vector<float> slopes(std::span<const float> line) {
 }
 
 // Returns local maxima of the slope's size that exceed its mean; the strongest `max_count`.
-std::vector<int> edge_columns(std::span<const float> edges, int max_count) {
+std::vector<int> find_edge_columns(std::span<const float> edges, int max_count) {
   double mean = 0.0;
   for (const float edge : edges)
     mean += static_cast<double>(std::abs(edge)) / static_cast<double>(edges.size());
@@ -83,7 +83,8 @@ RouteContours::RouteContours(const RoutePanorama& route, double margin_m)
   }
   spacing_m_ = route.length_m() / static_cast<double>(route.size() - 1);
   for (std::size_t i = 0; i < route.size(); ++i) {
-    const auto line = slopes(smooth_line(world_line(route, i), smoothing_deg * columns_ / 360.0));
+    const auto line =
+        compute_slopes(smooth_line(world_line(route, i), smoothing_deg * columns_ / 360.0));
     edges_.insert(edges_.end(), line.begin(), line.end());
   }
 }
@@ -102,7 +103,7 @@ float RouteContours::edge(double along, double azimuth) const noexcept {
   return (1.0F - fy) * ((1.0F - fx) * a[c0] + fx * a[c1]) + fy * ((1.0F - fx) * b[c0] + fx * b[c1]);
 }
 
-std::vector<RouteCrossing> RouteContours::curve(Point2 viewpoint) const {
+std::vector<RouteCrossing> RouteContours::predict_curve(Point2 viewpoint) const {
   std::vector<RouteCrossing> crossings(static_cast<std::size_t>(columns_));
   find_crossings(poses_, 0, viewpoint, directions_, crossings);
   return crossings;
@@ -188,10 +189,10 @@ struct RouteContours::Term {
 
 // Returns the equations of the contours along the path [Y03 eq. 5], weighted by how well an azimuth
 // determines the place.
-std::vector<RouteContours::Term> RouteContours::path_terms(const RouteContourFix& fix) const {
+std::vector<RouteContours::Term> RouteContours::make_path_terms(const RouteContourFix& fix) const {
   const auto size = static_cast<long long>(columns_);
   const double columns_per_rad = columns_ / (2.0 * std::numbers::pi);
-  const auto crossings = curve(fix.pose.position());
+  const auto crossings = predict_curve(fix.pose.position());
   std::vector<Term> terms;
   for (std::size_t i = 0; i < fix.columns.size(); ++i) {
     const double azimuth = fix.columns[i] + fix.pose.heading_rad * columns_per_rad;
@@ -273,7 +274,7 @@ bool RouteContours::fit_pose(RouteContourFix& fix) const {
     int moves = 0;
 
     bool linearise(DenseEquations<3>& equations) const {
-      std::vector<Term> terms = contours.path_terms(fix);
+      std::vector<Term> terms = contours.make_path_terms(fix);
       const std::size_t along_terms = terms.size();
       if (along_terms < min_points) return false;
       contours.add_heading_terms(fix, terms);
@@ -300,7 +301,7 @@ std::optional<RouteContourFix> RouteContours::fit(std::span<const float> line,
     throw ContractError("values of the line", static_cast<double>(line.size()),
                         std::to_string(columns_));
   }
-  const auto edges = slopes(smooth_line(line, smoothing_deg * columns_ / 360.0));
+  const auto edges = compute_slopes(smooth_line(line, smoothing_deg * columns_ / 360.0));
   std::vector<bool> joined;
   RouteContourFix fix = start(edges, predicted, joined);
   if (fix.columns.size() < min_points) return std::nullopt;
@@ -318,14 +319,14 @@ std::optional<RouteContourFix> RouteContours::fit(std::span<const float> line,
 // `joined`: whether a control point and the one before lie on the same side of the path.
 RouteContourFix RouteContours::start(std::span<const float> edges, const Pose2& predicted,
                                      std::vector<bool>& joined) const {
-  const auto crossings = curve(predicted.position());
+  const auto crossings = predict_curve(predicted.position());
   const double turn = predicted.heading_rad * columns_ / (2.0 * std::numbers::pi);
   const auto size = static_cast<long long>(columns_);
   RouteContourFix fix;
   fix.pose = predicted;
   const double margin = margin_m_ / spacing_m_;
   bool left = false;
-  for (const int column : edge_columns(edges, max_control_points)) {
+  for (const int column : find_edge_columns(edges, max_control_points)) {
     const double azimuth = column + turn;
     const auto c = static_cast<std::size_t>(((std::llround(azimuth) % size) + size) % size);
     const RouteCrossing& crossing = crossings[c];

@@ -54,14 +54,14 @@ class RouteContours {
   void move(std::vector<ContourPoint>& contour, const std::vector<ContourPoint>& other,
             const std::vector<int>& columns, std::span<const float> edges,
             const std::vector<bool>& joined, double step) const;
-  [[nodiscard]] std::vector<RouteCrossing> curve(Point2 viewpoint) const;
+  [[nodiscard]] std::vector<RouteCrossing> predict_curve(Point2 viewpoint) const;
   [[nodiscard]] double pair_energy(const ContourPoint& before, const ContourPoint& at,
                                    double interval, bool joined, double next_slope) const;
   [[nodiscard]] RouteContourFix start(std::span<const float> edges, const Pose2& predicted,
                                       std::vector<bool>& joined) const;
   void converge(RouteContourFix& fix, std::span<const float> edges,
                 const std::vector<bool>& joined) const;
-  [[nodiscard]] std::vector<Term> path_terms(const RouteContourFix& fix) const;
+  [[nodiscard]] std::vector<Term> make_path_terms(const RouteContourFix& fix) const;
   void add_heading_terms(const RouteContourFix& fix, std::vector<Term>& terms) const;
   [[nodiscard]] bool fill_equations(const std::vector<Term>& terms, std::size_t along_terms,
                                     RouteContourFix& fix, DenseEquations<3>& equations) const;

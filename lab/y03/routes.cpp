@@ -201,7 +201,7 @@ RoutePanorama record_route(const RouteScene& place, const std::vector<Pose2>& wa
   return route;
 }
 
-Pose2 DriftingWheels::true_step(const Pose2& commanded, Random& random) const {
+Pose2 DriftingWheels::execute(const Pose2& commanded, Random& random) const {
   const double travel_m = travel * std::hypot(commanded.x_m, commanded.y_m);
   const double turned = turn * commanded.heading_rad;
   const Pose2 step{travel_m * std::cos(0.5 * turned), travel_m * std::sin(0.5 * turned), turned};
@@ -263,7 +263,7 @@ RouteRun repeat_route(const RouteScene& place, RouteTracker tracker, const Route
     }
     commanded = *free_step;
     run.turned_aside += static_cast<std::size_t>(commanded != planned);
-    const Pose2 there = robot * wheels.true_step(commanded, random);
+    const Pose2 there = robot * wheels.execute(commanded, random);
     // A robot that its wheels led astray touches something: it turns, but does not move.
     if (has_clear_line(place, robot.position(), there.position())) {
       robot = there;

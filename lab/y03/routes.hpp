@@ -41,7 +41,7 @@ struct DriftingWheels {
   double travel = 1.0;  ///< true over commanded
   double turn = 1.0;
   OdometryNoise noise;  ///< on top; only the random part
-  [[nodiscard]] Pose2 true_step(const Pose2& commanded, Random& random) const;
+  [[nodiscard]] Pose2 execute(const Pose2& commanded, Random& random) const;
 };
 
 struct RouteRunOptions {

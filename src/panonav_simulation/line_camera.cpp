@@ -18,7 +18,7 @@ double radius_px(const Camera& camera, PixelPoint point) {
   return std::hypot(point.u_px - camera.centre.u_px, point.v_px - camera.centre.v_px);
 }
 
-double radius_at(const Camera& camera, double elevation_rad) {
+double compute_radius_px(const Camera& camera, double elevation_rad) {
   const auto point = project(camera, {std::cos(elevation_rad), 0.0, std::sin(elevation_rad)});
   if (!point) throw ContractError("the mirror camera does not see the horizon");
   return radius_px(camera, *point);
@@ -27,7 +27,7 @@ double radius_at(const Camera& camera, double elevation_rad) {
 }  // namespace
 
 LineCamera make_line_camera(double height_m, int columns) {
-  const Camera camera = simulated_mirror_camera();
+  const Camera camera = make_simulated_mirror_camera();
   const HorizonScanlineOptions line{.columns = columns};
   UnwarperOptions cylinder{.rows = 3, .columns = 2 * columns};
   cylinder.elevations = ElevationBand{-line.half_band_rad, line.half_band_rad};
@@ -36,8 +36,8 @@ LineCamera make_line_camera(double height_m, int columns) {
   result.spread_rad = 1.0 / (camera.rim_radius_px * 2.0 / 3.0) / rays_per_axis;
   // An unwarper interpolates between the pixels next to a point.
   constexpr double neighbours_px = 1.5;
-  const double low = radius_at(camera, -line.half_band_rad);
-  const double high = radius_at(camera, line.half_band_rad);
+  const double low = compute_radius_px(camera, -line.half_band_rad);
+  const double high = compute_radius_px(camera, line.half_band_rad);
   const HyperboloidalMirror mirror(camera);
   for (int v = 0; v < camera.image_size.height; ++v) {
     for (int u = 0; u < camera.image_size.width; ++u) {

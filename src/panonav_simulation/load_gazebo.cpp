@@ -28,7 +28,7 @@ Affine3 inverse(const Affine3& b_from_a) {
 
 // Normalises names: "Ground Plane" and ".../ground_plane" are one: Gazebo's database and its
 // servers differ.
-std::string well_known_name(std::string_view uri) {
+std::string normalise_model_name(std::string_view uri) {
   std::string name(uri.substr(uri.find_last_of('/') + 1));
   for (auto at = name.find("%20"); at != std::string::npos; at = name.find("%20"))
     name.replace(at, 3, "_");
@@ -38,7 +38,7 @@ std::string well_known_name(std::string_view uri) {
 
 // Returns one of the two models of Gazebo's database that nearly all worlds take from there; else
 // null.
-pugi::xml_node well_known_model(std::string_view uri) {
+pugi::xml_node find_well_known_model(std::string_view uri) {
   static const pugi::xml_document sun = parse_xml(
       "<sdf><light name='sun' type='directional'><pose>0 0 10 0 0 0</pose>"
       "<diffuse>0.8 0.8 0.8 1</diffuse><direction>-0.5 0.1 -0.9</direction></light></sdf>");
@@ -46,7 +46,7 @@ pugi::xml_node well_known_model(std::string_view uri) {
       "<sdf><model name='ground_plane'><link name='link'><visual name='visual'><geometry><plane>"
       "<normal>0 0 1</normal><size>100 100</size></plane></geometry><material><script>"
       "<name>Gazebo/Grey</name></script></material></visual></link></model></sdf>");
-  const std::string name = well_known_name(uri);
+  const std::string name = normalise_model_name(uri);
   return name == "sun"            ? sun.document_element()
          : name == "ground_plane" ? ground.document_element()
                                   : pugi::xml_node();
@@ -65,8 +65,8 @@ std::optional<Affine3> scope_from_frame(pugi::xml_node scope, std::string_view n
   for (const pugi::xml_node& part : scope) {
     if (part.attribute("name").value() != name.substr(0, split)) continue;
     if (!has_name_of(part, {"link", "model", "frame", "joint"})) continue;
-    std::string base(frame_of_pose(part));
-    if (base.empty() && has_name_of(part, {"joint"})) base = value_of(part, "child");
+    std::string base(find_pose_frame(part));
+    if (base.empty() && has_name_of(part, {"joint"})) base = child_text(part, "child");
     if (base.empty() && has_name_of(part, {"frame"})) base = part.attribute("attached_to").value();
     const auto scope_from_base = scope_from_frame(scope, base, depth + 1);
     if (!scope_from_base) return std::nullopt;
@@ -171,13 +171,13 @@ class WorldReader {
  private:
   // Returns the pose of a part; `world_from_parent` where it names no frame.
   Affine3 world_from(pugi::xml_node part, const Affine3& world_from_parent, const Place& place) {
-    const std::string_view frame = frame_of_pose(part);
+    const std::string_view frame = find_pose_frame(part);
     const Affine3 written = read_pose(pose_element(part));
     if (frame.empty()) return world_from_parent * written;
     if (const auto scope_from_base = scope_from_frame(place.scope, frame))
       return place.world_from_scope * *scope_from_base * written;
-    context_.warn(place.origin.object, "the pose of " + in_quotes(part.attribute("name").value()) +
-                                           " is relative to " + in_quotes(frame) +
+    context_.warn(place.origin.object, "the pose of " + quote(part.attribute("name").value()) +
+                                           " is relative to " + quote(frame) +
                                            ", which is not there; taken relative to its parent");
     return world_from_parent * written;
   }
@@ -191,11 +191,11 @@ class WorldReader {
   void add_part(pugi::xml_node part, pugi::xml_node placed_by, const Place& place) {
     const std::string kind = part.name();
     const std::string& object = place.origin.object;
-    std::string name = value_of(placed_by, "name");
+    std::string name = child_text(placed_by, "name");
     if (name.empty()) name = part.attribute("name").value();
-    const std::string thing = kind + " " + in_quotes(name);
+    const std::string thing = kind + " " + quote(name);
     if (kind == "include") {
-      context_.try_to_add(kind + " " + in_quotes(value_of(part, "uri")), object,
+      context_.try_to_add(kind + " " + quote(child_text(part, "uri")), object,
                           [&] { add_include(part, place); });
     } else if (kind == "model") {
       context_.try_to_add(thing, object, [&] { add_model(part, placed_by, name, place); });
@@ -215,12 +215,12 @@ class WorldReader {
     constexpr int max_includes = 100000;
     const auto found = context_.find(uri, place.origin);
     if (!found) {
-      const pugi::xml_node known = well_known_model(uri);
+      const pugi::xml_node known = find_well_known_model(uri);
       if (!known) throw Unusable{"it was not found in " + context_.files.places()};
       return {known, {}};
     }
     std::error_code code;
-    fs::path file = fs::is_directory(*found, code) ? GazeboFiles::description_in(*found) : *found;
+    fs::path file = fs::is_directory(*found, code) ? GazeboFiles::find_description(*found) : *found;
     file = file.lexically_normal();
     if (std::ranges::find(opened_, file) != opened_.end())
       throw Unusable{"it includes itself, directly or through other models"};
@@ -231,7 +231,7 @@ class WorldReader {
   }
 
   void add_include(pugi::xml_node include, const Place& place) {
-    const auto [root, file] = open_include(value_of(include, "uri"), place);
+    const auto [root, file] = open_include(child_text(include, "uri"), place);
     Place inside = place;
     if (!file.empty()) inside.origin.directory = file.parent_path();
     // Gazebo takes the first as well.
@@ -251,12 +251,12 @@ class WorldReader {
     if (inside.origin.object.empty()) inside.origin.object = name;
     inside.world_from_scope =
         world_from(pose_element(placed_by) ? placed_by : model, place.world_from_scope, place);
-    std::string anchor = value_of(placed_by, "placement_frame");
+    std::string anchor = child_text(placed_by, "placement_frame");
     if (anchor.empty()) anchor = model.attribute("placement_frame").value();
     if (const auto model_from_anchor = scope_from_frame(model, anchor))
       inside.world_from_scope = inside.world_from_scope * inverse(*model_from_anchor);
     for (const pugi::xml_node& link : model.children("link")) {
-      context_.try_to_add("link " + in_quotes(link.attribute("name").value()), inside.origin.object,
+      context_.try_to_add("link " + quote(link.attribute("name").value()), inside.origin.object,
                           [&] { add_link(link, inside); });
     }
     add_parts(model, inside);
@@ -268,7 +268,7 @@ class WorldReader {
       if (!has_name_of(part, {"visual", "light"})) continue;
       const std::string kind = part.name();
       context_.try_to_add(
-          kind + " " + in_quotes(part.attribute("name").value()), place.origin.object, [&] {
+          kind + " " + quote(part.attribute("name").value()), place.origin.object, [&] {
             const Affine3 world_from_part = world_from(part, world_from_link, place);
             if (kind == "light") return add_light(part, world_from_part);
             add_visual(part, world_from_part, place);
@@ -291,8 +291,8 @@ class WorldReader {
         brightness(read_colour(light, "diffuse").value_or(Colour{1.0F, 1.0F, 1.0F})) *
         static_cast<float>(read_number(light, "intensity", 1.0));
     if (std::string_view(light.attribute("type").value()) == "directional") {
-      const auto d = value_of(light, "direction").empty() ? std::vector{0.0, 0.0, -1.0}
-                                                          : read_size(light, "direction", 3);
+      const auto d = child_text(light, "direction").empty() ? std::vector{0.0, 0.0, -1.0}
+                                                            : read_size(light, "direction", 3);
       Affine3 turn = world_from_light;
       turn.translation = {};
       const Vector3 away = turn * Vector3{d[0], d[1], d[2]};

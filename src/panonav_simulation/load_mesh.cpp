@@ -163,7 +163,7 @@ class ColladaHoles {
     if (has_name(element, "polygons")) polygons_.push_back(element);
     const bool has_children =
         element.find_child([](pugi::xml_node child) { return child.type() == pugi::node_element; });
-    if (!has_children) return set_text(element, text_of(element));
+    if (!has_children) return set_text(element, element_text(element));
     for (const pugi::xml_node& child : element) {
       if (child.type() == pugi::node_element) collect(child);
     }
@@ -190,11 +190,11 @@ class ColladaHoles {
   void join_holes(pugi::xml_node polygons) {
     const pugi::xml_node array =
         source_of(source_of(polygons, "VERTEX"), "POSITION").child("float_array");
-    positions_ = array ? numbers_of(text_of(array)) : std::nullopt;
+    positions_ = array ? parse_numbers(element_text(array)) : std::nullopt;
     inputs_ = 1;
     vertex_input_ = 0;
     for (const pugi::xml_node& input : polygons.children("input")) {
-      const auto offset = numbers_of(input.attribute("offset").value());
+      const auto offset = parse_numbers(input.attribute("offset").value());
       if (!offset || offset->size() != 1) continue;
       if (!(offset->front() >= 0.0 && offset->front() < 32.0)) return;
       const auto number = static_cast<std::size_t>(offset->front());
@@ -221,7 +221,7 @@ class ColladaHoles {
   }
 
   [[nodiscard]] Outline corners(pugi::xml_node ring) const {
-    const auto indices = numbers_of(text_of(ring)).value_or(std::vector<double>{});
+    const auto indices = parse_numbers(element_text(ring)).value_or(std::vector<double>{});
     Outline outline;
     for (std::size_t i = 0; i + inputs_ <= indices.size(); i += inputs_)
       outline.emplace_back(&indices[i], &indices[i] + inputs_);
@@ -284,7 +284,7 @@ class ColladaHoles {
   std::size_t vertex_input_ = 0;
 };
 
-std::optional<std::string> readable_collada(const fs::path& path) {
+std::optional<std::string> repair_collada(const fs::path& path) {
   try {
     const pugi::xml_document document = parse_xml(text_of_scene_file(path));
     const ColladaHoles joined(document.document_element());
@@ -327,7 +327,7 @@ std::vector<FileMesh> MeshLibrary::read_new(const fs::path& path, UpAxis up) {
   const aiScene* source = importer.ReadFile(path.string(), steps);
   const std::string fault = importer.GetErrorString();
   if (source == nullptr && lower_ending(path) == ".dae") {
-    if (const auto text = readable_collada(path))
+    if (const auto text = repair_collada(path))
       source = importer.ReadFileFromMemory(text->data(), text->size(), steps, "dae");
   }
   if (source == nullptr || source->mRootNode == nullptr)

@@ -91,7 +91,7 @@ FourierSignature first_components(const FourierSignature& signature, int compone
           signature.elevations()};
 }
 
-MappingRecording every_nth(const MappingRecording& recording, std::size_t n) {
+MappingRecording thin_recording(const MappingRecording& recording, std::size_t n) {
   require(n >= 1, "n", static_cast<double>(n), ">= 1");
   MappingRecording thinned;
   for (std::size_t i = 0; i < recording.truth.size(); i += n) {

@@ -48,7 +48,7 @@ struct MappingRecording {
 [[nodiscard]] FourierSignature first_components(const FourierSignature& signature, int components);
 
 /// Returns every n-th view.
-[[nodiscard]] MappingRecording every_nth(const MappingRecording& recording, std::size_t n);
+[[nodiscard]] MappingRecording thin_recording(const MappingRecording& recording, std::size_t n);
 
 /// A run through the mapper.
 struct MappedRecording {

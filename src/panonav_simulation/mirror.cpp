@@ -84,7 +84,7 @@ MirrorRay HyperboloidalMirror::trace(PixelPoint pixel) const {
   return ray;
 }
 
-Camera simulated_mirror_camera() {
+Camera make_simulated_mirror_camera() {
   Camera camera;
   camera.model = HyperboloidalModel{9.365, 7.804, 320.0};
   camera.image_size = {640, 480};
@@ -94,7 +94,7 @@ Camera simulated_mirror_camera() {
   return camera;
 }
 
-Camera simulated_dual_fisheye(std::uint64_t lens_seed, double baseline_m) {
+Camera make_simulated_dual_fisheye(std::uint64_t lens_seed, double baseline_m) {
   Camera camera;
   camera.image_size = {1280, 640};
   DualFisheyeModel model;

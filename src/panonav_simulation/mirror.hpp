@@ -56,12 +56,12 @@ class HyperboloidalMirror {
 /// Returns the mirror camera that the simulated robot carries: 640 x 480 pixels, the shape of
 /// [Y03]'s mirror at a third of its size (5 cm across, so that it suits the smallest scene), from
 /// 58 degrees below the horizon to 21 above.
-[[nodiscard]] Camera simulated_mirror_camera();
+[[nodiscard]] Camera make_simulated_mirror_camera();
 
 /// Returns a 360 degree camera of two fisheye lenses, 1280 x 640 pixels, 190 degrees each, the left
 /// one forward. `lens_seed` 0: lenses as drawn. Any other: as made, with centres up to 5 px off,
 /// axes and rolls up to 2 degrees, focal lengths up to 2.5 %, a distortion of their own (k3 and k5
 /// up to 0.01 and 0.002) and one of them up to a fifth darker.
-[[nodiscard]] Camera simulated_dual_fisheye(std::uint64_t lens_seed, double baseline_m = 0.0);
+[[nodiscard]] Camera make_simulated_dual_fisheye(std::uint64_t lens_seed, double baseline_m = 0.0);
 
 }  // namespace panonav::simulation

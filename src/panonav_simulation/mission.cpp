@@ -37,7 +37,7 @@ std::vector<FourierSignature> observe_all(const MissionPlace& place,
 }
 
 // Makes a memory without views whose scale just fits the largest magnitude of these.
-VisualMemory empty_memory(const std::vector<FourierSignature>& views) {
+VisualMemory make_empty_memory(const std::vector<FourierSignature>& views) {
   float largest = 0.0F;
   for (const FourierSignature& view : views) {
     largest = std::max(largest, *std::ranges::max_element(view.magnitudes().subspan(
@@ -120,7 +120,7 @@ FourierSignature see(const MissionPlace& place, const Pose2& pose, std::uint64_t
                            place.components);
 }
 
-RememberedPlace remember_grid(const MissionPlace& place, double spacing_m, std::uint64_t seed,
+RememberedPlace memorise_grid(const MissionPlace& place, double spacing_m, std::uint64_t seed,
                               Executor& executor) {
   Random random(seed, 1);
   std::vector<Pose2> poses;
@@ -130,7 +130,7 @@ RememberedPlace remember_grid(const MissionPlace& place, double spacing_m, std::
     poses.push_back({at.position.x_m, at.position.y_m, heading_rad});
   }
   const auto views = observe_all(place, poses, seed, executor);
-  VisualMemory memory = empty_memory(views);
+  VisualMemory memory = make_empty_memory(views);
   for (std::size_t i = 0; i < views.size(); ++i) {
     static_cast<void>(memory.append(views[i], {.name = std::to_string(i)}));
   }
@@ -144,12 +144,12 @@ RememberedPlace remember_grid(const MissionPlace& place, double spacing_m, std::
   return remembered;
 }
 
-RememberedPlace remember_drive(const MissionPlace& place, const std::vector<Pose2>& poses,
+RememberedPlace memorise_drive(const MissionPlace& place, const std::vector<Pose2>& poses,
                                const OdometryNoise& wheels, std::uint64_t seed,
                                Executor& executor) {
   const auto views = observe_all(place, poses, seed, executor);
   const auto odometry = simulate_odometry(poses, wheels, seed);
-  VisualMemory memory = empty_memory(views);
+  VisualMemory memory = make_empty_memory(views);
   TopologicalMapper mapper(memory);
   for (std::size_t i = 0; i < views.size(); ++i) {
     std::optional<Pose2> moved;
@@ -228,7 +228,7 @@ void MissionRobot::command(const Velocity& velocity) {
   pose_ = there;
 }
 
-std::optional<double> MissionRobot::free_direction(double direct_rad, double distance_m) {
+std::optional<double> MissionRobot::find_free_direction(double direct_rad, double distance_m) {
   const auto is_open = [&](double direction_rad, double way_m) {
     const Point2 there =
         pose_ * Point2{way_m * std::cos(direction_rad), way_m * std::sin(direction_rad)};
@@ -381,7 +381,7 @@ class Voyage {
   }
 
   void move(const NavigationDecision& decision) {
-    const auto free_rad = robot_.free_direction(decision.direction_rad, decision.advance_m);
+    const auto free_rad = robot_.find_free_direction(decision.direction_rad, decision.advance_m);
     obstacle_ = !free_rad;
     if (free_rad) {
       const bool is_direct = *free_rad == decision.direction_rad;

@@ -65,14 +65,14 @@ struct RememberedPlace {
 
 /// Records views on a grid, 20 cm or more from all things, each in a heading at random, arranged by
 /// their similarity alone: no positions, no order, no motion [M04 section 3].
-[[nodiscard]] RememberedPlace remember_grid(const MissionPlace& place, double spacing_m,
+[[nodiscard]] RememberedPlace memorise_grid(const MissionPlace& place, double spacing_m,
                                             std::uint64_t seed, Executor& executor);
 
 /// Records views along a drive, mapped by visual odometry and closure of loops, lengths by `wheels`
 /// [F11 section 4]. The memory gets the poses of the map's largest component. Where the place has
 /// lines the robot records a route, too, as far as that component goes without a gap: a line every
 /// 10 cm at most [Y03 section 2.2], posed between the map's views, so that both lie in one frame.
-[[nodiscard]] RememberedPlace remember_drive(const MissionPlace& place,
+[[nodiscard]] RememberedPlace memorise_drive(const MissionPlace& place,
                                              const std::vector<Pose2>& poses,
                                              const OdometryNoise& wheels, std::uint64_t seed,
                                              Executor& executor);
@@ -92,7 +92,7 @@ class MissionRobot final : public RobotBase {
   [[nodiscard]] double travelled_m() const noexcept { return travelled_m_; }
   /// Finds the direction nearest to `direct_rad`, 15 degrees apart, in which half of the distance
   /// is free; while the direct one is blocked it keeps its side. Nullopt if none is free.
-  [[nodiscard]] std::optional<double> free_direction(double direct_rad, double distance_m);
+  [[nodiscard]] std::optional<double> find_free_direction(double direct_rad, double distance_m);
   /// Returns true if something stopped the robot since the last call.
   [[nodiscard]] bool take_contact() noexcept;
   /// Lets time pass.

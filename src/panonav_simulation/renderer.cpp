@@ -76,7 +76,7 @@ double light_spacing_m(const Scene& scene) {
   return std::clamp(distance(scene.floor_low, scene.floor_high) / 25.0, 0.03, 1.0);
 }
 
-LitTriangles checked_triangles(const Scene& scene) {
+LitTriangles validate_and_subdivide(const Scene& scene) {
   validate(scene);
   return subdivide(scene, light_spacing_m(scene));
 }
@@ -100,7 +100,7 @@ struct Renderer::Implementation {
   Implementation(const Scene& scene, const RendererOptions& options, Executor& executor)
       : channels(options.channels),
         background(scene.background),
-        lit(checked_triangles(scene)),
+        lit(validate_and_subdivide(scene)),
         tracer(lit.vertices, lit.indices, options.instructions) {
     bake_light(scene, tracer, options.shadows, light_spacing_m(scene), lit, executor);
     for (const Material& material : scene.materials) materials.emplace_back(material, channels);

@@ -31,18 +31,18 @@ SceneBuilder::SceneBuilder(std::string name, const SceneVariation& variation)
               tint(random_, 0.08, 0.45, 0.35), tint(random_, 0.08, 0.35, 0.05)};
 }
 
-int SceneBuilder::plain(Colour colour, float emission) {
+int SceneBuilder::add_plain_material(Colour colour, float emission) {
   scene_.materials.push_back({colour, nullptr, emission});
   return static_cast<int>(scene_.materials.size()) - 1;
 }
 
-int SceneBuilder::textured(Image image, float emission) {
+int SceneBuilder::add_textured_material(Image image, float emission) {
   scene_.materials.push_back(
       {{1.0F, 1.0F, 1.0F}, std::make_shared<const Image>(std::move(image)), emission});
   return static_cast<int>(scene_.materials.size()) - 1;
 }
 
-Mesh& SceneBuilder::mesh_of(const std::string& object, int material) {
+Mesh& SceneBuilder::get_or_create_mesh(const std::string& object, int material) {
   for (auto& mesh : scene_.meshes) {
     if (mesh.object == object && mesh.material == material) return mesh;
   }
@@ -50,9 +50,9 @@ Mesh& SceneBuilder::mesh_of(const std::string& object, int material) {
   return scene_.meshes.back();
 }
 
-void SceneBuilder::quadrilateral(const std::string& object, int material, Vector3 a, Vector3 b,
-                                 Vector3 c, Vector3 d, double repeat_u, double repeat_v) {
-  Mesh& mesh = mesh_of(object, material);
+void SceneBuilder::add_quadrilateral(const std::string& object, int material, Vector3 a, Vector3 b,
+                                     Vector3 c, Vector3 d, double repeat_u, double repeat_v) {
+  Mesh& mesh = get_or_create_mesh(object, material);
   const auto base = static_cast<std::uint32_t>(mesh.vertices.size());
   const auto u = static_cast<float>(repeat_u);
   const auto v = static_cast<float>(repeat_v);
@@ -65,8 +65,8 @@ void SceneBuilder::quadrilateral(const std::string& object, int material, Vector
   mesh.triangles.push_back({base, base + 2, base + 3});
 }
 
-void SceneBuilder::box(const std::string& object, int sides, int top, const Footing& footing,
-                       Vector3 at, Vector3 size, double tile_m) {
+void SceneBuilder::add_box(const std::string& object, int sides, int top, const Footing& footing,
+                           Vector3 at, Vector3 size, double tile_m) {
   const double c = std::cos(footing.turn_rad);
   const double s = std::sin(footing.turn_rad);
   const auto corner = [&](double x, double y, double z) {
@@ -82,30 +82,30 @@ void SceneBuilder::box(const std::string& object, int sides, int top, const Foot
   const double nx = copies(size.x_m);
   const double ny = copies(size.y_m);
   const double nz = copies(size.z_m);
-  quadrilateral(object, sides, corner(x0, y0, z0), corner(x1, y0, z0), corner(x1, y0, z1),
-                corner(x0, y0, z1), nx, nz);
-  quadrilateral(object, sides, corner(x1, y0, z0), corner(x1, y1, z0), corner(x1, y1, z1),
-                corner(x1, y0, z1), ny, nz);
-  quadrilateral(object, sides, corner(x1, y1, z0), corner(x0, y1, z0), corner(x0, y1, z1),
-                corner(x1, y1, z1), nx, nz);
-  quadrilateral(object, sides, corner(x0, y1, z0), corner(x0, y0, z0), corner(x0, y0, z1),
-                corner(x0, y1, z1), ny, nz);
-  quadrilateral(object, top, corner(x0, y0, z1), corner(x1, y0, z1), corner(x1, y1, z1),
-                corner(x0, y1, z1), nx, ny);
-  quadrilateral(object, top, corner(x0, y1, z0), corner(x1, y1, z0), corner(x1, y0, z0),
-                corner(x0, y0, z0), nx, ny);
+  add_quadrilateral(object, sides, corner(x0, y0, z0), corner(x1, y0, z0), corner(x1, y0, z1),
+                    corner(x0, y0, z1), nx, nz);
+  add_quadrilateral(object, sides, corner(x1, y0, z0), corner(x1, y1, z0), corner(x1, y1, z1),
+                    corner(x1, y0, z1), ny, nz);
+  add_quadrilateral(object, sides, corner(x1, y1, z0), corner(x0, y1, z0), corner(x0, y1, z1),
+                    corner(x1, y1, z1), nx, nz);
+  add_quadrilateral(object, sides, corner(x0, y1, z0), corner(x0, y0, z0), corner(x0, y0, z1),
+                    corner(x0, y1, z1), ny, nz);
+  add_quadrilateral(object, top, corner(x0, y0, z1), corner(x1, y0, z1), corner(x1, y1, z1),
+                    corner(x0, y1, z1), nx, ny);
+  add_quadrilateral(object, top, corner(x0, y1, z0), corner(x1, y1, z0), corner(x1, y0, z0),
+                    corner(x0, y0, z0), nx, ny);
 }
 
-void SceneBuilder::cylinder(const std::string& object, int material, Point2 centre, double bottom_m,
-                            double top_m, double radius_m, int facets,
-                            double bottom_radius_factor) {
+void SceneBuilder::add_cylinder(const std::string& object, int material, Point2 centre,
+                                double bottom_m, double top_m, double radius_m, int facets,
+                                double bottom_radius_factor) {
   const auto rim = [&](int i, double z, double r) {
     const double angle = 2.0 * std::numbers::pi * i / facets;
     return Vector3{centre.x_m + r * std::cos(angle), centre.y_m + r * std::sin(angle), z};
   };
   const double lower = radius_m * bottom_radius_factor;
   for (int i = 0; i < facets; ++i) {
-    Mesh& mesh = mesh_of(object, material);
+    Mesh& mesh = get_or_create_mesh(object, material);
     const auto base = static_cast<std::uint32_t>(mesh.vertices.size());
     mesh.vertices.insert(mesh.vertices.end(), {rim(i, bottom_m, lower), rim(i + 1, bottom_m, lower),
                                                rim(i + 1, top_m, radius_m), rim(i, top_m, radius_m),
@@ -121,11 +121,11 @@ void SceneBuilder::cylinder(const std::string& object, int material, Point2 cent
   }
 }
 
-void SceneBuilder::blob(const std::string& object, int material, Vector3 centre, Vector3 radii,
-                        double roughness) {
+void SceneBuilder::add_blob(const std::string& object, int material, Vector3 centre, Vector3 radii,
+                            double roughness) {
   constexpr int blob_facets = 10;
   constexpr int blob_rings = 6;
-  Mesh& mesh = mesh_of(object, material);
+  Mesh& mesh = get_or_create_mesh(object, material);
   const auto base = static_cast<std::uint32_t>(mesh.vertices.size());
   for (int ring = 0; ring <= blob_rings; ++ring) {
     const double elevation = std::numbers::pi * (static_cast<double>(ring) / blob_rings - 0.5);
@@ -153,16 +153,16 @@ void SceneBuilder::blob(const std::string& object, int material, Vector3 centre,
   }
 }
 
-void SceneBuilder::wall(const std::string& object, int material, Point2 from, Point2 to,
-                        double height_m, double tile_m, double bottom_m) {
-  quadrilateral(object, material, {from.x_m, from.y_m, bottom_m}, {to.x_m, to.y_m, bottom_m},
-                {to.x_m, to.y_m, height_m}, {from.x_m, from.y_m, height_m},
-                distance(from, to) / tile_m, (height_m - bottom_m) / tile_m);
+void SceneBuilder::add_wall(const std::string& object, int material, Point2 from, Point2 to,
+                            double height_m, double tile_m, double bottom_m) {
+  add_quadrilateral(object, material, {from.x_m, from.y_m, bottom_m}, {to.x_m, to.y_m, bottom_m},
+                    {to.x_m, to.y_m, height_m}, {from.x_m, from.y_m, height_m},
+                    distance(from, to) / tile_m, (height_m - bottom_m) / tile_m);
 }
 
-void SceneBuilder::on_wall(const std::string& object, int material, Point2 from, Point2 to,
-                           double along_m, double width_m, double bottom_m, double top_m,
-                           double before_m) {
+void SceneBuilder::add_on_wall(const std::string& object, int material, Point2 from, Point2 to,
+                               double along_m, double width_m, double bottom_m, double top_m,
+                               double before_m) {
   const double length = distance(from, to);
   const double ux = (to.x_m - from.x_m) / length;
   const double uy = (to.y_m - from.y_m) / length;
@@ -170,23 +170,28 @@ void SceneBuilder::on_wall(const std::string& object, int material, Point2 from,
     return Vector3{from.x_m + ux * along - uy * before_m, from.y_m + uy * along + ux * before_m, z};
   };
   // Seen from the left-hand side the wall runs from right to left.
-  quadrilateral(object, material, corner(along_m + width_m, bottom_m), corner(along_m, bottom_m),
-                corner(along_m, top_m), corner(along_m + width_m, top_m));
+  add_quadrilateral(object, material, corner(along_m + width_m, bottom_m),
+                    corner(along_m, bottom_m), corner(along_m, top_m),
+                    corner(along_m + width_m, top_m));
 }
 
-void SceneBuilder::floor(int material, Point2 low, Point2 high, double tile_m, double height_m) {
-  quadrilateral("floor", material, {low.x_m, low.y_m, height_m}, {high.x_m, low.y_m, height_m},
-                {high.x_m, high.y_m, height_m}, {low.x_m, high.y_m, height_m},
-                (high.x_m - low.x_m) / tile_m, (high.y_m - low.y_m) / tile_m);
+void SceneBuilder::add_floor(int material, Point2 low, Point2 high, double tile_m,
+                             double height_m) {
+  add_quadrilateral("floor", material, {low.x_m, low.y_m, height_m}, {high.x_m, low.y_m, height_m},
+                    {high.x_m, high.y_m, height_m}, {low.x_m, high.y_m, height_m},
+                    (high.x_m - low.x_m) / tile_m, (high.y_m - low.y_m) / tile_m);
 }
 
-void SceneBuilder::ceiling(int material, Point2 low, Point2 high, double height_m, double tile_m) {
-  quadrilateral("ceiling", material, {low.x_m, high.y_m, height_m}, {high.x_m, high.y_m, height_m},
-                {high.x_m, low.y_m, height_m}, {low.x_m, low.y_m, height_m},
-                (high.x_m - low.x_m) / tile_m, (high.y_m - low.y_m) / tile_m);
+void SceneBuilder::add_ceiling(int material, Point2 low, Point2 high, double height_m,
+                               double tile_m) {
+  add_quadrilateral("ceiling", material, {low.x_m, high.y_m, height_m},
+                    {high.x_m, high.y_m, height_m}, {high.x_m, low.y_m, height_m},
+                    {low.x_m, low.y_m, height_m}, (high.x_m - low.x_m) / tile_m,
+                    (high.y_m - low.y_m) / tile_m);
 }
 
-Footing SceneBuilder::movable(const Footing& planned, double radius_m, const FloorArea& room) {
+Footing SceneBuilder::place_movable(const Footing& planned, double radius_m,
+                                    const FloorArea& room) {
   // Numbers are drawn for every object, so that one object's luck does not change the next one's.
   const bool moves = moved_.uniform() < variation_.moved_objects;
   Footing found = planned;
@@ -200,7 +205,7 @@ Footing SceneBuilder::movable(const Footing& planned, double radius_m, const Flo
                         planned.centre.y_m + step * std::sin(angle)};
     bool is_free = inside(room, centre, 0.5 * radius_m);
     for (const auto& area : scene_.drivable) is_free = is_free && gap_to(area, centre) >= radius_m;
-    is_free = is_free && leaves_tour_free(centre, radius_m);
+    is_free = is_free && is_clear_of_tour(centre, radius_m);
     if (is_free) {
       found = {centre, planned.turn_rad + turn};
       placed = true;
@@ -209,13 +214,13 @@ Footing SceneBuilder::movable(const Footing& planned, double radius_m, const Flo
   return found;
 }
 
-bool SceneBuilder::leaves_tour_free(Point2 centre, double radius_m) const {
+bool SceneBuilder::is_clear_of_tour(Point2 centre, double radius_m) const {
   return std::ranges::all_of(scene_.tour, [&](Point2 corner) {
     return distance(corner, centre) >= radius_m + 1.5 * scene_.robot_radius_m;
   });
 }
 
-void SceneBuilder::lamp(Vector3 position, float intensity, float radius_m) {
+void SceneBuilder::add_lamp(Vector3 position, float intensity, float radius_m) {
   scene_.lights.push_back({position, intensity, radius_m});
 }
 

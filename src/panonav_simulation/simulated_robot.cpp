@@ -13,7 +13,7 @@ namespace {
 
 constexpr int feelers_each_side = 11;
 
-Point2 ahead(const Pose2& pose, double direction_rad, double distance_m) {
+Point2 point_ahead(const Pose2& pose, double direction_rad, double distance_m) {
   return pose * Point2{distance_m * std::cos(direction_rad), distance_m * std::sin(direction_rad)};
 }
 
@@ -86,10 +86,10 @@ SimulatedRobot::SimulatedRobot(const FreeSpace& space, const OdometryNoise& moti
 }
 
 bool SimulatedRobot::is_open(double direction_rad, double distance_m) const {
-  return space_->is_free_between(pose_.position(), ahead(pose_, direction_rad, distance_m));
+  return space_->is_free_between(pose_.position(), point_ahead(pose_, direction_rad, distance_m));
 }
 
-std::optional<double> SimulatedRobot::free_direction(double direct_rad, double advance_m) {
+std::optional<double> SimulatedRobot::find_free_direction(double direct_rad, double advance_m) {
   if (is_open(direct_rad, advance_m)) {
     side_ = 0;
     return direct_rad;

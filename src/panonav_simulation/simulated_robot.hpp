@@ -54,7 +54,7 @@ class SimulatedRobot {
 
   /// Finds the direction of a step of `advance_m` towards `direct_rad` past obstacles, in the robot
   /// frame; nullopt if it is stopped. Remembers the side on which it passes.
-  [[nodiscard]] std::optional<double> free_direction(double direct_rad, double advance_m);
+  [[nodiscard]] std::optional<double> find_free_direction(double direct_rad, double advance_m);
 
   /// Moves as far as nothing stands in the way. Returns true if that was the whole step.
   bool go(double direction_rad, double advance_m);

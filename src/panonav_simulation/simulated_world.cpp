@@ -237,10 +237,10 @@ SimulatedWorld SimulatedWorld::with(const RecordingOptions& recording, int seed)
 
 RecordingCamera SimulatedWorld::camera() const {
   const auto& simulation = options_.simulation;
-  if (simulation.kind == 0) return options_.mirror.value_or(simulated_mirror_camera());
+  if (simulation.kind == 0) return options_.mirror.value_or(make_simulated_mirror_camera());
   if (simulation.kind == 2) {
-    return simulated_dual_fisheye(static_cast<std::uint64_t>(simulation.lens_seed),
-                                  simulation.lens_distance_m);
+    return make_simulated_dual_fisheye(static_cast<std::uint64_t>(simulation.lens_seed),
+                                       simulation.lens_distance_m);
   }
   return PanoramaRendering{
       .rows = simulation.rows,

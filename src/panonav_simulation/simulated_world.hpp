@@ -36,7 +36,7 @@ struct SimulationOptions {
   int columns = 512;                 ///< of panoramas, 4 .. 16384
   double elevation_low_deg = -30.0;  ///< lower edge of panoramas
   double elevation_high_deg = 40.0;  ///< upper edge of panoramas
-  int lens_seed = 1;                 ///< see `simulated_dual_fisheye`
+  int lens_seed = 1;                 ///< see `make_simulated_dual_fisheye`
   double lens_distance_m = 0.0;      ///< of the two lenses, 0 .. 1; gives near things a parallax
   SceneOptions scene;                ///< how it differs from the plain one
 };
@@ -50,7 +50,7 @@ struct SimulatedWorldOptions {
   FreeSpaceOptions free_space;   ///< likewise: of the robot that the scene is made for
   SensorOptions sensor;          ///< noise and faults of the camera
   OdometryNoise odometry;        ///< errors of the wheels
-  std::optional<Camera> mirror;  ///< of mirror pictures; empty: `simulated_mirror_camera`
+  std::optional<Camera> mirror;  ///< of mirror pictures; empty: `make_simulated_mirror_camera`
 };
 
 /// Returns the name under which the user set an option; nullopt if he did not. `section`:

@@ -59,13 +59,13 @@ std::vector<float> noise_field(Random& random, int width, int height, double exp
   return field;
 }
 
-std::uint8_t byte_of(float value) {
+std::uint8_t to_byte(float value) {
   return static_cast<std::uint8_t>(std::lround(255.0F * std::clamp(value, 0.0F, 1.0F)));
 }
 
 void set(Image& image, int u, int v, Colour colour, float factor = 1.0F) {
   for (int c = 0; c < 3; ++c) {
-    image.at(u, v, c) = byte_of(colour[static_cast<std::size_t>(c)] * factor);
+    image.at(u, v, c) = to_byte(colour[static_cast<std::size_t>(c)] * factor);
   }
 }
 
@@ -76,14 +76,14 @@ void fill(Image& image, int u0, int v0, int u1, int v1, Colour colour) {
 }
 
 // Light and dirt over a finished picture, so that no surface is of one even colour.
-void weather(Random& random, Image& image, double contrast) {
+void add_weathering(Random& random, Image& image, double contrast) {
   const auto field = noise_field(random, image.width(), image.height(), 2.0);
   for (int v = 0; v < image.height(); ++v) {
     for (int u = 0; u < image.width(); ++u) {
       const float factor = 1.0F + static_cast<float>(contrast) *
                                       field[static_cast<std::size_t>(v) * image.width() + u];
       for (int c = 0; c < 3; ++c) {
-        image.at(u, v, c) = byte_of(static_cast<float>(image.at(u, v, c)) / 255.0F * factor);
+        image.at(u, v, c) = to_byte(static_cast<float>(image.at(u, v, c)) / 255.0F * factor);
       }
     }
   }
@@ -100,7 +100,7 @@ Colour tint(Random& random, double low, double high, double spread) {
   return colour;
 }
 
-Colour alike(Random& random, Colour colour, double spread) {
+Colour vary_colour(Random& random, Colour colour, double spread) {
   const auto factor = static_cast<float>(random.uniform(1.0 - spread, 1.0 + spread));
   for (float& channel : colour) channel *= factor;
   return colour;
@@ -161,7 +161,7 @@ Image brick_texture(Random& random, int size, int columns, int rows, Colour bric
       }
     }
   }
-  weather(random, image, 0.08);
+  add_weathering(random, image, 0.08);
   return image;
 }
 
@@ -190,7 +190,7 @@ Image bookshelf_texture(Random& random, int size, int boards) {
     }
     fill(image, 0, bottom - std::max(2, height / 16), size, bottom, board);
   }
-  weather(random, image, 0.05);
+  add_weathering(random, image, 0.05);
   return image;
 }
 
@@ -215,7 +215,7 @@ Image poster_texture(Random& random, int size) {
       }
     }
   }
-  weather(random, image, 0.06);
+  add_weathering(random, image, 0.06);
   const int frame = size / 24;
   const Colour edge = tint(random, 0.05, 0.3, 0.2);
   fill(image, 0, 0, size, frame, edge);
@@ -262,7 +262,7 @@ Image door_texture(Random& random, int size, Colour base) {
   fill(image, 0, 0, size / 40, size, gap);
   fill(image, size - size / 40, 0, size, size, gap);
   fill(image, 0, 0, size, size / 80, gap);
-  weather(random, image, 0.04);
+  add_weathering(random, image, 0.04);
   return image;
 }
 

@@ -17,7 +17,7 @@ using Colour = std::array<float, 3>;
 [[nodiscard]] Colour tint(Random& random, double low, double high, double spread);
 
 /// The colour times a random factor of 1 -+ `spread`: two things of the same make.
-[[nodiscard]] Colour alike(Random& random, Colour colour, double spread = 0.1);
+[[nodiscard]] Colour vary_colour(Random& random, Colour colour, double spread = 0.1);
 
 /// Mixture of noise over many scales whose power falls as 1 / f^exponent, as in natural pictures.
 /// Brightness varies around `base` with the standard deviation `contrast`.

@@ -14,7 +14,7 @@ namespace {
 namespace fs = std::filesystem;
 
 // Slashes of our kind, no scheme.
-std::string plain_path(std::string_view written) {
+std::string normalise_path(std::string_view written) {
   std::string path(written);
   if (path.rfind("file://", 0) == 0) path.erase(0, 7);
   std::replace(path.begin(), path.end(), '\\', '/');
@@ -94,7 +94,7 @@ TextureStore::TextureStore(TextureOptions options) : options_(std::move(options)
 std::shared_ptr<const Image> TextureStore::find(std::string_view written,
                                                 const fs::path& directory) {
   if (!options_.read || written.empty()) return nullptr;
-  const std::string path = plain_path(written);
+  const std::string path = normalise_path(written);
   const auto found = find_file(path, directory);
   if (!found) {
     if (reported_missing_.emplace(path, true).second) {

@@ -45,7 +45,7 @@ TEST_F(CameraVerbs, CalibrateFindsTheSimulatedMirror) {
                                    "rim_radius_px", "inner_radius_px", "inner_radius_found",
                                    "quality", "residual_px", "deviation_over_images", "camera"}));
   EXPECT_EQ(said["images"], 3);
-  const Camera truth = simulation::simulated_mirror_camera();
+  const Camera truth = simulation::make_simulated_mirror_camera();
   const Camera found = read_camera(out_ / "camera.toml").camera;
   EXPECT_NEAR(found.centre.u_px, truth.centre.u_px, 0.3);
   EXPECT_NEAR(found.centre.v_px, truth.centre.v_px, 0.3);

@@ -31,7 +31,7 @@ const HomingPlace& place_of(const std::string& name) {
 
 std::size_t successes(const std::vector<HomingRun>& runs, double radius_m = 0.1) {
   return static_cast<std::size_t>(std::count_if(
-      runs.begin(), runs.end(), [&](const HomingRun& run) { return run.succeeds(radius_m); }));
+      runs.begin(), runs.end(), [&](const HomingRun& run) { return run.is_success(radius_m); }));
 }
 
 TEST(HomingRun, BothDrivesGetHomeInOfficeAndLab) {
@@ -108,7 +108,7 @@ TEST(HomingRun, AnObstacleStopsARobotThatMayNotGoPast) {
         ++blocked;
         EXPECT_TRUE(run.met_obstacle);
         EXPECT_TRUE(place.free_space->is_free(run.path.back().position()));
-        EXPECT_FALSE(run.succeeds(10.0)) << "a robot that is stopped does not arrive";
+        EXPECT_FALSE(run.is_success(10.0)) << "a robot that is stopped does not arrive";
       }
       break;
     }
@@ -140,7 +140,7 @@ TEST(HomingRun, SaysThatItIsNotHomeWhereHomeWasSeenInAnotherRoom) {
     const HomingView home = take_homing_view(office, office.free_space->random_pose(random), 1);
     const Pose2 start = lab.free_space->random_pose(random);
     const HomingRun run = run_home(lab, home, start, start, {}, 3);
-    EXPECT_NE(run.end, HomingRunEnd::arrived) << "run " << i << ", " << name_of(run.end);
+    EXPECT_NE(run.end, HomingRunEnd::arrived) << "run " << i << ", " << to_string(run.end);
     EXPECT_GT(run.end_difference, 0.08);
   }
 }

@@ -23,7 +23,7 @@ TEST(S06Worlds, EveryEndHasItsReason) {
   HomingRun run;
   run.end = HomingRunEnd::arrived;
   run.end_distance_m = 0.05;
-  EXPECT_TRUE(run.succeeds(0.1));
+  EXPECT_TRUE(run.is_success(0.1));
   EXPECT_EQ(explain_failure(run), "");
   run.end_distance_m = 0.2;
   EXPECT_EQ(explain_failure(run), "stopped short, 20 cm off");
@@ -32,7 +32,7 @@ TEST(S06Worlds, EveryEndHasItsReason) {
   for (const auto end : {HomingRunEnd::arrived, HomingRunEnd::wrong_place, HomingRunEnd::blocked,
                          HomingRunEnd::exhausted}) {
     run.end = end;
-    EXPECT_FALSE(run.succeeds(0.1));
+    EXPECT_FALSE(run.is_success(0.1));
     reasons.insert(explain_failure(run));
   }
   EXPECT_EQ(reasons.size(), 4U);

@@ -20,7 +20,7 @@ namespace {
 void add_box(Scene& scene, const std::string& name, Vector3 centre, Vector3 size) {
   Affine3 place;
   place.translation = centre;
-  place_mesh(scene, box_mesh(size), place, name, 0);
+  place_mesh(scene, make_box_mesh(size), place, name, 0);
 }
 
 // A room of 6 x 4 m with a wall across at x = 3, with a door of 1 m at the top, and a carpet.

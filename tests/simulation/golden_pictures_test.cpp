@@ -30,7 +30,7 @@ constexpr char instructions[] = "sse4.2";
 
 // The simulated mirror camera with a quarter of its pixels along each side.
 Camera small_mirror_camera() {
-  Camera camera = simulated_mirror_camera();
+  Camera camera = make_simulated_mirror_camera();
   constexpr double quarter = 0.25;
   camera.image_size = {camera.image_size.width / 4, camera.image_size.height / 4};
   camera.centre = {quarter * camera.centre.u_px, quarter * camera.centre.v_px};

@@ -21,7 +21,7 @@ MappingRecording small_loop(int views, std::uint64_t seed) {
 TEST(MappingRun, FewerViewsAndComponentsAreThoseOfTheRecording) {
   const MappingRecording recording = small_loop(12, 3);
   ASSERT_EQ(recording.views.size(), 12U);
-  const MappingRecording thinned = every_nth(recording, 5);
+  const MappingRecording thinned = thin_recording(recording, 5);
   ASSERT_EQ(thinned.views.size(), 3U);
   EXPECT_EQ(thinned.views[2], recording.views[10]);
   EXPECT_EQ(thinned.truth[2], recording.truth[10]);
@@ -30,7 +30,7 @@ TEST(MappingRun, FewerViewsAndComponentsAreThoseOfTheRecording) {
   EXPECT_EQ(few.magnitude(7, 3), recording.views[0].magnitude(7, 3));
   EXPECT_EQ(few.phase_rad(7, 3), recording.views[0].phase_rad(7, 3));
   EXPECT_THROW((void)first_components(recording.views[0], 18), ContractError);
-  EXPECT_THROW((void)every_nth(recording, 0), ContractError);
+  EXPECT_THROW((void)thin_recording(recording, 0), ContractError);
 }
 
 TEST(MappingRun, ARoundTripIsClosedAndMeasured) {

@@ -16,7 +16,7 @@ double dot(const Direction3& a, const Direction3& b) {
 
 // The reflected ray and the camera model's single viewpoint are two ways to the same line.
 TEST(HyperboloidalMirror, ReflectedRayComesFromTheViewpointAsUnprojectSays) {
-  Camera camera = simulated_mirror_camera();
+  Camera camera = make_simulated_mirror_camera();
   for (const ColumnDirection sense :
        {ColumnDirection::counter_clockwise, ColumnDirection::clockwise}) {
     camera.direction = sense;
@@ -48,7 +48,7 @@ TEST(HyperboloidalMirror, ReflectedRayComesFromTheViewpointAsUnprojectSays) {
 // Without the model: light goes from the world to the lens by the shortest way (Fermat), so the
 // path over neighbouring points of the mirror is no shorter or longer to first order.
 TEST(HyperboloidalMirror, PathOverTheMirrorIsStationary) {
-  const Camera camera = simulated_mirror_camera();
+  const Camera camera = make_simulated_mirror_camera();
   const auto model = std::get<HyperboloidalModel>(camera.model);
   const double c_mm = std::hypot(model.a_mm, model.b_mm);
   const HyperboloidalMirror mirror(camera);
@@ -70,7 +70,7 @@ TEST(HyperboloidalMirror, PathOverTheMirrorIsStationary) {
 }
 
 TEST(HyperboloidalMirror, MiddleShowsTheCameraAndTheOutsideTheHousing) {
-  const Camera camera = simulated_mirror_camera();
+  const Camera camera = make_simulated_mirror_camera();
   const HyperboloidalMirror mirror(camera);
   const auto target_at = [&](double radius_px) {
     return mirror.trace({camera.centre.u_px, camera.centre.v_px - radius_px}).target;
@@ -84,7 +84,7 @@ TEST(HyperboloidalMirror, MiddleShowsTheCameraAndTheOutsideTheHousing) {
 }
 
 TEST(HyperboloidalMirror, RefusesOtherModels) {
-  Camera camera = simulated_mirror_camera();
+  Camera camera = make_simulated_mirror_camera();
   camera.model = EquiangularModel{-0.9, 0.3};
   EXPECT_THROW(HyperboloidalMirror{camera}, ContractError);
 }

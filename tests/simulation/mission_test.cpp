@@ -39,7 +39,7 @@ TEST(MissionRobot, StopsWhereSomethingIsInItsWayAndFeelsItsWayPast) {
     EXPECT_TRUE(stopped) << k;
     EXPECT_FALSE(robot.take_contact());
     // Ahead is no way; where there is one it is at most 90 degrees aside.
-    const auto aside = robot.free_direction(0.0, 0.3);
+    const auto aside = robot.find_free_direction(0.0, 0.3);
     if (!aside) continue;
     EXPECT_NE(*aside, 0.0);
     EXPECT_LE(std::abs(*aside), std::numbers::pi / 2.0 + 1e-9);
@@ -57,7 +57,7 @@ TEST(RememberedGrid, RoomsAndCorridorsAreArrangedWithoutFolding) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   Executor two(2);
   const MissionPlace place = make_mission_place(make_scene("loop", {.seed = 2}), two);
-  const RememberedPlace remembered = remember_grid(place, 0.3, 5, two);
+  const RememberedPlace remembered = memorise_grid(place, 0.3, 5, two);
   const Lattice lattice = arrange(remembered.memory, {}, {}, two);
   std::vector<Point2> found;
   std::vector<Point2> truth;
@@ -74,7 +74,7 @@ TEST(Missions, ArriveOverAMemoryWithoutPositionsAndAreRepeatable) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   Executor two(2);
   const MissionPlace& place = office();
-  const RememberedPlace remembered = remember_grid(place, 0.4, 5, two);
+  const RememberedPlace remembered = memorise_grid(place, 0.4, 5, two);
   ASSERT_GT(remembered.truth.size(), 40U);
   ASSERT_EQ(remembered.graph.size(), remembered.truth.size());
   const auto missions = draw_missions(place, remembered, {.count = 8}, 3);
@@ -101,7 +101,7 @@ TEST(Missions, ARobotThatIsCarriedAwayFindsItsGoalAllTheSame) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   Executor executor(2);
   const MissionPlace place = make_mission_place(make_scene("office", {.seed = 72}), executor);
-  const RememberedPlace remembered = remember_grid(place, 0.4, 5, executor);
+  const RememberedPlace remembered = memorise_grid(place, 0.4, 5, executor);
   const auto missions = draw_missions(place, remembered, {.count = 8, .kidnapped = true}, 4);
   const auto runs = run_missions(place, remembered, missions, {}, 10, executor);
   int carried = 0;
@@ -134,7 +134,7 @@ TEST(Missions, ATourGoesOnFromGoalToGoalAmongPeople) {
                      std::atan2(to.y_m - from.y_m, to.x_m - from.x_m)});
     }
   }
-  const RememberedPlace remembered = remember_drive(place, way, {}, 5, executor);
+  const RememberedPlace remembered = memorise_drive(place, way, {}, 5, executor);
   // Without a camera for lines there is no route.
   EXPECT_TRUE(remembered.routes.empty());
   // Monte-Carlo localisation asks for poses.
@@ -173,7 +173,7 @@ TEST(Missions, ADriveWithLinesRecordsARouteThatIsRepeated) {
                    std::atan2(to.y_m - from.y_m, to.x_m - from.x_m)});
   }
   place.line = make_line_sensor(place);
-  const RememberedPlace remembered = remember_drive(place, way, {}, 5, executor);
+  const RememberedPlace remembered = memorise_drive(place, way, {}, 5, executor);
   ASSERT_EQ(remembered.routes.size(), 1U);
   const KnownRoute& route = remembered.routes.front();
   // Each view lies on the route where the drive had come to then.
@@ -198,7 +198,7 @@ TEST(Missions, ADriveWithLinesRecordsARouteThatIsRepeated) {
 TEST(Missions, RefuseWhatMakesNoSense) {
   Executor executor(2);
   const MissionPlace& place = office();
-  const RememberedPlace remembered = remember_grid(place, 1.0, 5, executor);
+  const RememberedPlace remembered = memorise_grid(place, 1.0, 5, executor);
   EXPECT_THROW((void)draw_missions(place, remembered, {.count = -1}, 1), ContractError);
   EXPECT_THROW((void)draw_missions(place, remembered, {.beside_m = 0.0}, 1), ContractError);
   const MemoryViewSource source(remembered.memory);

@@ -110,7 +110,7 @@ TEST(Sensor, DirectionalLightIsBrighterOnItsSide) {
 }
 
 TEST(Sensor, ImageAndPanoramaAgreeOnWhereTheOccludersStand) {
-  const Camera camera = simulated_mirror_camera();
+  const Camera camera = make_simulated_mirror_camera();
   SensorOptions options = noiseless();
   options.occluded_fraction = 0.25;
   const Radiance white{640, 480, 1, std::vector<float>(640U * 480U, 0.9F)};
@@ -135,7 +135,7 @@ TEST(Sensor, ImageAndPanoramaAgreeOnWhereTheOccludersStand) {
 }
 
 TEST(Sensor, VignettingDarkensTowardsTheRim) {
-  const Camera camera = simulated_mirror_camera();
+  const Camera camera = make_simulated_mirror_camera();
   SensorOptions options = noiseless();
   options.vignetting = 0.4;
   const Radiance white{640, 480, 1, std::vector<float>(640U * 480U, 0.5F)};
@@ -151,7 +151,7 @@ TEST(Sensor, RefusesBadOptionsAndSizes) {
   EXPECT_THROW((void)apply_sensor(even_view(1, 4, 0.5F), {.read_noise = std::nan("")}, 1),
                OptionError);
   const Radiance small{64, 48, 1, std::vector<float>(64U * 48U)};
-  EXPECT_THROW((void)apply_sensor(small, simulated_mirror_camera(), {}, 1), ContractError);
+  EXPECT_THROW((void)apply_sensor(small, make_simulated_mirror_camera(), {}, 1), ContractError);
 }
 
 }  // namespace

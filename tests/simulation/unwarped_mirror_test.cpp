@@ -83,11 +83,11 @@ void expect_agreement(const Case& place, const Camera& camera, const UnwarperOpt
 }
 
 TEST_P(UnwarpedMirror, AgreesWithThePanorama) {
-  expect_agreement(GetParam(), simulated_mirror_camera(), {}, 1.0F);
+  expect_agreement(GetParam(), make_simulated_mirror_camera(), {}, 1.0F);
 }
 
 TEST_P(UnwarpedMirror, AndSoDoTwoLenses) {
-  const Camera camera = simulated_dual_fisheye(3);
+  const Camera camera = make_simulated_dual_fisheye(3);
   const auto& lenses = std::get<DualFisheyeModel>(camera.model).lenses;
   EXPECT_NE(lenses[0].gain, lenses[1].gain);
   expect_agreement(GetParam(), camera, {.elevations = ElevationBand{-0.5, 0.7}},

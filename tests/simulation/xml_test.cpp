@@ -18,13 +18,13 @@ TEST(Xml, ReadsElementsAttributesAndText) {
   EXPECT_STREQ(root.name(), "a");
   EXPECT_STREQ(root.attribute("two").value(), "<A\xE2\x82\xAC& &no; &");
   EXPECT_STREQ(root.attribute("three").value(), "");
-  EXPECT_EQ(text_of(root), "x <y>");
-  EXPECT_EQ(value_of(root, "one"), "1");
-  EXPECT_EQ(value_of(root, "three"), "");
-  EXPECT_EQ(value_of(root, "b"), "");
+  EXPECT_EQ(element_text(root), "x <y>");
+  EXPECT_EQ(child_text(root, "one"), "1");
+  EXPECT_EQ(child_text(root, "three"), "");
+  EXPECT_EQ(child_text(root, "b"), "");
   const pugi::xml_node last = root.last_child().previous_sibling("b");
-  EXPECT_EQ(text_of(root.last_child()), "z");
-  EXPECT_EQ(value_of(root.last_child(), "n"), "2");
+  EXPECT_EQ(element_text(root.last_child()), "z");
+  EXPECT_EQ(child_text(root.last_child(), "n"), "2");
   EXPECT_EQ(last, root.child("b"));
 }
 
@@ -58,10 +58,10 @@ TEST(Xml, WhatIsNoXmlIsRefusedWithItsLine) {
 }
 
 TEST(Xml, NumbersAreFiniteAndAlone) {
-  EXPECT_EQ(numbers_of(" 1\t-2.5\n+3e1 "), (std::vector{1.0, -2.5, 30.0}));
-  EXPECT_EQ(numbers_of(""), std::vector<double>{});
+  EXPECT_EQ(parse_numbers(" 1\t-2.5\n+3e1 "), (std::vector{1.0, -2.5, 30.0}));
+  EXPECT_EQ(parse_numbers(""), std::vector<double>{});
   for (const char* text : {"nan", "1 inf", "1,2", "1 x", "+", "1e999", "0x10"})
-    EXPECT_EQ(numbers_of(text), std::nullopt) << text;
+    EXPECT_EQ(parse_numbers(text), std::nullopt) << text;
 }
 
 }  // namespace

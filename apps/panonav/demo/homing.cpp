@@ -59,7 +59,7 @@ viewer::UnfoldingMap map_of_runs(const simulation::Scene& office,
       std::vector<Point2> line = positions_of(run.path);
       const bool over = line.size() <= step + 1;
       line.resize(std::min(line.size(), step + 1));
-      viewer::MapLayer& layer = over && !run.succeeds(close_m) ? bad : good;
+      viewer::MapLayer& layer = over && !run.is_success(close_m) ? bad : good;
       layer.dots.push_back(line.back());
       if (line.size() > 1) layer.lines.push_back(std::move(line));
     }
@@ -95,7 +95,7 @@ DemoHoming show_homing(const simulation::Scene& office, int runs, std::uint64_t 
   homing.runs = lab::run_home(place, tasks, {}, seed, session.executor());
   std::size_t steps = 0;
   for (const lab::HomingRun& run : homing.runs) {
-    homing.arrived += run.succeeds(close_m) ? 1 : 0;
+    homing.arrived += run.is_success(close_m) ? 1 : 0;
     homing.distances_m.push_back(run.end_distance_m);
     steps += run.path.size() - 1;
   }

@@ -196,7 +196,7 @@ simulation::SimulatedWorldOptions simulation_of(const DemoOptions& options, int 
   wanted.frame.rays_per_axis = 1;
   // What automatic exposure would choose in these rooms.
   wanted.sensor.exposure = 2.0;
-  if (options.quick) wanted.mirror = half_as_large(simulation::simulated_mirror_camera());
+  if (options.quick) wanted.mirror = half_as_large(simulation::make_simulated_mirror_camera());
   return wanted;
 }
 

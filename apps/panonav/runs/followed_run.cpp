@@ -33,13 +33,13 @@ void describe(recordings::RunMoment& moment, const FollowedImage& image) {
 }  // namespace
 
 void follow(RouteFollower& follower, const Dataset& run, const std::vector<Pose2>& truth,
-            int every_nth, const PanoramaReader* recorded, Executor& executor,
+            int thin_recording, const PanoramaReader* recorded, Executor& executor,
             const std::function<void(FollowedImage&&)>& report) {
   struct Seen {
     std::vector<float> line;
     std::optional<recordings::RunMoment> moment;
   };
-  const auto every = static_cast<std::size_t>(every_nth);
+  const auto every = static_cast<std::size_t>(thin_recording);
   make_in_order((run.entries.size() + every - 1) / every, executor,
                 [&](std::size_t i) {
                   StageClock clock;

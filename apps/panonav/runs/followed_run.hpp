@@ -37,7 +37,7 @@ struct FollowedImage {
 /// empty. `recorded`: makes panoramas of the pictures for moments; null: there are none. `report`
 /// is called after each picture, in order. Throws FileError on a picture that cannot be read.
 void follow(RouteFollower& follower, const Dataset& run, const std::vector<Pose2>& truth,
-            int every_nth, const PanoramaReader* recorded, Executor& executor,
+            int thin_recording, const PanoramaReader* recorded, Executor& executor,
             const std::function<void(FollowedImage&&)>& report);
 
 struct FollowSummary {

@@ -15,15 +15,15 @@ namespace panonav::simulation {
 
 namespace {
 
-std::array<Point2, 4> corners_of(const FloorArea& area) {
+std::array<Point2, 4> compute_corners(const FloorArea& area) {
   return {area.low, Point2{area.high.x_m, area.low.y_m}, area.high,
           Point2{area.low.x_m, area.high.y_m}};
 }
 
 void add_ceiling_lamp(SceneBuilder& builder, int shine, Point2 at, double height_m,
                       float intensity) {
-  builder.lamp({at.x_m, at.y_m, height_m - 0.15}, intensity);
-  builder.box("lamp", shine, shine, {at, 0.0}, {0.0, 0.0, height_m - 0.07}, {0.6, 0.2, 0.05});
+  builder.add_lamp({at.x_m, at.y_m, height_m - 0.15}, intensity);
+  builder.add_box("lamp", shine, shine, {at, 0.0}, {0.0, 0.0, height_m - 0.07}, {0.6, 0.2, 0.05});
 }
 
 struct CorridorStyle {
@@ -39,23 +39,23 @@ void add_wall_with_doors(SceneBuilder& builder, const std::string& name, const C
     const Point2 from = corners[i];
     const Point2 to = corners[(i + 1) % corners.size()];
     const double length = distance(from, to);
-    builder.wall(name, look.plaster, from, to, look.height_m, 2.0);
-    builder.on_wall(name + " rail", look.rail, from, to, 0.0, length, 0.85, 0.95, 0.005);
+    builder.add_wall(name, look.plaster, from, to, look.height_m, 2.0);
+    builder.add_on_wall(name + " rail", look.rail, from, to, 0.0, length, 0.85, 0.95, 0.005);
     const bool along_x = from.y_m == to.y_m;
     const double a = along_x ? from.x_m : from.y_m;
     const double b = along_x ? to.x_m : to.y_m;
     constexpr double half_door_m = 0.45;
     for (double at = 2.0 * std::ceil(0.5 * (std::min(a, b) + half_door_m));
          at <= std::max(a, b) - half_door_m; at += 2.0) {
-      builder.on_wall(name + " door", look.door, from, to, std::abs(at - a) - half_door_m,
-                      2.0 * half_door_m, 0.0, 2.05);
+      builder.add_on_wall(name + " door", look.door, from, to, std::abs(at - a) - half_door_m,
+                          2.0 * half_door_m, 0.0, 2.05);
     }
   }
 }
 
 // Adds the wall above an opening.
 void add_lintel(SceneBuilder& builder, const CorridorStyle& look, Point2 from, Point2 to) {
-  builder.wall("lintel", look.plaster, from, to, look.height_m, 2.0, 2.3);
+  builder.add_wall("lintel", look.plaster, from, to, look.height_m, 2.0, 2.3);
 }
 
 // The round trip of `loop` runs around a block: two rooms, below and above, joined by two
@@ -67,24 +67,24 @@ constexpr double loop_height_m = 2.5;
 // Adds the block's walls, each with pictures of its own.
 void add_block(SceneBuilder& builder) {
   Random& random = builder.random();
-  const auto inner = corners_of(loop_block);
+  const auto inner = compute_corners(loop_block);
   for (std::size_t i = 0; i < 4; ++i) {
     // Backwards, so that pictures hang on the outer side.
     const Point2 from = inner[(i + 1) % 4];
     const Point2 to = inner[i];
     const auto tone = static_cast<float>(random.uniform(0.4, 0.85));
     const std::string wall = "block " + std::to_string(i);
-    builder.wall(
-        wall,
-        builder.textured(noise_texture(random, 128, {tone, 0.95F * tone, 0.85F * tone}, 0.07)),
-        from, to, loop_height_m, 2.0);
+    builder.add_wall(wall,
+                     builder.add_textured_material(
+                         noise_texture(random, 128, {tone, 0.95F * tone, 0.85F * tone}, 0.07)),
+                     from, to, loop_height_m, 2.0);
     double along = random.uniform(0.2, 0.6);
     while (along < distance(from, to) - 0.5) {
       const double width = random.uniform(0.4, 0.9);
       const double bottom = random.uniform(0.5, 1.2);
       const double top = bottom + width * random.uniform(0.7, 1.2);
-      const int picture = builder.textured(poster_texture(random, 128));
-      builder.on_wall(wall + " picture", picture, from, to, along, width, bottom, top);
+      const int picture = builder.add_textured_material(poster_texture(random, 128));
+      builder.add_on_wall(wall + " picture", picture, from, to, along, width, bottom, top);
       along += width + random.uniform(0.3, 0.9);
     }
   }
@@ -93,8 +93,9 @@ void add_block(SceneBuilder& builder) {
 // Adds walls with a doorway of 1.2 m, which part rooms from corridors.
 void add_doorways(SceneBuilder& builder) {
   Random& random = builder.random();
-  const int plaster = builder.textured(noise_texture(random, 128, {0.7F, 0.69F, 0.64F}, 0.06));
-  const int frame = builder.textured(wood_texture(random, 64, {0.4F, 0.28F, 0.2F}));
+  const int plaster =
+      builder.add_textured_material(noise_texture(random, 128, {0.7F, 0.69F, 0.64F}, 0.06));
+  const int frame = builder.add_textured_material(wood_texture(random, 64, {0.4F, 0.28F, 0.2F}));
   int number = 0;
   for (const double y : {1.0, 3.0}) {
     for (const bool left : {true, false}) {
@@ -104,17 +105,17 @@ void add_doorways(SceneBuilder& builder) {
       const std::string name = "doorway " + std::to_string(number++);
       const auto piece = [&](double a, double b) {
         if (b - a > 0.05) {
-          builder.box(name, plaster, plaster, {{0.5 * (a + b), y}, 0.0}, {0.0, 0.0, 0.0},
-                      {b - a, 0.1, loop_height_m}, 1.5);
+          builder.add_box(name, plaster, plaster, {{0.5 * (a + b), y}, 0.0}, {0.0, 0.0, 0.0},
+                          {b - a, 0.1, loop_height_m}, 1.5);
         }
       };
       piece(x0, door - 0.65);
       piece(door + 0.65, x1);
-      builder.box(name + " lintel", plaster, frame, {{door, y}, 0.0}, {0.0, 0.0, 2.1},
-                  {1.3, 0.1, loop_height_m - 2.1}, 1.5);
+      builder.add_box(name + " lintel", plaster, frame, {{door, y}, 0.0}, {0.0, 0.0, 2.1},
+                      {1.3, 0.1, loop_height_m - 2.1}, 1.5);
       for (const double side : {-0.65, 0.65}) {
-        builder.box(name + " frame", frame, frame, {{door + side, y}, 0.0}, {0.0, 0.0, 0.0},
-                    {0.08, 0.16, 2.1}, 0.5);
+        builder.add_box(name + " frame", frame, frame, {{door + side, y}, 0.0}, {0.0, 0.0, 0.0},
+                        {0.08, 0.16, 2.1}, 0.5);
       }
     }
   }
@@ -145,7 +146,7 @@ void furnish_loop(SceneBuilder& builder) {
                          {loop_outside.high.x_m - 0.1, loop_outside.high.y_m - 0.1}};
   int number = 4;  // after the doorways
   const auto furnish = [&](Point2 at, double turn_rad) {
-    const Footing footing = builder.movable({at, turn_rad}, 0.4, inside);
+    const Footing footing = builder.place_movable({at, turn_rad}, 0.4, inside);
     add_any_furniture(builder, "furniture " + std::to_string(number++), footing);
   };
   for (double x = -1.0; x < 7.2; x += random.uniform(0.9, 1.7)) {
@@ -175,7 +176,7 @@ Scene make_loop(const SceneVariation& variation) {
   add_block(builder);
   add_doorways(builder);
   furnish_loop(builder);
-  const int shine = builder.plain({0.98F, 0.98F, 0.95F}, 1.0F);
+  const int shine = builder.add_plain_material({0.98F, 0.98F, 0.95F}, 1.0F);
   for (const Point2 at : {Point2{0.0, 0.0}, Point2{3.0, 0.0}, Point2{6.0, 0.0}, Point2{6.0, 2.0},
                           Point2{6.0, 4.0}, Point2{3.0, 4.0}, Point2{0.0, 4.0}, Point2{0.0, 2.0}}) {
     add_ceiling_lamp(builder, shine, at, loop_height_m,
@@ -225,7 +226,7 @@ void add_inner_blocks(SceneBuilder& builder, const CorridorStyle& look) {
                                     ring_long_m - ring_half_m};
   for (std::size_t i = 0; i < edges.size(); i += 2) {
     auto corners =
-        corners_of({{edges[i], ring_half_m}, {edges[i + 1], ring_short_m - ring_half_m}});
+        compute_corners({{edges[i], ring_half_m}, {edges[i + 1], ring_short_m - ring_half_m}});
     std::reverse(corners.begin(), corners.end());
     add_wall_with_doors(builder, "inner wall " + std::to_string(i / 2), look, corners);
     if (i == 0) continue;
@@ -238,18 +239,19 @@ void add_inner_blocks(SceneBuilder& builder, const CorridorStyle& look) {
 // Adds the few distinct places: a window, a notice board and a plant, each on a side of its own.
 void add_distinct_places(SceneBuilder& builder) {
   Random& random = builder.random();
-  builder.on_wall("window", builder.textured(window_texture(random, 128), 0.8F),
-                  {-ring_half_m, -ring_half_m}, {ring_long_m + ring_half_m, -ring_half_m}, 11.55,
-                  0.9, 0.9, 2.1);
+  builder.add_on_wall("window", builder.add_textured_material(window_texture(random, 128), 0.8F),
+                      {-ring_half_m, -ring_half_m}, {ring_long_m + ring_half_m, -ring_half_m},
+                      11.55, 0.9, 0.9, 2.1);
   const double along = random.uniform() < 0.5 ? 1.5 : 11.5;
-  const int board = builder.textured(poster_texture(random, 128));
-  builder.on_wall("notice board", board, {ring_long_m + ring_half_m, ring_short_m + ring_half_m},
-                  {-ring_half_m, ring_short_m + ring_half_m}, along, 1.0, 0.8, 1.6);
+  const int board = builder.add_textured_material(poster_texture(random, 128));
+  builder.add_on_wall("notice board", board,
+                      {ring_long_m + ring_half_m, ring_short_m + ring_half_m},
+                      {-ring_half_m, ring_short_m + ring_half_m}, along, 1.0, 0.8, 1.6);
   add_plant(builder, "plant", {-ring_half_m + 0.3, random.uniform(2.0, 6.0)});
 }
 
 void add_ring_lamps(SceneBuilder& builder) {
-  const int shine = builder.plain({0.98F, 0.98F, 0.95F}, 1.0F);
+  const int shine = builder.add_plain_material({0.98F, 0.98F, 0.95F}, 1.0F);
   for (double x = 0.0; x <= ring_long_m + 0.1; x += 2.0) {
     add_ceiling_lamp(builder, shine, {x, 0.0}, ring_height_m, 0.7F);
     add_ceiling_lamp(builder, shine, {x, ring_short_m}, ring_height_m, 0.7F);
@@ -283,13 +285,15 @@ Scene make_corridor(const SceneVariation& variation) {
   const Point2 low{-ring_half_m, -ring_half_m - dead_end_m};
   const Point2 high{ring_long_m + ring_half_m, ring_short_m + ring_half_m + dead_end_m};
   const int carpet =
-      builder.textured(noise_texture(random, 128, tint(random, 0.15, 0.5, 0.2), 0.08));
-  builder.floor(carpet, low, high, 1.0);
-  builder.ceiling(builder.plain({0.85F, 0.85F, 0.84F}), low, high, ring_height_m, 1.0);
+      builder.add_textured_material(noise_texture(random, 128, tint(random, 0.15, 0.5, 0.2), 0.08));
+  builder.add_floor(carpet, low, high, 1.0);
+  builder.add_ceiling(builder.add_plain_material({0.85F, 0.85F, 0.84F}), low, high, ring_height_m,
+                      1.0);
   const CorridorStyle look{
-      builder.textured(noise_texture(random, 128, tint(random, 0.5, 0.75, 0.1), 0.04)),
-      builder.plain(tint(random, 0.1, 0.4, 0.2)),
-      builder.textured(door_texture(random, 128, tint(random, 0.1, 0.45, 0.3))), ring_height_m};
+      builder.add_textured_material(noise_texture(random, 128, tint(random, 0.5, 0.75, 0.1), 0.04)),
+      builder.add_plain_material(tint(random, 0.1, 0.4, 0.2)),
+      builder.add_textured_material(door_texture(random, 128, tint(random, 0.1, 0.45, 0.3))),
+      ring_height_m};
   add_outer_wall(builder, look);
   add_inner_blocks(builder, look);
   add_distinct_places(builder);

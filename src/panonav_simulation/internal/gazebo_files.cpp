@@ -22,7 +22,7 @@ bool is_there(const fs::path& path) {
 
 // Returns the path below `base` with the case of letters of the folders; the first in the order of
 // names where several fit.
-std::optional<fs::path> path_in_any_case(const fs::path& base, const fs::path& path) {
+std::optional<fs::path> find_path_in_any_case(const fs::path& base, const fs::path& path) {
   fs::path found = base;
   for (const fs::path& part : path) {
     if (part == "/" || part.empty() || is_there(found / part)) {
@@ -32,7 +32,7 @@ std::optional<fs::path> path_in_any_case(const fs::path& base, const fs::path& p
     std::vector<fs::path> names;
     std::error_code code;
     for (fs::directory_iterator it(found, code), end; !code && it != end; it.increment(code)) {
-      if (same_but_for_case(it->path().filename().string(), part.string()))
+      if (equals_ignoring_case(it->path().filename().string(), part.string()))
         names.push_back(it->path().filename());
     }
     if (names.empty()) return std::nullopt;
@@ -43,7 +43,7 @@ std::optional<fs::path> path_in_any_case(const fs::path& base, const fs::path& p
 
 // Returns NAME/FILE of https://SERVER/1.0/OWNER/models/NAME[/VERSION/files/FILE]; empty for other
 // addresses.
-std::string path_of_fuel_model(std::string_view uri) {
+std::string parse_fuel_path(std::string_view uri) {
   constexpr std::string_view folder = "/models/";
   const auto at = uri.find(folder);
   if (at == std::string_view::npos) return {};
@@ -76,7 +76,7 @@ std::string text_of_scene_file(const fs::path& file) {
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 
-bool same_but_for_case(std::string_view a, std::string_view b) {
+bool equals_ignoring_case(std::string_view a, std::string_view b) {
   const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; };
   return std::equal(a.begin(), a.end(), b.begin(), b.end(),
                     [&](char x, char y) { return lower(x) == lower(y); });
@@ -113,7 +113,7 @@ std::optional<FoundFile> GazeboFiles::resolve(std::string_view uri,
   const std::string_view scheme =
       scheme_end == std::string_view::npos ? "" : uri.substr(0, scheme_end);
   const bool on_server = scheme == "http" || scheme == "https";
-  const fs::path path = on_server ? fs::path(path_of_fuel_model(uri))
+  const fs::path path = on_server ? fs::path(parse_fuel_path(uri))
                                   : fs::path(scheme.empty() ? uri : uri.substr(scheme_end + 3));
   if (path.empty()) return std::nullopt;
   std::vector<fs::path> bases;
@@ -128,7 +128,7 @@ std::optional<FoundFile> GazeboFiles::resolve(std::string_view uri,
     if (is_there(base / path)) return FoundFile{base / path};
   }
   for (const fs::path& base : bases) {
-    if (auto found = path_in_any_case(base, path)) return FoundFile{std::move(*found), false};
+    if (auto found = find_path_in_any_case(base, path)) return FoundFile{std::move(*found), false};
   }
   return std::nullopt;
 }
@@ -159,7 +159,7 @@ pugi::xml_node GazeboFiles::sdf(const fs::path& file) {
   return files_.emplace(key, std::move(document)).first->second.document_element();
 }
 
-fs::path GazeboFiles::description_in(const fs::path& folder) {
+fs::path GazeboFiles::find_description(const fs::path& folder) {
   std::error_code code;
   for (const char* list : {"model.config", "manifest.xml"}) {
     if (!fs::is_regular_file(folder / list, code)) continue;
@@ -172,18 +172,18 @@ fs::path GazeboFiles::description_in(const fs::path& folder) {
     std::optional<fs::path> best;
     double best_version = -1.0;
     for (const pugi::xml_node& entry : config.document_element().children("sdf")) {
-      const auto version = numbers_of(entry.attribute("version").value());
+      const auto version = parse_numbers(entry.attribute("version").value());
       const double number = version && version->size() == 1 ? version->front() : 0.0;
-      const std::string name = text_of(entry);
+      const std::string name = element_text(entry);
       if (name.empty() || number <= best_version) continue;
-      const auto found = path_in_any_case(folder, name);
+      const auto found = find_path_in_any_case(folder, name);
       if (!found) continue;
       best = found;
       best_version = number;
     }
     if (best) return *best;
   }
-  if (const auto usual = path_in_any_case(folder, "model.sdf")) return *usual;
+  if (const auto usual = find_path_in_any_case(folder, "model.sdf")) return *usual;
   std::vector<fs::path> others;
   for (fs::directory_iterator it(folder, code), end; !code && it != end; it.increment(code)) {
     if (it->path().extension() == ".sdf") others.push_back(it->path());

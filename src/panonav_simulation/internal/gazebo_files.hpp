@@ -19,7 +19,7 @@ void require_scene_file(const std::filesystem::path& file);
 [[nodiscard]] std::string text_of_scene_file(const std::filesystem::path& file);
 
 /// True if two texts differ at most in the case of their ASCII letters.
-[[nodiscard]] bool same_but_for_case(std::string_view a, std::string_view b);
+[[nodiscard]] bool equals_ignoring_case(std::string_view a, std::string_view b);
 
 struct FoundFile {
   std::filesystem::path path;
@@ -47,7 +47,7 @@ class GazeboFiles {
 
   /// Finds the model description in a folder: of those that `model.config` lists the one of the
   /// highest version, else `model.sdf`, else the first *.sdf. Throws FileError.
-  [[nodiscard]] static std::filesystem::path description_in(const std::filesystem::path& folder);
+  [[nodiscard]] static std::filesystem::path find_description(const std::filesystem::path& folder);
 
  private:
   std::filesystem::path world_;

@@ -17,7 +17,7 @@ namespace {
 void add_sky(SceneBuilder& builder, Point2 centre, double radius_m) {
   Mesh mesh;
   mesh.object = "sky";
-  mesh.material = builder.textured(sky_texture(builder.random(), 512, 256), 1.0F);
+  mesh.material = builder.add_textured_material(sky_texture(builder.random(), 512, 256), 1.0F);
   constexpr int facets = 48;
   constexpr int rings = 16;
   constexpr double lowest = -0.05;
@@ -48,13 +48,13 @@ void add_sky(SceneBuilder& builder, Point2 centre, double radius_m) {
 void add_house(SceneBuilder& builder, const std::string& name, const Footing& footing, Vector3 size,
                Colour wall_colour, Colour roof_colour) {
   Random& random = builder.random();
-  const int walls = builder.textured(
+  const int walls = builder.add_textured_material(
       brick_texture(random, 128, 6, 12, wall_colour,
                     {1.1F * wall_colour[0], 1.1F * wall_colour[1], 1.1F * wall_colour[2]}));
-  const int roof = builder.textured(
+  const int roof = builder.add_textured_material(
       brick_texture(random, 128, 8, 8, roof_colour,
                     {0.7F * roof_colour[0], 0.7F * roof_colour[1], 0.7F * roof_colour[2]}));
-  builder.box(name, walls, walls, footing, {0.0, 0.0, 0.0}, size, 0.6 * size.z_m);
+  builder.add_box(name, walls, walls, footing, {0.0, 0.0, 0.0}, size, 0.6 * size.z_m);
   const double c = std::cos(footing.turn_rad);
   const double s = std::sin(footing.turn_rad);
   const auto at = [&](double x, double y, double z) {
@@ -64,28 +64,28 @@ void add_house(SceneBuilder& builder, const std::string& name, const Footing& fo
   const double hy = 0.6 * size.y_m;
   const double z0 = 0.97 * size.z_m;
   const double z1 = 1.5 * size.z_m;
-  builder.quadrilateral(name, roof, at(-hx, -hy, z0), at(hx, -hy, z0), at(hx, 0.0, z1),
-                        at(-hx, 0.0, z1), 3.0, 2.0);
-  builder.quadrilateral(name, roof, at(hx, hy, z0), at(-hx, hy, z0), at(-hx, 0.0, z1),
-                        at(hx, 0.0, z1), 3.0, 2.0);
+  builder.add_quadrilateral(name, roof, at(-hx, -hy, z0), at(hx, -hy, z0), at(hx, 0.0, z1),
+                            at(-hx, 0.0, z1), 3.0, 2.0);
+  builder.add_quadrilateral(name, roof, at(hx, hy, z0), at(-hx, hy, z0), at(-hx, 0.0, z1),
+                            at(hx, 0.0, z1), 3.0, 2.0);
   for (const double x : {-hx, hx}) {
-    builder.quadrilateral(name, walls, at(0.9 * x, -hy, z0), at(0.9 * x, hy, z0),
-                          at(0.9 * x, 0.0, z1), at(0.9 * x, 0.0, z1));
+    builder.add_quadrilateral(name, walls, at(0.9 * x, -hy, z0), at(0.9 * x, hy, z0),
+                              at(0.9 * x, 0.0, z1), at(0.9 * x, 0.0, z1));
   }
-  const int window = builder.textured(window_texture(random, 64));
-  const int door = builder.textured(door_texture(random, 64, {0.35F, 0.22F, 0.15F}));
+  const int window = builder.add_textured_material(window_texture(random, 64));
+  const int door = builder.add_textured_material(door_texture(random, 64, {0.35F, 0.22F, 0.15F}));
   const double out = 0.5 * size.y_m * 1.01;
   for (const double side : {-1.0, 1.0}) {
     const double y = side * out;
     const double w = 0.12 * size.x_m * side;
     for (const double x : {-0.3, 0.3}) {
-      builder.quadrilateral(name, window, at(x * size.x_m + w * -1.0, y, 0.4 * size.z_m),
-                            at(x * size.x_m + w, y, 0.4 * size.z_m),
-                            at(x * size.x_m + w, y, 0.8 * size.z_m),
-                            at(x * size.x_m - w, y, 0.8 * size.z_m));
+      builder.add_quadrilateral(name, window, at(x * size.x_m + w * -1.0, y, 0.4 * size.z_m),
+                                at(x * size.x_m + w, y, 0.4 * size.z_m),
+                                at(x * size.x_m + w, y, 0.8 * size.z_m),
+                                at(x * size.x_m - w, y, 0.8 * size.z_m));
     }
-    builder.quadrilateral(name, door, at(-0.8 * w, y, 0.0), at(0.8 * w, y, 0.0),
-                          at(0.8 * w, y, 0.7 * size.z_m), at(-0.8 * w, y, 0.7 * size.z_m));
+    builder.add_quadrilateral(name, door, at(-0.8 * w, y, 0.0), at(0.8 * w, y, 0.0),
+                              at(0.8 * w, y, 0.7 * size.z_m), at(-0.8 * w, y, 0.7 * size.z_m));
   }
 }
 
@@ -93,8 +93,8 @@ void add_hedge(SceneBuilder& builder, const std::string& name, Point2 from, Poin
                double height_m) {
   Random& random = builder.random();
   const float green = static_cast<float>(random.uniform(0.18, 0.36));
-  const int leaves =
-      builder.textured(foliage_texture(random, 256, {0.75F * green, green, 0.5F * green}));
+  const int leaves = builder.add_textured_material(
+      foliage_texture(random, 256, {0.75F * green, green, 0.5F * green}));
   const double length = distance(from, to);
   const double turn = std::atan2(to.y_m - from.y_m, to.x_m - from.x_m);
   // Segments of different height and depth: a hedge grows as it likes.
@@ -104,7 +104,7 @@ void add_hedge(SceneBuilder& builder, const std::string& name, Point2 from, Poin
     const Footing footing{{from.x_m + share * (to.x_m - from.x_m) + random.normal(0.0, 0.05),
                            from.y_m + share * (to.y_m - from.y_m) + random.normal(0.0, 0.05)},
                           turn};
-    builder.box(
+    builder.add_box(
         name, leaves, leaves, footing, {0.0, 0.0, 0.0},
         {1.05 * length / segments, random.uniform(0.4, 0.7), height_m * random.uniform(0.8, 1.2)},
         1.5);
@@ -136,7 +136,7 @@ void add_trees_and_boxes(SceneBuilder& builder, const FloorArea& plot) {
     Point2 at;
     do {
       at = {random.uniform(0.0, 12.0), random.uniform(0.0, 10.0)};
-    } while (!builder.leaves_tour_free(at, radius_m));
+    } while (!builder.is_clear_of_tour(at, radius_m));
     return at;
   };
   constexpr double tree_clearance_m = 0.4;
@@ -146,12 +146,12 @@ void add_trees_and_boxes(SceneBuilder& builder, const FloorArea& plot) {
     const double height_m = random.uniform(2.0, 4.5);
     const TreeKind kind = make_tree_kind(builder);
     add_tree(builder, "tree " + std::to_string(i), kind,
-             builder.movable(planned, tree_clearance_m, plot).centre, height_m);
+             builder.place_movable(planned, tree_clearance_m, plot).centre, height_m);
   }
   for (int i = 0; i < 5; ++i) {
     const Footing planned{place(crate_clearance_m), random.uniform(-3.0, 3.0)};
     add_crate(builder, "flower box " + std::to_string(i),
-              builder.movable(planned, crate_clearance_m, plot),
+              builder.place_movable(planned, crate_clearance_m, plot),
               {random.uniform(0.4, 1.2), random.uniform(0.3, 0.6), random.uniform(0.3, 0.8)});
   }
 }
@@ -185,10 +185,12 @@ Scene make_garden(const SceneVariation& variation) {
   scene.directional_lights.push_back({Direction3::from_angles(azimuth, 0.8), 0.8F});
   const Point2 middle{6.0, 5.0};
   add_sky(builder, middle, 150.0);
-  const int grass = builder.textured(noise_texture(random, 256, {0.25F, 0.36F, 0.16F}, 0.2, 1.4));
-  builder.floor(grass, {-160.0, -160.0}, {160.0, 160.0}, 3.0);
-  const int gravel = builder.textured(noise_texture(random, 256, {0.55F, 0.5F, 0.42F}, 0.15, 1.0));
-  builder.floor(gravel, {4.8, -1.0}, {6.4, 11.0}, 2.0, 0.01);
+  const int grass =
+      builder.add_textured_material(noise_texture(random, 256, {0.25F, 0.36F, 0.16F}, 0.2, 1.4));
+  builder.add_floor(grass, {-160.0, -160.0}, {160.0, 160.0}, 3.0);
+  const int gravel =
+      builder.add_textured_material(noise_texture(random, 256, {0.55F, 0.5F, 0.42F}, 0.15, 1.0));
+  builder.add_floor(gravel, {4.8, -1.0}, {6.4, 11.0}, 2.0, 0.01);
 
   add_hedges(builder);
   const FloorArea plot{{-1.0, -1.0}, {13.0, 11.0}};
@@ -213,24 +215,25 @@ Scene make_arena(const SceneVariation& variation) {
   scene.camera_height_m = 0.08;
   scene.robot_radius_m = 0.0275;
   scene.ambient = 0.5F;
-  const int table = builder.textured(noise_texture(random, 128, {0.55F, 0.55F, 0.5F}, 0.06));
+  const int table =
+      builder.add_textured_material(noise_texture(random, 128, {0.55F, 0.55F, 0.5F}, 0.06));
   // A little above the floor of the lab, so that the two do not compete.
-  builder.floor(table, {-0.04, -0.04}, {1.44, 1.24}, 0.4, 0.002);
+  builder.add_floor(table, {-0.04, -0.04}, {1.44, 1.24}, 0.4, 0.002);
   // The lab around the table, seen above the houses.
   const FloorArea lab{{-2.0, -2.0}, {3.4, 3.2}};
   furnish_room_shell(builder, lab, 2.2);
   // One lamp stands to the side, so that houses have a bright and a dark face.
-  builder.lamp({random.uniform(-1.5, -0.5), random.uniform(-1.5, 2.7), 1.9}, 2.5F);
-  builder.lamp({0.7, 0.6, 2.0}, 0.5F);
+  builder.add_lamp({random.uniform(-1.5, -0.5), random.uniform(-1.5, 2.7), 1.9}, 2.5F);
+  builder.add_lamp({0.7, 0.6, 2.0}, 0.5F);
 
   // A low wall around the town: painted, dark in places and bright in others.
   const std::array<Point2, 4> wall{Point2{-0.04, -0.04}, Point2{1.44, -0.04}, Point2{1.44, 1.24},
                                    Point2{-0.04, 1.24}};
   for (std::size_t i = 0; i < 4; ++i) {
-    builder.wall(
-        "border " + std::to_string(i),
-        builder.textured(noise_texture(random, 128, tint(random, 0.2, 0.75, 0.15), 0.35, 3.0)),
-        wall[i], wall[(i + 1) % 4], 0.16, 1.0);
+    builder.add_wall("border " + std::to_string(i),
+                     builder.add_textured_material(
+                         noise_texture(random, 128, tint(random, 0.2, 0.75, 0.15), 0.35, 3.0)),
+                     wall[i], wall[(i + 1) % 4], 0.16, 1.0);
   }
   // Two rows of three blocks with streets of 20 cm and more around each, one or two houses a block.
   const FloorArea plot{{0.0, 0.0}, {1.4, 1.2}};
@@ -242,14 +245,14 @@ Scene make_arena(const SceneVariation& variation) {
       const Footing block{
           {x + random.normal(0.0, 0.015), y + random.normal(0.0, 0.015)},
           random.uniform() < 0.5 ? random.normal(0.0, 0.12) : 1.57 + random.normal(0.0, 0.12)};
-      const Footing footing = builder.movable(block, 0.1, plot);
+      const Footing footing = builder.place_movable(block, 0.1, plot);
       const bool pair = random.uniform() < 0.4;
       const double length = pair ? 0.085 : random.uniform(0.12, 0.18);
       for (const double side : pair ? std::array{-0.05, 0.05} : std::array{0.0, 0.0}) {
         const Footing place{{footing.centre.x_m + side * std::cos(footing.turn_rad),
                              footing.centre.y_m + side * std::sin(footing.turn_rad)},
                             footing.turn_rad};
-        const Colour plaster = alike(random, paint);
+        const Colour plaster = vary_colour(random, paint);
         const Vector3 size{length, random.uniform(0.09, 0.14), random.uniform(0.1, 0.17)};
         add_house(builder, "house " + std::to_string(number++), place, size, plaster, tiles);
         if (!pair) break;

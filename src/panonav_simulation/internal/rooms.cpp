@@ -46,7 +46,8 @@ void furnish_row(SceneBuilder& builder, const FloorArea& room, const std::string
     const std::string piece = name + " " + std::to_string(number++);
     const Footing planned{at, turn_rad + random.normal(0.0, 0.05)};
     // Nobody moves a wardrobe.
-    const Footing footing = is_wardrobe ? planned : builder.movable(planned, 0.5 * width, room);
+    const Footing footing =
+        is_wardrobe ? planned : builder.place_movable(planned, 0.5 * width, room);
     if (is_desk) {
       add_desk(builder, piece, footing);
       const Point2 before{footing.centre.x_m + 0.45 * std::sin(footing.turn_rad),
@@ -94,14 +95,15 @@ void add_lamps(SceneBuilder& builder, const FloorArea& room, double height_m, do
   const double depth = room.high.y_m - room.low.y_m;
   const int columns = std::max(1, static_cast<int>(width / spacing_m));
   const int rows = std::max(1, static_cast<int>(depth / spacing_m));
-  const int shine = builder.plain({0.98F, 0.98F, 0.95F}, 1.0F);
+  const int shine = builder.add_plain_material({0.98F, 0.98F, 0.95F}, 1.0F);
   for (int i = 0; i < columns; ++i) {
     for (int j = 0; j < rows; ++j) {
       const Point2 at{room.low.x_m + (i + 0.5) * width / columns,
                       room.low.y_m + (j + 0.5) * depth / rows};
-      builder.lamp({at.x_m, at.y_m, height_m - 0.2},
-                   static_cast<float>(builder.random().uniform(weakest, strongest)));
-      builder.box("lamp", shine, shine, {at, 0.0}, {0.0, 0.0, height_m - 0.1}, {1.2, 0.25, 0.06});
+      builder.add_lamp({at.x_m, at.y_m, height_m - 0.2},
+                       static_cast<float>(builder.random().uniform(weakest, strongest)));
+      builder.add_box("lamp", shine, shine, {at, 0.0}, {0.0, 0.0, height_m - 0.1},
+                      {1.2, 0.25, 0.06});
     }
   }
 }
@@ -126,18 +128,18 @@ void add_periodic_wall(SceneBuilder& builder, const PeriodicLook& look, std::siz
   for (double along = 0.5; along + 1.0 < length; along += 2.0) {
     const bool is_door = number == 0 && std::abs(along - 4.5) < 1e-9;
     if (is_door) {
-      builder.on_wall("door", look.door, from, to, along, 0.9, 0.0, 2.1);
+      builder.add_on_wall("door", look.door, from, to, along, 0.9, 0.0, 2.1);
     } else {
-      builder.on_wall(wall + " picture", look.poster, from, to, along, 0.9, 0.6, 1.8);
+      builder.add_on_wall(wall + " picture", look.poster, from, to, along, 0.9, 0.6, 1.8);
     }
     const double pillar = along + 1.45;
-    builder.box(wall + " pillar", look.stone, look.stone, {on_line(pillar), 0.0}, {0.0, 0.0, 0.0},
-                {pillar_m, pillar_m, look.height_m}, 1.0);
-    builder.wall(wall, look.plaster, on_line(wall_from), on_line(pillar - 0.5 * pillar_m),
-                 look.height_m, 2.0);
+    builder.add_box(wall + " pillar", look.stone, look.stone, {on_line(pillar), 0.0},
+                    {0.0, 0.0, 0.0}, {pillar_m, pillar_m, look.height_m}, 1.0);
+    builder.add_wall(wall, look.plaster, on_line(wall_from), on_line(pillar - 0.5 * pillar_m),
+                     look.height_m, 2.0);
     wall_from = pillar + 0.5 * pillar_m;
   }
-  builder.wall(wall, look.plaster, on_line(wall_from), to, look.height_m, 2.0);
+  builder.add_wall(wall, look.plaster, on_line(wall_from), to, look.height_m, 2.0);
 }
 
 }  // namespace
@@ -196,22 +198,25 @@ Scene make_hall(const SceneVariation& variation, bool periodic) {
   // apart.
   const Colour joint = tint(random, 0.1, 0.4, 0.1);
   const Colour tile = tint(random, 0.3, 0.6, 0.1);
-  builder.floor(builder.textured(brick_texture(random, 128, 2, 2, tile, joint)), room.low,
-                room.high, 1.0);
-  builder.ceiling(builder.plain({0.85F, 0.85F, 0.83F}), room.low, room.high, room_height_m, 1.0);
+  builder.add_floor(builder.add_textured_material(brick_texture(random, 128, 2, 2, tile, joint)),
+                    room.low, room.high, 1.0);
+  builder.add_ceiling(builder.add_plain_material({0.85F, 0.85F, 0.83F}), room.low, room.high,
+                      room_height_m, 1.0);
   const int plaster =
-      builder.textured(noise_texture(random, 128, tint(random, 0.45, 0.8, 0.1), 0.05));
-  const int poster = builder.textured(poster_texture(random, 128));
-  const int door = builder.textured(door_texture(random, 128, tint(random, 0.2, 0.6, 0.3)));
-  const int stone = builder.textured(noise_texture(random, 128, tint(random, 0.15, 0.7, 0.1), 0.1));
+      builder.add_textured_material(noise_texture(random, 128, tint(random, 0.45, 0.8, 0.1), 0.05));
+  const int poster = builder.add_textured_material(poster_texture(random, 128));
+  const int door =
+      builder.add_textured_material(door_texture(random, 128, tint(random, 0.2, 0.6, 0.3)));
+  const int stone =
+      builder.add_textured_material(noise_texture(random, 128, tint(random, 0.15, 0.7, 0.1), 0.1));
   const std::array<Point2, 4> corners{room.low, Point2{room.high.x_m, room.low.y_m}, room.high,
                                       Point2{room.low.x_m, room.high.y_m}};
   for (std::size_t i = 0; i < 4; ++i) {
     add_periodic_wall(builder, {plaster, poster, door, stone, room_height_m}, i, corners[i],
                       corners[(i + 1) % 4]);
   }
-  builder.on_wall("clock", builder.textured(poster_texture(random, 64)), corners[2], corners[3],
-                  4.65, 0.6, 2.0, 2.6);
+  builder.add_on_wall("clock", builder.add_textured_material(poster_texture(random, 64)),
+                      corners[2], corners[3], 4.65, 0.6, 2.0, 2.6);
   add_lamps(builder, room, room_height_m, 3.0, 0.6, 0.6);
   scene.tour = {{0.5, 0.5}, {6.5, 0.5}, {6.5, 6.5}, {0.5, 6.5}};
   return builder.finish();

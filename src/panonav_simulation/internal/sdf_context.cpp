@@ -24,7 +24,7 @@ std::string SdfContext::to_line(const Warning& warning) {
   const std::size_t models = warning.objects.size();
   std::string line = models == 0 ? "" : models == 1 ? "model " : "models ";
   for (std::size_t i = 0; i < std::min(models, max_named); ++i)
-    line += (i == 0 ? "" : ", ") + in_quotes(warning.objects[i]);
+    line += (i == 0 ? "" : ", ") + quote(warning.objects[i]);
   if (models > max_named) line += " and " + std::to_string(models - max_named) + " more";
   line += (models == 0 ? "" : ": ") + warning.what;
   const bool is_repeated = warning.count > static_cast<int>(std::max<std::size_t>(models, 1));
@@ -36,8 +36,7 @@ std::optional<std::filesystem::path> SdfContext::find(std::string_view uri,
   const auto found = files.resolve(uri, origin.directory);
   if (!found) return std::nullopt;
   if (!found->as_written) {
-    warn(origin.object, in_quotes(uri) +
-                            " was not found; taken instead, with letters of other case: " +
+    warn(origin.object, quote(uri) + " was not found; taken instead, with letters of other case: " +
                             to_readable_line(found->path.string()));
   }
   return found->path;

@@ -12,7 +12,7 @@ namespace {
 
 // The quaternion w x y z of turns about x, y and z, in this order; `half` turns the unit of the
 // angles into half radians.
-std::array<double, 4> quaternion_of_turns(double roll, double pitch, double yaw, double half) {
+std::array<double, 4> make_quaternion(double roll, double pitch, double yaw, double half) {
   const double cr = std::cos(roll * half);
   const double sr = std::sin(roll * half);
   const double cp = std::cos(pitch * half);
@@ -30,7 +30,7 @@ float brightness(const Colour& colour) {
 }
 
 std::optional<Colour> read_colour(pugi::xml_node parent, const char* name) {
-  const auto numbers = numbers_of(value_of(parent, name));
+  const auto numbers = parse_numbers(child_text(parent, name));
   if (!numbers || numbers->size() < 3) return std::nullopt;
   Colour colour{};
   for (std::size_t i = 0; i < 3; ++i)
@@ -39,15 +39,15 @@ std::optional<Colour> read_colour(pugi::xml_node parent, const char* name) {
 }
 
 double read_number(pugi::xml_node parent, const char* name, double otherwise) {
-  const auto numbers = numbers_of(value_of(parent, name));
+  const auto numbers = parse_numbers(child_text(parent, name));
   return numbers && numbers->size() == 1 ? numbers->front() : otherwise;
 }
 
 std::vector<double> read_size(pugi::xml_node shape, const char* name, std::size_t count,
                               std::optional<double> otherwise) {
-  const std::string text = value_of(shape, name);
+  const std::string text = child_text(shape, name);
   if (text.empty() && otherwise) return std::vector<double>(count, *otherwise);
-  auto numbers = numbers_of(text);
+  auto numbers = parse_numbers(text);
   if (!numbers || numbers->size() != count) {
     throw Unusable{"the " + std::string(name) + " of its " + to_readable_line(shape.name()) +
                    " is not " +
@@ -72,20 +72,20 @@ pugi::xml_node pose_element(pugi::xml_node part) {
 
 Affine3 read_pose(pugi::xml_node pose) {
   if (!pose) return {};
-  std::string text = text_of(pose);
+  std::string text = element_text(pose);
   if (text.empty()) text = pose.attribute("pose").value();
   const bool is_quaternion =
       std::string_view(pose.attribute("rotation_format").value()) == "quat_xyzw";
   const std::size_t count = is_quaternion ? 7 : 6;
-  const auto n = numbers_of(text);
+  const auto n = parse_numbers(text);
   if (n && n->empty()) return {};
   if (!n || n->size() != count)
     throw Unusable{"its pose is not " + std::to_string(count) + " finite numbers"};
   const auto& v = *n;
   const std::string_view degrees = pose.attribute("degrees").value();
   const double half = degrees == "true" || degrees == "1" ? std::numbers::pi / 360.0 : 0.5;
-  const std::array<double, 4> q = is_quaternion ? std::array{v[6], v[3], v[4], v[5]}
-                                                : quaternion_of_turns(v[3], v[4], v[5], half);
+  const std::array<double, 4> q =
+      is_quaternion ? std::array{v[6], v[3], v[4], v[5]} : make_quaternion(v[3], v[4], v[5], half);
   const double length = std::hypot(std::hypot(q[0], q[1]), std::hypot(q[2], q[3]));
   if (!(length > 0.0) || !std::isfinite(length)) throw Unusable{"its pose has no rotation"};
   const double w = q[0] / length;
@@ -98,13 +98,13 @@ Affine3 read_pose(pugi::xml_node pose) {
           {v[0], v[1], v[2]}};
 }
 
-std::string_view frame_of_pose(pugi::xml_node part) {
+std::string_view find_pose_frame(pugi::xml_node part) {
   const pugi::xml_node pose = pose_element(part);
   const std::string_view frame = pose.attribute("relative_to").value();
   return frame.empty() ? pose.attribute("frame").value() : frame;
 }
 
-std::string in_quotes(std::string_view text) {
+std::string quote(std::string_view text) {
   return "\"" + to_readable_line(text) + "\"";
 }
 

@@ -45,9 +45,9 @@ struct Unusable {
 [[nodiscard]] Affine3 read_pose(pugi::xml_node pose);
 
 /// Returns the frame that the pose of a part names; empty for none.
-[[nodiscard]] std::string_view frame_of_pose(pugi::xml_node part);
+[[nodiscard]] std::string_view find_pose_frame(pugi::xml_node part);
 
 /// Returns a text on one line, in quotation marks, for messages.
-[[nodiscard]] std::string in_quotes(std::string_view text);
+[[nodiscard]] std::string quote(std::string_view text);
 
 }  // namespace panonav::simulation

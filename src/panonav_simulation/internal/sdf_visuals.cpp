@@ -14,7 +14,7 @@ namespace {
 namespace fs = std::filesystem;
 
 // Returns a frame whose z axis is the plane's normal.
-Affine3 frame_along(const Vector3& normal) {
+Affine3 make_frame_along(const Vector3& normal) {
   const double length = std::hypot(normal.x_m, normal.y_m, normal.z_m);
   if (!(length > 0.0)) return {};
   const Vector3 z{normal.x_m / length, normal.y_m / length, normal.z_m / length};
@@ -32,31 +32,32 @@ std::optional<Mesh> make_shape(pugi::xml_node shape) {
   const std::string_view kind = shape.name();
   if (kind == "box") {
     const auto size = read_positive_size(shape, "size", 3);
-    return box_mesh({size[0], size[1], size[2]});
+    return make_box_mesh({size[0], size[1], size[2]});
   }
   if (kind == "cylinder" || kind == "capsule") {
     const double radius_m = read_positive_size(shape, "radius", 1)[0];
     const double length_m = read_positive_size(shape, "length", 1)[0];
-    return kind == "capsule" ? capsule_mesh(radius_m, length_m) : cylinder_mesh(radius_m, length_m);
+    return kind == "capsule" ? make_capsule_mesh(radius_m, length_m)
+                             : make_cylinder_mesh(radius_m, length_m);
   }
   if (kind == "sphere") {
     const double r = read_positive_size(shape, "radius", 1)[0];
-    return ellipsoid_mesh({r, r, r});
+    return make_ellipsoid_mesh({r, r, r});
   }
   if (kind == "ellipsoid") {
     const auto r = read_positive_size(shape, "radii", 3);
-    return ellipsoid_mesh({r[0], r[1], r[2]});
+    return make_ellipsoid_mesh({r[0], r[1], r[2]});
   }
   if (kind == "plane") {
     const auto size = read_size(shape, "size", 2, 1.0);
-    return rectangle_mesh(size[0], size[1]);
+    return make_rectangle_mesh(size[0], size[1]);
   }
   if (kind == "empty") return std::nullopt;
-  throw Unusable{"panonav does not show a geometry of the kind " + in_quotes(kind)};
+  throw Unusable{"panonav does not show a geometry of the kind " + quote(kind)};
 }
 
 // Returns the map that moves the middle of these parts to the origin.
-Affine3 centre_parts(const std::vector<const FileMesh*>& parts) {
+Affine3 make_centring_map(const std::vector<const FileMesh*>& parts) {
   Scene together;
   for (const FileMesh* part : parts) together.meshes.push_back(part->mesh);
   const auto [low, high] = *extent(together);
@@ -66,7 +67,7 @@ Affine3 centre_parts(const std::vector<const FileMesh*>& parts) {
   return shift;
 }
 
-void shine(Material& material, const Colour& emissive) {
+void set_emission(Material& material, const Colour& emissive) {
   if (brightness(emissive) <= brightness(material.colour)) return;
   material.colour = emissive;
   material.emission = 1.0F;
@@ -90,12 +91,12 @@ void SdfVisuals::add_shape(pugi::xml_node shape, pugi::xml_node visual,
   if (!mesh) return;
   Affine3 world_from_shape = world_from_visual;
   if (kind == "plane") {
-    const auto n = value_of(shape, "normal").empty() ? std::vector{0.0, 0.0, 1.0}
-                                                     : read_size(shape, "normal", 3);
-    world_from_shape = world_from_visual * frame_along({n[0], n[1], n[2]});
+    const auto n = child_text(shape, "normal").empty() ? std::vector{0.0, 0.0, 1.0}
+                                                       : read_size(shape, "normal", 3);
+    world_from_shape = world_from_visual * make_frame_along({n[0], n[1], n[2]});
   }
   Scene& scene = context_.scene;
-  scene.materials.push_back(dress({}, visual, origin));
+  scene.materials.push_back(apply_material({}, visual, origin));
   place_mesh(scene, *mesh, world_from_shape, origin.object,
              static_cast<int>(scene.materials.size()) - 1);
   if (kind == "plane") planes_.push_back(scene.meshes.size() - 1);
@@ -103,23 +104,23 @@ void SdfVisuals::add_shape(pugi::xml_node shape, pugi::xml_node visual,
 
 void SdfVisuals::add_mesh_file(pugi::xml_node shape, pugi::xml_node visual,
                                const Affine3& world_from_visual, const SdfOrigin& origin) {
-  std::string uri = value_of(shape, "uri");
-  if (uri.empty()) uri = value_of(shape, "filename");
+  std::string uri = child_text(shape, "uri");
+  if (uri.empty()) uri = child_text(shape, "filename");
   const auto path = context_.find(uri, origin);
   if (!path)
-    throw Unusable{"its mesh " + in_quotes(uri) + " was not found in " + context_.files.places()};
+    throw Unusable{"its mesh " + quote(uri) + " was not found in " + context_.files.places()};
   const pugi::xml_node submesh = shape.child("submesh");
-  const std::string name = value_of(submesh, "name");
+  const std::string name = child_text(submesh, "name");
   std::vector<const FileMesh*> shown;
   for (const FileMesh& part : meshes_.read(*path)) {
     if (name.empty() || part.node == name || part.geometry == name) shown.push_back(&part);
   }
-  if (shown.empty()) throw Unusable{path->string() + " has no part " + in_quotes(name)};
+  if (shown.empty()) throw Unusable{path->string() + " has no part " + quote(name)};
   const auto scale = read_size(shape, "scale", 3, 1.0);
   Affine3 world_from_mesh = world_from_visual * Affine3::scaling(scale[0], scale[1], scale[2]);
-  const std::string centre = value_of(submesh, "center");
+  const std::string centre = child_text(submesh, "center");
   if (!name.empty() && (centre == "true" || centre == "1"))
-    world_from_mesh = world_from_mesh * centre_parts(shown);
+    world_from_mesh = world_from_mesh * make_centring_map(shown);
   for (const FileMesh* part : shown) {
     place_mesh(context_.scene, part->mesh, world_from_mesh, origin.object,
                get_or_add_material(*part, visual, origin));
@@ -132,14 +133,15 @@ int SdfVisuals::get_or_add_material(const FileMesh& part, pugi::xml_node visual,
   const bool is_shared = !visual.child("material");
   if (const auto known = materials_.find(&part); is_shared && known != materials_.end())
     return known->second;
-  context_.scene.materials.push_back(dress(part.material, visual, origin));
+  context_.scene.materials.push_back(apply_material(part.material, visual, origin));
   const int index = static_cast<int>(context_.scene.materials.size()) - 1;
   if (is_shared) materials_.emplace(&part, index);
   return index;
 }
 
 // Returns the material of a mesh, changed by the visual's <material>.
-Material SdfVisuals::dress(Material material, pugi::xml_node visual, const SdfOrigin& origin) {
+Material SdfVisuals::apply_material(Material material, pugi::xml_node visual,
+                                    const SdfOrigin& origin) {
   const pugi::xml_node said = visual.child("material");
   if (!said) return material;
   if (const auto diffuse = read_colour(said, "diffuse")) {
@@ -147,10 +149,10 @@ Material SdfVisuals::dress(Material material, pugi::xml_node visual, const SdfOr
   } else if (const auto ambient = read_colour(said, "ambient")) {
     material.colour = *ambient;
   }
-  if (const auto emissive = read_colour(said, "emissive")) shine(material, *emissive);
+  if (const auto emissive = read_colour(said, "emissive")) set_emission(material, *emissive);
   apply_script(material, said, origin);
   for (const pugi::xml_node& workflow : said.child("pbr"))
-    set_texture(material, value_of(workflow, "albedo_map"), origin);
+    set_texture(material, child_text(workflow, "albedo_map"), origin);
   return material;
 }
 
@@ -167,25 +169,25 @@ void SdfVisuals::set_texture(Material& material, const std::string& written,
 
 void SdfVisuals::apply_script(Material& material, pugi::xml_node said, const SdfOrigin& origin) {
   const pugi::xml_node script = said.child("script");
-  std::string name = value_of(script, "name");
-  if (name.empty()) name = value_of(said, "script");
+  std::string name = child_text(script, "name");
+  if (name.empty()) name = child_text(said, "script");
   if (name.empty()) return;
   std::vector<fs::path> places;
   for (const pugi::xml_node& uri : (script ? script : said).children("uri")) {
-    if (const auto found = context_.files.resolve(text_of(uri), origin.directory))
+    if (const auto found = context_.files.resolve(element_text(uri), origin.directory))
       places.push_back(found->path);
   }
   // Models list the folders of their scripts and textures as several <uri>; they lie side by side.
   places.push_back(origin.directory / "materials/scripts");
   const auto known = find_script_material(name, places);
   if (!known) {
-    context_.warn(origin.object, "material script " + in_quotes(name) +
+    context_.warn(origin.object, "material script " + quote(name) +
                                      " was not found; a plain colour is shown instead");
     return;
   }
   material = Material{};
   if (known->diffuse) material.colour = *known->diffuse;
-  if (known->emissive) shine(material, *known->emissive);
+  if (known->emissive) set_emission(material, *known->emissive);
   set_texture(material, known->texture, {known->texture_directory, origin.object});
 }
 

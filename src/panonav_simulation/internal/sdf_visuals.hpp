@@ -26,7 +26,7 @@ class SdfVisuals {
   void add_mesh_file(pugi::xml_node shape, pugi::xml_node visual, const Affine3& world_from_visual,
                      const SdfOrigin& origin);
   int get_or_add_material(const FileMesh& part, pugi::xml_node visual, const SdfOrigin& origin);
-  Material dress(Material material, pugi::xml_node visual, const SdfOrigin& origin);
+  Material apply_material(Material material, pugi::xml_node visual, const SdfOrigin& origin);
   void set_texture(Material& material, const std::string& written, const SdfOrigin& origin);
   void apply_script(Material& material, pugi::xml_node said, const SdfOrigin& origin);
 

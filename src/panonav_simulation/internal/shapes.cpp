@@ -44,7 +44,7 @@ Mesh revolve(const std::vector<Ring>& rings) {
 
 }  // namespace
 
-Mesh box_mesh(const Vector3& size_m) {
+Mesh make_box_mesh(const Vector3& size_m) {
   Mesh mesh;
   const double x = 0.5 * size_m.x_m;
   const double y = 0.5 * size_m.y_m;
@@ -68,12 +68,12 @@ Mesh box_mesh(const Vector3& size_m) {
   return mesh;
 }
 
-Mesh cylinder_mesh(double radius_m, double length_m) {
+Mesh make_cylinder_mesh(double radius_m, double length_m) {
   const double z = 0.5 * length_m;
   return revolve({{0.0, -z}, {radius_m, -z}, {radius_m, z}, {0.0, z}});
 }
 
-Mesh ellipsoid_mesh(const Vector3& radii_m) {
+Mesh make_ellipsoid_mesh(const Vector3& radii_m) {
   std::vector<Ring> rings;
   for (int i = 0; i <= sectors / 2; ++i) {
     const double polar = std::numbers::pi * (2.0 * i / sectors - 0.5);
@@ -86,7 +86,7 @@ Mesh ellipsoid_mesh(const Vector3& radii_m) {
   return mesh;
 }
 
-Mesh capsule_mesh(double radius_m, double length_m) {
+Mesh make_capsule_mesh(double radius_m, double length_m) {
   std::vector<Ring> rings;
   for (int i = 0; i <= sectors / 2; ++i) {
     const double polar = std::numbers::pi * (2.0 * i / sectors - 0.5);
@@ -98,7 +98,7 @@ Mesh capsule_mesh(double radius_m, double length_m) {
   return revolve(rings);
 }
 
-Mesh rectangle_mesh(double size_x_m, double size_y_m) {
+Mesh make_rectangle_mesh(double size_x_m, double size_y_m) {
   Mesh mesh;
   const double x = 0.5 * size_x_m;
   const double y = 0.5 * size_y_m;

@@ -6,14 +6,14 @@ namespace panonav::simulation {
 
 /// Meshes of simple shapes around the origin, z up; the texture covers each face or the whole
 /// round surface once. `object` and `material` are not set. Sizes must be > 0.
-[[nodiscard]] Mesh box_mesh(const Vector3& size_m);
+[[nodiscard]] Mesh make_box_mesh(const Vector3& size_m);
 /// Makes a cylinder along z, with both ends closed.
-[[nodiscard]] Mesh cylinder_mesh(double radius_m, double length_m);
+[[nodiscard]] Mesh make_cylinder_mesh(double radius_m, double length_m);
 /// Makes an ellipsoid with three radii along x, y and z.
-[[nodiscard]] Mesh ellipsoid_mesh(const Vector3& radii_m);
+[[nodiscard]] Mesh make_ellipsoid_mesh(const Vector3& radii_m);
 /// Makes a cylinder along z with half spheres at its ends; `length_m` is that of the cylinder.
-[[nodiscard]] Mesh capsule_mesh(double radius_m, double length_m);
+[[nodiscard]] Mesh make_capsule_mesh(double radius_m, double length_m);
 /// Makes a rectangle in the plane z = 0; the texture repeats every metre.
-[[nodiscard]] Mesh rectangle_mesh(double size_x_m, double size_y_m);
+[[nodiscard]] Mesh make_rectangle_mesh(double size_x_m, double size_y_m);
 
 }  // namespace panonav::simulation

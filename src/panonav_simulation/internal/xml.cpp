@@ -43,7 +43,7 @@ pugi::xml_document parse_xml(std::string_view text) {
   return document;
 }
 
-std::string text_of(pugi::xml_node element) {
+std::string element_text(pugi::xml_node element) {
   std::string text;
   for (const pugi::xml_node& child : element) {
     if (child.type() != pugi::node_element) text += child.value();
@@ -53,12 +53,12 @@ std::string text_of(pugi::xml_node element) {
   return text.substr(first, text.find_last_not_of(blanks) + 1 - first);
 }
 
-std::string value_of(pugi::xml_node element, const char* name) {
+std::string child_text(pugi::xml_node element, const char* name) {
   const pugi::xml_node child = element.child(name);
-  return child ? text_of(child) : element.attribute(name).value();
+  return child ? element_text(child) : element.attribute(name).value();
 }
 
-std::optional<std::vector<double>> numbers_of(std::string_view text) {
+std::optional<std::vector<double>> parse_numbers(std::string_view text) {
   std::vector<double> numbers;
   for (std::size_t at = 0; (at = text.find_first_not_of(blanks, at)) != std::string_view::npos;) {
     const auto end = std::min(text.find_first_of(blanks, at), text.size());

@@ -15,13 +15,13 @@ namespace panonav::simulation {
 [[nodiscard]] pugi::xml_document parse_xml(std::string_view text);
 
 /// Returns the text of an element without that of its children; blanks around it are left out.
-[[nodiscard]] std::string text_of(pugi::xml_node element);
+[[nodiscard]] std::string element_text(pugi::xml_node element);
 
 /// Returns the text of the first child of this name, else the attribute of this name, else "".
-[[nodiscard]] std::string value_of(pugi::xml_node element, const char* name);
+[[nodiscard]] std::string child_text(pugi::xml_node element, const char* name);
 
 /// Returns the finite numbers that a text consists of, separated by blanks; `nullopt` where
 /// anything else stands in it.
-[[nodiscard]] std::optional<std::vector<double>> numbers_of(std::string_view text);
+[[nodiscard]] std::optional<std::vector<double>> parse_numbers(std::string_view text);
 
 }  // namespace panonav::simulation
