@@ -44,18 +44,18 @@ struct MappingExperiments : Experiments {
   void reproduce_first_set() const;
   /// Figures 5 and 6 (b): 150 views captured by threshold in `lab`.
   void reproduce_second_set() const;
-  /// Time from a mirror image to a pose.
+  /// Measures the time from a mirror image to a pose.
   void measure_step_time() const;
   /// Places that look alike: closures in a corridor of identical doors.
   void reproduce_identical_doors() const;
-  /// 60 m with two loops in a Gazebo world of `options.data`.
+  /// Maps paths of 60 m with two loops in a Gazebo world of `options.data`.
   void reproduce_world(const std::string& name) const;
-  /// The recordings of `options.data`: a route outdoors, a walk through a building.
+  /// Maps the recordings of `options.data`: a route outdoors, a walk through a building.
   void reproduce_recordings() const;
-  /// Time and memory at 100 views and at more, ten times each, up to `options.max_views`.
+  /// Measures time and memory at 100 views and at more, ten times each, up to `options.max_views`.
   void measure_large_maps() const;
 
-  /// Variant `number` of a built-in scene.
+  /// Makes variant `number` of a built-in scene.
   [[nodiscard]] simulation::PlaceRecording make_variant(const std::string& scene, int number) const;
 };
 
@@ -80,15 +80,15 @@ struct NavigationExperiments : Experiments {
 
 /// The experiments of [Y03] and what its author left to later work.
 struct RouteExperiments : Experiments {
-  /// Section 5: drives across a straight path through `lab`, sweeps, time, the run to a goal;
-  /// figures 3, 5, 9 and 10.
+  /// Reproduces section 5: drives across a straight path through `lab`, sweeps, time, the run to a
+  /// goal; figures 3, 5, 9 and 10.
   void reproduce_lab_drives() const;
-  /// 60 m repeated forward and back in closed loop through variants of `loop`, and how many bytes
-  /// these routes take in a memory file.
+  /// Measures routes of 60 m repeated forward and back in closed loop through variants of `loop`,
+  /// and how many bytes these routes take in a memory file.
   void reproduce_loop_routes() const;
-  /// The same in a Gazebo world of `options.data`.
+  /// Measures the same in a Gazebo world of `options.data`.
   void reproduce_world_routes(const std::string& name) const;
-  /// A real route outdoors: `sussex_route` of `options.data`.
+  /// Localises along a real route outdoors: `sussex_route` of `options.data`.
   void reproduce_real_route() const;
 };
 

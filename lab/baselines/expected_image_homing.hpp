@@ -21,9 +21,9 @@ class ExpectedImageHoming {
     float eta = 0.0F;
   };
 
-  /// For rows of `columns` pixels, with the positions of the finest square lattice around (0, 0)
-  /// that has at most `max_positions` within 2/3 R (200 gives 197): beyond R the image would fold
-  /// over. Throws ContractError unless 4 <= columns <= 65536 and 5 <= max_positions <= 10000.
+  /// Prepares rows of `columns` pixels, with the positions of the finest square lattice around (0,
+  /// 0) that has at most `max_positions` within 2/3 R (200 gives 197): beyond R the image would
+  /// fold over. Throws ContractError unless 4 <= columns <= 65536 and 5 <= max_positions <= 10000.
   explicit ExpectedImageHoming(int columns, int max_positions = 200);
 
   [[nodiscard]] int columns() const noexcept { return columns_; }

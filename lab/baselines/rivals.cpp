@@ -201,7 +201,8 @@ class Spectra {
             view.values().size()};
   }
 
-  // min over turns of the sum of squared differences = |a|^2 + |b|^2 - 2 max correlation.
+  // Returns the minimum over rotations of the sum of squared differences = |a|^2 + |b|^2 - 2 max
+  // correlation.
   [[nodiscard]] double distance(const Spectrum& a, const Spectrum& b) const {
     const Eigen::VectorXcf cross =
         (a.rows.array() * b.rows.array().conjugate()).colwise().sum().transpose();
@@ -314,7 +315,7 @@ std::unique_ptr<RivalRecogniser> fourier_signature_recogniser(int components) {
        [](const auto& signature) { return 2.0 * static_cast<double>(signature.shape().size()); }});
 }
 
-// One histogram over the whole view: what Ulrich and Nourbakhsh use, in grey.
+// Compares one histogram over the whole view: what Ulrich and Nourbakhsh use, in grey.
 std::unique_ptr<RivalRecogniser> grey_histogram_recogniser(int bins) {
   require(bins >= 2 && bins <= 256, "histogram bins", bins, "2 .. 256");
   return make_recogniser<PixelValues>(
@@ -323,7 +324,7 @@ std::unique_ptr<RivalRecogniser> grey_histogram_recogniser(int bins) {
        [](const PixelValues& histogram) { return 2.0 * static_cast<double>(histogram.size()); }});
 }
 
-// Colour needs no phases and no unwarping, and does not change when the robot turns.
+// Compares colours, which need no phases and no unwarping, and do not depend on the heading.
 std::unique_ptr<RivalRecogniser> colour_histogram_recogniser(int bins_per_channel) {
   require(bins_per_channel >= 2 && bins_per_channel <= 32, "histogram bins per channel",
           bins_per_channel, "2 .. 32");

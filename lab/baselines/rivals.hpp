@@ -26,7 +26,7 @@ class RivalRecogniser {
   [[nodiscard]] virtual std::string name() const = 0;
   /// Called once with all reference views, of one shape.
   virtual void memorise(const std::vector<RivalView>& references) = 0;
-  /// Index of the nearest reference view but for the one that is left out.
+  /// Returns the index of the nearest reference view but for the one that is left out.
   [[nodiscard]] virtual std::size_t nearest(const RivalView& query,
                                             std::optional<std::size_t> left_out = {}) const = 0;
   [[nodiscard]] virtual double bytes_per_view() const = 0;
@@ -34,8 +34,8 @@ class RivalRecogniser {
 
 [[nodiscard]] std::unique_ptr<RivalRecogniser> fourier_signature_recogniser(int components = 15);
 [[nodiscard]] std::unique_ptr<RivalRecogniser> grey_histogram_recogniser(int bins = 64);
-/// One histogram of RGB colours over the whole view, bins_per_channel^3 bins. Memorising throws
-/// ContractError on a view without colour.
+/// Compares one histogram of RGB colours over the whole view, bins_per_channel^3 bins. Memorising
+/// throws ContractError on a view without colour.
 [[nodiscard]] std::unique_ptr<RivalRecogniser> colour_histogram_recogniser(
     int bins_per_channel = 8);
 [[nodiscard]] std::unique_ptr<RivalRecogniser> eigenimage_recogniser(int dimensions = 15);

@@ -116,7 +116,7 @@ struct Pairs {
   std::size_t joined = 0;
 };
 
-/// Each walk through one place joined with the next one.
+/// Reports each walk through one place joined with the next one.
 void report_place(const std::string& name, const std::vector<Session>& walks,
                   const std::filesystem::path& folder, Reproduction& result) {
   Pairs sharing;

@@ -99,14 +99,14 @@ struct TrackingExperiments : Experiments {
   void reproduce_kidnapping();
   /// Varies numbers of particles and noise of odometry.
   void reproduce_sweeps();
-  /// "A long indoor corridor with a loop where we face many false hypothesis": never surely wrong.
+  /// Reproduces "a long indoor corridor with a loop where we face many false hypothesis".
   void reproduce_corridor();
-  /// "A large outdoor environment where we are investigating the different nature of brightness
-  /// variations".
+  /// Reproduces "a large outdoor environment where we are investigating the different nature of
+  /// brightness variations".
   void reproduce_garden();
   /// Runs a robot that leaves the memorised half of the scene `name` and returns.
   void reproduce_leaving(const std::string& name);
-  /// Global localisation in the world `name` of `options.data`. Throws FileError.
+  /// Reproduces global localisation in the world `name` of `options.data`. Throws FileError.
   void reproduce_gazebo_world(const std::string& name);
   /// Localises in the recordings sussex_route and gantry_plants of `options.data`. Throw FileError.
   void reproduce_recorded_route();

@@ -99,7 +99,7 @@ void add_ratio_row(const Rule& rule, const std::vector<double>& with,
                                                          : std::nullopt);
 }
 
-// "Large odometric errors": 20 % of the distance and 10 degrees a metre.
+// Returns "large odometric errors": 20 % of the distance and 10 degrees a metre.
 FilterSetting large_error_setting(InjectionMethod injection) {
   FilterSetting setting = compass_setting(injection);
   setting.odometry.translation_from_translation = 0.05;

@@ -64,8 +64,7 @@ double find_first_above_m(const Curve& curve, double value) {
   return bin_distance_m(static_cast<std::size_t>(found - curve.begin()) - (found == curve.end()));
 }
 
-// A straight way of length line_length_m with free floor all along, or the longest of the ways
-// drawn.
+// Draws a straight free line of `line_length_m`, or the longest of `line_draws` trials.
 std::pair<Point2, Point2> sample_straight_line(const simulation::FreeSpace& space, Random& random) {
   std::optional<std::pair<Point2, Point2>> best;
   constexpr int line_draws = 200;
@@ -184,7 +183,7 @@ class DistanceCurve final : public Experiment {
   }
 
  private:
-  // All pairs of views along one straight way.
+  // Adds all pairs of views along one straight way.
   void add_line(const simulation::PlaceRecording& place, Point2 from, Point2 to, std::size_t line,
                 CurveSums& sums, Executor& executor) {
     const auto steps = static_cast<std::size_t>(std::lround(distance(from, to) / line_step_m));

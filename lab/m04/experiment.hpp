@@ -38,14 +38,15 @@ class Experiment {
 [[nodiscard]] std::unique_ptr<Experiment> area_shape_experiment();
 /// [M04] eq. 6: weights learnt in one place and used in the next.
 [[nodiscard]] std::unique_ptr<Experiment> component_weights_experiment();
-/// The ways of recognising places that [M04] argues against, on the same views.
+/// Compares the ways of recognising places that [M04] argues against, on the same views.
 [[nodiscard]] std::unique_ptr<Experiment> rivals_experiment();
 
 /// [M04] section 3: views that arrange themselves (figures 12, 15, 16 and 17), in the hall, a small
 /// room and the periodic hall.
 void reproduce_lattice(const Experiments& context);
 
-/// [M03] table 1: bits of the raw image, the cylinder and the signature, counted from the objects.
+/// Adds [M03] table 1: bits of the raw image, the cylinder and the signature, counted from the
+/// objects.
 void reproduce_memory_table(Reproduction& result);
 
 }  // namespace panonav::lab

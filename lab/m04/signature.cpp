@@ -31,7 +31,7 @@ std::vector<double> mean_power(const Panorama& view, int components) {
   return power;
 }
 
-// Slope of log power against log k, k = 1 .. last, by least squares.
+// Returns the slope of log power against log k, k = 1 .. last, by least squares.
 double spectrum_slope(const std::vector<double>& power, int last) {
   double n = 0.0;
   double sx = 0.0;

@@ -75,7 +75,7 @@ class WeightsOfComponents final : public Experiment {
   }
 
  private:
-  // The weights of the scene before, in this one.
+  // Uses the weights of the scene before, in this one.
   void compare(const simulation::PlaceRecording& place,
                const std::vector<FourierSignature>& references, Executor& executor) {
     const std::array<std::vector<double>, weightings> weights{

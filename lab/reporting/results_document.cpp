@@ -22,7 +22,7 @@ std::string escape_markdown(const std::string& text) {
   return result;
 }
 
-// An item of a list, broken between words.
+// Returns an item of a list, broken between words.
 std::string list_item(const std::string& text) {
   constexpr std::size_t width = 120;
   std::string result = "-";
@@ -39,14 +39,14 @@ std::string list_item(const std::string& text) {
   return result + "\n";
 }
 
-// One line of a table.
+// Returns one line of a table.
 std::string table_line(std::span<const std::string> cells) {
   std::string line = "|";
   for (const std::string& cell : cells) line += " " + escape_markdown(cell) + " |";
   return line + "\n";
 }
 
-// The rows with a target.
+// Returns the rows with a target.
 std::string target_table(std::span<const ResultRow> rows) {
   std::string text = table_line(table_header()) + "|---|---|---|---|---|---|\n";
   for (const ResultRow& row : rows) {

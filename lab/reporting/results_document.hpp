@@ -22,19 +22,20 @@ struct ResultsDocument {
   std::vector<PaperResults> papers;
 };
 
-/// Over all papers.
+/// Counts the targets of all papers.
 [[nodiscard]] TargetCount count_targets(const ResultsDocument& document);
 
-/// Every row that misses its target, a sentence each: what, ours against the target, and why.
+/// Lists every row that misses its target, a sentence each: what, ours against the target, and why.
 [[nodiscard]] std::vector<std::string> list_misses(const ResultsDocument& document);
 
-/// The rows with a target first, in their order; then the others. Gives how many have one.
+/// Moves the rows with a target before the others; keeps their order. Returns their number.
 std::size_t move_targets_first(std::vector<ResultRow>& rows);
 
-/// One object: `version`, `command`, `targets`, `held`, `papers` (by name, an array of rows each).
+/// Returns one object: `version`, `command`, `targets`, `held`, `papers` (by name, an array of rows
+/// each).
 [[nodiscard]] std::string to_json(const ResultsDocument& document);
-/// Markdown: title, command, counts, the rows that do not hold with their reasons, then for each
-/// paper a table of its rows with a target, and how many rows the JSON document holds.
+/// Returns Markdown: title, command, counts, the rows that do not hold with their reasons, then for
+/// each paper a table of its rows with a target, and how many rows the JSON document holds.
 [[nodiscard]] std::string to_markdown(const ResultsDocument& document);
 
 }  // namespace panonav::lab

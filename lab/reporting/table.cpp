@@ -15,12 +15,12 @@ std::string_view to_symbol(Comparison comparison) {
   return comparison == Comparison::at_most ? "<=" : ">=";
 }
 
-// Four significant digits: what a person compares.
+// Formats four significant digits.
 std::string format_value(double value, const std::string& unit) {
   return format_number(value, unit, 4);
 }
 
-// With its interval, without its unit.
+// Formats a figure with its interval, without its unit.
 std::string figure_text(const ResultRow& row) {
   std::string text = format_value(row.ours, row.unit);
   if (row.interval) {

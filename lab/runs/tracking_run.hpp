@@ -24,8 +24,8 @@ namespace panonav::lab {
 /// moved: its parts refer to the memory.
 class TrackingPlace {
  public:
-  /// `spacing_m`: of the grid of references, > 0: by it errors are judged. Throws ContractError as
-  /// `learn_observation_model`.
+  /// Learns the models of the memory. `spacing_m`: of the grid of references, > 0. Throws
+  /// ContractError as `learn_observation_model`.
   TrackingPlace(VisualMemory memory, double spacing_m);
   TrackingPlace(const TrackingPlace&) = delete;
   TrackingPlace& operator=(const TrackingPlace&) = delete;

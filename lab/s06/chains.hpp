@@ -56,7 +56,7 @@ void reproduce_snapshot_chains(const HomingPlace& place, const std::string& name
                                std::uint64_t seed, int routes, Executor& executor,
                                Reproduction& reproduction);
 
-/// The same in the built-in scenes office, hall, loop and corridor.
+/// Measures the same in the built-in scenes office, hall, loop and corridor.
 void reproduce_snapshot_chains(int routes, const Experiments& context);
 
 }  // namespace panonav::lab

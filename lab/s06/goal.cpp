@@ -56,7 +56,7 @@ class GoalPictures {
   std::size_t goal_;
 };
 
-// One layer of cells for each range between limits, the highest values darkest.
+// Returns one layer of cells for each range between limits, the highest values darkest.
 std::vector<viewer::MapLayer> GoalPictures::shade_cells(const std::vector<double>& values,
                                                         const std::vector<double>& limits) const {
   constexpr std::array greys{viewer::PlotColour::yellow,     viewer::PlotColour::pale_grey,
@@ -79,7 +79,7 @@ std::vector<viewer::MapLayer> GoalPictures::shade_cells(const std::vector<double
   return layers;
 }
 
-// A stroke from each place towards home, a dot where it begins.
+// Draws a stroke from each place towards home, a dot where it begins.
 viewer::MapLayer GoalPictures::draw_home_vectors(const FourierHomingOptions& homing) const {
   viewer::MapLayer layer{.colour = viewer::PlotColour::blue};
   for (const auto& placed : arena_.currents.views) {
@@ -95,7 +95,7 @@ viewer::MapLayer GoalPictures::draw_home_vectors(const FourierHomingOptions& hom
   return layer;
 }
 
-// The edges between cells from which runs end within 10 cm of the goal and all others.
+// Outlines the edges between cells from which runs end within 10 cm of the goal and all others.
 viewer::MapLayer GoalPictures::outline_catchment(const std::vector<double>& ends_m) const {
   viewer::MapLayer layer{.colour = viewer::PlotColour::vermilion};
   const double spacing_m = arena_.options.spacing_m;
@@ -160,7 +160,7 @@ viewer::Series make_transect(const Arena& arena, Point2 goal,
   return series;
 }
 
-// The goal nearest to the crossing of the streets left of the middle.
+// Returns the goal nearest to the crossing of the streets left of the middle.
 std::size_t choose_goal(const HomingSurvey& survey) {
   const Point2 crossing{0.5, 0.6};
   return static_cast<std::size_t>(

@@ -69,8 +69,7 @@ double bytes_per_metre(const SnapshotChain& chain) noexcept {
 
 ChainRecorder::ChainRecorder(double max_spacing_m) : max_spacing_m_(max_spacing_m) {}
 
-// `candidate` is the last of the views passed. Between two views that follow each other the last
-// candidate has asked already for the direction back.
+// True if homing works between the last snapshot and `candidate`, the last of the views passed.
 bool ChainRecorder::is_reachable(const Passed& candidate) const {
   const auto points_from_to = [](const Passed& from, const Passed& to) {
     return agrees_with_odometry(from.view, to.view,

@@ -32,9 +32,10 @@ struct HomingStrategy {
   std::vector<int> highest;  ///< K of each stage; not for expected images and our rule
 };
 [[nodiscard]] HomingStrategy published_strategy(std::vector<int> highest);
-/// Our own: home vectors with default options and K = 10; where runs stop at a place that does not
-/// look like home, coarse to fine without the search of displacements, three times; default options
-/// last. A place looks like home below `s06_alike`. All this was chosen on arenas of seeds 1 to 4.
+/// Returns our strategy: home vectors with default options and K = 10; where runs stop at a place
+/// that does not look like home, coarse to fine without the search of displacements, three times;
+/// default options last. A place looks like home below `s06_alike`. All this was chosen on arenas
+/// of seeds 1 to 4.
 [[nodiscard]] HomingStrategy own_strategy();
 [[nodiscard]] HomingStrategy expected_image_strategy();
 

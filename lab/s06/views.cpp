@@ -221,7 +221,7 @@ viewer::Series curve_by_distance(const Arena& arena, const PairSums& sums, doubl
   return series;
 }
 
-// All at one heading, as in the paper.
+// Rotates all views to one heading, as in the paper.
 std::vector<HomingView> rotate_to_north(const ArenaRecording& recording) {
   std::vector<HomingView> views;
   for (const auto& placed : recording.views) {
@@ -312,7 +312,8 @@ std::vector<std::vector<std::uint8_t>> find_best_shifts(const Arena& arena, Exec
   return shifts;
 }
 
-// Circular standard deviation of `count` errors whose cosines and sines have these sums.
+// Returns the circular standard deviation of `count` errors whose cosines and sines have these
+// sums.
 double deviation_deg(const std::pair<double, double>& sums, double count) {
   const double length = std::hypot(sums.first, sums.second) / count;
   return degrees(std::sqrt(std::max(0.0, -2.0 * std::log(length))));

@@ -35,7 +35,7 @@ viewer::MapLayer make_path_layer(const LabRoute& lab) {
                          to_path_frame(lab, {lab.route.poses().begin(), lab.route.poses().end()}));
 }
 
-// The lab from above, as it was memorised, in the frame of the path.
+// Returns the layers with the memorised lab below them, in the frame of the path.
 std::vector<viewer::MapLayer> prepend_room(const LabRoute& lab,
                                            std::vector<viewer::MapLayer> layers) {
   std::vector<viewer::MapLayer> all =
@@ -52,7 +52,7 @@ std::vector<viewer::MapLayer> prepend_room(const LabRoute& lab,
   return all;
 }
 
-// Column of a line shown at place i from the left: clockwise, forward in the middle.
+// Returns the column of a line shown at place i from the left: clockwise, forward in the middle.
 std::size_t shown_column(std::size_t i, std::size_t columns) {
   return (2 * columns + columns / 2 - i) % columns;
 }

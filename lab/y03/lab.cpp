@@ -103,8 +103,8 @@ struct ChangedLab {
   double share = 0.0;
 };
 
-// Share of the directions in which two scenes differ by more than noise makes of one, as seen from
-// start, middle and end of a drive.
+// Returns the share of the directions in which two scenes differ by more than noise makes of one,
+// as seen from start, middle and end of a drive.
 double changed_share(const simulation::Renderer& before, const simulation::Renderer& after,
                      const std::vector<Pose2>& drive, simulation::LineCamera camera) {
   camera.sensor.read_noise = 0.0;

@@ -125,7 +125,7 @@ double RouteContours::pair_energy(const ContourPoint& before, const ContourPoint
   return energy;
 }
 
-// Dynamic programming along the contour: each control point stays or goes to one of its eight
+// Moves the contour by dynamic programming: each control point stays or goes to one of its eight
 // neighbours, and pairs of neighbours share eq. 7 and 11. The second derivative takes the point
 // after next from the last iteration.
 void RouteContours::move(std::vector<ContourPoint>& contour, const std::vector<ContourPoint>& other,

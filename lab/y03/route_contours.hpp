@@ -39,12 +39,12 @@ class RouteContours {
   /// Throws ContractError on a route of fewer than two lines and unless margin_m > 0.
   explicit RouteContours(const RoutePanorama& route, double margin_m = default_contour_margin_m);
 
-  /// Two contours start `margin_m` before and behind the curve that eq. 5 predicts, move by dynamic
-  /// programming over the eight neighbours and the place of each control point, and pull each other
-  /// until they meet; least squares of eq. 5 over the control points give the pose [Y03 section 4].
-  /// Control points lie on edges of the line, not within 10 degrees of the path's direction, where
-  /// eq. 5 has its poles. Empty with fewer than eight control points or where the path is out of
-  /// reach. Throws ContractError on a wrong length.
+  /// Fits a line. Two contours start `margin_m` before and behind the curve that eq. 5 predicts,
+  /// move by dynamic programming over the eight neighbours and the place of each control point, and
+  /// pull each other until they meet; least squares of eq. 5 over the control points give the pose
+  /// [Y03 section 4]. Control points lie on edges of the line, not within 10 degrees of the path's
+  /// direction, where eq. 5 has its poles. Empty with fewer than eight control points or where the
+  /// path is out of reach. Throws ContractError on a wrong length.
   [[nodiscard]] std::optional<RouteContourFix> fit(std::span<const float> line,
                                                    const Pose2& predicted) const;
 

@@ -12,21 +12,21 @@ namespace panonav::simulation {
 /// them.
 void furnish_room_shell(SceneBuilder& builder, const FloorArea& room, double height_m);
 
-/// 1.4 x 0.7 m with drawers, a screen and papers on it.
+/// Adds a desk of 1.4 x 0.7 m with drawers, a screen and papers on it.
 void add_desk(SceneBuilder& builder, const std::string& name, const Footing& footing);
-/// An office chair on five legs, with its back along +y of the footing.
+/// Adds an office chair on five legs, with its back along +y of the footing.
 void add_chair(SceneBuilder& builder, const std::string& name, const Footing& footing);
-/// A bookshelf 0.32 m deep with books on both long sides.
+/// Adds a bookshelf 0.32 m deep with books on both long sides.
 void add_shelf(SceneBuilder& builder, const std::string& name, const Footing& footing,
                double width_m, double height_m);
-/// Wide, closed and of one tone: what makes the large dark and bright parts of a view.
+/// Adds a wardrobe, wide, closed and of one tone: a large dark or bright part of a view.
 void add_wardrobe(SceneBuilder& builder, const std::string& name, const Footing& footing,
                   double width_m, double height_m);
-/// A chest of drawers, 0.45 to 0.9 m wide, with a thing on it.
+/// Adds a chest of drawers, 0.45 to 0.9 m wide, with a thing on it.
 void add_cabinet(SceneBuilder& builder, const std::string& name, const Footing& footing);
-/// A pot with leaves, about 1 m high.
+/// Adds a pot with leaves, about 1 m high.
 void add_plant(SceneBuilder& builder, const std::string& name, Point2 centre);
-/// A box of any size, of wood or with a picture on its sides.
+/// Adds a box of any size, of wood or with a picture on its sides.
 void add_crate(SceneBuilder& builder, const std::string& name, const Footing& footing,
                Vector3 size);
 
@@ -37,7 +37,7 @@ struct TreeKind {
 };
 /// Adds the materials of a kind to the scene; all trees of a kind share them.
 [[nodiscard]] TreeKind make_tree_kind(SceneBuilder& builder);
-/// A trunk of 0.3 of the height below a crown of four to six clumps of leaves.
+/// Adds a trunk of 0.3 of the height below a crown of four to six clumps of leaves.
 void add_tree(SceneBuilder& builder, const std::string& name, const TreeKind& kind, Point2 centre,
               double height_m);
 

@@ -97,8 +97,8 @@ double light_on_floor(const Scene& scene, double x_m, double y_m, double floor_m
   return light;
 }
 
-// Gazebo's lamps add up beyond white. As a camera would, this exposes for the brightest floor that
-// lies under a lamp: all light is scaled so that it is 1 there, if it is more.
+// Scales the light of Gazebo's lamps, which add up beyond white: exposes for the brightest floor
+// that lies under a lamp: all light is scaled so that it is 1 there, if it is more.
 void expose(Scene& scene) {
   const double floor_m = extent(scene)->first.z_m;
   double brightest = scene.ambient;

@@ -43,7 +43,7 @@ class HyperboloidalMirror {
     double radius_mm, height_mm;      // of the hit, about the middle between the foci
     double direction_r, direction_z;  // of the reflected ray, unit length
   };
-  // False where the ray misses the mirror's sheet.
+  // Reflects a ray; false if it misses the mirror's sheet.
   bool reflect(double radius_px, Point& point) const;
 
   Camera camera_;

@@ -140,8 +140,7 @@ struct Mission {
 
 struct RandomMissionOptions {
   int count = 100;
-  /// Starts, and places that the robot is kidnapped to, lie within so much of a reference at
-  /// random; infinite: anywhere.
+  /// Largest distance of random starts and kidnapping targets from a reference; infinite: anywhere.
   double beside_m = std::numeric_limits<double>::infinity();
   bool kidnapped = false;  ///< somebody kidnaps the robot on its way
 };

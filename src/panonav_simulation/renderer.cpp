@@ -320,8 +320,8 @@ class CameraRays {
         dual_->lenses[lens_at(camera_, {static_cast<double>(column), 0.0})].gain);
   }
 
-  // The angle between pixels varies little over a picture; the one at two thirds of the rim, about
-  // the horizon, stands for all.
+  // Returns the angle between pixels, which varies little over an image: the one at two thirds of
+  // the rim, about the horizon, stands for all.
   [[nodiscard]] double pixel_rad() const {
     const bool flat = std::holds_alternative<EquirectangularModel>(camera_.model);
     const double around_px = flat    ? camera_.image_size.width

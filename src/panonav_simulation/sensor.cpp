@@ -39,7 +39,8 @@ class Occluders {
     }
   }
 
-  // Empty where the view is free. `height` runs from 0 (bottom) to 1 (top of the view).
+  // Returns the brightness of an occluder; nullopt where the view is free. `height` runs from 0
+  // (bottom) to 1 (top of the view).
   [[nodiscard]] std::optional<float> at(double azimuth_rad, double height) const {
     for (const Occluder& occluder : occluders_) {
       const double within =

@@ -17,7 +17,7 @@ Point2 point_ahead(const Pose2& pose, double direction_rad, double distance_m) {
   return pose * Point2{distance_m * std::cos(direction_rad), distance_m * std::sin(direction_rad)};
 }
 
-// Length of the free part of the straight way, at most `distance_m`.
+// Returns the length of the free part of the straight way, at most `distance_m`.
 double free_length_m(const FreeSpace& space, Point2 from, Point2 to) {
   if (space.is_free_between(from, to)) return distance(from, to);
   double low = 0.0;

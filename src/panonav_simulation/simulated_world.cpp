@@ -57,7 +57,7 @@ void limit_this_process() {
 /// Reads a file whose textures the argument reads; empty: surfaces get plain colours.
 using ReadScene = std::function<Scene(const TextureReader&)>;
 
-/// The end of a process that read a scene: its exit code is 0, or it wrote an error's message.
+/// Reads a scene and ends the process with exit code 0, or writes the message of an error.
 [[noreturn]] void read_and_exit(const ReadScene& read, int answer) {
   limit_this_process();
   std::string message;

@@ -38,7 +38,7 @@ class LatticeNoise {
   std::vector<float> values_;
 };
 
-// A periodic field of standard deviation about 1 whose power falls as 1 / f^exponent.
+// Makes a periodic field of standard deviation about 1 whose power falls as 1 / f^exponent.
 std::vector<float> noise_field(Random& random, int width, int height, double exponent) {
   std::vector<float> field(static_cast<std::size_t>(width) * height);
   double energy = 0.0;
@@ -75,7 +75,7 @@ void fill(Image& image, int u0, int v0, int u1, int v1, Colour colour) {
   }
 }
 
-// Light and dirt over a finished picture, so that no surface is of one even colour.
+// Adds light and dirt over a finished picture, so that no surface is of one even colour.
 void add_weathering(Random& random, Image& image, double contrast) {
   const auto field = noise_field(random, image.width(), image.height(), 2.0);
   for (int v = 0; v < image.height(); ++v) {

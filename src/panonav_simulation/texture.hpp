@@ -12,41 +12,41 @@ namespace panonav::simulation {
 /// surface. Sizes are powers of two. Colours are 0 .. 1.
 using Colour = std::array<float, 3>;
 
-/// A colour of brightness `low` .. `high` whose channels differ from grey by a factor of up to
-/// 1 -+ `spread`.
+/// Draws a colour of brightness `low` .. `high` whose channels differ from grey by a factor of up
+/// to 1 -+ `spread`.
 [[nodiscard]] Colour tint(Random& random, double low, double high, double spread);
 
-/// The colour times a random factor of 1 -+ `spread`: two things of the same make.
+/// Returns the colour times a random factor of 1 -+ `spread`: two things of the same make.
 [[nodiscard]] Colour vary_colour(Random& random, Colour colour, double spread = 0.1);
 
-/// Mixture of noise over many scales whose power falls as 1 / f^exponent, as in natural pictures.
-/// Brightness varies around `base` with the standard deviation `contrast`.
+/// Makes a mixture of noise over many scales whose power falls as 1 / f^exponent, as in natural
+/// pictures. Brightness varies around `base` with the standard deviation `contrast`.
 [[nodiscard]] Image noise_texture(Random& random, int size, Colour base, double contrast,
                                   double exponent = 2.0);
 
-/// Boards with grain along v.
+/// Makes boards with grain along v.
 [[nodiscard]] Image wood_texture(Random& random, int size, Colour base);
 
-/// Courses of bricks or tiles, `columns` by `rows` in one copy, with joints.
+/// Makes courses of bricks or tiles, `columns` by `rows` in one copy, with joints.
 [[nodiscard]] Image brick_texture(Random& random, int size, int columns, int rows, Colour brick,
                                   Colour joint);
 
-/// A shelf seen from the front: boards with rows of books, binders and gaps between.
+/// Makes a shelf seen from the front: boards with rows of books, binders and gaps between.
 [[nodiscard]] Image bookshelf_texture(Random& random, int size, int boards);
 
-/// A picture with large shapes in strong colours, framed: a poster or painting.
+/// Makes a picture with large shapes in strong colours, framed: a poster or painting.
 [[nodiscard]] Image poster_texture(Random& random, int size);
 
-/// A window with crossbars, a bright sky and something dark at its lower edge.
+/// Makes a window with crossbars, a bright sky and something dark at its lower edge.
 [[nodiscard]] Image window_texture(Random& random, int size);
 
-/// A door with panels and a handle; the same for the same engine state.
+/// Makes a door with panels and a handle; the same for the same engine state.
 [[nodiscard]] Image door_texture(Random& random, int size, Colour base);
 
-/// Leaves and branches: dark and light patches at many scales.
+/// Makes leaves and branches: dark and light patches at many scales.
 [[nodiscard]] Image foliage_texture(Random& random, int size, Colour base);
 
-/// Sky with soft clouds; v = 0 is the horizon.
+/// Makes a sky with soft clouds; v = 0 is the horizon.
 [[nodiscard]] Image sky_texture(Random& random, int width, int height);
 
 }  // namespace panonav::simulation

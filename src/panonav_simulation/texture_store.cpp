@@ -26,7 +26,8 @@ bool is_file(const fs::path& path) {
   return fs::is_regular_file(path, error);
 }
 
-// A file of `folder` with this base name: the same ending first, then those that can be decoded.
+// Finds a file of `folder` with this base name: the same ending first, then those that can be
+// decoded.
 std::optional<fs::path> find_in_folder(const fs::path& folder, const fs::path& name) {
   std::error_code error;
   std::vector<fs::path> entries;

@@ -16,7 +16,7 @@ namespace panonav::lab {
 using namespace testing;
 namespace {
 
-// What stands on a cylinder of radius 1 m around (0, 0).
+// Surroundings on a cylinder of radius 1 m around (0, 0).
 ToyWorld surroundings(std::uint64_t seed) {
   Random random(seed);
   std::vector<CylinderWave> waves;

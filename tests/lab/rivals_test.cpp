@@ -122,7 +122,7 @@ TEST(ColourHistogram, RefusesViewsWithoutColour) {
   EXPECT_THROW(recogniser->memorise({{random_view(1)}}), ContractError);
 }
 
-/// Answers the reference so many places after the query's own.
+/// Returns the reference `after` places behind the query's own.
 class NextOne final : public RivalRecogniser {
  public:
   explicit NextOne(std::size_t after) : after_(after) {}

@@ -102,7 +102,7 @@ TEST(PredictedExtents, AgreeWithStepsThatAreReallyTaken) {
   EXPECT_GT(rank_correlation(predicted, taken), 0.8);
 }
 
-/// What stands around, and walls.
+/// Objects and walls of a drawn scene.
 struct Drawn {
   explicit Drawn(const simulation::Scene& scene) {
     for (const viewer::MapLayer& layer : viewer::scene_layers(scene)) {

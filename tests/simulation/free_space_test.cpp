@@ -130,9 +130,9 @@ TEST(FreeSpace, KeepsTheRobotItsRadiusAwayFromEverythingInItsHeight) {
   EXPECT_FALSE(space.is_free({100.0, 2.0}));
   EXPECT_FALSE(space.is_free({std::nan(""), 2.0}));
   // Two rooms less a rim of 20 cm (and up to 1.5 cells), and less the wall with its rim.
-  const double most = 5.6 * 3.6 - 0.5 * 3.0;
-  EXPECT_LT(space.area_m2(), most + 0.05);
-  EXPECT_GT(space.area_m2(), most - 0.9);
+  const double max_area_m2 = 5.6 * 3.6 - 0.5 * 3.0;
+  EXPECT_LT(space.area_m2(), max_area_m2 + 0.05);
+  EXPECT_GT(space.area_m2(), max_area_m2 - 0.9);
   FreeSpaceOptions tall;
   tall.robot_height_m = 1.6;
   EXPECT_FALSE(FreeSpace(two_rooms(), tall).is_free({1.0, 1.0}));  // the lamp

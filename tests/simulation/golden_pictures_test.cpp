@@ -1,7 +1,7 @@
 // Pictures of every built-in scene against those committed in data/golden. Rays are traced with one
 // instruction set, so that the pictures are the same on every machine that has it.
 //
-// After an intended change: PANONAV_WRITE_GOLDEN=1 writes them anew; look at each before it is
+// After an intended change: PANONAV_WRITE_GOLDEN=1 writes them again; look at each before it is
 // committed.
 
 #include <gtest/gtest.h>
@@ -76,9 +76,9 @@ Difference difference(const Image& a, const Image& b) {
   return {sum / count, far / count};
 }
 
-// What other rounding may do. Measured between the instruction sets SSE4.2, AVX2 and AVX-512: a
-// mean difference of 0.002 levels at most and no far pixel. The small changes below give 0.15
-// levels and more.
+// True if the difference is that of other rounding. Measured between the instruction sets SSE4.2,
+// AVX2 and AVX-512: a mean difference of 0.002 levels at most and no far pixel. The small changes
+// below give 0.15 levels and more.
 bool is_the_same(const Difference& found) {
   return found.mean_levels <= 0.1 && found.share_of_far_pixels <= 0.002;
 }

@@ -342,7 +342,7 @@ TEST_F(GazeboWorld, PosesMayBeRelativeToFrames) {
       "<model name='m'><pose rotation_format='quat_xyzw'>1 0 3 0 0 0.70710678 0.70710678</pose>"
       "<link name='l'><pose>2 0 0 0 0 0</pose><visual name='v'>" +
       cube + "</visual></link></model>");
-  // As SDF 1.0 wrote it.
+  // The form of SDF 1.0.
   expect_at(
       "<model name='m'><origin pose='1 2 3 0 0 0'/><link name='l'><visual name='v'><geometry><box "
       "size='0.2 0.2 0.2'/></geometry></visual></link></model>");

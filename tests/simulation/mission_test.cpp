@@ -10,6 +10,7 @@
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/mapping/lattice.hpp"
 #include "panonav_simulation/scenes.hpp"
+#include "support/scene_views.hpp"
 #include "support/skips.hpp"
 
 namespace panonav::simulation {
@@ -18,12 +19,7 @@ namespace {
 TEST(MissionRobot, StopsWhereSomethingIsInItsWayAndFeelsItsWayPast) {
   Executor executor(2);
   const MissionPlace place = make_mission_place(make_scene("loop", {.seed = 3}), executor);
-  const OdometryNoise exact{.translation_from_translation = 0.0,
-                            .translation_from_rotation = 0.0,
-                            .rotation_from_translation = 0.0,
-                            .rotation_from_rotation = 0.0,
-                            .translation_scale_error = 0.0,
-                            .rotation_scale_error = 0.0};
+  const OdometryNoise exact = testing::exact_odometry();
   const Point2 start = place.scene.tour.front();
   const BaseOptions base;
   // Straight on until it touches something, in every direction.

@@ -7,6 +7,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav_simulation/scenes.hpp"
+#include "support/scene_views.hpp"
 
 namespace panonav::simulation {
 namespace {
@@ -49,12 +50,7 @@ TEST_F(Recording, EveryKindOfPathIsFreeAndRepeatsWithItsSeed) {
 
 TEST_F(Recording, OdometryFollowsTheTrueMotion) {
   RecordingOptions options{.path = RecordingPath::walk, .heading = RecordingHeading::path};
-  const OdometryNoise exact{.translation_from_translation = 0.0,
-                            .translation_from_rotation = 0.0,
-                            .rotation_from_translation = 0.0,
-                            .rotation_from_rotation = 0.0,
-                            .translation_scale_error = 0.0,
-                            .rotation_scale_error = 0.0};
+  const OdometryNoise exact = testing::exact_odometry();
   options.spacing_m = 0.1;
   const auto poses = plan_recording(scene_, space_, options, exact, 3);
   for (const auto& recorded : poses) {

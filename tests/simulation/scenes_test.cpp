@@ -20,7 +20,7 @@ using namespace testing;
 namespace {
 
 constexpr std::uint64_t tested_seeds[] = {1, 2, 300};
-constexpr PanoramaRendering small{.rows = 20, .columns = 128, .rays_per_axis = 1};
+constexpr PanoramaRendering small_rendering{.rows = 20, .columns = 128, .rays_per_axis = 1};
 
 class EveryScene : public ::testing::TestWithParam<std::string_view> {
  protected:
@@ -29,25 +29,6 @@ class EveryScene : public ::testing::TestWithParam<std::string_view> {
 
 Viewpoint viewpoint_in(const Scene& scene) {
   return viewpoint_on_tour(scene, 0.5, 0.3);
-}
-
-double mean_difference(const Panorama& a, const Panorama& b) {
-  double sum = 0.0;
-  for (std::size_t i = 0; i < a.values().size(); ++i) {
-    sum += std::abs(static_cast<double>(a.values()[i]) - b.values()[i]);
-  }
-  return sum / static_cast<double>(a.values().size());
-}
-
-double standard_deviation(const Panorama& view) {
-  double sum = 0.0;
-  double squares = 0.0;
-  for (const float value : view.values()) {
-    sum += value;
-    squares += static_cast<double>(value) * value;
-  }
-  const auto n = static_cast<double>(view.values().size());
-  return std::sqrt(squares / n - sum / n * (sum / n));
 }
 
 TEST_P(EveryScene, HasRoomForItsRobotAllOverItsRoundTrip) {
@@ -80,21 +61,22 @@ TEST_P(EveryScene, LooksDifferentFromSeedToSeedAndTheSameForASeed) {
     const Scene world = scene(seed);
     const Viewpoint viewpoint = viewpoint_in(world);
     views.push_back(
-        Renderer(world, {.shadows = false}, one).render_panorama(viewpoint, small, one));
+        Renderer(world, {.shadows = false}, one).render_panorama(viewpoint, small_rendering, one));
     // Something is to be seen, and the light neither drowns nor blinds.
-    EXPECT_GT(standard_deviation(views.back()), 0.08) << "seed " << seed;
+    EXPECT_GT(testing::moments_of(views.back()).deviation, 0.08) << "seed " << seed;
     const auto values = views.back().values();
     const auto clipped = std::ranges::count_if(values, [](float v) { return v >= 1.0F; });
     EXPECT_LT(static_cast<double>(clipped), 0.1 * static_cast<double>(values.size()))
         << "seed " << seed;
     if (seed == tested_seeds[0]) {
-      EXPECT_EQ(Renderer(scene(seed), {}, two).render_panorama(viewpoint, small, two),
-                Renderer(world, {}, one).render_panorama(viewpoint, small, one));
+      EXPECT_EQ(Renderer(scene(seed), {}, two).render_panorama(viewpoint, small_rendering, two),
+                Renderer(world, {}, one).render_panorama(viewpoint, small_rendering, one));
     }
   }
   for (std::size_t i = 0; i < views.size(); ++i) {
     for (std::size_t k = 0; k < i; ++k) {
-      EXPECT_GT(mean_difference(views[i], views[k]), 0.03) << "seeds no. " << i << " and " << k;
+      EXPECT_GT(testing::mean_difference(views[i], views[k]), 0.03)
+          << "seeds no. " << i << " and " << k;
     }
   }
 }
@@ -234,7 +216,7 @@ TEST(Scenes, TheGardenHasASkyAHorizonAndTrees) {
     int trees = 0;
     for (int i = 0; i < 360; ++i) {
       const double azimuth = radians(i);
-      // From above all trees one sees the sky above the horizon and the ground below it.
+      // A viewpoint above all trees sees the sky above the horizon and the ground below it.
       const Vector3 above{6.0, 5.0, 20.0};
       EXPECT_GT(renderer.distance_along(above, Direction3::from_angles(azimuth, 0.1)), 100.0);
       EXPECT_NEAR(renderer.distance_along(above, Direction3::from_angles(azimuth, -1.0)),

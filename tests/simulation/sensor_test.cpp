@@ -8,6 +8,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav_simulation/mirror.hpp"
+#include "support/scene_views.hpp"
 
 namespace panonav::simulation {
 namespace {
@@ -15,22 +16,6 @@ namespace {
 Panorama even_view(int rows, int columns, float value) {
   return {rows, columns, ElevationBand{-0.5, 0.5},
           std::vector<float>(static_cast<std::size_t>(rows) * columns, value)};
-}
-
-struct Moments {
-  double mean = 0.0;
-  double deviation = 0.0;
-};
-
-Moments moments_of(const Panorama& view) {
-  double sum = 0.0;
-  double squares = 0.0;
-  for (const float value : view.values()) {
-    sum += value;
-    squares += static_cast<double>(value) * value;
-  }
-  const auto n = static_cast<double>(view.values().size());
-  return {sum / n, std::sqrt(squares / n - sum / n * sum / n)};
 }
 
 SensorOptions noiseless() {
@@ -42,7 +27,8 @@ TEST(Sensor, NoiseIsReadNoiseAndShotNoise) {
   for (const float light : {0.2F, 0.5F, 0.7F}) {
     for (const double gain : {1.0, 1.2}) {
       options.gain = gain;
-      const Moments seen = moments_of(apply_sensor(even_view(100, 400, light), options, 5));
+      const testing::Moments seen =
+          testing::moments_of(apply_sensor(even_view(100, 400, light), options, 5));
       const double expected = gain * std::sqrt(1e-4 + light / 2000.0);
       EXPECT_NEAR(seen.mean, gain * light, 5.0 * expected / 200.0);
       // The deviation of 40000 values is known to 0.35 %.

@@ -3,21 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include "support/scene_views.hpp"
 
 namespace panonav::simulation {
 namespace {
 
-OdometryNoise no_noise() {
-  return {.translation_from_translation = 0.0,
-          .translation_from_rotation = 0.0,
-          .rotation_from_translation = 0.0,
-          .rotation_from_rotation = 0.0,
-          .translation_scale_error = 0.0,
-          .rotation_scale_error = 0.0};
-}
-
 TEST(SimulatedOdometry, ScaleErrorIsConstantWithinARunAndDiffersBetweenRuns) {
-  OdometryNoise noise = no_noise();
+  OdometryNoise noise = testing::exact_odometry();
   noise.translation_scale_error = 0.05;
   noise.rotation_scale_error = 0.1;
   constexpr int runs = 2000;
@@ -46,7 +38,7 @@ TEST(SimulatedOdometry, SimulatedRunStartsAtZeroAndRepeatsWithItsSeed) {
   EXPECT_EQ(a.front(), Pose2{});
   EXPECT_EQ(a, simulate_odometry(truth, {}, 9));
   EXPECT_NE(a, simulate_odometry(truth, {}, 10));
-  const auto exact = simulate_odometry(truth, no_noise(), 9);
+  const auto exact = simulate_odometry(truth, testing::exact_odometry(), 9);
   for (std::size_t i = 0; i < truth.size(); ++i) {
     const Pose2 pose = truth.front() * exact[i];
     EXPECT_NEAR(distance(pose.position(), truth[i].position()), 0.0, 1e-10);

@@ -14,20 +14,13 @@
 #include "panonav_simulation/renderer.hpp"
 #include "panonav_simulation/scenes.hpp"
 #include "panonav_simulation/sensor.hpp"
+#include "support/scene_views.hpp"
 
 namespace panonav::simulation {
 namespace {
 
-double mean_difference(const Panorama& a, const Panorama& b) {
-  double sum = 0.0;
-  for (std::size_t i = 0; i < a.values().size(); ++i) {
-    sum += std::abs(a.values()[i] - b.values()[i]);
-  }
-  return sum / static_cast<double>(a.values().size());
-}
-
-// How far `seen` lies to the left of `expected` in a sector of columns, to first order: least
-// squares of their difference against the slope along the rows.
+// Returns the shift of `seen` to the left of `expected` in a sector of columns, to first order:
+// least squares of their difference against the slope along the rows.
 double shift_in_sector(const Panorama& seen, const Panorama& expected, int first, int columns) {
   double product = 0.0;
   double energy = 0.0;
@@ -78,8 +71,8 @@ void expect_agreement(const Case& place, const Camera& camera, const UnwarperOpt
     EXPECT_LT(std::abs(shift_in_sector(unwarped, direct, first, 64)), 0.1)
         << "columns from " << first;
   }
-  const double noise = mean_difference(apply_sensor(direct, {}, 1), direct);
-  EXPECT_LT(mean_difference(unwarped, direct), 1.5 * noise);
+  const double noise = testing::mean_difference(apply_sensor(direct, {}, 1), direct);
+  EXPECT_LT(testing::mean_difference(unwarped, direct), 1.5 * noise);
 }
 
 TEST_P(UnwarpedMirror, AgreesWithThePanorama) {

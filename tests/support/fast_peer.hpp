@@ -35,7 +35,7 @@ class FastPeer {
   Endpoint& talk(const std::string& topic, bool reliable = true) {
     return talk("rt/" + topic, wire_type(Message::type), reliable);
   }
-  /// Whether each endpoint of this peer is matched by somebody within the time.
+  /// True if each endpoint of this peer is matched by somebody within the time.
   bool all_matched(std::chrono::milliseconds within);
   static bool write(Endpoint& endpoint, const Bytes& cdr);
   template <class Message>

@@ -23,7 +23,7 @@ inline std::vector<Pose2> grid_poses(int side) {
   return poses;
 }
 
-/// How `landmark_picture`s are to be read.
+/// Returns the layout of `landmark_picture`s.
 inline PictureSource landmark_panoramas() {
   PictureSource source;
   source.layout.elevations = ElevationBand{radians(-20.0), radians(20.0)};

@@ -104,7 +104,7 @@ inline std::string damaged_bytes(std::string bytes, Random& random, int trial) {
   return bytes;
 }
 
-/// What two memories hold is the same.
+/// True if two memories have the same content.
 inline bool same_content(const VisualMemory& a, const VisualMemory& b) {
   if (a.shape() != b.shape() || a.full_scale() != b.full_scale() ||
       a.elevations() != b.elevations() || a.size() != b.size() ||

@@ -76,7 +76,7 @@ class RecordedMessages : public recordings::Recording {
   std::vector<std::vector<std::uint8_t>> messages_;
 };
 
-/// Of each topic of a file without warnings: its type and how many messages it has.
+/// Returns type and number of messages of each topic of a file without warnings.
 inline std::map<std::string, std::pair<std::string, std::uint64_t>> topics_of(
     const std::string& file) {
   std::map<std::string, std::pair<std::string, std::uint64_t>> topics;

@@ -1,7 +1,6 @@
 #pragma once
 
-// What robots see of the toy world as signatures, memories of it, and a robot in it that stops
-// where something is in its way.
+// Signatures and memories of the toy world, and a robot in it that stops at obstacles.
 
 #include <algorithm>
 #include <cmath>
@@ -94,7 +93,7 @@ struct RememberedRoom {
   }
 };
 
-/// Where the robot of these tests can be.
+/// Radius of the robot of these tests.
 inline constexpr double robot_radius_m = 0.15;
 inline bool robot_fits(const ToyWorld& world, Point2 p) {
   return world.clearance_m(p) > robot_radius_m;
@@ -154,17 +153,17 @@ class SimulatedRobot final : public RobotBase {
   }
 
   void command(const Velocity& velocity) override {
-    const Pose2 told = integrate_velocity(velocity, base_.period_s);
-    const Pose2 step = sample_step(told, noise_, random_);
+    const Pose2 commanded = integrate_velocity(velocity, base_.period_s);
+    const Pose2 step = sample_step(commanded, noise_, random_);
     const Pose2 there = pose_ * step;
     if (!robot_fits(*world_, there.position())) {
       // A round robot that turns on the spot hits nothing.
       obstacle_ |= velocity.forward_m_s != 0.0 || velocity.left_m_s != 0.0;
       pose_.heading_rad = there.heading_rad;
-      told_ = told_ * Pose2{0.0, 0.0, told.heading_rad};
+      odometry_ = odometry_ * Pose2{0.0, 0.0, commanded.heading_rad};
       return;
     }
-    told_ = told_ * told;
+    odometry_ = odometry_ * commanded;
     travelled_m_ += std::hypot(step.x_m, step.y_m);
     pose_ = there;
   }
@@ -186,13 +185,13 @@ class SimulatedRobot final : public RobotBase {
   /// Its wheels do not tell.
   void carry_to(const Pose2& pose) { pose_ = pose; }
   /// The motion that its wheels tell since the last time.
-  [[nodiscard]] Pose2 take_odometry() { return std::exchange(told_, Pose2{}); }
+  [[nodiscard]] Pose2 take_odometry() { return std::exchange(odometry_, Pose2{}); }
   [[nodiscard]] double travelled_m() const noexcept { return travelled_m_; }
 
  private:
   const ToyWorld* world_;
   Pose2 pose_;
-  Pose2 told_;
+  Pose2 odometry_;
   Random random_;
   BaseOptions base_;
   OdometryNoise noise_;

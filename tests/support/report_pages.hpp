@@ -11,7 +11,7 @@
 
 namespace panonav::testing {
 
-/// What a page draws: "plan", "chart" or "run", and from which data.
+/// A drawing of a page: "plan", "chart" or "run", and its data.
 struct PagePanel {
   std::string name;
   nlohmann::json data;
@@ -69,7 +69,7 @@ inline std::size_t pictures_of(const std::string& page) {
   return count;
 }
 
-/// What "data:TYPE;base64,..." holds.
+/// Decodes "data:TYPE;base64,...".
 inline std::vector<std::uint8_t> bytes_of_url(std::string_view url) {
   constexpr std::string_view letters =
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";

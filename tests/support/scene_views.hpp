@@ -1,9 +1,12 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
+#include "panonav/motion/odometry.hpp"
 #include "panonav/motion/path.hpp"
+#include "panonav/panorama/panorama.hpp"
 #include "panonav_simulation/free_space.hpp"
 #include "panonav_simulation/paths.hpp"
 #include "panonav_simulation/renderer.hpp"
@@ -22,6 +25,41 @@ inline simulation::Viewpoint viewpoint_on_tour(const simulation::Scene& scene, d
   const auto places = simulation::resample(way, std::max(1e-3, share * path_length_m(way)));
   const Pose2& at = places.at(1);
   return {.pose = {at.x_m, at.y_m, heading_rad}, .height_m = scene.camera_height_m};
+}
+
+/// Mean and standard deviation of the values of a view.
+struct Moments {
+  double mean = 0.0;
+  double deviation = 0.0;
+};
+inline Moments moments_of(const Panorama& view) {
+  double sum = 0.0;
+  double squares = 0.0;
+  for (const float value : view.values()) {
+    sum += value;
+    squares += static_cast<double>(value) * value;
+  }
+  const auto n = static_cast<double>(view.values().size());
+  return {sum / n, std::sqrt(squares / n - sum / n * (sum / n))};
+}
+
+/// Returns the mean absolute difference of two views of one shape.
+inline double mean_difference(const Panorama& a, const Panorama& b) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < a.values().size(); ++i) {
+    sum += std::abs(static_cast<double>(a.values()[i]) - b.values()[i]);
+  }
+  return sum / static_cast<double>(a.values().size());
+}
+
+/// Returns the noise of exact odometry.
+inline OdometryNoise exact_odometry() {
+  return {.translation_from_translation = 0.0,
+          .translation_from_rotation = 0.0,
+          .rotation_from_translation = 0.0,
+          .rotation_from_rotation = 0.0,
+          .translation_scale_error = 0.0,
+          .rotation_scale_error = 0.0};
 }
 
 }  // namespace panonav::testing

@@ -53,7 +53,7 @@ struct Oracle {
   }
 };
 
-/// How the views of a test lie.
+/// Distribution of the views of a test.
 enum class Kind { random, clustered, repeated, dark };
 
 /// Random bytes; or smooth curves that drift slowly, as along a path, with rare jumps; or few

@@ -7,7 +7,7 @@
 
 namespace panonav::testing {
 
-/// Whether `part` stands in the text; a failure shows the text.
+/// True if `part` stands in the text; a failure shows the text.
 inline ::testing::AssertionResult contains(std::string_view text, std::string_view part) {
   if (text.find(part) != std::string_view::npos) {
     return ::testing::AssertionSuccess() << "'" << part << "' stands in: " << text;

@@ -60,7 +60,7 @@ class Texture {
   double mean_, block_m_, contrast_;
 };
 
-/// How a picture differs from the ideal one.
+/// Differences of an image from the ideal one.
 struct Disturbance {
   double light = 1.0;            ///< factor
   double noise_deviation = 0.0;  ///< of every pixel, white 1
@@ -77,7 +77,7 @@ class ToyWorld {
   ToyWorld(std::uint64_t seed, double contrast)
       : random_(seed), floor_(Texture(random_, contrast)), ceiling_(Texture(random_, contrast)) {}
 
-  /// Where textures that are added later come from.
+  /// Returns the source of textures that are added later.
   [[nodiscard]] Random& random() noexcept { return random_; }
 
   /// Throughout the height, or up to `top_m`: things that one may look over.
@@ -109,9 +109,9 @@ class ToyWorld {
     pillars_.at(i).middle.y_m += by.y_m;
   }
 
-  /// To the nearest wall; 0 within a box.
+  /// Returns the distance to the nearest wall; 0 within a box.
   [[nodiscard]] double clearance_m(Point2 p) const {
-    double least = std::numeric_limits<double>::infinity();
+    double min_m = std::numeric_limits<double>::infinity();
     for (const auto& [low, high] : boxes_) {
       if (p.x_m > low.x_m && p.x_m < high.x_m && p.y_m > low.y_m && p.y_m < high.y_m) return 0.0;
     }
@@ -121,10 +121,10 @@ class ToyWorld {
       const double share = std::clamp(
           ((p.x_m - wall.from.x_m) * ex + (p.y_m - wall.from.y_m) * ey) / (ex * ex + ey * ey), 0.0,
           1.0);
-      least =
-          std::min(least, distance(p, {wall.from.x_m + share * ex, wall.from.y_m + share * ey}));
+      min_m =
+          std::min(min_m, distance(p, {wall.from.x_m + share * ex, wall.from.y_m + share * ey}));
     }
-    return least;
+    return min_m;
   }
   /// A room from (0, 0) to `size`: no wall and no box within 0.2 m in x and y.
   [[nodiscard]] bool is_free(Point2 p, Point2 size) const {
@@ -139,8 +139,8 @@ class ToyWorld {
            p.y_m < size.y_m - margin_m;
   }
 
-  /// What a robot at `pose` sees. Without elevations every ray is horizontal and a row's pattern
-  /// is its own. Where there is a floor, values are clamped to 0 .. 1 as a camera does.
+  /// Renders the view of a robot at `pose`. Without elevations every ray is horizontal and a row's
+  /// pattern is its own. Where there is a floor, values are clamped to 0 .. 1 as a camera does.
   [[nodiscard]] Panorama panorama(const Pose2& pose, int rows, int columns,
                                   std::optional<ElevationBand> elevations, Random& noise,
                                   const Disturbance& disturbance = {}) const {

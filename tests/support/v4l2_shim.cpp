@@ -1,7 +1,7 @@
 // Stands between a program and the system (LD_PRELOAD) and plays the camera /dev/video7: JPEG
 // pictures from the file V4L2_SHIM_PICTURES, which holds each behind its length in four bytes, at
 // V4L2_SHIM_RATE a second. After V4L2_SHIM_UNPLUG of them the camera is gone, and back when it is
-// opened for the second time after that, V4L2_SHIM_UNPLUGS times (1). Pictures begin anew at the
+// opened for the second time after that, V4L2_SHIM_UNPLUGS times (1). Pictures start over at the
 // end. The wall clock is set back by an hour after V4L2_SHIM_CLOCK_BACK pictures. How many were
 // taken is in the file V4L2_SHIM_TAKEN.
 #include <dlfcn.h>
@@ -32,7 +32,7 @@ struct Camera {
   std::vector<std::string> pictures;
   unsigned sent = 0;
   unsigned sent_since_open = 0;
-  std::uint64_t taken = 0;  // with those that nobody fetched in time
+  std::uint64_t produced = 0;  // with those that nobody fetched in time
   unsigned sequence = 0;
   long unplugs = 0;
   int failed_opens = 0;
@@ -41,7 +41,7 @@ struct Camera {
   unsigned next_buffer = 0;
   unsigned buffers = 0;
   unsigned char* memory = nullptr;
-  int taken_file = -1;
+  int produced_file = -1;
 };
 
 std::atomic<bool> clock_is_back = false;
@@ -79,8 +79,8 @@ int open_camera() {
   self.sequence = self.queued = self.next_buffer = self.sent_since_open = 0;
   if (self.pictures.empty()) {
     read_pictures();
-    const char* const taken = std::getenv("V4L2_SHIM_TAKEN");
-    if (taken != nullptr) self.taken_file = creat(taken, 0600);
+    const char* const file = std::getenv("V4L2_SHIM_TAKEN");
+    if (file != nullptr) self.produced_file = creat(file, 0600);
   }
   self.descriptor = timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC);
   return self.descriptor;
@@ -117,10 +117,10 @@ int give_picture(v4l2_buffer& buffer) {
   self.next_buffer = (self.next_buffer + 1) % self.buffers;
   --self.queued;
   ++self.sent;
-  self.taken += self.sent_since_open++ == 0 ? 1 : due;
+  self.produced += self.sent_since_open++ == 0 ? 1 : due;
   if (static_cast<long>(self.sent) == setting("V4L2_SHIM_CLOCK_BACK", 0)) clock_is_back = true;
-  if (self.taken_file >= 0) {
-    (void)!pwrite(self.taken_file, &self.taken, sizeof(self.taken), 0);
+  if (self.produced_file >= 0) {
+    (void)!pwrite(self.produced_file, &self.produced, sizeof(self.produced), 0);
   }
   return 0;
 }
@@ -154,9 +154,9 @@ int answer(unsigned long request, void* argument) {
       return 0;
     }
     case VIDIOC_REQBUFS: {
-      auto& wanted = *static_cast<v4l2_requestbuffers*>(argument);
-      if (wanted.count > max_buffers) wanted.count = max_buffers;
-      self.buffers = wanted.count;
+      auto& request = *static_cast<v4l2_requestbuffers*>(argument);
+      if (request.count > max_buffers) request.count = max_buffers;
+      self.buffers = request.count;
       return 0;
     }
     case VIDIOC_QUERYBUF: {

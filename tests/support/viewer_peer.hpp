@@ -14,7 +14,7 @@
 
 #include "panonav_viewer/view_server.hpp"
 
-/// What tests of the server share: a client, and a moment.
+/// A client and a moment for tests of the server.
 namespace panonav {
 
 using nlohmann::json;
@@ -133,7 +133,7 @@ inline recordings::RunMoment moment_at(double stamp_s) {
   return moment;
 }
 
-/// Whether something holds before long.
+/// True if a condition holds within the patience.
 inline bool soon(const auto& holds) {
   for (const auto end = Clock::now() + patience; Clock::now() < end;) {
     if (holds()) return true;

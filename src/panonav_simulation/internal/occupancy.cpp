@@ -8,7 +8,7 @@ namespace panonav::simulation {
 
 namespace {
 
-// The part of a convex polygon on one side of a horizontal plane: sign * (z - height) >= 0.
+// Returns the part of a convex polygon on one side of a horizontal plane: sign * (z - height) >= 0.
 std::vector<Vector3> clip(const std::vector<Vector3>& polygon, double height, double sign) {
   std::vector<Vector3> result;
   for (std::size_t i = 0; i < polygon.size(); ++i) {
@@ -34,7 +34,7 @@ struct Interval {
   }
 };
 
-// x values of the convex polygon's points with y in y_low .. y_high.
+// Returns the x values of the convex polygon's points with y in y_low .. y_high.
 Interval span_between(const std::vector<Vector3>& polygon, double y_low, double y_high) {
   Interval span;
   for (std::size_t i = 0; i < polygon.size(); ++i) {
@@ -78,7 +78,7 @@ void mark(const std::vector<Vector3>& polygon, const Raster& raster,
   }
 }
 
-// Lower envelope of the parabolas f(q) + (p - q)^2 at every p.
+// Computes the lower envelope of the parabolas f(q) + (p - q)^2 at every p.
 void transform_line(const std::vector<float>& f, std::vector<float>& result,
                     std::vector<int>& roots, std::vector<float>& borders) {
   constexpr float infinity = std::numeric_limits<float>::infinity();

@@ -13,7 +13,7 @@ namespace panonav::simulation {
 
 namespace {
 
-// A dome far away, from a little below the horizon up to the zenith: sky and clouds all round.
+// Adds a dome far away, from a little below the horizon up to the zenith: sky and clouds all round.
 void add_sky(SceneBuilder& builder, Point2 centre, double radius_m) {
   Mesh mesh;
   mesh.object = "sky";
@@ -156,7 +156,7 @@ void add_trees_and_boxes(SceneBuilder& builder, const FloorArea& plot) {
   }
 }
 
-// Far trees, of a few kinds, which make the horizon.
+// Adds far trees, of a few kinds, which make the horizon.
 void add_far_trees(SceneBuilder& builder, Point2 middle) {
   Random& random = builder.random();
   std::array<TreeKind, 6> kinds;

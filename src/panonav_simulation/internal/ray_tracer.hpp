@@ -36,7 +36,8 @@ class RayTracer {
   RayTracer(const RayTracer&) = delete;
   RayTracer& operator=(const RayTracer&) = delete;
 
-  /// First hit of each ray. Neighbouring rays should be alike: they are traced in packets.
+  /// Finds the first hit of each ray. Neighbouring rays should be alike: they are traced in
+  /// packets.
   void trace(std::span<const Ray> rays, std::span<RayHit> hits) const;
   [[nodiscard]] RayHit first_hit(const Ray& ray) const;
 

@@ -10,8 +10,8 @@ namespace panonav::simulation {
 
 namespace {
 
-// The quaternion w x y z of turns about x, y and z, in this order; `half` turns the unit of the
-// angles into half radians.
+// Returns the quaternion w x y z of turns about x, y and z, in this order; `half` turns the unit of
+// the angles into half radians.
 std::array<double, 4> make_quaternion(double roll, double pitch, double yaw, double half) {
   const double cr = std::cos(roll * half);
   const double sr = std::sin(roll * half);
