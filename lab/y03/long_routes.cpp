@@ -127,8 +127,7 @@ std::uint64_t file_bytes(const std::filesystem::path& path) {
   return bytes;
 }
 
-void measure_file(const ReproductionOptions& options, const std::vector<RepeatedRoute>& routes,
-                  Reproduction& result) {
+void measure_file(const std::vector<RepeatedRoute>& routes, Reproduction& result) {
   const std::filesystem::path path = result.out / "routes.panonav";
   std::filesystem::remove(path);
   MemoryHeader header;
@@ -183,7 +182,7 @@ void RouteExperiments::reproduce_loop_routes() const {
     if (!first) first = std::move(place);
   }
   report_routes(options, "loop", *first, routes, result);
-  measure_file(options, routes, result);
+  measure_file(routes, result);
 }
 
 void RouteExperiments::reproduce_world_routes(const std::string& name) const {
