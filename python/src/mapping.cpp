@@ -126,11 +126,11 @@ void bind_maps(py::module_& m) {
 }
 
 void bind_lattices(py::module_& m) {
-  Record<Lattice::Node>(m, "Lattice::Node", "A view in an arrangement.")
+  Record<Lattice::Node>(m, "LatticeNode", "A view in an arrangement.")
       .field("view", &Lattice::Node::view, "Its id in the memory.")
       .field("pose", &Lattice::Node::pose, "In its component's frame.")
       .field("component", &Lattice::Node::component, "Index of its connected component.");
-  Record<Lattice::Spring>(m, "Lattice::Spring", "What two views say of where they lie.")
+  Record<Lattice::Spring>(m, "LatticeSpring", "What two views say of where they lie.")
       .field("a", &Lattice::Spring::a, "Number of a node.")
       .field("b", &Lattice::Spring::b, "Number of the other, larger than a.")
       .field("dissimilarity", &Lattice::Spring::dissimilarity,
@@ -138,7 +138,7 @@ void bind_lattices(py::module_& m) {
       .field("length", &Lattice::Spring::length, "Rest length.")
       .field("stiffness", &Lattice::Spring::stiffness, "K of [M04 eq. 5].")
       .field("weight", &Lattice::Spring::weight, "Near 0: an outlier.");
-  Record<Lattice::Component>(m, "Lattice::Component", "Views that springs join.")
+  Record<Lattice::Component>(m, "LatticeComponent", "Views that springs join.")
       .field("views", &Lattice::Component::views, "Number of its nodes.")
       .field("handedness_known", &Lattice::Component::handedness_known,
              "False: it may be the mirror image.");

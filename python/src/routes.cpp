@@ -33,8 +33,7 @@ RouteFollowerOptions follower_options(const std::optional<std::string>& name, bo
 }
 
 void bind_following(py::module_& m) {
-  Record<RouteChanges::AzimuthRange>(m, "RouteChanges::AzimuthRange",
-                                     "Azimuths in the robot's frame.")
+  Record<RouteChanges::AzimuthRange>(m, "AzimuthRange", "Azimuths in the robot's frame.")
       .field("from_rad", &RouteChanges::AzimuthRange::from_rad, "In [-pi, pi).")
       .field("to_rad", &RouteChanges::AzimuthRange::to_rad, "Counter-clockwise from the first.");
   Record<NamedStep>(m, "RouteStep", "Where a robot is beside a route.")

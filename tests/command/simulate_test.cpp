@@ -62,7 +62,7 @@ TEST_F(Simulate, ARecordOfASimulatedRunIsTheDataSetAgain) {
       record, 12,
       {{"/ground_truth", {"geometry_msgs/PoseStamped", 12}}, {"/odom", {"nav_msgs/Odometry", 12}}});
   const Dataset written = read_dataset(folder / "run");
-  const Dataset recorded = panonav::recordings::read_recording(record, written.source).dataset;
+  const Dataset recorded = panonav::recordings::read_recording(record, written.source);
   ASSERT_EQ(recorded.entries.size(), 12U);
   for (std::size_t i = 0; i < 12; ++i) {
     const DatasetEntry& a = written.entries[i];
