@@ -124,7 +124,7 @@ Panorama rotate_to_zero_phase(const Panorama& view) {
   }
   // I(phi) ~ cos(phi + psi) has its crest at phi = -psi, which is brought to column 0.
   const double columns_per_radian = view.columns() / (2.0 * std::numbers::pi);
-  return turn_columns(view, static_cast<int>(std::lround(-std::arg(first) * columns_per_radian)));
+  return rotate_columns(view, static_cast<int>(std::lround(-std::arg(first) * columns_per_radian)));
 }
 
 // Compares principal components of views rotated to zero phase. Eigenimages depend on the heading,

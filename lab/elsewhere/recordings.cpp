@@ -132,7 +132,7 @@ class LeaveOneOut {
       const Panorama& sharp = views_[n / turns].sharp;
       const auto turn = static_cast<int>(
           std::lround(turn_of(n) * sharp.columns() / static_cast<double>(columns_)));
-      const RivalView query{turned(n), to_picture(turn_columns(sharp, turn))};
+      const RivalView query{turned(n), to_picture(rotate_columns(sharp, turn))};
       const double start = simulation::thread_seconds();
       const std::size_t view = rival.nearest(query, n / turns);
       return Found{view, 1000.0 * (simulation::thread_seconds() - start)};
@@ -192,7 +192,7 @@ class LeaveOneOut {
     return static_cast<int>(random.index(columns_));
   }
   [[nodiscard]] Panorama turned(std::size_t n) const {
-    return turn_columns(views_[n / turns].panorama, turn_of(n));
+    return rotate_columns(views_[n / turns].panorama, turn_of(n));
   }
   [[nodiscard]] std::size_t count_near(const std::vector<Found>& found) const {
     std::size_t count = 0;

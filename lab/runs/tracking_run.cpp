@@ -93,7 +93,7 @@ FeatureSource extract_reference_features(const simulation::PlaceRecording& place
 
 QueryFeatures make_query_features(const Panorama& view) {
   return [&view](Handedness handedness) {
-    return extract_features(handedness == Handedness::as_seen ? view : mirrored(view));
+    return extract_features(handedness == Handedness::as_seen ? view : mirror(view));
   };
 }
 

@@ -31,10 +31,10 @@ CameraModel mirror_model(const std::string& name, const py::dict& parameters,
   CameraModel model = camera_model_from(name, parameters);
   if (!rim_elevation_rad) return model;
   if (const auto* hyperboloid = std::get_if<HyperboloidalModel>(&model)) {
-    return with_elevation_at(*hyperboloid, rim_radius_px, *rim_elevation_rad);
+    return fit_focal_length(*hyperboloid, rim_radius_px, *rim_elevation_rad);
   }
   if (const auto* unified = std::get_if<UnifiedModel>(&model)) {
-    return with_elevation_at(*unified, rim_radius_px, *rim_elevation_rad);
+    return fit_focal_length(*unified, rim_radius_px, *rim_elevation_rad);
   }
   throw ContractError("rim_elevation_rad", *rim_elevation_rad,
                       "None for the model '" + name + "', whose parameters say it");

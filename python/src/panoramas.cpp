@@ -16,7 +16,7 @@ ColumnDirection direction_of(const std::string& name) {
 }
 
 CameraModel camera_model_from(const std::string& name, const py::dict& parameters) {
-  auto model = model_of_name(name);
+  auto model = make_default_model(name);
   if (!model) throw ContractError("model", "'" + name + "'", "a name of `camera_models`");
   py::dict left = parameters.attr("copy")();
   visit_parameters(*model, [&](const auto& parameter, auto& value) {
@@ -207,7 +207,7 @@ void bind_panoramas(py::module_& m) {
           },
           py::arg("dtype") = py::none())
       .def(
-          "turned", [](const Panorama& p, int columns) { return turn_columns(p, columns); },
+          "turned", [](const Panorama& p, int columns) { return rotate_columns(p, columns); },
           py::arg("columns"),
           "What the robot sees after turning on the spot by so many columns, counter-clockwise.")
       .def(

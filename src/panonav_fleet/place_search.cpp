@@ -411,7 +411,7 @@ VisualMemory PlaceSearch::Snapshot::load(std::span<const ViewId> views) {
     const auto found = own.kept.find(view);
     if (found == own.kept.end()) continue;
     try {
-      memory.append_as(view, found->second.signature, found->second.info);
+      memory.append_with_id(view, found->second.signature, found->second.info);
     } catch (const ContractError& error) {
       own.tables->fail_damaged(error.what());
     }

@@ -355,11 +355,11 @@ TEST(MirrorCamera, HasTheCirclesAndTheModel) {
   EXPECT_THROW((void)camera_from_mirror(mirror, knowing(HyperboloidalModel{28, 23, 100})),
                ContractError);
   const HyperboloidalModel scaled =
-      with_elevation_at(HyperboloidalModel{28, 23, 100}, mirror.rim_radius_px, 0.3);
+      fit_focal_length(HyperboloidalModel{28, 23, 100}, mirror.rim_radius_px, 0.3);
   EXPECT_NEAR(visible_elevations(camera_from_mirror(mirror, knowing(scaled))).top_rad, 0.3, 1e-12);
-  const UnifiedModel unified = with_elevation_at(UnifiedModel{}, mirror.rim_radius_px, 0.3);
+  const UnifiedModel unified = fit_focal_length(UnifiedModel{}, mirror.rim_radius_px, 0.3);
   EXPECT_NEAR(visible_elevations(camera_from_mirror(mirror, knowing(unified))).top_rad, 0.3, 1e-12);
-  EXPECT_THROW((void)with_elevation_at(HyperboloidalModel{28, 23, 100}, 220, 1.5), ContractError);
+  EXPECT_THROW((void)fit_focal_length(HyperboloidalModel{28, 23, 100}, 220, 1.5), ContractError);
 }
 
 }  // namespace

@@ -60,13 +60,13 @@ void visit_options(NestedOptions& options, OptionVisitor& visitor) {
   table.visit(options, visitor);
 }
 
-// What the table's own check rests on: a member more or less does not compile.
+// The table's own check rests on these: a member more or less does not compile.
 static_assert(detail::member_count<SampleOptions>() == 5);
 static_assert(detail::member_count<NestedOptions>() == 3);
 static_assert(detail::member_count<ElevationBounds>() == 2);
 static_assert(detail::member_name<&SampleOptions::radius_m>() == "radius_m");
 
-/// What a table says, one line an option; sets choices to the last one.
+/// Lists what a table holds, one entry an option; sets choices to the last one.
 class Listing final : public OptionVisitor {
  public:
   void visit(const OptionInfo& info, int& /*value*/) override { add(info, "int"); }

@@ -147,7 +147,7 @@ TEST_F(AnyBytes, ANumberFollowedByATextBeyondAsciiIsNoToml) {
                  "line 1 is not TOML"))
         << text;
   }
-  // What is read is what was written.
+  // Texts are read as they were written.
   const TomlTable table = read_toml(folder.write(
       "v.toml",
       "a = \"\xC3\xA9\\\"\xF0\x9F\x98\x80\"\nb = '\\\"\xC3\xA9' # \xC3\xA9\n\"\xC3\xA9\" = 1\n"));

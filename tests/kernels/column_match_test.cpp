@@ -29,20 +29,20 @@ TEST(MatchColumns, AgreesWithItsDefinitionOnEveryInstructionSet) {
       query.assign(512, 0);
       reference.assign(2048, 255);
     }
-    std::vector<std::uint16_t> wanted(128);
+    std::vector<std::uint16_t> expected(128);
     for (std::size_t s = 0; s < 128; ++s) {
       for (std::size_t c = 0; c < 32; ++c) {
         int l1 = 0;
         for (std::size_t b = 0; b < 16; ++b) {
           l1 += std::abs(query[c * 16 + b] - reference[b * 128 + (4 * c + s) % 128]);
         }
-        wanted[s] = static_cast<std::uint16_t>(wanted[s] + std::lround(16.0 * std::sqrt(l1)));
+        expected[s] = static_cast<std::uint16_t>(expected[s] + std::lround(16.0 * std::sqrt(l1)));
       }
     }
     for (const Instructions set : available_instructions()) {
       std::vector<std::uint16_t> costs(128);
       match_columns(query, reference, costs, set);
-      EXPECT_EQ(costs, wanted) << name(set);
+      EXPECT_EQ(costs, expected) << name(set);
       ++checked;
     }
   }

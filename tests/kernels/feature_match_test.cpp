@@ -25,15 +25,15 @@ TEST(NearestDescriptors, AgreeWithTheirDefinitionOnEveryInstructionSet) {
     }
     const auto nearest = [](const std::vector<std::uint64_t>& from, std::size_t i,
                             const std::vector<std::uint64_t>& to) {
-      int least = 257;
+      int min_distance = 257;
       std::uint16_t found = 9999;
       for (std::size_t j = 0; j < to.size() / 4; ++j) {
         int distance = 0;
         for (std::size_t w = 0; w < 4; ++w) {
           distance += std::popcount(from[4 * i + w] ^ to[4 * j + w]);
         }
-        if (distance < least) {
-          least = distance;
+        if (distance < min_distance) {
+          min_distance = distance;
           found = static_cast<std::uint16_t>(j);
         }
       }

@@ -19,10 +19,10 @@ TEST(NormalPairs, AreThoseOfTheGeneratorOnEveryInstructionSet) {
   Random generator(3);
   Random same(3);
   std::vector<std::uint64_t> bits;
-  std::vector<std::pair<double, double>> wanted;
+  std::vector<std::pair<double, double>> expected;
   for (int i = 0; i < 10007; ++i) {
     bits.push_back(generator.next());
-    wanted.push_back(same.normal_pair());
+    expected.push_back(same.normal_pair());
   }
   // Both ends of both halves.
   for (const std::uint64_t end : {0x00000000FFFFFFFFULL, 0xFFFFFFFF00000000ULL, 0ULL, ~0ULL}) {
@@ -30,11 +30,11 @@ TEST(NormalPairs, AreThoseOfTheGeneratorOnEveryInstructionSet) {
   }
   std::vector<float> plain_first(bits.size()), plain_second(bits.size());
   normal_pairs(bits, plain_first, plain_second, Instructions::scalar);
-  for (std::size_t i = 0; i < wanted.size(); ++i) {
-    ASSERT_NEAR(plain_first[i], wanted[i].first, 2e-6);
-    ASSERT_NEAR(plain_second[i], wanted[i].second, 2e-6);
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    ASSERT_NEAR(plain_first[i], expected[i].first, 2e-6);
+    ASSERT_NEAR(plain_second[i], expected[i].second, 2e-6);
   }
-  for (std::size_t i = wanted.size(); i < bits.size(); ++i) {
+  for (std::size_t i = expected.size(); i < bits.size(); ++i) {
     const float radius = std::hypot(plain_first[i], plain_second[i]);
     EXPECT_NEAR(radius, bits[i] >> 63U != 0 ? 0.0F : 6.764F, 0.002F) << bits[i];
   }

@@ -37,8 +37,8 @@ double explained(const SimilarityLanes& lanes, const SimilarityLanes::Fall& fall
     const double apart = std::sqrt(std::pow(lanes.x_m[i] - x, 2) + std::pow(lanes.y_m[i] - y, 2) +
                                    static_cast<double>(fall.blur_square_m2));
     const double expected = std::exp(-apart * static_cast<double>(fall.per_metre));
-    const auto facing = [&](double told) {
-      const double turn = std::remainder(heading - told, 2.0 * std::numbers::pi);
+    const auto facing = [&](double reported) {
+      const double turn = std::remainder(heading - reported, 2.0 * std::numbers::pi);
       return std::exp(turn * turn * static_cast<double>(lanes.per_square_turn[i]));
     };
     const double similarity =
@@ -71,9 +71,10 @@ TEST(ExplainSimilarity, AgreesWithItsDefinitionOnEveryInstructionSet) {
       explain_similarity(lanes, fall, x, y, heading, found, set);
       EXPECT_EQ(found, plain) << name(set);
       for (std::size_t p = 0; p < found.size(); ++p) {
-        const double wanted = explained(lanes, fall, static_cast<double>(x[p]),
-                                        static_cast<double>(y[p]), static_cast<double>(heading[p]));
-        EXPECT_NEAR(static_cast<double>(found[p]), wanted, 1e-6 + 1e-4 * wanted) << name(set);
+        const double expected =
+            explained(lanes, fall, static_cast<double>(x[p]), static_cast<double>(y[p]),
+                      static_cast<double>(heading[p]));
+        EXPECT_NEAR(static_cast<double>(found[p]), expected, 1e-6 + 1e-4 * expected) << name(set);
         ++checked;
       }
     }
@@ -99,8 +100,8 @@ TEST(Exponentials, AgreeWithTheirDefinitionOnEveryInstructionSet) {
   std::vector<float> plain(logarithms.size());
   exponentials(logarithms, 0.75F, plain, Instructions::scalar);
   for (std::size_t i = 0; i < plain.size(); ++i) {
-    const double wanted = std::exp(0.75 * static_cast<double>(logarithms[i]));
-    EXPECT_NEAR(static_cast<double>(plain[i]), wanted, 1e-5 * wanted);
+    const double expected = std::exp(0.75 * static_cast<double>(logarithms[i]));
+    EXPECT_NEAR(static_cast<double>(plain[i]), expected, 1e-5 * expected);
   }
   for (const Instructions set : available_instructions()) {
     std::vector<float> found(logarithms.size());

@@ -72,7 +72,7 @@ TEST(RivalRecogniser, EveryRivalFindsAMemorisedViewAfterAnyTurn) {
     Random random(7);
     for (std::size_t i = 0; i < references.size(); ++i) {
       const int turn = static_cast<int>(random.index(64));
-      const RivalView turned = in_colour(turn_columns(references[i].panorama, turn), i);
+      const RivalView turned = in_colour(rotate_columns(references[i].panorama, turn), i);
       EXPECT_EQ(recogniser->nearest(turned), i) << recogniser->name();
     }
   }
@@ -89,7 +89,7 @@ TEST(PixelsOverAllTurns, AgreesWithTryingEveryTurn) {
     double smallest = 1e30;
     for (std::size_t i = 0; i < references.size(); ++i) {
       for (int turn = 0; turn < query.columns(); ++turn) {
-        const Panorama turned = turn_columns(references[i].panorama, turn);
+        const Panorama turned = rotate_columns(references[i].panorama, turn);
         double sum = 0.0;
         for (std::size_t p = 0; p < query.values().size(); ++p) {
           const double d = query.values()[p] - turned.values()[p];

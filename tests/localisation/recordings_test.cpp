@@ -39,8 +39,8 @@ std::vector<FourierSignature> disturbed(const Recording& recording,
   std::vector<FourierSignature> views;
   for (std::size_t i = 0; i < recording.views.size(); ++i) {
     if (!chosen(i)) continue;
-    Panorama view = turn_columns(recording.views[i],
-                                 static_cast<int>(random.index(recording.views[i].columns())));
+    Panorama view = rotate_columns(recording.views[i],
+                                   static_cast<int>(random.index(recording.views[i].columns())));
     const double light = random.uniform(0.8, 1.2);
     for (float& value : view.values()) {
       value = static_cast<float>(std::clamp(light * value + 0.02 * random.normal(), 0.0, 1.0));

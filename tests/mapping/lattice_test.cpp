@@ -353,10 +353,11 @@ TEST(Lattice, GrowsFromNothing) {
   VisualMemory memory(place.memory.shape(), place.memory.full_scale(), place.memory.elevations());
   extend(lattice, memory);
   EXPECT_TRUE(lattice.nodes.empty());
-  memory.append_as(ViewId{5}, place.memory.packed(place.memory.views()[0]), {.name = "first"});
+  memory.append_with_id(ViewId{5}, place.memory.packed(place.memory.views()[0]), {.name = "first"});
   extend(lattice, memory);
   ASSERT_EQ(lattice.nodes.size(), 1U);
-  memory.append_as(ViewId{3 + 5}, place.memory.packed(place.memory.views()[1]), {.name = "second"});
+  memory.append_with_id(ViewId{3 + 5}, place.memory.packed(place.memory.views()[1]),
+                        {.name = "second"});
   extend(lattice, memory);
   ASSERT_EQ(lattice.nodes.size(), 2U);
   for (const auto& node : lattice.nodes) EXPECT_TRUE(std::isfinite(node.pose.x_m));

@@ -51,9 +51,9 @@ struct Case {
 class ExactSearch : public ::testing::TestWithParam<Case> {};
 
 TEST_P(ExactSearch, FindsWhatAFullScanFinds) {
-  const Case& given = GetParam();
-  Filled filled(given.shape, given.kind, 21);
-  filled.append(given.views);
+  const Case& tested = GetParam();
+  Filled filled(tested.shape, tested.kind, 21);
+  filled.append(tested.views);
   Random random(22);
   const auto views = filled.memory.views();
   for (int repeat = 0; repeat < 12; ++repeat) {
@@ -61,7 +61,7 @@ TEST_P(ExactSearch, FindsWhatAFullScanFinds) {
                                       ? filled.memory.packed(views[random.index(views.size())])
                                       : filled.maker.next();
     const int top = 1 + static_cast<int>(random.index(25));
-    const auto components = static_cast<int>(random.index(given.shape.components + 1));
+    const auto components = static_cast<int>(random.index(tested.shape.components + 1));
     expect_exact(filled, query, top, components, {});
 
     std::vector<ViewId> excluded;
@@ -70,7 +70,7 @@ TEST_P(ExactSearch, FindsWhatAFullScanFinds) {
     }
     if (!excluded.empty()) excluded.push_back(excluded.front());
     excluded.push_back(ViewId{4000000000U});
-    std::vector<std::uint8_t> rows(given.shape.rows);
+    std::vector<std::uint8_t> rows(tested.shape.rows);
     const bool band = random.index(2) == 0;  // whole blocks stay, or none does
     for (std::size_t row = 0; row < rows.size(); ++row) {
       rows[row] =
@@ -83,17 +83,17 @@ TEST_P(ExactSearch, FindsWhatAFullScanFinds) {
 }
 
 TEST_P(ExactSearch, HierarchyHoldsExactlyTheViewsWithinItsLimit) {
-  const Case& given = GetParam();
-  Filled filled(given.shape, given.kind, 23);
-  filled.append(given.views);
+  const Case& tested = GetParam();
+  Filled filled(tested.shape, tested.kind, 23);
+  filled.append(tested.views);
   for (const double tolerance : {0.0, 0.3}) {
     const PackedSignature query = filled.maker.next();
     std::vector<ViewId> excluded;
-    if (given.views > 1) excluded = {filled.memory.search(query, {1, 0}).matches.front().view};
+    if (tested.views > 1) excluded = {filled.memory.search(query, {1, 0}).matches.front().view};
     const SearchMask mask{excluded, {}};
     const auto levels = filled.memory.hierarchy(query, tolerance, 0, {}, mask);
-    ASSERT_EQ(levels.size(), static_cast<std::size_t>(given.shape.components));
-    const Match nearest = filled.oracle.nearest(query, 1, given.shape.components, mask).front();
+    ASSERT_EQ(levels.size(), static_cast<std::size_t>(tested.shape.components));
+    const Match nearest = filled.oracle.nearest(query, 1, tested.shape.components, mask).front();
     double limit_before = levels.front().limit;
     std::uint64_t bytes_before = 0;
     for (std::size_t i = 0; i < levels.size(); ++i) {

@@ -107,7 +107,7 @@ TEST(VisualMemory, BadAppendsChangeNothing) {
   PackedSignature short_one = good;
   short_one.phases.pop_back();
   refuses(short_one, {"new", {}, {}});
-  EXPECT_THROW(memory.append_as(ViewId{2}, good, {"new", {}, {}}), ContractError);
+  EXPECT_THROW(memory.append_with_id(ViewId{2}, good, {"new", {}, {}}), ContractError);
   EXPECT_EQ(memory.append(good, {"new", {}, {}}), ViewId{3});
 }
 
@@ -123,8 +123,8 @@ TEST(VisualMemory, RefusesImpossibleShapesAndScales) {
 TEST(VisualMemory, GivenIdsGrowAndMayLeaveGaps) {
   VisualMemory memory(shape, 1.0F, {});
   ViewMaker maker(shape, Kind::random, 6);
-  memory.append_as(ViewId{7}, maker.next(), {"a", {}, {}});
-  memory.append_as(ViewId{4294967295U}, maker.next(), {"b", {}, {}});
+  memory.append_with_id(ViewId{7}, maker.next(), {"a", {}, {}});
+  memory.append_with_id(ViewId{4294967295U}, maker.next(), {"b", {}, {}});
   EXPECT_THROW(memory.append(maker.next(), {"c", {}, {}}), ContractError);
   EXPECT_EQ(memory.search(maker.next(), {5, 0}).matches.size(), 2U);
 }

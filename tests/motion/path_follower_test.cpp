@@ -38,9 +38,9 @@ bool follow(PathFollower& follower, Pose2& robot, double step_m = 0.05) {
 }
 
 double off_path_m(Point2 place, const std::vector<Point2>& path) {
-  double least = std::numeric_limits<double>::infinity();
-  for (const Point2 point : path) least = std::min(least, distance(point, place));
-  return least;
+  double nearest_m = std::numeric_limits<double>::infinity();
+  for (const Point2 point : path) nearest_m = std::min(nearest_m, distance(point, place));
+  return nearest_m;
 }
 
 TEST(PathFollower, RepeatsAPathThatCrossesItselfForwardAndBack) {
@@ -88,16 +88,16 @@ TEST(PathFollower, CutsNoCorner) {
     for (int k = 1; k <= 4; ++k) {
       const Point2 between{robot.x_m + 0.25 * k * (there.x_m - robot.x_m),
                            robot.y_m + 0.25 * k * (there.y_m - robot.y_m)};
-      double least = std::numeric_limits<double>::infinity();
+      double nearest_m = std::numeric_limits<double>::infinity();
       for (std::size_t i = 1; i < path.size(); ++i) {
         for (int share = 0; share <= 10; ++share) {
-          least = std::min(
-              least,
+          nearest_m = std::min(
+              nearest_m,
               distance(between, {path[i - 1].x_m + 0.1 * share * (path[i].x_m - path[i - 1].x_m),
                                  path[i - 1].y_m + 0.1 * share * (path[i].y_m - path[i - 1].y_m)}));
         }
       }
-      max_m = std::max(max_m, least);
+      max_m = std::max(max_m, nearest_m);
     }
     robot = there;
   }

@@ -77,9 +77,9 @@ TEST(FillHiddenValues, NothingHiddenChangesNothingAndATurnOfBothIsATurnOfTheResu
   Panorama filled = view;
   fill_hidden_values(filled, sector(5, 40, 30, 15));
   EXPECT_NE(filled, view);
-  Panorama turned = turn_columns(view, 13);
+  Panorama turned = rotate_columns(view, 13);
   fill_hidden_values(turned, sector(5, 40, 17, 15));
-  EXPECT_EQ(turned, turn_columns(filled, 13));
+  EXPECT_EQ(turned, rotate_columns(filled, 13));
 }
 
 enum class Rule { line, black, mean_of_row };
@@ -104,7 +104,7 @@ void hide(Panorama& seen, const Hidden& hidden, Rule rule) {
   }
 }
 
-// What a sector that stays with the robot does when the robot turns on the spot: the mean
+// Effect of a sector that stays with the robot when it turns on the spot: the mean
 // dissimilarity of a view and the same view turned (without the mask it would be 0), over that of
 // two different views.
 double disturbance(const std::vector<Panorama>& views, const Hidden& hidden, Rule rule,
@@ -119,7 +119,7 @@ double disturbance(const std::vector<Panorama>& views, const Hidden& hidden, Rul
   for (std::size_t i = 0; i < views.size(); ++i) {
     const FourierSignature before = signature(views[i]);
     for (int turn = 1; turn < views[i].columns(); turn += 3) {
-      turned += dissimilarity_l1(before, signature(turn_columns(views[i], turn)));
+      turned += dissimilarity_l1(before, signature(rotate_columns(views[i], turn)));
       ++turns;
     }
     other += dissimilarity_l1(before, signature(views[(i + 1) % views.size()]));
@@ -161,7 +161,7 @@ TEST(ValuesHiddenBy, AreThoseThatLookAtTheMask) {
       mask.at(u, v) = robot ? 0 : 7;
     }
   }
-  const Hidden hidden = values_hidden_by(mask.view(), unwarper);
+  const Hidden hidden = find_hidden_values(mask.view(), unwarper);
   ASSERT_EQ(hidden.size(), 20U * 120U);
   const double column_rad = 2.0 * std::numbers::pi / 120.0;
   int inside = 0;
@@ -190,7 +190,7 @@ TEST(ValuesHiddenBy, RefusesMasksThatDoNotFitOrHideEverything) {
   const Camera camera = mirror_camera();
   const Unwarper unwarper(camera, {.rows = 8, .columns = 32});
   for (const Image& mask : {Image(10, 10), Image(640, 480), Image(640, 480, 3)}) {
-    EXPECT_THROW((void)values_hidden_by(mask.view(), unwarper), ContractError);
+    EXPECT_THROW((void)find_hidden_values(mask.view(), unwarper), ContractError);
   }
   Panorama view(2, 8, std::nullopt);
   EXPECT_THROW(fill_hidden_values(view, Hidden(15, 0)), ContractError);

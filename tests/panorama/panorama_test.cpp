@@ -70,25 +70,25 @@ TEST(Panorama, RefusesBrokenInvariants) {
 
 TEST(TurnColumns, FollowsTheConvention) {
   const Panorama view = random_panorama(1, 3, 12);
-  const Panorama turned = turn_columns(view, 5);
+  const Panorama turned = rotate_columns(view, 5);
   for (int y = 0; y < 3; ++y) {
     for (int c = 0; c < 12; ++c) EXPECT_EQ(turned.at(y, c), view.at(y, (c + 5) % 12));
   }
   EXPECT_NE(turned, view);
-  EXPECT_EQ(turn_columns(turned, -5), view);
-  EXPECT_EQ(turn_columns(view, 12 * 7), view);
-  EXPECT_EQ(turn_columns(turn_columns(view, 7), 9), turn_columns(view, 4));
+  EXPECT_EQ(rotate_columns(turned, -5), view);
+  EXPECT_EQ(rotate_columns(view, 12 * 7), view);
+  EXPECT_EQ(rotate_columns(rotate_columns(view, 7), 9), rotate_columns(view, 4));
 }
 
 TEST(Mirrored, TheLeftOfTheRobotBecomesItsRight) {
   const Panorama view = random_panorama(2, 3, 12);
-  const Panorama image = mirrored(view);
+  const Panorama image = mirror(view);
   for (int y = 0; y < 3; ++y) {
     for (int c = 0; c < 12; ++c) EXPECT_EQ(image.at(y, c), view.at(y, (12 - c) % 12));
   }
   EXPECT_NE(image, view);
-  EXPECT_EQ(mirrored(image), view);
-  EXPECT_EQ(mirrored(turn_columns(view, 5)), turn_columns(image, -5));
+  EXPECT_EQ(mirror(image), view);
+  EXPECT_EQ(mirror(rotate_columns(view, 5)), rotate_columns(image, -5));
 }
 
 TEST(ToPicture, RunsClockwiseWithForwardInTheMiddle) {

@@ -38,10 +38,10 @@ TEST(Preprocess, EveryCombinationIsIndifferentToATurn) {
     const Panorama plain = preprocess(view, options);
     EXPECT_EQ(plain == view, bits == 0);
     for (const int turned : {1, 17, 49}) {
-      EXPECT_LT(largest_difference(preprocess(turn_columns(view, turned), options),
-                                   turn_columns(plain, turned)),
+      EXPECT_LT(largest_difference(preprocess(rotate_columns(view, turned), options),
+                                   rotate_columns(plain, turned)),
                 1e-6);
-      EXPECT_GT(largest_difference(preprocess(turn_columns(view, turned), options), plain),
+      EXPECT_GT(largest_difference(preprocess(rotate_columns(view, turned), options), plain),
                 0.01);  // guard
     }
     ++combinations;

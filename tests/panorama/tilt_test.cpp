@@ -13,7 +13,7 @@
 namespace panonav {
 namespace {
 
-// What lies in a direction of the world: smooth, without symmetry.
+// Brightness of a direction of the world: smooth, without symmetry.
 double world(const std::array<double, 3>& d) {
   return 0.5 + 0.2 * std::sin(3.0 * d[0] + 1.0) * std::cos(2.0 * d[1]) +
          0.2 * std::sin(4.0 * d[2] + 2.0 * d[1] - d[0]);

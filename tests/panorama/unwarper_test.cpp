@@ -157,7 +157,7 @@ TEST(Unwarper, ATurnOfTheRobotTurnsTheColumns) {
   });
   const Panorama here = unwarper.unwrap(image_here.view());
   const Panorama there = unwarper.unwrap(image_there.view());
-  const Panorama expected = turn_columns(here, 100);
+  const Panorama expected = rotate_columns(here, 100);
   double squares = 0.0;
   double guard = 0.0;
   for (std::size_t i = 0; i < here.values().size(); ++i) {

@@ -26,8 +26,8 @@ VisualMemory memory_of_noise(std::uint64_t seed, int first, int end) {
       packed.magnitudes.push_back(static_cast<std::uint8_t>(random.index(8) * random.index(32)));
       packed.phases.push_back(static_cast<std::uint8_t>(i));
     }
-    memory.append_as(ViewId{static_cast<std::uint32_t>(view)}, packed,
-                     {.name = std::to_string(view)});
+    memory.append_with_id(ViewId{static_cast<std::uint32_t>(view)}, packed,
+                          {.name = std::to_string(view)});
   }
   return memory;
 }

@@ -93,12 +93,12 @@ TEST(ColumnProfiles, AreThoseOfTheBandLimitedView) {
   double error = 0.0;
   for (std::size_t b = 0; b < 16; ++b) {
     for (std::size_t c = 0; c < columns; ++c) {
-      const double wanted = 40.0 * bands[b][c] / (std::sqrt(contrast[c]) + 0.2 * std::sqrt(all));
+      const double expected = 40.0 * bands[b][c] / (std::sqrt(contrast[c]) + 0.2 * std::sqrt(all));
       const double found = profiles.values()[b * columns + c] - 128.0;
-      EXPECT_NEAR(found, std::clamp(wanted, -127.0, 127.0),
+      EXPECT_NEAR(found, std::clamp(expected, -127.0, 127.0),
                   8.0);  // phases and magnitudes are bytes
-      error += std::abs(found - wanted);
-      sum += std::abs(wanted);
+      error += std::abs(found - expected);
+      sum += std::abs(expected);
     }
   }
   EXPECT_GT(sum / (16.0 * columns), 10.0);
@@ -108,7 +108,7 @@ TEST(ColumnProfiles, AreThoseOfTheBandLimitedView) {
 TEST(ColumnProfiles, DoNotChangeWithGainAndOffset) {
   const Panorama view = smooth_view(2);
   const double other = difference(smooth_view(3), view);
-  // What is left is the rounding of smaller magnitudes to bytes.
+  // The rest is the rounding of smaller magnitudes to bytes.
   EXPECT_LT(difference(changed(view, 0.7F, 0.0F), view), 0.3 * other);
   EXPECT_LT(difference(changed(view, 0.7F, 0.1F), view), 0.3 * other);
 }
@@ -116,7 +116,7 @@ TEST(ColumnProfiles, DoNotChangeWithGainAndOffset) {
 TEST(ColumnMatch, OfTheSameViewTurnedIsZeroAndTellsTheTurn) {
   const Panorama view = smooth_view(4);
   for (const int turned : {0, 2, 64, 128, 130, 254}) {  // whole columns of the profiles
-    const ColumnMatch match = match_columns(ColumnProfiles(packed(turn_columns(view, turned))),
+    const ColumnMatch match = match_columns(ColumnProfiles(packed(rotate_columns(view, turned))),
                                             ColumnProfiles(packed(view)));
     EXPECT_LT(match.difference, 0.1);
     EXPECT_NEAR(
@@ -133,7 +133,7 @@ TEST(ColumnMatch, AHiddenTenthRaisesTheDifferenceByLittle) {
     const Panorama view = smooth_view(seed);
     const double other = difference(smooth_view(seed + 100), view);
     for (const float colour : {-0.5F, 0.0F, 0.5F}) {
-      const Panorama spoilt = hidden(turn_columns(view, 50), 17 * static_cast<int>(seed), colour);
+      const Panorama spoilt = hidden(rotate_columns(view, 50), 17 * static_cast<int>(seed), colour);
       const ColumnMatch match =
           match_columns(ColumnProfiles(packed(spoilt)), ColumnProfiles(packed(view)));
       EXPECT_LT(match.difference, 0.75 * other) << "seed " << seed << " colour " << colour;
@@ -148,7 +148,7 @@ TEST(ColumnMatch, AHiddenTenthRaisesTheDifferenceByLittle) {
 TEST(ColumnMatch, IsTheLeastOverAllTurns) {
   const ColumnProfiles query(packed(smooth_view(5)));
   const ColumnProfiles reference(packed(smooth_view(6)));
-  double least = std::numeric_limits<double>::infinity();
+  double min_difference = std::numeric_limits<double>::infinity();
   for (std::size_t s = 0; s < 128; ++s) {
     double sum = 0.0;
     for (std::size_t c = 0; c < 32; ++c) {
@@ -159,9 +159,9 @@ TEST(ColumnMatch, IsTheLeastOverAllTurns) {
       }
       sum += std::sqrt(l1 / 40.0 / 16.0) / 32.0;
     }
-    least = std::min(least, sum);
+    min_difference = std::min(min_difference, sum);
   }
-  EXPECT_NEAR(match_columns(query, reference).difference, least, 1e-3);
+  EXPECT_NEAR(match_columns(query, reference).difference, min_difference, 1e-3);
 }
 
 double mean_of_roots(std::span<const double> distances) {
@@ -195,16 +195,16 @@ TEST(ColumnDistances, AreTheLeastOfThreeTurnsColumnByColumn) {
                                      (nearest - 0.4) * turn_step_rad - 2.0 * std::numbers::pi}) {
       const auto distances = column_distances_near(query, reference, heading_rad);
       for (std::size_t c = 0; c < distances.size(); ++c) {
-        double least = std::numeric_limits<double>::infinity();
+        double min_difference = std::numeric_limits<double>::infinity();
         for (int turn = nearest - 1; turn <= nearest + 1; ++turn) {
           const std::size_t at = (4 * c + static_cast<std::size_t>(turn + 128)) % 128;
           int l1 = 0;
           for (std::size_t b = 0; b < 16; ++b) {
             l1 += std::abs(query.values()[b * 128 + 4 * c] - reference.values()[b * 128 + at]);
           }
-          least = std::min(least, l1 / 40.0 / 16.0);
+          min_difference = std::min(min_difference, l1 / 40.0 / 16.0);
         }
-        EXPECT_NEAR(distances[c], least, 1e-12) << "turn " << nearest << " column " << c;
+        EXPECT_NEAR(distances[c], min_difference, 1e-12) << "turn " << nearest << " column " << c;
       }
     }
   }
@@ -255,7 +255,7 @@ TEST(ColumnProfiles, OfFewRowsCompareBrightness) {
     const ColumnProfiles profiles(packed(view));
     EXPECT_EQ(profiles.used_bands(), rows);
     const ColumnMatch same =
-        match_columns(ColumnProfiles(packed(turn_columns(view, 20))), profiles);
+        match_columns(ColumnProfiles(packed(rotate_columns(view, 20))), profiles);
     EXPECT_NEAR(angle_difference(same.heading_rad, 2.0 * std::numbers::pi * 20 / 256), 0.0, 1e-9);
     EXPECT_LT(same.difference, difference(smooth_view(9, rows), view));
   }

@@ -92,7 +92,7 @@ TEST(Compass, HoldsTheSignConventionOnPanoramas) {
   std::vector<float> values(6 * 64);
   for (float& value : values) value = static_cast<float>(random.uniform());
   const Panorama view(6, 64, std::nullopt, values);
-  const auto reading = compass(compute_signature(turn_columns(view, 3)), compute_signature(view));
+  const auto reading = compass(compute_signature(rotate_columns(view, 3)), compute_signature(view));
   ASSERT_TRUE(reading);
   EXPECT_LT(heading_error(*reading, 2.0 * std::numbers::pi * 3 / 64), 1e-5);
 }

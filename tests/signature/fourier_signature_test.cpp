@@ -98,7 +98,7 @@ TEST(FourierSignature, TurningColumnsIsTurningPhases) {
     for (int trial = 0; trial < 20; ++trial) {
       const int turned =
           1 + static_cast<int>(random.index(static_cast<std::uint64_t>(columns) - 1));
-      const FourierSignature there = compute_signature(turn_columns(view, turned));
+      const FourierSignature there = compute_signature(rotate_columns(view, turned));
       EXPECT_LT(dissimilarity_l1(here, there), 1e-4);
       const FourierSignature predicted = turn(here, 2.0 * std::numbers::pi * turned / columns);
       for (int y = 0; y < 7; ++y) {

@@ -63,18 +63,18 @@ class Gantry : public ::testing::Test {
     double worst_m = 0.0;
   };
 
-  /// Each view against all others: where the least dissimilar one stands.
+  /// Each view against all others: where the min_dissimilarity dissimilar one stands.
   template <class Dissimilarity>
   [[nodiscard]] Nearest find_nearest(Dissimilarity dissimilarity) const {
     Nearest result;
     for (std::size_t query = 0; query < views_.size(); ++query) {
-      double least = std::numeric_limits<double>::infinity();
+      double min_dissimilarity = std::numeric_limits<double>::infinity();
       std::size_t best = query;
       for (std::size_t other = 0; other < views_.size(); ++other) {
         if (other == query) continue;
         const double value = dissimilarity(query, other);
-        if (value < least) {
-          least = value;
+        if (value < min_dissimilarity) {
+          min_dissimilarity = value;
           best = other;
         }
       }
@@ -116,7 +116,7 @@ TEST_F(Gantry, NearestPackedViewIsANeighbourHoweverTheRobotTurned) {
   std::vector<FourierSignature> queries;
   for (const View& view : views_) {
     const int columns_turned = 1 + static_cast<int>(random.index(89));
-    queries.push_back(compute_signature(turn_columns(view.panorama, columns_turned), components));
+    queries.push_back(compute_signature(rotate_columns(view.panorama, columns_turned), components));
     packed_queries.push_back(pack(queries.back(), full_scale));
   }
   expect_good(find_nearest([&](std::size_t a, std::size_t b) {
@@ -165,7 +165,7 @@ TEST_F(Gantry, CompassReadsTheTurnOfTheRobot) {
   for (const View& a : views_) {
     const int columns_turned = 1 + static_cast<int>(random.index(89));
     const FourierSignature query =
-        compute_signature(turn_columns(a.panorama, columns_turned), components);
+        compute_signature(rotate_columns(a.panorama, columns_turned), components);
     const double turned_rad = 2.0 * std::numbers::pi * columns_turned / 90;
     for (const View& b : views_) {
       if (&a == &b || distance(a.position, b.position) > 0.10 + 1e-6) continue;

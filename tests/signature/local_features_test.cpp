@@ -32,7 +32,7 @@ TEST(LocalFeatures, ATurnedViewHasTheTurnedFeatures) {
   EXPECT_GT(here.features.size(), 60U);
   EXPECT_LE(here.features.size(), 256U);
   for (const int turned : {1, 100, 359}) {
-    const LocalFeatures there = extract_features(turn_columns(view, turned)).value();
+    const LocalFeatures there = extract_features(rotate_columns(view, turned)).value();
     auto expected = here.features;
     for (LocalFeatures::Feature& feature : expected) {
       feature.column = static_cast<std::uint16_t>((feature.column + 360 - turned) % 360);

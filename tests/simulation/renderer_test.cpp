@@ -205,7 +205,7 @@ TEST(Renderer, TurningTheRobotShiftsColumns) {
   const int columns = 37;
   const Panorama after = renderer.render_panorama(
       {.pose = {0.1, 0.2, 2.0 * std::numbers::pi * columns / 128.0}}, rendering, executor);
-  const Panorama expected = turn_columns(before, columns);
+  const Panorama expected = rotate_columns(before, columns);
   double sum = 0.0;
   for (std::size_t i = 0; i < after.values().size(); ++i) {
     sum += std::abs(after.values()[i] - expected.values()[i]);

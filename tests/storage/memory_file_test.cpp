@@ -62,7 +62,7 @@ TEST_F(MemoryFileContent, ContentComesBack) {
     for (int number = 0; number < 50; ++number) {
       const NewView view = random_view(random, header.shape, number);
       const ViewId id = file.append(view);
-      expected.append_as(id, view.signature, view.info);
+      expected.append_with_id(id, view.signature, view.info);
     }
     const auto views = expected.views();
     const std::vector<Link> links{{views[0], views[1], LinkKind::sequence},
@@ -304,7 +304,7 @@ TEST_F(MemoryFileContent, ALargeMemoryComesBackWhole) {
     const std::vector<ViewId> ids = file.append(views);
     ASSERT_EQ(ids.size(), views.size());
     for (std::size_t i = 0; i < ids.size(); ++i) {
-      expected.append_as(ids[i], views[i].signature, views[i].info);
+      expected.append_with_id(ids[i], views[i].signature, views[i].info);
     }
   }
   const MemoryFile file = MemoryFile::open(path, Access::read_only);

@@ -68,8 +68,8 @@ inline VisualMemory memory_of(std::size_t views) {
       signature.magnitudes[k] = static_cast<std::uint8_t>(1 + bits % 255);
       signature.phases[k] = static_cast<std::uint8_t>(bits >> 32U);
     }
-    memory.append_as(ViewId{static_cast<std::uint32_t>(i + 1)}, signature,
-                     {"view_" + std::to_string(i), std::nullopt, std::nullopt});
+    memory.append_with_id(ViewId{static_cast<std::uint32_t>(i + 1)}, signature,
+                          {"view_" + std::to_string(i), std::nullopt, std::nullopt});
   }
   return memory;
 }

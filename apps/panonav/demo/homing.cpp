@@ -78,7 +78,7 @@ std::vector<viewer::ReportView> views_of(const Panorama& home, const Panorama& c
         {wrap_angle(vector.direction_rad() + std::numbers::pi), viewer::PlotColour::blue, true});
   }
   const double columns = -vector.heading_rad / (2.0 * std::numbers::pi) * home.columns();
-  return {{turn_columns(home, static_cast<int>(std::lround(columns))), marks,
+  return {{rotate_columns(home, static_cast<int>(std::lround(columns))), marks,
            "The first run: what was seen at home, turned as the robot faces at the start."},
           {current, marks,
            "What it sees at the start. Orange: the direction home, where things spread out on the "

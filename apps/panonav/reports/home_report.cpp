@@ -79,7 +79,7 @@ std::vector<viewer::ReportView> views_of(const std::optional<Panorama>& home,
   std::vector<viewer::ReportView> views;
   if (home) {  // the robot at home turns to the current heading
     const double columns = -found.heading_rad / (2.0 * std::numbers::pi) * home->columns();
-    views.push_back({turn_columns(*home, static_cast<int>(std::lround(columns))), marks,
+    views.push_back({rotate_columns(*home, static_cast<int>(std::lround(columns))), marks,
                      "At home, turned alike"});
   }
   views.push_back({current, marks, caption_of(answer)});

@@ -145,11 +145,11 @@ CameraModel model_of(const MirrorOptions& options, double rim_radius_px) {
   const double rim_rad = radians(options.rim_elevation_deg);
   switch (options.profile) {
     case 1:
-      return with_elevation_at(
+      return fit_focal_length(
           HyperboloidalModel{.a_mm = options.mirror_a_mm, .b_mm = options.mirror_b_mm},
           rim_radius_px, rim_rad);
     case 2:
-      return with_elevation_at(UnifiedModel{.xi = options.xi}, rim_radius_px, rim_rad);
+      return fit_focal_length(UnifiedModel{.xi = options.xi}, rim_radius_px, rim_rad);
     default:
       return EquiangularModel{radians(options.inner_elevation_deg), rim_rad};
   }

@@ -29,7 +29,7 @@ double turn(Observation& observation, const PlaceRecogniser& recogniser,
   Random random(*arguments.turn_seed, index);
   const auto columns = static_cast<std::uint64_t>(panorama.columns());
   const auto turned = static_cast<int>(random.index(columns));
-  observation.picture = turn_columns(panorama, turned);
+  observation.picture = rotate_columns(panorama, turned);
   return wrap_angle(2.0 * std::numbers::pi * turned / static_cast<double>(columns));
 }
 

@@ -30,8 +30,8 @@ using Eigen::VectorXd;
 constexpr std::array<double, 4> fields_of_view_deg{186, 194, 203, 213};
 /// Pictures that are turned less than this leave the centres of the lenses open.
 constexpr double min_turn_deg = 10.0;
-/// Directions in which patches are looked for: at first, and for the last fits; of one picture only
-/// the overlap of the lenses serves, and so many more are looked at.
+/// Directions in which patches are searched: at first, and for the last fits. Of one picture only
+/// the overlap of the lenses serves, and so more directions are searched.
 constexpr int coarse_directions = 250, coarse_directions_of_one = 1000;
 constexpr int fine_directions = 2000, fine_directions_of_one = 6000;
 /// Patches with contrast that the last fit needs, and the share of them that must be found again:
@@ -51,7 +51,7 @@ VectorXd prior_deviations(const std::array<FieldCircle, 2>& circles, int picture
       1e-6;  // the first picture's yaw and the left lens's azimuth say where 0 is
   constexpr double unknown_rad = 10.0;
   constexpr double tilt_deg = 0.5;  // of the axis of turns from picture to picture
-  VectorXd deviations(stand_at(pictures));
+  VectorXd deviations(rotation_at(pictures));
   for (int lens = 0; lens < 2; ++lens) {
     const double centre_px = 0.015 * circles[lens].radius;
     deviations.segment<lens_size>(lens_at(lens)) << centre_px, centre_px, 0.1, 0.05, 0.02,
@@ -59,8 +59,8 @@ VectorXd prior_deviations(const std::array<FieldCircle, 2>& circles, int picture
   }
   for (int p = 0; p < pictures; ++p) {
     const double turn_rad = turn_is_known ? radians(5.0) : unknown_rad;
-    deviations.segment<stand_size>(stand_at(p)) << (p == 0 ? fixed : turn_rad), radians(tilt_deg),
-        radians(tilt_deg);
+    deviations.segment<rotation_size>(rotation_at(p)) << (p == 0 ? fixed : turn_rad),
+        radians(tilt_deg), radians(tilt_deg);
   }
   return deviations;
 }
@@ -83,7 +83,7 @@ std::optional<std::array<FieldCircle, 2>> find_circles(const std::vector<Image>&
     }
     const EdgeField field = mean_field(fields);
     const int coarser = std::max(1, std::min(field.width, field.height) / 64);
-    const EdgeField coarse = reduced(field, coarser);
+    const EdgeField coarse = reduce(field, coarser);
     const double half_side = 0.5 * std::min(coarse.width, coarse.height);
     CircleRange range{0.75 * half_side, 1.2 * half_side, 0.5, Evenness::even};
     std::optional<CircleFit> best;
@@ -91,7 +91,7 @@ std::optional<std::array<FieldCircle, 2>> find_circles(const std::vector<Image>&
       circle = {circle.u * coarser, circle.v * coarser, circle.radius * coarser};
       const CircleRange fine{range.lowest_radius * coarser, range.highest_radius * coarser, 0.5,
                              Evenness::even};
-      const auto fit = fit_circle(planes, climb(field, circle, fine));
+      const auto fit = fit_circle(planes, climb_to_maximum(field, circle, fine));
       if (fit && (!best || fit->support > best->support)) best = fit;
     }
     constexpr double min_support = 0.5;  // of the circumference: the other half may be dark
@@ -109,36 +109,36 @@ class Calibrator {
       : grey_(grey),
         circles_(circles),
         known_(known),
-        side_(known.direction == ColumnDirection::clockwise ? 1.0 : -1.0),
+        mirror_sign_(known.direction == ColumnDirection::clockwise ? 1.0 : -1.0),
         fine_rad_(1.8 / circles[0].radius),
         coarse_rad_(std::max(radians(0.6), 2 * fine_rad_)),
-        matcher_(grey_, side_, executor),
+        matcher_(grey_, mirror_sign_, executor),
         fit_(prior_deviations(circles, static_cast<int>(grey.size()), known.turn_rad.has_value()),
-             fine_rad_, side_, executor) {}
+             fine_rad_, mirror_sign_, executor) {}
 
   std::variant<DualFisheyeCalibration, std::string> run();
 
  private:
   /// Returns the state in which lenses are as their makers mean them.
-  [[nodiscard]] State start(double field_of_view_rad) const;
+  [[nodiscard]] State make_initial_state(double field_of_view_rad) const;
   /// Ends the lenses at their circles.
-  [[nodiscard]] bool close_lenses() {
-    return fit_.close_lenses({circles_[0].radius, circles_[1].radius});
+  [[nodiscard]] bool set_max_angles() {
+    return fit_.set_max_angles({circles_[0].radius, circles_[1].radius});
   }
   /// Fits each field of view and keeps the best; returns the reason where none is found.
   [[nodiscard]] std::optional<std::string> fit_fields_of_view();
   /// Fits again on ever finer values; returns the reason where the lenses cannot be closed.
-  [[nodiscard]] std::optional<std::string> refine();
+  [[nodiscard]] std::optional<std::string> refine_fit();
   /// Counts the matches into `result`; returns the reason where there are too few.
   [[nodiscard]] std::optional<std::string> count_matches(DualFisheyeCalibration& result) const;
   /// Returns the camera as fitted, with the lenses' gains.
-  [[nodiscard]] Camera found_camera() const;
+  [[nodiscard]] Camera make_camera() const;
   [[nodiscard]] double azimuth_deviation(const Camera& camera, const MatrixXd& covariance) const;
 
   const std::vector<Image>& grey_;
   std::array<FieldCircle, 2> circles_;
   DualFisheyeCalibration::Knowledge known_;
-  double side_;
+  double mirror_sign_;
   double fine_rad_;    ///< about a pixel
   double coarse_rad_;  ///< between the values of the first fits
   PatchMatcher matcher_;
@@ -146,7 +146,7 @@ class Calibrator {
   Matching last_;
 };
 
-State Calibrator::start(double field_of_view_rad) const {
+State Calibrator::make_initial_state(double field_of_view_rad) const {
   State state;
   for (int i = 0; i < 2; ++i) {
     FisheyeLens& lens = state.lenses[i];
@@ -157,9 +157,9 @@ State Calibrator::start(double field_of_view_rad) const {
     lens.azimuth_rad = known_.left_azimuth_rad + std::numbers::pi * i;
     lens.roll_rad = i == 0 ? known_.left_roll_rad : known_.right_roll_rad;
   }
-  state.stands.resize(grey_.size());
+  state.rotations.resize(grey_.size());
   for (std::size_t p = 0; p < grey_.size(); ++p) {
-    state.stands[p].yaw_rad = known_.turn_rad.value_or(0.0) * static_cast<double>(p);
+    state.rotations[p].yaw_rad = known_.turn_rad.value_or(0.0) * static_cast<double>(p);
   }
   return state;
 }
@@ -172,23 +172,23 @@ std::optional<std::string> Calibrator::fit_fields_of_view() {
   LensFit::Parameters best;
   int best_near = -1;
   for (const double field_deg : fields_deg) {
-    State prior = start(radians(field_deg));
-    if (!known_.turn_rad) matcher_.find_turns(prior, coarse_rad_, known_.left_azimuth_rad);
+    State prior = make_initial_state(radians(field_deg));
+    if (!known_.turn_rad) matcher_.estimate_yaws(prior, coarse_rad_, known_.left_azimuth_rad);
     fit_.restart(prior);
     double most_turned = 0;
-    for (const Stand& stand : prior.stands) {
-      most_turned = std::max(most_turned, std::abs(wrap_angle(stand.yaw_rad)));
+    for (const RigRotation& rotation : prior.rotations) {
+      most_turned = std::max(most_turned, std::abs(wrap_angle(rotation.yaw_rad)));
     }
     if (grey_.size() > 1 && most_turned < radians(min_turn_deg)) {
       return "the pictures are not turned against each other: 10 degrees are needed, 90 are good";
     }
     fit_.solve(matcher_.match(fit_.state(), coarse_rad_, 10, directions).matches);
-    if (!close_lenses()) continue;
+    if (!set_max_angles()) continue;
     const Matching again = matcher_.match(fit_.state(), coarse_rad_, 4, directions);
     fit_.solve(again.matches);
-    if (again.near() > best_near && close_lenses()) {
+    if (again.count_near_expected() > best_near && set_max_angles()) {
       best = fit_.parameters();
-      best_near = again.near();
+      best_near = again.count_near_expected();
     }
   }
   if (best_near < 0) return "the two circles show nothing in common";
@@ -196,21 +196,21 @@ std::optional<std::string> Calibrator::fit_fields_of_view() {
   return std::nullopt;
 }
 
-std::optional<std::string> Calibrator::refine() {
+std::optional<std::string> Calibrator::refine_fit() {
   const double middle_rad = std::sqrt(coarse_rad_ * fine_rad_);
   const int directions = grey_.size() == 1 ? fine_directions_of_one : fine_directions;
   for (const double step_rad : {middle_rad, fine_rad_, fine_rad_}) {
     last_ = matcher_.match(fit_.state(), step_rad, 3, directions);
     fit_.solve(last_.matches);
-    if (!close_lenses()) return "the lenses' distortion cannot be told";
+    if (!set_max_angles()) return "the lenses' distortion cannot be told";
   }
   return std::nullopt;
 }
 
 std::optional<std::string> Calibrator::count_matches(DualFisheyeCalibration& result) const {
-  result.matches = last_.near();
+  result.matches = last_.count_near_expected();
   const bool both_lenses = std::ranges::any_of(last_.matches, [](const Match& match) {
-    return match.off_steps <= 1.0 && match.seen[0].picture == match.seen[1].picture;
+    return match.off_steps <= 1.0 && match.points[0].picture == match.points[1].picture;
   });
   if (last_.textured < min_textured) {
     return "too little structure in the pictures: " + std::to_string(last_.textured) +
@@ -225,11 +225,11 @@ std::optional<std::string> Calibrator::count_matches(DualFisheyeCalibration& res
   return std::nullopt;
 }
 
-Camera Calibrator::found_camera() const {
+Camera Calibrator::make_camera() const {
   DualFisheyeModel model{fit_.state().lenses, 0.0};
   std::vector<double> log_gains;  // of the right lens against the left one
   for (const Match& match : last_.matches) {
-    if (match.off_steps <= 1.0 && match.seen[0].picture == match.seen[1].picture) {
+    if (match.off_steps <= 1.0 && match.points[0].picture == match.points[1].picture) {
       log_gains.push_back(match.log_gain);
     }
   }
@@ -257,7 +257,8 @@ double Calibrator::azimuth_deviation(const Camera& camera, const MatrixXd& covar
     if (!pixel) continue;
     const int lens = panonav::lens_at(camera, *pixel);
     const auto azimuth = [&](const FisheyeLens& seen_by) {
-      const Vector3d d = Stance(seen_by, {}, side_).ray(Vector2d(pixel->u_px, pixel->v_px));
+      const Vector3d d =
+          PosedLens(seen_by, {}, mirror_sign_).ray(Vector2d(pixel->u_px, pixel->v_px));
       return std::atan2(d.y(), d.x());
     };
     for (int j = 0; j < lens_size; ++j) {
@@ -274,11 +275,11 @@ double Calibrator::azimuth_deviation(const Camera& camera, const MatrixXd& covar
 std::variant<DualFisheyeCalibration, std::string> Calibrator::run() {
   DualFisheyeCalibration result;
   if (auto reason = fit_fields_of_view()) return std::move(*reason);
-  if (auto reason = refine()) return std::move(*reason);
+  if (auto reason = refine_fit()) return std::move(*reason);
   if (auto reason = count_matches(result)) return std::move(*reason);
-  result.camera = found_camera();
-  for (const Stand& stand : fit_.state().stands) {
-    result.turns_rad.push_back(wrap_angle(stand.yaw_rad));
+  result.camera = make_camera();
+  for (const RigRotation& rotation : fit_.state().rotations) {
+    result.turns_rad.push_back(wrap_angle(rotation.yaw_rad));
   }
   try {
     validate(result.camera);

@@ -14,17 +14,17 @@ namespace panonav {
 
 /// A camera found in pictures, and how well it fits them.
 struct DualFisheyeCalibration {
-  /// What a user knows of a dual fisheye camera beyond its pictures.
+  /// Knowledge of a dual fisheye camera beyond its pictures.
   struct Knowledge {
-    /// How the circles lie in the picture, see `FisheyeLens::roll_rad`; to about 3 degrees.
+    /// Roll of the lens in the left half, see `FisheyeLens::roll_rad`; to about 3 degrees.
     double left_roll_rad = 0.0;
     double right_roll_rad = 0.0;  ///< the same of the lens in the right half
     /// Azimuth of the left lens's axis: no picture shows where the robot's forward direction is.
     double left_azimuth_rad = 0.0;
     /// Field of view of one lens; empty: found, between 185 and 220 degrees.
     std::optional<double> field_of_view_rad;
-    /// How far the camera was turned from each picture to the next, counter-clockwise seen from
-    /// above, to some degrees; empty: found.
+    /// Yaw of the camera from each picture to the next, counter-clockwise seen from above, to
+    /// some degrees; empty: found.
     std::optional<double> turn_rad;
     ColumnDirection direction = ColumnDirection::clockwise;  ///< see Camera
   };
@@ -42,15 +42,12 @@ struct DualFisheyeCalibration {
 
 /// Finds the lenses of a dual fisheye camera (centres, focal lengths, distortion, rotations, fields
 /// of view, gain) from pictures of one place, between which the camera is turned about its vertical
-/// axis: what both lenses see, or one lens in two pictures, must lie in the same direction, and
-/// what is matched all round closes to 360 degrees. Small patches are matched by normalised
-/// correlation, from coarse to fine; all parameters and the turns follow by robust least squares
-/// (Levenberg-Marquardt) with weak priors of how cameras are made. The axis of the turns becomes
-/// the vertical. One picture alone shows the lenses only where they overlap.
-/// Returns one line, what is missing in the pictures, where they do not determine the camera.
-/// Throws ContractError on no picture, different sizes, or a height below 64 px. Same pictures:
-/// same bits on any number of threads. Cost: some seconds for four pictures of 1280 x 640 on one
-/// thread.
+/// axis, which becomes the vertical. Patches that both lenses see, or one lens in two pictures, are
+/// matched by normalised correlation; all parameters and the yaws follow by robust least squares
+/// (Levenberg-Marquardt) with weak priors of how cameras are made (docs/equations.md). Returns one
+/// line that says what the pictures lack where they do not determine the camera. Throws
+/// ContractError on no picture, different sizes, or a height below 64 px. The same bits on any
+/// number of threads. Cost: some seconds for four pictures of 1280 x 640.
 [[nodiscard]] std::variant<DualFisheyeCalibration, std::string> calibrate_dual_fisheye(
     std::span<const ImageView> pictures, const DualFisheyeCalibration::Knowledge& known,
     Executor& executor);

@@ -17,32 +17,33 @@ struct Overloaded : Functions... {
 template <class... Functions>
 Overloaded(Functions...) -> Overloaded<Functions...>;  // clang 14 does not find it
 
-/// How far beyond a border rounding may carry a value, relative to the image's size.
+/// Distance by which rounding may carry a value beyond a border, relative to the image's size.
 constexpr double border_tolerance = 1e-9;
 
 double tolerance_px(const Camera& camera) {
   return border_tolerance * std::max(camera.image_size.width, camera.image_size.height);
 }
 
-/// The value within [low, high], or empty where it lies beyond by more than the tolerance (or is
+/// Clamps to [low, high]; nullopt where the value lies beyond by more than the tolerance (or is
 /// NaN).
-std::optional<double> within(double value, double low, double high, double tolerance) {
+std::optional<double> clamp_with_tolerance(double value, double low, double high,
+                                           double tolerance) {
   if (!(value >= low - tolerance && value <= high + tolerance)) return std::nullopt;
   return std::clamp(value, low, high);
 }
 
-std::optional<PixelPoint> within_image(const Camera& camera, PixelPoint pixel) {
+std::optional<PixelPoint> clamp_to_image(const Camera& camera, PixelPoint pixel) {
   const double tolerance = tolerance_px(camera);
-  const auto u = within(pixel.u_px, 0, camera.image_size.width, tolerance);
-  const auto v = within(pixel.v_px, 0, camera.image_size.height, tolerance);
+  const auto u = clamp_with_tolerance(pixel.u_px, 0, camera.image_size.width, tolerance);
+  const auto v = clamp_with_tolerance(pixel.v_px, 0, camera.image_size.height, tolerance);
   if (!u || !v) return std::nullopt;
   return PixelPoint{*u, *v};
 }
 
-/// Elevation at a distance from the centre within [inner, rim]; mirror cameras only.
+/// Returns the elevation at a distance from the centre within [inner, rim]; of mirrors only.
 std::optional<double> elevation_at(const Camera& camera, double radius_px) {
-  const auto r =
-      within(radius_px, camera.inner_radius_px, camera.rim_radius_px, tolerance_px(camera));
+  const auto r = clamp_with_tolerance(radius_px, camera.inner_radius_px, camera.rim_radius_px,
+                                      tolerance_px(camera));
   if (!r) return std::nullopt;
   return std::visit(
       Overloaded{[&](const EquiangularModel& model) -> std::optional<double> {
@@ -55,7 +56,7 @@ std::optional<double> elevation_at(const Camera& camera, double radius_px) {
       camera.model);
 }
 
-/// Distance from the centre within [inner, rim] at which an elevation is seen; mirror cameras only.
+/// Returns the distance from the centre within [inner, rim] at which a mirror shows an elevation.
 std::optional<double> radius_at(const Camera& camera, double elevation_rad) {
   const double inner_px = camera.inner_radius_px;
   const double rim_px = camera.rim_radius_px;
@@ -73,11 +74,12 @@ std::optional<double> radius_at(const Camera& camera, double elevation_rad) {
                  [&](const auto& model) { return panonav::radius_at(model, elevation_rad); }},
       camera.model);
   if (!r) return std::nullopt;
-  return within(*r, inner_px, rim_px, slack_px);
+  return clamp_with_tolerance(*r, inner_px, rim_px, slack_px);
 }
 
-/// +1 where azimuth runs counter-clockwise in the picture as shown, or rises with u; else -1.
-double turn_sign(const Camera& camera) {
+/// Returns +1 where azimuth runs counter-clockwise in the picture as shown, or rises with u; else
+/// -1.
+double azimuth_sign(const Camera& camera) {
   return camera.direction == ColumnDirection::counter_clockwise ? 1.0 : -1.0;
 }
 
@@ -119,31 +121,32 @@ void validate_dual(const Camera& camera, const DualFisheyeModel& model) {
   }
 }
 
-/// How far right in the lens's picture lies right in the image as shown.
+/// Returns +1 where right in a lens's picture is right in the image as shown, else -1.
 double mirror_sign(const Camera& camera) {
   return camera.direction == ColumnDirection::clockwise ? 1.0 : -1.0;
 }
 
-struct SeenByLens {
+struct LensProjection {
   PixelPoint pixel;
   double margin_rad = 0.0;
 };
-std::optional<SeenByLens> see(const Camera& camera, const DualFisheyeModel& model, int index,
-                              const Direction3& direction) {
+std::optional<LensProjection> project_into_lens(const Camera& camera, const DualFisheyeModel& model,
+                                                int index, const Direction3& direction) {
   const FisheyeLens& lens = model.lenses[index];
   const auto point = project(lens, FisheyeLens::Rotation(lens).lens_from_robot(direction));
   if (!point) return std::nullopt;
-  const auto pixel = within_image(camera, {lens.centre_u_px + mirror_sign(camera) * point->right_px,
-                                           lens.centre_v_px - point->up_px});
+  const auto pixel = clamp_to_image(
+      camera,
+      {lens.centre_u_px + mirror_sign(camera) * point->right_px, lens.centre_v_px - point->up_px});
   if (!pixel || lens_at(camera, *pixel) != index) return std::nullopt;
-  return SeenByLens{*pixel, point->margin_rad};
+  return LensProjection{*pixel, point->margin_rad};
 }
 
-/// The band about the horizon in which no direction of a grid is missing, borders included.
+/// Finds the band about the horizon in which no direction of a grid is missing, borders included.
 ElevationBand visible_elevations_of_lenses(const Camera& camera) {
   constexpr int azimuths = 180;
   constexpr int elevations = 90;
-  const auto all_round = [&](double elevation_rad) {
+  const auto is_seen_all_around = [&](double elevation_rad) {
     for (int i = 0; i < azimuths; ++i) {
       const auto direction =
           Direction3::from_angles(2 * std::numbers::pi * i / azimuths, elevation_rad);
@@ -151,12 +154,13 @@ ElevationBand visible_elevations_of_lenses(const Camera& camera) {
     }
     return true;
   };
-  require(all_round(0), "elevation seen at every azimuth", 0.0,
+  require(is_seen_all_around(0), "elevation seen at every azimuth", 0.0,
           "seen by one of the lenses; max_angle_rad is too small or the frame cuts the circles");
   const double step = std::numbers::pi / 2 / elevations;
   ElevationBand band;
-  for (int i = 1; i <= elevations && all_round(i * step); ++i) band.top_rad = i * step;
-  for (int i = 1; i <= elevations && all_round(-i * step); ++i) band.bottom_rad = -i * step;
+  for (int i = 1; i <= elevations && is_seen_all_around(i * step); ++i) band.top_rad = i * step;
+  for (int i = 1; i <= elevations && is_seen_all_around(-i * step); ++i)
+    band.bottom_rad = -i * step;
   require(band.top_rad > band.bottom_rad, "elevations seen at every azimuth", 0.0, "a band");
   return band;
 }
@@ -196,9 +200,10 @@ std::optional<PixelPoint> project(const Camera& camera, const Direction3& direct
     const double width = camera.image_size.width;
     const double v_px = (model->elevation_top_rad - elevation_rad) /
                         (model->elevation_top_rad - model->elevation_bottom_rad) * height;
-    const auto v = within(v_px, 0, height, tolerance_px(camera));
+    const auto v = clamp_with_tolerance(v_px, 0, height, tolerance_px(camera));
     if (!v) return std::nullopt;
-    double turns = camera.forward_column + turn_sign(camera) * azimuth_rad / (2 * std::numbers::pi);
+    double turns =
+        camera.forward_column + azimuth_sign(camera) * azimuth_rad / (2 * std::numbers::pi);
     turns -= std::floor(turns);
     const double u_px = turns * width;
     return PixelPoint{u_px < width ? u_px : 0.0, *v};
@@ -210,20 +215,21 @@ std::optional<PixelPoint> project(const Camera& camera, const Direction3& direct
   }
   const auto radius_px = radius_at(camera, elevation_rad);
   if (!radius_px) return std::nullopt;
-  const double angle_rad = camera.forward_angle_rad + turn_sign(camera) * azimuth_rad;
-  return within_image(camera, {camera.centre.u_px + *radius_px * std::cos(angle_rad),
-                               camera.centre.v_px - *radius_px * std::sin(angle_rad)});
+  const double angle_rad = camera.forward_angle_rad + azimuth_sign(camera) * azimuth_rad;
+  return clamp_to_image(camera, {camera.centre.u_px + *radius_px * std::cos(angle_rad),
+                                 camera.centre.v_px - *radius_px * std::sin(angle_rad)});
 }
 
 std::optional<Direction3> unproject(const Camera& camera, PixelPoint pixel) {
-  const auto inside = within_image(camera, pixel);
+  const auto inside = clamp_to_image(camera, pixel);
   if (!inside) return std::nullopt;
   if (const auto* model = std::get_if<EquirectangularModel>(&camera.model)) {
     const double t = inside->v_px / camera.image_size.height;
     const double elevation_rad =
         model->elevation_top_rad * (1 - t) + model->elevation_bottom_rad * t;
     const double turns = inside->u_px / camera.image_size.width - camera.forward_column;
-    return Direction3::from_angles(turn_sign(camera) * turns * 2 * std::numbers::pi, elevation_rad);
+    return Direction3::from_angles(azimuth_sign(camera) * turns * 2 * std::numbers::pi,
+                                   elevation_rad);
   }
   if (const auto* model = std::get_if<DualFisheyeModel>(&camera.model)) {
     const FisheyeLens& lens = model->lenses[static_cast<std::size_t>(lens_at(camera, *inside))];
@@ -237,7 +243,7 @@ std::optional<Direction3> unproject(const Camera& camera, PixelPoint pixel) {
   const auto elevation_rad = elevation_at(camera, std::hypot(right_px, up_px));
   if (!elevation_rad) return std::nullopt;
   const double angle_rad = std::atan2(up_px, right_px);
-  return Direction3::from_angles(turn_sign(camera) * (angle_rad - camera.forward_angle_rad),
+  return Direction3::from_angles(azimuth_sign(camera) * (angle_rad - camera.forward_angle_rad),
                                  *elevation_rad);
 }
 
@@ -252,8 +258,8 @@ std::array<std::optional<Camera::WeightedPixel>, 2> project_all(const Camera& ca
   }
   const double length = std::hypot(direction.x, direction.y, direction.z);
   if (!std::isfinite(length) || length == 0) return result;
-  const auto first = see(camera, *model, 0, direction);
-  const auto second = see(camera, *model, 1, direction);
+  const auto first = project_into_lens(camera, *model, 0, direction);
+  const auto second = project_into_lens(camera, *model, 1, direction);
   const double share = !second  ? 1.0
                        : !first ? 0.0
                                 : blend_share(first->margin_rad, second->margin_rad);

@@ -33,7 +33,7 @@ struct EquirectangularModel {
 using CameraModel = std::variant<HyperboloidalModel, PolynomialModel, UnifiedModel,
                                  EquiangularModel, EquirectangularModel, DualFisheyeModel>;
 
-/// Which way azimuths run in a picture; what counts as its columns, see `Camera::direction`.
+/// Sense in which azimuths run in a picture; for its columns, see `Camera::direction`.
 enum class ColumnDirection {
   clockwise,         ///< azimuths grow against the columns or the image angle
   counter_clockwise  ///< azimuths grow with them
@@ -55,11 +55,12 @@ struct Camera {
   PixelPoint centre;             ///< inside the image
   double rim_radius_px = 0.0;    ///< nothing is seen beyond
   double inner_radius_px = 0.0;  ///< nothing is seen within (the camera's own reflection)
-  /// How azimuth runs in the picture as it is shown (u right, v down). Equirectangular: clockwise
-  /// means that the columns, left to right, follow a turn to the right seen from above. A camera
-  /// that looks up, at a mirror or through a fisheye lens, sees the world from below: clockwise,
-  /// unless its driver mirrors the picture. So do most 360 degree pictures. Dual fisheye: clockwise
-  /// means that right in a lens's picture is right in the world, and not mirrored.
+  /// Sense in which azimuth runs in the picture as it is shown (u right, v down). Equirectangular:
+  /// clockwise means that the columns, left to right, follow a turn to the right seen from above. A
+  /// camera that looks up, at a mirror or through a fisheye lens, sees the world from below:
+  /// clockwise, unless its driver mirrors the picture. So do most 360 degree pictures. Dual
+  /// fisheye: clockwise means that right in a lens's picture is right in the world, and not
+  /// mirrored.
   ColumnDirection direction = ColumnDirection::clockwise;
   /// Mirror: image angle of the robot's forward direction, counter-clockwise as shown, from +u.
   double forward_angle_rad = 0.0;
@@ -72,47 +73,50 @@ struct Camera {
 /// Throws ContractError that names the field, its value and its range.
 void validate(const Camera& camera);
 
-/// Where a direction in the robot frame is seen; empty where the camera does not see it: outside
-/// the image, outside inner radius to rim, outside the model's domain, or for a direction without
+/// Projects a direction in the robot frame; nullopt where the camera does not see it: outside the
+/// image, outside inner radius to rim, outside the model's domain, or for a direction without
 /// length or with values that are not finite. Borders belong to the domain; rounding up to 1e-9 of
 /// the image's size beyond them is forgiven and clamped. u of an equirectangular picture is in [0,
 /// width). Cost: some ten arithmetic and four trigonometric operations; polynomials ten evaluations
 /// more.
 [[nodiscard]] std::optional<PixelPoint> project(const Camera& camera, const Direction3& direction);
 
-/// The unit direction that a point of the image shows; empty outside the same domain.
+/// Returns the unit direction that a point of the image shows; nullopt outside the same domain.
 [[nodiscard]] std::optional<Direction3> unproject(const Camera& camera, PixelPoint pixel);
 
-/// As `project`, for each lens: two of a dual fisheye camera, in order, one of any other (the
-/// second is empty). `project` gives the one that counts most. See `blend_share`.
+/// Projects into each lens: two of a dual fisheye camera, in order, one of any other (the second is
+/// empty). `project` returns the one of the larger weight. See `blend_share`.
 [[nodiscard]] std::array<std::optional<Camera::WeightedPixel>, 2> project_all(
     const Camera& camera, const Direction3& direction);
-/// 2 for a dual fisheye camera, 1 for any other.
+/// Number of lenses: 2 of a dual fisheye camera, 1 of any other.
 [[nodiscard]] inline int lens_count(const Camera& camera) {
   return std::holds_alternative<DualFisheyeModel>(camera.model) ? 2 : 1;
 }
-/// The lens of a dual fisheye camera in whose half of the picture a point lies; 0 of any other.
+/// Index of the lens of a dual fisheye camera in whose half of the picture a point lies; 0 of any
+/// other camera.
 [[nodiscard]] inline int lens_at(const Camera& camera, PixelPoint pixel) {
   return lens_count(camera) == 2 && pixel.u_px >= 0.5 * camera.image_size.width ? 1 : 0;
 }
 
-/// What a mirror or a lens covers of the picture.
+/// The part of the picture that a mirror or a lens covers.
 struct ImageCircle {
   PixelPoint centre;             ///< in the picture
   double inner_radius_px = 0.0;  ///< nothing is seen within; 0 for a lens
   double rim_radius_px = 0.0;    ///< nothing is seen beyond
 };
-/// Of the mirror, or of that lens of a dual fisheye camera. Of an equirectangular one: all zero.
+/// Returns the circle of the mirror, or of that lens of a dual fisheye camera; all zero for an
+/// equirectangular one.
 [[nodiscard]] ImageCircle image_circle(const Camera& camera, int lens);
 
-/// Lowest and highest elevation that is seen at every azimuth, in radians.
+/// A band of elevations, in radians.
 struct ElevationBand {
   double bottom_rad = 0.0;  ///< lowest, in [-pi/2, pi/2]
   double top_rad = 0.0;     ///< highest, above `bottom_rad`
   friend bool operator==(const ElevationBand&, const ElevationBand&) = default;
 };
-/// Where the frame cuts the mirror, the band ends where the cut begins. Of a dual fisheye camera:
-/// the band about the horizon, to a degree (its lenses see the whole sphere where nothing is cut).
+/// Finds the band that is seen at every azimuth. Where the frame cuts the mirror, the band ends
+/// where the cut begins. Of a dual fisheye camera: the band about the horizon, to a degree (its
+/// lenses see the whole sphere where nothing is cut).
 /// Throws ContractError when no elevation is seen at every azimuth (the frame cuts even the inner
 /// radius, or lenses leave a gap at the horizon).
 [[nodiscard]] ElevationBand visible_elevations(const Camera& camera);

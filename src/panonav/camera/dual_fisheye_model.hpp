@@ -17,9 +17,9 @@ struct FisheyeLens {
    public:
     /// Computes the rotation once, for many directions.
     explicit Rotation(const FisheyeLens& lens);
-    /// A direction of the lens frame in the robot frame.
+    /// Rotates a direction of the lens frame into the robot frame.
     [[nodiscard]] Direction3 robot_from_lens(const Direction3& d) const;
-    /// A direction of the robot frame in the lens frame.
+    /// Rotates a direction of the robot frame into the lens frame.
     [[nodiscard]] Direction3 lens_from_robot(const Direction3& d) const;
 
    private:
@@ -30,7 +30,7 @@ struct FisheyeLens {
   struct Point {
     double right_px = 0.0;  ///< from the lens's centre
     double up_px = 0.0;     ///< from the lens's centre, against v
-    /// How far within the lens's field of view, > 0; 0 on its border.
+    /// Angle to the border of the lens's field of view, > 0 within; 0 on it.
     double margin_rad = 0.0;
   };
 
@@ -41,7 +41,7 @@ struct FisheyeLens {
   double k5 = 0.0;                 ///< radial distortion of fifth order, without unit
   /// Half of the field of view: nothing is seen beyond. In (0, pi].
   double max_angle_rad = 1.6580627893946132;
-  /// Where the optical axis points in the robot frame.
+  /// Azimuth of the optical axis in the robot frame.
   double azimuth_rad = 0.0;
   double elevation_rad = 0.0;  ///< of the optical axis, above the horizon
   /// The turn of lens and sensor about the viewing direction, right-handed: the picture shows what
@@ -68,13 +68,13 @@ void validate(const DualFisheyeModel& model);
 
 /// Distance from the lens's centre at which `angle_rad` from its axis is seen.
 [[nodiscard]] double radius_at(const FisheyeLens& lens, double angle_rad);
-/// The inverse of it, for a radius within 0 .. radius_at(lens, max_angle_rad), by Newton steps.
+/// Inverts `radius_at`, for a radius within 0 .. radius_at(lens, max_angle_rad), by Newton steps.
 [[nodiscard]] double angle_at(const FisheyeLens& lens, double radius_px);
 
-/// `in_lens` in the lens frame, of any length but 0. Empty beyond the field of view.
+/// Projects a direction of the lens frame, of any length but 0; nullopt beyond the field of view.
 [[nodiscard]] std::optional<FisheyeLens::Point> project(const FisheyeLens& lens,
                                                         const Direction3& in_lens);
-/// The unit direction in the lens frame; empty beyond the field of view.
+/// Returns the unit direction in the lens frame; nullopt beyond the field of view.
 [[nodiscard]] std::optional<Direction3> unproject(const FisheyeLens& lens, double right_px,
                                                   double up_px);
 

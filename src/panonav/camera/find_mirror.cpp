@@ -47,8 +47,8 @@ constexpr double max_disc_offset = 0.02;
 /// often as dark as the disc, which leaves gaps in its edge.
 constexpr double min_disc_quality = 0.5, min_plain_disc_quality = 0.3;
 
-/// What one search needs of one or several images.
-struct Evidence {
+/// Edge fields of one or several images at both resolutions of the search.
+struct SearchFields {
   EdgeField middle;
   EdgeField coarse;
   int middle_reduction = 1;
@@ -59,16 +59,16 @@ int reduction_to(int side_px, int target_px) {
   return std::max(1, (side_px + target_px - 1) / target_px);
 }
 
-EdgeField middle_field(const ImageView& image) {
+EdgeField make_middle_field(const ImageView& image) {
   const int longest = std::max(image.width, image.height);
   return edge_field(smooth_planes(image, reduction_to(longest, middle_side_px), 1.0));
 }
 
-Evidence evidence(EdgeField middle, const ImageSize& size) {
-  Evidence result;
+SearchFields make_search_fields(EdgeField middle, const ImageSize& size) {
+  SearchFields result;
   result.middle_reduction = reduction_to(std::max(size.width, size.height), middle_side_px);
   result.coarse_reduction = reduction_to(std::max(middle.width, middle.height), coarse_side_px);
-  result.coarse = reduced(middle, result.coarse_reduction);
+  result.coarse = reduce(middle, result.coarse_reduction);
   result.middle = std::move(middle);
   return result;
 }
@@ -77,29 +77,29 @@ double distance_px(const PixelPoint& a, const PixelPoint& b) {
   return std::hypot(a.u_px - b.u_px, a.v_px - b.v_px);
 }
 
-FieldCircle scaled(const FieldCircle& circle, double factor) {
+FieldCircle scale(const FieldCircle& circle, double factor) {
   return {circle.u * factor, circle.v * factor, circle.radius * factor};
 }
 
-CircleRange scaled(const CircleRange& range, double factor) {
+CircleRange scale(const CircleRange& range, double factor) {
   return {range.lowest_radius * factor, range.highest_radius * factor, range.visible_fraction,
           range.evenness};
 }
 
-/// A circle of the middle field, fitted to the edges in the image's pixels.
-std::optional<MirrorCircle::Circle> refined(const Evidence& seen,
-                                            std::span<const SmoothPlanes> planes,
-                                            const FieldCircle& on_middle) {
-  const auto fit = fit_circle(planes, scaled(on_middle, seen.middle_reduction));
+/// Fits a circle of the middle field to the edges in the image's pixels.
+std::optional<MirrorCircle::Circle> refine_circle(const SearchFields& seen,
+                                                  std::span<const SmoothPlanes> planes,
+                                                  const FieldCircle& on_middle) {
+  const auto fit = fit_circle(planes, scale(on_middle, seen.middle_reduction));
   if (!fit) return std::nullopt;
   return MirrorCircle::Circle{
       {fit->circle.u, fit->circle.v}, fit->circle.radius, fit->support, fit->residual};
 }
 
-/// Part of the samples along the circles between two radii where the grey changes by an edge's
-/// slope: how much is to be seen there.
-double structure(std::span<const SmoothPlanes> images, const PixelPoint& centre, double from_px,
-                 double to_px) {
+/// Measures the structure between two radii: the part of the samples along the circles there at
+/// which the grey changes by an edge's slope.
+double measure_structure(std::span<const SmoothPlanes> images, const PixelPoint& centre,
+                         double from_px, double to_px) {
   std::size_t steep = 0;
   std::size_t count = 0;
   for (const SmoothPlanes& image : images) {
@@ -132,9 +132,9 @@ double structure(std::span<const SmoothPlanes> images, const PixelPoint& centre,
   return count == 0 ? 0.0 : static_cast<double>(steep) / static_cast<double>(count);
 }
 
-/// Of circles about one centre, ascending, the one where the mirrored scene ends.
-std::size_t rim_among(const std::vector<MirrorCircle::Circle>& circles,
-                      std::span<const SmoothPlanes> planes) {
+/// Chooses, of circles about one centre, ascending, the one where the mirrored scene ends.
+std::size_t choose_rim(const std::vector<MirrorCircle::Circle>& circles,
+                       std::span<const SmoothPlanes> planes) {
   std::size_t rim = circles.size() - 1;
   for (std::size_t inner = rim; inner-- > 0;) {
     const double outer_px = circles[rim].radius_px;
@@ -143,18 +143,19 @@ std::size_t rim_among(const std::vector<MirrorCircle::Circle>& circles,
     // Blur of the two edges; a thin ring has less to spare.
     const double margin_px = std::min(std::max(2.0, 0.02 * outer_px), 0.35 * (outer_px - inner_px));
     const double ring =
-        structure(planes, circles[rim].centre, inner_px + margin_px, outer_px - margin_px);
+        measure_structure(planes, circles[rim].centre, inner_px + margin_px, outer_px - margin_px);
     const double scene =
-        structure(planes, circles[inner].centre, 0.5 * inner_px, inner_px - margin_px);
+        measure_structure(planes, circles[inner].centre, 0.5 * inner_px, inner_px - margin_px);
     if (ring < max_ring_structure * scene) rim = inner;
   }
   return rim;
 }
 
-/// Radius about the rim's centre that covers the dark disc or the camera's reflection in the
-/// middle.
-std::optional<double> disc_within(const Evidence& seen, std::span<const SmoothPlanes> planes,
-                                  const MirrorCircle::Circle& rim) {
+/// Finds the radius about the rim's centre that covers the dark disc or the camera's reflection in
+/// the middle.
+std::optional<double> find_disc_radius(const SearchFields& seen,
+                                       std::span<const SmoothPlanes> planes,
+                                       const MirrorCircle::Circle& rim) {
   const double rim_radius = rim.radius_px / seen.middle_reduction;
   CircleRange range;
   range.lowest_radius = std::max(3.0, min_disc_radius * rim_radius);
@@ -172,13 +173,13 @@ std::optional<double> disc_within(const Evidence& seen, std::span<const SmoothPl
   double best_quality = 0;
   for (const FieldCircle& candidate : concentric_candidates(
            seen.middle, centre.u_px, centre.v_px, reach_px / seen.middle_reduction, range, 1.0)) {
-    const auto found = refined(seen, planes, climb(seen.middle, candidate, range));
+    const auto found = refine_circle(seen, planes, climb_to_maximum(seen.middle, candidate, range));
     if (!found || found->radius_px > max_disc_radius * rim.radius_px) continue;
     const double off_px = distance_px(found->centre, rim.centre);
     if (off_px > reach_px) continue;
-    const double inside = structure(planes, found->centre, 0.0, 0.9 * found->radius_px);
+    const double inside = measure_structure(planes, found->centre, 0.0, 0.9 * found->radius_px);
     const double outside =
-        structure(planes, rim.centre, 1.1 * found->radius_px, 0.95 * rim.radius_px);
+        measure_structure(planes, rim.centre, 1.1 * found->radius_px, 0.95 * rim.radius_px);
     const double needed =
         inside < max_ring_structure * outside ? min_plain_disc_quality : min_disc_quality;
     if (found->quality < needed) continue;
@@ -196,19 +197,20 @@ std::optional<double> disc_within(const Evidence& seen, std::span<const SmoothPl
   return radius_px;
 }
 
-/// The circles of the middle field with the most edge on them, different from each other, best
-/// first.
-std::vector<FieldCircle> best_circles(const Evidence& seen, const CircleRange& range) {
+/// Finds the circles of the middle field with the strongest edges on them, different from each
+/// other, best first.
+std::vector<FieldCircle> find_best_circles(const SearchFields& seen, const CircleRange& range) {
   struct Scored {
     double merit;
     FieldCircle circle;
   };
   std::vector<Scored> climbed;
-  for (const FieldCircle& candidate : circle_candidates(
-           seen.coarse, scaled(range, 1.0 / seen.coarse_reduction), climbed_circles)) {
-    const FieldCircle circle = climb(seen.middle, scaled(candidate, seen.coarse_reduction), range);
+  for (const FieldCircle& candidate :
+       circle_candidates(seen.coarse, scale(range, 1.0 / seen.coarse_reduction), climbed_circles)) {
+    const FieldCircle circle =
+        climb_to_maximum(seen.middle, scale(candidate, seen.coarse_reduction), range);
     if (circle.radius < range.lowest_radius || circle.radius > range.highest_radius) continue;
-    const CircleScore found = score(seen.middle, circle, range.evenness);
+    const CircleScore found = score_circle(seen.middle, circle, range.evenness);
     if (found.visible < range.visible_fraction) continue;
     climbed.push_back({found.quality * std::sqrt(found.visible), circle});
   }
@@ -232,8 +234,9 @@ struct Search {
   std::optional<double> inner_radius_px;
 };
 
-std::optional<Search> search(const Evidence& seen, std::span<const SmoothPlanes> planes,
-                             const ImageSize& size, const MirrorCircle::SearchOptions& options) {
+std::optional<Search> search_mirror(const SearchFields& seen, std::span<const SmoothPlanes> planes,
+                                    const ImageSize& size,
+                                    const MirrorCircle::SearchOptions& options) {
   CircleRange range;
   range.lowest_radius = options.min_rim * std::min(size.width, size.height) / seen.middle_reduction;
   range.highest_radius =
@@ -243,11 +246,11 @@ std::optional<Search> search(const Evidence& seen, std::span<const SmoothPlanes>
   std::optional<MirrorCircle::Circle> clearest;
   double clearest_merit = 0;
   FieldCircle start;
-  for (const FieldCircle& circle : best_circles(seen, range)) {
-    const auto found = refined(seen, planes, circle);
+  for (const FieldCircle& circle : find_best_circles(seen, range)) {
+    const auto found = refine_circle(seen, planes, circle);
     if (!found || found->quality < options.min_quality) continue;
     const double merit =
-        found->quality * std::sqrt(score(seen.middle, circle, range.evenness).visible);
+        found->quality * std::sqrt(score_circle(seen.middle, circle, range.evenness).visible);
     if (merit > clearest_merit) {
       clearest_merit = merit;
       clearest = found;
@@ -259,7 +262,7 @@ std::optional<Search> search(const Evidence& seen, std::span<const SmoothPlanes>
   std::vector<MirrorCircle::Circle> circles{*clearest};
   for (const FieldCircle& candidate : concentric_candidates(
            seen.middle, start.u, start.v, max_centre_distance * start.radius, range, 2.0)) {
-    const auto found = refined(seen, planes, climb(seen.middle, candidate, range));
+    const auto found = refine_circle(seen, planes, climb_to_maximum(seen.middle, candidate, range));
     if (!found || found->quality < min_relative_quality * clearest->quality ||
         (found->radius_px > clearest->radius_px && found->quality < options.min_quality) ||
         distance_px(found->centre, clearest->centre) > max_centre_distance * found->radius_px) {
@@ -275,9 +278,9 @@ std::optional<Search> search(const Evidence& seen, std::span<const SmoothPlanes>
               return a.radius_px < b.radius_px;
             });
   Search result;
-  result.rim = circles[rim_among(circles, planes)];
+  result.rim = circles[choose_rim(circles, planes)];
 
-  result.inner_radius_px = disc_within(seen, planes, result.rim);
+  result.inner_radius_px = find_disc_radius(seen, planes, result.rim);
   return result;
 }
 
@@ -316,18 +319,19 @@ std::optional<MirrorCircle> find_mirror(std::span<const ImageView> images,
   std::vector<EdgeField> fields;
   for (const ImageView& image : images) {
     planes.push_back(smooth_planes(image, 1, 1.0));
-    fields.push_back(middle_field(image));
+    fields.push_back(make_middle_field(image));
   }
   MirrorCircle mirror;
   mirror.image_size = size;
-  const auto all = search(evidence(mean_field(fields), size), planes, size, options);
+  const auto all =
+      search_mirror(make_search_fields(mean_field(fields), size), planes, size, options);
   if (!all) return std::nullopt;
   if (images.size() == 1) {
     mirror.rim_per_image.emplace_back(all->rim);
   } else {
     for (std::size_t i = 0; i < images.size(); ++i) {
-      const auto one =
-          search(evidence(fields[i], size), std::span(planes).subspan(i, 1), size, options);
+      const auto one = search_mirror(make_search_fields(fields[i], size),
+                                     std::span(planes).subspan(i, 1), size, options);
       mirror.rim_per_image.push_back(one ? std::optional(one->rim) : std::nullopt);
     }
   }

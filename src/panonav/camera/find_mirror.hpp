@@ -10,9 +10,10 @@
 
 namespace panonav {
 
-/// What `find_mirror` found. Invariant: rim_radius_px > 0; inner_radius_px, if any, is below it.
+/// The mirror that `find_mirror` found. Invariant: rim_radius_px > 0; inner_radius_px, if any, is
+/// below it.
 struct MirrorCircle {
-  /// Which circles `find_mirror` takes for a rim.
+  /// Bounds of the circles that `find_mirror` takes for a rim.
   struct SearchOptions {
     double min_rim = 0.2;           ///< smallest rim radius, in shorter sides of the image; (0, 2]
     double max_rim = 0.75;          ///< largest rim radius, in longer sides of the image; (0, 2]
@@ -21,7 +22,7 @@ struct MirrorCircle {
     friend bool operator==(const SearchOptions&, const SearchOptions&) = default;
   };
 
-  /// How far the per-image rims agree: standard deviation over the images that show the rim.
+  /// Agreement of the per-image rims: standard deviations over the images that show the rim.
   struct Agreement {
     int images = 0;              ///< that show the rim on their own
     double centre_u_px = 0.0;    ///< of the centre's column
@@ -59,20 +60,16 @@ struct MirrorCircle {
 void visit_options(MirrorCircle::SearchOptions& options, OptionVisitor& visitor);
 
 /// Finds the mirror in one or several raw images of one camera: circles along which edges run, over
-/// all centres inside the image and all radii, refined to a fraction of a pixel by a robust fit.
-/// Several images count together, so that what moves averages out and rim and camera remain. Of
-/// several circles about one centre the rim is the largest that has the scene's structure just
-/// inside: a plain ring around the mirror (its holder) does not belong to it. Empty when no circle
-/// reaches `min_quality`.
-/// Limits: other round things that fill the picture are taken for a mirror, no picture can tell
-/// them apart; in surroundings as patterned as the scene a mirror may be missed; a ring whose inner
-/// edge hardly differs from the scene counts as part of the mirror.
-/// Throws ContractError when there is no image, sizes differ, or a side is shorter than 32 px;
-/// OptionError. Cost: about 0.4 s for each image of 640 x 480.
+/// all centres and radii, refined to a fraction of a pixel by a robust fit. In several images what
+/// moves averages out. A plain ring around the mirror does not belong to it. nullopt when no circle
+/// reaches `min_quality`. Limits: other round things that fill the picture are taken for a mirror;
+/// a mirror in patterned surroundings may be missed; a ring hardly different from the scene counts
+/// as mirror. Throws ContractError when there is no image, sizes differ, or a side is
+/// shorter than 32 px; OptionError. Cost: about 0.4 s for each image of 640 x 480.
 [[nodiscard]] std::optional<MirrorCircle> find_mirror(
     std::span<const ImageView> images, const MirrorCircle::SearchOptions& options = {});
 
-/// Empty with fewer than two such images.
+/// Compares the rims of single images; nullopt with fewer than two that show one.
 [[nodiscard]] std::optional<MirrorCircle::Agreement> agreement(const MirrorCircle& mirror);
 
 }  // namespace panonav

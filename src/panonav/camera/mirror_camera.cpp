@@ -10,7 +10,7 @@ namespace {
 
 /// Distances from the centre are proportional to the focal length in both models.
 template <class Model>
-Model scaled_to(Model model, double radius_px, double elevation_rad) {
+Model scale_focal_length(Model model, double radius_px, double elevation_rad) {
   validate(model);
   const auto seen_at_px = radius_at(model, elevation_rad);
   require(seen_at_px.has_value() && *seen_at_px > 0, "elevation_rad", elevation_rad,
@@ -39,13 +39,13 @@ Camera camera_from_mirror(const MirrorCircle& mirror, const MirrorKnowledge& kno
   return camera;
 }
 
-HyperboloidalModel with_elevation_at(HyperboloidalModel model, double radius_px,
-                                     double elevation_rad) {
-  return scaled_to(model, radius_px, elevation_rad);
+HyperboloidalModel fit_focal_length(HyperboloidalModel model, double radius_px,
+                                    double elevation_rad) {
+  return scale_focal_length(model, radius_px, elevation_rad);
 }
 
-UnifiedModel with_elevation_at(UnifiedModel model, double radius_px, double elevation_rad) {
-  return scaled_to(model, radius_px, elevation_rad);
+UnifiedModel fit_focal_length(UnifiedModel model, double radius_px, double elevation_rad) {
+  return scale_focal_length(model, radius_px, elevation_rad);
 }
 
 namespace {

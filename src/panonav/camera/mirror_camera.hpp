@@ -8,7 +8,7 @@
 
 namespace panonav {
 
-/// What a user knows of a mirror camera beyond its picture.
+/// Knowledge of a mirror camera beyond its picture.
 struct MirrorKnowledge {
   /// Any but EquirectangularModel. When the mirror's shape is unknown: EquiangularModel with the
   /// elevations seen at the inner radius and at the rim.
@@ -19,21 +19,21 @@ struct MirrorKnowledge {
   double forward_angle_rad = 0.0;                          ///< see Camera
 };
 
-/// The camera of a mirror found in an image. Where no inner radius is known or found it is 0.
+/// Makes the camera of a mirror found in an image. Where no inner radius is known or found it is 0.
 /// Throws ContractError when model and circle do not fit together, see validate(const Camera&).
 [[nodiscard]] Camera camera_from_mirror(const MirrorCircle& mirror,
                                         const MirrorKnowledge& knowledge);
 
-/// The same mirror with the focal length with which `elevation_rad` is seen `radius_px` from the
-/// centre: how a focal length follows from the rim when the elevation at the mirror's edge is
-/// known. Throws ContractError unless the model sees that elevation and radius_px > 0.
-[[nodiscard]] HyperboloidalModel with_elevation_at(HyperboloidalModel model, double radius_px,
-                                                   double elevation_rad);
+/// Fits the focal length so that `elevation_rad` is seen `radius_px` from the centre, as on the rim
+/// of a mirror whose edge shows a known elevation. Throws ContractError unless the model sees that
+/// elevation and radius_px > 0.
+[[nodiscard]] HyperboloidalModel fit_focal_length(HyperboloidalModel model, double radius_px,
+                                                  double elevation_rad);
 /// The same for a unified model. Throws as above.
-[[nodiscard]] UnifiedModel with_elevation_at(UnifiedModel model, double radius_px,
-                                             double elevation_rad);
+[[nodiscard]] UnifiedModel fit_focal_length(UnifiedModel model, double radius_px,
+                                            double elevation_rad);
 
-/// A colour copy of the image for a person to check: the rim in green, the inner radius in orange
+/// Draws what was found on a colour copy of the image: the rim in green, the inner radius in orange
 /// (where found), the centre as a red cross, and from inner radius to rim a yellow line in the
 /// robot's forward direction where it is given (image angle, counter-clockwise as shown, from +u).
 /// Throws ContractError when the image's size is not the mirror's.

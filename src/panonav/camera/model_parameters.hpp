@@ -21,13 +21,13 @@ inline constexpr std::array<std::string_view, std::variant_size_v<CameraModel>> 
 /// the parameters.
 inline constexpr std::array<std::string_view, 2> view_axis_names{"down", "up"};
 
-/// What files call the camera's model: one of `camera_model_names`.
+/// Returns the model's name in files: one of `camera_model_names`.
 [[nodiscard]] inline std::string_view model_name(const CameraModel& model) {
   return camera_model_names[model.index()];
 }
 
-/// The model of that name with default parameters; empty when there is none.
-[[nodiscard]] inline std::optional<CameraModel> model_of_name(std::string_view name) {
+/// Makes the model of that name with default parameters; nullopt when there is none.
+[[nodiscard]] inline std::optional<CameraModel> make_default_model(std::string_view name) {
   std::optional<CameraModel> found;
   [&]<std::size_t... i>(std::index_sequence<i...>) {
     ((camera_model_names[i] == name ? void(found.emplace(std::in_place_index<i>)) : void()), ...);

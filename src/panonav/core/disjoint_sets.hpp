@@ -16,20 +16,20 @@ class DisjointSets {
     std::iota(parent_.begin(), parent_.end(), std::size_t{0});
   }
 
-  /// The smallest member of the set of `i`, which must be below `size`; shortens the paths on its
-  /// way.
+  /// Returns the smallest member of the set of `i`, which must be below `size`; shortens the paths
+  /// that it follows.
   [[nodiscard]] std::size_t find(std::size_t i) {
     while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
     return i;
   }
-  /// False when they were one set before.
+  /// Joins two sets; false when they were one set before.
   bool join(std::size_t a, std::size_t b) {
     a = find(a);
     b = find(b);
     parent_[std::max(a, b)] = std::min(a, b);
     return a != b;
   }
-  /// The set of each member, numbered from 0 in the order of their smallest members.
+  /// Returns the number of each member's set, from 0 in the order of their smallest members.
   [[nodiscard]] std::vector<std::size_t> number_sets() {
     std::vector<std::size_t> number(parent_.size());
     std::size_t next = 0;

@@ -53,7 +53,7 @@ class Image {
   /// The same, to be written.
   [[nodiscard]] std::span<std::uint8_t> pixels() & noexcept { return pixels_; }
   std::span<const std::uint8_t> pixels() const&& = delete;  // would dangle
-  /// The pixels as functions take them; valid as long as the image lives and is not assigned to.
+  /// Returns a view of the pixels; valid as long as the image lives and is not assigned to.
   [[nodiscard]] ImageView view() const& noexcept;
   ImageView view() const&& = delete;  // would dangle
 
@@ -76,7 +76,8 @@ class Image {
   std::vector<std::uint8_t> pixels_;
 };
 
-/// One grey channel; colour is weighed as ITU-R BT.601 does (0.299 R + 0.587 G + 0.114 B).
+/// Converts to one grey channel; colour is weighed as ITU-R BT.601 does (0.299 R + 0.587 G + 0.114
+/// B).
 [[nodiscard]] Image to_grey(ImageView image);
 
 }  // namespace panonav

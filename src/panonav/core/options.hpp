@@ -50,7 +50,7 @@ class OptionVisitor {
                      int& value) = 0;
 };
 
-/// The allowed range in words: ">= 1 and <= 20".
+/// Describes the allowed range: ">= 1 and <= 20".
 [[nodiscard]] std::string describe_range(const OptionInfo& info);
 
 /// Describes a value that is out of its range or not a number; nullopt when it is valid.
@@ -79,7 +79,7 @@ struct AnyMember {
   operator Value() const;  // NOLINT: asked for, never called
 };
 
-/// How many members the aggregate has: the most that braces can initialise.
+/// Number of members of the aggregate: the largest number that braces can initialise.
 template <class Options, class... Members>
 consteval std::size_t member_count() {
   if constexpr (requires { Options{Members{}..., AnyMember{}}; }) {

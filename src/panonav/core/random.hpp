@@ -16,16 +16,16 @@ class Random {
   Random(std::uint64_t seed, std::uint64_t stream);
 
   std::uint64_t next();  ///< 64 random bits.
-  /// [0, 1).
+  /// Uniform in [0, 1).
   double uniform();
-  /// [low, high).
+  /// Uniform in [low, high).
   double uniform(double low, double high);
-  /// 0 .. count - 1 without bias; count >= 1.
+  /// Uniform index 0 .. count - 1, without bias; count >= 1.
   std::uint64_t index(std::uint64_t count);
   /// Normal distribution of mean 0 and standard deviation 1.
   double normal();
-  /// Two independent ones to 24 bits, at a third of the price: one number of the generator, and no
-  /// value beyond 6.7 deviations.
+  /// Two independent standard normal values to 24 bits from one number of the generator, at a third
+  /// of the cost; none is beyond 6.7 deviations.
   std::pair<double, double> normal_pair();
   /// Normal distribution of this mean and standard deviation (>= 0), in the unit of both.
   double normal(double mean, double standard_deviation);

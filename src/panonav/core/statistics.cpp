@@ -40,10 +40,10 @@ double mean(std::span<const double> values) {
 double order_statistic(std::vector<double> values, double fraction) {
   require(!values.empty(), "number of values", 0.0, ">= 1");
   require(fraction >= 0.0 && fraction <= 1.0, "fraction", fraction, "0 .. 1");
-  const auto place = values.begin() +
-                     static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), place, values.end());
-  return *place;
+  const auto position = values.begin() + static_cast<std::ptrdiff_t>(
+                                             fraction * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), position, values.end());
+  return *position;
 }
 
 }  // namespace panonav

@@ -25,14 +25,14 @@ template <typename Value>
   return *middle;
 }
 
-/// The same of a copy.
+/// The upper median of a copy.
 template <typename Value>
 [[nodiscard]] Value upper_median(std::vector<Value> values) {
   return upper_median_in_place(std::span(values));
 }
 
-/// The value of `values` that stands at `fraction` (0 .. 1) of the way through them in ascending
-/// order, rounded down: one of them, where `quantile` interpolates. Throws ContractError on no
+/// The value at `fraction` (0 .. 1) of the ascending order, its position rounded down: one of the
+/// values, where `quantile` interpolates. Throws ContractError on no
 /// values. Cost: O(n).
 [[nodiscard]] double order_statistic(std::vector<double> values, double fraction);
 

@@ -25,13 +25,13 @@ std::string random_digits() {
   return text;
 }
 
-int create(const fs::path& path) {
+int create_exclusively(const fs::path& path) {
   return ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
 }
 
 // The lock is held by nobody else, and the file still has the name: a process that is done gives
 // its file another one before it unlocks it.
-bool lock(int descriptor, const fs::path& path) {
+bool lock_if_current(int descriptor, const fs::path& path) {
   struct stat file {};
   struct stat named {};
   return ::flock(descriptor, LOCK_EX | LOCK_NB) == 0 && ::fstat(descriptor, &file) == 0 &&
@@ -39,10 +39,10 @@ bool lock(int descriptor, const fs::path& path) {
          file.st_dev == named.st_dev && S_ISREG(file.st_mode) && file.st_uid == ::geteuid();
 }
 
-void remove_if_left(const fs::path& path) {
+void remove_if_abandoned(const fs::path& path) {
   const int descriptor = ::open(path.c_str(), O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
   if (descriptor < 0) return;
-  if (lock(descriptor, path)) ::unlink(path.c_str());
+  if (lock_if_current(descriptor, path)) ::unlink(path.c_str());
   ::close(descriptor);
 }
 
@@ -53,16 +53,16 @@ TemporaryFile::TemporaryFile(const fs::path& target) {
   constexpr std::size_t max_name_bytes = 200;
   const std::string stem = "." + target.filename().string().substr(0, max_name_bytes) + ".";
   path_ = target.parent_path() / (stem + "tmp");
-  descriptor_ = create(path_);
+  descriptor_ = create_exclusively(path_);
   if (descriptor_ < 0 && errno == EEXIST) {
-    remove_if_left(path_);
-    descriptor_ = create(path_);
+    remove_if_abandoned(path_);
+    descriptor_ = create_exclusively(path_);
   }
-  if (descriptor_ >= 0 && lock(descriptor_, path_)) return;
+  if (descriptor_ >= 0 && lock_if_current(descriptor_, path_)) return;
   // In use, or on a file system without locks.
   if (descriptor_ >= 0) ::close(descriptor_);
   path_ = target.parent_path() / (stem + random_digits() + ".tmp");
-  descriptor_ = create(path_);
+  descriptor_ = create_exclusively(path_);
   if (descriptor_ < 0) {
     throw FileError(target.string(),
                     "cannot be written: " + std::generic_category().message(errno));

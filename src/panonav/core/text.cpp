@@ -12,12 +12,12 @@ namespace panonav {
 
 namespace {
 
-bool continues(char c) {
+bool is_continuation_byte(char c) {
   return (static_cast<unsigned char>(c) & 0xC0U) == 0x80U;
 }
 
 // Bytes of the UTF-8 character at the beginning of the text; 0 where there is none.
-std::size_t character_size(std::string_view text) {
+std::size_t utf8_character_size(std::string_view text) {
   const auto first = static_cast<unsigned char>(text.front());
   if (first < 0x80U) return 1;
   struct Form {
@@ -31,7 +31,7 @@ std::size_t character_size(std::string_view text) {
     if (first < form.low || first > form.high || text.size() < form.size) continue;
     char32_t number = first & (0x7FU >> form.size);
     for (std::size_t i = 1; i < form.size; ++i) {
-      if (!continues(text[i])) return 0;
+      if (!is_continuation_byte(text[i])) return 0;
       number = number << 6U | (static_cast<unsigned char>(text[i]) & 0x3FU);
     }
     const bool surrogate = number >= 0xD800 && number <= 0xDFFF;
@@ -65,25 +65,25 @@ std::string format_fixed(double value, int digits) {
   std::ostringstream text;
   text << std::fixed << std::setprecision(digits) << value;
   const std::string shown = text.str();
-  // What rounds to nothing has no sign.
-  const bool nothing = shown.find_first_not_of("-0.") == std::string::npos;
-  return nothing && shown.front() == '-' ? shown.substr(1) : shown;
+  // A value that rounds to zero has no sign.
+  const bool is_zero = shown.find_first_not_of("-0.") == std::string::npos;
+  return is_zero && shown.front() == '-' ? shown.substr(1) : shown;
 }
 
 std::string format_number(double value, std::string_view unit, int significant) {
   if (!std::isfinite(value)) return "none";
   if (std::abs(value) >= 1e15) return (std::ostringstream() << value).str();
-  constexpr std::array<std::pair<std::string_view, int>, 9> places_of{{{"m", 5},
-                                                                       {"cm", 3},
-                                                                       {"mm", 2},
-                                                                       {"deg", 3},
-                                                                       {"degrees", 3},
-                                                                       {"px", 3},
-                                                                       {"%", 2},
-                                                                       {"ms", 5},
-                                                                       {"us", 4}}};
+  constexpr std::array<std::pair<std::string_view, int>, 9> decimal_places{{{"m", 5},
+                                                                            {"cm", 3},
+                                                                            {"mm", 2},
+                                                                            {"deg", 3},
+                                                                            {"degrees", 3},
+                                                                            {"px", 3},
+                                                                            {"%", 2},
+                                                                            {"ms", 5},
+                                                                            {"us", 4}}};
   int places = 9;
-  for (const auto& [name, count] : places_of) {
+  for (const auto& [name, count] : decimal_places) {
     if (unit == name) places = count;
   }
   if (value != 0.0) {
@@ -110,7 +110,7 @@ std::string to_readable_line(std::string_view text) {
   std::string line;
   line.reserve(text.size());
   while (!text.empty()) {
-    const std::size_t size = character_size(text);
+    const std::size_t size = utf8_character_size(text);
     const std::string_view character = text.substr(0, size);
     text.remove_prefix(std::max<std::size_t>(size, 1));
     const auto first = static_cast<unsigned char>(size == 0 ? '?' : character.front());
@@ -127,10 +127,11 @@ std::string to_readable_line(std::string_view text) {
 }
 
 std::string to_csv_field(std::string_view text) {
-  const auto blank = [](char c) { return c == ' ' || c == '\t'; };
-  const bool quoted = text.empty() || text.find_first_of(",\"#\r\n") != std::string_view::npos ||
-                      blank(text.front()) || blank(text.back());
-  if (!quoted) return std::string(text);
+  const auto is_blank = [](char c) { return c == ' ' || c == '\t'; };
+  const bool needs_quotes = text.empty() ||
+                            text.find_first_of(",\"#\r\n") != std::string_view::npos ||
+                            is_blank(text.front()) || is_blank(text.back());
+  if (!needs_quotes) return std::string(text);
   std::string result = "\"";
   for (const char c : text) {
     if (c == '"') result += '"';
@@ -140,27 +141,27 @@ std::string to_csv_field(std::string_view text) {
 }
 
 std::string shorten_middle(std::string_view text, std::size_t max_characters) {
-  const auto characters =
-      static_cast<std::size_t>(std::ranges::count_if(text, [](char c) { return !continues(c); }));
+  const auto characters = static_cast<std::size_t>(
+      std::ranges::count_if(text, [](char c) { return !is_continuation_byte(c); }));
   if (characters <= max_characters) return std::string(text);
-  // What stands at its end, such as a file's name in a path, tells most.
+  // The end, such as a file's name in a path, says most, and so both ends stay.
   const std::size_t kept = (max_characters - 3) / 2;
   std::size_t begin = 0;
   for (std::size_t left = kept; left > 0; --left) {
     do ++begin;
-    while (continues(text[begin]));
+    while (is_continuation_byte(text[begin]));
   }
   std::size_t end = text.size();
   for (std::size_t left = kept; left > 0; --left) {
     do --end;
-    while (continues(text[end]));
+    while (is_continuation_byte(text[end]));
   }
   return std::string(text.substr(0, begin)) + "..." + std::string(text.substr(end));
 }
 
 std::string suggest_name(std::string_view typed, std::span<const std::string_view> names) {
-  constexpr std::size_t longest = 64;  // the work grows with the square
-  if (typed.size() > longest) return {};
+  constexpr std::size_t max_bytes = 64;  // the work grows with the square
+  if (typed.size() > max_bytes) return {};
   std::size_t best = std::max<std::size_t>(1, typed.size() / 3) + 1;
   std::string_view nearest;
   for (const auto name : names) {
@@ -175,11 +176,11 @@ std::string suggest_name(std::string_view typed, std::span<const std::string_vie
 }
 
 std::string quote_for_shell(std::string_view text) {
-  const auto plain = [](char c) {
+  const auto is_plain = [](char c) {
     return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||
            std::string_view("_./:=,+@%-").find(c) != std::string_view::npos;
   };
-  if (!text.empty() && std::ranges::all_of(text, plain)) return std::string(text);
+  if (!text.empty() && std::ranges::all_of(text, is_plain)) return std::string(text);
   std::string quoted = "'";
   for (const char c : text) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
   return quoted + "'";

@@ -72,8 +72,8 @@ Alignment align(std::span<const Point2> from, std::span<const Point2> to,
   if (options.allow_scale && c.from_norm2 > 0.0) {
     result.scale = (result.reflected ? mirrored : proper) / c.from_norm2;
   }
-  const Point2 turned = result.apply(from_centre);
-  result.translation = {to_centre.x_m - turned.x_m, to_centre.y_m - turned.y_m};
+  const Point2 rotated = result.apply(from_centre);
+  result.translation = {to_centre.x_m - rotated.x_m, to_centre.y_m - rotated.y_m};
   double sum = 0.0;
   for (std::size_t i = 0; i < from.size(); ++i) {
     const double d = distance(result.apply(from[i]), to[i]);

@@ -6,7 +6,7 @@
 
 namespace panonav {
 
-/// The best map of one point set onto another: to ~ scale * R(rotation) * from + translation, with
+/// A map of one point set onto another: to ~ scale * R(rotation) * from + translation, with
 /// a mirror image first (y -> -y) when `reflected`.
 struct Alignment {
   /// Freedoms of the fit beyond rotation and translation.
@@ -21,7 +21,7 @@ struct Alignment {
   bool reflected = false;     ///< whether y changes its sign first
   double rms_m = 0.0;         ///< root mean square distance that remains
 
-  /// A point of the frame of `from` in that of `to`.
+  /// Maps a point of the frame of `from` into that of `to`.
   [[nodiscard]] Point2 apply(Point2 p_in_from) const;
 };
 
@@ -39,7 +39,8 @@ struct ShapeDifference {
   double with_reflection = 0.0;  ///< the same when a mirror image is allowed
 };
 
-/// Throws ContractError unless both sets have the same size >= 2 and neither is a single point.
+/// Computes the disparity. Throws ContractError unless both sets have the same size >= 2 and
+/// neither is a single point.
 [[nodiscard]] ShapeDifference shape_difference(std::span<const Point2> a,
                                                std::span<const Point2> b);
 

@@ -120,7 +120,7 @@ class SparseEquations {
   bool analysed_ = false;
 };
 
-/// How `minimise` damps its steps, and when it ends.
+/// Damping of the steps of `minimise`, and when it ends.
 struct LeastSquaresOptions {
   int max_steps = 20;         ///< >= 0
   double damping = 0.0;       ///< of the first step, as a share of the diagonal
@@ -129,7 +129,7 @@ struct LeastSquaresOptions {
   double min_relative_decrease = 0.0;  ///< the same, as a share of the cost
 };
 
-/// How a minimisation went.
+/// Outcome of a minimisation.
 struct LeastSquaresReport {
   int steps = 0;           ///< linearisations that were made
   bool converged = false;  ///< false: `max_steps` were not enough

@@ -8,7 +8,7 @@
 
 namespace panonav {
 
-/// A point of the plane, in a frame that the name of the variable tells.
+/// A point of the plane; the name of the variable says in which frame.
 struct Point2 {
   double x_m = 0.0;  ///< forward, or along the frame's first axis
   double y_m = 0.0;  ///< left, or along its second axis
@@ -44,7 +44,7 @@ struct Pose2 {
   return std::isfinite(pose.x_m) && std::isfinite(pose.y_m) && std::isfinite(pose.heading_rad);
 }
 
-/// a_from_c = a_from_b * b_from_c.
+/// Composes transforms: a_from_c = a_from_b * b_from_c.
 [[nodiscard]] inline Pose2 operator*(const Pose2& a_from_b, const Pose2& b_from_c) {
   const double c = std::cos(a_from_b.heading_rad);
   const double s = std::sin(a_from_b.heading_rad);
@@ -53,7 +53,7 @@ struct Pose2 {
           wrap_angle(a_from_b.heading_rad + b_from_c.heading_rad)};
 }
 
-/// b_from_a.
+/// Inverts a transform: returns b_from_a.
 [[nodiscard]] inline Pose2 inverse(const Pose2& a_from_b) {
   const double c = std::cos(a_from_b.heading_rad);
   const double s = std::sin(a_from_b.heading_rad);
@@ -61,7 +61,7 @@ struct Pose2 {
           wrap_angle(-a_from_b.heading_rad)};
 }
 
-/// p_in_a = a_from_b * p_in_b.
+/// Transforms a point: p_in_a = a_from_b * p_in_b.
 [[nodiscard]] inline Point2 operator*(const Pose2& a_from_b, Point2 p_in_b) {
   const double c = std::cos(a_from_b.heading_rad);
   const double s = std::sin(a_from_b.heading_rad);

@@ -26,12 +26,11 @@ struct Circle {
 /// Voronoi cells of positions, clipped at half the spacing [M04 figures 9 and 10].
 ///
 /// Positions that coincide share one site. A cell is the part of the plane that is nearer to its
-/// site than to any other, cut by a square of side `spacing_m` around the site that stands along
-/// the direction to the nearest other site. So every cell of a square grid of that spacing, inside,
-/// on the border and in a corner, has the area spacing^2 however the grid is turned; a cell along a
-/// path is a strip as wide as the spacing; a lone site gets the square; and places far from every
-/// site belong to no cell. Cells do not overlap: the area of a set of sites is the sum of their
-/// areas.
+/// site than to any other, cut by a square of side `spacing_m` around the site, aligned with the
+/// direction to the nearest other site. So every cell of a square grid of that spacing has the area
+/// spacing^2, also on the border and however the grid is rotated; a cell along a path is a strip as
+/// wide as the spacing; a lone site gets the square. Cells do not overlap: the area of a set of
+/// sites is the sum of their areas.
 class VoronoiCells {
  public:
   /// `spacing_m` left out: the (lower) median over sites of the distance to the second-nearest
@@ -42,15 +41,15 @@ class VoronoiCells {
   explicit VoronoiCells(std::span<const Point2> positions,
                         std::optional<double> spacing_m = std::nullopt);
 
-  /// 0 when there are fewer than two sites and none was given.
+  /// Side of the clipping squares; 0 when there are fewer than two sites and none was stated.
   [[nodiscard]] double spacing_m() const noexcept { return spacing_m_; }
   /// Distinct positions, in the order of their first appearance.
   [[nodiscard]] std::span<const Point2> sites() const& noexcept { return sites_; }
   std::span<const Point2> sites() const&& = delete;  // would dangle
-  /// The site of every position given.
+  /// The site of every position.
   [[nodiscard]] std::span<const std::size_t> site_of() const& noexcept { return site_of_; }
   std::span<const std::size_t> site_of() const&& = delete;  // would dangle
-  /// Corners counter-clockwise. Throws ContractError when there is no such site.
+  /// Corners of a cell, counter-clockwise. Throws ContractError when there is no such site.
   [[nodiscard]] std::vector<Point2> cell(std::size_t site) const;
   /// Area of that cell, 0 where it is empty. Throws as `cell`.
   [[nodiscard]] double area_m2(std::size_t site) const;

@@ -19,11 +19,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string cause() {
+std::string last_error_text() {
   return std::generic_category().message(errno);
 }
 
-// A file descriptor that is closed on every way out.
+// A file descriptor that closes itself.
 class Descriptor {
  public:
   explicit Descriptor(int number) : number_(number) {}
@@ -43,14 +43,14 @@ void write_all(int descriptor, std::span<const std::uint8_t> bytes, const fs::pa
     const ssize_t written = ::write(descriptor, bytes.data(), bytes.size());
     if (written < 0) {
       if (errno == EINTR) continue;
-      throw FileError(path.string(), "cannot be written: " + cause());
+      throw FileError(path.string(), "cannot be written: " + last_error_text());
     }
     bytes = bytes.subspan(static_cast<std::size_t>(written));
   }
 }
 
-// Where the bytes must end up: behind all symbolic links.
-fs::path behind_links(const fs::path& path) {
+// Returns the file that all symbolic links end at.
+fs::path resolve_links(const fs::path& path) {
   std::error_code code;
   if (!fs::is_symlink(fs::symlink_status(path, code))) return path;
   const fs::path target = fs::weakly_canonical(path, code);
@@ -68,19 +68,20 @@ void write_file(const fs::path& path, std::span<const std::uint8_t> bytes) {
   }
   if (exists && !S_ISREG(status.st_mode)) {
     Descriptor file(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
-    if (file.number() < 0) throw FileError(path.string(), "cannot be written: " + cause());
+    if (file.number() < 0)
+      throw FileError(path.string(), "cannot be written: " + last_error_text());
     write_all(file.number(), bytes, path);
     return;
   }
 
-  const fs::path target = behind_links(path);
+  const fs::path target = resolve_links(path);
   TemporaryFile file(target);
   if (exists && ::fchmod(file.descriptor(), status.st_mode & 07777) != 0) {
-    throw FileError(path.string(), "cannot be written: " + cause());
+    throw FileError(path.string(), "cannot be written: " + last_error_text());
   }
   write_all(file.descriptor(), bytes, path);
   if (::fsync(file.descriptor()) != 0 || ::rename(file.path().c_str(), target.c_str()) != 0) {
-    throw FileError(path.string(), "cannot be written: " + cause());
+    throw FileError(path.string(), "cannot be written: " + last_error_text());
   }
   file.keep();
 }
@@ -91,10 +92,10 @@ void write_file(const fs::path& path, std::string_view text) {
 
 std::vector<std::uint8_t> read_file(const fs::path& path, std::size_t limit_bytes) {
   const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-  if (file.number() < 0) throw FileError(path.string(), "cannot be read: " + cause());
+  if (file.number() < 0) throw FileError(path.string(), "cannot be read: " + last_error_text());
   struct stat status {};
   if (::fstat(file.number(), &status) != 0) {
-    throw FileError(path.string(), "cannot be read: " + cause());
+    throw FileError(path.string(), "cannot be read: " + last_error_text());
   }
   if (S_ISDIR(status.st_mode)) throw FileError(path.string(), "is a folder; allowed: a file");
 
@@ -112,7 +113,7 @@ std::vector<std::uint8_t> read_file(const fs::path& path, std::size_t limit_byte
     const ssize_t got = ::read(file.number(), bytes.data() + filled, bytes.size() - filled);
     if (got < 0) {
       if (errno == EINTR) continue;
-      throw FileError(path.string(), "cannot be read: " + cause());
+      throw FileError(path.string(), "cannot be read: " + last_error_text());
     }
     if (got == 0) break;
     filled += static_cast<std::size_t>(got);

@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::array<std::string_view, 2> direction_names{"clockwise", "counter-clockwise"};
 
-int whole(TomlFields& fields, std::string_view field) {
+int read_whole_number(TomlFields& fields, std::string_view field) {
   const double value = fields.required_number(field);
   if (value != std::round(value) || value < 1.0 || value > 100000.0) {
     fields.fail(field, to_text(value), "a whole number, 1 .. 100000");
@@ -38,7 +38,7 @@ CameraFile read_camera(const std::filesystem::path& path) {
   for (const auto name : camera_model_names)
     known += (known.empty() ? "" : ", ") + std::string(name);
   const std::string name = fields.required_text("model", known);
-  const auto model = model_of_name(name);
+  const auto model = make_default_model(name);
   if (!model) fields.fail("model", "\"" + name + "\"", known);
   camera.model = *model;
   visit_parameters(camera.model, [&](std::string_view parameter, auto& value) {
@@ -54,7 +54,8 @@ CameraFile read_camera(const std::filesystem::path& path) {
     unified->axis =
         static_cast<UnifiedModel::Axis>(fields.choice("axis", view_axis_names).value_or(0));
   }
-  camera.image_size = {whole(fields, "width_px"), whole(fields, "height_px")};
+  camera.image_size = {read_whole_number(fields, "width_px"),
+                       read_whole_number(fields, "height_px")};
   if (std::holds_alternative<EquirectangularModel>(camera.model)) {
     camera.forward_column = fields.number("forward_column").value_or(0.5);
   } else if (lens_count(camera) == 1) {

@@ -29,7 +29,7 @@ constexpr std::array<std::string_view, 10> column_names{
     "file",     "stamp_s",          "x_m",      "y_m",      "heading_deg", "odom_x_m",
     "odom_y_m", "odom_heading_deg", "roll_deg", "pitch_deg"};
 
-ElevationBand elevation_band(TomlFields& fields, const std::vector<double>& values) {
+ElevationBand to_elevation_band(TomlFields& fields, const std::vector<double>& values) {
   const bool fits =
       values.size() == 2 && values[0] >= -90.0 && values[1] <= 90.0 && values[0] < values[1];
   if (!fits) {
@@ -47,7 +47,8 @@ PictureSource read_source(TomlFields& images, const fs::path& folder) {
   if (!kind) images.fail("kind", "missing", "\"panorama\", \"equirectangular\", \"mirror\"");
   source.kind = static_cast<PictureKind>(*kind);
   std::optional<ElevationBand> band;
-  if (const auto values = images.numbers("elevation_deg")) band = elevation_band(images, *values);
+  if (const auto values = images.numbers("elevation_deg"))
+    band = to_elevation_band(images, *values);
   if (source.kind == PictureKind::mirror) {
     const std::string file = images.required_text("camera", "the name of a camera file");
     CameraFile camera = read_camera(folder / file);
@@ -84,8 +85,8 @@ void require_picture(const fs::path& table, const DatasetEntry& entry) {
 }
 
 // Columns that belong together are given all or not at all.
-bool has_all(const CsvTable& table, const fs::path& path,
-             std::initializer_list<std::string_view> names) {
+bool has_all_or_none(const CsvTable& table, const fs::path& path,
+                     std::initializer_list<std::string_view> names) {
   std::size_t found = 0;
   std::string_view missing;
   for (const auto name : names) {
@@ -104,7 +105,7 @@ bool has_all(const CsvTable& table, const fs::path& path,
 }
 
 std::vector<DatasetEntry> read_entries(const fs::path& folder, const fs::path& path,
-                                       bool positions_wanted) {
+                                       bool needs_positions) {
   const CsvTable table = CsvTable::read(path);
   for (const auto& column : table.columns()) {
     if (std::find(column_names.begin(), column_names.end(), column) == column_names.end()) {
@@ -114,13 +115,14 @@ std::vector<DatasetEntry> read_entries(const fs::path& folder, const fs::path& p
     }
   }
   if (!table.has("file")) throw FileError(path.string(), "has no column 'file'");
-  const bool has_position = has_all(table, path, {"x_m", "y_m"});
-  const bool has_odometry = has_all(table, path, {"odom_x_m", "odom_y_m", "odom_heading_deg"});
-  const bool has_tilt = has_all(table, path, {"roll_deg", "pitch_deg"});
+  const bool has_position = has_all_or_none(table, path, {"x_m", "y_m"});
+  const bool has_odometry =
+      has_all_or_none(table, path, {"odom_x_m", "odom_y_m", "odom_heading_deg"});
+  const bool has_tilt = has_all_or_none(table, path, {"roll_deg", "pitch_deg"});
   if (table.has("heading_deg") && !has_position) {
     throw FileError(path.string(), "has a column 'heading_deg' but no 'x_m' and 'y_m'");
   }
-  if (positions_wanted && !has_position && !has_odometry) {
+  if (needs_positions && !has_position && !has_odometry) {
     throw FileError(path.string(),
                     "has no columns 'x_m' and 'y_m'; a table without positions is named by [list]");
   }
@@ -167,7 +169,7 @@ bool is_picture(const fs::path& path) {
 }
 
 // Digits compare as numbers, everything else letter by letter.
-bool natural_less(const std::string& a, const std::string& b) {
+bool is_naturally_less(const std::string& a, const std::string& b) {
   const auto digit = [](char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; };
   std::size_t i = 0;
   std::size_t j = 0;
@@ -215,10 +217,10 @@ Dataset find_pictures(const fs::path& folder, PictureSource source, bool is_recu
     }
   }
   if (error) throw FileError(folder.string(), "cannot be read: " + error.message());
-  std::ranges::sort(dataset.left_out, natural_less);
+  std::ranges::sort(dataset.left_out, is_naturally_less);
   if (names.empty())
     throw FileError(folder.string(), "holds no PNG or JPEG picture; allowed: one or more");
-  std::sort(names.begin(), names.end(), natural_less);
+  std::sort(names.begin(), names.end(), is_naturally_less);
   for (auto& name : names) {
     DatasetEntry entry;
     entry.path = folder / name;
@@ -405,7 +407,7 @@ std::vector<std::uint8_t> read_encoded_picture(const DatasetEntry& entry) {
   return encode_png(picture.view());
 }
 
-Dataset single_picture(const fs::path& file, PictureSource source) {
+Dataset read_single_picture(const fs::path& file, PictureSource source) {
   std::error_code error;
   if (!fs::is_regular_file(file, error))
     throw FileError(file.string(), "is not there; allowed: a PNG or JPEG picture");

@@ -16,21 +16,21 @@
 
 namespace panonav {
 
-/// Pictures that do not lie in a file each: those of a video, of a recording of topics.
+/// A store of pictures that are not files of their own: those of a video, of a recording of topics.
 class PictureStore {
  public:
   virtual ~PictureStore() = default;
-  /// The picture of this number. Several threads may call at a time; in ascending order it costs
-  /// least. Throws FileError.
+  /// Reads the picture of this number. Several threads may call at a time; in ascending order it
+  /// costs least. Throws FileError.
   [[nodiscard]] virtual Image read(std::size_t index) const = 0;
-  /// The JPEG or PNG that holds it, as it was recorded; empty where there is none. Likewise.
+  /// Returns the JPEG or PNG that holds it, as it was recorded; nullopt where there is none.
   [[nodiscard]] virtual std::optional<std::vector<std::uint8_t>> encoded(
       std::size_t /*index*/) const {
     return std::nullopt;
   }
 };
 
-/// One picture of a data set and what is known of it.
+/// One picture of a data set with its stamp, poses and tilt.
 struct DatasetEntry {
   std::string file;            ///< as the data set names it, relative to its folder; unique
   std::filesystem::path path;  ///< where it lies: its own file, or that of all pictures
@@ -45,15 +45,16 @@ struct DatasetEntry {
   friend bool operator==(const DatasetEntry&, const DatasetEntry&) = default;
 };
 
-/// The picture, from its own file or from its store. Throws FileError.
+/// Reads the picture from its own file or from its store. Throws FileError.
 [[nodiscard]] Image read_picture(const DatasetEntry& entry);
-/// The same as a JPEG or PNG: the bytes of its own file, or what its store has; else a PNG.
+/// Reads the picture as a JPEG or PNG: the bytes of its own file, or those of its store; else a new
+/// PNG.
 [[nodiscard]] std::vector<std::uint8_t> read_encoded_picture(const DatasetEntry& entry);
 
 /// A recording: pictures in order, and how they become panoramic cylinders. Pictures are read when
 /// they are needed (PanoramaReader).
 struct Dataset {
-  /// Which pictures of a recording are taken. Times are seconds from its first picture.
+  /// Pictures of a recording that are read. Times are seconds from its first picture.
   struct Selection {
     int every = 1;  ///< each n-th of those that the times leave
     std::optional<double>
@@ -61,11 +62,11 @@ struct Dataset {
     std::optional<double> from_s;  ///< this moment included; empty: from the first
     std::optional<double> to_s;    ///< this moment included
 
-    /// Whether pictures need stamps to be selected.
+    /// True if pictures need stamps to be selected.
     [[nodiscard]] bool by_time() const noexcept { return every_s || from_s || to_s; }
   };
 
-  /// What all pictures of a data set have.
+  /// Fields that all pictures of a data set have.
   struct Fields {
     bool stamps = false;     ///< `stamp_s`
     bool positions = false;  ///< `pose`
@@ -79,7 +80,7 @@ struct Dataset {
   std::vector<DatasetEntry> entries;  ///< in the order in which they were taken
   /// Of a folder of pictures: what lies in it and was left out, sorted; folders end in "/".
   std::vector<std::string> left_out;
-  /// What was left out, guessed or missing when an input was opened, a line each.
+  /// Warnings of the reader: what was left out, guessed or missing, a line each.
   std::vector<std::string> warnings;
 };
 
@@ -89,24 +90,24 @@ struct Dataset {
 /// picture at all.
 [[nodiscard]] Dataset read_dataset(const std::filesystem::path& folder);
 
-/// The numbers of the pictures with these ascending stamps that the selection takes. A tenth of a
+/// Returns the indices of the pictures with these ascending stamps that are selected. A tenth of a
 /// millisecond does not count.
 [[nodiscard]] std::vector<std::size_t> selected_pictures(const std::vector<double>& stamps_s,
                                                          const Dataset::Selection& selection);
 
-/// Drops the other entries. Throws FileError when times are asked for and an entry has no stamp or
-/// one before that of its predecessor, and when nothing is left.
+/// Keeps the selected entries. Throws FileError when the selection has times and an entry has no
+/// stamp or one before that of its predecessor, and when nothing is left.
 void select_pictures(Dataset& dataset, const Dataset::Selection& selection);
 
-/// A folder of PNG and JPEG pictures without dataset.toml, in natural order of their names
+/// Reads a folder of PNG and JPEG pictures without dataset.toml, in natural order of their names
 /// ("view_9" before "view_10"). Throws FileError when there is none.
 [[nodiscard]] Dataset read_picture_folder(const std::filesystem::path& folder,
                                           PictureSource source);
 /// The same with the pictures of all folders within ("morning/view_1"); links are not followed.
 [[nodiscard]] Dataset read_picture_tree(const std::filesystem::path& folder, PictureSource source);
 
-/// One picture as a data set.
-[[nodiscard]] Dataset single_picture(const std::filesystem::path& file, PictureSource source);
+/// Makes a data set of one picture.
+[[nodiscard]] Dataset read_single_picture(const std::filesystem::path& file, PictureSource source);
 
 /// Returns what all entries have, of which there must be one or more.
 [[nodiscard]] Dataset::Fields shared_fields(const Dataset& dataset);

@@ -10,9 +10,9 @@
 
 namespace panonav {
 
-/// What a caller says of an input, and which of its pictures are read.
+/// Layout of an input as a caller states it, and which of its pictures are read.
 struct InputOptions {
-  /// Which topics of a recording become the data set. What is not named is found by its type.
+  /// Topics of a recording that become the data set; those that are not named are found by type.
   struct Topics {
     std::optional<std::string> image;     ///< sensor_msgs/Image or CompressedImage
     std::optional<std::string> odometry;  ///< nav_msgs/Odometry
@@ -21,23 +21,23 @@ struct InputOptions {
     std::optional<std::pair<std::string, std::string>> odometry_frames;
   };
 
-  /// How its pictures lie. A folder with a dataset.toml says so itself and refuses it.
+  /// Layout of its pictures. A folder with a dataset.toml states its own and refuses it.
   std::optional<PictureSource> source;
-  /// How they lie where neither `source` nor a dataset.toml says it, such as those of a memory.
+  /// Layout where neither `source` nor a dataset.toml states one, such as that of a memory.
   std::optional<PictureSource> default_source;
   Topics topics;                 ///< of a recording of topics; other inputs refuse them
   Dataset::Selection selection;  ///< which of its pictures
   bool recursive = false;        ///< of a folder: pictures of the folders within, too
 };
 
-/// How inputs of one kind are read.
+/// A reader of inputs of one kind.
 struct DatasetReader {
   std::string name;         ///< the kind: "recording", "video"
   bool has_topics = false;  ///< whether `InputOptions::topics` applies
-  /// Whether the path is of this kind. Never throws.
+  /// True if the path is of this kind. Never throws.
   bool (*recognises)(const std::filesystem::path& path) = nullptr;
-  /// Reads what `options.selection` takes of it; the pictures lie as `source` says, whatever the
-  /// options do. Throws FileError.
+  /// Reads the pictures that `options.selection` selects; `source` is their layout, whatever the
+  /// options state. Throws FileError.
   Dataset (*read)(const std::filesystem::path& path, const PictureSource& source,
                   const InputOptions& options) = nullptr;
 };

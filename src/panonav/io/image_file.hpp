@@ -10,8 +10,8 @@
 
 namespace panonav {
 
-/// What a picture may cost. Pictures that are larger are refused before the memory is taken, those
-/// with too many scans before the time is.
+/// Bounds of a picture. Larger ones are refused before memory is allocated, those with too many
+/// scans before they are decoded.
 struct ImageLimits {
   int side_px = 32768;               ///< the longest side, in pixels
   std::int64_t area_px = 134217728;  ///< 16384 x 8192
@@ -34,26 +34,26 @@ enum class ImageFormat {
   jpeg  ///< with losses
 };
 
-/// By the first bytes. Throws FileError, which names `name`, when they are of neither.
+/// Returns the format by the first bytes. Throws FileError, which names `name`, for any other.
 [[nodiscard]] ImageFormat image_format(std::span<const std::uint8_t> bytes, std::string_view name);
 
-/// The bytes of a PNG or JPEG file. Throws FileError when it begins otherwise.
+/// Reads the bytes of a PNG or JPEG file. Throws FileError when it begins otherwise.
 [[nodiscard]] std::vector<std::uint8_t> read_encoded_image(const std::filesystem::path& path);
 
-/// Width and height of the upright picture from the head of the file, without decoding the pixels.
-/// Throws FileError.
+/// Reads width and height of the upright picture from the head of the file, without decoding the
+/// pixels. Throws FileError.
 [[nodiscard]] ImageSize read_image_size(const std::filesystem::path& path,
                                         const ImageLimits& limits = {});
 
-/// The same from bytes in memory; `name` stands in error messages.
+/// Decodes a PNG or JPEG in memory as `read_image` does; `name` appears in error messages.
 [[nodiscard]] Image decode_image(std::span<const std::uint8_t> bytes, std::string_view name,
                                  const ImageLimits& limits = {});
 
-/// The picture (1 or 3 channels) as PNG. Throws ContractError on an empty picture.
+/// Encodes a picture (1 or 3 channels) as PNG. Throws ContractError on an empty picture.
 [[nodiscard]] std::vector<std::uint8_t> encode_png(ImageView image);
 
-/// The picture (1 or 3 channels, sides at most 65,500 px) as baseline JPEG. `quality`: 1 .. 100.
-/// About 3 ms for 1280 x 640 x 3. Throws ContractError outside these.
+/// Encodes a picture (1 or 3 channels, sides at most 65,500 px) as baseline JPEG. `quality`: 1 ..
+/// 100. About 3 ms for 1280 x 640 x 3. Throws ContractError outside these.
 [[nodiscard]] std::vector<std::uint8_t> encode_jpeg(ImageView image, int quality = 85);
 
 /// Writes a PNG that appears whole or not at all. Throws FileError.

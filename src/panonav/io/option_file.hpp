@@ -24,7 +24,7 @@ class OptionFile {
   /// Throws FileError: missing, not TOML, a field outside all sections.
   explicit OptionFile(std::filesystem::path path);
   ~OptionFile();
-  /// What is left of the other may only be destroyed or assigned to.
+  /// Leaves the other in a state in which it may only be destroyed or assigned to.
   OptionFile(OptionFile&&) noexcept;
   OptionFile& operator=(OptionFile&&) noexcept;
 
@@ -40,11 +40,11 @@ class OptionFile {
     apply(section, [&options](OptionVisitor& visitor) { visit_options(options, visitor); });
   }
 
-  /// Takes a field that holds a text, which then is no more there: `apply` refuses what it does not
-  /// know. Empty when there is none. Throws FileError on another type.
+  /// Removes and returns a field that holds a text, since `apply` refuses unknown fields; nullopt
+  /// when there is none. Throws FileError on another type.
   std::optional<std::string> take_text(std::string_view section, std::string_view field);
 
-  /// Whether the file gives this field.
+  /// True if the file has this field.
   [[nodiscard]] bool has(std::string_view section, std::string_view field) const;
   /// Throws FileError when the file has a section that is neither among `own` nor among `others`: a
   /// misspelt one would otherwise do nothing. The message names `own` only.

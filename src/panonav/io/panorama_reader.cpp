@@ -14,7 +14,7 @@ namespace panonav {
 
 namespace {
 
-// Of a picture that is said to show the whole sphere.
+// Throws ContractError unless the picture can show the whole sphere.
 void require_whole_sphere(ImageSize size) {
   constexpr double tolerance = 0.02;  // borders and scaling take or add a few pixels
   if (std::abs(size.width - 2.0 * size.height) <= tolerance * size.width) return;
@@ -30,8 +30,8 @@ struct WiderBand {
   int rows = 0;
   ElevationBand band;
 };
-WiderBand wider(const ElevationBand& band, int rows, const ElevationBand& limit,
-                double margin_rad) {
+WiderBand widen_band(const ElevationBand& band, int rows, const ElevationBand& limit,
+                     double margin_rad) {
   const double row_rad = (band.top_rad - band.bottom_rad) / rows;
   const auto rows_in = [&](double room_rad) {
     return static_cast<int>(std::floor(std::clamp(room_rad, 0.0, margin_rad) / row_rad + 1e-6));
@@ -52,7 +52,7 @@ Panorama level_equirectangular(ImageView picture, PictureLayout layout, Panorama
   }
   const double row_rad = (band.top_rad - band.bottom_rad) / shape.rows;
   const double margin_rad = std::hypot(tilt.roll_rad, tilt.pitch_rad) + 2.0 * row_rad;
-  const WiderBand wide = wider(band, shape.rows, sphere, margin_rad);
+  const WiderBand wide = widen_band(band, shape.rows, sphere, margin_rad);
   layout.kept_elevations = wide.band;
   return level_panorama(panorama_from_picture(picture, layout, {wide.rows, shape.columns}), tilt,
                         shape.rows, band);
@@ -75,19 +75,19 @@ PanoramaReader::PanoramaReader(PictureSource source, PanoramaShape shape)
   if (shape.columns != 0) options.columns = shape.columns;
   options.elevations = source_.layout.kept_elevations;
   unwarper_.emplace(*source_.camera, options);
-  if (source_.mask) hidden_ = values_hidden_by(source_.mask->view(), *unwarper_);
+  if (source_.mask) hidden_ = find_hidden_values(source_.mask->view(), *unwarper_);
   wide_ = std::make_shared<Wide>();
 }
 
-const PanoramaReader::Wide& PanoramaReader::wide() const {
+const PanoramaReader::Wide& PanoramaReader::get_or_create_wide() const {
   std::call_once(wide_->is_made, [&] {
     constexpr double margin_rad = 0.175;  // 10 degrees: robots lean less
-    const WiderBand band = wider(unwarper_->elevations(), unwarper_->rows(),
-                                 visible_elevations(*source_.camera), margin_rad);
+    const WiderBand band = widen_band(unwarper_->elevations(), unwarper_->rows(),
+                                      visible_elevations(*source_.camera), margin_rad);
     if (band.rows == unwarper_->rows()) return;
     wide_->unwarper.emplace(*source_.camera,
                             UnwarperOptions{band.rows, unwarper_->columns(), band.band});
-    if (source_.mask) wide_->hidden = values_hidden_by(source_.mask->view(), *wide_->unwarper);
+    if (source_.mask) wide_->hidden = find_hidden_values(source_.mask->view(), *wide_->unwarper);
   });
   return *wide_;
 }
@@ -101,7 +101,8 @@ Panorama PanoramaReader::convert(ImageView picture, const Tilt& tilt) const {
   }
   if (!unwarper_)
     return level_panorama(panorama_from_picture(picture, source_.layout, shape_), tilt);
-  const Wide* const more = is_level || !wide().unwarper ? nullptr : &wide();
+  const Wide* const more =
+      is_level || !get_or_create_wide().unwarper ? nullptr : &get_or_create_wide();
   Panorama panorama = (more == nullptr ? *unwarper_ : *more->unwarper).unwrap(picture);
   const auto& hidden = more == nullptr ? hidden_ : more->hidden;
   if (!hidden.empty()) fill_hidden_values(panorama, hidden);

@@ -22,25 +22,25 @@ class PanoramaReader {
   /// ContractError on a source that is not valid.
   PanoramaReader(PictureSource source, PanoramaShape shape);
 
-  /// How the pictures lie, as it was given.
+  /// The layout of the pictures, as stated at construction.
   [[nodiscard]] const PictureSource& source() const noexcept { return source_; }
   /// The table that turns mirror pictures into panoramas where that is all there is to do: null for
   /// other pictures and where a mask hides a part of the mirror.
   [[nodiscard]] const Unwarper* unwarper() const noexcept {
     return unwarper_ && hidden_.empty() ? &*unwarper_ : nullptr;
   }
-  /// With the tilt, what a level robot would have seen (`level_panorama`); more than the band is
-  /// looked at for that where the picture shows more. Throws ContractError on a picture whose size
-  /// is not the camera's, on an equirectangular one that is not twice as wide as high (2 % off at
-  /// most), and on a tilt as `level_panorama` does.
+  /// Converts a picture. With a tilt, to the view of a level robot (`level_panorama`), for which
+  /// more than the band is read where the picture shows more. Throws ContractError on a picture
+  /// whose size is not the camera's, on an equirectangular one that is not twice as wide as high (2
+  /// % off at most), and on a tilt as `level_panorama` does.
   [[nodiscard]] Panorama convert(ImageView picture, const Tilt& tilt = {}) const;
   /// Reads and converts. Throws FileError that names the file and what is wrong with it.
   [[nodiscard]] Panorama read(const std::filesystem::path& file) const;
 
  private:
-  /// Of mirror pictures: the table of a wider band, made when the first tilted picture comes.
+  /// The table of a wider band of mirror pictures, made when the first tilted picture comes.
   struct Wide;
-  const Wide& wide() const;
+  const Wide& get_or_create_wide() const;
 
   PictureSource source_;
   PanoramaShape shape_;

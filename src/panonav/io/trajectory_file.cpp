@@ -36,17 +36,17 @@ std::vector<StampedPose> read_csv(const std::filesystem::path& path) {
 
 // The eight numbers of a line of TUM text.
 bool parse_line(std::string_view line, std::array<double, 8>& numbers) {
-  const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r' || c == ','; };
+  const auto is_blank = [](char c) { return c == ' ' || c == '\t' || c == '\r' || c == ','; };
   std::size_t count = 0;
   std::size_t i = 0;
   while (true) {
-    while (i < line.size() && blank(line[i])) ++i;
+    while (i < line.size() && is_blank(line[i])) ++i;
     if (i >= line.size()) return count == numbers.size();
     if (count == numbers.size()) return false;
     const auto result = std::from_chars(line.data() + i, line.data() + line.size(), numbers[count]);
     if (result.ec != std::errc{} || !std::isfinite(numbers[count])) return false;
     i = static_cast<std::size_t>(result.ptr - line.data());
-    if (i < line.size() && !blank(line[i])) return false;
+    if (i < line.size() && !is_blank(line[i])) return false;
     ++count;
   }
 }

@@ -7,7 +7,7 @@
 
 namespace panonav {
 
-/// A folder that gets its name when it is whole, and is gone if it never is.
+/// A folder that gets its name when it is complete, and is removed if it never is.
 class UnfinishedFolder {
  public:
   /// Makes the folder under a temporary name, and the folders that it lies in. Throws FileError

@@ -10,7 +10,7 @@ namespace panonav::kernels {
 /// "scalar", "avx2", "avx512" or "neon".
 [[nodiscard]] std::string_view name(Instructions instructions) noexcept;
 
-/// The sets that this build and this processor have, the widest last; never empty.
+/// The instruction sets that this build and this processor have, the widest last; never empty.
 [[nodiscard]] std::span<const Instructions> available_instructions() noexcept;
 
 /// The widest available set, or the one named by the environment variable PANONAV_INSTRUCTIONS.

@@ -7,7 +7,7 @@
 
 namespace panonav::kernels {
 
-/// For each descriptor of `a`, four words of 64 bits, the number of the nearest one of `b` by
+/// Finds for each descriptor of `a`, four words of 64 bits, the index of the nearest one of `b` by
 /// Hamming distance, and the reverse; of equally near ones the first. Entries where the other list
 /// is empty keep their value. Throws ContractError on sizes that do not fit and more than
 /// `max_descriptors`.

@@ -34,7 +34,7 @@ void move_poses(const PoseColumns& poses, const PoseColumns::Steps& steps,
   with_body<MotionBody>(instructions, [&](auto body) {
     body.move_poses(poses.x_m.data(), poses.y_m.data(), poses.heading_rad.data(),
                     steps.forward_m.data(), steps.left_m.data(), steps.turn_error_rad.data(),
-                    steps.turn_rad, steps.share_before, static_cast<int>(count));
+                    steps.turn_rad, steps.turn_share_before_travel, static_cast<int>(count));
   });
 }
 

@@ -11,11 +11,11 @@ namespace panonav::kernels {
 /// The first Fourier components of rows of equal length:
 ///   real(k) + j imaginary(k) = 2 / columns * sum_c value[c] exp(-j 2 pi k c / columns),  k = 0 ..
 ///   components - 1.
-/// Few components of many columns need no FFT. Columns c, columns - c and columns / 2 -+ c share
-/// their sines and cosines up to the sign, so each row is first folded to a quarter (an odd number
-/// of columns: to a half); then `components` sums remain, which fill the lanes of a vector. Cost:
-/// rows * (columns + components * columns / 2) additions, and as many multiplications as components
-/// * columns / 2. Rounding: a few units of 1e-7 times the mean absolute value of the row.
+/// Columns c, columns - c and columns / 2 -+ c share their sines and cosines up to the sign, so
+/// each row is first folded to a quarter (an odd number of columns: to a half); then `components`
+/// sums remain, which fill the lanes of a vector. Cost: rows * (columns + components * columns / 2)
+/// additions, and components * columns / 2 multiplications. Rounding: a few units of 1e-7 times the
+/// mean absolute value of the row.
 class RowTransform {
  public:
   /// Throws ContractError unless columns >= 4 and 1 <= components <= columns / 2.

@@ -1,6 +1,7 @@
 #pragma once
 
-// What callers and bodies of the kernels share. No C++ standard header here: see CMakeLists.txt.
+// Types that callers and bodies of the kernels share. No C++ standard header here: see
+// CMakeLists.txt.
 
 #include <stddef.h>
 #include <stdint.h>
@@ -125,10 +126,10 @@ struct MotionHypotheses {
 /// References around a place that the kernel compares at a time; unused lanes have similarity 0.
 inline constexpr int similarity_lanes = 12;
 
-/// What reference views around a place tell of a view, side by side. A lane without a reference has
-/// similarity 0, the logarithm of which is minus infinity, and lies far away.
+/// Reference views around a place and their similarity to a view, side by side. A lane without a
+/// reference has similarity 0, the logarithm of which is minus infinity, and lies far away.
 struct SimilarityLanes {
-  /// How similarity falls with distance: exp(-sqrt(distance^2 + blur) * per_metre).
+  /// Fall of similarity with distance: exp(-sqrt(distance^2 + blur) * per_metre).
   struct Fall {
     float per_metre;  ///< above 0, the fall of the logarithm for each metre
     /// Added to the square of each distance, so that similarity falls little near a reference.
@@ -138,7 +139,7 @@ struct SimilarityLanes {
   float x_m[similarity_lanes];                   ///< position of each reference
   float y_m[similarity_lanes];                   ///< the same, along y
   float log_similarity[similarity_lanes];        ///< to the view
-  float heading_rad[similarity_lanes];           ///< that the reference tells of the view
+  float heading_rad[similarity_lanes];           ///< of the view, as the reference implies it
   float other_log_similarity[similarity_lanes];  ///< at the other heading that fits
   /// The heading at which `other_log_similarity` holds.
   float other_heading_rad[similarity_lanes];

@@ -139,7 +139,7 @@ VisualMemory join_memories(const VisualMemory& part, const VisualMemory& drawn) 
     const VisualMemory& from = part.contains(view) ? part : drawn;
     // Another user may have given its name to another view meanwhile.
     if (all.find(from.info(view).name)) continue;
-    all.append_as(view, from.packed(view), from.info(view));
+    all.append_with_id(view, from.packed(view), from.info(view));
   }
   return all;
 }

@@ -15,7 +15,8 @@ VisualMemory HeldViewIndex::load(std::span<const ViewId> views) {
   ascending.erase(std::unique(ascending.begin(), ascending.end()), ascending.end());
   VisualMemory part(memory_->shape(), memory_->full_scale(), memory_->elevations());
   for (const ViewId view : ascending) {
-    if (memory_->contains(view)) part.append_as(view, memory_->packed(view), memory_->info(view));
+    if (memory_->contains(view))
+      part.append_with_id(view, memory_->packed(view), memory_->info(view));
   }
   return part;
 }

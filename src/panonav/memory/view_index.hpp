@@ -20,7 +20,7 @@ struct PositionBounds {
       max_y_m = 0.0;     ///< largest y, included
 };
 
-/// The views of a memory at one moment, found by what they show or where they are: those of a
+/// Finds the views of a memory at one moment by appearance or position: those of a
 /// memory that is held (`HeldViewIndex`), or of one that lies elsewhere (`IndexedMemory`). One
 /// thread uses it, for the questions of one query. An index of views that lie elsewhere throws
 /// FileError when they cannot be read.
@@ -28,12 +28,11 @@ class ViewIndex {
  public:
   virtual ~ViewIndex() = default;
   [[nodiscard]] virtual std::size_t size() const = 0;  ///< Views that can be found.
-  /// Finds what `VisualMemory::search` finds among all views.
+  /// Searches all views as `VisualMemory::search` does.
   [[nodiscard]] virtual SearchResult search(const PackedSignature& query,
                                             const SearchOptions& options,
                                             const SearchMask& mask) = 0;
-  /// Returns a memory of those of the views that there are, without links; they may be in any
-  /// order.
+  /// Returns a memory of those views that exist, without links; they may be in any order.
   [[nodiscard]] virtual VisualMemory load(std::span<const ViewId> views) = 0;
   /// Returns the view of that name; empty when there is none.
   [[nodiscard]] virtual std::optional<ViewId> find(std::string_view name) = 0;
@@ -67,8 +66,8 @@ struct SearchCounters {
   double seconds = 0.0;          ///< time that searches took, the server's part included
 };
 
-/// A memory that is searched where it lies: what is held of it is an index of its views, which
-/// takes less than they do. Several threads may use one object.
+/// A memory that is searched where it is stored: only an index of its views is held, which is
+/// smaller than they are. Several threads may use one object.
 class IndexedMemory {
  public:
   virtual ~IndexedMemory() = default;
@@ -79,8 +78,9 @@ class IndexedMemory {
   /// Returns the views as they are now; what others change meanwhile is not seen. *this must
   /// outlive it. Throws FileError when the memory cannot be reached; the next call may reach it.
   [[nodiscard]] virtual std::unique_ptr<ViewIndex> index() const = 0;
-  /// Takes over which views came and went since; searches continue meanwhile. Returns whether
-  /// anything changed. Throws FileError; then the index stays, and the next call compares all.
+  /// Updates the index to the views that came and went since; searches continue meanwhile. Returns
+  /// whether anything changed. Throws FileError; then the index stays, and the next call compares
+  /// all.
   virtual bool refresh() = 0;
 };
 

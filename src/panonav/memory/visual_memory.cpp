@@ -78,7 +78,8 @@ struct VisualMemory::Implementation {
   void require_view(ViewId view) const { static_cast<void>(position(view)); }
   [[nodiscard]] Row row(ViewId view) const { return rows[position(view)]; }
 
-  /// What is searched; rows that came since the last search are indexed first, all at once.
+  /// Returns the searched views; rows that came since the last search are indexed first, all at
+  /// once.
   [[nodiscard]] SearchedViews searched() const {
     index_rows();
     return {shape, store, index, views, rows, view_of_row};
@@ -148,7 +149,7 @@ ViewId VisualMemory::append(const PackedSignature& signature, ReferenceInfo info
   require(implementation_->next_id <= std::numeric_limits<std::uint32_t>::max(), "next view id",
           static_cast<double>(implementation_->next_id), "< 2^32");
   const ViewId id{static_cast<std::uint32_t>(implementation_->next_id)};
-  append_as(id, signature, std::move(info));
+  append_with_id(id, signature, std::move(info));
   return id;
 }
 
@@ -156,7 +157,7 @@ ViewId VisualMemory::append(const FourierSignature& signature, ReferenceInfo inf
   return append(pack(signature, implementation_->full_scale), std::move(info));
 }
 
-void VisualMemory::append_as(ViewId id, const PackedSignature& signature, ReferenceInfo info) {
+void VisualMemory::append_with_id(ViewId id, const PackedSignature& signature, ReferenceInfo info) {
   Implementation& memory = *implementation_;
   require_signature(signature, memory.shape);
   if (info.name.empty()) throw ContractError("view name", "empty", "at least one character");

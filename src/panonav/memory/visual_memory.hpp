@@ -15,7 +15,7 @@
 
 namespace panonav {
 
-/// Where a reference view was taken. Some recordings know positions but no headings.
+/// Pose of a reference view. Some recordings know positions but no headings.
 struct ReferencePose {
   double x_m = 0.0;                   ///< in the frame of the memory's positions
   double y_m = 0.0;                   ///< in the frame of the memory's positions
@@ -24,7 +24,7 @@ struct ReferencePose {
   friend bool operator==(const ReferencePose&, const ReferencePose&) = default;
 };
 
-/// What a memory knows of a view besides its signature.
+/// Name, pose and stamp of a view.
 struct ReferenceInfo {
   std::string name;                   ///< unique within a memory; usually the image's file name
   std::optional<ReferencePose> pose;  ///< empty: unknown
@@ -32,7 +32,7 @@ struct ReferenceInfo {
   friend bool operator==(const ReferenceInfo&, const ReferenceInfo&) = default;
 };
 
-/// Why two views are linked.
+/// Reason why two views are linked.
 enum class LinkKind {
   sequence,   ///< taken one after the other
   neighbour,  ///< beside each other in an arrangement by similarity
@@ -43,7 +43,7 @@ enum class LinkKind {
 struct Link {
   ViewId a;                            ///< one view
   ViewId b;                            ///< the other; links have no direction
-  LinkKind kind = LinkKind::sequence;  ///< of several kinds the one that was told last
+  LinkKind kind = LinkKind::sequence;  ///< of several kinds the last one
   friend bool operator==(const Link&, const Link&) = default;
 };
 
@@ -55,9 +55,9 @@ struct Match {
   friend bool operator==(const Match&, const Match&) = default;
 };
 
-/// How many views a search finds, and what it compares.
+/// Number of views that a search finds, and the components that it compares.
 struct SearchOptions {
-  int top = 10;        ///< matches wanted, >= 1
+  int top = 10;        ///< number of matches, >= 1
   int components = 0;  ///< 1 .. the memory's; 0 takes all
 };
 
@@ -67,7 +67,7 @@ struct SearchMask {
   std::span<const std::uint8_t> allowed_rows;  ///< one entry per row, 0: the row does not count
 };
 
-/// What a search found, and what it cost.
+/// Views that a search found, and its cost.
 struct SearchResult {
   std::vector<Match> matches;       ///< ascending (dissimilarity, view)
   std::uint64_t bytes_read = 0;     ///< signature and index bytes that the search touched
@@ -94,7 +94,7 @@ class VisualMemory {
   /// `full_scale`: magnitude that is packed as 255. Throws ContractError.
   VisualMemory(SignatureShape shape, float full_scale, std::optional<ElevationBand> elevations);
   ~VisualMemory();
-  /// What is left of the other may only be destroyed or assigned to.
+  /// Leaves the other in a state in which it may only be destroyed or assigned to.
   VisualMemory(VisualMemory&&) noexcept;
   VisualMemory& operator=(VisualMemory&&) noexcept;
   /// Copies all views and links.
@@ -103,10 +103,10 @@ class VisualMemory {
 
   [[nodiscard]] SignatureShape shape() const noexcept;  ///< Rows and components of every view.
   [[nodiscard]] float full_scale() const noexcept;      ///< Magnitude that is packed as 255.
-  /// Of the signatures' rows, the same for every view; empty: unknown.
+  /// Elevations of the signatures' rows, the same for every view; nullopt: unknown.
   [[nodiscard]] const std::optional<ElevationBand>& elevations() const noexcept;
   [[nodiscard]] std::size_t size() const noexcept;  ///< Number of views.
-  /// Whether there is no view.
+  /// True if there is no view.
   [[nodiscard]] bool empty() const noexcept { return size() == 0; }
 
   /// Throws ContractError on another shape, an empty or known name, or a pose that is not finite;
@@ -114,20 +114,20 @@ class VisualMemory {
   ViewId append(const PackedSignature& signature, ReferenceInfo info);
   /// Packs with the memory's full scale, then appends.
   ViewId append(const FourierSignature& signature, ReferenceInfo info);
-  /// For readers of files: appends under a given id, which must be larger than all before.
-  void append_as(ViewId id, const PackedSignature& signature, ReferenceInfo info);
+  /// Appends under this id, which must be larger than all before, as readers of files do.
+  void append_with_id(ViewId id, const PackedSignature& signature, ReferenceInfo info);
   /// Also drops the links of the view. Throws ContractError when there is no such view.
   void remove(ViewId view);
 
   /// Ascending.
   [[nodiscard]] std::span<const ViewId> views() const noexcept;
-  /// Whether the memory has this view. Cost: O(log n).
+  /// True if the memory has this view. Cost: O(log n).
   [[nodiscard]] bool contains(ViewId view) const noexcept;
-  /// The view of that name; empty when there is none.
+  /// Finds the view of that name; nullopt when there is none.
   [[nodiscard]] std::optional<ViewId> find(std::string_view name) const;
   /// These throw ContractError when there is no such view.
   [[nodiscard]] const ReferenceInfo& info(ViewId view) const;
-  /// Replaces what is known of the pose; empty: it is unknown. Throws also on a pose that is not
+  /// Replaces the pose; nullopt: it is unknown. Throws also on a pose that is not
   /// finite.
   void set_pose(ViewId view, std::optional<ReferencePose> pose);
   [[nodiscard]] PackedSignature packed(ViewId view) const;  ///< A copy of the view's bytes.
@@ -144,14 +144,14 @@ class VisualMemory {
   /// such view.
   [[nodiscard]] std::vector<ViewId> neighbours(ViewId view) const;
 
-  /// The nearest views by integer L1 over packed magnitudes: exactly what a full scan finds, ties
-  /// by id. Throws ContractError on another shape or options out of range.
+  /// Finds the nearest views by integer L1 over packed magnitudes: exactly those of a full scan,
+  /// ties by id. Throws ContractError on another shape or options out of range.
   [[nodiscard]] SearchResult search(const PackedSignature& query, const SearchOptions& options = {},
                                     const SearchMask& mask = {}) const;
 
-  /// For m = 1 .. components: the views whose partial dissimilarity is at most (1 + tolerance)
-  /// times the best full dissimilarity known so far [M04 section 2.3]. Stops early when `stop` says
-  /// so after a level.
+  /// Lists, for m = 1 .. components, the views whose partial dissimilarity is at most (1 +
+  /// tolerance) times the best full dissimilarity known so far [M04 section 2.3]. Stops after a
+  /// level for which `stop` returns true.
   [[nodiscard]] std::vector<HierarchyLevel> hierarchy(
       const PackedSignature& query, double tolerance, int components = 0,
       const std::function<bool(const HierarchyLevel&)>& stop = {},

@@ -27,7 +27,7 @@ void visit_options(OdometryNoise& options, OptionVisitor& visitor) {
 
 StepSampler::StepSampler(const Pose2& step, const OdometryNoise& noise)
     : step_(step),
-      holonomic_(noise.drive == DriveKind::holonomic),
+      is_holonomic_(noise.drive == DriveKind::holonomic),
       cos_middle_(std::cos(0.5 * step.heading_rad)),
       sin_middle_(std::sin(0.5 * step.heading_rad)) {
   const double travel = std::hypot(step.x_m, step.y_m);
@@ -46,10 +46,12 @@ StepSampler::StepSampler(const Pose2& step, const OdometryNoise& noise)
 
 Pose2 StepSampler::move(const Pose2& world_from_robot, Random& random) const {
   const auto [first, second] = random.normal_pair();
-  const Pose2 error = error_of(first, second, holonomic_ ? random.normal_pair().first : 0.0);
+  const Pose2 error =
+      error_from_deviates(first, second, is_holonomic_ ? random.normal_pair().first : 0.0);
   const double x = step_.x_m + error.x_m;
   const double y = step_.y_m + error.y_m;
-  const double direction = world_from_robot.heading_rad + share_before() * error.heading_rad;
+  const double direction =
+      world_from_robot.heading_rad + turn_share_before_travel() * error.heading_rad;
   const double c = std::cos(direction);
   const double s = std::sin(direction);
   return {world_from_robot.x_m + c * x - s * y, world_from_robot.y_m + s * x + c * y,

@@ -12,7 +12,7 @@ namespace panonav {
 /// An odometry step is `robot_old_from_robot_new`: the pose of the robot after the step in the
 /// frame of the robot before it. It does not depend on any world frame.
 
-/// How a robot moves, and so which errors its odometry can make.
+/// Drive of a robot, which decides the errors that its odometry can make.
 enum class DriveKind {
   differential,  ///< cannot move sideways: travel errors lie along the heading at the middle of the
                  ///< step
@@ -25,7 +25,7 @@ enum class DriveKind {
 /// The defaults are the order of size of small wheeled robots on flat floors without slip; measure
 /// your own.
 struct OdometryNoise {
-  /// Which errors there are: those of wheels, or of a platform that moves sideways.
+  /// Kind of errors: those of wheels, or of a platform that moves sideways.
   DriveKind drive = DriveKind::differential;
   /// Standard deviation of travel after 1 m (m); of each of x and y for a holonomic robot.
   double translation_from_translation = 0.03;
@@ -42,50 +42,54 @@ struct OdometryNoise {
 };
 void visit_options(OdometryNoise& options, OptionVisitor& visitor);
 
-/// Draws the true motion when odometry reports `step`, or the reported one when `step` is true (the
-/// random part only, with zero mean in travel and turn). Differential drive: the chord of the step
-/// keeps its angle to the heading at the middle of the step, as wheels without slip demand.
+/// Samples the true motion when odometry reports `step`, or the reported one when `step` is true
+/// (the random part only, with zero mean in travel and turn). Differential drive: the chord of the
+/// step keeps its angle to the heading at the middle of the step, as wheels without slip demand.
 class StepSampler {
  public:
   /// `noise` must be valid.
   StepSampler(const Pose2& step, const OdometryNoise& noise);
 
-  /// Where a robot is after the step that was at `world_from_robot` before. Draws one
+  /// Returns the pose after the step of a robot that was at `world_from_robot` before. Draws one
   /// `Random::normal_pair` for a differential drive, two for a holonomic one. Cost: 0.1
   /// microseconds.
   [[nodiscard]] Pose2 move(const Pose2& world_from_robot, Random& random) const;
 
-  /// The same in its parts, for many poses at once: the step with its heading in [-pi, pi).
+  /// The step with its heading in [-pi, pi).
   [[nodiscard]] const Pose2& step() const noexcept { return step_; }
-  /// Whether its travel errors are alike in x and y.
-  [[nodiscard]] bool holonomic() const noexcept { return holonomic_; }
+  /// True if its travel errors are alike in x and y.
+  [[nodiscard]] bool is_holonomic() const noexcept { return is_holonomic_; }
   /// Standard deviation of its travel (m); of each of x and y for a holonomic drive.
   [[nodiscard]] double translation_deviation_m() const noexcept { return translation_deviation_m_; }
   /// Standard deviation of its turn (rad).
   [[nodiscard]] double rotation_deviation_rad() const noexcept { return rotation_deviation_rad_; }
-  /// The error of travel and turn that normal deviates of mean 0 and deviation 1 stand for (the
-  /// third for a holonomic drive only), in the frame of the robot before the step, which the error
-  /// of the turn turns first by `share_before` of itself.
-  [[nodiscard]] Pose2 error_of(double first, double second, double third) const noexcept {
-    if (holonomic_) {
+  /// Scales normal deviates of mean 0 and deviation 1 (the third for a holonomic drive only) to
+  /// errors of travel and turn, in the frame of the robot before the step, which the error of the
+  /// turn rotates first by `share_before` of itself.
+  [[nodiscard]] Pose2 error_from_deviates(double first, double second,
+                                          double third) const noexcept {
+    if (is_holonomic_) {
       return {first * translation_deviation_m_, second * translation_deviation_m_,
               third * rotation_deviation_rad_};
     }
     const double travel_m = first * translation_deviation_m_;
     return {travel_m * cos_middle_, travel_m * sin_middle_, second * rotation_deviation_rad_};
   }
-  /// 0 for a holonomic drive, 1/2 for wheels, whose travel points along the middle of the turn.
-  [[nodiscard]] double share_before() const noexcept { return holonomic_ ? 0.0 : 0.5; }
+  /// Share of the turn's error before the travel: 0 for a holonomic drive, 1/2 for wheels, whose
+  /// travel points along the middle of the turn.
+  [[nodiscard]] double turn_share_before_travel() const noexcept {
+    return is_holonomic_ ? 0.0 : 0.5;
+  }
 
  private:
   Pose2 step_;
-  bool holonomic_;
+  bool is_holonomic_;
   double translation_deviation_m_;
   double rotation_deviation_rad_;
   double cos_middle_, sin_middle_;  ///< of half the turn
 };
 
-/// One draw: the step itself.
+/// Draws one step.
 [[nodiscard]] Pose2 sample_step(const Pose2& step, const OdometryNoise& noise, Random& random);
 
 }  // namespace panonav

@@ -49,9 +49,9 @@ Point2 PathFollower::position_at(double along_m) const {
 
 // Moves to the nearest point of the path, from the last one on and not farther than the robot can
 // have driven, even if it has cut a corner.
-void PathFollower::advance(Point2 robot) {
+void PathFollower::advance_to_nearest(Point2 robot) {
   const double max_m = along_m_ + 2.0 * options_.look_ahead_m;
-  double least = std::numeric_limits<double>::infinity();
+  double min_distance_m = std::numeric_limits<double>::infinity();
   double best_m = along_m_;
   const auto first = std::ranges::upper_bound(length_to_m_, along_m_);
   auto i = static_cast<std::size_t>(std::max<std::ptrdiff_t>(1, first - length_to_m_.begin()));
@@ -64,9 +64,9 @@ void PathFollower::advance(Point2 robot) {
         ((robot.x_m - path_[i - 1].x_m) * ex + (robot.y_m - path_[i - 1].y_m) * ey) / length;
     const double there_m =
         std::clamp(length_to_m_[i - 1] + std::clamp(foot, 0.0, length), along_m_, max_m);
-    const double off = distance(position_at(there_m), robot);
-    if (off < least) {
-      least = off;
+    const double distance_m = distance(position_at(there_m), robot);
+    if (distance_m < min_distance_m) {
+      min_distance_m = distance_m;
       best_m = there_m;
     }
   }
@@ -79,7 +79,7 @@ Point2 PathFollower::find_target() const {
   // Nearer, the robot would turn for every error of its position.
   double ahead_m = along_m_ + options_.look_ahead_m / 3.0;
   const double max_m = along_m_ + options_.look_ahead_m;
-  const auto leaves = [&](Point2 there) {
+  const auto is_cut_too_wide = [&](Point2 there) {
     const double ex = there.x_m - here.x_m;
     const double ey = there.y_m - here.y_m;
     const double length = std::hypot(ex, ey);
@@ -98,14 +98,14 @@ Point2 PathFollower::find_target() const {
   for (int i = 0; i < steps; ++i) {
     ahead_m += step_m;
     const Point2 farther = position_at(ahead_m);
-    if (leaves(farther)) break;
+    if (is_cut_too_wide(farther)) break;
     there = farther;
   }
   return there;
 }
 
 std::optional<Point2> PathFollower::next_target(Point2 robot) {
-  advance(robot);
+  advance_to_nearest(robot);
   // A robot beside the end has arrived, too.
   const double left_m = length_m() - along_m_;
   const bool near = distance(robot, path_.back()) <= options_.arrived_m;

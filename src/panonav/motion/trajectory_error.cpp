@@ -13,14 +13,14 @@ struct Pair {
   Pose2 truth;
 };
 
-TrajectoryError::Summary summary(const std::vector<double>& errors) {
+TrajectoryError::Summary summarise(const std::vector<double>& errors) {
   double squares = 0;
   for (const double error : errors) squares += error * error;
   return {std::sqrt(squares / static_cast<double>(errors.size())), mean(errors), median(errors),
           quantile(errors, 0.95), *std::max_element(errors.begin(), errors.end())};
 }
 
-Pose2 aligned(const Alignment& ground_truth_from_estimate, const Pose2& pose) {
+Pose2 apply_alignment(const Alignment& ground_truth_from_estimate, const Pose2& pose) {
   const Point2 position = ground_truth_from_estimate.apply(pose.position());
   const double heading_rad =
       ground_truth_from_estimate.reflected ? -pose.heading_rad : pose.heading_rad;
@@ -28,8 +28,9 @@ Pose2 aligned(const Alignment& ground_truth_from_estimate, const Pose2& pose) {
           wrap_angle(heading_rad + ground_truth_from_estimate.rotation_rad)};
 }
 
-/// For each pose the first one that lies `distance_m` farther along the true path.
-void relative_errors(const std::vector<Pair>& pairs, double distance_m, TrajectoryError& error) {
+/// Compares each pose with the first one that lies `distance_m` farther along the true path.
+void compute_relative_errors(const std::vector<Pair>& pairs, double distance_m,
+                             TrajectoryError& error) {
   std::vector<double> travelled_m{0.0};
   for (std::size_t i = 1; i < pairs.size(); ++i) {
     travelled_m.push_back(travelled_m.back() +
@@ -49,8 +50,8 @@ void relative_errors(const std::vector<Pair>& pairs, double distance_m, Trajecto
   }
   error.relative_pairs = position_m.size();
   if (position_m.empty()) return;
-  error.relative_position_m = summary(position_m);
-  error.relative_heading_rad = summary(heading_rad);
+  error.relative_position_m = summarise(position_m);
+  error.relative_heading_rad = summarise(heading_rad);
 }
 
 }  // namespace
@@ -94,15 +95,15 @@ std::optional<TrajectoryError> trajectory_error(const Trajectory& estimate, cons
   }
   std::vector<double> heading_rad;
   for (Pair& pair : pairs) {
-    pair.estimate = aligned(error.ground_truth_from_estimate, pair.estimate);
+    pair.estimate = apply_alignment(error.ground_truth_from_estimate, pair.estimate);
     error.position_errors_m.push_back(distance(pair.estimate.position(), pair.truth.position()));
     heading_rad.push_back(
         std::abs(angle_difference(pair.estimate.heading_rad, pair.truth.heading_rad)));
   }
-  error.position_m = summary(error.position_errors_m);
-  error.heading_rad = summary(heading_rad);
+  error.position_m = summarise(error.position_errors_m);
+  error.heading_rad = summarise(heading_rad);
   error.ground_truth_from_estimate.rms_m = error.position_m.rms;
-  relative_errors(pairs, options.relative_distance_m, error);
+  compute_relative_errors(pairs, options.relative_distance_m, error);
   return error;
 }
 

@@ -9,14 +9,14 @@
 
 namespace panonav {
 
-/// How far an estimated trajectory is from the truth (Sturm et al. 2012).
+/// Errors of an estimated trajectory (Sturm et al. 2012).
 struct TrajectoryError {
-  /// How an estimate is compared with the truth.
+  /// Rules by which an estimate is compared with the truth.
   struct Options {
     /// The truth is interpolated to the stamps of the estimate; estimates in a gap of the truth
     /// longer than this are left out.
     double max_gap_s = 1.0;
-    /// How far apart the poses of a relative error lie along the true path.
+    /// Distance along the true path between the poses of a relative error.
     double relative_distance_m = 1.0;
     bool align = true;              ///< false: both are in one frame already
     bool align_scale = false;       ///< with `align`: the estimate's unit of length is free
@@ -48,8 +48,8 @@ struct TrajectoryError {
 
 void visit_options(TrajectoryError::Options& options, OptionVisitor& visitor);
 
-/// Associates by stamp, aligns by least squares over the positions, and compares. Empty when fewer
-/// than two estimates have a true pose at their stamp. Throws OptionError.
+/// Associates by stamp, aligns by least squares over the positions, and compares; nullopt when
+/// fewer than two estimates have a true pose at their stamp. Throws OptionError.
 [[nodiscard]] std::optional<TrajectoryError> trajectory_error(
     const Trajectory& estimate, const Trajectory& truth,
     const TrajectoryError::Options& options = {});

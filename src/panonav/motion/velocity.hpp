@@ -19,11 +19,11 @@ struct Velocity {
 class RobotBase {
  public:
   virtual ~RobotBase() = default;
-  /// Drives so from now on, instead of as before.
+  /// Drives at this velocity until the next command.
   virtual void command(const Velocity& velocity) = 0;
 };
 
-/// What a base can do, and how commands to it are made.
+/// Limits of a base, and the period of its commands.
 struct BaseOptions {
   DriveKind drive = DriveKind::differential;  ///< wheels, or a platform that moves sideways
   double speed_m_s = 0.3;                     ///< highest, > 0
@@ -33,15 +33,16 @@ struct BaseOptions {
 };
 void visit_options(BaseOptions& options, OptionVisitor& visitor);
 
-/// The command for the next period towards a point at `direction_rad` and `distance_m` in the
-/// current robot frame. It never drives past the point. A holonomic robot keeps its heading; a
+/// Computes the command for the next period towards a point at `direction_rad` and `distance_m` in
+/// the current robot frame. It never drives past the point. A holonomic robot keeps its heading; a
 /// differential drive turns towards the point, on the spot first, and slows down with the cosine of
-/// the angle that is left. At distance 0 the robot stands. Throws ContractError on numbers that are
+/// the remaining angle. At distance 0 the robot stands. Throws ContractError on numbers that are
 /// not finite or a distance below 0, OptionError.
 [[nodiscard]] Velocity compute_command_towards(double direction_rad, double distance_m,
                                                const BaseOptions& options);
 
-/// robot_old_from_robot_new after driving so for a time >= 0: an arc, or a straight line.
+/// Returns robot_old_from_robot_new after driving at this velocity for a time >= 0: an arc, or a
+/// straight line.
 [[nodiscard]] Pose2 integrate_velocity(const Velocity& velocity, double duration_s);
 
 }  // namespace panonav

@@ -38,7 +38,7 @@ void fill_row(std::span<float> row, std::span<const std::uint8_t> hidden, float 
 
 }  // namespace
 
-std::vector<std::uint8_t> values_hidden_by(ImageView mask, const Unwarper& unwarper) {
+std::vector<std::uint8_t> find_hidden_values(ImageView mask, const Unwarper& unwarper) {
   require(mask.channels == 1, "channels of the mask", mask.channels, "1");
   Image seen(mask.width, mask.height);
   for (int v = 0; v < mask.height; ++v) {

@@ -10,11 +10,12 @@
 
 namespace panonav {
 
-/// Which values of the unwarped panorama depend on pixels of `mask` that are 0, where the robot
-/// itself is seen: rows x columns entries, row-major, 1 where hidden. `mask` has one channel and
-/// the size of the camera's images. Throws ContractError on another mask, and on one that hides
+/// Finds the values of the unwarped panorama that depend on pixels of `mask` that are 0, where the
+/// robot itself is seen: rows x columns entries, row-major, 1 where hidden. `mask` has one channel
+/// and the size of the camera's images. Throws ContractError on another mask, and on one that hides
 /// everything.
-[[nodiscard]] std::vector<std::uint8_t> values_hidden_by(ImageView mask, const Unwarper& unwarper);
+[[nodiscard]] std::vector<std::uint8_t> find_hidden_values(ImageView mask,
+                                                           const Unwarper& unwarper);
 
 /// Replaces the hidden values of each row by the straight line, round the cylinder, between the
 /// seen values on either side. For rows whose power falls as 1 / f^2, as it does in natural

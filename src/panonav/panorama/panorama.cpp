@@ -60,7 +60,7 @@ double Panorama::azimuth_rad(int column) const noexcept {
   return wrap_angle(2.0 * std::numbers::pi * column / columns_);
 }
 
-Panorama mirrored(const Panorama& panorama) {
+Panorama mirror(const Panorama& panorama) {
   Panorama image = panorama;
   for (int y = 0; y < panorama.rows(); ++y) {
     for (int x = 1; x < panorama.columns(); ++x) {
@@ -70,7 +70,7 @@ Panorama mirrored(const Panorama& panorama) {
   return image;
 }
 
-Panorama turn_columns(const Panorama& panorama, int columns_turned) {
+Panorama rotate_columns(const Panorama& panorama, int columns_turned) {
   const int columns = panorama.columns();
   const int shift = (columns_turned % columns + columns) % columns;
   Panorama turned = panorama;

@@ -62,19 +62,20 @@ class Panorama {
   std::vector<float> values_;
 };
 
-/// What the robot sees after turning on the spot by `columns_turned` columns counter-clockwise:
+/// Rotates the view as if the robot had turned by `columns_turned` columns counter-clockwise:
 /// I'(phi) = I(phi + delta), so column c of the result is column c + columns_turned.
-[[nodiscard]] Panorama turn_columns(const Panorama& panorama, int columns_turned);
-/// The left of the robot becomes its right: column c goes to -c.
-[[nodiscard]] Panorama mirrored(const Panorama& panorama);
+[[nodiscard]] Panorama rotate_columns(const Panorama& panorama, int columns_turned);
+/// Mirrors the view, left to right: column c goes to -c.
+[[nodiscard]] Panorama mirror(const Panorama& panorama);
 
-/// As a picture for people: clockwise, forward in the middle, 0..1 as 0..255 (clamped). No column
-/// is mixed with another: column 0 becomes the picture's column columns / 2, so that reading the
-/// picture back with `picture_forward_column` gives the same panorama but for the rounding to 8
+/// Makes a picture for people: clockwise, forward in the middle, 0..1 as 0..255 (clamped). No
+/// column is mixed with another: column 0 becomes the picture's column columns / 2, so that reading
+/// the picture back with `picture_forward_column` gives the same panorama but for the rounding to 8
 /// bit.
 [[nodiscard]] Image to_picture(const Panorama& panorama);
 
-/// Where `to_picture` puts the forward direction: a fraction of the width, between its outer edges.
+/// Position of the forward direction in `to_picture`: a fraction of the width, between its outer
+/// edges.
 [[nodiscard]] double picture_forward_column(int columns) noexcept;
 
 }  // namespace panonav

@@ -13,7 +13,7 @@ namespace panonav {
 namespace {
 
 /// Keys' cubic convolution kernel, a = -1/2: exact on parabolas.
-double cubic(double x) {
+double cubic_kernel(double x) {
   x = std::abs(x);
   if (x < 1.0) return (1.5 * x - 2.5) * x * x + 1.0;
   if (x < 2.0) return ((-0.5 * x + 2.5) * x - 4.0) * x + 2.0;
@@ -39,14 +39,14 @@ Sample make_sample(double position, double step) {
   std::vector<double> weights;
   double sum = 0.0;
   for (int i = sample.first; i <= last; ++i) {
-    weights.push_back(cubic((i - position) / width));
+    weights.push_back(cubic_kernel((i - position) / width));
     sum += weights.back();
   }
   for (const double weight : weights) sample.weights.push_back(static_cast<float>(weight / sum));
   return sample;
 }
 
-void check(const PictureLayout& layout) {
+void validate_layout(const PictureLayout& layout) {
   require(layout.forward_column >= 0.0 && layout.forward_column <= 1.0, "forward_column",
           layout.forward_column, "0 .. 1 (a fraction of the width)");
   const auto check_band = [](const ElevationBand& band, const char* name, double low, double high) {
@@ -109,7 +109,7 @@ std::vector<float> sample_grey(ImageView picture, const PictureLayout& layout, d
 
 Panorama panorama_from_picture(ImageView picture, const PictureLayout& layout,
                                PanoramaShape shape) {
-  check(layout);
+  validate_layout(layout);
   require(picture.width >= 4, "picture width", picture.width, ">= 4");
   require(picture.height >= 1, "picture height", picture.height, ">= 1");
   require(shape.rows >= 0, "rows", shape.rows, ">= 0");

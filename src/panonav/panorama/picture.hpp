@@ -12,31 +12,31 @@ namespace panonav {
 /// the full circle, its rows are elevations. The centre of column c lies at (c + 0.5) / columns of
 /// the width, rows likewise.
 struct PictureLayout {
-  /// How columns run from left to right, seen from above. Pictures for people run clockwise.
+  /// Sense of the columns from left to right, seen from above. Pictures for people run clockwise.
   ColumnDirection direction = ColumnDirection::clockwise;
   /// Fraction of the width, between its outer edges, that shows the direction of the heading.
   double forward_column = 0.5;
-  /// Of the picture's lower and upper edge; empty: unknown.
+  /// Elevations of the picture's lower and upper edge; nullopt: unknown.
   std::optional<ElevationBand> elevations = std::nullopt;
   /// The part to keep, within `elevations`; empty: all. Needs `elevations`.
   std::optional<ElevationBand> kept_elevations = std::nullopt;
   friend bool operator==(const PictureLayout&, const PictureLayout&) = default;
 };
 
-/// Rows and columns wanted; 0 keeps the size of the picture (of the part that is kept).
+/// Rows and columns of a panorama; 0 keeps the size of the picture (of the part that is kept).
 struct PanoramaShape {
   int rows = 0;     ///< 0, or >= 1
   int columns = 0;  ///< 0, or >= 4
   friend bool operator==(const PanoramaShape&, const PanoramaShape&) = default;
 };
 
-/// Brings a picture into the conventions of `Panorama`, once, at the border of the program: the
-/// result runs counter-clockwise with forward at column 0, and colour becomes grey. Where the
-/// picture is as coarse as the result or coarser it is interpolated by Keys' cubic; where it is
-/// denser the cubic is widened to the distance of the new samples, so that nothing aliases. Columns
-/// that fall on columns of the same number are copied unchanged. Columns wrap round; rows end at
-/// the picture's edges. Values are clamped to [0, 1]. Throws ContractError on a layout or shape out
-/// of range. Cost: about 1 ms for 1024 x 512 to 80 x 512.
+/// Converts a picture to the conventions of `Panorama`: the result runs counter-clockwise with
+/// forward at column 0, and colour becomes grey. Where the picture is as coarse as the result or
+/// coarser it is interpolated by Keys' cubic; where it is denser the cubic is widened to the
+/// distance of the new samples, so that nothing aliases. Columns that fall on columns of the same
+/// number are copied unchanged. Columns wrap round; rows end at the picture's edges. Values are
+/// clamped to [0, 1]. Throws ContractError on a layout or shape out of range. Cost: about 1 ms for
+/// 1024 x 512 to 80 x 512.
 [[nodiscard]] Panorama panorama_from_picture(ImageView picture, const PictureLayout& layout,
                                              PanoramaShape shape = {});
 

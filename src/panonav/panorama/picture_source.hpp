@@ -8,14 +8,14 @@
 
 namespace panonav {
 
-/// What the pictures of a recording show.
+/// Kind of the pictures of a recording.
 enum class PictureKind {
   panorama,         ///< ready-made panoramic cylinders
   equirectangular,  ///< 360 degree pictures, the whole sphere
   mirror            ///< raw images of a mirror or fisheye camera with a vertical axis
 };
 
-/// How the pictures of a recording become panoramic cylinders: all that is known of the camera.
+/// Layout of the pictures of a recording, from which they become panoramic cylinders.
 struct PictureSource {
   PictureKind kind = PictureKind::panorama;  ///< which of the other members count
   /// Panorama and equirectangular: the layout of columns and rows. Mirror: only `kept_elevations`

@@ -18,7 +18,7 @@ struct Moments {
   double deviation = 0.0;
 };
 
-Moments moments(const Panorama& panorama, int first_row, int end_row) {
+Moments compute_moments(const Panorama& panorama, int first_row, int end_row) {
   const double count = static_cast<double>(end_row - first_row) * panorama.columns();
   double sum = 0.0;
   for (int y = first_row; y < end_row; ++y) {
@@ -62,12 +62,12 @@ void visit_options(PreprocessingOptions& options, OptionVisitor& visitor) {
 }
 
 double normalising_gain(double standard_deviation) noexcept {
-  constexpr double target = 0.25;
-  constexpr double least = 0.25 / 255.0;
-  return standard_deviation >= least ? target / standard_deviation : 1.0;
+  constexpr double target_deviation = 0.25;
+  constexpr double min_deviation = 0.25 / 255.0;
+  return standard_deviation >= min_deviation ? target_deviation / standard_deviation : 1.0;
 }
 
-void check_masks(const PreprocessingOptions& options, int rows) {
+void require_unmasked_rows(const PreprocessingOptions& options, int rows) {
   if (options.masked_rows_top >= rows - options.masked_rows_bottom) {
     throw ContractError(
         "masked_rows_top + masked_rows_bottom",
@@ -78,7 +78,7 @@ void check_masks(const PreprocessingOptions& options, int rows) {
 
 Panorama preprocess(Panorama panorama, const PreprocessingOptions& options) {
   validate(options);
-  check_masks(options, panorama.rows());
+  require_unmasked_rows(options, panorama.rows());
   const int first = options.masked_rows_top;
   const int end = panorama.rows() - options.masked_rows_bottom;
   const auto values = panorama.values();
@@ -89,7 +89,7 @@ Panorama preprocess(Panorama panorama, const PreprocessingOptions& options) {
 
   if (options.edge_channel) replace_by_gradients(panorama, first, end);
   if (options.remove_mean || options.normalise_gain) {
-    const Moments found = moments(panorama, first, end);
+    const Moments found = compute_moments(panorama, first, end);
     const double offset = options.remove_mean ? found.mean : 0.0;
     const double gain = options.normalise_gain ? normalising_gain(found.deviation) : 1.0;
     for (float& value : kept) value = static_cast<float>((value - offset) * gain);

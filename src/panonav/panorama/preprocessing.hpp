@@ -5,7 +5,7 @@
 
 namespace panonav {
 
-/// What is done to a panorama before its signature is taken. Every step commutes with a turn of the
+/// Steps between a panorama and its signature. Every step commutes with a turn of the
 /// robot: preprocessing a turned view gives the preprocessed view turned. Steps run in the order of
 /// the members. There is no low-pass step: taking the first components of a signature is one. Mean
 /// and gain are on by default: on real routes they cost nothing in constant light, and places are
@@ -30,13 +30,14 @@ struct PreprocessingOptions {
 
 void visit_options(PreprocessingOptions& options, OptionVisitor& visitor);
 
-/// The factor by which `normalise_gain` scales a view of this standard deviation.
+/// Returns the factor by which `normalise_gain` scales a view of this standard deviation.
 [[nodiscard]] double normalising_gain(double standard_deviation) noexcept;
 
-/// Throws ContractError when the masks leave no row of so many.
-void check_masks(const PreprocessingOptions& options, int rows);
+/// Throws ContractError when the masks leave none of `rows` rows.
+void require_unmasked_rows(const PreprocessingOptions& options, int rows);
 
-/// Throws ContractError when the masks leave no row; OptionError on options out of range.
+/// Applies the steps. Throws ContractError when the masks leave no row; OptionError on options out
+/// of range.
 [[nodiscard]] Panorama preprocess(Panorama panorama, const PreprocessingOptions& options);
 
 }  // namespace panonav

@@ -58,27 +58,28 @@ constexpr double node_spacing_rad = 5.0 * std::numbers::pi / 180.0;
 constexpr double polar_rad = std::numbers::pi / 3.0;
 
 /// The nodes of one row, one more than needed at its end.
-void nodes_of_row(const TiltedPositions& positions, double elevation_rad, int columns, int step,
-                  std::vector<Shift>& nodes) {
+void compute_nodes(const TiltedPositions& positions, double elevation_rad, int columns, int step,
+                   std::vector<Shift>& nodes) {
   nodes.clear();
   for (int c = 0; c < columns + step; c += step)
     nodes.push_back(positions.at(elevation_rad, 2.0 * std::numbers::pi * c / columns));
 }
 
-Shift between(const Shift& a, const Shift& b, float share) {
+Shift interpolate_shift(const Shift& a, const Shift& b, float share) {
   return {a.row + share * (b.row - a.row), a.columns + share * (b.columns - a.columns)};
 }
 
 /// One row of the level panorama.
-void look_up_row(const Panorama& seen, const std::vector<Shift>& nodes, int step,
-                 std::span<float> values) {
+void interpolate_row(const Panorama& seen, const std::vector<Shift>& nodes, int step,
+                     std::span<float> values) {
   const int columns = seen.columns();
   const auto last_row = static_cast<float>(seen.rows() - 1);
   const float* const from = seen.values().data();
   for (int c = 0; c < columns; ++c) {
     const int node = c / step;
-    const Shift shift = between(nodes[node], nodes[static_cast<std::size_t>(node) + 1],
-                                static_cast<float>(c - node * step) / static_cast<float>(step));
+    const Shift shift =
+        interpolate_shift(nodes[node], nodes[static_cast<std::size_t>(node) + 1],
+                          static_cast<float>(c - node * step) / static_cast<float>(step));
     const float row = std::clamp(shift.row, 0.0F, last_row);
     const int above = static_cast<int>(row);
     const int below = std::min(above + 1, seen.rows() - 1);
@@ -126,27 +127,28 @@ Panorama level_panorama(const Panorama& seen, const Tilt& tilt, int rows,
   std::vector<Shift> lower;
   int lower_row = -1;
   for (int y = 0; y < rows; ++y) {
-    const bool polar = std::abs(level.elevation_rad(y)) + tilt_rad > polar_rad;
-    const int step = polar ? 1 : column_step;
-    if (polar) {
-      nodes_of_row(positions, level.elevation_rad(y), columns, step, nodes);
+    const bool is_polar = std::abs(level.elevation_rad(y)) + tilt_rad > polar_rad;
+    const int step = is_polar ? 1 : column_step;
+    if (is_polar) {
+      compute_nodes(positions, level.elevation_rad(y), columns, step, nodes);
     } else {
       const int upper_row = y / row_step * row_step;
       if (lower_row != upper_row + row_step) {
         if (lower_row == upper_row) {
           std::swap(upper, lower);
         } else {
-          nodes_of_row(positions, level.elevation_rad(upper_row), columns, step, upper);
+          compute_nodes(positions, level.elevation_rad(upper_row), columns, step, upper);
         }
         lower_row = upper_row + row_step;
-        nodes_of_row(positions, level.elevation_rad(lower_row), columns, step, lower);
+        compute_nodes(positions, level.elevation_rad(lower_row), columns, step, lower);
       }
       const auto share = static_cast<float>(y - upper_row) / static_cast<float>(row_step);
       nodes.resize(upper.size());
-      for (std::size_t i = 0; i < nodes.size(); ++i) nodes[i] = between(upper[i], lower[i], share);
+      for (std::size_t i = 0; i < nodes.size(); ++i)
+        nodes[i] = interpolate_shift(upper[i], lower[i], share);
     }
-    look_up_row(seen, nodes, step,
-                level.values().subspan(width * static_cast<std::size_t>(y), width));
+    interpolate_row(seen, nodes, step,
+                    level.values().subspan(width * static_cast<std::size_t>(y), width));
   }
   return level;
 }

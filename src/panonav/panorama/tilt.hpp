@@ -18,16 +18,17 @@ inline constexpr double max_tilt_rad = 0.5235987755982988;  // 30 degrees
 /// Throws ContractError unless both angles are at most `max_tilt_rad`.
 void validate(const Tilt& tilt);
 
-/// What the robot would see if its axis were vertical, heading and place the same: `seen` turned by
-/// the inverse of the tilt, as a panorama of `rows` rows in `band`, interpolated linearly between
-/// four values. `seen` may show more than the band, so that little of it is missing; directions
-/// that `seen` does not show take its nearest row, as in `Unwarper`. No tilt and the same shape:
-/// the same bits. Throws ContractError where the elevations of `seen` are unknown or the tilt is
-/// too large. Cost: 0.37 ms for 80 x 512 (docs/performance.md).
+/// Levels a panorama: computes the view of the robot with its axis vertical, at the same heading
+/// and place. `seen` is rotated by the inverse of the tilt into a panorama of `rows` rows in
+/// `band`, interpolated linearly between four values. `seen` may show more than the band, so that
+/// little of it is missing; directions that `seen` does not show take its nearest row, as in
+/// `Unwarper`. No tilt and the same shape: the same bits. Throws ContractError where the elevations
+/// of `seen` are unknown or the tilt is too large. Cost: 0.37 ms for 80 x 512
+/// (docs/performance.md).
 [[nodiscard]] Panorama level_panorama(const Panorama& seen, const Tilt& tilt, int rows,
                                       const ElevationBand& band);
-/// In the band and with the rows of `seen`. Where its elevations are unknown, a tilt of up to half
-/// a degree is tolerated.
+/// Levels a panorama in the band and with the rows of `seen`. Where its elevations are unknown, a
+/// tilt of up to half a degree is tolerated.
 [[nodiscard]] Panorama level_panorama(const Panorama& seen, const Tilt& tilt);
 
 }  // namespace panonav

@@ -71,7 +71,7 @@ bool Unwarper::is_seen(int row, int column) const noexcept {
          table_->seen[static_cast<std::size_t>(row) * columns_ + column] != 0;
 }
 
-void Unwarper::check(ImageView image) const {
+void Unwarper::require_camera_size(ImageView image) const {
   const auto text = [](ImageSize size) {
     return std::to_string(size.width) + " x " + std::to_string(size.height);
   };
@@ -81,7 +81,7 @@ void Unwarper::check(ImageView image) const {
   }
 }
 
-void Unwarper::prepare(ImageView image, Workspace& workspace) const {
+void Unwarper::halve_and_pair(ImageView image, Workspace& workspace) const {
   const kernels::Instructions instructions = kernels::chosen_instructions();
   workspace.halved.resize(table_->halved_size);
   workspace.pairs.resize(table_->pairs_size);
@@ -115,8 +115,8 @@ void Unwarper::prepare(ImageView image, Workspace& workspace) const {
   }
 }
 
-void Unwarper::look_up(std::span<const std::uint16_t> pairs, int row,
-                       std::span<float> values) const {
+void Unwarper::compute_row(std::span<const std::uint16_t> pairs, int row,
+                           std::span<float> values) const {
   const UnwarpTable::Row& entry = table_->rows[row];
   const std::size_t count = static_cast<std::size_t>(entry.taps) * columns_;
   // The taps of two lenses share the weight of one.
@@ -142,7 +142,7 @@ Panorama Unwarper::unwrap(ImageView image, Workspace& workspace) const {
 
 void Unwarper::unwrap_blocks(ImageView image, Workspace& workspace,
                              const std::function<void(int, std::span<const float>)>& take) const {
-  check(image);
+  require_camera_size(image);
   if (std::holds_alternative<EquirectangularModel>(camera_.model)) {
     const Panorama panorama = unwrap_picture(camera_, image, elevations_, rows_, columns_);
     for (int y = 0; y < rows_; y += rows_per_block) {
@@ -157,14 +157,14 @@ void Unwarper::unwrap_blocks(ImageView image, Workspace& workspace,
     grey = to_grey(image);
     image = grey->view();
   }
-  prepare(image, workspace);
+  halve_and_pair(image, workspace);
   std::vector<float>& block = workspace.block;
   block.resize(static_cast<std::size_t>(rows_per_block) * columns_);
   for (int y = 0; y < rows_; y += rows_per_block) {
     const int count = std::min(rows_per_block, rows_ - y);
     for (int i = 0; i < count; ++i) {
-      look_up(workspace.pairs, y + i,
-              std::span(block).subspan(static_cast<std::size_t>(i) * columns_, columns_));
+      compute_row(workspace.pairs, y + i,
+                  std::span(block).subspan(static_cast<std::size_t>(i) * columns_, columns_));
     }
     take(y, std::span<const float>(block).first(static_cast<std::size_t>(count) * columns_));
   }

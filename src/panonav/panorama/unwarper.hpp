@@ -29,26 +29,13 @@ struct UnwarperOptions {
 void visit_options(UnwarperOptions& options, OptionVisitor& visitor);
 
 /// Turns the images of one camera into panoramic cylinders by a table that is computed once.
-///
 /// Each value is the mean of one or more taps within its field; a tap interpolates linearly between
-/// four pixels, of the image itself or of the image halved so often that the distance of its pixels
-/// fits the distance of the values (in the direction where they lie closer; more than one tap where
-/// the other direction needs it). So nothing aliases however dense the image is. The level and the
-/// number of taps are the same along a row. Weights have 7 bit: a value differs from exact
-/// interpolation by at most 2 grey levels next to full contrast, 0.3 typically.
-///
-/// Near the mirror's border finer levels are used, and in the image itself taps keep two pixels
-/// away from it, so that the dark beyond does not leak in. Directions that the camera does not see
-/// are looked up at the nearest row seen in the same column, and columns in which nothing is seen
-/// at the nearest column: no edge appears that is not in the world.
-///
-/// Pictures of a dual fisheye camera are blended across the seam (`blend_share`), the brighter lens
-/// made as dark as the other one.
-///
-/// Images of an equirectangular camera go through `panorama_from_picture`.
-///
-/// Immutable after construction; several threads may use one at a time, each with its own
-/// Workspace.
+/// four pixels of the image, halved until its pixels are as far apart as the values, so that
+/// nothing aliases. Weights have 7 bit: at most 2 grey levels of error next to full contrast. Taps
+/// keep two pixels away from a mirror's border.
+/// Directions that the camera does not see take the nearest row seen in the same column, or the
+/// nearest column. Two fisheye lenses are blended across the seam (`blend_share`). Immutable after
+/// construction; several threads may use one at a time, each with its own Workspace.
 class Unwarper {
  public:
   static constexpr int rows_per_block = 4;  ///< Rows that `unwrap_blocks` hands over at a time.
@@ -68,7 +55,8 @@ class Unwarper {
   [[nodiscard]] const Camera& camera() const noexcept { return camera_; }
   [[nodiscard]] int rows() const noexcept { return rows_; }        ///< Rows of its panoramas.
   [[nodiscard]] int columns() const noexcept { return columns_; }  ///< Columns of its panoramas.
-  /// Of its panoramas: the wanted band, or all that the camera sees at every azimuth.
+  /// Elevations of its panoramas: the band of the options, or all that the camera sees at every
+  /// azimuth.
   [[nodiscard]] const ElevationBand& elevations() const noexcept { return elevations_; }
   /// False where the value is taken from a neighbour, because the camera does not see that
   /// direction.
@@ -86,10 +74,10 @@ class Unwarper {
                      const std::function<void(int, std::span<const float>)>& take) const;
 
  private:
-  void check(ImageView image) const;
+  void require_camera_size(ImageView image) const;
   /// Halves and pairs what the table needs.
-  void prepare(ImageView image, Workspace& workspace) const;
-  void look_up(std::span<const std::uint16_t> pairs, int row, std::span<float> values) const;
+  void halve_and_pair(ImageView image, Workspace& workspace) const;
+  void compute_row(std::span<const std::uint16_t> pairs, int row, std::span<float> values) const;
 
   Camera camera_;
   int rows_, columns_;

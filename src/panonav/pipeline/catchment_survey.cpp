@@ -145,7 +145,7 @@ RecordedViews read_views(const Dataset& recording, const HomingViewOptions& opti
           Random random(*turn_seed, index);
           const auto columns = static_cast<std::uint64_t>(panorama.columns());
           const auto turned = static_cast<int>(random.index(columns));
-          panorama = turn_columns(panorama, turned);
+          panorama = rotate_columns(panorama, turned);
           result.turned_rad[index] =
               wrap_angle(2.0 * std::numbers::pi * turned / static_cast<double>(columns));
         }

@@ -72,7 +72,7 @@ bool Mapper::add(EncodedView seen) {
   if (odometry_of_node_ && seen.odometry) moved = inverse(*odometry_of_node_) * *seen.odometry;
   start = Clock::now();
   try {
-    seen_.append_as(id, added.signature, added.info);
+    seen_.append_with_id(id, added.signature, added.info);
     static_cast<void>(mapper_.add(id, std::move(view), moved));
   } catch (const ContractError& error) {
     throw FileError(file_.path().string(), added.info.name + ": " + error.what());

@@ -183,7 +183,7 @@ Dataset open_pictures(const fs::path& path, const InputOptions& options) {
     throw OptionError(path.string() +
                       " is one picture; 'from_s', 'to_s' and the option every go with a recording");
   } else {
-    opened = single_picture(path, source);
+    opened = read_single_picture(path, source);
   }
   warn_of_left_out(opened);
   if (options.source) warn_of_other_kind(opened);

@@ -36,8 +36,7 @@ class ObservationQuery {
   }
   [[nodiscard]] QueryFeatures features() {
     return [this](Handedness handedness) {
-      return encoder_.features(handedness == Handedness::as_seen ? panorama()
-                                                                 : mirrored(panorama()));
+      return encoder_.features(handedness == Handedness::as_seen ? panorama() : mirror(panorama()));
     };
   }
 

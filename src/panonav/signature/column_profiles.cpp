@@ -19,30 +19,30 @@ constexpr int bands = ColumnProfiles::bands;
 static_assert(columns == kernels::matched_reference_columns && bands == kernels::matched_bands);
 constexpr std::uint8_t middle = 128;  // byte of a value as high as the column's mean
 // A contrast of 1 in bytes: more than three times the contrast of a column is rare.
-constexpr float unit = 40.0F;
+constexpr float bytes_per_contrast = 40.0F;
 // A column's own contrast counts together with this share of that of all columns, so that the noise
 // of a blank wall is not blown up to a pattern.
-constexpr float share_of_all = 0.2F;
+constexpr float mean_contrast_share = 0.2F;
 // With fewer bands than this a column has no shape of its own.
-constexpr int fewest_for_shape = 4;
+constexpr int min_bands_for_shape = 4;
 
 // Each band of all columns; a band is the unit of the vector loops.
-using Rebuilt = std::array<std::array<float, columns>, bands>;
+using BandView = std::array<std::array<float, columns>, bands>;
 
 // Finer components than this would need more columns.
 constexpr int max_components = columns / 2;
 
 // The columns of a quarter turn, both ends included; the others follow by symmetry. Filled up to
-// whole vectors.
+// scale vectors.
 constexpr std::size_t quarter = columns / 4 + 1;
-constexpr std::size_t quarter_filled = (quarter + 3) / 4 * 4;
-using Quarter = std::array<float, quarter_filled>;
+constexpr std::size_t padded_quarter = (quarter + 3) / 4 * 4;
+using Quarter = std::array<float, padded_quarter>;
 
 struct Waves {
   std::array<Quarter, max_components> cosines, sines;
 };
 
-const Waves& waves() {
+const Waves& wave_table() {
   static const Waves made = [] {
     Waves waves{};
     for (std::size_t k = 0; k < max_components; ++k) {
@@ -58,9 +58,9 @@ const Waves& waves() {
   return made;
 }
 
-// Rows that count, spread over the bands as evenly as whole rows allow.
-int rebuild(const PackedSignature& signature, int components,
-            std::span<const std::uint8_t> allowed_rows, Rebuilt& view) {
+// Rows that count, spread over the bands as evenly as scale rows allow.
+int reconstruct_view(const PackedSignature& signature, int components,
+                     std::span<const std::uint8_t> allowed_rows, BandView& view) {
   const auto rows = static_cast<std::size_t>(signature.shape.rows);
   std::vector<std::size_t> counted;
   for (std::size_t y = 0; y < rows; ++y) {
@@ -93,11 +93,11 @@ int rebuild(const PackedSignature& signature, int components,
       const float scale = (k == 0 ? 0.5F : 1.0F) / static_cast<float>(end - first);
       real *= scale;
       imaginary *= scale;
-      const auto& cosine = waves().cosines[k];
-      const auto& sine = waves().sines[k];
+      const auto& cosine = wave_table().cosines[k];
+      const auto& sine = wave_table().sines[k];
       auto& cosine_sum = cosine_sums[k % 2];
       auto& sine_sum = sine_sums[k % 2];
-      for (std::size_t c = 0; c < quarter_filled; ++c) {
+      for (std::size_t c = 0; c < padded_quarter; ++c) {
         cosine_sum[c] += real * cosine[c];
         sine_sum[c] += imaginary * sine[c];
       }
@@ -118,7 +118,7 @@ int rebuild(const PackedSignature& signature, int components,
   return static_cast<int>(used);
 }
 
-void free_columns_of_mean(Rebuilt& view, std::size_t used) {
+void subtract_column_means(BandView& view, std::size_t used) {
   std::array<float, columns> means{};
   for (std::size_t b = 0; b < used; ++b) {
     for (std::size_t c = 0; c < columns; ++c) means[c] += view[b][c];
@@ -130,7 +130,7 @@ void free_columns_of_mean(Rebuilt& view, std::size_t used) {
 }
 
 // Views of so few rows are compared by their brightness.
-void free_view_of_mean(Rebuilt& view, std::size_t used) {
+void subtract_view_mean(BandView& view, std::size_t used) {
   float mean = 0.0F;
   for (std::size_t b = 0; b < used; ++b) {
     for (const float value : view[b]) mean += value / static_cast<float>(used * columns);
@@ -143,7 +143,7 @@ void free_view_of_mean(Rebuilt& view, std::size_t used) {
 constexpr int query_columns = ColumnProfiles::compared_columns;
 static_assert(query_columns == kernels::matched_query_columns);
 
-void check_bands(const ColumnProfiles& query, const ColumnProfiles& reference) {
+void require_same_bands(const ColumnProfiles& query, const ColumnProfiles& reference) {
   if (query.used_bands() == reference.used_bands()) return;
   throw ContractError("bands of the query", query.used_bands(),
                       to_text(reference.used_bands()) + ", as of the reference");
@@ -151,19 +151,20 @@ void check_bands(const ColumnProfiles& query, const ColumnProfiles& reference) {
 
 using Costs = std::array<std::uint16_t, columns>;
 
-Costs costs_of_turns(const ColumnProfiles& query, const ColumnProfiles& reference) {
-  check_bands(query, reference);
+Costs compute_costs(const ColumnProfiles& query, const ColumnProfiles& reference) {
+  require_same_bands(query, reference);
   Costs costs{};
   kernels::match_columns(query.compared_values(), reference.values(), costs,
                          kernels::chosen_instructions());
   return costs;
 }
 
-ColumnMatch match_at(const ColumnProfiles& query, const Costs& costs, std::size_t turn) {
+ColumnMatch make_match(const ColumnProfiles& query, const Costs& costs, std::size_t turn) {
   // The kernel counts 16 roots of bytes.
-  const double whole =
-      16.0 * query_columns * std::sqrt(static_cast<double>(unit) * std::max(1, query.used_bands()));
-  return {static_cast<double>(costs[turn]) / whole,
+  const double scale =
+      16.0 * query_columns *
+      std::sqrt(static_cast<double>(bytes_per_contrast) * std::max(1, query.used_bands()));
+  return {static_cast<double>(costs[turn]) / scale,
           wrap_angle(2.0 * std::numbers::pi * static_cast<double>(turn) / columns)};
 }
 
@@ -181,14 +182,14 @@ ColumnProfiles::ColumnProfiles(const PackedSignature& signature, int components,
   if (components == 0) components = signature.shape.components;
   components = std::min(components, max_components);
 
-  Rebuilt view;
-  used_bands_ = rebuild(signature, components, allowed_rows, view);
+  BandView view;
+  used_bands_ = reconstruct_view(signature, components, allowed_rows, view);
   const auto used = static_cast<std::size_t>(used_bands_);
-  const bool shaped = used_bands_ >= fewest_for_shape;
-  if (shaped) {
-    free_columns_of_mean(view, used);
+  const bool has_shape = used_bands_ >= min_bands_for_shape;
+  if (has_shape) {
+    subtract_column_means(view, used);
   } else {
-    free_view_of_mean(view, used);
+    subtract_view_mean(view, used);
   }
   std::array<float, columns> contrasts{};
   float all = 0.0F;
@@ -202,11 +203,12 @@ ColumnProfiles::ColumnProfiles(const PackedSignature& signature, int components,
   all = std::sqrt(all);
   if (!(all > 0.0F)) return;  // nothing to see
   for (float& contrast : contrasts) {
-    contrast = shaped ? std::sqrt(contrast) + share_of_all * all : all;
+    contrast = has_shape ? std::sqrt(contrast) + mean_contrast_share * all : all;
   }
   for (std::size_t b = 0; b < used; ++b) {
     for (std::size_t c = 0; c < columns; ++c) {
-      const float value = std::clamp(unit * view[b][c] / contrasts[c], -127.0F, 127.0F);
+      const float value =
+          std::clamp(bytes_per_contrast * view[b][c] / contrasts[c], -127.0F, 127.0F);
       values_[b * columns + c] =
           static_cast<std::uint8_t>(static_cast<int>(value + (middle + 0.5F)));
     }
@@ -217,38 +219,38 @@ ColumnProfiles::ColumnProfiles(const PackedSignature& signature, int components,
 }
 
 ColumnMatch match_columns(const ColumnProfiles& query, const ColumnProfiles& reference) {
-  const auto costs = costs_of_turns(query, reference);
+  const auto costs = compute_costs(query, reference);
   const auto best = std::ranges::min_element(costs) - costs.begin();
-  return match_at(query, costs, static_cast<std::size_t>(best));
+  return make_match(query, costs, static_cast<std::size_t>(best));
 }
 
 std::array<ColumnMatch, 2> match_columns_twice(const ColumnProfiles& query,
                                                const ColumnProfiles& reference) {
   constexpr std::size_t apart = (columns + 5) / 6;
-  const auto costs = costs_of_turns(query, reference);
+  const auto costs = compute_costs(query, reference);
   // With its turn as the last bits a cost is found together with it, and the first of equal ones.
-  std::uint32_t least = ~0U;
+  std::uint32_t min_cost = ~0U;
   for (std::uint32_t turn = 0; turn < columns; ++turn) {
-    least = std::min(least, static_cast<std::uint32_t>(costs[turn]) * columns + turn);
+    min_cost = std::min(min_cost, static_cast<std::uint32_t>(costs[turn]) * columns + turn);
   }
-  const std::size_t best = least % columns;
+  const std::size_t best = min_cost % columns;
   std::array<std::uint16_t, 2 * columns> twice;
   std::ranges::copy(costs, std::ranges::copy(costs, twice.begin()).out);
-  std::uint32_t min_apart = ~0U;
+  std::uint32_t min_other_cost = ~0U;
   for (std::uint32_t turn = apart; turn <= columns - apart; ++turn) {
-    min_apart =
-        std::min(min_apart, static_cast<std::uint32_t>(twice[best + turn]) * columns + turn);
+    min_other_cost =
+        std::min(min_other_cost, static_cast<std::uint32_t>(twice[best + turn]) * columns + turn);
   }
-  const std::size_t other = (best + min_apart % columns) % columns;
-  return {match_at(query, costs, best), match_at(query, costs, other)};
+  const std::size_t other = (best + min_other_cost % columns) % columns;
+  return {make_match(query, costs, best), make_match(query, costs, other)};
 }
 
 std::array<double, ColumnProfiles::compared_columns> column_distances_near(
     const ColumnProfiles& query, const ColumnProfiles& reference, double heading_rad) {
-  check_bands(query, reference);
+  require_same_bands(query, reference);
   const auto nearest =
       static_cast<int>(std::lround(wrap_angle(heading_rad) * columns / (2.0 * std::numbers::pi)));
-  std::array<int, query_columns> least{};
+  std::array<int, query_columns> min_sums{};
   for (int turn = nearest - 1; turn <= nearest + 1; ++turn) {
     const auto shift = static_cast<std::size_t>((turn + 2 * columns) % columns);
     std::array<int, query_columns> sums{};
@@ -261,12 +263,12 @@ std::array<double, ColumnProfiles::compared_columns> column_distances_near(
       }
     }
     for (std::size_t c = 0; c < query_columns; ++c) {
-      least[c] = turn == nearest - 1 ? sums[c] : std::min(least[c], sums[c]);
+      min_sums[c] = turn == nearest - 1 ? sums[c] : std::min(min_sums[c], sums[c]);
     }
   }
   std::array<double, query_columns> distances{};
-  const double whole = static_cast<double>(unit) * std::max(1, query.used_bands());
-  for (std::size_t c = 0; c < query_columns; ++c) distances[c] = least[c] / whole;
+  const double scale = static_cast<double>(bytes_per_contrast) * std::max(1, query.used_bands());
+  for (std::size_t c = 0; c < query_columns; ++c) distances[c] = min_sums[c] / scale;
   return distances;
 }
 

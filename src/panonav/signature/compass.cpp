@@ -29,7 +29,7 @@ struct CrossSpectrum {
   [[nodiscard]] std::complex<double> term(int k) const { return {real[k], imaginary[k]}; }
 };
 
-int components_used(SignatureShape query, SignatureShape reference, int components) {
+int choose_components(SignatureShape query, SignatureShape reference, int components) {
   require(query.rows == reference.rows, "rows of the query", query.rows,
           std::to_string(reference.rows) + " (as the reference)");
   const int common = std::min(query.components, reference.components);
@@ -59,7 +59,7 @@ inline SineCosine sine_cosine(float angle_rad) {
 
 std::optional<CrossSpectrum> cross_spectrum(const FourierSignature& query,
                                             const FourierSignature& reference, int components) {
-  components = components_used(query.shape(), reference.shape(), components);
+  components = choose_components(query.shape(), reference.shape(), components);
   const auto rows = static_cast<std::size_t>(query.rows());
   CrossSpectrum spectrum(components);
   std::vector<float> cosines(rows);
@@ -91,15 +91,15 @@ std::optional<CrossSpectrum> cross_spectrum(const FourierSignature& query,
   // Views are of the order of 1, so a transform in single precision leaves less than this of
   // nothing.
   constexpr double rounding = 1e-6;
-  const double least = rounding * rounding * static_cast<double>(rows);
-  if (!(query_energy > least && reference_energy > least)) return {};
+  const double min_energy = rounding * rounding * static_cast<double>(rows);
+  if (!(query_energy > min_energy && reference_energy > min_energy)) return {};
   spectrum.norm = std::sqrt(query_energy) * std::sqrt(reference_energy);
   return spectrum;
 }
 
 std::optional<CrossSpectrum> cross_spectrum(const PackedSignature& query,
                                             const PackedSignature& reference, int components) {
-  components = components_used(query.shape, reference.shape, components);
+  components = choose_components(query.shape, reference.shape, components);
   for (const PackedSignature* packed : {&query, &reference}) {
     require(packed->magnitudes.size() == packed->shape.size() &&
                 packed->phases.size() == packed->shape.size(),
@@ -155,9 +155,9 @@ struct Peak {
   double value = 0.0;
 };
 
-/// The maximum between `low` and `high`, where the slope changes from rising to falling: Newton's
-/// rule, halving the interval where that would leave it.
-Peak refine(const CrossSpectrum& spectrum, double low, double high) {
+/// Finds the maximum between `low` and `high`, where the slope changes from rising to falling:
+/// Newton's rule, halving the interval where that would leave it.
+Peak refine_peak(const CrossSpectrum& spectrum, double low, double high) {
   double heading = 0.5 * (low + high);
   Point point = evaluate(spectrum, heading);
   for (int iteration = 0; iteration < 60; ++iteration) {
@@ -172,8 +172,8 @@ Peak refine(const CrossSpectrum& spectrum, double low, double high) {
   return {wrap_angle(heading), point.value};
 }
 
-/// The maxima of C, highest first: all that may be the highest or the second highest.
-std::vector<Peak> highest_peaks(const CrossSpectrum& spectrum) {
+/// Finds the maxima of C, highest first: all that may be the highest or the second highest.
+std::vector<Peak> find_highest_peaks(const CrossSpectrum& spectrum) {
   const int highest = spectrum.highest();
   int count = 16;
   while (count < 8 * highest) count *= 2;
@@ -220,15 +220,15 @@ std::vector<Peak> highest_peaks(const CrossSpectrum& spectrum) {
   std::ranges::sort(candidates, [](const Candidate& a, const Candidate& b) {
     return a.value != b.value ? a.value > b.value : a.index < b.index;
   });
-  // By Bernstein's inequality C rises by at most (highest * half a step)^2 / 2 <= 0.08 of its
-  // maximum between a maximum and the nearest point of the grid.
+  // Bernstein's inequality: C rises by at most (highest * half a step)^2 / 2 <= 0.08 of its maximum
+  // between a maximum and the nearest point of the grid.
   std::vector<Peak> peaks;
   const double grid_step = 2.0 * std::numbers::pi / count;
   const float margin = candidates.empty() ? 0.0F : 0.1F * candidates.front().value;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     if (i >= 2 && candidates[i].value + margin < candidates[1].value) break;
     const double centre = grid_step * static_cast<double>(candidates[i].index);
-    peaks.push_back(refine(spectrum, centre - grid_step, centre + grid_step));
+    peaks.push_back(refine_peak(spectrum, centre - grid_step, centre + grid_step));
   }
   std::ranges::stable_sort(peaks, [](const Peak& a, const Peak& b) { return a.value > b.value; });
   return peaks;
@@ -240,7 +240,7 @@ double distinctness(double value, double other) {
 
 std::optional<CompassReading> read_compass(const std::optional<CrossSpectrum>& spectrum) {
   if (!spectrum) return {};
-  const std::vector<Peak> peaks = highest_peaks(*spectrum);
+  const std::vector<Peak> peaks = find_highest_peaks(*spectrum);
   if (peaks.empty()) return {};  // the views have no component in common
   const double other = peaks.size() > 1 ? peaks[1].value : 0.0;
   return CompassReading{peaks[0].heading_rad,
@@ -267,7 +267,7 @@ std::optional<CompassReading> compass_near(const PackedSignature& query,
           "above 0 .. pi");
   const auto spectrum = cross_spectrum(query, reference, components);
   if (!spectrum) return {};
-  // As fine as `highest_peaks` looks.
+  // The grid is as fine as that of `find_highest_peaks`.
   const int steps =
       1 + static_cast<int>(std::ceil(within_rad * 8.0 * spectrum->highest() / std::numbers::pi));
   const double step = 2.0 * within_rad / steps;
@@ -280,18 +280,18 @@ std::optional<CompassReading> compass_near(const PackedSignature& query,
     points.push_back(evaluate(*spectrum, heading));
     if (points.back().value > best.value) best = {heading, points.back().value};
   }
-  // By Bernstein's inequality C rises by at most (highest * half a step)^2 / 2 <= 0.08 of its bound
+  // Bernstein's inequality: C rises by at most (highest * half a step)^2 / 2 <= 0.08 of its bound
   // between two points.
   double bound = 0.0;
   for (int k = 1; k <= spectrum->highest(); ++k) bound += std::abs(spectrum->term(k));
-  const double least = best.value - 0.08 * bound;
+  const double min_value = best.value - 0.08 * bound;
   for (int i = 0; i < steps; ++i) {
     const Point& low = points[i];
     const Point& high = points[static_cast<std::size_t>(i) + 1];
-    if (!(low.slope > 0.0 && high.slope < 0.0 && std::max(low.value, high.value) >= least)) {
+    if (!(low.slope > 0.0 && high.slope < 0.0 && std::max(low.value, high.value) >= min_value)) {
       continue;
     }
-    const Peak peak = refine(*spectrum, first + i * step, first + (i + 1) * step);
+    const Peak peak = refine_peak(*spectrum, first + i * step, first + (i + 1) * step);
     if (peak.value > best.value) best = peak;
   }
   return CompassReading{wrap_angle(best.heading_rad),

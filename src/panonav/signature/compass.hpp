@@ -8,7 +8,7 @@ namespace panonav {
 
 /// The relative heading of two views [F11 section 3.2, M04 section 3.4, S06 section 2.4].
 struct CompassReading {
-  /// heading of the query minus heading of the reference, in [-pi, pi).
+  /// Heading of the query minus heading of the reference, in [-pi, pi).
   double heading_rad = 0.0;
   /// Normalised correlation at this heading without k = 0, -1 .. 1; 1 for the same view turned.
   double correlation = 0.0;
@@ -17,13 +17,14 @@ struct CompassReading {
   double distinctness = 0.0;
 };
 
-/// Heading of `query` relative to `reference`: the global maximum of C(sigma) = sum_{y,k} A^q A^r
-/// cos(psi^q - psi^r - k sigma) [S06 eq. 33], exact to rounding between columns. The sum over rows
-/// is a trigonometric polynomial. It is evaluated at eight points per period of its highest
-/// frequency, and each maximum that may be the highest is refined by Newton's rule. No single
-/// component needs to be reliable, not even the first. Empty when a view has no structure: no
-/// component k >= 1 above the rounding of its computation. Throws ContractError on different rows,
-/// or components outside 0, 2 .. those of both signatures. Cost: a few microseconds for 80 x 15.
+/// Finds the heading of `query` relative to `reference`: the global maximum of C(sigma) = sum_{y,k}
+/// A^q A^r cos(psi^q - psi^r - k sigma) [S06 eq. 33], exact to rounding between columns. This
+/// trigonometric polynomial is evaluated at eight points per period of its highest frequency, and
+/// each maximum that may be the highest is refined by Newton's rule. `components`:
+/// k = 1 .. components - 1 are used; 0 takes all that both signatures have. Empty when a view has
+/// no structure: no component k >= 1 above the rounding of its computation. Throws ContractError on
+/// different rows, or components outside 0, 2 .. those of both signatures. Cost: a few microseconds
+/// for 80 x 15.
 [[nodiscard]] std::optional<CompassReading> compass(const FourierSignature& query,
                                                     const FourierSignature& reference,
                                                     int components = 0);

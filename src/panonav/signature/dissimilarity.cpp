@@ -12,7 +12,7 @@ namespace panonav {
 namespace {
 
 /// Number of leading magnitudes to compare: all rows of the components wanted.
-std::size_t compared(SignatureShape a, SignatureShape b, int components) {
+std::size_t compared_size(SignatureShape a, SignatureShape b, int components) {
   if (a != b) {
     throw ContractError("signature of " + std::to_string(a.rows) + " rows x " +
                             std::to_string(a.components) + " components compared with one",
@@ -27,7 +27,7 @@ std::size_t compared(SignatureShape a, SignatureShape b, int components) {
 }  // namespace
 
 double dissimilarity_l1(const FourierSignature& a, const FourierSignature& b, int components) {
-  const std::size_t count = compared(a.shape(), b.shape(), components);
+  const std::size_t count = compared_size(a.shape(), b.shape(), components);
   double sum = 0.0;
   for (std::size_t i = 0; i < count; ++i) {
     sum += std::abs(static_cast<double>(a.magnitudes()[i]) - b.magnitudes()[i]);
@@ -36,7 +36,7 @@ double dissimilarity_l1(const FourierSignature& a, const FourierSignature& b, in
 }
 
 double dissimilarity_l2(const FourierSignature& a, const FourierSignature& b, int components) {
-  const std::size_t count = compared(a.shape(), b.shape(), components);
+  const std::size_t count = compared_size(a.shape(), b.shape(), components);
   double sum = 0.0;
   for (std::size_t i = 0; i < count; ++i) {
     const double difference = static_cast<double>(a.magnitudes()[i]) - b.magnitudes()[i];
@@ -50,7 +50,7 @@ double dissimilarity_weighted(const FourierSignature& a, const FourierSignature&
   require(!weights.empty() && weights.size() <= static_cast<std::size_t>(a.components()),
           "number of weights", static_cast<double>(weights.size()),
           "1 .. " + std::to_string(a.components()) + " (one per component)");
-  compared(a.shape(), b.shape(), 0);
+  compared_size(a.shape(), b.shape(), 0);
   double sum = 0.0;
   for (std::size_t k = 0; k < weights.size(); ++k) {
     require(weights[k] >= 0.0 && std::isfinite(weights[k]), "weight", weights[k], "finite, >= 0");
@@ -65,7 +65,7 @@ double dissimilarity_weighted(const FourierSignature& a, const FourierSignature&
 
 std::uint32_t dissimilarity_packed(const PackedSignature& a, const PackedSignature& b,
                                    int components) {
-  const std::size_t count = compared(a.shape, b.shape, components);
+  const std::size_t count = compared_size(a.shape, b.shape, components);
   std::uint32_t sum = 0;
   for (std::size_t i = 0; i < count; ++i) {
     sum +=

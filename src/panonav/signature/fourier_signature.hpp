@@ -10,7 +10,8 @@
 
 namespace panonav {
 
-/// `components` counts k = 0 .. components - 1 (the papers' "first 15").
+/// Rows and components of a signature; components are k = 0 .. components - 1 (the papers' "first
+/// 15").
 struct SignatureShape {
   int rows = 80;        ///< rows of the panorama, >= 1 [M04 section 2.1]
   int components = 15;  ///< >= 1 [M04 section 2.1]
@@ -39,7 +40,7 @@ class FourierSignature {
   [[nodiscard]] int rows() const noexcept { return shape_.rows; }
   /// Frequencies k = 0 .. components - 1.
   [[nodiscard]] int components() const noexcept { return shape_.components; }
-  /// Of the panorama's rows; empty: unknown.
+  /// Elevations of the panorama's rows; nullopt: unknown.
   [[nodiscard]] const std::optional<ElevationBand>& elevations() const noexcept {
     return elevations_;
   }
@@ -70,8 +71,8 @@ class FourierSignature {
   std::optional<ElevationBand> elevations_;
 };
 
-/// Throws ContractError unless 1 <= components <= columns / 2. Cost: rows * columns * components /
-/// 4 multiplications (an odd number of columns: / 2).
+/// Transforms every row. Throws ContractError unless 1 <= components <= columns / 2. Cost: rows *
+/// columns * components / 4 multiplications (an odd number of columns: / 2).
 [[nodiscard]] FourierSignature compute_signature(const Panorama& panorama, int components = 15);
 
 /// The same with the tables of the transform made once, for many panoramas of the same width.
@@ -79,8 +80,8 @@ class FourierSignature {
 [[nodiscard]] FourierSignature compute_signature(const Panorama& panorama,
                                                  const kernels::RowTransform& transform);
 
-/// The signature of the same view after the robot turned by `turn_rad` counter-clockwise (exact
-/// shift theorem [M04 eq. 1]).
+/// Returns the signature of the same view after the robot turned by `turn_rad` counter-clockwise
+/// (exact shift theorem [M04 eq. 1]).
 [[nodiscard]] FourierSignature turn(const FourierSignature& signature, double turn_rad);
 
 /// A signature in 8 + 8 bit per component and row: 19 kbit for 80 x 15 [M03 table 1]. Magnitudes
@@ -95,10 +96,10 @@ struct PackedSignature {
   friend bool operator==(const PackedSignature&, const PackedSignature&) = default;
 };
 
-/// Throws ContractError unless full_scale is finite and > 0.
+/// Packs a signature. Throws ContractError unless full_scale is finite and > 0.
 [[nodiscard]] PackedSignature pack(const FourierSignature& signature, float full_scale);
-/// pack(unpack(p)) == p. Throws ContractError unless full_scale is finite and > 0 and the vectors
-/// fit the shape.
+/// Unpacks a signature; pack(unpack(p)) == p. Throws ContractError unless full_scale is finite and
+/// > 0 and the vectors fit the shape.
 [[nodiscard]] FourierSignature unpack(const PackedSignature& packed, float full_scale,
                                       std::optional<ElevationBand> elevations);
 

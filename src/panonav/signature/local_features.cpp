@@ -15,13 +15,13 @@ namespace panonav {
 
 namespace {
 
-// How far from the corner the compared places lie, at most: 8 degrees find 11 points more places
-// than 14 (docs/decisions.md).
+// Largest distance of the compared points from the corner: with 8 degrees 11 percentage points more
+// places are found than with 14 (docs/decisions.md).
 constexpr double patch_rad = radians(8.0);
 // Half of a stretch of azimuth, and how many corners are kept in it: so they lie all round, and not
 // on one poster.
 constexpr double window_rad = radians(6.0);
-constexpr int kept_in_window = 4;
+constexpr int max_kept_in_window = 4;
 // Corners closer than this to the upper or lower edge lack a part of their surroundings.
 constexpr int margin_rows = 3;
 constexpr int descriptor_bits = 256;
@@ -65,7 +65,7 @@ using Grey = Padded<float>;
 
 // Sums over squares of 2 radius + 1 pixels. All values are whole numbers below 2^24, or rounded
 // alike wherever a column stands: sums run in one order.
-Grey box_sums(const Grey& from, int radius, int pad_rows, int pad_columns) {
+Grey compute_box_sums(const Grey& from, int radius, int pad_rows, int pad_columns) {
   Grey columns(from.rows, from.columns, radius, 0);
   for (int y = 0; y < from.rows; ++y) {
     const float* const in = from.row(y);
@@ -89,7 +89,7 @@ Grey box_sums(const Grey& from, int radius, int pad_rows, int pad_columns) {
 }
 
 // The smaller eigenvalue of the structure tensor [Shi and Tomasi 1994], over 5 x 5 pixels.
-Grey corner_strengths(const Grey& smooth) {
+Grey compute_corner_strengths(const Grey& smooth) {
   const int rows = smooth.rows;
   const int columns = smooth.columns;
   Grey xx(rows, columns, 0, 2);
@@ -109,7 +109,7 @@ Grey corner_strengths(const Grey& smooth) {
   }
   for (Grey* products : {&xx, &xy, &yy}) {
     products->pad();
-    *products = box_sums(*products, 2, 0, 0);
+    *products = compute_box_sums(*products, 2, 0, 0);
   }
   Grey strengths(rows, columns, 2, 2);
   for (int y = 0; y < rows; ++y) {
@@ -141,16 +141,16 @@ bool is_corner(const Grey& strengths, int row, int column) {
   return true;
 }
 
-std::vector<Corner> corners_of(const Grey& smooth, int first_row, int end_row) {
+std::vector<Corner> find_corners(const Grey& smooth, int first_row, int end_row) {
   // 3 x 3 pixels smooth, two lie between those whose difference is a gradient, 25 are added up: a
   // grey level a pixel in the direction of the weaker gradient.
-  constexpr float weakest = 25.0F * (2.0F * 9.0F) * (2.0F * 9.0F);
-  const Grey strengths = corner_strengths(smooth);
+  constexpr float min_strength = 25.0F * (2.0F * 9.0F) * (2.0F * 9.0F);
+  const Grey strengths = compute_corner_strengths(smooth);
   std::vector<Corner> all;  // by column
   for (int x = 0; x < strengths.columns; ++x) {
     for (int y = first_row; y < end_row; ++y) {
       const float strength = strengths.row(y)[x];
-      if (strength > weakest && is_corner(strengths, y, x)) all.push_back({x, y, strength});
+      if (strength > min_strength && is_corner(strengths, y, x)) all.push_back({x, y, strength});
     }
   }
   const int columns = strengths.columns;
@@ -168,7 +168,7 @@ std::vector<Corner> corners_of(const Grey& smooth, int first_row, int end_row) {
     };
     count(1);                                         // to larger columns, and round
     if (2 * window < columns) count(all.size() - 1);  // to smaller ones
-    if (stronger < kept_in_window) kept.push_back(all[i]);
+    if (stronger < max_kept_in_window) kept.push_back(all[i]);
   }
   if (kept.size() > LocalFeatures::max_count) {
     std::ranges::stable_sort(kept, std::greater<>(), &Corner::strength);
@@ -179,9 +179,9 @@ std::vector<Corner> corners_of(const Grey& smooth, int first_row, int end_row) {
 }
 
 // Pairs of places around a corner, denser near it, the same for every view [Calonder et al. 2010].
-std::array<std::array<int, 4>, descriptor_bits> pairs_within(int rows, int columns) {
+std::array<std::array<int, 4>, descriptor_bits> draw_point_pairs(int rows, int columns) {
   Random random(5);
-  const auto drawn = [&](int radius) {
+  const auto draw_offset = [&](int radius) {
     double value = 0.0;
     do value = random.normal(0.0, 0.5 * radius);
     while (std::abs(value) > radius);
@@ -190,7 +190,8 @@ std::array<std::array<int, 4>, descriptor_bits> pairs_within(int rows, int colum
   std::array<std::array<int, 4>, descriptor_bits> pairs{};
   for (auto& pair : pairs) {
     do {
-      for (std::size_t i = 0; i < pair.size(); ++i) pair[i] = drawn(i % 2 == 0 ? columns : rows);
+      for (std::size_t i = 0; i < pair.size(); ++i)
+        pair[i] = draw_offset(i % 2 == 0 ? columns : rows);
     } while (pair[0] == pair[2] && pair[1] == pair[3]);
   }
   return pairs;
@@ -200,7 +201,7 @@ double row_height(PanoramaShape shape, ElevationBand band) {
   return (band.top_rad - band.bottom_rad) / shape.rows;
 }
 
-// What a comparison needs of each feature.
+// Bearings and descriptors of the features of a view, one array for each number.
 struct Bearings {
   explicit Bearings(const LocalFeatures& view) {
     const double column_rad = 2.0 * std::numbers::pi / view.shape.columns;
@@ -265,7 +266,8 @@ class MutualMatches {
 
   [[nodiscard]] std::size_t size() const { return azimuths_.size() / 2; }
 
-  /// Of a turn by `turn` steps, 0 <= turn * step_rad < 2 pi.
+  /// Returns the matches that a turn by `turn` steps brings within a right angle of each other;
+  /// 0 <= turn * step_rad < 2 pi.
   [[nodiscard]] Window within_right_angle(int turn, double step_rad) const {
     constexpr double right_angle = 0.5 * std::numbers::pi;
     double from = -turn * step_rad - right_angle;
@@ -295,8 +297,8 @@ constexpr float max_ratio = 2.0F;
 struct Circle2 {
   std::array<float, turns> sines, cosines;
 };
-// Cosines and sines of `step` i.
-Circle2 circle_of(double step) {
+// Tabulates cosines and sines of the multiples of `step`.
+Circle2 make_circle(double step) {
   Circle2 circle{};
   for (std::size_t i = 0; i < circle.sines.size(); ++i) {
     circle.sines[i] = static_cast<float>(std::sin(step * static_cast<double>(i)));
@@ -311,7 +313,7 @@ std::optional<LocalFeatures> extract_features(const Panorama& panorama,
                                               const PreprocessingOptions& preprocessing) {
   if (!panorama.elevations()) return std::nullopt;
   const PanoramaShape shape{panorama.rows(), panorama.columns()};
-  check_masks(preprocessing, shape.rows);
+  require_unmasked_rows(preprocessing, shape.rows);
   LocalFeatures view{shape, *panorama.elevations(), {}};
   const int radius_columns = std::max(
       3, static_cast<int>(std::lround(patch_rad / (2.0 * std::numbers::pi) * shape.columns)));
@@ -327,11 +329,11 @@ std::optional<LocalFeatures> extract_features(const Panorama& panorama,
     }
   }
   grey.pad();
-  const Grey smooth = box_sums(grey, 1, std::max(1, radius_rows), radius_columns);
+  const Grey smooth = compute_box_sums(grey, 1, std::max(1, radius_rows), radius_columns);
   const std::vector<Corner> corners =
-      corners_of(smooth, std::max(margin_rows, preprocessing.masked_rows_top),
-                 shape.rows - std::max(margin_rows, preprocessing.masked_rows_bottom));
-  const auto pairs = pairs_within(radius_rows, radius_columns);
+      find_corners(smooth, std::max(margin_rows, preprocessing.masked_rows_top),
+                   shape.rows - std::max(margin_rows, preprocessing.masked_rows_bottom));
+  const auto pairs = draw_point_pairs(radius_rows, radius_columns);
   std::array<std::pair<std::ptrdiff_t, std::ptrdiff_t>, descriptor_bits> offsets;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     const auto& [x0, y0, x1, y1] = pairs[i];
@@ -393,18 +395,19 @@ LocalFeatures::Match match_features(const LocalFeatures& query, const LocalFeatu
   if (query.shape != reference.shape || query.elevations != reference.elevations) {
     throw ContractError("local features", "of another panorama", "of one shape and band");
   }
-  const Bearings seen(query);
-  const Bearings there(reference);
+  const Bearings query_bearings(query);
+  const Bearings reference_bearings(reference);
   const std::size_t count = query.features.size();
   std::vector<std::uint16_t> of_query(count);
   std::vector<std::uint16_t> of_reference(reference.features.size());
   const kernels::Instructions instructions = kernels::chosen_instructions();
-  kernels::nearest_descriptors(seen.words, there.words, of_query, of_reference, instructions);
-  const MutualMatches matched(seen, there, of_query, of_reference);
+  kernels::nearest_descriptors(query_bearings.words, reference_bearings.words, of_query,
+                               of_reference, instructions);
+  const MutualMatches matched(query_bearings, reference_bearings, of_query, of_reference);
   if (static_cast<std::int64_t>(matched.size()) <= more_than) return {};
 
-  static const Circle2 whole = circle_of(2.0 * std::numbers::pi / turns);
-  static const Circle2 half = circle_of(std::numbers::pi / turns);
+  static const Circle2 whole = make_circle(2.0 * std::numbers::pi / turns);
+  static const Circle2 half = make_circle(std::numbers::pi / turns);
   static const kernels::MotionHypotheses hypotheses = [] {
     kernels::MotionHypotheses made{};
     for (int d = 0; d < kernels::motion_axes; ++d) {
@@ -433,9 +436,9 @@ LocalFeatures::Match match_features(const LocalFeatures& query, const LocalFeatu
     kernels::count_explained(matched.bearings(begin, bound),
                              {whole.sines[t], whole.cosines[t], half.sines[t], half.cosines[t]},
                              hypotheses, explained, instructions);
-    const std::int32_t most = *std::ranges::max_element(explained);
-    if (most > std::max(match.verified, more_than)) {
-      match.verified = most;
+    const std::int32_t max_explained = *std::ranges::max_element(explained);
+    if (max_explained > std::max(match.verified, more_than)) {
+      match.verified = max_explained;
       match.heading_rad = wrap_angle(2.0 * std::numbers::pi * turn / turns);
     }
   }

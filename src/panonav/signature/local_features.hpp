@@ -15,8 +15,8 @@ namespace panonav {
 /// azimuth, at most `max_count`, each with an upright binary descriptor. A turn of the robot by
 /// whole columns moves them and changes nothing else.
 struct LocalFeatures {
-  /// How many features two views share when a robot with a vertical axis has turned and moved on
-  /// level ground from one to the other.
+  /// Number of features that two views share when a robot with a vertical axis has turned and moved
+  /// on level ground from one to the other.
   struct Match {
     int verified = 0;  ///< matched features that one turn and one direction of motion explain
     /// Heading of the query minus heading of the reference, in [-pi, pi), in steps of 2 pi / 128; 0
@@ -24,11 +24,11 @@ struct LocalFeatures {
     double heading_rad = 0.0;
   };
 
-  /// A corner of a view and what its surroundings look like.
+  /// A corner of a view and a descriptor of its surroundings.
   struct Feature {
     std::uint16_t column = 0;  ///< of the panorama, where the corner is
     std::uint16_t row = 0;     ///< of the panorama, 0 at the top
-    /// Bit i tells which of the i-th pair of places around the corner is brighter.
+    /// Bit i: the second of the i-th pair of points around the corner is brighter than the first.
     std::array<std::uint64_t, 4> bits{};
     friend bool operator==(const Feature&, const Feature&) = default;
   };
@@ -43,24 +43,25 @@ struct LocalFeatures {
   friend bool operator==(const LocalFeatures&, const LocalFeatures&) = default;
 };
 
-/// Empty where the elevations of the rows are unknown: features of two views are compared by their
-/// directions in space. A view without structure has no features. Masked rows hold none. Cost:
-/// about 1 ms for 80 x 512.
+/// Extracts the features; nullopt where the elevations of the rows are unknown: features of two
+/// views are compared by their directions in space. A view without structure has no features.
+/// Masked rows hold none. Cost: about 1 ms for 80 x 512.
 [[nodiscard]] std::optional<LocalFeatures> extract_features(
     const Panorama& panorama, const PreprocessingOptions& preprocessing = {});
 
-/// `packed_bytes` for each feature.
+/// Packs the features, `packed_bytes` for each.
 [[nodiscard]] std::vector<std::uint8_t> pack(const LocalFeatures& features);
-/// Throws ContractError on bytes that `pack` does not make of a panorama of this shape.
+/// Unpacks features. Throws ContractError on bytes that `pack` does not make of a panorama of this
+/// shape.
 [[nodiscard]] LocalFeatures unpack_features(std::span<const std::uint8_t> bytes,
                                             PanoramaShape shape, ElevationBand elevations);
 
-/// Spatial verification (docs/equations.md, Local features): features that are each other's nearest
-/// by Hamming distance, and of these the largest set that one turn and one direction of motion
-/// explain, with nothing nearer than half the way. The number is the same when query and reference
-/// change places, but for rounding. Where `more_than` features or fewer are verified, the answer is
-/// that of none, and comes sooner. Throws ContractError on views of another shape or band. Cost:
-/// about 0.06 ms with AVX2 for 120 features each.
+/// Verifies matches spatially (docs/equations.md, Local features): features that are each other's
+/// nearest by Hamming distance, and of these the largest set that one turn and one direction of
+/// motion explain, with nothing nearer than half the way. The number is the same when query and
+/// reference change places, but for rounding. Where `more_than` features or fewer are verified, the
+/// answer is that of none, and comes sooner. Throws ContractError on views of another shape or
+/// band. Cost: about 0.06 ms with AVX2 for 120 features each.
 [[nodiscard]] LocalFeatures::Match match_features(const LocalFeatures& query,
                                                   const LocalFeatures& reference,
                                                   int more_than = 0);

@@ -72,7 +72,7 @@ class SignatureExtractor::Rows {
     imaginary_.resize(extractor.shape().size());
   }
 
-  void take(std::size_t first, std::span<const float> values) {
+  void add_rows(std::size_t first, std::span<const float> values) {
     extractor_.transform_(values, std::span(real_).subspan(first),
                           std::span(imaginary_).subspan(first), rows_, instructions_);
     const auto& preprocessing = extractor_.preprocessing_;
@@ -131,7 +131,7 @@ SignatureExtractor::SignatureExtractor(PanoramaShape cylinder, int components,
       preprocessing_(preprocessing) {
   require(rows_ >= 1, "rows", rows_, ">= 1");
   validate(preprocessing_);
-  check_masks(preprocessing_, rows_);
+  require_unmasked_rows(preprocessing_, rows_);
 }
 
 void SignatureExtractor::require_shape(int rows, int columns) const {
@@ -151,7 +151,7 @@ FourierSignature SignatureExtractor::signature(const Panorama& panorama,
   const auto columns = static_cast<std::size_t>(panorama.columns());
   const std::size_t block = Unwarper::rows_per_block * columns;
   for (std::size_t at = 0; at < values.size(); at += block) {
-    rows.take(at / columns, values.subspan(at, std::min(block, values.size() - at)));
+    rows.add_rows(at / columns, values.subspan(at, std::min(block, values.size() - at)));
   }
   return rows.finish(panorama.elevations());
 }
@@ -165,7 +165,7 @@ FourierSignature SignatureExtractor::signature(const Unwarper& unwarper, ImageVi
   Rows rows(*this, workspace);
   unwarper.unwrap_blocks(image, workspace.unwarping,
                          [&](int first_row, std::span<const float> values) {
-                           rows.take(static_cast<std::size_t>(first_row), values);
+                           rows.add_rows(static_cast<std::size_t>(first_row), values);
                          });
   return rows.finish(unwarper.elevations());
 }

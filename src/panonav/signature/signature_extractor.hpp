@@ -11,7 +11,7 @@
 
 namespace panonav {
 
-/// From pictures to signatures: preprocessing and transform in one pass, row by row while a row is
+/// Makes signatures of pictures: preprocessing and transform in one pass, row by row while a row is
 /// in the cache. The result is that of
 ///   compute_signature(preprocess(panorama, preprocessing), components)
 /// up to rounding: coefficients differ by at most 2e-6 of the largest magnitude before the mean is
@@ -38,10 +38,11 @@ class SignatureExtractor {
   /// Rows and components of the signatures that it makes.
   [[nodiscard]] SignatureShape shape() const noexcept { return {rows_, transform_.components()}; }
 
-  /// Throws ContractError on a panorama of another shape.
+  /// Computes the signature of a panorama. Throws ContractError on another shape.
   [[nodiscard]] FourierSignature signature(const Panorama& panorama, Workspace& workspace) const;
 
-  /// Of the panorama that `unwarper` makes of the image, to the bit, without making it. Throws
+  /// Computes the signature of the panorama that `unwarper` would make of the image, to the bit.
+  /// Throws
   /// ContractError unless the image has the camera's size (colour becomes grey) and the unwarper's
   /// cylinder this shape.
   [[nodiscard]] FourierSignature signature(const Unwarper& unwarper, ImageView image,

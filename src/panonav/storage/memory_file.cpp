@@ -93,7 +93,7 @@ struct MemoryFile::Implementation {
     packed.shape = header.shape;
     packed.magnitudes.assign(signature.begin(), signature.begin() + half);
     packed.phases.assign(signature.begin() + half, signature.end());
-    memory.append_as(row.id, packed, row.info);
+    memory.append_with_id(row.id, packed, row.info);
   }
   /// Throws as `refuse_view`.
   void change_info(ViewId view, const std::function<void(ReferenceInfo&)>& change) {

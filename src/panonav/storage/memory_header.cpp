@@ -197,7 +197,7 @@ class SettingsReader final : public OptionFields<SettingsReader> {
   }
   void model(const std::string& key, CameraModel& model) {
     const auto& name = get<std::string>(key);
-    const auto found = model_of_name(name);
+    const auto found = make_default_model(name);
     if (!found) throw ContractError(key, name, "a model in docs/formats.md");
     model = *found;
   }

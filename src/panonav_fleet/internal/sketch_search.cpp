@@ -80,10 +80,10 @@ class SketchSearch {
             static_cast<double>(magnitudes.size()), std::to_string(layout_.shape().size()));
     ++result_.views_in_full;
     result_.bytes_read += compared_bytes_;
-    nearest_.offer({view, mask_.empty()
-                              ? kernels_.l1(magnitudes.data(), magnitudes_.data(), compared_bytes_)
-                              : kernels_.masked_l1(magnitudes.data(), magnitudes_.data(),
-                                                   mask_.data(), compared_bytes_)});
+    nearest_.insert_if_nearer(
+        {view, mask_.empty() ? kernels_.l1(magnitudes.data(), magnitudes_.data(), compared_bytes_)
+                             : kernels_.masked_l1(magnitudes.data(), magnitudes_.data(),
+                                                  mask_.data(), compared_bytes_)});
   }
 
   /// Compares these in full; none is compared twice.
@@ -314,7 +314,7 @@ class SketchSearch {
   void read_some(std::vector<SketchedView>& waiting) {
     const auto drop = [&] {
       std::erase_if(waiting, [this](const SketchedView& candidate) {
-        return nearest_.rules_out(candidate.bound, candidate.view) ||
+        return nearest_.can_exclude(candidate.bound, candidate.view) ||
                std::ranges::binary_search(compared_, candidate.view);
       });
     };
@@ -336,7 +336,7 @@ class SketchSearch {
   const ViewSketches::ReadViews& read_;
   Executor& executor_;
   std::size_t top_;
-  Nearest nearest_;
+  NearestMatches nearest_;
   SegmentQuery query_;
   AlignedVector<std::uint8_t> magnitudes_, mask_;  // the mask is empty when all rows count
   std::size_t compared_bytes_ = 0;

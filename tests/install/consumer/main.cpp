@@ -19,7 +19,7 @@ int main() {
   panonav::VisualMemory memory(here.shape(), 1.0F, view.elevations());
   const auto id =
       memory.append(here, {.name = "here", .pose = std::nullopt, .stamp_s = std::nullopt});
-  const auto turned = panonav::compute_signature(panonav::turn_columns(view, 16), 8);
+  const auto turned = panonav::compute_signature(panonav::rotate_columns(view, 16), 8);
   const auto result = memory.search(panonav::pack(turned, memory.full_scale()));
   const auto place =
       panonav::Localiser(memory).localise(panonav::pack(turned, memory.full_scale()));

@@ -20,14 +20,14 @@ namespace {
 constexpr int coarse_directions = 96;
 
 /// One sample for each `spacing` of circumference, 48 to 720.
-int samples_on(double radius, double spacing) {
+int sample_count(double radius, double spacing) {
   return std::clamp(static_cast<int>(2 * std::numbers::pi * radius / spacing), 48, 720);
 }
 
 /// Bilinear; the point must lie inside [0.5, width - 0.5] x [0.5, height - 0.5] or is clamped to
 /// it.
 template <class Planes>
-float sample(const Planes& image, const std::vector<float>& plane, double u, double v) {
+float sample_bilinear(const Planes& image, const std::vector<float>& plane, double u, double v) {
   const double x = std::clamp(u - 0.5, 0.0, image.width - 1.0);
   const double y = std::clamp(v - 0.5, 0.0, image.height - 1.0);
   const int x0 = std::min(static_cast<int>(x), std::max(0, image.width - 2));
@@ -50,7 +50,7 @@ struct Direction {
   float double_cosine, double_sine;  ///< of twice its angle
 };
 
-std::array<Direction, coarse_directions> directions() {
+std::array<Direction, coarse_directions> make_directions() {
   std::array<Direction, coarse_directions> result{};
   for (int i = 0; i < coarse_directions; ++i) {
     const double angle = 2 * std::numbers::pi * i / coarse_directions;
@@ -127,7 +127,7 @@ class ShiftedSums {
   }
 
   /// The merit of the circles of one radius about every pixel's centre.
-  void merits(int radius, const CircleRange& range, std::span<float> merit) const {
+  void compute_merits(int radius, const CircleRange& range, std::span<float> merit) const {
     std::vector<float> sum(merit.size());
     std::vector<float> samples(merit.size());
     std::vector<float> roots(merit.size(), 0.0F);
@@ -176,7 +176,7 @@ class ShiftedSums {
 
   int width_;
   int height_;
-  std::array<Direction, coarse_directions> rays_ = directions();
+  std::array<Direction, coarse_directions> rays_ = make_directions();
   std::vector<std::vector<float>> across_;  ///< opposite directions share a plane
 };
 
@@ -186,9 +186,9 @@ struct EdgePoint {
 };
 
 /// Along the ray the strongest edge within `reach` of the radius, near ones preferred.
-std::optional<EdgePoint> edge_on_ray(std::span<const SmoothPlanes> images,
-                                     const FieldCircle& circle, double cosine, double sine,
-                                     double reach) {
+std::optional<EdgePoint> find_edge_on_ray(std::span<const SmoothPlanes> images,
+                                          const FieldCircle& circle, double cosine, double sine,
+                                          double reach) {
   constexpr double step = 0.5;
   const int half = static_cast<int>(reach / step);
   const int count = 2 * half + 1;
@@ -207,7 +207,8 @@ std::optional<EdgePoint> edge_on_ray(std::span<const SmoothPlanes> images,
       }
       double slope = 0;
       for (const std::vector<float>& plane : image.channels) {
-        const double rise = sample(image, plane, u1, v1) - sample(image, plane, u0, v0);
+        const double rise =
+            sample_bilinear(image, plane, u1, v1) - sample_bilinear(image, plane, u0, v0);
         slope = std::max(slope, std::abs(rise));
       }
       const double scale = image.slope_scale;
@@ -296,7 +297,8 @@ class CircleProblem {
 
 /// Returns the circle of least squares, its residual the weighted root mean square. Empty when the
 /// points do not determine a circle.
-std::optional<CircleFit> fit_points(const std::vector<EdgePoint>& points, FieldCircle circle) {
+std::optional<CircleFit> fit_circle_to_points(const std::vector<EdgePoint>& points,
+                                              FieldCircle circle) {
   CircleProblem problem(points, circle);
   CircleProblem::Equations equations;
   // An arc too short leaves centre and radius undetermined.
@@ -308,8 +310,8 @@ std::optional<CircleFit> fit_points(const std::vector<EdgePoint>& points, FieldC
 
 }  // namespace
 
-CircleScore score(const EdgeField& field, const FieldCircle& circle, Evenness evenness) {
-  const int count = samples_on(circle.radius, 3.0);
+CircleScore score_circle(const EdgeField& field, const FieldCircle& circle, Evenness evenness) {
+  const int count = sample_count(circle.radius, 3.0);
   SectorScore total;
   // One turn in equal steps by rotating a unit vector; the rounding of 720 steps stays below 1e-12.
   const double step_cosine = std::cos(2 * std::numbers::pi / count);
@@ -327,7 +329,8 @@ CircleScore score(const EdgeField& field, const FieldCircle& circle, Evenness ev
     const auto across = static_cast<float>(cosine * cosine - sine * sine);
     const auto along = static_cast<float>(2 * cosine * sine);
     total.add(i, count,
-              sample(field, field.cosine, u, v) * across + sample(field, field.sine, u, v) * along);
+              sample_bilinear(field, field.cosine, u, v) * across +
+                  sample_bilinear(field, field.sine, u, v) * along);
   }
   return total.result(count, evenness);
 }
@@ -342,7 +345,7 @@ std::vector<FieldCircle> circle_candidates(const EdgeField& field, const CircleR
   const ShiftedSums sums(field);
   std::vector<float> merit(area * radii);
   for (int r = 0; r < radii; ++r) {
-    sums.merits(lowest + r, range, std::span(merit).subspan(r * area, area));
+    sums.compute_merits(lowest + r, range, std::span(merit).subspan(r * area, area));
   }
   struct Candidate {
     float merit;
@@ -390,7 +393,7 @@ std::vector<FieldCircle> circle_candidates(const EdgeField& field, const CircleR
 std::vector<FieldCircle> concentric_candidates(const EdgeField& field, double u, double v,
                                                double centre_reach, const CircleRange& range,
                                                double step) {
-  const auto rays = directions();
+  const auto rays = make_directions();
   std::vector<double> merits;
   std::vector<FieldCircle> circles;
   for (double radius = range.lowest_radius; radius <= range.highest_radius; radius += step) {
@@ -418,9 +421,10 @@ std::vector<FieldCircle> concentric_candidates(const EdgeField& field, double u,
   return result;
 }
 
-FieldCircle climb(const EdgeField& field, const FieldCircle& start, const CircleRange& range) {
+FieldCircle climb_to_maximum(const EdgeField& field, const FieldCircle& start,
+                             const CircleRange& range) {
   FieldCircle best = start;
-  double best_merit = figure_of_merit(score(field, best, range.evenness), range);
+  double best_merit = figure_of_merit(score_circle(field, best, range.evenness), range);
   for (double step = 2; step >= 0.25; step /= 2) {
     for (int round = 0; round < 20; ++round) {
       const FieldCircle from = best;
@@ -430,7 +434,7 @@ FieldCircle climb(const EdgeField& field, const FieldCircle& start, const Circle
           for (int dr = -1; dr <= 1; ++dr) {
             const FieldCircle next{from.u + du * step, from.v + dv * step, from.radius + dr * step};
             if (next.radius < 2) continue;
-            const double merit = figure_of_merit(score(field, next, range.evenness), range);
+            const double merit = figure_of_merit(score_circle(field, next, range.evenness), range);
             if (merit > best_merit) {
               best_merit = merit;
               best = next;
@@ -457,7 +461,7 @@ std::optional<CircleFit> fit_circle(std::span<const SmoothPlanes> images,
   // Half the window at first: what the coarse search may be off; at last: the width of an edge.
   for (const double reach :
        {std::max(4.0, 0.03 * start.radius), std::max(3.0, 0.01 * start.radius), 2.5, 2.5}) {
-    const int count = samples_on(circle.radius, 1.5);
+    const int count = sample_count(circle.radius, 1.5);
     std::vector<EdgePoint> points;
     int visible = 0;
     for (int i = 0; i < count; ++i) {
@@ -466,11 +470,11 @@ std::optional<CircleFit> fit_circle(std::span<const SmoothPlanes> images,
       const double v = circle.v + circle.radius * std::sin(angle);
       if (u < 1 || v < 1 || u > images[0].width - 1 || v > images[0].height - 1) continue;
       ++visible;
-      const auto point = edge_on_ray(images, circle, std::cos(angle), std::sin(angle), reach);
+      const auto point = find_edge_on_ray(images, circle, std::cos(angle), std::sin(angle), reach);
       if (point) points.push_back(*point);
     }
     if (visible < 24 || static_cast<int>(points.size()) * 4 < visible) return std::nullopt;
-    const auto next = fit_points(points, circle);
+    const auto next = fit_circle_to_points(points, circle);
     if (!next || std::hypot(next->circle.u - start.u, next->circle.v - start.v) +
                          std::abs(next->circle.radius - start.radius) >
                      std::max(8.0, 0.06 * start.radius)) {

@@ -15,7 +15,7 @@ struct FieldCircle {
   double radius = 0.0;
 };
 
-/// How the edge around a circle is summed up.
+/// Rule by which the edge around a circle is summed.
 enum class Evenness {
   mean,  ///< the plain mean: long gaps are expected
   even,  ///< square of the mean root over 12 sectors: an edge all around counts more than the same
@@ -31,8 +31,8 @@ struct CircleScore {
 };
 
 /// Scores a circle on about one sample for each 3 px of circumference, 48 to 720.
-[[nodiscard]] CircleScore score(const EdgeField& field, const FieldCircle& circle,
-                                Evenness evenness);
+[[nodiscard]] CircleScore score_circle(const EdgeField& field, const FieldCircle& circle,
+                                       Evenness evenness);
 
 struct CircleRange {
   double lowest_radius = 0.0;
@@ -41,12 +41,12 @@ struct CircleRange {
   Evenness evenness = Evenness::even;
 };
 
-/// Looks at all centres (a grid of the field's pixels) and radii; the local maxima of the score,
-/// best first, at most `count`. Meant for small fields: the cost is pixels * radii * 96.
+/// Scores all centres (a grid of the field's pixels) and radii. Returns the local maxima, best
+/// first, at most `count`. Meant for small fields: the cost is pixels * radii * 96.
 [[nodiscard]] std::vector<FieldCircle> circle_candidates(const EdgeField& field,
                                                          const CircleRange& range, int count);
 
-/// Circles about nearly one centre: for each radius of the range in steps of `step`, the best
+/// Finds circles about nearly one centre: for each radius of the range in steps of `step`, the best
 /// centre within `centre_reach` * radius of (u, v); of those the local maxima over the radius, by
 /// ascending radius.
 [[nodiscard]] std::vector<FieldCircle> concentric_candidates(const EdgeField& field, double u,
@@ -55,11 +55,11 @@ struct CircleRange {
 
 /// Climbs from a circle to the nearest maximum of quality * sqrt(visible), steps 2 px down to 1/4
 /// px.
-[[nodiscard]] FieldCircle climb(const EdgeField& field, const FieldCircle& start,
-                                const CircleRange& range);
+[[nodiscard]] FieldCircle climb_to_maximum(const EdgeField& field, const FieldCircle& start,
+                                           const CircleRange& range);
 
-/// How near to a fitted circle an edge must lie to belong to it: what blur and a not quite round
-/// rim allow.
+/// Distance within which an edge belongs to a fitted circle: the allowance for blur and a rim that
+/// is not quite round.
 [[nodiscard]] double fit_tolerance(double radius);
 
 struct CircleFit {

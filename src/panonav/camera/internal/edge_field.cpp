@@ -28,8 +28,8 @@ std::vector<float> gaussian(double sigma_px) {
   return kernel;
 }
 
-std::vector<float> smoothed(const std::vector<float>& plane, int width, int height,
-                            const std::vector<float>& kernel) {
+std::vector<float> smooth(const std::vector<float>& plane, int width, int height,
+                          const std::vector<float>& kernel) {
   const int reach = static_cast<int>(kernel.size() / 2);
   std::vector<float> rows(plane.size());
   std::vector<float> result(plane.size());
@@ -57,7 +57,7 @@ std::vector<float> smoothed(const std::vector<float>& plane, int width, int heig
 }
 
 /// The steepest slope over the channels; one-sided at the frame.
-Slope steepest(const SmoothPlanes& planes, int u, int v) {
+Slope steepest_slope(const SmoothPlanes& planes, int u, int v) {
   const int left = std::max(0, u - 1);
   const int right = std::min(planes.width - 1, u + 1);
   const int above = std::max(0, v - 1);
@@ -101,12 +101,12 @@ SmoothPlanes smooth_planes(ImageView image, int reduction, double sigma_px) {
         plane[planes.index(u, v)] = static_cast<float>(sum) / area;
       }
     }
-    planes.channels.push_back(smoothed(plane, planes.width, planes.height, kernel));
+    planes.channels.push_back(smooth(plane, planes.width, planes.height, kernel));
   }
   std::vector<float> slopes;
   slopes.reserve(size);
   for (int v = 0; v < planes.height; ++v) {
-    for (int u = 0; u < planes.width; ++u) slopes.push_back(steepest(planes, u, v).squared);
+    for (int u = 0; u < planes.width; ++u) slopes.push_back(steepest_slope(planes, u, v).squared);
   }
   const auto fifth = slopes.begin() + static_cast<std::ptrdiff_t>(slopes.size() * 4 / 5);
   std::nth_element(slopes.begin(), fifth, slopes.end());
@@ -124,7 +124,7 @@ EdgeField edge_field(const SmoothPlanes& planes) {
   const float scale = planes.slope_scale * planes.slope_scale;
   for (int v = 0; v < field.height; ++v) {
     for (int u = 0; u < field.width; ++u) {
-      const Slope slope = steepest(planes, u, v);
+      const Slope slope = steepest_slope(planes, u, v);
       // |g|^2 / (|g|^2 + scale) times (cos 2t, sin 2t) = (u^2 - v^2, 2 u v) / |g|^2.
       const float weight = 1.0F / (slope.squared + scale);
       field.cosine.push_back(weight * (slope.u * slope.u - slope.v * slope.v));
@@ -151,7 +151,7 @@ EdgeField mean_field(std::span<const EdgeField> fields) {
   return mean;
 }
 
-EdgeField reduced(const EdgeField& field, int reduction) {
+EdgeField reduce(const EdgeField& field, int reduction) {
   require(reduction >= 1 && reduction <= std::min(field.width, field.height), "reduction",
           reduction, "1 .. the shorter side");
   EdgeField result;

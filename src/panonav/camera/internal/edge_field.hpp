@@ -26,8 +26,8 @@ struct SmoothPlanes {
 /// nothing.
 [[nodiscard]] SmoothPlanes smooth_planes(ImageView image, int reduction, double sigma_px);
 
-/// How strongly, and across which direction, an edge runs through each pixel: weight * (cos 2t, sin
-/// 2t), t the angle of the gradient (u right, v down), weight in [0, 1). Of colour images the
+/// Strength and direction of the edge through each pixel: weight * (cos 2t, sin 2t), t the angle of
+/// the gradient (u right, v down), weight in [0, 1). Of colour images the
 /// channel with the strongest edge counts. Doubled angles make the polarity of an edge irrelevant,
 /// so fields of several images can be averaged: what stays in its place remains, what moves
 /// averages out.
@@ -48,6 +48,6 @@ struct EdgeField {
 [[nodiscard]] EdgeField mean_field(std::span<const EdgeField> fields);
 
 /// Averages blocks of `reduction` x `reduction` pixels.
-[[nodiscard]] EdgeField reduced(const EdgeField& field, int reduction);
+[[nodiscard]] EdgeField reduce(const EdgeField& field, int reduction);
 
 }  // namespace panonav

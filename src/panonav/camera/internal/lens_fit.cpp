@@ -24,18 +24,18 @@ namespace {
 /// deviations; 95 % efficient for Gaussian errors.
 constexpr double tukey = 4.685;
 /// Parameters on which a point depends: those of its lens and of its picture's stand.
-constexpr int own = lens_size + stand_size;
+constexpr int own = lens_size + rotation_size;
 
-Vector2d residual(const std::vector<Stance>& stances, const Match& match) {
-  const Vector3d apart = stances[match.seen[0].view()].ray(match.seen[0].pixel) -
-                         stances[match.seen[1].view()].ray(match.seen[1].pixel);
+Vector2d residual(const std::vector<PosedLens>& lenses, const Match& match) {
+  const Vector3d apart = lenses[match.points[0].view()].ray(match.points[0].pixel) -
+                         lenses[match.points[1].view()].ray(match.points[1].pixel);
   return match.whitener * Vector2d(match.east.dot(apart), match.north.dot(apart));
 }
 
-/// Returns where a point's parameter stands among all.
-int place_of(const Seen& seen, int parameter) {
-  return parameter < lens_size ? lens_at(seen.lens) + parameter
-                               : stand_at(seen.picture) + parameter - lens_size;
+/// Returns the index of a point's parameter among all.
+int parameter_index(const ImagePoint& point, int parameter) {
+  return parameter < lens_size ? lens_at(point.lens) + parameter
+                               : rotation_at(point.picture) + parameter - lens_size;
 }
 
 }  // namespace
@@ -43,15 +43,15 @@ int place_of(const Seen& seen, int parameter) {
 /// The views as they stand, and with each of their parameters changed a little.
 class LensFit::Linearised {
  public:
-  Linearised(const State& state, double side)
-      : here_(stances(state, side)), changed_(here_.size()) {
+  Linearised(const State& state, double mirror_sign)
+      : here_(make_posed_lenses(state, mirror_sign)), changed_(here_.size()) {
     for (std::size_t view = 0; view < here_.size(); ++view) {
       for (int i = 0; i < own; ++i) {
         FisheyeLens lens = state.lenses[view % 2];
-        Stand stand = state.stands[view / 2];
+        RigRotation rotation = state.rotations[view / 2];
         i < lens_size ? add_to(lens, i, slope_step(i))
-                      : add_to(stand, i - lens_size, slope_step(i));
-        changed_[view].emplace_back(lens, stand, side);
+                      : add_to(rotation, i - lens_size, slope_step(i));
+        changed_[view].emplace_back(lens, rotation, mirror_sign);
       }
     }
   }
@@ -65,13 +65,13 @@ class LensFit::Linearised {
     Slopes slopes;
     std::array<int, 2 * own> places{};
     for (int side = 0; side < 2; ++side) {
-      const Seen& seen = match.seen[side];
-      const Vector3d unchanged = here_[seen.view()].ray(seen.pixel);
+      const ImagePoint& point = match.points[side];
+      const Vector3d unchanged = here_[point.view()].ray(point.pixel);
       for (int i = 0; i < own; ++i) {
         const int column = side * own + i;
-        places[column] = place_of(seen, i);
+        places[column] = parameter_index(point, i);
         const Vector3d change = (side == 0 ? 1.0 : -1.0) / slope_step(i) *
-                                (changed_[seen.view()][i].ray(seen.pixel) - unchanged);
+                                (changed_[point.view()][i].ray(point.pixel) - unchanged);
         slopes.col(column) =
             match.whitener * Vector2d(match.east.dot(change), match.north.dot(change));
       }
@@ -86,15 +86,16 @@ class LensFit::Linearised {
   }
 
  private:
-  std::vector<Stance> here_;
-  std::vector<std::vector<Stance>> changed_;
+  std::vector<PosedLens> here_;
+  std::vector<std::vector<PosedLens>> changed_;
 };
 
-LensFit::LensFit(const VectorXd& prior_deviations, double fine_rad, double side, Executor& executor)
+LensFit::LensFit(const VectorXd& prior_deviations, double fine_rad, double mirror_sign,
+                 Executor& executor)
     : at_{{}, VectorXd::Zero(prior_deviations.size())},
       prior_information_(prior_deviations.size()),
       fine_rad_(fine_rad),
-      side_(side),
+      mirror_sign_(mirror_sign),
       executor_(executor) {
   for (Eigen::Index i = 0; i < prior_deviations.size(); ++i) {
     prior_information_[i] = 1 / (prior_deviations[i] * prior_deviations[i]);
@@ -108,7 +109,7 @@ void LensFit::restart(const State& prior) {
 
 MatrixXd LensFit::normal(const State& state, const std::vector<Match>& matches,
                          VectorXd& right) const {
-  const Linearised linearised(state, side_);
+  const Linearised linearised(state, mirror_sign_);
   struct Part {
     MatrixXd matrix;
     VectorXd right;
@@ -134,7 +135,8 @@ MatrixXd LensFit::normal(const State& state, const std::vector<Match>& matches,
 }
 
 double LensFit::cost(const VectorXd& offset, const std::vector<Match>& matches) const {
-  const std::vector<Stance> here = stances(moved(at_.prior, offset), side_);
+  const std::vector<PosedLens> here =
+      make_posed_lenses(apply_change(at_.prior, offset), mirror_sign_);
   double sum = 0.5 * offset.dot(prior_information_.cwiseProduct(offset));
   for (const Match& match : matches) {
     const double t = std::min(1.0, residual(here, match).norm() / (tukey * deviation_rad_));
@@ -146,7 +148,7 @@ double LensFit::cost(const VectorXd& offset, const std::vector<Match>& matches) 
 
 void LensFit::update_deviation(const std::vector<Match>& matches) {
   std::vector<double> lengths;
-  const std::vector<Stance> here = stances(state(), side_);
+  const std::vector<PosedLens> here = make_posed_lenses(state(), mirror_sign_);
   for (const Match& match : matches) lengths.push_back(residual(here, match).norm());
   constexpr double median_length = 1.1774;  // of a Gaussian in the plane, in deviations
   deviation_rad_ =
@@ -181,7 +183,7 @@ void LensFit::solve(const std::vector<Match>& matches) {
   minimise(problem, equations, {.max_steps = 20, .damping = 1e-3, .min_decrease = 0.01});
 }
 
-bool LensFit::close_lenses(const std::array<double, 2>& radii_px) {
+bool LensFit::set_max_angles(const std::array<double, 2>& radii_px) {
   const State now = state();
   for (int i = 0; i < 2; ++i) {
     FisheyeLens lens = now.lenses[i];

@@ -10,12 +10,13 @@
 
 namespace panonav::dual_fisheye {
 
-/// Fits lenses and stands to matches by robust least squares (Levenberg-Marquardt) about a prior.
+/// Fits lenses and rotations to matches by robust least squares (Levenberg-Marquardt) about a
+/// prior.
 class LensFit {
  public:
   /// Takes the standard deviation of each parameter about the prior, and how far apart the finest
-  /// values of the pictures are. `side`: see `Stance`.
-  LensFit(const Eigen::VectorXd& prior_deviations, double fine_rad, double side,
+  /// values of the pictures are. `mirror_sign`: see `PosedLens`.
+  LensFit(const Eigen::VectorXd& prior_deviations, double fine_rad, double mirror_sign,
           Executor& executor);
 
   /// A prior, and how far the parameters are from it.
@@ -33,9 +34,9 @@ class LensFit {
   void solve(const std::vector<Match>& matches);
   /// Ends the lenses at these radii in pixels; false where the image's radius does not grow up to
   /// there.
-  [[nodiscard]] bool close_lenses(const std::array<double, 2>& radii_px);
+  [[nodiscard]] bool set_max_angles(const std::array<double, 2>& radii_px);
 
-  [[nodiscard]] State state() const { return moved(at_.prior, at_.offset); }
+  [[nodiscard]] State state() const { return apply_change(at_.prior, at_.offset); }
   /// Returns the standard deviation of a match.
   [[nodiscard]] double deviation_rad() const { return deviation_rad_; }
   /// Returns the covariance of all parameters, with what residuals of one region have in common
@@ -43,7 +44,7 @@ class LensFit {
   [[nodiscard]] Eigen::MatrixXd covariance(const std::vector<Match>& matches) const;
 
  private:
-  using Slopes = Eigen::Matrix<double, 2, 2 * (lens_size + stand_size)>;
+  using Slopes = Eigen::Matrix<double, 2, 2 * (lens_size + rotation_size)>;
   class Linearised;
   class Problem;
   /// Returns the information of the matches about all parameters; `right`: where the cost falls.
@@ -56,7 +57,7 @@ class LensFit {
   Parameters at_;
   Eigen::VectorXd prior_information_;
   double fine_rad_;
-  double side_;
+  double mirror_sign_;
   Executor& executor_;
   double deviation_rad_ = 0.01;
 };

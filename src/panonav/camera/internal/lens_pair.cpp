@@ -13,10 +13,10 @@ using Eigen::Vector3d;
 
 namespace {
 
-Matrix3d world_from_rig(const Stand& stand) {
-  return (Eigen::AngleAxisd(stand.yaw_rad, Vector3d::UnitZ()) *
-          Eigen::AngleAxisd(stand.pitch_rad, Vector3d::UnitY()) *
-          Eigen::AngleAxisd(stand.roll_rad, Vector3d::UnitX()))
+Matrix3d world_from_rig(const RigRotation& rotation) {
+  return (Eigen::AngleAxisd(rotation.yaw_rad, Vector3d::UnitZ()) *
+          Eigen::AngleAxisd(rotation.pitch_rad, Vector3d::UnitY()) *
+          Eigen::AngleAxisd(rotation.roll_rad, Vector3d::UnitX()))
       .toRotationMatrix();
 }
 Matrix3d rig_from_lens(const FisheyeLens& lens) {
@@ -41,32 +41,35 @@ void add_to(FisheyeLens& lens, int parameter, double change) {
   value = parameter == 2 ? value * std::exp(change) : value + change;
 }
 
-void add_to(Stand& stand, int parameter, double change) {
-  (parameter == 0 ? stand.yaw_rad : parameter == 1 ? stand.roll_rad : stand.pitch_rad) += change;
+void add_to(RigRotation& rotation, int parameter, double change) {
+  (parameter == 0   ? rotation.yaw_rad
+   : parameter == 1 ? rotation.roll_rad
+                    : rotation.pitch_rad) += change;
 }
 
-State moved(State state, const Eigen::VectorXd& change) {
+State apply_change(State state, const Eigen::VectorXd& change) {
   for (int lens = 0; lens < 2; ++lens) {
     for (int i = 0; i < lens_size; ++i) add_to(state.lenses[lens], i, change[lens_at(lens) + i]);
   }
-  for (int p = 0; p < static_cast<int>(state.stands.size()); ++p) {
-    for (int i = 0; i < stand_size; ++i) add_to(state.stands[p], i, change[stand_at(p) + i]);
+  for (int p = 0; p < static_cast<int>(state.rotations.size()); ++p) {
+    for (int i = 0; i < rotation_size; ++i)
+      add_to(state.rotations[p], i, change[rotation_at(p) + i]);
   }
   return state;
 }
 
-Matrix3d world_from_lens(const Stand& stand, const FisheyeLens& lens) {
-  return world_from_rig(stand) * rig_from_lens(lens);
+Matrix3d world_from_lens(const RigRotation& rotation, const FisheyeLens& lens) {
+  return world_from_rig(rotation) * rig_from_lens(lens);
 }
 
-Stance::Stance(const FisheyeLens& lens, const Stand& stand, double side)
-    : lens_(lens), world_from_lens_(world_from_lens(stand, lens)), side_(side) {
-  // What other parameters see beyond the circle still has a slope.
+PosedLens::PosedLens(const FisheyeLens& lens, const RigRotation& rotation, double mirror_sign)
+    : lens_(lens), world_from_lens_(world_from_lens(rotation, lens)), mirror_sign_(mirror_sign) {
+  // Rays that other parameters see beyond the circle still have a slope.
   lens_.max_angle_rad = std::min(std::numbers::pi, 1.1 * lens_.max_angle_rad);
 }
 
-Vector3d Stance::ray(const Eigen::Vector2d& pixel) const {
-  const double right = side_ * (pixel.x() - lens_.centre_u_px);
+Vector3d PosedLens::ray(const Eigen::Vector2d& pixel) const {
+  const double right = mirror_sign_ * (pixel.x() - lens_.centre_u_px);
   const double up = lens_.centre_v_px - pixel.y();
   const double radius = std::hypot(right, up);
   const double angle = angle_at(lens_, radius);
@@ -74,10 +77,10 @@ Vector3d Stance::ray(const Eigen::Vector2d& pixel) const {
   return world_from_lens_ * Vector3d(std::cos(angle), -right * scale, up * scale);
 }
 
-std::vector<Stance> stances(const State& state, double side) {
-  std::vector<Stance> result;
-  for (const Stand& stand : state.stands) {
-    for (const FisheyeLens& lens : state.lenses) result.emplace_back(lens, stand, side);
+std::vector<PosedLens> make_posed_lenses(const State& state, double mirror_sign) {
+  std::vector<PosedLens> result;
+  for (const RigRotation& rotation : state.rotations) {
+    for (const FisheyeLens& lens : state.lenses) result.emplace_back(lens, rotation, mirror_sign);
   }
   return result;
 }

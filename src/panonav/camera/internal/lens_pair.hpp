@@ -8,30 +8,30 @@
 
 namespace panonav::dual_fisheye {
 
-/// How the camera stood when a picture was taken, against the first picture's vertical axis.
-struct Stand {
+/// Rotation of the camera in a picture against the first picture's vertical axis.
+struct RigRotation {
   double yaw_rad = 0.0, roll_rad = 0.0, pitch_rad = 0.0;
 };
 
-/// What a calibration looks for: both lenses, and a stand for each picture.
+/// Unknowns of a calibration: both lenses, and a rotation for each picture.
 struct State {
   std::array<FisheyeLens, 2> lenses;
-  std::vector<Stand> stands;
+  std::vector<RigRotation> rotations;
 };
 
 /// Parameters of a lens in the vector of unknowns: centre u and v (px), logarithm of the focal
 /// length, k3, k5, azimuth, elevation, roll (rad).
 inline constexpr int lens_size = 8;
-/// Parameters of a stand: yaw, roll, pitch (rad).
-inline constexpr int stand_size = 3;
+/// Parameters of a rotation: yaw, roll, pitch (rad).
+inline constexpr int rotation_size = 3;
 
 /// Returns the index of a lens's first parameter: those of both lenses come first.
 [[nodiscard]] constexpr int lens_at(int lens) {
   return lens * lens_size;
 }
-/// Returns the index of the first parameter of a picture's stand.
-[[nodiscard]] constexpr int stand_at(int picture) {
-  return 2 * lens_size + picture * stand_size;
+/// Returns the index of the first parameter of a picture's rotation.
+[[nodiscard]] constexpr int rotation_at(int picture) {
+  return 2 * lens_size + picture * rotation_size;
 }
 /// Returns the change of a parameter over which its slope is taken: thousandths of a pixel for a
 /// centre, millionths for all else.
@@ -41,28 +41,28 @@ inline constexpr int stand_size = 3;
 
 /// Adds `change` to one parameter.
 void add_to(FisheyeLens& lens, int parameter, double change);
-void add_to(Stand& stand, int parameter, double change);
+void add_to(RigRotation& rotation, int parameter, double change);
 /// Returns the state with all parameters changed.
-[[nodiscard]] State moved(State state, const Eigen::VectorXd& change);
+[[nodiscard]] State apply_change(State state, const Eigen::VectorXd& change);
 
 /// Returns the rotation from the frame of a lens to the world's: x along its axis.
-[[nodiscard]] Eigen::Matrix3d world_from_lens(const Stand& stand, const FisheyeLens& lens);
+[[nodiscard]] Eigen::Matrix3d world_from_lens(const RigRotation& rotation, const FisheyeLens& lens);
 
 /// One lens in one picture, ready for many rays.
-class Stance {
+class PosedLens {
  public:
-  /// `side`: 1 where columns run clockwise, else -1.
-  Stance(const FisheyeLens& lens, const Stand& stand, double side);
+  /// `mirror_sign`: 1 where columns run clockwise, else -1.
+  PosedLens(const FisheyeLens& lens, const RigRotation& rotation, double mirror_sign);
   /// Returns the direction in the world that is seen at a pixel of the image.
   [[nodiscard]] Eigen::Vector3d ray(const Eigen::Vector2d& pixel) const;
 
  private:
   FisheyeLens lens_;
   Eigen::Matrix3d world_from_lens_;
-  double side_;
+  double mirror_sign_;
 };
 
-/// Returns the stances of both lenses in all pictures: that of lens l in picture p is 2 p + l.
-[[nodiscard]] std::vector<Stance> stances(const State& state, double side);
+/// Poses both lenses in all pictures: lens l in picture p has the index 2 p + l.
+[[nodiscard]] std::vector<PosedLens> make_posed_lenses(const State& state, double mirror_sign);
 
 }  // namespace panonav::dual_fisheye

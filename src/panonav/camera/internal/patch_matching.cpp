@@ -24,7 +24,7 @@ struct Plane {
   const std::vector<float>* values = nullptr;
 };
 
-Plane plane_of(const SmoothPlanes& smooth, int reduction) {
+Plane make_plane(const SmoothPlanes& smooth, int reduction) {
   return {reduction, smooth.width, smooth.height, &smooth.channels[0]};
 }
 
@@ -45,8 +45,8 @@ struct Patch {
   }
 };
 template <class View>
-Patch cut(const View& view, const Vector3d& middle, const Vector3d& east, const Vector3d& north,
-          double step_rad, int half) {
+Patch cut_patch(const View& view, const Vector3d& middle, const Vector3d& east,
+                const Vector3d& north, double step_rad, int half) {
   Patch patch{half, {}};
   for (int y = -half; y <= half; ++y) {
     for (int x = -half; x <= half; ++x) {
@@ -83,8 +83,8 @@ Correlation correlate(const Patch& a, const Patch& b, int dx, int dy) {
           std::log(std::max(sb, 1.0) / std::max(sa, 1.0))};
 }
 
-/// Contrast across edges and along them; empty where there is too little of it.
-std::optional<Eigen::Matrix2d> whitener_of(const Patch& patch) {
+/// Computes the weights of errors across edges and along them; nullopt where contrast is too low.
+std::optional<Eigen::Matrix2d> compute_whitener(const Patch& patch) {
   double n = 0, sum = 0, squares = 0;
   Eigen::Matrix2d tensor = Eigen::Matrix2d::Zero();
   for (int y = -reach; y <= reach; ++y) {
@@ -103,9 +103,9 @@ std::optional<Eigen::Matrix2d> whitener_of(const Patch& patch) {
   if (squares - sum * sum / n < min_contrast * min_contrast * n) return std::nullopt;
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver;
   solver.computeDirect(tensor);
-  const double most = solver.eigenvalues()[1];
-  if (!(most > 0)) return std::nullopt;
-  const Vector2d roots(std::sqrt(std::max(0.0, solver.eigenvalues()[0] / most)), 1.0);
+  const double largest = solver.eigenvalues()[1];
+  if (!(largest > 0)) return std::nullopt;
+  const Vector2d roots(std::sqrt(std::max(0.0, solver.eigenvalues()[0] / largest)), 1.0);
   const Eigen::Matrix2d axes = solver.eigenvectors();
   return Eigen::Matrix2d(axes * roots.asDiagonal() * axes.transpose());
 }
@@ -116,7 +116,7 @@ struct Direction {
   int region = 0;
 };
 /// Returns direction i of `count`: evenly over the sphere (Fibonacci), but for the poles: floor or
-/// stand, and the hand above.
+/// rotation, and the hand above.
 Direction direction_at(std::size_t i, int count) {
   const double z = 0.94 * (1 - (2.0 * static_cast<double>(i) + 1) / count);
   const double azimuth = std::numbers::pi * (3 - std::sqrt(5.0)) * static_cast<double>(i);
@@ -146,21 +146,22 @@ std::vector<std::array<int, 2>> view_pairs(int pictures) {
 
 }  // namespace
 
-/// One lens in one picture as it is believed to stand.
+/// One lens in one picture as it is believed to rotation.
 class PatchMatcher::View {
  public:
-  View(const State& state, int picture, int lens, const Plane& plane, double side)
+  View(const State& state, int picture, int lens, const Plane& plane, double mirror_sign)
       : lens_(state.lenses[lens]),
-        lens_from_world_(world_from_lens(state.stands[picture], lens_).transpose()),
+        lens_from_world_(world_from_lens(state.rotations[picture], lens_).transpose()),
         plane_(plane),
-        side_(side) {}
+        mirror_sign_(mirror_sign) {}
 
-  /// Where the lens sees a direction of the world (image pixels); empty beyond its field of view.
+  /// Projects a direction of the world to image pixels; nullopt beyond the field of view.
   [[nodiscard]] std::optional<Vector2d> pixel(const Vector3d& in_world) const {
     const Vector3d d = lens_from_world_ * in_world;
     const auto point = project(lens_, {d.x(), d.y(), d.z()});
     if (!point) return std::nullopt;
-    return Vector2d(lens_.centre_u_px + side_ * point->right_px, lens_.centre_v_px - point->up_px);
+    return Vector2d(lens_.centre_u_px + mirror_sign_ * point->right_px,
+                    lens_.centre_v_px - point->up_px);
   }
   /// Its grey level there; negative: not seen.
   [[nodiscard]] float value(const Vector3d& in_world) const {
@@ -182,15 +183,15 @@ class PatchMatcher::View {
   FisheyeLens lens_;
   Matrix3d lens_from_world_;
   Plane plane_;
-  double side_;
+  double mirror_sign_;
 };
 
-int Matching::near() const {
+int Matching::count_near_expected() const {
   return static_cast<int>(
       std::ranges::count_if(matches, [](const Match& match) { return match.off_steps <= 1.0; }));
 }
 
-void PatchMatcher::find_turns(State& state, double step_rad, double left_azimuth_rad) {
+void PatchMatcher::estimate_yaws(State& state, double step_rad, double left_azimuth_rad) {
   static_cast<void>(planes(state, step_rad));
   // The first reduction serves all fields of view that are tried: they differ little.
   const int reduction = planes_.front().first;
@@ -199,11 +200,11 @@ void PatchMatcher::find_turns(State& state, double step_rad, double left_azimuth
   constexpr int rows = 30;      // every second degree about the horizon
   const auto panorama = [&](int picture) {
     std::vector<float> values;
-    const Plane plane = plane_of(smooth_pictures[picture], reduction);
+    const Plane plane = make_plane(smooth_pictures[picture], reduction);
     State level = state;
-    level.stands[picture] = {};
-    const View left(level, picture, 0, plane, side_);
-    const View right(level, picture, 1, plane, side_);
+    level.rotations[picture] = {};
+    const View left(level, picture, 0, plane, mirror_sign_);
+    const View right(level, picture, 1, plane, mirror_sign_);
     for (int y = 0; y < rows; ++y) {
       double sum = 0;
       for (int c = 0; c < columns; ++c) {
@@ -220,7 +221,7 @@ void PatchMatcher::find_turns(State& state, double step_rad, double left_azimuth
     return values;
   };
   const auto first = panorama(0);
-  for (int p = 1; p < static_cast<int>(state.stands.size()); ++p) {
+  for (int p = 1; p < static_cast<int>(state.rotations.size()); ++p) {
     const auto other = panorama(p);
     double best = -1;
     for (int turn = 0; turn < columns; ++turn) {
@@ -231,7 +232,7 @@ void PatchMatcher::find_turns(State& state, double step_rad, double left_azimuth
       }
       if (product > best) {
         best = product;
-        state.stands[p].yaw_rad = 2 * std::numbers::pi * turn / columns;
+        state.rotations[p].yaw_rad = 2 * std::numbers::pi * turn / columns;
       }
     }
   }
@@ -251,7 +252,7 @@ class PatchMatcher::Search {
   void add_match(int a, int b, Matching& found) {
     const auto pixel = views_[a].pixel(direction_.middle);
     if (!pixel || !views_[b].pixel(direction_.middle)) return;
-    const auto whitener = whitener_of(area(a));
+    const auto whitener = compute_whitener(area(a));
     if (!whitener) return;
     const std::vector<Correlation> at = correlations(a, b);
     const auto best =
@@ -275,7 +276,7 @@ class PatchMatcher::Search {
     const double dy = y - search_ + vertex(width);
     const auto other = views_[b].pixel(middle + step_rad_ * (dx * east + dy * north));
     if (!other) return;
-    found.matches.push_back({{Seen{a / 2, a % 2, *pixel}, Seen{b / 2, b % 2, *other}},
+    found.matches.push_back({{ImagePoint{a / 2, a % 2, *pixel}, ImagePoint{b / 2, b % 2, *other}},
                              east,
                              north,
                              *whitener,
@@ -288,8 +289,8 @@ class PatchMatcher::Search {
   /// Returns the patch of a view with all that is searched around it.
   [[nodiscard]] const Patch& area(int view) {
     if (!areas_[view]) {
-      areas_[view] = cut(views_[view], direction_.middle, direction_.east, direction_.north,
-                         step_rad_, reach + search_);
+      areas_[view] = cut_patch(views_[view], direction_.middle, direction_.east, direction_.north,
+                               step_rad_, reach + search_);
     }
     return *areas_[view];
   }
@@ -315,8 +316,8 @@ Matching PatchMatcher::match(const State& state, double step_rad, int search, in
   const int count = static_cast<int>(grey_.size());
   std::vector<View> views;
   for (int p = 0; p < count; ++p) {
-    const Plane plane = plane_of(smooth[p], reduction);
-    for (int lens = 0; lens < 2; ++lens) views.emplace_back(state, p, lens, plane, side_);
+    const Plane plane = make_plane(smooth[p], reduction);
+    for (int lens = 0; lens < 2; ++lens) views.emplace_back(state, p, lens, plane, mirror_sign_);
   }
   const auto pairs = view_pairs(count);
   const auto directions_size = static_cast<std::size_t>(directions);

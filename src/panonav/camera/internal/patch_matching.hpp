@@ -19,16 +19,16 @@ inline constexpr int sectors = 24;
 inline constexpr int regions = 4 * sectors;
 
 /// A point of a picture.
-struct Seen {
+struct ImagePoint {
   int picture = 0, lens = 0;
   Eigen::Vector2d pixel;
-  /// Returns the index of the lens in this picture among `stances`.
+  /// Returns the index of the lens in this picture among `make_posed_lenses`.
   [[nodiscard]] int view() const { return 2 * picture + lens; }
 };
 
 /// The same thing of the world seen by two lenses, or by one in two pictures.
 struct Match {
-  std::array<Seen, 2> seen;
+  std::array<ImagePoint, 2> points;
   Eigen::Vector3d east, north;  ///< across the direction
   Eigen::Matrix2d whitener;     ///< 1 across the patch's edges, less along them
   double off_steps = 0.0;       ///< from where the state before expected it
@@ -40,19 +40,19 @@ struct Matching {
   std::vector<Match> matches;
   int textured = 0;  ///< patches with contrast, matched or not
   /// Counts the matches within one step of where they were expected.
-  [[nodiscard]] int near() const;
+  [[nodiscard]] int count_near_expected() const;
 };
 
 /// Finds what two lenses, or one in two pictures, both see, by normalised correlation of patches.
 class PatchMatcher {
  public:
-  /// Takes grey pictures of one size, which outlive the matcher. `side`: see `Stance`.
-  PatchMatcher(std::span<const Image> grey, double side, Executor& executor)
-      : grey_(grey), side_(side), executor_(executor) {}
+  /// Takes grey pictures of one size, which outlive the matcher. `mirror_sign`: see `PosedLens`.
+  PatchMatcher(std::span<const Image> grey, double mirror_sign, Executor& executor)
+      : grey_(grey), mirror_sign_(mirror_sign), executor_(executor) {}
 
   /// Sets each picture's yaw to the turn by which its panorama, of values about `step_rad` apart,
   /// is most like the first one's.
-  void find_turns(State& state, double step_rad, double left_azimuth_rad);
+  void estimate_yaws(State& state, double step_rad, double left_azimuth_rad);
   /// Looks in each of `directions` for what is within `search` steps of where the state expects it.
   [[nodiscard]] Matching match(const State& state, double step_rad, int search, int directions);
 
@@ -65,7 +65,7 @@ class PatchMatcher {
                                                                         double step_rad);
 
   std::span<const Image> grey_;
-  double side_;
+  double mirror_sign_;
   Executor& executor_;
   std::vector<std::pair<int, std::vector<SmoothPlanes>>> planes_;
 };

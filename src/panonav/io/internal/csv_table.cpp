@@ -13,15 +13,15 @@ namespace {
 
 constexpr std::size_t table_limit_bytes = 64U << 20U;
 
-std::string_view trimmed(std::string_view text) {
-  const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
-  while (!text.empty() && blank(text.front())) text.remove_prefix(1);
-  while (!text.empty() && blank(text.back())) text.remove_suffix(1);
+std::string_view trim(std::string_view text) {
+  const auto is_blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
+  while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
+  while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
   return text;
 }
 
 // Empty when a quote is not closed or something follows it.
-std::optional<std::vector<std::string>> split(std::string_view line) {
+std::optional<std::vector<std::string>> split_fields(std::string_view line) {
   std::vector<std::string> fields;
   std::size_t i = 0;
   while (true) {
@@ -42,7 +42,7 @@ std::optional<std::vector<std::string>> split(std::string_view line) {
       if (i < line.size() && line[i] != ',') return std::nullopt;
     } else {
       const std::size_t end = std::min(line.find(',', i), line.size());
-      field = trimmed(line.substr(i, end - i));
+      field = trim(line.substr(i, end - i));
       i = end;
     }
     fields.push_back(std::move(field));
@@ -63,11 +63,11 @@ CsvTable CsvTable::read(const std::filesystem::path& path) {
   std::size_t line_number = 0;
   while (!rest.empty()) {
     const std::size_t end = std::min(rest.find('\n'), rest.size());
-    const std::string_view line = trimmed(rest.substr(0, end));
+    const std::string_view line = trim(rest.substr(0, end));
     rest.remove_prefix(std::min(end + 1, rest.size()));
     ++line_number;
     if (line.empty() || line.front() == '#') continue;
-    auto fields = split(line);
+    auto fields = split_fields(line);
     const std::string where = "line " + std::to_string(line_number);
     if (!fields)
       throw FileError(path.string(),

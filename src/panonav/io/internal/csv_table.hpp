@@ -20,7 +20,7 @@ class CsvTable {
   [[nodiscard]] std::size_t rows() const noexcept { return cells_.size(); }
   /// Names of the columns, in the order of the header.
   [[nodiscard]] const std::vector<std::string>& columns() const noexcept { return columns_; }
-  /// Whether the header names the column.
+  /// True if the header names the column.
   [[nodiscard]] bool has(std::string_view column) const noexcept {
     return index(column).has_value();
   }

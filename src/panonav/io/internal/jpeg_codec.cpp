@@ -105,7 +105,7 @@ bool pixel_steps(Reader& reader, std::uint8_t* pixels, std::size_t stride) {
 }
 
 // The EXIF block: what an APP1 segment before the first scan holds behind its name.
-std::span<const std::uint8_t> exif_of(std::span<const std::uint8_t> bytes) {
+std::span<const std::uint8_t> find_exif(std::span<const std::uint8_t> bytes) {
   constexpr std::uint8_t app1 = 0xE1;
   constexpr std::uint8_t start_of_scan = 0xDA;
   constexpr std::array<std::uint8_t, 6> exif{'E', 'x', 'i', 'f', 0, 0};
@@ -209,7 +209,7 @@ ImageSize jpeg_size(std::span<const std::uint8_t> bytes, std::string_view name,
                     const ImageLimits& limits) {
   Reader reader;
   const ImageSize stored = open(reader, bytes, name, limits);
-  return upright_size(stored, exif_orientation(exif_of(bytes)));
+  return upright_size(stored, exif_orientation(find_exif(bytes)));
 }
 
 Image decode_jpeg(std::span<const std::uint8_t> bytes, std::string_view name,
@@ -231,7 +231,7 @@ Image decode_jpeg(std::span<const std::uint8_t> bytes, std::string_view name,
                    static_cast<std::size_t>(size.width) * channels)) {
     fail(reader, name);
   }
-  return upright(std::move(image), exif_orientation(exif_of(bytes)));
+  return upright(std::move(image), exif_orientation(find_exif(bytes)));
 }
 
 }  // namespace panonav::detail

@@ -92,7 +92,7 @@ bool pixel_steps(Reader& reader, png_bytepp rows) {
 }
 
 // libpng takes the memory of some chunks before it reads them, up to 2 GB whatever its limits are.
-bool holds_its_chunks(std::span<const std::uint8_t> bytes) {
+bool has_complete_chunks(std::span<const std::uint8_t> bytes) {
   constexpr std::size_t around = 12;  // length, name and checksum
   std::size_t at = 8;
   while (at + around <= bytes.size()) {
@@ -107,7 +107,7 @@ bool holds_its_chunks(std::span<const std::uint8_t> bytes) {
 
 ImageSize open(Reader& reader, std::span<const std::uint8_t> bytes, std::string_view name,
                const ImageLimits& limits) {
-  if (!holds_its_chunks(bytes)) throw FileError(name, "damaged PNG: the file ends too early");
+  if (!has_complete_chunks(bytes)) throw FileError(name, "damaged PNG: the file ends too early");
   reader.next = bytes.data();
   reader.left = bytes.size();
   reader.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &reader, on_read_error, on_warning);

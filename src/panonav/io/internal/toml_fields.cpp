@@ -35,20 +35,20 @@ namespace {
 
 constexpr std::size_t document_limit_bytes = 1U << 20U;
 
-TomlTable copy_of(const toml::table& table);
+TomlTable convert(const toml::table& table);
 
-TomlValue copy_of(const toml::node& node) {
+TomlValue convert(const toml::node& node) {
   TomlValue result;
   std::ostringstream shown;
   node.visit([&](const auto& value) {
     using Value = std::remove_cvref_t<decltype(value)>;
     if constexpr (std::is_same_v<Value, toml::table>) {
       shown << "a section";
-      result.content = copy_of(value);
+      result.content = convert(value);
     } else if constexpr (std::is_same_v<Value, toml::array>) {
       std::vector<TomlValue> list;
       for (const auto& element : value) {
-        list.push_back(copy_of(element));
+        list.push_back(convert(element));
         shown << (list.size() > 1 ? ", " : "[") << list.back().shown;
       }
       shown << (list.empty() ? "[]" : "]");
@@ -65,10 +65,10 @@ TomlValue copy_of(const toml::node& node) {
   return result;
 }
 
-TomlTable copy_of(const toml::table& table) {
+TomlTable convert(const toml::table& table) {
   TomlTable result;
   for (const auto& [key, node] : table) {
-    result.push_back({std::string(key.str()), copy_of(node)});
+    result.push_back({std::string(key.str()), convert(node)});
   }
   return result;
 }
@@ -102,7 +102,7 @@ TomlTable read_toml(const std::filesystem::path& path) {
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   check_dots(text, path);
   try {
-    return copy_of(toml::parse(text));
+    return convert(toml::parse(text));
   } catch (const toml::parse_error& error) {
     throw FileError(path.string(), "line " + std::to_string(error.source().begin.line) +
                                        " is not TOML: " + to_readable_line(error.description()));

@@ -16,7 +16,7 @@ struct TomlField;
 /// The fields of a TOML table in the order of the file.
 using TomlTable = std::vector<TomlField>;
 
-/// What stands to the right of a field's name.
+/// The value of a field.
 struct TomlValue {
   /// Dates and times are monostate: nothing here uses them.
   std::variant<std::monostate, bool, std::int64_t, double, std::string, std::vector<TomlValue>,
@@ -43,9 +43,9 @@ class TomlFields {
   /// `section` is its name for messages; empty for the top level.
   TomlFields(std::filesystem::path path, std::string section, const TomlTable& table);
 
-  /// Empty when the field is absent; FileError when it is of another type.
+  /// Returns a number; nullopt when the field is absent. Throws FileError on another type.
   std::optional<double> number(std::string_view field);
-  /// A whole number; reals are refused.
+  /// Returns a whole number; reals are refused.
   std::optional<std::int64_t> integer(std::string_view field);
   std::optional<bool> boolean(std::string_view field);      ///< true or false.
   std::optional<std::string> text(std::string_view field);  ///< A text in quotation marks.

@@ -45,7 +45,7 @@ struct MotionBody {
   static void normal_pairs(const uint64_t* bits, float* first, float* second, int count);
   static void move_poses(double* x_m, double* y_m, double* heading_rad, const double* forward_m,
                          const double* left_m, const double* turn_error_rad, double turn_rad,
-                         double share_before, int count);
+                         double turn_share_before_travel, int count);
 };
 
 template <Instructions set>

@@ -13,7 +13,7 @@ struct HalvedColumns {
   alignas(64) uint8_t at[matched_residues][matched_halves][2 * matched_query_columns][8];
 };
 
-// From 16 bands of 128 bytes each: eight bands of sixteen columns at a time.
+// Transposes 16 bands of 128 bytes each: eight bands of sixteen columns at a time.
 inline void halve_columns(const uint8_t* reference, HalvedColumns& halved) {
   for (int half = 0; half < matched_halves; ++half) {
     for (int first = 0; first < matched_reference_columns; first += 16) {
@@ -50,7 +50,7 @@ inline void halve_columns(const uint8_t* reference, HalvedColumns& halved) {
   }
 }
 
-// Where eight absolute differences are added up at once.
+// Sums eight absolute differences by one instruction.
 template <Instructions set>
 void match_by_sad(const uint8_t* query, const uint8_t* reference, uint16_t* costs) {
   using Vector = ByteVector<set>;

@@ -73,17 +73,17 @@ uint32_t interleaved_bounds(const uint8_t* sketches, const int32_t* slacks, size
     EightInts sum;
     Vector::narrow(sums, sum);
     const EightInts slack = *reinterpret_cast<const EightInts*>(slacks + octet * 8);
-    const EightInts taken = slack < max_slack ? slack : max_slack;
-    const EightInts difference = sum + constant - taken;
+    const EightInts used_slack = slack < max_slack ? slack : max_slack;
+    const EightInts difference = sum + constant - used_slack;
     const EightInts bound = difference > 0 ? difference : EightInts{};
     *reinterpret_cast<EightInts*>(bounds + octet * 8) = bound;
     smallest = bound < smallest ? bound : smallest;
   }
   uint32_t each[8];
   __builtin_memcpy(each, &smallest, sizeof each);
-  uint32_t least = each[0];
-  for (const uint32_t bound : each) least = bound < least ? bound : least;
-  return least;
+  uint32_t min_bound = each[0];
+  for (const uint32_t bound : each) min_bound = bound < min_bound ? bound : min_bound;
+  return min_bound;
 }
 
 bool counts_everywhere(const DistanceKernels::SketchQuery& query) {
@@ -141,8 +141,8 @@ void DistanceBody<set>::sketch_bounds_at(const uint8_t* sketches, const int32_t*
       sums = sums + Vector::product(sad, Vector::load(query.steps + group));
     }
     const int32_t slack = slacks == nullptr ? query.max_slack : slacks[indices[i]];
-    const int32_t taken = slack < query.max_slack ? slack : query.max_slack;
-    const int64_t bound = static_cast<int64_t>(Vector::total(sums)) + query.constant - taken;
+    const int32_t used_slack = slack < query.max_slack ? slack : query.max_slack;
+    const int64_t bound = static_cast<int64_t>(Vector::total(sums)) + query.constant - used_slack;
     bounds[i] = bound < 0 ? 0U : static_cast<uint32_t>(bound);
   }
 }

@@ -61,9 +61,9 @@ void FeatureMatchBody<set>::count_explained(const MatchedBearings& matched,
                                   matched.reference_cosine[at] * turn.half_sine);
       reference_cosine[i] = sign * (matched.reference_cosine[at] * turn.half_cosine +
                                     matched.reference_sine[at] * turn.half_sine);
-      const float least =
+      const float limit =
           (size * hypotheses.tolerance_cosine - hypotheses.tolerance_sine) / hypotheses.max_ratio;
-      const float needed = size <= hypotheses.tolerance_sine ? -2.0F : least;
+      const float needed = size <= hypotheses.tolerance_sine ? -2.0F : limit;
       min_sine[i] = within > 0.0F ? needed : 2.0F;
     }
     for (size_t i = 0; i < count; ++i) {
@@ -72,7 +72,7 @@ void FeatureMatchBody<set>::count_explained(const MatchedBearings& matched,
       const float query_square = query_tangent * query_tangent;
       const float reference_square = reference_tangent * reference_tangent;
       for (size_t d = 0; d < motion_axes; ++d) {
-        // Of the angles between the direction of motion and both bearings.
+        // Sines of the angles between the direction of motion and both bearings.
         const float of_query =
             query_sine[i] * hypotheses.cosine[d] - query_cosine[i] * hypotheses.sine[d];
         const float of_reference =

@@ -59,10 +59,10 @@ void MotionBody<set>::move_poses(double* __restrict x_m, double* __restrict y_m,
                                  double* __restrict heading_rad, const double* __restrict forward_m,
                                  const double* __restrict left_m,
                                  const double* __restrict turn_error_rad, double turn_rad,
-                                 double share_before, int count) {
+                                 double turn_share_before_travel, int count) {
   constexpr double rounder = 6755399441055744.0;  // 1.5 * 2^52
   for (int i = 0; i < count; ++i) {
-    const double direction = heading_rad[i] + share_before * turn_error_rad[i];
+    const double direction = heading_rad[i] + turn_share_before_travel * turn_error_rad[i];
     const double rounded = direction * 0.636619772367581343 + rounder;  // in quarters of a turn
     long long quarter;
     __builtin_memcpy(&quarter, &rounded, sizeof quarter);

@@ -36,7 +36,7 @@ inline void explain_similarity_together(const SimilarityLanes& lanes,
                                         const float* __restrict x_m, const float* __restrict y_m,
                                         const float* __restrict heading_rad,
                                         float* __restrict explained) {
-  constexpr float least = -60.0F;  // the squares are normal numbers still: others are slow
+  constexpr float min_exponent = -60.0F;  // the squares are normal numbers still: others are slow
   float squares[poses_together] = {};
   float products[poses_together] = {};
   for (int i = 0; i < similarity_lanes; ++i) {
@@ -44,18 +44,18 @@ inline void explain_similarity_together(const SimilarityLanes& lanes,
       const float dx = lanes.x_m[i] - x_m[p];
       const float dy = lanes.y_m[i] - y_m[p];
       const float apart = __builtin_sqrtf(dx * dx + dy * dy + fall.blur_square_m2);
-      const float expected = exp_of(-apart * fall.per_metre, least);
+      const float expected = exp_of(-apart * fall.per_metre, min_exponent);
       const float turn = wrapped(heading_rad[p] - lanes.heading_rad[i]);
       const float other_turn = wrapped(heading_rad[p] - lanes.other_heading_rad[i]);
       const float facing = lanes.log_similarity[i] + turn * turn * lanes.per_square_turn[i];
       const float other =
           lanes.other_log_similarity[i] + other_turn * other_turn * lanes.per_square_turn[i];
       squares[p] += expected * expected;
-      products[p] += exp_of(facing > other ? facing : other, least) * expected;
+      products[p] += exp_of(facing > other ? facing : other, min_exponent) * expected;
     }
   }
   for (int p = 0; p < poses_together; ++p) {
-    // What is left of similarity 0 is nothing.
+    // The rounding residue of similarity 0 becomes 0.
     const float product = products[p] > 1e-16F ? products[p] : 0.0F;
     explained[p] = product * product / (squares[p] + 1e-30F);
   }

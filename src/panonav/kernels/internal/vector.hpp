@@ -28,24 +28,28 @@ constexpr int lanes_of = set == Instructions::avx512 ? 16
                          : set == Instructions::avx2 ? 8
                                                      : 4;
 
+// Operations of a ByteVector on bytes and images:
+//   load(from)             from any address
+//   halve(upper, lower, to)   `halved` means of 2 x 2 bytes, halves rounded up
+//   lookup(table, bytes), lookup_upper(table, bytes)    of each byte the entry of a table of 16
+//                          bytes at its lower, its upper four bits
+//   add_saturated(a, b)    of each byte the sum, at most 255
+//   at_most(a, limit)      bit i: byte i is at most the limit
+//   collect(values, limit, first, to)    of sizeof(Register) / 4 values those <= limit: writes
+//                          first + position, may write as many as there are values; their number
+
+// Operations on groups of eight bytes and on numbers:
+//   repeat(number)         in each group
+//   sad(a, b)              of each group the sum of the absolute differences of its bytes
+//   add_sad(sums, a, b)    the same added to sums of which only the total counts
+//   total(sums)            of all numbers; below 2^32
+//   product(a, b)          of each group; factors below 2^32
+//   narrow(sums, eight)    the eight numbers of 64 / sizeof(Register) registers, each below 2^32
+//   add_products(sums, bytes, weights)   adds to each number of 32 bits its four bytes times their
+//                          weights, which add up to at most 127
+
 /// The few instructions that no compiler makes of a loop. A Register holds groups of eight bytes,
 /// which are numbers of 64 bits too (`+`, `&`), or twice as many of 32.
-///   load(from)             from any address
-///   repeat(number)         in each group
-///   sad(a, b)              of each group the sum of the absolute differences of its bytes
-///   add_sad(sums, a, b)    the same added to sums of which only the total counts
-///   total(sums)            of all numbers; below 2^32
-///   product(a, b)          of each group; factors below 2^32
-///   narrow(sums, eight)    the eight numbers of 64 / sizeof(Register) registers, each below 2^32
-///   add_products(sums, bytes, weights)   adds to each number of 32 bits its four bytes times their
-///                          weights, which add up to at most 127
-///   halve(upper, lower, to)   `halved` means of 2 x 2 bytes, halves rounded up
-///   lookup(table, bytes), lookup_upper(table, bytes)    of each byte the entry of a table of 16
-///                          bytes at its lower, its upper four bits
-///   add_saturated(a, b)    of each byte the sum, at most 255
-///   at_most(a, limit)      bit i: byte i is at most the limit
-///   collect(values, limit, first, to)    of sizeof(Register) / 4 values those <= limit: writes
-///                          first + position, may write as many as there are values; their number
 template <Instructions set>
 struct ByteVector;
 

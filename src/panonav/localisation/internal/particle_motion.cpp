@@ -23,7 +23,7 @@ void move_block(const kernels::PoseColumns& poses, const StepSampler& sampler, R
   std::array<std::uint64_t, block_size> bits, further_bits;
   for (std::size_t i = 0; i < count; ++i) {
     bits[i] = random.next();
-    if (sampler.holonomic()) further_bits[i] = random.next();
+    if (sampler.is_holonomic()) further_bits[i] = random.next();
   }
   std::array<float, block_size> first, second, third, unused;
   const auto draw = [&](const auto& from, auto& x, auto& y) {
@@ -31,13 +31,13 @@ void move_block(const kernels::PoseColumns& poses, const StepSampler& sampler, R
                           std::span(y).first(count), instructions);
   };
   draw(bits, first, second);
-  if (sampler.holonomic()) draw(further_bits, third, unused);
+  if (sampler.is_holonomic()) draw(further_bits, third, unused);
 
   Numbers forward_m, left_m, turn_error_rad;
   for (std::size_t i = 0; i < count; ++i) {
     const Pose2 error =
-        sampler.error_of(static_cast<double>(first[i]), static_cast<double>(second[i]),
-                         sampler.holonomic() ? static_cast<double>(third[i]) : 0.0);
+        sampler.error_from_deviates(static_cast<double>(first[i]), static_cast<double>(second[i]),
+                                    sampler.is_holonomic() ? static_cast<double>(third[i]) : 0.0);
     forward_m[i] = sampler.step().x_m + error.x_m;
     left_m[i] = sampler.step().y_m + error.y_m;
     turn_error_rad[i] = error.heading_rad;
@@ -45,7 +45,7 @@ void move_block(const kernels::PoseColumns& poses, const StepSampler& sampler, R
   const auto part = [count](Numbers& numbers) { return std::span(numbers).first(count); };
   kernels::move_poses(poses,
                       {part(forward_m), part(left_m), part(turn_error_rad),
-                       sampler.step().heading_rad, sampler.share_before()},
+                       sampler.step().heading_rad, sampler.turn_share_before_travel()},
                       instructions);
   for (double& heading_rad : poses.heading_rad) heading_rad = wrap_angle(heading_rad);
 }

@@ -20,16 +20,18 @@ void require_signature(const PackedSignature& signature, SignatureShape shape);
 /// Throws ContractError unless the mask has one entry for each row, or none.
 void require_mask(const SearchMask& mask, SignatureShape shape);
 
-/// A query against full signatures: the first `components` components of the rows that count.
+/// Compares a query with full signatures: the first `components` components of the rows that count.
 class Comparison {
  public:
   /// Throws ContractError.
   Comparison(const SearchedViews& searched, const PackedSignature& query, int components,
              const SearchMask& mask, const kernels::DistanceKernels& kernels);
 
-  [[nodiscard]] std::uint32_t full(ViewStore::Row row) const { return part(row, 0, components_); }
+  [[nodiscard]] std::uint32_t distance(ViewStore::Row row) const {
+    return partial_distance(row, 0, components_);
+  }
   /// Over components begin .. end - 1.
-  [[nodiscard]] std::uint32_t part(ViewStore::Row row, int begin, int end) const {
+  [[nodiscard]] std::uint32_t partial_distance(ViewStore::Row row, int begin, int end) const {
     const std::size_t first = begin * component_bytes_;
     const std::size_t count = (end - begin) * component_bytes_;
     const std::uint8_t* const view = store_.magnitudes(row) + first;
@@ -50,7 +52,7 @@ class Comparison {
   [[nodiscard]] const std::vector<ViewStore::Row>& excluded_rows() const noexcept {
     return excluded_rows_;
   }
-  [[nodiscard]] bool excludes(ViewStore::Row row) const {
+  [[nodiscard]] bool is_excluded(ViewStore::Row row) const {
     return !excluded_rows_.empty() && std::ranges::binary_search(excluded_rows_, row);
   }
 
@@ -69,12 +71,12 @@ class Comparison {
 }
 
 /// The nearest views so far, at most `top`.
-class Nearest {
+class NearestMatches {
  public:
-  /// Nothing further away than `limit` is wanted.
-  Nearest(std::size_t top, std::uint32_t limit) : top_(top), limit_(limit) {}
+  /// Keeps views up to the distance `limit`.
+  NearestMatches(std::size_t top, std::uint32_t limit) : top_(top), limit_(limit) {}
 
-  void offer(const Match& match) {
+  void insert_if_nearer(const Match& match) {
     if (heap_.size() == top_) {
       if (!is_nearer(match, heap_.front())) return;
       std::ranges::pop_heap(heap_, is_nearer);
@@ -87,8 +89,8 @@ class Nearest {
   }
   /// Views whose distance is larger cannot be among the nearest; views at this distance can.
   [[nodiscard]] std::uint32_t limit() const noexcept { return limit_; }
-  /// Whether a view at `bound` or further away would not be taken.
-  [[nodiscard]] bool rules_out(std::uint32_t bound, ViewId view) const noexcept {
+  /// True if no view at `bound` or further away can be among the nearest.
+  [[nodiscard]] bool can_exclude(std::uint32_t bound, ViewId view) const noexcept {
     return bound > limit_ || (heap_.size() == top_ && bound == heap_.front().dissimilarity &&
                               heap_.front().view < view);
   }

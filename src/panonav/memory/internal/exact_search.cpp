@@ -17,7 +17,7 @@ using Row = ViewStore::Row;
 /// A row and a lower bound of its distance.
 using Bounded = std::pair<std::uint32_t, Row>;
 
-/// Whether the fine bounds of the last views were worth their bytes.
+/// Tracks whether the fine bounds of the last views saved more bytes than they read.
 class FineBenefit {
  public:
   FineBenefit(std::size_t fine_bytes, std::size_t full_bytes)
@@ -26,7 +26,7 @@ class FineBenefit {
     tested_ = tested_ / 2 + tested;
     passed_ = passed_ / 2 + passed;
   }
-  [[nodiscard]] bool pays() const noexcept {
+  [[nodiscard]] bool is_worthwhile() const noexcept {
     return tested_ < 256 || (tested_ - passed_) * full_bytes_ > tested_ * fine_bytes_;
   }
 
@@ -56,31 +56,32 @@ class Search {
     const auto smallest = std::make_unique_for_overwrite<std::uint32_t[]>(blocks);
     bounds_ = {bounds.get(), rows};
     smallest_ = {smallest.get(), blocks};
-    searched_.index.coarse_bounds(kernels_, query_, bounds_, smallest_);
+    searched_.index.compute_coarse_bounds(kernels_, query_, bounds_, smallest_);
     result_.bytes_read += std::uint64_t{rows} * searched_.index.coarse_bytes(query_);
     for (const Row row : comparison_.excluded_rows()) bounds_[row] = SketchIndex::no_view;
 
-    Nearest nearest(top_, first_limit());
+    NearestMatches nearest(top_, find_first_limit());
     scan(nearest);
     return std::move(nearest).sorted();
   }
 
  private:
-  std::uint32_t full(Row row) {
+  std::uint32_t compare_in_full(Row row) {
     result_.bytes_read += comparison_.bytes();
     ++result_.views_in_full;
-    return comparison_.full(row);
+    return comparison_.distance(row);
   }
 
   /// Fine bounds of rows first + places[i], which lie in one segment.
-  void fine(Row first, std::span<const std::uint32_t> places, std::uint32_t* bounds) {
+  void compute_fine_bounds(Row first, std::span<const std::uint32_t> places,
+                           std::uint32_t* bounds) {
     result_.bytes_read += places.size() * fine_.bytes();
     fine_(first, places, bounds);
   }
 
   /// A distance within which `top` views lie, from the views that look best by their bounds. A good
   /// one is worth some bytes: it decides how many views the bounds leave.
-  std::uint32_t first_limit() {
+  std::uint32_t find_first_limit() {
     std::vector<Bounded> best_blocks(smallest_.size());
     for (std::size_t i = 0; i < best_blocks.size(); ++i) {
       best_blocks[i] = {smallest_[i], static_cast<Row>(i)};
@@ -103,10 +104,11 @@ class Search {
       // In the order of the rows, so that the query is encoded once for each segment.
       std::ranges::sort(best, {}, &Bounded::second);
       constexpr std::uint32_t here = 0;
-      for (Bounded& candidate : best) fine(candidate.second, {&here, 1}, &candidate.first);
+      for (Bounded& candidate : best)
+        compute_fine_bounds(candidate.second, {&here, 1}, &candidate.first);
     }
     keep_smallest(best, 2 * top_);
-    for (Bounded& candidate : best) candidate.first = full(candidate.second);
+    for (Bounded& candidate : best) candidate.first = compare_in_full(candidate.second);
     keep_smallest(best, top_);
     return std::ranges::max(best).first;
   }
@@ -117,7 +119,7 @@ class Search {
     values.resize(count);
   }
 
-  void scan(Nearest& nearest) {
+  void scan(NearestMatches& nearest) {
     constexpr std::size_t chunk = 1024;
     static_assert(SketchIndex::rows_per_segment % chunk == 0);
     // Now and then the fine bounds get a new chance: the limit sinks while the scan runs.
@@ -131,17 +133,17 @@ class Search {
       const std::size_t count = std::min(chunk, bounds_.size() - begin);
       const std::size_t passed =
           kernels_.collect_at_most(bounds_.data() + begin, count, nearest.limit(), found.data());
-      const bool test_fine = has_fine_ && (benefit.pays() || begin / chunk % retry == 0);
+      const bool test_fine = has_fine_ && (benefit.is_worthwhile() || begin / chunk % retry == 0);
       if (test_fine) {
         const std::size_t before = waiting.size();
-        fine(static_cast<Row>(begin), {found.data(), passed}, fine_bounds.data());
+        compute_fine_bounds(static_cast<Row>(begin), {found.data(), passed}, fine_bounds.data());
         for (std::size_t i = 0; i < passed; ++i) {
           if (fine_bounds[i] <= nearest.limit()) {
             waiting.emplace_back(fine_bounds[i], static_cast<Row>(begin + found[i]));
           }
         }
         benefit.count(passed, waiting.size() - before);
-        if (waiting.size() >= max_waiting || !benefit.pays()) compare(waiting, nearest);
+        if (waiting.size() >= max_waiting || !benefit.is_worthwhile()) compare(waiting, nearest);
       } else {
         for (std::size_t i = 0; i < passed; ++i) {
           // The processor itself looks ahead from row to row.
@@ -149,8 +151,8 @@ class Search {
             comparison_.prefetch(static_cast<Row>(begin + found[i + 1]));
           }
           const auto row = static_cast<Row>(begin + found[i]);
-          if (nearest.rules_out(bounds_[row], searched_.view_of_row[row])) continue;
-          nearest.offer({searched_.view_of_row[row], full(row)});
+          if (nearest.can_exclude(bounds_[row], searched_.view_of_row[row])) continue;
+          nearest.insert_if_nearer({searched_.view_of_row[row], compare_in_full(row)});
         }
       }
     }
@@ -158,14 +160,14 @@ class Search {
   }
 
   /// Compares in full, the best bound first, as long as the bounds allow.
-  void compare(std::vector<Bounded>& waiting, Nearest& nearest) {
+  void compare(std::vector<Bounded>& waiting, NearestMatches& nearest) {
     std::ranges::sort(waiting);
     for (std::size_t i = 0; i < waiting.size(); ++i) {
       const auto [bound, row] = waiting[i];
       if (bound > nearest.limit()) break;
       if (i + 1 < waiting.size()) comparison_.prefetch(waiting[i + 1].second);
-      if (nearest.rules_out(bound, searched_.view_of_row[row])) continue;
-      nearest.offer({searched_.view_of_row[row], full(row)});
+      if (nearest.can_exclude(bound, searched_.view_of_row[row])) continue;
+      nearest.insert_if_nearer({searched_.view_of_row[row], compare_in_full(row)});
     }
     waiting.clear();
   }
@@ -196,18 +198,18 @@ SearchResult exact_search(const SearchedViews& searched, const PackedSignature& 
   if (top == 0) return result;
 
   // Bounds help when few of the views are wanted.
-  constexpr std::size_t fewest_views_per_match = 8;
-  if (searched.index.layout().any() && views / fewest_views_per_match >= top) {
+  constexpr std::size_t min_views_per_match = 8;
+  if (searched.index.layout().has_sketches() && views / min_views_per_match >= top) {
     const SketchIndex::Query sketch =
-        searched.index.prepare(comparison.query(), comparison.components(), mask.allowed_rows);
+        searched.index.make_query(comparison.query(), comparison.components(), mask.allowed_rows);
     result.matches = Search(searched, comparison, sketch, kernels, top, result).run();
     return result;
   }
-  Nearest nearest(top, SketchIndex::no_view);
+  NearestMatches nearest(top, SketchIndex::no_view);
   for (std::size_t i = 0; i < searched.views.size(); ++i) {
     const Row row = searched.rows[i];
-    if (comparison.excludes(row)) continue;
-    nearest.offer({searched.views[i], comparison.full(row)});
+    if (comparison.is_excluded(row)) continue;
+    nearest.insert_if_nearer({searched.views[i], comparison.distance(row)});
   }
   result.views_in_full = views;
   result.bytes_read = result.bytes_in_full;

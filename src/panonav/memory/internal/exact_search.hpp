@@ -11,7 +11,7 @@
 
 namespace panonav {
 
-/// What a search runs over. All parts belong to one memory.
+/// The views and index of one memory that a search runs over.
 struct SearchedViews {
   SignatureShape shape;
   const ViewStore& store;

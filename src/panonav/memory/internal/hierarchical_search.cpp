@@ -45,7 +45,8 @@ class Hierarchy {
 
   /// `partial` is the candidate's sum over the first `compared` components.
   void compare_in_full(const Candidate& candidate, int compared) {
-    const std::uint32_t rest = comparison_.part(candidate.row, compared, comparison_.components());
+    const std::uint32_t rest =
+        comparison_.partial_distance(candidate.row, compared, comparison_.components());
     bytes_read_ += (comparison_.components() - compared) * comparison_.component_bytes();
     best_full_ = std::min(best_full_, static_cast<double>(candidate.partial) + rest);
   }
@@ -54,30 +55,30 @@ class Hierarchy {
   /// bounds over all components are best.
   void start() {
     const SketchIndex& index = searched_.index;
-    const auto keep_all = [this] {
+    const auto keep_all_views = [this] {
       for (const Row row : searched_.rows) {
-        if (!comparison_.excludes(row)) candidates_.push_back({row, 0});
+        if (!comparison_.is_excluded(row)) candidates_.push_back({row, 0});
       }
     };
-    if (!index.layout().any()) {
-      keep_all();
+    if (!index.layout().has_sketches()) {
+      keep_all_views();
       return;
     }
     std::vector<std::uint32_t> bounds(index.blocks() * SketchIndex::rows_per_block);
     std::vector<std::uint32_t> smallest(index.blocks());
-    const auto find_bounds = [&](int components) {
+    const auto compute_bounds = [&](int components) {
       const SketchIndex::Query query =
-          index.prepare(comparison_.query(), components, mask_.allowed_rows);
-      index.coarse_bounds(kernels_, query, bounds, smallest);
+          index.make_query(comparison_.query(), components, mask_.allowed_rows);
+      index.compute_coarse_bounds(kernels_, query, bounds, smallest);
       for (const Row row : comparison_.excluded_rows()) bounds[row] = SketchIndex::no_view;
       bytes_read_ += std::uint64_t{bounds.size()} * index.coarse_bytes(query);
     };
-    find_bounds(comparison_.components());
+    compute_bounds(comparison_.components());
     const auto first = std::ranges::min_element(bounds);
     if (first == bounds.end() || *first >= SketchIndex::no_view) return;
     compare_in_full({static_cast<Row>(first - bounds.begin()), 0}, 0);
 
-    find_bounds(1);
+    compute_bounds(1);
     for (std::size_t row = 0; row < bounds.size(); ++row) {
       if (bounds[row] < SketchIndex::no_view && bounds[row] <= limit()) {
         candidates_.push_back({static_cast<Row>(row), 0});
@@ -89,7 +90,7 @@ class Hierarchy {
   void compare_component(int m) {
     const Candidate* leader = &candidates_.front();
     for (Candidate& candidate : candidates_) {
-      candidate.partial += comparison_.part(candidate.row, m - 1, m);
+      candidate.partial += comparison_.partial_distance(candidate.row, m - 1, m);
       if (std::pair(candidate.partial, searched_.view_of_row[candidate.row]) <
           std::pair(leader->partial, searched_.view_of_row[leader->row])) {
         leader = &candidate;

@@ -9,17 +9,17 @@ namespace panonav {
 
 namespace {
 
-constexpr std::size_t group_bytes = 8;       // that an instruction sums at once
-constexpr std::size_t enough_to_learn = 64;  // views, from which scales are learnt
+constexpr std::size_t group_bytes = 8;          // that an instruction sums at once
+constexpr std::size_t min_views_to_learn = 64;  // views, from which scales are learnt
 // Of a row without a view: raises its bound above every limit.
 constexpr std::int32_t no_slack = -static_cast<std::int32_t>(SketchIndex::no_view);
 
-std::size_t groups_of(std::size_t dimensions) {
+std::size_t group_count(std::size_t dimensions) {
   return (dimensions + group_bytes - 1) / group_bytes;
 }
 
 /// The sum of `count` bytes.
-std::int32_t sum_of_bytes(const std::uint8_t* bytes, int count) {
+std::int32_t sum_bytes(const std::uint8_t* bytes, int count) {
   std::int32_t sum = 0;
   int i = 0;
   for (; i + 8 <= count; i += 8) {
@@ -81,7 +81,7 @@ void encode_query(const SketchScale& scale, bool covers, std::span<const std::in
     for (std::size_t i = 0; i < group_bytes; ++i) {
       const std::size_t d = group * group_bytes + i;
       counts[i] = mask[d] != 0 ? 1 : 0;
-      // What does not count becomes code 0 without loss.
+      // Dimensions that do not count become code 0 without loss.
       offsets[i] = counts[i] * scale.offsets[d];
       inside[i] = counts[i] * sums[d];
       if (covers) {
@@ -111,12 +111,12 @@ SketchLayout::SketchLayout(SignatureShape shape_) : shape(shape_) {
   if (shape.rows >= 3) coarse_blocks = shape.rows >= 6 ? 2 : 1;
   if (shape.rows >= 20) {
     fine_blocks = BlockSums::blocks_per_component;
-    // Views differ most in their low components, because the spectra of pictures fall.
+    // Views differ more in their low components, because the spectra of pictures fall.
     low_components = (shape.components + 2) / 3;
   }
   const auto components = static_cast<std::size_t>(shape.components);
-  coarse_groups = groups_of(coarse_dimensions(shape.components));
-  fine_groups = (groups_of(components * fine_blocks) + 7) / 8 * 8;
+  coarse_groups = group_count(coarse_dimensions(shape.components));
+  fine_groups = (group_count(components * fine_blocks) + 7) / 8 * 8;
 }
 
 void SketchLayout::sum_blocks(const std::uint8_t* magnitudes, BlockSums& sums) const {
@@ -131,7 +131,7 @@ void SketchLayout::sum_blocks(const std::uint8_t* magnitudes, BlockSums& sums) c
     const std::uint8_t* const rows = magnitudes + k * shape.rows;
     for (int block = 0; block < blocks; ++block) {
       out[k * blocks + block] =
-          sum_of_bytes(rows + borders[block], borders[block + 1] - borders[block]);
+          sum_bytes(rows + borders[block], borders[block + 1] - borders[block]);
     }
   }
   if (fine_blocks == 0) return;
@@ -184,7 +184,8 @@ bool SketchIndex::encode(Segment& segment, std::size_t place, const BlockSums& s
   return within;
 }
 
-void SketchIndex::learn(Segment& segment, std::size_t first_row, const ViewStore& store) const {
+void SketchIndex::learn_scales(Segment& segment, std::size_t first_row,
+                               const ViewStore& store) const {
   std::vector<std::pair<std::size_t, BlockSums>> all;
   all.reserve(segment.used);
   for (std::size_t place = 0; place < segment.coarse.slacks.size(); ++place) {
@@ -214,7 +215,7 @@ void SketchIndex::learn(Segment& segment, std::size_t first_row, const ViewStore
   segment.outside = 0;
 }
 
-SketchIndex::Segment& SketchIndex::segment_of(Row row) {
+SketchIndex::Segment& SketchIndex::get_or_create_segment(Row row) {
   const std::size_t number = row / rows_per_segment;
   const std::size_t place = row % rows_per_segment;
   if (number == segments_.size()) segments_.push_back(make_segment());
@@ -231,9 +232,9 @@ SketchIndex::Segment& SketchIndex::segment_of(Row row) {
 }
 
 void SketchIndex::insert(const ViewStore& store, Row row) {
-  if (!layout_.any()) return;
+  if (!layout_.has_sketches()) return;
   const std::size_t place = row % rows_per_segment;
-  Segment& segment = segment_of(row);
+  Segment& segment = get_or_create_segment(row);
 
   BlockSums sums;
   layout_.sum_blocks(store.magnitudes(row), sums);
@@ -241,34 +242,34 @@ void SketchIndex::insert(const ViewStore& store, Row row) {
   ++segment.used;
   // A scale that was learnt from fewer views is never too wide, so only those outside call for
   // another.
-  const bool first = segment.learnt_from == 0 && segment.used >= enough_to_learn;
+  const bool first = segment.learnt_from == 0 && segment.used >= min_views_to_learn;
   const bool drifted = segment.learnt_from > 0 && segment.outside >= 8 + segment.used / 8;
-  if (first || drifted) learn(segment, row - place, store);
+  if (first || drifted) learn_scales(segment, row - place, store);
 }
 
 void SketchIndex::insert(const ViewStore& store, std::span<const Row> rows) {
-  if (!layout_.any()) return;
+  if (!layout_.has_sketches()) return;
   while (!rows.empty()) {
     const std::size_t number = rows.front() / rows_per_segment;
     const auto end =
         std::ranges::find_if(rows, [number](Row row) { return row / rows_per_segment != number; });
     const auto here = rows.first(static_cast<std::size_t>(end - rows.begin()));
     rows = rows.subspan(here.size());
-    if (here.size() < enough_to_learn) {
+    if (here.size() < min_views_to_learn) {
       for (const Row row : here) insert(store, row);
       continue;
     }
     for (const Row row : here) {
-      Segment& segment = segment_of(row);
+      Segment& segment = get_or_create_segment(row);
       segment.coarse.slacks[row % rows_per_segment] = 0;  // there, to be encoded
       ++segment.used;
     }
-    learn(segments_[number], number * rows_per_segment, store);
+    learn_scales(segments_[number], number * rows_per_segment, store);
   }
 }
 
 void SketchIndex::erase(Row row) {
-  if (!layout_.any()) return;
+  if (!layout_.has_sketches()) return;
   Segment& segment = segments_[row / rows_per_segment];
   const std::size_t place = row % rows_per_segment;
   segment.coarse.slacks[place] = no_slack;
@@ -276,8 +277,8 @@ void SketchIndex::erase(Row row) {
   --segment.used;
 }
 
-SketchIndex::Query SketchIndex::prepare(const std::uint8_t* magnitudes, int components,
-                                        std::span<const std::uint8_t> allowed_rows) const {
+SketchIndex::Query SketchIndex::make_query(const std::uint8_t* magnitudes, int components,
+                                           std::span<const std::uint8_t> allowed_rows) const {
   Query query;
   layout_.sum_blocks(magnitudes, query.sums);
   const auto counts = [&](int block, int blocks) {
@@ -298,14 +299,14 @@ SketchIndex::Query SketchIndex::prepare(const std::uint8_t* magnitudes, int comp
       query.fine_mask[fine++] = counts(i, layout_.fine_blocks) ? 255 : 0;
     }
   }
-  query.coarse_groups = groups_of(coarse);
-  query.fine_groups = (groups_of(fine) + 7) / 8 * 8;
+  query.coarse_groups = group_count(coarse);
+  query.fine_groups = (group_count(fine) + 7) / 8 * 8;
   return query;
 }
 
-void SketchIndex::coarse_bounds(const kernels::DistanceKernels& kernels, const Query& query,
-                                std::span<std::uint32_t> bounds,
-                                std::span<std::uint32_t> smallest) const {
+void SketchIndex::compute_coarse_bounds(const kernels::DistanceKernels& kernels, const Query& query,
+                                        std::span<std::uint32_t> bounds,
+                                        std::span<std::uint32_t> smallest) const {
   std::vector<std::uint8_t> values(layout_.coarse_groups * group_bytes, 0);
   kernels::DistanceKernels::SketchQuery encoded{};
   encoded.values = values.data();

@@ -25,11 +25,11 @@ struct BlockSums {
       coarse;  ///< 2 (few rows: 1) blocks a component, unions of the fine ones
 };
 
-/// How views of a shape are sketched. Both levels are laid out in groups of 8 bytes.
+/// Layout of the sketches of views of one shape. Both levels are laid out in groups of 8 bytes.
 struct SketchLayout {
   explicit SketchLayout(SignatureShape shape_);
 
-  [[nodiscard]] bool any() const noexcept { return coarse_blocks > 0; }
+  [[nodiscard]] bool has_sketches() const noexcept { return coarse_blocks > 0; }
   /// Blocks of component k in the coarse level.
   [[nodiscard]] int coarse_blocks_of(int k) const noexcept {
     return k < low_components ? 2 * coarse_blocks : coarse_blocks;
@@ -67,7 +67,7 @@ struct SketchScale {
 };
 
 /// Block sums of all views of a store as bytes, in segments of 4096 rows with a scale each. Rows of
-/// a segment are encoded when they arrive; the scale is learnt anew whenever a segment has grown
+/// a segment are encoded when they arrive; the scale is learnt again whenever a segment has grown
 /// fourfold, or when too many views fell outside, so that appending costs a constant number of
 /// encodings a view.
 class SketchIndex {
@@ -89,7 +89,7 @@ class SketchIndex {
   void insert(const ViewStore& store, std::span<const Row> rows);
   void erase(Row row);
 
-  /// What does not depend on the segment: the query's block sums, and which of them count.
+  /// The part of a query that no segment changes: its block sums, and which of them count.
   struct Query {
     BlockSums sums;
     std::vector<std::uint8_t> coarse_mask;  ///< per dimension 255 or 0, padded to groups
@@ -98,13 +98,14 @@ class SketchIndex {
     std::size_t fine_groups = 0;    ///< a multiple of 8
   };
   /// `allowed_rows` empty: all. A block counts when all its rows do.
-  [[nodiscard]] Query prepare(const std::uint8_t* magnitudes, int components,
-                              std::span<const std::uint8_t> allowed_rows) const;
+  [[nodiscard]] Query make_query(const std::uint8_t* magnitudes, int components,
+                                 std::span<const std::uint8_t> allowed_rows) const;
 
   /// Lower bounds of all rows below `rows_end()` (rounded up to a block), and the smallest of each
   /// block.
-  void coarse_bounds(const kernels::DistanceKernels& kernels, const Query& query,
-                     std::span<std::uint32_t> bounds, std::span<std::uint32_t> smallest) const;
+  void compute_coarse_bounds(const kernels::DistanceKernels& kernels, const Query& query,
+                             std::span<std::uint32_t> bounds,
+                             std::span<std::uint32_t> smallest) const;
 
   /// Lower bounds of some rows from the fine level.
   class FineBounds {
@@ -128,7 +129,7 @@ class SketchIndex {
   [[nodiscard]] std::size_t blocks() const noexcept {
     return (rows_end_ + rows_per_block - 1) / rows_per_block;
   }
-  /// Bytes that `coarse_bounds` reads for one row.
+  /// Bytes that `compute_coarse_bounds` reads for one row.
   [[nodiscard]] std::size_t coarse_bytes(const Query& query) const noexcept {
     return query.coarse_groups * 8 + sizeof(std::int32_t);
   }
@@ -149,10 +150,10 @@ class SketchIndex {
 
   [[nodiscard]] Segment make_segment() const;
   /// Makes room for the row.
-  Segment& segment_of(Row row);
-  /// Whether all sums lay within the scales.
+  Segment& get_or_create_segment(Row row);
+  /// Encodes a row; true if all its sums lie within the scales.
   bool encode(Segment& segment, std::size_t place, const BlockSums& sums) const;
-  void learn(Segment& segment, std::size_t first_row, const ViewStore& store) const;
+  void learn_scales(Segment& segment, std::size_t first_row, const ViewStore& store) const;
 
   SketchLayout layout_;
   std::vector<Segment> segments_;

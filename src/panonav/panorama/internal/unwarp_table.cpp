@@ -28,7 +28,7 @@ struct Tap {
 /// direction follow each other.
 using Taps = std::vector<Tap>;
 
-/// Four weights that add up to `sum` exactly; what rounding leaves goes where it cut off most.
+/// Packs four weights that add up to `sum` exactly: the rest goes to those that rounding cut most.
 std::uint32_t pack_weights(double fraction_u, double fraction_v, int sum) {
   const std::array<double, 4> exact = {(1 - fraction_u) * (1 - fraction_v),
                                        (1 - fraction_u) * fraction_v, fraction_u * (1 - fraction_v),
@@ -43,9 +43,10 @@ std::uint32_t pack_weights(double fraction_u, double fraction_v, int sum) {
     left -= static_cast<int>(weights[i]);
   }
   for (; left > 0; --left) {
-    const auto most = static_cast<std::size_t>(std::ranges::max_element(cut_off) - cut_off.begin());
-    ++weights[most];
-    cut_off[most] = -1.0;
+    const auto largest =
+        static_cast<std::size_t>(std::ranges::max_element(cut_off) - cut_off.begin());
+    ++weights[largest];
+    cut_off[largest] = -1.0;
   }
   return weights[0] | weights[1] << 8U | weights[2] << 16U | weights[3] << 24U;
 }
@@ -73,13 +74,13 @@ class RowSampler {
 
   [[nodiscard]] Taps sample(int row) const {
     const double elevation_rad = top_rad_ - row_rad_ * (row + 0.5);
-    const Spacing spacing = measure(elevation_rad);
+    const Spacing spacing = measure_spacing(elevation_rad);
     const int smaller_side = std::min(camera_.image_size.width, camera_.image_size.height);
     int level = static_cast<int>(
         std::lround(std::log2(std::max(1.0, std::min(spacing.across_px, spacing.down_px)))));
     while (level > 0 && (smaller_side >> level) < 4) --level;
     for (;; --level) {
-      Placement placement = place(elevation_rad, spacing, level);
+      Placement placement = place_taps(elevation_rad, spacing, level);
       if (level == 0 || !placement.crosses_border) return std::move(placement.taps);
     }
   }
@@ -96,7 +97,8 @@ class RowSampler {
     bool crosses_border = false;
   };
 
-  [[nodiscard]] std::optional<PixelPoint> look(double azimuth_rad, double elevation_rad) const {
+  [[nodiscard]] std::optional<PixelPoint> project_direction(double azimuth_rad,
+                                                            double elevation_rad) const {
     return project(camera_, Direction3::from_angles(azimuth_rad, elevation_rad));
   }
 
@@ -115,21 +117,21 @@ class RowSampler {
   }
 
   /// Means over some azimuths; 0 where nothing is seen.
-  [[nodiscard]] Spacing measure(double elevation_rad) const {
+  [[nodiscard]] Spacing measure_spacing(double elevation_rad) const {
     Spacing sum;
     int across_count = 0;
     int down_count = 0;
     constexpr int probes = 32;
     for (int probe = 0; probe < probes; ++probe) {
       const double azimuth_rad = 2.0 * std::numbers::pi * probe / probes;
-      const auto centre = look(azimuth_rad, elevation_rad);
+      const auto centre = project_direction(azimuth_rad, elevation_rad);
       if (!centre) continue;
-      if (const auto beside = look(azimuth_rad + column_rad_ / 2, elevation_rad)) {
-        sum.across_px += 2.0 * distance_px(*centre, *beside);
+      if (const auto neighbour = project_direction(azimuth_rad + column_rad_ / 2, elevation_rad)) {
+        sum.across_px += 2.0 * distance_px(*centre, *neighbour);
         ++across_count;
       }
       for (const double half_rad : {row_rad_ / 2, -row_rad_ / 2}) {
-        if (const auto below = look(azimuth_rad, elevation_rad - half_rad)) {
+        if (const auto below = project_direction(azimuth_rad, elevation_rad - half_rad)) {
           sum.down_px += 2.0 * distance_px(*centre, *below);
           ++down_count;
         }
@@ -138,7 +140,8 @@ class RowSampler {
     return {sum.across_px / std::max(1, across_count), sum.down_px / std::max(1, down_count)};
   }
 
-  [[nodiscard]] Placement place(double elevation_rad, const Spacing& spacing, int level) const {
+  [[nodiscard]] Placement place_taps(double elevation_rad, const Spacing& spacing,
+                                     int level) const {
     const double pixel = 1 << level;
     const int across = std::max(1, static_cast<int>(std::lround(spacing.across_px / pixel)));
     const int down = std::max(1, static_cast<int>(std::lround(spacing.down_px / pixel)));
@@ -156,18 +159,19 @@ class RowSampler {
               project_all(camera_, Direction3::from_angles(azimuth_rad, tap_elevation_rad));
           // The sum over both lenses is what is rounded: equal shares add up to the whole.
           double share = 0.0;
-          int given = 0;
+          int assigned = 0;
           for (int lens = 0; lens < lenses_; ++lens) {
             if (!points[lens] || points[lens]->weight == 0.0) continue;
             share += points[lens]->weight * brightness_[lens];
-            const int sum = static_cast<int>(std::lround(share * kernels::tap_weight_sum)) - given;
-            given += sum;
+            const int sum =
+                static_cast<int>(std::lround(share * kernels::tap_weight_sum)) - assigned;
+            assigned += sum;
             Tap& placed = tap[static_cast<std::ptrdiff_t>(lens) * columns_ + c];
             placed =
-                tap_at(points[lens]->pixel, sum, circles[lens], level, placement.crosses_border);
+                make_tap(points[lens]->pixel, sum, circles[lens], level, placement.crosses_border);
           }
           if (lenses_ == 1) continue;
-          // What one lens shows alone costs the other a tap without weight.
+          // A direction that one lens shows alone costs the other a tap without weight.
           Tap& first = tap[c];
           Tap& second = tap[columns_ + c];
           if (first.is_seen() == second.is_seen()) continue;
@@ -180,8 +184,8 @@ class RowSampler {
     return placement;
   }
 
-  [[nodiscard]] Tap tap_at(PixelPoint point, int sum, const ImageCircle& circle, int level,
-                           bool& crosses_border) const {
+  [[nodiscard]] Tap make_tap(PixelPoint point, int sum, const ImageCircle& circle, int level,
+                             bool& crosses_border) const {
     const double pixel = 1 << level;
     const int width = camera_.image_size.width >> level;
     const int height = camera_.image_size.height >> level;
@@ -211,9 +215,9 @@ class RowSampler {
   std::array<double, 2> brightness_{1.0, 1.0};
 };
 
-/// Values of which some taps are seen take those for the others; taps of several lenses go
+/// Replaces taps that are not seen by those of the same value that are; taps of several lenses go
 /// together. Returns which columns are seen.
-std::vector<std::uint8_t> complete_columns(Taps& taps, int columns, int lenses) {
+std::vector<std::uint8_t> fill_missing_taps(Taps& taps, int columns, int lenses) {
   std::vector<std::uint8_t> seen(static_cast<std::size_t>(columns), 0);
   const int count = static_cast<int>(taps.size()) / columns;
   for (int c = 0; c < columns; ++c) {
@@ -236,10 +240,10 @@ void copy_column(const Taps& from, int from_column, Taps& to, int to_column, int
   }
 }
 
-/// The first index for which holds(index) is true, in the order start, start - 1, start + 1, start
-/// - 2, ..
+/// Finds the first index for which holds(index) is true, in the order start, start - 1, start + 1,
+/// start - 2, ..
 template <class Predicate>
-std::optional<int> nearest(int start, int count, bool wraps, Predicate holds) {
+std::optional<int> find_nearest_index(int start, int count, bool wraps, Predicate holds) {
   for (int distance = 0; distance < count; ++distance) {
     for (const int sign : {-1, 1}) {
       int index = start + sign * distance;
@@ -250,10 +254,10 @@ std::optional<int> nearest(int start, int count, bool wraps, Predicate holds) {
   return {};
 }
 
-/// What is not seen looks where the nearest row seen in the same column looks; a column in which
-/// nothing is seen looks as the nearest column does.
-void fill_unseen(std::vector<Taps>& rows, const std::vector<std::vector<std::uint8_t>>& seen,
-                 int columns) {
+/// Fills directions that the camera does not see with the taps of the nearest row seen in the same
+/// column, and columns in which nothing is seen with those of the nearest column.
+void fill_unseen_directions(std::vector<Taps>& rows,
+                            const std::vector<std::vector<std::uint8_t>>& seen, int columns) {
   const int count = static_cast<int>(rows.size());
   std::vector<std::uint8_t> column_seen(static_cast<std::size_t>(columns), 0);
   for (const auto& row : seen) {
@@ -266,23 +270,23 @@ void fill_unseen(std::vector<Taps>& rows, const std::vector<std::vector<std::uin
   for (int y = 0; y < count; ++y) {
     // A row of which nothing is seen is as fine as the one whose columns it takes.
     if (std::ranges::count(seen[y], 0) == columns) {
-      const auto like = nearest(
+      const auto like = find_nearest_index(
           y, count, false, [&](int row) { return std::ranges::count(seen[row], 0) < columns; });
       rows[y].assign(original[*like].size(), Tap{});
     }
     for (int c = 0; c < columns; ++c) {
       if (seen[y][c] != 0) continue;
       const int column =
-          *nearest(c, columns, true, [&](int other) { return column_seen[other] != 0; });
+          *find_nearest_index(c, columns, true, [&](int other) { return column_seen[other] != 0; });
       const int row =
-          *nearest(y, count, false, [&](int other) { return seen[other][column] != 0; });
+          *find_nearest_index(y, count, false, [&](int other) { return seen[other][column] != 0; });
       copy_column(original[row], column, rows[y], c, columns);
     }
   }
 }
 
-/// Which parts of which halved images are needed, and where they lie in their buffers.
-void place_levels(const std::vector<Taps>& rows, UnwarpTable& table) {
+/// Finds the needed parts of the halved images and lays them out in their buffers.
+void lay_out_levels(const std::vector<Taps>& rows, UnwarpTable& table) {
   int highest = 0;
   for (const Taps& taps : rows) {
     for (const Tap& tap : taps) highest = std::max(highest, tap.level);
@@ -332,12 +336,12 @@ UnwarpTable make_unwarp_table(const Camera& camera, int rows, int columns,
   std::vector<std::vector<std::uint8_t>> seen;
   for (int y = 0; y < rows; ++y) {
     taps_of_rows.push_back(sampler.sample(y));
-    seen.push_back(complete_columns(taps_of_rows.back(), columns, lens_count(camera)));
+    seen.push_back(fill_missing_taps(taps_of_rows.back(), columns, lens_count(camera)));
   }
-  fill_unseen(taps_of_rows, seen, columns);
+  fill_unseen_directions(taps_of_rows, seen, columns);
 
   UnwarpTable table;
-  place_levels(taps_of_rows, table);
+  lay_out_levels(taps_of_rows, table);
   for (const Taps& taps : taps_of_rows) {
     table.rows.push_back({static_cast<int>(taps.size()) / columns, table.positions.size()});
     for (const Tap& tap : taps) {

@@ -8,7 +8,7 @@
 
 namespace panonav {
 
-/// What `Unwarper` computes once: which pixels of which halved image each value is made of.
+/// The table that `Unwarper` computes once: the pixels of halved images that make each value.
 struct UnwarpTable {
   /// A part of the image halved `level` times (its place in `levels`). Level 0 is the image itself.
   struct Level {
@@ -25,7 +25,7 @@ struct UnwarpTable {
         pair_bottom = 0;       ///< one beyond the last row
     std::size_t pairs_at = 0;  ///< in the buffer of pairs
 
-    /// Whether any tap looks this level up.
+    /// True if any tap reads this level.
     [[nodiscard]] bool has_pairs() const { return pair_right > pair_left; }
   };
   /// Each row has the same number of taps for all its columns: entry t * columns + c of its part of
