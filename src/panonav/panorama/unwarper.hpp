@@ -28,13 +28,13 @@ struct UnwarperOptions {
 /// `elevations` is not an option of one number: callers set it.
 void visit_options(UnwarperOptions& options, OptionVisitor& visitor);
 
-/// Turns the images of one camera into panoramic cylinders by a table that is computed once.
+/// Turns images of one camera into panoramic cylinders by a table computed once.
 /// Each value is the mean of one or more taps within its field; a tap interpolates linearly between
 /// four pixels of the image, halved until its pixels are as far apart as the values, so that
 /// nothing aliases. Weights have 7 bit: at most 2 grey levels of error next to full contrast. Taps
 /// keep two pixels away from a mirror's border.
 /// Directions that the camera does not see take the nearest row seen in the same column, or the
-/// nearest column. Two fisheye lenses are blended across the seam (`blend_share`). Immutable after
+/// nearest column. Two fisheye lenses blend across the seam (`blend_share`). Immutable after
 /// construction; several threads may use one at a time, each with its own Workspace.
 class Unwarper {
  public:
