@@ -139,11 +139,11 @@ TEST_P(Distance, CellBoundsFollowTheirDefinition) {
                                          {tables.data(), pairs, static_cast<std::uint8_t>(limit)},
                                          bounds.data(), indices.data()));
       EXPECT_EQ(bounds, expected) << pairs << " pairs";
-      std::vector<std::uint32_t> expected;
+      std::vector<std::uint32_t> expected_indices;
       for (std::uint32_t view = 0; view < expected.size(); ++view) {
-        if (expected[view] <= limit) expected.push_back(view);
+        if (expected[view] <= limit) expected_indices.push_back(view);
       }
-      EXPECT_EQ(indices, expected) << pairs << " pairs, limit " << limit;
+      EXPECT_EQ(indices, expected_indices) << pairs << " pairs, limit " << limit;
     }
   }
 }
