@@ -70,7 +70,7 @@ Session record_walk(const simulation::PlaceRecording& place, const std::string& 
   PictureSource source;
   source.layout.elevations = std::get<Panorama>(seen.front().picture).elevations();
   Mapper mapper(
-      MemoryFile::create(session.memory, header_from_first(first, source, {}, {}, executor)),
+      MemoryFile::create(session.memory, make_memory_header(first, source, {}, {}, executor)),
       source, {.thumbnails = false});
   const auto encoded = simulation::make_each(executor, seen.size(),
                                              [&](std::size_t i) { return mapper.encode(seen[i]); });
@@ -94,7 +94,7 @@ std::optional<Joined> join(const Session& first, const Session& second,
     const MemoryFile file = MemoryFile::open(both, Access::read_only);
     const TopologicalMap map = file.map(map_name).value();
     const VisualMemory memory = file.load();
-    const std::size_t largest = largest_component(map);
+    const std::size_t largest = find_largest_component(map);
     std::vector<Point2> estimate;
     std::vector<Point2> truth;
     for (const MapNode& node : map.nodes) {

@@ -191,7 +191,7 @@ void bind_catchment(py::module_& m) {
           [](const NamedSurvey& s, std::size_t goal, double accepted_m) {
             require(goal < s.survey.goals.size(), "goal", static_cast<double>(goal),
                     "0 to " + std::to_string(s.survey.goals.size() - 1));
-            return catchment_of(s, goal, accepted_m);
+            return count_catchment(s, goal, accepted_m);
           },
           py::arg("goal"), py::arg("accepted_m"),
           "Number of places from which runs to this goal end so near.");

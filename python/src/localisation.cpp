@@ -390,7 +390,7 @@ void bind_updater(py::module_& m) {
           [](SharedUpdater& updater, const py::object& observation, const Panorama& panorama,
              const NamedPlace& place) {
             const Observation seen = observation_from(observation);
-            updater.change([&](MemoryUpdater& u) { u.see(seen, panorama, place); });
+            updater.change([&](MemoryUpdater& u) { u.observe(seen, panorama, place); });
           },
           py::arg("observation"), py::arg("panorama"), py::arg("place"),
           "The next observation of the run, which needs its odometry (another says nothing and is "

@@ -41,10 +41,10 @@ Mapper::Result make_map(const Dataset& recording, const std::filesystem::path& p
                         int threads) {
   InterruptibleExecutor executor(threads);
   const bool there = memory_exists(path);
-  Mapper mapper(
-      there ? MemoryFile::open(path, Access::read_write)
-            : MemoryFile::create(path, header_from_first_views(recording, signature, {}, executor)),
-      recording.source, options);
+  Mapper mapper(there ? MemoryFile::open(path, Access::read_write)
+                      : MemoryFile::create(
+                            path, make_header_of_recording(recording, signature, {}, executor)),
+                recording.source, options);
   if (there) check_known_views(recording, mapper.memory(), mapper.encoder(), executor);
   return mapper.map(recording, executor);
 }
@@ -174,8 +174,8 @@ void bind_lattices(py::module_& m) {
         InterruptibleExecutor executor(threads);
         auto file = MemoryFile::open(path, save ? Access::read_write : Access::read_only);
         const VisualMemory views = file.load();
-        const auto motions =
-            recording ? motions_between(*recording, views, motion) : std::vector<CoarseMotion>{};
+        const auto motions = recording ? make_coarse_motions(*recording, views, motion)
+                                       : std::vector<CoarseMotion>{};
         Lattice lattice = arrange(views, options, motions, executor);
         if (save) store_lattice(lattice, views, file);
         return lattice;

@@ -322,7 +322,7 @@ void bind_memory_file(py::module_& m) {
       .def(
           "named",
           [](SharedFile& s, const std::string& name) {
-            return s.change([&](MemoryFile& f) { return named_view(f, name); });
+            return s.change([&](MemoryFile& f) { return find_view_by_name_or_id(f, name); });
           },
           py::arg("name"), "The id of a view by name or, as text, by id; FileError when none is.")
       .def(

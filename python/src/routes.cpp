@@ -140,7 +140,7 @@ RouteRecorder::Recorded record_route(const Dataset& dataset, const std::filesyst
   RouteRecorder recorder(
       memory_exists(memory)
           ? MemoryFile::open(memory, Access::read_write)
-          : MemoryFile::create(memory, header_from_first_views(dataset, {}, {}, executor)),
+          : MemoryFile::create(memory, make_header_of_recording(dataset, {}, {}, executor)),
       dataset.source, options);
   return recorder.record(dataset, poses, executor);
 }

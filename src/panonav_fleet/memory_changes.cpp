@@ -18,18 +18,18 @@ struct MemoryChanges::Implementation {
   explicit Implementation(const ServerAddress& address)
       : memories(connect_to_memories(address, false)) {
     const auto found = find_memory(memories, address);
-    if (!found) refuse_no_memory(address);
+    if (!found) refuse_missing_memory(address);
     memories.connection.execute("LISTEN \"" + found->channel + "\"");  // of the server's making
   }
   MemoriesConnection memories;
 };
 
-std::optional<MemoryChange> MemoryChanges::wait(std::chrono::milliseconds longest) {
-  const auto said = implementation_->memories.connection.wait_for_notification(
-      std::chrono::duration<double>(longest).count());
-  if (!said) return std::nullopt;
+std::optional<MemoryChange> MemoryChanges::wait(std::chrono::milliseconds timeout) {
+  const auto payload = implementation_->memories.connection.wait_for_notification(
+      std::chrono::duration<double>(timeout).count());
+  if (!payload) return std::nullopt;
   MemoryChange change;
-  std::istringstream words(*said);
+  std::istringstream words(*payload);
   MemoryArea area;
   char comma = 0;
   while (words >> area.column >> comma >> area.row) change.areas.push_back(area);

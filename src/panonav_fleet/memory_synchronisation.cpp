@@ -57,13 +57,13 @@ std::unique_ptr<ServerExchange> connect_or_make(const ServerAddress& address,
                                                 const MemoryHeader& header) {
   if (auto found = ServerExchange::connect(address)) return found;
   try {
-    make_postgresql_memory(address, header, {});
+    create_postgresql_memory(address, header, {});
   } catch (const FileError&) {
     if (auto found = ServerExchange::connect(address)) return found;  // somebody was first
     throw;
   }
   auto made = ServerExchange::connect(address);
-  if (!made) refuse_no_memory(address);
+  if (!made) refuse_missing_memory(address);
   return made;
 }
 
@@ -80,8 +80,8 @@ SynchronisationReport synchronise_memory(const std::filesystem::path& file,
   std::error_code ignored;
   if (!std::filesystem::exists(std::filesystem::symlink_status(file, ignored))) {
     exchange = ServerExchange::connect(address);
-    if (!exchange) refuse_no_memory(address);
-    make_memory_tables(file, header_from(exchange->tables().settings()), {});
+    if (!exchange) refuse_missing_memory(address);
+    create_memory_tables(file, to_header(exchange->tables().settings()), {});
   }
   OpenedMemory opened = open_memory_tables(file, Access::read_write);
   if (!exchange) exchange = connect_or_make(address, opened.header);

@@ -43,7 +43,7 @@ class Sketcher {
     ids_.push_back(row.id);
     magnitudes_.insert(magnitudes_.end(), row.magnitudes.begin(), row.magnitudes.end());
     areas_.emplace_back(row.id, area_at(row.position));
-    if (ids_.size() < some) return false;
+    if (ids_.size() < views_per_batch) return false;
     flush();
     return true;
   }
@@ -59,7 +59,7 @@ class Sketcher {
   ViewSketches sketches;
 
  private:
-  static constexpr std::size_t some = 1 << 15;
+  static constexpr std::size_t views_per_batch = 1 << 15;
   std::vector<std::pair<ViewId, std::optional<MemoryArea>>> areas_;
   std::vector<ViewId> ids_;
   std::vector<std::uint8_t> magnitudes_;
@@ -158,25 +158,25 @@ struct PlaceSearch::Implementation {
 
   // ---- connections of searches
 
-  [[nodiscard]] std::unique_ptr<MemoryTables> borrow() const {
+  [[nodiscard]] std::unique_ptr<MemoryTables> borrow_connection() const {
     const std::lock_guard lock(mutex);
     if (idle.empty()) return nullptr;
     auto tables = std::move(idle.back());
     idle.pop_back();
     return tables;
   }
-  void give_back(std::unique_ptr<MemoryTables> tables) const {
+  void return_connection(std::unique_ptr<MemoryTables> tables) const {
     const std::lock_guard lock(mutex);
     idle.push_back(std::move(tables));
   }
   /// Connections of a server that was away cannot be used again.
-  void drop_idle() const {
+  void drop_idle_connections() const {
     std::vector<std::unique_ptr<MemoryTables>> dropped;
     const std::lock_guard lock(mutex);
     dropped.swap(idle);
   }
 
-  void count(const SearchResult& found, std::chrono::steady_clock::duration duration) const {
+  void count_search(const SearchResult& found, std::chrono::steady_clock::duration duration) const {
     const std::lock_guard lock(mutex);
     ++counted.searches;
     counted.views_read += found.views_in_full;
@@ -205,7 +205,7 @@ struct PlaceSearch::Implementation {
       if (!any) return false;
       if (!own) own = connect();
       compare_all = true;  // until it is done
-      const bool found = compare(changed_areas, all || changed_areas.size() > max_areas);
+      const bool found = update_sketches(changed_areas, all || changed_areas.size() > max_areas);
       compare_all = false;
       return found || is_postgresql_address(path);
     } catch (const FileError&) {
@@ -217,7 +217,7 @@ struct PlaceSearch::Implementation {
   }
 
   /// Returns true if views were added or removed.
-  bool compare(const std::set<MemoryArea>& changed_areas, bool all) {
+  bool update_sketches(const std::set<MemoryArea>& changed_areas, bool all) {
     const auto reading = own->transaction(MemoryTables::Kind::reading);
     std::vector<ViewId> there;
     std::vector<ViewId> before;
@@ -239,37 +239,38 @@ struct PlaceSearch::Implementation {
       std::ranges::sort(there);
       before = areas.within(changed_areas);
     }
-    std::vector<ViewId> came;
+    std::vector<ViewId> added;
     for (const ViewId view : there) {
-      if (!areas.has(view)) came.push_back(view);
+      if (!areas.has(view)) added.push_back(view);
     }
-    std::vector<ViewId> gone;
-    std::ranges::set_difference(before, there, std::back_inserter(gone));
-    if (!all && !gone.empty()) {  // or they are elsewhere now
+    std::vector<ViewId> removed;
+    std::ranges::set_difference(before, there, std::back_inserter(removed));
+    if (!all && !removed.empty()) {  // or they are elsewhere now
       std::vector<ViewId> elsewhere;
-      own->read_views_there(gone, [&](const ViewRow& row) {
+      own->read_available_views(removed, [&](const ViewRow& row) {
         elsewhere.push_back(row.id);
         const auto& pose = row.info.pose;
         areas.set(row.id, area_at(pose ? std::optional(pose->position()) : std::nullopt));
       });
       std::ranges::sort(elsewhere);
-      std::erase_if(gone, [&](ViewId view) { return std::ranges::binary_search(elsewhere, view); });
+      std::erase_if(removed,
+                    [&](ViewId view) { return std::ranges::binary_search(elsewhere, view); });
     }
-    if (came.empty() && gone.empty()) return false;
+    if (added.empty() && removed.empty()) return false;
     Sketcher sketcher(header.shape);
-    for (std::size_t begin = 0; begin < came.size();) {
+    for (std::size_t begin = 0; begin < added.size();) {
       // Ids one after the other in one statement.
       std::size_t end = begin + 1;
-      while (end < came.size() && came[end].value == came[end - 1].value + 1) ++end;
-      own->read_magnitudes(came[begin], came[end - 1], header.shape.size(),
+      while (end < added.size() && added[end].value == added[end - 1].value + 1) ++end;
+      own->read_magnitudes(added[begin], added[end - 1], header.shape.size(),
                            [&](const MagnitudesRow& row) { sketcher.add(*own, row); });
       begin = end;
     }
     sketcher.flush();
     ViewSketches next = sketched()->sketches;
-    next.erase(gone);
+    next.erase(removed);
     next.insert(sketcher.sketches);
-    for (const ViewId view : gone) areas.erase(view);
+    for (const ViewId view : removed) areas.erase(view);
     sketcher.note_areas(areas);
     publish(std::move(next));
     return true;
@@ -295,13 +296,13 @@ struct PlaceSearch::Implementation {
 struct PlaceSearch::Snapshot::Implementation {
   explicit Implementation(const PlaceSearch::Implementation& search_)
       : search(&search_), sketched(search_.sketched()) {
-    if ((tables = search->borrow())) {
+    if ((tables = search->borrow_connection())) {
       try {
         reading = tables->transaction(MemoryTables::Kind::reading);
         return;
       } catch (const FileError&) {  // its server was away; it may be back
         tables.reset();
-        search->drop_idle();
+        search->drop_idle_connections();
       }
     }
     tables = search->connect();
@@ -311,7 +312,7 @@ struct PlaceSearch::Snapshot::Implementation {
   Implementation& operator=(const Implementation&) = delete;
   ~Implementation() {
     reading.reset();
-    if (!failed) search->give_back(std::move(tables));
+    if (!failed) search->return_connection(std::move(tables));
   }
 
   /// Runs `read_some`. After an exception the connection is not used again.
@@ -327,18 +328,18 @@ struct PlaceSearch::Snapshot::Implementation {
 
   void read(std::span<const ViewId> views) {
     mark_failed_on_throw([&] {
-      tables->read_views_there(views, [&](const ViewRow& row) {
+      tables->read_available_views(views, [&](const ViewRow& row) {
         const auto bytes = tables->checked(row, search->header.shape, scratch).signature;
         const auto half = static_cast<std::ptrdiff_t>(search->header.shape.size());
-        kept.insert_or_assign(row.id, Kept{row.info,
-                                           {search->header.shape,
-                                            {bytes.begin(), bytes.begin() + half},
-                                            {bytes.begin() + half, bytes.end()}}});
+        cached.insert_or_assign(row.id, CachedView{row.info,
+                                                   {search->header.shape,
+                                                    {bytes.begin(), bytes.begin() + half},
+                                                    {bytes.begin() + half, bytes.end()}}});
       });
     });
   }
 
-  struct Kept {
+  struct CachedView {
     ReferenceInfo info;
     PackedSignature signature;
   };
@@ -348,7 +349,7 @@ struct PlaceSearch::Snapshot::Implementation {
   std::unique_ptr<MemoryTables::Transaction> reading;
   bool failed = false;
   RecordBytes scratch;
-  std::unordered_map<ViewId, Kept> kept;
+  std::unordered_map<ViewId, CachedView> cached;
 };
 
 PlaceSearch::Snapshot::Snapshot(std::unique_ptr<Implementation> implementation)
@@ -382,16 +383,16 @@ SearchResult PlaceSearch::Snapshot::search(const PackedSignature& query,
       [&own](std::span<const ViewId> views, const ViewSketches::TakeView& take) {
         std::vector<ViewId> unread;
         for (const ViewId view : views) {
-          if (!own.kept.contains(view)) unread.push_back(view);
+          if (!own.cached.contains(view)) unread.push_back(view);
         }
         if (!unread.empty()) own.read(unread);
         for (const ViewId view : views) {
-          const auto found = own.kept.find(view);
-          if (found != own.kept.end()) take(view, found->second.signature.magnitudes);
+          const auto found = own.cached.find(view);
+          if (found != own.cached.end()) take(view, found->second.signature.magnitudes);
         }
       },
       executor);
-  own.search->count(result, std::chrono::steady_clock::now() - start);
+  own.search->count_search(result, std::chrono::steady_clock::now() - start);
   return result;
 }
 
@@ -402,14 +403,14 @@ VisualMemory PlaceSearch::Snapshot::load(std::span<const ViewId> views) {
   ascending.erase(std::unique(ascending.begin(), ascending.end()), ascending.end());
   std::vector<ViewId> unread;
   for (const ViewId view : ascending) {
-    if (!own.kept.contains(view)) unread.push_back(view);
+    if (!own.cached.contains(view)) unread.push_back(view);
   }
   if (!unread.empty()) own.read(unread);
   const MemoryHeader& header = own.search->header;
   VisualMemory memory(header.shape, header.full_scale, header.elevations);
   for (const ViewId view : ascending) {
-    const auto found = own.kept.find(view);
-    if (found == own.kept.end()) continue;
+    const auto found = own.cached.find(view);
+    if (found == own.cached.end()) continue;
     try {
       memory.append_with_id(view, found->second.signature, found->second.info);
     } catch (const ContractError& error) {

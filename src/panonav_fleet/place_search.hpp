@@ -14,8 +14,8 @@
 
 namespace panonav::fleet {
 
-/// Exact search in a memory that is not held: of each view it keeps a sketch (350 bytes for 80 x
-/// 15) and reads the few views that can be among the nearest when it is asked. For memories on a
+/// Searches a memory exactly without holding it: keeps a sketch of each view (350 bytes for 80 x
+/// 15) and reads, for each query, the few views that can be among the nearest. For memories on a
 /// server that are larger than a machine, and for any number of machines that search one memory;
 /// nothing is written. A memory file is searched the same way. Several threads may use one object,
 /// each with a connection of its own.
@@ -31,15 +31,15 @@ class PlaceSearch final : public IndexedMemory {
   PlaceSearch& operator=(PlaceSearch&&) noexcept;
 
   [[nodiscard]] const MemoryHeader& header() const noexcept;  ///< Fixed when the memory was made.
-  [[nodiscard]] std::size_t size() const override;            ///< Views that are sketched.
+  [[nodiscard]] std::size_t size() const override;  ///< Returns the number of sketched views.
   [[nodiscard]] std::vector<ViewId> views() const override;
-  [[nodiscard]] std::uint64_t bytes() const override;  ///< That sketches and ids take.
+  [[nodiscard]] std::uint64_t bytes() const override;  ///< Returns the size of sketches and ids.
   [[nodiscard]] SearchCounters counters() const override;
 
-  /// The memory at one moment, for the questions of one query: what others change meanwhile is not
-  /// seen. One thread uses it, and not for longer than it takes: it holds a transaction open. The
-  /// search must outlive it. All throw FileError when the server cannot be reached, and on a view
-  /// that does not match its checksum.
+  /// Shows the memory at one moment, for one query; later changes are invisible. One thread uses
+  /// it, as shortly as possible: it holds a transaction open. The search must outlive it. All
+  /// functions throw FileError when the server cannot be reached, and on a view that does not match
+  /// its checksum.
   class Snapshot final : public ViewIndex {
    public:
     ~Snapshot() override;
@@ -47,14 +47,15 @@ class PlaceSearch final : public IndexedMemory {
     Snapshot(Snapshot&&) noexcept;
     Snapshot& operator=(Snapshot&&) noexcept;
 
-    [[nodiscard]] std::size_t size() const noexcept override;  ///< Views that are sketched.
-    /// As `VisualMemory::search` over those views that are sketched and that the memory has: one or
-    /// two statements to the server, a few where many views look alike. On all cores while no other
-    /// search of this memory runs.
+    [[nodiscard]] std::size_t size()
+        const noexcept override;  ///< Returns the number of sketched views.
+    /// Searches, as `VisualMemory::search`, the views that are sketched and that the memory has, by
+    /// one or two statements to the server, a few if many views look alike. Uses all cores while no
+    /// other search of this memory runs.
     [[nodiscard]] SearchResult search(const PackedSignature& query, const SearchOptions& options,
                                       const SearchMask& mask) override;
-    /// Those of the views that the memory has, without links, in one statement; what this snapshot
-    /// read before is not read again.
+    /// Loads those of the views that the memory has, without links, in one statement; views that
+    /// this snapshot read before are not read again.
     [[nodiscard]] VisualMemory load(std::span<const ViewId> views) override;
     [[nodiscard]] std::optional<ViewId> find(std::string_view name) override;
     [[nodiscard]] std::vector<ViewId> views_within(std::span<const PositionBounds> bounds) override;
@@ -65,17 +66,17 @@ class PlaceSearch final : public IndexedMemory {
     explicit Snapshot(std::unique_ptr<Implementation> implementation);
     std::unique_ptr<Implementation> implementation_;
   };
-  /// Throws FileError when the server cannot be reached; the next one may find it again.
+  /// Begins a snapshot. Throws FileError when the server cannot be reached; the next call may reach
+  /// it again.
   [[nodiscard]] Snapshot snapshot() const;
-  [[nodiscard]] std::unique_ptr<ViewIndex> index() const override;  ///< The same.
-  /// One search of a snapshot of its own.
+  [[nodiscard]] std::unique_ptr<ViewIndex> index() const override;  ///< Begins a snapshot.
+  /// Searches in a snapshot of its own.
   [[nodiscard]] SearchResult search(const PackedSignature& query, const SearchOptions& options = {},
                                     const SearchMask& mask = {}) const;
 
-  /// Takes over which views came and went since: of a server that tells which areas changed, those
-  /// areas are compared, otherwise the ids of all views. Searches go on
-  /// meanwhile. Returns whether anything changed that others told or that was found. Throws
-  /// FileError; then what is sketched stays, and the next call compares all.
+  /// Updates the sketches: compares the areas that the server reports as changed, or else the ids
+  /// of all views. Searches continue meanwhile. Returns true if anything changed. Throws FileError;
+  /// then the sketches stay, and the next call compares all.
   bool refresh() override;
 
  private:

@@ -7,9 +7,9 @@ namespace panonav::fleet {
 ///
 ///     postgresql://[USER[:PASSWORD]@][HOST][:PORT]/DATABASE?memory=NAME
 ///
-/// libpq reads the address and takes what it leaves out from the environment, the service file and
-/// the password file. Three parameters are panonav's own: `memory` is the name of the memory,
-/// `fleet` whose it is where that is not the login's own fleet, and `robot` who adds to it; all
+/// libpq reads the address, and missing parts from the environment, the service file and the
+/// password file. Three parameters are panonav's own: `memory` is the name of the memory, `fleet`
+/// its owner if that is not the login's own fleet, and `robot` the robot that adds to it; all
 /// others (sslmode, sslrootcert, connect_timeout, ...) are libpq's. "postgres://" is the same.
 void register_postgresql_memories();
 

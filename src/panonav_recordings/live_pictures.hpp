@@ -22,7 +22,7 @@ namespace panonav::recordings {
 struct LivePicture {
   Image picture;                      ///< decoded and upright
   std::vector<std::uint8_t> encoded;  ///< the JPEG it was decoded from; empty where it was none
-  /// When it arrived, seconds since 1970-01-01 UTC; of a camera: when it was taken.
+  /// When it arrived, in seconds since 1970-01-01 UTC; from a camera: when it was taken.
   double stamp_s = 0.0;
   /// The same moment by the clock that is never set.
   std::chrono::steady_clock::time_point arrived{};
@@ -31,8 +31,7 @@ struct LivePicture {
 
 /// Options for reading a live source.
 struct LiveOptions {
-  /// Of a camera: wanted width and height; it may give the nearest that it has. Empty: as it is
-  /// set.
+  /// Size requested from a camera, which may give its nearest. Empty: the camera's setting.
   std::optional<ImageSize> size;
   double reopen_after_s = 1.0;  ///< until a source that broke off is opened again
   ImageLimits limits;           ///< of each picture; those beyond count as damaged

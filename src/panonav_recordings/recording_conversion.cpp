@@ -32,7 +32,7 @@ Dataset::Fields convert_to_recording(const Dataset& dataset, const fs::path& fil
   std::int64_t log_ns = 0;
   for (std::size_t i = 0; i < dataset.entries.size(); ++i) {
     const DatasetEntry& entry = dataset.entries[i];
-    const std::int64_t ns = nanoseconds(shared.stamps ? *entry.stamp_s : static_cast<double>(i));
+    const std::int64_t ns = to_nanoseconds(shared.stamps ? *entry.stamp_s : static_cast<double>(i));
     log_ns = std::max(log_ns, ns);  // readers go by it, and the order of pictures stays
     std::optional<ReferencePose> truth = entry.pose;
     if (truth && !shared.headings) truth->heading_rad.reset();

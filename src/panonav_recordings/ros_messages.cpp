@@ -25,109 +25,109 @@ concept Is = std::same_as<std::remove_const_t<M>, T>;
 // The members of each message in the order of its .msg file; readers and writers are `a`.
 
 template <class A>
-void fields(A& a, Is<Header> auto& m) {
+void visit_fields(A& a, Is<Header> auto& m) {
   a.sequence_number();
   a.stamp(m.stamp_ns);
   a(m.frame_id);
 }
 template <class A>
-void fields(A& a, Is<Vector3> auto& m) {
+void visit_fields(A& a, Is<Vector3> auto& m) {
   a(m.x, m.y, m.z);
 }
 template <class A>
-void fields(A& a, Is<Quaternion> auto& m) {
+void visit_fields(A& a, Is<Quaternion> auto& m) {
   a(m.x, m.y, m.z, m.w);
 }
 template <class A>
-void fields(A& a, Is<Pose> auto& m) {
+void visit_fields(A& a, Is<Pose> auto& m) {
   a(m.position, m.orientation);
 }
 template <class A>
-void fields(A& a, Is<Image> auto& m) {
+void visit_fields(A& a, Is<Image> auto& m) {
   a(m.header, m.height, m.width, m.encoding, m.is_bigendian, m.step, m.data);
 }
 template <class A>
-void fields(A& a, Is<CompressedImage> auto& m) {
+void visit_fields(A& a, Is<CompressedImage> auto& m) {
   a(m.header, m.format, m.data);
 }
 template <class A>
-void fields(A& a, Is<Imu> auto& m) {
+void visit_fields(A& a, Is<Imu> auto& m) {
   a(m.header, m.orientation, m.orientation_covariance, m.angular_velocity,
     m.angular_velocity_covariance, m.linear_acceleration, m.linear_acceleration_covariance);
 }
 template <class A>
-void fields(A& a, Is<PoseWithCovariance> auto& m) {
+void visit_fields(A& a, Is<PoseWithCovariance> auto& m) {
   a(m.pose, m.covariance);
 }
 template <class A>
-void fields(A& a, Is<Odometry> auto& m) {
+void visit_fields(A& a, Is<Odometry> auto& m) {
   a(m.header, m.child_frame_id, m.pose, m.linear_velocity, m.angular_velocity, m.twist_covariance);
 }
 template <class A>
-void fields(A& a, Is<TransformStamped> auto& m) {
+void visit_fields(A& a, Is<TransformStamped> auto& m) {
   a(m.header, m.child_frame_id, m.transform);
 }
 template <class A>
-void fields(A& a, Is<TFMessage> auto& m) {
+void visit_fields(A& a, Is<TFMessage> auto& m) {
   a(m.transforms);
 }
 template <class A>
-void fields(A& a, Is<PointStamped> auto& m) {
+void visit_fields(A& a, Is<PointStamped> auto& m) {
   a(m.header, m.point);
 }
 template <class A>
-void fields(A& a, Is<PoseStamped> auto& m) {
+void visit_fields(A& a, Is<PoseStamped> auto& m) {
   a(m.header, m.pose);
 }
 template <class A>
-void fields(A& a, Is<PoseWithCovarianceStamped> auto& m) {
+void visit_fields(A& a, Is<PoseWithCovarianceStamped> auto& m) {
   a(m.header, m.pose);
 }
 template <class A>
-void fields(A& a, Is<PoseArray> auto& m) {
+void visit_fields(A& a, Is<PoseArray> auto& m) {
   a(m.header, m.poses);
 }
 template <class A>
-void fields(A& a, Is<Path> auto& m) {
+void visit_fields(A& a, Is<Path> auto& m) {
   a(m.header, m.poses);
 }
 template <class A>
-void fields(A& a, Is<PointField> auto& m) {
+void visit_fields(A& a, Is<PointField> auto& m) {
   a(m.name, m.offset, m.datatype, m.count);
 }
 template <class A>
-void fields(A& a, Is<PointCloud2> auto& m) {
+void visit_fields(A& a, Is<PointCloud2> auto& m) {
   a(m.header, m.height, m.width, m.fields, m.is_bigendian, m.point_step, m.row_step, m.data,
     m.is_dense);
 }
 template <class A>
-void fields(A& a, Is<OccupancyGrid> auto& m) {
+void visit_fields(A& a, Is<OccupancyGrid> auto& m) {
   a(m.header);
   a.stamp(m.map_load_time_ns);
   a(m.resolution, m.width, m.height, m.origin, m.cells);
 }
 template <class A>
-void fields(A& a, Is<KeyValue> auto& m) {
+void visit_fields(A& a, Is<KeyValue> auto& m) {
   a(m.key, m.value);
 }
 template <class A>
-void fields(A& a, Is<DiagnosticStatus> auto& m) {
+void visit_fields(A& a, Is<DiagnosticStatus> auto& m) {
   a(m.level, m.name, m.message, m.hardware_id, m.values);
 }
 template <class A>
-void fields(A& a, Is<DiagnosticArray> auto& m) {
+void visit_fields(A& a, Is<DiagnosticArray> auto& m) {
   a(m.header, m.status);
 }
 template <class A>
-void fields(A& a, Is<Twist> auto& m) {
+void visit_fields(A& a, Is<Twist> auto& m) {
   a(m.linear, m.angular);
 }
 template <class A>
-void fields(A& a, Is<Clock> auto& m) {
+void visit_fields(A& a, Is<Clock> auto& m) {
   a.stamp(m.clock_ns);
 }
 template <class A>
-void fields(A& a, Is<String> auto& m) {
+void visit_fields(A& a, Is<String> auto& m) {
   a(m.data);
 }
 
@@ -159,7 +159,7 @@ class Reader {
 
   template <class... Values>
   void operator()(Values&... values) {
-    (value(values), ...);
+    (read_value(values), ...);
   }
   void sequence_number() {
     if (!cdr_) (void)number<std::uint32_t>();
@@ -202,27 +202,27 @@ class Reader {
     std::memcpy(&value, take(sizeof(Number)).data(), sizeof(Number));
     return swaps_ ? swapped(value) : value;
   }
-  void value(std::string& text) {
+  void read_value(std::string& text) {
     auto bytes = take(number<std::uint32_t>());
     if (cdr_ && !bytes.empty()) bytes = bytes.first(bytes.size() - 1);  // its final zero
     text.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   }
-  void value(std::span<const std::uint8_t>& bulk) { bulk = take(number<std::uint32_t>()); }
+  void read_value(std::span<const std::uint8_t>& bulk) { bulk = take(number<std::uint32_t>()); }
   template <class Element>
-  void value(std::vector<Element>& elements) {
+  void read_value(std::vector<Element>& elements) {
     const auto count = number<std::uint32_t>();
-    for (std::uint32_t i = 0; i < count; ++i) value(elements.emplace_back());
+    for (std::uint32_t i = 0; i < count; ++i) read_value(elements.emplace_back());
   }
   template <std::size_t count>
-  void value(std::array<double, count>& numbers) {
+  void read_value(std::array<double, count>& numbers) {
     for (double& each : numbers) each = number<double>();
   }
   template <class Value>
-  void value(Value& of) {
+  void read_value(Value& of) {
     if constexpr (std::is_arithmetic_v<Value>) {
       of = number<Value>();
     } else {
-      fields(*this, of);
+      visit_fields(*this, of);
       check(of);
     }
   }
@@ -255,10 +255,10 @@ class Writer {
   }
   template <class... Values>
   void operator()(const Values&... values) {
-    (value(values), ...);
+    (write_value(values), ...);
   }
   void sequence_number() {
-    if (!cdr_) value(std::uint32_t{0});
+    if (!cdr_) write_value(std::uint32_t{0});
   }
   void stamp(std::int64_t ns) {
     std::int64_t seconds = ns / second_ns;
@@ -271,8 +271,8 @@ class Writer {
       throw ContractError("stamp", std::to_string(seconds) + " s",
                           std::to_string(low) + " .. " + std::to_string(high) + " s");
     }
-    value(static_cast<std::uint32_t>(seconds));
-    value(static_cast<std::uint32_t>(ns - seconds * second_ns));
+    write_value(static_cast<std::uint32_t>(seconds));
+    write_value(static_cast<std::uint32_t>(ns - seconds * second_ns));
   }
   std::vector<std::uint8_t> take() { return std::move(bytes_); }
 
@@ -281,31 +281,31 @@ class Writer {
     const auto* bytes = static_cast<const std::uint8_t*>(from);
     bytes_.insert(bytes_.end(), bytes, bytes + count);
   }
-  void value(const std::string& text) {
-    value(static_cast<std::uint32_t>(text.size() + (cdr_ ? 1 : 0)));
+  void write_value(const std::string& text) {
+    write_value(static_cast<std::uint32_t>(text.size() + (cdr_ ? 1 : 0)));
     append(text.c_str(), text.size() + (cdr_ ? 1 : 0));
   }
-  void value(std::span<const std::uint8_t> bulk) {
-    value(static_cast<std::uint32_t>(bulk.size()));
+  void write_value(std::span<const std::uint8_t> bulk) {
+    write_value(static_cast<std::uint32_t>(bulk.size()));
     append(bulk.data(), bulk.size());
   }
   template <class Element>
-  void value(const std::vector<Element>& elements) {
-    value(static_cast<std::uint32_t>(elements.size()));
-    for (const auto& element : elements) value(element);
+  void write_value(const std::vector<Element>& elements) {
+    write_value(static_cast<std::uint32_t>(elements.size()));
+    for (const auto& element : elements) write_value(element);
   }
   template <std::size_t count>
-  void value(const std::array<double, count>& numbers) {
-    for (const double number : numbers) value(number);
+  void write_value(const std::array<double, count>& numbers) {
+    for (const double number : numbers) write_value(number);
   }
   template <class Value>
-  void value(const Value& of) {
+  void write_value(const Value& of) {
     if constexpr (std::is_arithmetic_v<Value>) {
       bytes_.resize(bytes_.size() + padding(cdr_, bytes_.size(), sizeof(Value)));
       const Value little = std::endian::native == std::endian::little ? of : swapped(of);
       append(&little, sizeof(Value));
     } else {
-      fields(*this, of);
+      visit_fields(*this, of);
     }
   }
 

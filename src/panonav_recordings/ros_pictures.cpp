@@ -47,7 +47,8 @@ std::uint8_t clamped(int value) {
   return static_cast<std::uint8_t>(std::clamp(value, 0, 255));
 }
 
-void take_interleaved(Row row, const Encoding& from, int width, int channels, std::uint8_t* to) {
+void convert_interleaved_row(Row row, const Encoding& from, int width, int channels,
+                             std::uint8_t* to) {
   for (int u = 0; u < width; ++u) {
     for (int c = 0; c < channels; ++c) {
       *to++ = row[u * from.bytes + from.order[static_cast<std::size_t>(c)]];
@@ -55,7 +56,7 @@ void take_interleaved(Row row, const Encoding& from, int width, int channels, st
   }
 }
 
-void take_deep(Row row, bool big_endian, int width, std::uint8_t* to) {
+void convert_deep_row(Row row, bool big_endian, int width, std::uint8_t* to) {
   for (int u = 0; u < width; ++u) {
     const int value = row[2 * u + (big_endian ? 0 : 1)] << 8 | row[2 * u + (big_endian ? 1 : 0)];
     *to++ = static_cast<std::uint8_t>((value * 255 + 32895) >> 16);  // libpng's, exact
@@ -63,7 +64,7 @@ void take_deep(Row row, bool big_endian, int width, std::uint8_t* to) {
 }
 
 // BT.601 in 1/256.
-void take_yuv(Row row, const Encoding& from, int width, std::uint8_t* to) {
+void convert_yuv_row(Row row, const Encoding& from, int width, std::uint8_t* to) {
   for (int u = 0; u < width; ++u) {
     const Row pair = row + 4 * (u / 2);
     const int y = 298 * (pair[from.order[0] + 2 * (u % 2)] - 16) + 128;
@@ -77,7 +78,8 @@ void take_yuv(Row row, const Encoding& from, int width, std::uint8_t* to) {
 
 /// Each colour that a pixel lacks is the mean of its two or four neighbours of that colour; the
 /// picture is mirrored at its edges, which keeps the pattern.
-void take_bayer(const Image& message, Row data, const Encoding& from, panonav::Image& picture) {
+void convert_bayer_row(const Image& message, Row data, const Encoding& from,
+                       panonav::Image& picture) {
   const int width = picture.width();
   const int height = picture.height();
   if (width < 2 || height < 2) {
@@ -150,18 +152,18 @@ panonav::Image picture_of(const Image& message, const ImageLimits& limits) {
   panonav::Image picture(static_cast<int>(width), static_cast<int>(height), grey ? 1 : 3);
   const Row data = message.data.data();
   if (found->kind == Encoding::Kind::bayer) {
-    take_bayer(message, data, *found, picture);
+    convert_bayer_row(message, data, *found, picture);
     return picture;
   }
   for (int v = 0; v < picture.height(); ++v) {
     const Row row = data + static_cast<std::size_t>(v) * message.step;
     std::uint8_t* to = &picture.at(0, v);
     if (found->kind == Encoding::Kind::deep) {
-      take_deep(row, message.is_bigendian != 0, picture.width(), to);
+      convert_deep_row(row, message.is_bigendian != 0, picture.width(), to);
     } else if (found->kind == Encoding::Kind::yuv) {
-      take_yuv(row, *found, picture.width(), to);
+      convert_yuv_row(row, *found, picture.width(), to);
     } else {
-      take_interleaved(row, *found, picture.width(), picture.channels(), to);
+      convert_interleaved_row(row, *found, picture.width(), picture.channels(), to);
     }
   }
   return picture;

@@ -82,7 +82,7 @@ PointValues edge_points(const std::vector<RunEdge>& edges) {
 
 }  // namespace
 
-RunMoment moment_of(const Observation& seen, std::size_t number) {
+RunMoment make_moment(const Observation& seen, std::size_t number) {
   RunMoment moment{.stamp_s = seen.stamp_s.value_or(static_cast<double>(number)),
                    .odometry = seen.odometry,
                    .tilt = seen.tilt,
@@ -170,7 +170,7 @@ struct RunRecorder::Implementation {
   }
 
   void write(const RunMoment& moment) {
-    const std::int64_t ns = nanoseconds(moment.stamp_s);
+    const std::int64_t ns = to_nanoseconds(moment.stamp_s);
     log_ns = std::max(log_ns, ns);  // the clock may have been set back
     robot.write(log_ns, ns, moment.odometry, moment.tilt, moment.truth);
     if (!moment.encoded_picture.empty()) {

@@ -92,7 +92,7 @@ struct RunMoment {
 };
 
 /// The picture of an observation and what is known of it. Where it has no stamp, `number` seconds.
-[[nodiscard]] RunMoment moment_of(const Observation& seen, std::size_t number);
+[[nodiscard]] RunMoment make_moment(const Observation& seen, std::size_t number);
 /// Returns the positions of the views with a pose.
 [[nodiscard]] std::vector<Point2> reference_positions(const VisualMemory& memory);
 

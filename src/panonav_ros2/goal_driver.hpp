@@ -15,7 +15,7 @@
 
 namespace panonav::ros2 {
 
-/// A memory that a robot is localised by.
+/// The memory of a node.
 struct LoadedMemory {
   std::filesystem::path path;
   MemoryFile file;
@@ -23,29 +23,29 @@ struct LoadedMemory {
 };
 
 /// Drives a robot to a goal or along a route, by velocities on `cmd_vel`, and reports on
-/// `~/goal/feedback` and `~/goal/result`. On the thread that localises, unless said otherwise.
+/// `~/goal/feedback` and `~/goal/result`. Used by the thread that localises, unless stated
+/// otherwise.
 class GoalDriver {
  public:
   GoalDriver(Participant& participant, const LocalisationNodeSetup& setup, WarningLog& log,
              const RobotMotion& motion, NowNs now_ns);
 
-  /// Ends the mission, and takes the next ones by this memory, which outlives *this or the next
-  /// call.
+  /// Ends the mission, and uses this memory for the next ones; it outlives *this or the next call.
   void set_memory(const LoadedMemory& memory);
   /// Returns the mission of a node that used the same memory and died.
   [[nodiscard]] std::optional<Mission> load_interrupted_mission();
 
-  /// Begins a mission in place of the one before. Throws Error, having reported it, when there is
-  /// no way.
+  /// Begins a mission, replacing the one before. Throws Error, having reported it, when there is no
+  /// path.
   void start(const Mission& mission);
   /// Sends the velocity for the picture, if there is a mission. `pose`: the camera's in the map,
-  /// `nullopt` where the robot is not localised.
+  /// `nullopt` if the robot is not localised.
   void drive(const Observation& observation, const std::optional<Pose2>& pose);
-  /// Stops the robot and reports why, if there is a mission. From any thread, as long as no other
-  /// one is in a function above.
+  /// Stops the robot and reports why, if there is a mission. Any thread may call, as long as no
+  /// other one is in a function above.
   void end(const std::string& why, std::uint8_t level = warning);
-  /// Stops the robot, on any thread, when no velocity was sent for `command_timeout_s`: whatever
-  /// holds up pictures.
+  /// Stops the robot when no velocity was sent for `command_timeout_s`, whatever delays pictures.
+  /// Any thread may call.
   void stop_if_silent();
 
  private:

@@ -79,7 +79,7 @@ void MemoryLocaliser::add_view(const std::string& name) {
 
 void MemoryLocaliser::remove_view(const std::string& name) {
   MemoryFile writable = MemoryFile::open(loaded().path, Access::read_write);
-  const ViewId view = named_view(writable, name);
+  const ViewId view = find_view_by_name_or_id(writable, name);
   writable.remove({&view, 1});
   reload();
 }

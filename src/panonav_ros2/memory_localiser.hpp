@@ -23,10 +23,10 @@ class MemoryLocaliser {
 
   /// Loads a memory. If this throws, the one before stays.
   void load(std::filesystem::path path);
-  /// Loads another memory of the same folder: who may write to a topic may not open any file that
-  /// the node may read.
+  /// Loads another memory of the same folder only, so that a topic cannot open any file that the
+  /// node may read.
   void load_neighbour(const std::string& name);
-  /// Continues the mission of a node that died, with the next picture.
+  /// Continues the mission of a node that died, beginning with the next picture.
   void load_interrupted_mission();
   /// Adds the last picture to the memory as a view.
   void add_view(const std::string& name);
@@ -34,7 +34,7 @@ class MemoryLocaliser {
 
   void start_globally();
   void start_at(const Pose2& map_from_base, double deviation_m, double heading_deviation_rad);
-  /// Starts at a pose that is known as well as poses in the map are.
+  /// Starts at a pose with the uncertainty of poses in the map.
   void start_at(const Pose2& map_from_base);
 
   /// Localises by a picture with odometry, that of the camera after `moved`. Returns the state.

@@ -12,20 +12,20 @@
 
 namespace panonav::ros2 {
 
-/// Stores the odometry of the last seconds. A publisher that starts again begins at another pose or
-/// time; then what follows is joined to the motion so far.
+/// Stores the odometry of the last seconds. A restarted publisher begins at another pose or time;
+/// its motion is appended to the motion so far.
 class MotionHistory {
  public:
   static constexpr std::int64_t kept_ns = 10'000'000'000;
   static constexpr std::size_t max_samples = 10'000;
-  /// A faster motion between two messages is a jump of the odometry.
+  /// Faster motion between two messages is a jump of the odometry.
   static constexpr double max_speed_m_s = 20.0;
-  /// A message that is older than the newest by less is late, by more it is of another clock.
+  /// A message that is older than the newest by less is late; an older one is of another clock.
   static constexpr std::int64_t late_ns = 1'000'000'000;
 
   struct Motion {
     Pose2 odom_from_base;  ///< as published
-    /// In a frame of this class, in which the motion has no jumps.
+    /// Pose in a frame of this class, in which the motion has no jumps.
     Pose2 path_from_base;
   };
 

@@ -23,8 +23,8 @@ constexpr std::size_t max_file_bytes = 1'000'000;
 constexpr int max_depth = 16;
 constexpr int max_nodes = 10'000;
 
-std::pair<std::string, std::string> sides_of(const std::string& text, const std::string& what,
-                                             const std::string& allowed) {
+std::pair<std::string, std::string> parse_sides(const std::string& text, const std::string& what,
+                                                const std::string& allowed) {
   const std::size_t at = text.find(":=");
   if (at == 0 || at == std::string::npos || at + 2 == text.size()) {
     throw ContractError(what, "'" + to_readable_line(shorten_middle(text, 80)) + "'", allowed);
@@ -42,7 +42,8 @@ void set(Parameters& parameters, RosArguments::Parameter parameter) {
 }
 
 /// YAML has more forms of true and false than the options have.
-std::string text_of(const YAML::Node& node, const std::string& name, const std::string& where) {
+std::string to_text_value(const YAML::Node& node, const std::string& name,
+                          const std::string& where) {
   if (!node.IsScalar()) throw FileError(where, name + " has a value that is no text or number");
   const auto text = node.as<std::string>();
   if (text == "True" || text == "TRUE") return "true";
@@ -65,9 +66,9 @@ void flatten(const YAML::Node& node, const std::string& name, const std::string&
   }
   RosArguments::Parameter parameter{name, {}, where};
   if (node.IsSequence()) {
-    for (const auto& each : node) parameter.values.push_back(text_of(each, name, where));
+    for (const auto& each : node) parameter.values.push_back(to_text_value(each, name, where));
   } else {
-    parameter.values.push_back(text_of(node, name, where));
+    parameter.values.push_back(to_text_value(node, name, where));
   }
   set(parameters, std::move(parameter));
 }
@@ -109,7 +110,7 @@ void read_parameter_file(const std::string& path, const std::string& node,
 struct RosOption {
   std::string flag;
   std::string value;
-  [[nodiscard]] bool is(std::initializer_list<std::string_view> forms) const {
+  [[nodiscard]] bool matches(std::initializer_list<std::string_view> forms) const {
     return std::ranges::find(forms, flag) != forms.end();
   }
 };
@@ -129,8 +130,8 @@ std::vector<RosOption> split_words(std::span<const std::string> words,
       others.push_back(word);
     } else if (!word.starts_with("--enable-") && !word.starts_with("--disable-")) {
       RosOption option{word, {}};
-      if (!option.is({"-r", "--remap", "-p", "--param", "--params-file", "--log-level",
-                      "--log-config-file", "--log-file-name", "-e", "--enclave"})) {
+      if (!option.matches({"-r", "--remap", "-p", "--param", "--params-file", "--log-level",
+                           "--log-config-file", "--log-file-name", "-e", "--enclave"})) {
         throw ContractError("word after --ros-args",
                             "'" + to_readable_line(shorten_middle(word, 80)) + "'",
                             "-r FROM:=TO, -p NAME:=VALUE, --params-file FILE");
@@ -153,7 +154,7 @@ bool is_for_node(std::string& name, const std::string& node) {
 }
 
 void read_parameter(const RosOption& option, const std::string& node, Parameters& parameters) {
-  auto [name, value] = sides_of(option.value, "parameter", "NAME:=VALUE, as use_sim_time:=true");
+  auto [name, value] = parse_sides(option.value, "parameter", "NAME:=VALUE, as use_sim_time:=true");
   if (!is_for_node(name, node)) return;
   try {
     int nodes_left = max_nodes;
@@ -166,8 +167,8 @@ void read_parameter(const RosOption& option, const std::string& node, Parameters
 
 }  // namespace
 
-std::pair<std::string, std::string> remapping_of(const std::string& text) {
-  return sides_of(text, "remapping", "FROM:=TO, as image:=/camera/image");
+std::pair<std::string, std::string> parse_remapping(const std::string& text) {
+  return parse_sides(text, "remapping", "FROM:=TO, as image:=/camera/image");
 }
 
 RosArguments read_ros_arguments(std::span<const std::string> words, const std::string& node,
@@ -175,8 +176,8 @@ RosArguments read_ros_arguments(std::span<const std::string> words, const std::s
   RosArguments read;
   const auto options = split_words(words, read.words);
   for (const RosOption& option : options) {
-    if (!option.is({"-r", "--remap"})) continue;
-    auto [from, to] = remapping_of(option.value);
+    if (!option.matches({"-r", "--remap"})) continue;
+    auto [from, to] = parse_remapping(option.value);
     if (!is_for_node(from, node)) continue;
     read.remappings.insert_or_assign(from == "__name" ? "__node" : from, to);
   }
@@ -187,9 +188,9 @@ RosArguments read_ros_arguments(std::span<const std::string> words, const std::s
   const std::string own_node = renamed("__node", node);
   const std::string own_space = renamed("__ns", name_space);
   for (const RosOption& option : options) {
-    if (option.is({"--params-file"})) {
+    if (option.matches({"--params-file"})) {
       read_parameter_file(option.value, own_node, own_space, read.parameters);
-    } else if (option.is({"-p", "--param"})) {
+    } else if (option.matches({"-p", "--param"})) {
       read_parameter(option, own_node, read.parameters);
     }
   }

@@ -32,6 +32,6 @@ struct RosArguments {
                                               const std::string& name_space);
 
 /// Returns the two sides of FROM:=TO. Throws ContractError.
-[[nodiscard]] std::pair<std::string, std::string> remapping_of(const std::string& text);
+[[nodiscard]] std::pair<std::string, std::string> parse_remapping(const std::string& text);
 
 }  // namespace panonav::ros2

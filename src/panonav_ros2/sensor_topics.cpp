@@ -19,7 +19,7 @@ SensorTopics::SensorTopics(Participant& participant, const LocalisationNodeOptio
       motion_(motion),
       queue_(queue) {
   constexpr int sensor_depth = 50;
-  const auto take_message = [this](const auto& message) { take(message); };
+  const auto receive_message = [this](const auto& message) { receive(message); };
   if (options.use_sim_time) {
     subscribe<recordings::ros::Clock>(
         participant, log, "/clock", {.depth = 10, .reliable = false},
@@ -27,21 +27,23 @@ SensorTopics::SensorTopics(Participant& participant, const LocalisationNodeOptio
   }
   if (options.motion == MotionInput::odometry) {
     subscribe<recordings::ros::Odometry>(participant, log, "odom", {.depth = sensor_depth},
-                                         take_message);
+                                         receive_message);
   } else {
-    subscribe<recordings::ros::TFMessage>(participant, log, "/tf", {.depth = 100}, take_message);
+    subscribe<recordings::ros::TFMessage>(participant, log, "/tf", {.depth = 100}, receive_message);
     subscribe<recordings::ros::TFMessage>(participant, log, "/tf_static",
-                                          {.depth = 100, .transient_local = true}, take_message);
+                                          {.depth = 100, .transient_local = true}, receive_message);
   }
   if (options.tilt_from_imu)
-    subscribe<recordings::ros::Imu>(participant, log, "imu", {.depth = sensor_depth}, take_message);
-  const auto take_bytes = [this](const auto& message, std::span<const std::uint8_t> cdr) {
-    take_picture(message.header.stamp_ns, cdr);
+    subscribe<recordings::ros::Imu>(participant, log, "imu", {.depth = sensor_depth},
+                                    receive_message);
+  const auto receive_bytes = [this](const auto& message, std::span<const std::uint8_t> cdr) {
+    receive_picture(message.header.stamp_ns, cdr);
   };
   if (options.pictures == PictureInput::raw) {
-    subscribe<recordings::ros::Image>(participant, log, picture_topic(), {}, take_bytes);
+    subscribe<recordings::ros::Image>(participant, log, picture_topic(), {}, receive_bytes);
   } else {
-    subscribe<recordings::ros::CompressedImage>(participant, log, picture_topic(), {}, take_bytes);
+    subscribe<recordings::ros::CompressedImage>(participant, log, picture_topic(), {},
+                                                receive_bytes);
   }
 }
 
@@ -85,13 +87,13 @@ std::pair<Observation, std::int64_t> SensorTopics::decode(
   return named(recordings::ros::picture_of(read, picture_topic()), read.header.stamp_ns);
 }
 
-void SensorTopics::take(const recordings::ros::Odometry& odometry) {
+void SensorTopics::receive(const recordings::ros::Odometry& odometry) {
   require_frame("odom", odometry.header.frame_id, frames_.odom);
   require_frame("odom", odometry.child_frame_id, frames_.base);
   add_motion("odom", odometry.header.stamp_ns, odometry.pose.pose);
 }
 
-void SensorTopics::take(const recordings::ros::TFMessage& message) {
+void SensorTopics::receive(const recordings::ros::TFMessage& message) {
   std::optional<std::int64_t> stamp_ns;
   for (const recordings::ros::TransformStamped& each : message.transforms) {
     if (each.child_frame_id == frames_.odom) continue;  // what the node sends itself
@@ -105,7 +107,7 @@ void SensorTopics::take(const recordings::ros::TFMessage& message) {
   add_motion("/tf", *stamp_ns, *odom_from_base);
 }
 
-void SensorTopics::take(const recordings::ros::Imu& imu) {
+void SensorTopics::receive(const recordings::ros::Imu& imu) {
   if (imu.orientation_covariance[0] == -1.0) {
     throw ContractError("orientation_covariance[0]", -1.0,
                         "another value: the sensor must state an orientation");
@@ -117,7 +119,7 @@ void SensorTopics::take(const recordings::ros::Imu& imu) {
   motion_.set_tilt(tilt);
 }
 
-void SensorTopics::take_picture(std::int64_t stamp_ns, std::span<const std::uint8_t> cdr) {
+void SensorTopics::receive_picture(std::int64_t stamp_ns, std::span<const std::uint8_t> cdr) {
   if (last_picture_ns_ && stamp_ns <= *last_picture_ns_ &&
       stamp_ns > *last_picture_ns_ - MotionHistory::late_ns) {
     log_.warn(

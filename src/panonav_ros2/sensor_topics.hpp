@@ -33,10 +33,10 @@ class SensorTopics {
       std::span<const std::uint8_t> message) const;
 
  private:
-  void take(const recordings::ros::Odometry& odometry);
-  void take(const recordings::ros::TFMessage& message);
-  void take(const recordings::ros::Imu& imu);
-  void take_picture(std::int64_t stamp_ns, std::span<const std::uint8_t> cdr);
+  void receive(const recordings::ros::Odometry& odometry);
+  void receive(const recordings::ros::TFMessage& message);
+  void receive(const recordings::ros::Imu& imu);
+  void receive_picture(std::int64_t stamp_ns, std::span<const std::uint8_t> cdr);
   void add_motion(const std::string& topic, std::int64_t stamp_ns,
                   const recordings::ros::Pose& pose);
 

@@ -29,8 +29,8 @@ Teacher::Teacher(std::filesystem::path memory, const TeacherOptions& options)
 void Teacher::make_mapper() {
   Executor alone;
   mapper_.emplace(
-      MemoryFile::create(path_, header_from_first(waiting_, options_.pictures, options_.signature,
-                                                  options_.preprocessing, alone)),
+      MemoryFile::create(path_, make_memory_header(waiting_, options_.pictures, options_.signature,
+                                                   options_.preprocessing, alone)),
       options_.pictures);
   for (const Observation& first : std::exchange(waiting_, {})) mapper_->add(first);
 }

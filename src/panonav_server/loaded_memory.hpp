@@ -20,14 +20,14 @@ namespace panonav::server {
 /// Notices when a memory was changed.
 class MemoryWatch {
  public:
-  /// Begins with the memory as it is now.
+  /// Begins with the present state of the memory.
   explicit MemoryWatch(std::filesystem::path memory);
-  /// True if the memory was changed since the last call. A server that cannot be reached may have
-  /// changed it once it is back.
+  /// True if the memory was changed since the last call. Of a server that could not be reached,
+  /// also true once it is back.
   [[nodiscard]] bool has_changed();
 
  private:
-  /// Times and sizes of a file as it was last written, and of its log, of an SQLite file.
+  /// Times of change and sizes of an SQLite file and of its log.
   using FileState = std::array<std::pair<std::filesystem::file_time_type, std::uintmax_t>, 2>;
   [[nodiscard]] static FileState read_state(const std::filesystem::path& path);
 
@@ -37,12 +37,12 @@ class MemoryWatch {
   std::function<bool()> poll_changes_;          // empty while what keeps the memory is away
 };
 
-/// A memory as it was read: held, or searched where it lies.
+/// A loaded memory: held, or searched on its server.
 struct LoadedMemory {
   LoadedMemory(const std::filesystem::path& memory, const LocalisationServerOptions& options);
 
-  /// Returns the picture of a view, `nullopt` where it has none. Opens the file again where its
-  /// server was away.
+  /// Returns the picture of a view, `nullopt` if it has none. Opens the memory again if its server
+  /// was away.
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> thumbnail(const std::string& view);
 
   std::filesystem::path path;

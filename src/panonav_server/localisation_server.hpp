@@ -12,7 +12,7 @@
 
 namespace panonav::server {
 
-/// A memory under the name by which clients ask for it.
+/// A memory with its name for clients.
 struct ServedMemory {
   std::string name;  ///< 1 to 64 letters, digits, '-', '_' and '.'
   std::filesystem::path path;
@@ -20,41 +20,42 @@ struct ServedMemory {
 
 struct LocalisationServerOptions {
   std::string address = "127.0.0.1";  ///< an IPv4 address of this machine, to listen at
-  int port = 0;                       ///< 0 .. 65535; 0: one that is free
-  int threads = 0;                    ///< that answer pictures; 0: one per core; at most 1024
-  std::size_t max_waiting = 64;       ///< pictures that wait for a thread; further ones get 503
-  std::string token;                  ///< that clients must send; empty: none
+  int port = 0;                       ///< 0 .. 65535; 0: a free one
+  int threads = 0;  ///< number of threads that answer pictures; 0: one per core; at most 1024
+  std::size_t max_waiting =
+      64;             ///< number of pictures that may wait for a thread; further ones get 503
+  std::string token;  ///< token that clients must send; empty: none
   LocaliserOptions localiser;
-  /// Memories on a server with more views are not held but searched where they lie
-  /// (`PlaceRecogniserOptions::max_held_views`), which takes longer for each picture.
+  /// Largest number of views of a memory on a server that is held
+  /// (`PlaceRecogniserOptions::max_held_views`).
   std::size_t max_held_views = 200'000;
   /// Poll interval of memory files for changes.
   std::chrono::milliseconds look_every{1000};
-  /// Is told in one line what happens to a memory while it is served; called on another thread.
+  /// Receives, in one line, what happens to a memory while it is served; called on another thread.
   std::function<void(const std::string& line)> note;
 };
 
-/// Answers where pictures were taken, over HTTP (docs/formats.md, "HTTP"): pictures as PNG or JPEG
-/// in, JSON out, as `PlaceRecogniser` answers, to the bit. Pictures wait in a bounded queue; a
-/// picture has at most 16 MiB and 33,554,432 pixels, waiting ones 128 MiB together. A memory whose
-/// file was changed is read again while the old one answers.
+/// Localises pictures over HTTP (docs/formats.md, "HTTP"): PNG or JPEG in, JSON out, with the same
+/// bits as the answers of `PlaceRecogniser`. Pictures wait in a bounded queue; a picture has at most
+/// 16 MiB and 33,554,432 pixels, waiting ones 128 MiB together. A changed memory is read again
+/// while the old one answers.
 ///
-/// Without a token every program that reaches the port is answered, but no page of another origin
-/// or one that used a name other than "localhost" (DNS rebinding). There is no encryption: use a
+/// Without a token every program that reaches the port is answered, but no web page of another
+/// origin or under a name other than "localhost" (DNS rebinding). There is no encryption: use a
 /// proxy outside of trusted networks.
 class LocalisationServer {
  public:
-  /// Reads the memories and listens from here on. Throws FileError as `PlaceRecogniser`, Error
-  /// where address and port are not to be had, ContractError on no memory, on names that are not
-  /// allowed or stand twice, and on options out of range.
+  /// Reads the memories and begins to listen. Throws FileError as `PlaceRecogniser`, Error if
+  /// address and port are not available, ContractError on no memory, on names that are not allowed
+  /// or not unique, and on options out of range.
   LocalisationServer(std::span<const ServedMemory> memories,
                      const LocalisationServerOptions& options);
-  /// Takes no more pictures; those that wait are answered, for 5 s at most.
+  /// Accepts no more pictures; waiting ones are answered, for 5 s at most.
   ~LocalisationServer();
   LocalisationServer(const LocalisationServer&) = delete;
   LocalisationServer& operator=(const LocalisationServer&) = delete;
 
-  /// "http://127.0.0.1:41234": before the paths of docs/formats.md.
+  /// Returns "http://127.0.0.1:41234", the prefix of the paths of docs/formats.md.
   [[nodiscard]] std::string url() const;
 
  private:

@@ -27,7 +27,7 @@ class Histogram {
 [[nodiscard]] std::string describe_metric(const std::string& name, const std::string& type,
                                           const std::string& help);
 
-/// Returns the bytes of memory that the process holds; 0 where the system does not tell.
+/// Returns the bytes of memory that the process holds; 0 if unknown.
 [[nodiscard]] std::uint64_t resident_bytes();
 
 }  // namespace panonav::server

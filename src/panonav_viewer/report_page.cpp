@@ -89,12 +89,12 @@ std::string view_element(const ReportView& view) {
 ReportPage::ReportPage(std::string title, std::string lead)
     : title_(std::move(title)), lead_(std::move(lead)) {}
 
-void ReportPage::section(std::string_view title) {
+void ReportPage::begin_section(std::string_view title) {
   body_.emplace_back(element("h2", title) + "\n", "");
 }
 
-void ReportPage::part(std::string_view title,
-                      const std::pair<std::string, std::string>& value_and_meaning) {
+void ReportPage::begin_part(std::string_view title,
+                            const std::pair<std::string, std::string>& value_and_meaning) {
   const std::string number = std::to_string(++parts_);
   const std::string numbered = number + ". " + std::string(title);
   overview_ += "<a href=\"#part" + number + "\">" + element("small", numbered) +
@@ -103,11 +103,11 @@ void ReportPage::part(std::string_view title,
   body_.emplace_back("<h2 id=\"part" + number + "\">" + html_escaped(numbered) + "</h2>\n", "");
 }
 
-void ReportPage::text(std::string_view paragraph) {
+void ReportPage::add_text(std::string_view paragraph) {
   body_.emplace_back(element("p", paragraph) + "\n", "");
 }
 
-void ReportPage::figures(
+void ReportPage::add_figures(
     const std::vector<std::pair<std::string, std::string>>& value_and_meaning) {
   std::string html = "<div class=\"figures\">\n";
   for (const auto& [value, meaning] : value_and_meaning) {
@@ -116,8 +116,8 @@ void ReportPage::figures(
   body_.emplace_back(html + "</div>\n", "");
 }
 
-void ReportPage::table(const std::vector<std::string>& header,
-                       const std::vector<std::vector<std::string>>& rows) {
+void ReportPage::add_table(const std::vector<std::string>& header,
+                           const std::vector<std::vector<std::string>>& rows) {
   std::string html = "<div class=\"wide\" tabindex=\"0\"><table>\n" + table_row("th", header);
   for (const auto& row : rows) {
     require(row.size() == header.size(), "cells of a table row", static_cast<double>(row.size()),
@@ -127,7 +127,7 @@ void ReportPage::table(const std::vector<std::string>& header,
   body_.emplace_back(html + "</table></div>\n", "");
 }
 
-void ReportPage::figure(const ReportPicture& picture) {
+void ReportPage::add_figure(const ReportPicture& picture) {
   if (!picture.file.empty()) {
     const bool plot = std::filesystem::path(picture.file).extension() == ".svg";
     body_.emplace_back("<figure><img" + std::string(plot ? " class=\"plot\"" : "") + " alt=\"" +
@@ -140,46 +140,46 @@ void ReportPage::figure(const ReportPicture& picture) {
   body_.emplace_back(element("figcaption", picture.caption) + "</figure>\n", "");
 }
 
-void ReportPage::pictures(const std::vector<ReportPicture>& pictures) {
+void ReportPage::add_pictures(const std::vector<ReportPicture>& pictures) {
   body_.emplace_back("<div class=\"pictures\">\n", "");
-  for (const auto& picture : pictures) figure(picture);
+  for (const auto& picture : pictures) add_figure(picture);
   body_.emplace_back("</div>\n", "");
 }
 
-void ReportPage::thumbnails(const std::vector<ReportPicture>& pictures) {
+void ReportPage::add_thumbnails(const std::vector<ReportPicture>& pictures) {
   body_.emplace_back("<div class=\"pictures small\">\n", "");
-  for (const auto& picture : pictures) figure(picture);
+  for (const auto& picture : pictures) add_figure(picture);
   body_.emplace_back("</div>\n", "");
 }
 
-void ReportPage::plots(const std::vector<ReportPlot>& plots) {
+void ReportPage::add_plots(const std::vector<ReportPlot>& plots) {
   std::string html = "<div class=\"pictures\">\n";
   for (const auto& plot : plots) html += plot_element(plot);
   body_.emplace_back(html + "</div>\n", "");
 }
 
-void ReportPage::views(const std::vector<ReportView>& views) {
+void ReportPage::add_views(const std::vector<ReportView>& views) {
   std::string html = "<div class=\"pictures above\">\n";
   for (const auto& view : views) html += view_element(view);
   body_.emplace_back(html + "</div>\n", "");
 }
 
-void ReportPage::run(const RunPage& run) {
+void ReportPage::add_run(const RunPage& run) {
   body_.emplace_back(run.element(), "");
 }
 
-void ReportPage::link(std::string_view file, std::string_view text) {
+void ReportPage::add_link(std::string_view file, std::string_view text) {
   body_.emplace_back("<p class=\"link\"><a href=\"" + html_escaped(file) + "\">" +
                          html_escaped(text) + "</a></p>\n",
                      "");
 }
 
-void ReportPage::commands(const std::vector<std::string>& command_lines) {
+void ReportPage::add_commands(const std::vector<std::string>& command_lines) {
   body_.emplace_back(command_block(command_lines), "");
 }
 
-void ReportPage::story(const std::vector<StoryCard>& cards, std::string_view commands_title,
-                       const std::vector<std::string>& command_lines) {
+void ReportPage::add_story(const std::vector<StoryCard>& cards, std::string_view commands_title,
+                           const std::vector<std::string>& command_lines) {
   story_ = "<div class=\"story\">\n";
   for (const StoryCard& card : cards) {
     story_ += "<section><h2><a href=\"#part" + std::to_string(card.part) + "\">" +

@@ -66,31 +66,32 @@ class ReportPage {
   ReportPage(std::string title, std::string lead);
 
   /// Begins the page with its subject: pictures with their figures, and how to begin.
-  void story(const std::vector<StoryCard>& cards, std::string_view commands_title,
-             const std::vector<std::string>& command_lines);
-  void section(std::string_view title);
+  void add_story(const std::vector<StoryCard>& cards, std::string_view commands_title,
+                 const std::vector<std::string>& command_lines);
+  void begin_section(std::string_view title);
   /// A numbered section. Its main figure stands at the top of the page, too, and leads here.
-  void part(std::string_view title, const std::pair<std::string, std::string>& value_and_meaning);
-  void text(std::string_view paragraph);
+  void begin_part(std::string_view title,
+                  const std::pair<std::string, std::string>& value_and_meaning);
+  void add_text(std::string_view paragraph);
   /// Numbers that matter most, large: "0.09 m" "median error".
-  void figures(const std::vector<std::pair<std::string, std::string>>& value_and_meaning);
+  void add_figures(const std::vector<std::pair<std::string, std::string>>& value_and_meaning);
   /// Throws ContractError when a row has another number of cells than the header.
-  void table(const std::vector<std::string>& header,
-             const std::vector<std::vector<std::string>>& rows);
+  void add_table(const std::vector<std::string>& header,
+                 const std::vector<std::vector<std::string>>& rows);
   /// Side by side where the window is wide enough. Files are read by `write`.
-  void pictures(const std::vector<ReportPicture>& pictures);
+  void add_pictures(const std::vector<ReportPicture>& pictures);
   /// The same, small; those without a picture have their caption alone.
-  void thumbnails(const std::vector<ReportPicture>& pictures);
+  void add_thumbnails(const std::vector<ReportPicture>& pictures);
   /// Side by side where the window is wide enough. Throws ContractError as `write_plot`.
-  void plots(const std::vector<ReportPlot>& plots);
+  void add_plots(const std::vector<ReportPlot>& plots);
   /// One above the other, so that directions can be compared.
-  void views(const std::vector<ReportView>& views);
+  void add_views(const std::vector<ReportView>& views);
   /// The run with its panels: map, pictures, facts, route and timeline, as far as it has them.
-  void run(const RunPage& run);
+  void add_run(const RunPage& run);
   /// A file beside the page to open: "mission.log" "Read each decision".
-  void link(std::string_view file, std::string_view text);
+  void add_link(std::string_view file, std::string_view text);
   /// Command lines as typed.
-  void commands(const std::vector<std::string>& command_lines);
+  void add_commands(const std::vector<std::string>& command_lines);
 
   /// Writes the page into `folder`, whole or not at all, with the pictures of `folder` in it.
   /// `generator`: "panonav track", by which a later run knows its own page. Throws FileError, also
@@ -99,7 +100,7 @@ class ReportPage {
              std::string_view generator = {}) const;
 
  private:
-  void figure(const ReportPicture& picture);
+  void add_figure(const ReportPicture& picture);
 
   std::string title_;
   std::string lead_;

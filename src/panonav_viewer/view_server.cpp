@@ -152,7 +152,7 @@ struct ViewServer::Implementation {
     const std::string_view asked = std::string_view(request.path).substr(1 + token.size());
     if ((options.replay || options.takes != ViewWish::none) && asked == "/control") {
       if (request.method != "POST") return only(405);
-      return only(control(request.body) ? 204 : 400);
+      return only(handle_control(request.body) ? 204 : 400);
     }
     if (request.method != "GET") return only(405);
     if (asked == "/") return {.type = "text/html; charset=utf-8", .content = page};
@@ -269,7 +269,7 @@ struct ViewServer::Implementation {
 
   /// {"play": true} or {"play": false}, {"step": 1}, {"speed": 2} of a replay; {"goal": [x, y]} or
   /// {"pose": [x, y, heading or null]} where the run takes it: false where it is none of them.
-  bool control(const std::string& text) {
+  bool handle_control(const std::string& text) {
     const auto json = nlohmann::json::parse(text, nullptr, false);
     if (!json.is_object()) return false;
     const std::lock_guard lock(mutex);
@@ -413,7 +413,7 @@ void ViewServer::add(recordings::RunMoment moment) {
   implementation_->add(std::move(moment));
 }
 
-std::optional<ReferencePose> ViewServer::take_wish() {
+std::optional<ReferencePose> ViewServer::consume_wish() {
   const std::lock_guard lock(implementation_->mutex);
   return std::exchange(implementation_->wish, std::nullopt);
 }

@@ -21,7 +21,7 @@ enum class ViewWish {
 
 struct ViewServerOptions {
   std::string address = "127.0.0.1";  ///< an IPv4 address of this machine, to listen at
-  int port = 0;                       ///< 0 .. 65535; 0: one that is free
+  int port = 0;                       ///< 0 .. 65535; 0: a free one
   std::string title = "panonav";      ///< of the page
   std::size_t max_viewers = 8;        ///< at a time; further ones are told to come later
   /// The run is one of a recording: it waits for the first viewer, continues at the pace of its
@@ -44,8 +44,8 @@ struct ViewServerOptions {
 /// rebinding).
 class ViewServer {
  public:
-  /// Listens from here on. Throws Error where address and port are not to be had, ContractError
-  /// where the port is out of range.
+  /// Begins to listen. Throws Error if address and port are not available, ContractError if the
+  /// port is out of range.
   explicit ViewServer(const ViewServerOptions& options = {});
   /// Viewers are told that the run has ended; those who are there get 0.3 s for the last pictures.
   ~ViewServer();
@@ -60,7 +60,7 @@ class ViewServer {
   [[nodiscard]] std::size_t viewers() const;
   /// Returns the last wish of a viewer once: of the kind that the run accepts, finite, and at most
   /// 10 m beside the references that it has told.
-  [[nodiscard]] std::optional<ReferencePose> take_wish();
+  [[nodiscard]] std::optional<ReferencePose> consume_wish();
 
  private:
   struct Implementation;

@@ -56,10 +56,10 @@ class KeptModels : public ::testing::Test {
 
 TEST_F(KeptModels, ComeBackFromTheFileToTheBit) {
   MemoryFile file = make_file();
-  EXPECT_EQ(kept_models(file, file.load()), std::nullopt);
+  EXPECT_EQ(load_kept_models(file, file.load()), std::nullopt);
   keep_models(file);
   const VisualMemory memory = file.load();
-  const auto kept = kept_models(MemoryFile::open(path(), Access::read_only), memory);
+  const auto kept = load_kept_models(MemoryFile::open(path(), Access::read_only), memory);
   ASSERT_TRUE(kept);
   EXPECT_EQ(*kept, learn_models(memory));
   EXPECT_TRUE(kept->place.learnt);
@@ -71,7 +71,7 @@ TEST_F(KeptModels, ComeBackFromTheFileToTheBit) {
 TEST_F(KeptModels, OfOtherViewsAreNotUsed) {
   MemoryFile file = make_file();
   keep_models(file);
-  const auto outdated = [&] { return !kept_models(file, file.load()); };
+  const auto outdated = [&] { return !load_kept_models(file, file.load()); };
   EXPECT_FALSE(outdated());
   const ViewId last = file.append(view_at(99, 9.0, 9.0));
   EXPECT_TRUE(outdated());
@@ -83,7 +83,7 @@ TEST_F(KeptModels, OfOtherViewsAreNotUsed) {
   file.remove(std::vector{last});
   EXPECT_TRUE(outdated());
   keep_models(file);
-  EXPECT_EQ(kept_models(file, file.load()).value(), learn_models(file.load()));
+  EXPECT_EQ(load_kept_models(file, file.load()).value(), learn_models(file.load()));
   file.set_parameter("learnt models", "1 nonsense");
   EXPECT_TRUE(outdated());
 }
@@ -120,7 +120,7 @@ TEST_F(KeptModels, AnswersAreThoseOfModelsLearntAnew) {
 TEST_F(KeptModels, ASmallMemoryKeepsWhatItHas) {
   MemoryFile file = make_file(3);
   keep_models(file);
-  const auto kept = kept_models(file, file.load());
+  const auto kept = load_kept_models(file, file.load());
   ASSERT_TRUE(kept);
   EXPECT_FALSE(kept->place.learnt);
   EXPECT_FALSE(kept->observation);

@@ -98,7 +98,7 @@ class MemoryUpdating : public ::testing::Test {
       seen.name = "view " + std::to_string(i);
       seen.odometry = Pose2{-2.0, 7.0, 1.0} * pose;
       const Panorama panorama = recogniser.encoder().panorama(seen);
-      updater.see(seen, panorama, recogniser.localise(seen));
+      updater.observe(seen, panorama, recogniser.localise(seen));
     }
     before_finish();
     return updater.finish("a run");
@@ -269,7 +269,7 @@ TEST_F(MemoryUpdating, AKillWhileARunIsStoredLeavesTheFileAsBeforeOrAfterIt) {
     const Remembered left = remembered();
     EXPECT_TRUE(left == learnt || (!stored && left == untouched));
     EXPECT_EQ(file().history().size(), left == learnt ? 1U : 0U);
-    EXPECT_TRUE(kept_models(file(), file().load())) << "the models are of other views";
+    EXPECT_TRUE(load_kept_models(file(), file().load())) << "the models are of other views";
   }
 }
 
@@ -331,13 +331,14 @@ TEST_F(MemoryUpdating, WithoutOdometryNothingIsSaidAndNothingLearnt) {
   const PlaceRecogniser recogniser(path);
   MemoryUpdater updater(path);
   const Observation seen = picture_of(world, {1.0, 1.0, 0.0}, 0);
-  updater.see(seen, recogniser.encoder().panorama(seen), recogniser.localise(seen));
+  updater.observe(seen, recogniser.encoder().panorama(seen), recogniser.localise(seen));
   const auto changes = updater.finish("nothing");
   EXPECT_EQ(changes.seen, 0U);
   EXPECT_TRUE(file().history().empty());
   EXPECT_THROW((void)updater.finish("nothing"), ContractError);
-  EXPECT_THROW(updater.see(seen, recogniser.encoder().panorama(seen), recogniser.localise(seen)),
-               ContractError);
+  EXPECT_THROW(
+      updater.observe(seen, recogniser.encoder().panorama(seen), recogniser.localise(seen)),
+      ContractError);
 }
 
 TEST_F(MemoryUpdating, MemoriesWithoutHeadingsAreRefused) {

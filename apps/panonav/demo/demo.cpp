@@ -51,10 +51,10 @@ viewer::ReportPicture show_camera(const DemoRecordings& recordings, Session& ses
   const MirrorCircle& found = recordings.mirror;
   const std::string centre_px = format_fixed(
       std::hypot(found.centre.u_px - truth.centre.u_px, found.centre.v_px - truth.centre.v_px), 2);
-  page.part("What the robot sees",
-            {centre_px + " pixels",
-             "is how far off it finds the middle of its mirror, in its own pictures alone"});
-  page.text(
+  page.begin_part("What the robot sees",
+                  {centre_px + " pixels",
+                   "is how far off it finds the middle of its mirror, in its own pictures alone"});
+  page.add_text(
       "A camera looks up into a curved mirror and sees all around at once. The dark disc in the "
       "middle is the camera itself. Before anything else, calibration finds the mirror in some of "
       "the raw pictures: centre, rim and inner radius. Everything below uses what it found, not "
@@ -63,7 +63,7 @@ viewer::ReportPicture show_camera(const DemoRecordings& recordings, Session& ses
       colour.view(), "Raw picture of the mirror camera, " + std::to_string(truth.image_size.width) +
                          " x " + std::to_string(truth.image_size.height) +
                          " (in colour for you; the robot works on grey)");
-  page.pictures(
+  page.add_pictures(
       {mirror,
        picture_in_page(
            overlay.view(),
@@ -71,15 +71,16 @@ viewer::ReportPicture show_camera(const DemoRecordings& recordings, Session& ses
                " raw pictures: rim green, inner radius orange, centre red. The centre is off by " +
                centre_px + " pixels, the rim by " +
                format_fixed(std::abs(found.rim_radius_px - truth.rim_radius_px), 2) + ".")});
-  page.text(
+  page.add_text(
       "The picture is then unwrapped to a panoramic cylinder. Of each of its 80 rows only the "
       "first 15 Fourier components are kept, 2.4 kB a view. Their magnitudes do not change when "
       "the robot turns, so they tell the place whichever way it faces; their phases tell the "
       "heading.");
-  page.views({{std::move(cylinder),
-               {},
-               "The same view as a cylinder of 512 x 80 pixels, forward in the middle, left on the "
-               "left"}});
+  page.add_views(
+      {{std::move(cylinder),
+        {},
+        "The same view as a cylinder of 512 x 80 pixels, forward in the middle, left on the "
+        "left"}});
   return mirror;
 }
 
@@ -144,27 +145,29 @@ void show_answers(const VisualMemory& memory, const std::vector<viewer::MapLayer
                   const std::vector<AskedView>& asked, const Outcome& own, const Outcome& foreign,
                   double spacing_m, viewer::ReportPage& page) {
   const std::string spacing = format_fixed(100.0 * spacing_m, 0) + " cm";
-  page.part("It remembers and localises itself",
-            {median_text(own.errors_m, 100.0, 1, "cm"),
-             "is how far off it says that it is, from one picture (median)"});
-  page.text("The robot took a view every " + spacing +
-            " and remembered it. Then it was put down at " + std::to_string(asked.size()) +
-            " random places between them, facing anywhere, and asked from one new picture each: "
-            "where are you, and which way do you face? It was also put into another room, where "
-            "the right answer is that it does not know the place.");
-  page.figures({{std::to_string(memory.size()), "views remembered, " + spacing + " apart"},
-                {median_text(own.errors_m, 100.0, 1, "cm"), "median error of the position"},
-                {median_text(own.heading_errors_rad, degrees(1.0), 2, "degrees"),
-                 "median error of the heading"},
-                {percent(own.known), "of its own places recognised"},
-                {percent(foreign.known), "of the views of another room taken for this one"}});
-  page.text(
+  page.begin_part("It remembers and localises itself",
+                  {median_text(own.errors_m, 100.0, 1, "cm"),
+                   "is how far off it says that it is, from one picture (median)"});
+  page.add_text(
+      "The robot took a view every " + spacing + " and remembered it. Then it was put down at " +
+      std::to_string(asked.size()) +
+      " random places between them, facing anywhere, and asked from one new picture each: "
+      "where are you, and which way do you face? It was also put into another room, where "
+      "the right answer is that it does not know the place.");
+  page.add_figures({{std::to_string(memory.size()), "views remembered, " + spacing + " apart"},
+                    {median_text(own.errors_m, 100.0, 1, "cm"), "median error of the position"},
+                    {median_text(own.heading_errors_rad, degrees(1.0), 2, "degrees"),
+                     "median error of the heading"},
+                    {percent(own.known), "of its own places recognised"},
+                    {percent(foreign.known), "of the views of another room taken for this one"}});
+  page.add_text(
       "On the map, circles are the remembered views and green crosses the places where the robot "
       "was put down. From each a line runs to where its memory says it is; the shorter, the "
       "better. The nearest remembered view alone would be " +
       median_text(own.nearest_errors_m, 100.0, 1, "cm") +
       " off (median): the position is interpolated between views.");
-  page.plots({{map_of_answers(memory, scene, asked), "True places, and the error of each answer"}});
+  page.add_plots(
+      {{map_of_answers(memory, scene, asked), "True places, and the error of each answer"}});
 }
 
 /// The first place that was recognised stands for all.
@@ -180,14 +183,14 @@ viewer::UnfoldingMap show_levels(const VisualMemory& memory,
   AreasShown areas = map_of_areas(memory, scene, view);
   const std::string first = format_fixed(areas.areas_m2.front(), 1);
   const std::string last = format_fixed(areas.areas_m2.back(), 2);
-  page.part("As accurate as needed",
-            {first + " to " + last + " m²",
-             "is the area where it may be: a coarse look is cheap, a fine one exact"});
-  page.text(
+  page.begin_part("As accurate as needed",
+                  {first + " to " + last + " m²",
+                   "is the area where it may be: a coarse look is cheap, a fine one exact"});
+  page.add_text(
       "With one Fourier component compared, the robot may be anywhere in a large area (" + first +
       " square metres here); with each further component the area shrinks, down to " + last +
       ". In the open a coarse answer is enough and costs less; at a door a fine one is needed.");
-  page.plots(
+  page.add_plots(
       {{areas.map,
         "The orange area is where the robot may be, with ever more components; the cross is where "
         "it is."},
@@ -201,15 +204,15 @@ viewer::UnfoldingMap show_levels(const VisualMemory& memory,
 void show_what_next(const DemoOptions& wanted, const DemoRecordings& recordings,
                     const DemoNavigation& navigation, viewer::ReportPage& page) {
   const auto in_out = [&](const char* name) { return (wanted.out / name).string(); };
-  page.section("Try it yourself");
-  page.text(
+  page.begin_section("Try it yourself");
+  page.add_text(
       "The recordings and the memory of this run lie beside this page. Each command shows more "
       "with --help.");
   const std::string memory = in_out("office.panonav");
   const simulation::SimulatedWorldOptions seen = simulation_of(wanted, 0);
   std::string mission;
   for (const std::string& word : navigation.first_mission) mission += " " + word;
-  page.commands(
+  page.add_commands(
       {"alias panonav=build/release/bin/panonav", "panonav info " + memory,
        "panonav localise " + memory + " " + in_out("query_run"),
        "panonav localise " + memory + " " + in_out("elsewhere_run") + "    # another room: unknown",

@@ -106,24 +106,27 @@ DemoHoming show_homing(const simulation::Scene& office, int runs, std::uint64_t 
   };
   const lab::HomingRun& shown = homing.runs.front();
 
-  page.part("Back home", {std::to_string(homing.arrived) + " of " + std::to_string(runs),
-                          "robots found home from a metre away, by one remembered picture"});
-  page.text(
+  page.begin_part("Back home", {std::to_string(homing.arrived) + " of " + std::to_string(runs),
+                                "robots found home from a metre away, by one remembered picture"});
+  page.add_text(
       "From one view of a place the robot finds its way back to it, without a map and without "
       "knowing which way it faces: the Fourier components of both views tell the direction home. "
       "It was put down one metre away from " +
       std::to_string(runs) +
       " places, with random heading, and made step after step, each after a new picture. Its "
       "wheels and its camera are noisy.");
-  page.figures({{std::to_string(homing.arrived) + " of " + std::to_string(runs),
-                 "runs that ended within 10 cm of home, and knew it"},
-                {format_fixed(100.0 * median(homing.distances_m), 1) + " cm",
-                 "median distance from home at the end"},
-                {format_fixed(static_cast<double>(steps) / runs, 0), "steps a run, on average"}});
-  page.plots({{map_of_runs(office, homing.runs),
-               "All robots at once, step by step, from the green circles to the black squares. A "
-               "run that ended elsewhere turns orange."}});
-  page.views(views_of(seen_from(shown.goal), seen_from(shown.path.front()), shown.vectors.front()));
+  page.add_figures(
+      {{std::to_string(homing.arrived) + " of " + std::to_string(runs),
+        "runs that ended within 10 cm of home, and knew it"},
+       {format_fixed(100.0 * median(homing.distances_m), 1) + " cm",
+        "median distance from home at the end"},
+       {format_fixed(static_cast<double>(steps) / runs, 0), "steps a run, on average"}});
+  page.add_plots(
+      {{map_of_runs(office, homing.runs),
+        "All robots at once, step by step, from the green circles to the black squares. A "
+        "run that ended elsewhere turns orange."}});
+  page.add_views(
+      views_of(seen_from(shown.goal), seen_from(shown.path.front()), shown.vectors.front()));
   return homing;
 }
 

@@ -191,31 +191,34 @@ DemoMaps show_maps(const VisualMemory& office, std::uint64_t seed, bool quick, S
       align(positions_of(recording.wheels), mapped.truth, {.allow_scale = true}).rms_m;
 
   const std::string arranged = maps.lattice ? whole_centimetres(maps.lattice->rms_m) : "none";
-  page.part("How places lie",
-            {arranged, "is how far off a map is that views made by how alike they look alone"});
-  page.text(
+  page.begin_part(
+      "How places lie",
+      {arranged, "is how far off a map is that views made by how alike they look alone"});
+  page.add_text(
       "Can pictures alone make a map? The remembered views of the office were shuffled and their "
       "positions taken away. Views that look alike pull each other close, like balls on springs, "
       "and so they find their places by themselves.");
-  page.plots({{map_of_growth(maps.arranged, office, growth, seed),
-               "At first the views lie anywhere. Those that belong together join, and the groups "
-               "grow until all hang together; each group is drawn where it ends. The whole is "
-               "turned and scaled to fit the truth, because pictures know neither north nor "
-               "metres."},
-              {map_of_truth(office),
-               "Where the views were taken, which the robot was not told. Colours go from west to "
-               "east: were the arrangement perfect, the left picture would become this one."}});
-  page.text(
+  page.add_plots(
+      {{map_of_growth(maps.arranged, office, growth, seed),
+        "At first the views lie anywhere. Those that belong together join, and the groups "
+        "grow until all hang together; each group is drawn where it ends. The whole is "
+        "turned and scaled to fit the truth, because pictures know neither north nor "
+        "metres."},
+       {map_of_truth(office),
+        "Where the views were taken, which the robot was not told. Colours go from west to "
+        "east: were the arrangement perfect, the left picture would become this one."}});
+  page.add_text(
       "Below, a robot drives through rooms that it has never seen and makes a map "
       "of its way, from one picture after the other and without wheels; where it comes by again it "
       "recognises the place and closes the loop.");
-  page.plots({{map_of_drive(place, recording, mapped),
-               "The drive: " + std::to_string(recording.truth.size()) + " views, one every " +
-                   whole_centimetres(spacing_m) +
-                   ". The blue map should lie on the black way; both it and the orange line are "
-                   "laid over that in equal size. The orange one is what the wheels of a cheap "
-                   "robot make of the same drive."}});
-  page.figures(figures_of(maps, office, recording.truth.size()));
+  page.add_plots(
+      {{map_of_drive(place, recording, mapped),
+        "The drive: " + std::to_string(recording.truth.size()) + " views, one every " +
+            whole_centimetres(spacing_m) +
+            ". The blue map should lie on the black way; both it and the orange line are "
+            "laid over that in equal size. The orange one is what the wheels of a cheap "
+            "robot make of the same drive."}});
+  page.add_figures(figures_of(maps, office, recording.truth.size()));
   return maps;
 }
 

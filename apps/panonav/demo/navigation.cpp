@@ -256,20 +256,21 @@ void add_part(const DemoNavigation& navigation, Shown shown, viewer::ReportPage&
   const std::string count = std::to_string(navigation.runs.size());
   const std::string arrived = std::to_string(navigation.arrived) + " of " + count;
   const std::string within = format_fixed(100.0 * navigation.within_m, 1) + " cm";
-  page.part("It goes where it is told", {arrived, "missions arrived, by views alone"});
-  page.text(
+  page.begin_part("It goes where it is told", {arrived, "missions arrived, by views alone"});
+  page.add_text(
       "The goal is a remembered view. The robot knows how the views arranged themselves (part 5), "
       "and what it sees now. It knows no positions, not where it starts, nor which way it faces, "
       "and it has no map of walls: it feels what stands in the way of its next step. Each "
       "remembered view has a direction towards the goal, read from the phases of the views on the "
       "way. The robot looks, finds the view that it is at, takes its direction, drives a step and "
       "looks again; the last stretch is the way home to the goal's view.");
-  page.text("It was sent from " + count + " random places to " + count +
-            " random views. One more robot was kidnapped half way, and another one found a "
-            "screen across its way that had not been there before. A mission counts when the robot "
-            "says that it arrived and is within half the spacing of the views, " +
-            within + ".");
-  page.figures(
+  page.add_text(
+      "It was sent from " + count + " random places to " + count +
+      " random views. One more robot was kidnapped half way, and another one found a "
+      "screen across its way that had not been there before. A mission counts when the robot "
+      "says that it arrived and is within half the spacing of the views, " +
+      within + ".");
+  page.add_figures(
       {{arrived, "missions arrived within " + within + ", and knew it"},
        {navigation.detours.empty() ? "none" : format_fixed(median(navigation.detours), 2),
         "times the shortest way, driven by those that arrived (median)"},
@@ -278,11 +279,11 @@ void add_part(const DemoNavigation& navigation, Shown shown, viewer::ReportPage&
        {navigation.screened ? end_text(*navigation.screened, navigation.within_m) : "none",
         navigation.screened ? "the robot with a screen in its way"
                             : "no screen leaves a way round here"}});
-  page.text(
+  page.add_text(
       "The first mission, look by look. Short strokes: which way each remembered view sends the "
       "robot; the thick line: the way planned. Below what the robot sees stands the view that it "
       "takes for the place where it is, turned alike.");
-  page.run(shown.first);
+  page.add_run(shown.first);
   std::vector<viewer::ReportPlot> maps{
       {std::move(shown.all), "All missions at once. A way that did not end at its goal is orange."},
       {std::move(shown.kidnapped),
@@ -294,8 +295,8 @@ void add_part(const DemoNavigation& navigation, Shown shown, viewer::ReportPage&
                     "the memory does not know it. There is a way round. " +
                         sentence_on(*navigation.screened, navigation.within_m)});
   }
-  page.plots(maps);
-  page.link("mission.log", "Read each decision of all missions");
+  page.add_plots(maps);
+  page.add_link("mission.log", "Read each decision of all missions");
 }
 
 }  // namespace

@@ -112,33 +112,34 @@ DemoRoute show_route(const simulation::Scene& office, double length_m, std::uint
   const auto median_cm = [](const std::vector<double>& values) {
     return values.empty() ? std::string("none") : format_fixed(100.0 * median(values), 1) + " cm";
   };
-  page.part("A route, again and again",
-            {median_cm(route.lateral_m),
-             "is how far a robot strays from a route it was shown once (median)"});
-  page.text(
+  page.begin_part("A route, again and again",
+                  {median_cm(route.lateral_m),
+                   "is how far a robot strays from a route it was shown once (median)"});
+  page.add_text(
       "Of a route the robot remembers one line of pixels every 10 cm: its horizon, a byte a "
       "degree. Light in the plane of the camera goes straight from place to place, so that these "
       "lines also tell what is seen from beside the route. The robot was shown a route of " +
       format_fixed(route.length_m, 0) +
       " m once, then put down 0.3 m off its start and told that it stands on it, with wheels that "
       "are wrong by 5 %; it drove the route to its end, and another robot drove it back.");
-  page.figures({{std::to_string(route.completed) + " of " + std::to_string(route.runs.size()),
-                 "runs that reached the end of the route, and knew it"},
-                {median_cm(route.lateral_m), "median distance from the route, from 1 m on"},
-                {median_cm(route.position_m), "median error of the position"},
-                {format_fixed(1e-3 * static_cast<double>(route.bytes), 0) + " kB",
-                 "what the route takes, before packing"}});
-  page.text(
+  page.add_figures({{std::to_string(route.completed) + " of " + std::to_string(route.runs.size()),
+                     "runs that reached the end of the route, and knew it"},
+                    {median_cm(route.lateral_m), "median distance from the route, from 1 m on"},
+                    {median_cm(route.position_m), "median error of the position"},
+                    {format_fixed(1e-3 * static_cast<double>(route.bytes), 0) + " kB",
+                     "what the route takes, before packing"}});
+  page.add_text(
       "Below is the first of them. The striped picture is all that the robot keeps of the route: "
       "each row is what it saw at one place, all around, straight ahead in the middle; the start "
       "is the lowest row, the end the highest. A thing that the robot passes is a curve that "
       "begins in the middle and runs out to a side. The mark says which row it is at by what it "
       "sees.");
-  page.run(played_run(place, panorama, route.runs.front(), seed, executor));
-  page.plots({{map,
-               "The remembered route in black, under both drives: one there, one back. Each was "
-               "put down at a circle, 0.3 m beside the route, and comes to it by itself; where "
-               "only one colour is seen the drives lie on the route."}});
+  page.add_run(played_run(place, panorama, route.runs.front(), seed, executor));
+  page.add_plots(
+      {{map,
+        "The remembered route in black, under both drives: one there, one back. Each was "
+        "put down at a circle, 0.3 m beside the route, and comes to it by itself; where "
+        "only one colour is seen the drives lie on the route."}});
   return route;
 }
 

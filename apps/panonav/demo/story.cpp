@@ -5,7 +5,7 @@
 namespace panonav::command {
 
 void tell_story(DemoStory story, viewer::ReportPage& page) {
-  page.story(
+  page.add_story(
       {{.title = "One camera, all around",
         .shown = std::move(story.mirror),
         .value = "2.4 kB",

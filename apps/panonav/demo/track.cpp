@@ -85,32 +85,34 @@ void add_part(const DemoTrack& track, double spacing_m, std::size_t kidnapped_af
               viewer::ReportPage& page) {
   const std::string median_text =
       track.errors_m.empty() ? "none" : format_fixed(100.0 * median(track.errors_m), 1) + " cm";
-  page.part("It tracks itself",
-            {pictures_text(track.until_localised), "until a robot knew which of " +
-                                                       std::to_string(track.places_at_first) +
-                                                       " places it was at, several of them alike"});
-  page.text(
+  page.begin_part("It tracks itself",
+                  {pictures_text(track.until_localised),
+                   "until a robot knew which of " + std::to_string(track.places_at_first) +
+                       " places it was at, several of them alike"});
+  page.add_text(
       "A corridor with identical doors and eight identical junctions. The robot does not know "
       "where it is, nor which way it faces, and it starts in one of two narrow crossings: its plan "
       "is the same when turned by half, so that at first several places explain what it sees. "
       "Each dot is a particle, a place where the robot may be. Its odometry, which drifts, moves "
       "them, and each picture keeps those that explain it: they gather in a few places, and in one "
       "once small differences have added up.");
-  page.text("After " + std::to_string(kidnapped_after + 1) +
-            " pictures somebody carries the robot to the other crossing and tells it nothing. It "
-            "counts as localised when it says so and is right to " +
-            format_fixed(100.0 * spacing_m, 0) + " cm.");
-  page.figures(
+  page.add_text(
+      "After " + std::to_string(kidnapped_after + 1) +
+      " pictures somebody carries the robot to the other crossing and tells it nothing. It "
+      "counts as localised when it says so and is right to " +
+      format_fixed(100.0 * spacing_m, 0) + " cm.");
+  page.add_figures(
       {{std::to_string(track.places_at_first), "places possible after the first picture"},
        {pictures_text(track.until_localised), "until it was localised"},
        {pictures_text(track.until_found_again), "until it was found again, once kidnapped"},
        {median_text, "median error where it says that it is localised"},
        {std::to_string(track.wrong) + " of " + std::to_string(track.localised),
         "of these answers wrong; a kidnapped robot needs some pictures to notice"}});
-  page.run(played);
-  page.plots({{whole,
-               "The whole run. The true way in black begins anew where the robot was put down; the "
-               "estimated one in blue lies on it, but for the pictures after it was kidnapped."}});
+  page.add_run(played);
+  page.add_plots(
+      {{whole,
+        "The whole run. The true way in black begins anew where the robot was put down; the "
+        "estimated one in blue lies on it, but for the pictures after it was kidnapped."}});
 }
 
 }  // namespace

@@ -145,17 +145,18 @@ void write_arrange_report(const std::filesystem::path& folder, const std::string
                            "trustworthiness: neighbours on the map that truly are");
     }
   }
-  page.figures(figures);
-  page.section("Step by step");
-  page.text(
+  page.add_figures(figures);
+  page.begin_section("Step by step");
+  page.add_text(
       "Groups grow where views are certain to belong together, and join where both agree how they "
       "lie. Each group is drawn over where it ends, in the shape that it has at that step.");
-  page.plots({{steps.unfold(lattice, memory),
-               "Grey lines are springs: pairs of views that tell how far and in which direction "
-               "the other one is"}});
+  page.add_plots(
+      {{steps.unfold(lattice, memory),
+        "Grey lines are springs: pairs of views that tell how far and in which direction "
+        "the other one is"}});
   if (comparison) {
-    page.section("Beside the true places");
-    page.text(
+    page.begin_section("Beside the true places");
+    page.add_text(
         "True places were not used; they only turn, move and scale the arrangement so that both "
         "can be compared.");
     std::vector<viewer::ReportPlot> plots;
@@ -163,17 +164,17 @@ void write_arrange_report(const std::filesystem::path& folder, const std::string
       plots.push_back({std::move(plot), ""});
     plots.front().caption = "Where the views were taken";
     plots.back().caption = "Where their similarity puts them";
-    page.plots(plots);
+    page.add_plots(plots);
   }
-  page.section("Groups");
+  page.begin_section("Groups");
   std::vector<std::vector<std::string>> rows;
   for (std::size_t i = 0; i < std::min<std::size_t>(20, components.size()); ++i) {
     rows.push_back({std::to_string(i + 1), std::to_string(components[i].views),
                     components[i].handedness_known ? "yes" : "no: may be the mirror image"});
   }
-  page.table({"group", "views", "left and right told apart"}, rows);
+  page.add_table({"group", "views", "left and right told apart"}, rows);
   if (rows.size() < components.size()) {
-    page.text("The largest 20 of " + std::to_string(components.size()) + " groups.");
+    page.add_text("The largest 20 of " + std::to_string(components.size()) + " groups.");
   }
   page.write(folder, "index.html", "panonav arrange");
 }

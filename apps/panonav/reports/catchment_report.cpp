@@ -114,7 +114,7 @@ void write_catchment_report(const std::filesystem::path& folder, const RecordedV
   const double accepted_m = result.spacing_m;
   const auto count = static_cast<double>(result.survey.places.size());
   auto sizes = raster(result.survey.goals, result.spacing_m, [&](std::size_t g) {
-    return 100.0 * static_cast<double>(catchment_of(result, g, accepted_m)) / count;
+    return 100.0 * static_cast<double>(count_catchment(result, g, accepted_m)) / count;
   });
   sizes.title = "Catchment area of the view at each place";
   sizes.value_label = "share of all places [%]";
@@ -142,31 +142,31 @@ void write_catchment_report(const std::filesystem::path& folder, const RecordedV
       "Every view of a recording as a home, every view of " + std::to_string(places.views.size()) +
           " places as what the robot sees: does the home vector point home, and where "
           "does a robot end that follows it from place to place?");
-  page.figures(
+  page.add_figures(
       {{format_fixed(result.component, 3),
         "average homeward component, " + std::to_string(result.pairs) + " pairs"},
        {format_fixed(degrees(result.orientation_error_rad), 1) + " degrees",
         "error of the heading"},
        {format_fixed(result.areas[1], 1) + " of " + std::to_string(result.survey.places.size()),
         "places from which runs end within " + format_fixed(result.spacing_m, 2) + " m"}});
-  page.section("Against the distance");
-  page.plots(curves(result));
-  page.section("Place by place");
-  page.plots({{sizes, "Share of all places from which runs end within " +
-                          format_fixed(result.spacing_m, 2) + " m of home, home by home"}});
-  page.section("One home: " + goals.files[goal]);
-  page.plots({{field(places, vectors, result, goal),
-               "Home vectors, and the catchment area [S06 figure 9]"},
-              {difference, "How far views differ from home's [S06 figure 9]"},
-              {ends, "How far from home runs end [S06 figure 14]"}});
-  page.section("Numbers");
+  page.begin_section("Against the distance");
+  page.add_plots(curves(result));
+  page.begin_section("Place by place");
+  page.add_plots({{sizes, "Share of all places from which runs end within " +
+                              format_fixed(result.spacing_m, 2) + " m of home, home by home"}});
+  page.begin_section("One home: " + goals.files[goal]);
+  page.add_plots({{field(places, vectors, result, goal),
+                   "Home vectors, and the catchment area [S06 figure 9]"},
+                  {difference, "How far views differ from home's [S06 figure 9]"},
+                  {ends, "How far from home runs end [S06 figure 14]"}});
+  page.begin_section("Numbers");
   std::vector<std::vector<std::string>> rows;
   for (const CatchmentResult::Bin& bin : result.bins) {
     rows.push_back({format_fixed(bin.homeward.distance_m, 3), std::to_string(bin.homeward.pairs),
                     format_fixed(bin.homeward.component, 3),
                     format_fixed(degrees(bin.orientation_error_rad), 1)});
   }
-  page.table({"distance [m]", "pairs", "homeward component", "heading error [degrees]"}, rows);
+  page.add_table({"distance [m]", "pairs", "homeward component", "heading error [degrees]"}, rows);
   page.write(folder, "index.html", "panonav catchment");
 }
 

@@ -98,9 +98,9 @@ void write_home_report(const std::filesystem::path& folder, const Goal& goal,
           "knowing the heading.");
   const WayHome& first = answers.front().way;
   if (answers.size() == 1 && !first.known) {
-    page.figures({{"no answer", why_none(first)}});
+    page.add_figures({{"no answer", why_none(first)}});
   } else if (answers.size() == 1) {
-    page.figures(
+    page.add_figures(
         {{first.direction_rad ? in_words(*first.direction_rad) : "none", "direction home"},
          {format_fixed(first.distance_r, 2) + " R", "distance, R that of the things around"},
          {format_fixed(degrees(first.turn_rad), 0) + " degrees",
@@ -108,8 +108,8 @@ void write_home_report(const std::filesystem::path& folder, const Goal& goal,
          {format_fixed(first.probability, 2),
           "probability that the direction is right within 45 degrees"}});
   }
-  page.section(goal.panorama ? "Both views" : "What the robot sees");
-  page.text(
+  page.begin_section(goal.panorama ? "Both views" : "What the robot sees");
+  page.add_text(
       std::string(goal.panorama
                       ? "Above, the view at home, turned as if the robot there faced the same way "
                         "as here; below, what it sees now. "
@@ -117,14 +117,14 @@ void write_home_report(const std::filesystem::path& folder, const Goal& goal,
       "Forward is in the middle (grey mark). Orange: the direction home, where things spread out "
       "on the way; blue: the opposite one, where they close up.");
   for (const std::size_t i : shown_of(answers.size())) {
-    page.views(views_of(goal.panorama, current(i), answers[i]));
+    page.add_views(views_of(goal.panorama, current(i), answers[i]));
   }
   if (const auto vectors = field(goal, answers)) {
-    page.section("From above");
-    page.plots(
+    page.begin_section("From above");
+    page.add_plots(
         {{*vectors, "The direction home at each place whose position and heading are known"}});
   }
-  page.section("Numbers");
+  page.begin_section("Numbers");
   std::vector<std::vector<std::string>> rows;
   for (const HomeAnswer& answer : answers) {
     const WayHome& way = answer.way;
@@ -136,9 +136,9 @@ void write_home_report(const std::filesystem::path& folder, const Goal& goal,
                     format_fixed(way.vector.correlation, 3), format_fixed(way.vector.residual, 3),
                     format_fixed(way.probability, 3)});
   }
-  page.table({"view", "direction home", "distance [R]", "turned [degrees]", "correlation",
-              "residual", "probability"},
-             rows);
+  page.add_table({"view", "direction home", "distance [R]", "turned [degrees]", "correlation",
+                  "residual", "probability"},
+                 rows);
   page.write(folder, "index.html", "panonav home");
 }
 

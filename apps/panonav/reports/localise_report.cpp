@@ -41,8 +41,8 @@ std::string answer_text(const LocalisedQuery& query) {
 }
 
 /// What the run shows of a picture. The first one brings the references.
-recordings::RunMoment moment_of(const LocalisedQuery& query, std::size_t number, Panorama&& seen,
-                                const MemoryFile& file) {
+recordings::RunMoment make_moment(const LocalisedQuery& query, std::size_t number, Panorama&& seen,
+                                  const MemoryFile& file) {
   recordings::RunMoment moment{.stamp_s = static_cast<double>(number), .panorama = std::move(seen)};
   moment.truth = query.pose;
   const auto& matches = query.place.matches;
@@ -71,10 +71,10 @@ recordings::RunMoment moment_of(const LocalisedQuery& query, std::size_t number,
 }
 
 void add_table(viewer::ReportPage& page, const std::vector<LocalisedQuery>& queries) {
-  page.section("All answers");
+  page.begin_section("All answers");
   if (queries.size() > max_rows) {
-    page.text("The first " + std::to_string(max_rows) + " of " + std::to_string(queries.size()) +
-              "; --out writes all of them.");
+    page.add_text("The first " + std::to_string(max_rows) + " of " +
+                  std::to_string(queries.size()) + "; --out writes all of them.");
   }
   std::vector<std::vector<std::string>> rows;
   for (std::size_t i = 0; i < std::min(max_rows, queries.size()); ++i) {
@@ -95,11 +95,11 @@ void add_table(viewer::ReportPage& page, const std::vector<LocalisedQuery>& quer
                     error ? format_fixed(*error, 2) : "", difference(0), difference(1),
                     dissimilarity(0), dissimilarity(1)});
   }
-  page.text(
+  page.add_text(
       "Difference and dissimilarity (of the signatures) are to the best match and to the next.");
-  page.table({"picture", "answer", "probability", "position", "heading", "error [m]", "difference",
-              "to the next", "dissimilarity", "to the next"},
-             rows);
+  page.add_table({"picture", "answer", "probability", "position", "heading", "error [m]",
+                  "difference", "to the next", "dissimilarity", "to the next"},
+                 rows);
 }
 
 /// How many places are known and how far off the answers are, where the truth is known.
@@ -137,38 +137,39 @@ void write_localise_report(const std::filesystem::path& folder, const MemoryFile
       "What the robot saw, and the view of " + memory_name(file.path()) +
           " that resembles it most, turned as the robot faced. Where both show the "
           "same things in the same directions, the answer is right.");
-  page.figures(summarise(queries, readable.size()));
-  page.text(
+  page.add_figures(summarise(queries, readable.size()));
+  page.add_text(
       "The difference compares the picture with a view column by column, both turned alike: 0 "
       "where they are the same. The probability that the place is known follows from how much less "
       "the better half of the columns differs at the best match than at the tenth best and at "
       "mirrored views, which show places that do not exist. Below one half the place is unknown.");
   const std::size_t shown = std::min(max_shown, readable.size());
-  page.section("Picture by picture");
-  page.text(
+  page.begin_section("Picture by picture");
+  page.add_text(
       "The upper view is the picture, forward in its middle. Below it stands the most similar view "
       "of the memory, turned as the robot faced. Grey dots on the map are all views of the memory; "
       "the large dot with its circle is the answer and where it is in 95 % of cases; the ring is "
       "the data set's own position.");
   if (shown < readable.size()) {
-    page.text("Shown are " + std::to_string(shown) + " of " + std::to_string(readable.size()) +
-              " pictures, evenly spread.");
+    page.add_text("Shown are " + std::to_string(shown) + " of " + std::to_string(readable.size()) +
+                  " pictures, evenly spread.");
   }
   viewer::RunPage run("", shown);
   run.unordered();
   bool thumbnails = true;
   for (std::size_t n = 0; n < shown; ++n) {
     const std::size_t i = readable[n * (readable.size() - 1) / std::max<std::size_t>(1, shown - 1)];
-    recordings::RunMoment moment = moment_of(queries[i], n, panorama(i), file);
+    recordings::RunMoment moment = make_moment(queries[i], n, panorama(i), file);
     thumbnails = thumbnails && (queries[i].place.matches.empty() || !moment.best_match.empty());
     if (n == 0) moment.references = recordings::reference_positions(recogniser.memory());
     run.add(moment);
   }
-  if (!thumbnails) page.text("The memory holds no thumbnail of the best match of some pictures.");
+  if (!thumbnails)
+    page.add_text("The memory holds no thumbnail of the best match of some pictures.");
   if (recordings::reference_positions(recogniser.memory()).empty()) {
-    page.text("The memory knows no positions, so there is no map.");
+    page.add_text("The memory knows no positions, so there is no map.");
   }
-  if (shown > 0) page.run(run);
+  if (shown > 0) page.add_run(run);
   add_table(page, queries);
   page.write(folder, "index.html", "panonav localise");
 }

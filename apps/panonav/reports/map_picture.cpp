@@ -28,7 +28,7 @@ struct Nodes {
 
 Nodes nodes_of(const Dataset& recording, const Mapper::Result& run) {
   Nodes nodes;
-  const std::size_t component = largest_component(run.map);
+  const std::size_t component = find_largest_component(run.map);
   for (std::size_t i = 0; i < run.map.nodes.size(); ++i) {
     const MapNode& node = run.map.nodes[i];
     if (node.component != component) continue;
@@ -147,17 +147,18 @@ void write_map_report(const std::filesystem::path& folder, const std::string& na
                            "the same of the wheels alone");
     }
   }
-  page.figures(figures);
-  page.section("The drive, picture by picture");
-  page.text(
+  page.add_figures(figures);
+  page.begin_section("The drive, picture by picture");
+  page.add_text(
       "Grey dots are the places of the map, lines its edges. The large dot is where the map puts "
       "the picture; pictures between places are not in the map.");
-  page.run(played);
-  page.section("The whole map");
-  page.plots({{map_plot(recording, run),
-               comparison ? "The map, turned and moved over the true way: only for the comparison, "
-                            "true positions were not used"
-                          : "The places in the order of the pictures, and the closures"}});
+  page.add_run(played);
+  page.begin_section("The whole map");
+  page.add_plots(
+      {{map_plot(recording, run),
+        comparison ? "The map, turned and moved over the true way: only for the comparison, "
+                     "true positions were not used"
+                   : "The places in the order of the pictures, and the closures"}});
   page.write(folder, "index.html", "panonav map");
 }
 

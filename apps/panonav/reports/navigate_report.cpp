@@ -27,15 +27,15 @@ void write_navigate_report(const std::filesystem::path& folder, const MissionRep
                        std::isfinite(run.shortest_m)
                            ? "driven; the shortest way is " + format_fixed(run.shortest_m, 1) + " m"
                            : "driven");
-  page.figures(figures);
-  page.section("The mission, decision by decision");
-  page.text(
+  page.add_figures(figures);
+  page.begin_section("The mission, decision by decision");
+  page.add_text(
       "Grey dots are the remembered views, with the direction in which each of them sends the "
       "robot; the thick line is the way planned, the ring its goal. The robot is drawn where it "
       "truly is. The list tells what it decided; a click on a decision goes there.");
-  page.run(played);
-  page.section("The whole mission");
-  page.plots({{mission.plot, "The way planned and the way driven, with what stands around"}});
+  page.add_run(played);
+  page.begin_section("The whole mission");
+  page.add_plots({{mission.plot, "The way planned and the way driven, with what stands around"}});
   page.write(folder, "index.html", "panonav navigate");
 }
 

@@ -16,7 +16,7 @@ void add_table(viewer::ReportPage& page, std::span<const lab::ResultRow> rows) {
     lines.push_back(lab::table_cells(row));
     if (row.target && !row.holds()) lines.back().back() = "NO";
   }
-  page.table({header.begin(), header.end()}, lines);
+  page.add_table({header.begin(), header.end()}, lines);
 }
 
 // Those with a target first.
@@ -25,21 +25,21 @@ void add_tables(viewer::ReportPage& page, std::vector<lab::ResultRow> rows) {
   const std::span<const lab::ResultRow> all(rows);
   if (judged > 0) add_table(page, all.first(judged));
   if (judged == all.size()) return;
-  page.text("Figures without a target:");
+  page.add_text("Figures without a target:");
   add_table(page, all.subspan(judged));
 }
 
 void add_counts(viewer::ReportPage& page, const lab::TargetCount& count, std::size_t rows) {
-  page.figures(
+  page.add_figures(
       {{std::to_string(count.held) + " of " + std::to_string(count.judged), "targets hold"},
        {std::to_string(rows - count.judged), "more figures are reported"}});
 }
 
 void add_misses(viewer::ReportPage& page, const lab::ResultsDocument& document) {
-  page.section("Rows that do not hold");
+  page.begin_section("Rows that do not hold");
   const auto misses = lab::list_misses(document);
-  for (const std::string& line : misses) page.text(line);
-  if (misses.empty()) page.text("None.");
+  for (const std::string& line : misses) page.add_text(line);
+  if (misses.empty()) page.add_text("None.");
 }
 
 }  // namespace
@@ -51,28 +51,28 @@ void write_paper_page(const std::filesystem::path& folder, const ReproducedPaper
   add_misses(
       page,
       {.version = {}, .command = {}, .papers = {{std::string(paper.name), {}, reproduction.rows}}});
-  page.section("Published and measured");
+  page.begin_section("Published and measured");
   add_tables(page, reproduction.rows);
-  page.section("Pictures");
+  page.begin_section("Pictures");
   std::vector<viewer::ReportPicture> pictures;
   for (const auto& picture : reproduction.pictures) {
     pictures.push_back({picture.file.string(), picture.caption});
   }
-  page.pictures(pictures);
+  page.add_pictures(pictures);
   page.write(folder);
 }
 
 void write_results_page(const std::filesystem::path& folder, const lab::ResultsDocument& document) {
   viewer::ReportPage page("Results: published and measured",
                           "Written by panonav " + document.version + ":");
-  page.commands({document.command});
+  page.add_commands({document.command});
   std::size_t rows = 0;
   for (const lab::PaperResults& paper : document.papers) rows += paper.rows.size();
   add_counts(page, lab::count_targets(document), rows);
   add_misses(page, document);
   for (const lab::PaperResults& paper : document.papers) {
-    page.section(paper.title);
-    page.link(paper.paper + "/index.html", "Its own page, with pictures");
+    page.begin_section(paper.title);
+    page.add_link(paper.paper + "/index.html", "Its own page, with pictures");
     add_tables(page, paper.rows);
   }
   page.write(folder);

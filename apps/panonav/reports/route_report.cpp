@@ -198,19 +198,19 @@ void write_record_report(const std::filesystem::path& folder, const std::string&
       "Route '" + name + "'",
       "A robot drove this way once. From each place it keeps one line of pixels, what its camera "
       "sees at its own height, and that is all it needs to follow the way again.");
-  page.figures(
+  page.add_figures(
       {{format_fixed(route.length_m(), 1) + " m", "long"},
        {std::to_string(route.size()), "lines of " + std::to_string(route.columns()) + " pixels"},
        {format_fixed(1e-6 * bytes_per_km, 2) + " MB", "a kilometre in the memory"}});
-  page.section("The route panorama");
-  page.text(
+  page.begin_section("The route panorama");
+  page.add_text(
       "Each row is one place, the start at the bottom, the end on top; from left to right all "
       "around the robot, straight ahead in the middle. Things beside the way go from the middle "
       "outwards as the robot passes them, the slower the farther they are.");
-  page.plots({{plot_of_panorama(route), "Omnidirectional route panorama"}});
-  page.section("The way");
-  page.plots({{viewer::MapPlot{.title = "From above", .layers = {path, start}},
-               "Where the lines were taken"}});
+  page.add_plots({{plot_of_panorama(route), "Omnidirectional route panorama"}});
+  page.begin_section("The way");
+  page.add_plots({{viewer::MapPlot{.title = "From above", .layers = {path, start}},
+                   "Where the lines were taken"}});
   page.write(folder, "index.html", "panonav route record");
 }
 
@@ -228,43 +228,43 @@ void write_follow_report(const std::filesystem::path& folder, const FollowedRout
       "Following route '" + route.name + "'",
       "A robot that drives the way again, or beside it, looks for the pose from which "
       "the remembered lines show what it sees.");
-  page.figures(figures);
+  page.add_figures(figures);
   played.route(plot_of_panorama(route.panorama), marks_of(images));
-  page.section("The run, picture by picture");
-  page.text(
+  page.begin_section("The run, picture by picture");
+  page.add_text(
       "On the map, the remembered route and where the robot is beside it. Below, the route "
       "panorama: each row is the horizon at one place of the route, the start at the bottom, "
       "straight ahead in the middle. The line across it is the row that the robot is at; orange "
       "marks are directions in which something is not as remembered.");
-  page.run(played);
-  page.section("The way");
-  page.plots({{plot_of_path(route.lines, images),
-               "Remembered route, fixes, and the true path where it is known"}});
+  page.add_run(played);
+  page.begin_section("The way");
+  page.add_plots({{plot_of_path(route.lines, images),
+                   "Remembered route, fixes, and the true path where it is known"}});
   if (!chosen.empty()) {
-    page.section("Seen and shown");
-    page.text(
+    page.begin_section("Seen and shown");
+    page.add_text(
         "For some pictures, spread over the run, what the robot saw (upper band of each pair) and "
         "what the route shows from where it believes to be (lower band), put together from the "
         "lines of many places. Light blue: in this direction the route shows nothing.");
-    page.plots(
+    page.add_plots(
         {{plot_of_lines(route.lines, images, chosen), "Lines seen, and lines made from the route"},
          {plot_of_correlations(images), "Correlation of the two, picture by picture"}});
   }
   if (!summary.position_m.empty()) {
-    page.section("Errors");
-    page.plots({{plot_of_errors(images), "Distance of each fix from the data set's own pose"}});
+    page.begin_section("Errors");
+    page.add_plots({{plot_of_errors(images), "Distance of each fix from the data set's own pose"}});
   }
   const auto stretches = changed_stretches(images);
   if (!stretches.empty()) {
-    page.section("Changed here");
-    page.text(
+    page.begin_section("Changed here");
+    page.add_text(
         "Along these stretches some directions stay unexplained picture after picture: the "
         "scene is not as it was.");
     std::vector<std::vector<std::string>> rows;
     for (const auto& [from_m, to_m] : stretches) {
       rows.push_back({format_fixed(from_m, 2) + " m", format_fixed(to_m, 2) + " m"});
     }
-    page.table({"from", "to"}, rows);
+    page.add_table({"from", "to"}, rows);
   }
   page.write(folder, "index.html", "panonav route follow");
 }

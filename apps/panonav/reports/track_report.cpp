@@ -130,18 +130,18 @@ void write_track_report(const std::filesystem::path& folder, const VisualMemory&
           " views, and took " + std::to_string(images.size()) +
           " pictures. After each one, particles say where it may be: far apart while it does not "
           "know, close together once it does.");
-  page.figures(main_figures(summary, images.size()));
-  page.section("The run, picture by picture");
-  page.text(
+  page.add_figures(main_figures(summary, images.size()));
+  page.begin_section("The run, picture by picture");
+  page.add_text(
       "Each small dot is a particle, a place where the robot may be. Grey dots are the remembered "
       "views, " +
       format_fixed(100.0 * spacing_m, 0) +
       " cm apart. The large dot is the estimate, the mean of the heaviest group of particles; it "
       "is missing where the robot is lost." +
       std::string(truth_known ? " The ring is where the robot truly is." : ""));
-  page.run(played);
-  page.section("The whole run");
-  page.plots(
+  page.add_run(played);
+  page.begin_section("The whole run");
+  page.add_plots(
       {{track_map(memory, images, {}),
         truth_known ? "True and estimated path; crosses: true places where the robot was lost"
                     : "The estimated path; it breaks off where the robot was not localised"},
@@ -149,14 +149,14 @@ void write_track_report(const std::filesystem::path& folder, const VisualMemory&
         truth_known ? "Error of each estimate, and how far the particles spread around their "
                       "mean, on a logarithmic scale"
                     : "How far the particles spread around their mean, on a logarithmic scale"}});
-  page.section("State by state");
-  page.table({"images", "state", "median error", "largest error"}, stretches(images));
-  page.section("Particles");
-  page.text(
+  page.begin_section("State by state");
+  page.add_table({"images", "state", "median error", "largest error"}, stretches(images));
+  page.begin_section("Particles");
+  page.add_text(
       "More are used while much is possible, fewer once they lie close together. By those drawn "
       "anew a robot that was kidnapped is found again.");
-  page.plots({{plot_of_particles(images),
-               "Number of particles after each image, on a logarithmic scale"}});
+  page.add_plots({{plot_of_particles(images),
+                   "Number of particles after each image, on a logarithmic scale"}});
   page.write(folder, "index.html", "panonav track");
 }
 

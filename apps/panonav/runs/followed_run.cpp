@@ -48,7 +48,7 @@ void follow(RouteFollower& follower, const Dataset& run, const std::vector<Pose2
                   Seen seen{follower.encode(observation), std::nullopt};
                   clock.stage("scanline");
                   if (recorded == nullptr) return seen;
-                  seen.moment = recordings::moment_of(observation, i * every);
+                  seen.moment = recordings::make_moment(observation, i * every);
                   seen.moment->panorama = recorded->convert(seen.moment->picture->view(),
                                                             observation.tilt.value_or(Tilt{}));
                   clock.stage("for viewers");

@@ -110,7 +110,7 @@ class RunMoments {
 
   recordings::RunMoment make(const Observation& observation, const LiveMemory::Answer& answer,
                              const RunRecord& record, StageClock& stages) {
-    recordings::RunMoment moment = record.moment_of(observation, number_++);
+    recordings::RunMoment moment = record.make_moment(observation, number_++);
     stages.put(moment);
     const PlaceRecogniser* const recogniser = memory_.recogniser();
     if (record.wants_pictures()) moment.panorama = memory_.panorama();

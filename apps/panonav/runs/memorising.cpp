@@ -8,7 +8,7 @@ void require_kept_options(const Arguments& arguments, const SignatureOptions& si
   const std::string as =
       ", as " + memory.path().string() + " was made with; leave it out or start a new memory";
   // 0 stands for the usual size, or for the pictures' own.
-  const PanoramaShape usual = wanted_shape(header.source, {});
+  const PanoramaShape usual = choose_panorama_shape(header.source, {});
   const PanoramaShape own =
       header.picture_shape.value_or(PanoramaShape{header.shape.rows, header.panorama_columns});
   SignatureOptions wanted = signature;

@@ -109,7 +109,7 @@ void MissionMoments::add_field(recordings::RunMoment& moment) const {
 std::optional<ViewId> set_goal_of_viewer(RobotNavigator& robot,
                                          const simulation::RememberedPlace& remembered,
                                          RunRecord& record, Session& session) {
-  const auto wish = record.take_wish();
+  const auto wish = record.consume_wish();
   if (!wish) return std::nullopt;
   std::optional<std::size_t> nearest;
   double min_m = std::numeric_limits<double>::infinity();

@@ -75,8 +75,8 @@ bool RunRecord::wants_pictures() const {
   return recorder_ || page_ != nullptr || (viewer_ && (!live_ || viewer_->viewers() > 0));
 }
 
-recordings::RunMoment RunRecord::moment_of(const Observation& seen, std::size_t number) const {
-  if (wants_pictures()) return recordings::moment_of(seen, number);
+recordings::RunMoment RunRecord::make_moment(const Observation& seen, std::size_t number) const {
+  if (wants_pictures()) return recordings::make_moment(seen, number);
   return {.stamp_s = seen.stamp_s.value_or(static_cast<double>(number)),
           .odometry = seen.odometry,
           .tilt = seen.tilt,

@@ -50,11 +50,12 @@ class RunRecord {
   /// Whether somebody looks at pictures: a file, or a viewer who is there or waited for.
   [[nodiscard]] bool wants_pictures() const;
   /// What is known of an observation, with its picture where it is wanted.
-  [[nodiscard]] recordings::RunMoment moment_of(const Observation& seen, std::size_t number) const;
+  [[nodiscard]] recordings::RunMoment make_moment(const Observation& seen,
+                                                  std::size_t number) const;
   void add(recordings::RunMoment moment);
   /// What a viewer wished since the last time.
-  [[nodiscard]] std::optional<ReferencePose> take_wish() {
-    return viewer_ ? viewer_->take_wish() : std::nullopt;
+  [[nodiscard]] std::optional<ReferencePose> consume_wish() {
+    return viewer_ ? viewer_->consume_wish() : std::nullopt;
   }
   /// All that waits is written, and viewers know that the run has ended.
   void close();

@@ -50,7 +50,7 @@ void GrowingMap::put(recordings::RunMoment& moment, const TopologicalMap& map, b
 
 void GrowingMap::finish(recordings::RunMoment& moment, const TopologicalMap& map) const {
   if (map.nodes.empty()) return;
-  const std::size_t component = largest_component(map);
+  const std::size_t component = find_largest_component(map);
   moment.truth = truth_;
   place(moment, map, component);
   moment.values.emplace_back("event", "the map is finished");

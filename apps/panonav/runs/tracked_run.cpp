@@ -111,7 +111,7 @@ void track(Tracker& tracker, const Dataset& run, const TrackSettings& settings, 
         signatures[i] = tracker.encoder().packed(seen);
         return;
       }
-      recordings::RunMoment& moment = moments[i].emplace(recordings::moment_of(seen, index));
+      recordings::RunMoment& moment = moments[i].emplace(recordings::make_moment(seen, index));
       clock.restart();
       moment.panorama = tracker.encoder().panorama(seen);
       clock.stage("unwarping");

@@ -37,7 +37,7 @@ std::vector<CoarseMotion> motions_of(const ArrangeArguments& wanted, const Pictu
   const Dataset recording =
       read_described(*wanted.odometry, wanted.pictures, source,
                      "odom_x_m,odom_y_m,odom_heading_deg", "1.5,0.25,90", session);
-  auto motions = motions_between(recording, memory, wanted.motion);
+  auto motions = make_coarse_motions(recording, memory, wanted.motion);
   if (motions.empty()) {
     throw FileError(*wanted.odometry,
                     "has no odometry between pictures that the memory knows by name");

@@ -77,7 +77,7 @@ ordered_json as_json(const CatchmentArguments& wanted, const RecordedViews& goal
   auto views = ordered_json::array();
   for (std::size_t g = 0; g < goals.files.size(); ++g) {
     views.push_back(
-        {{"file", goals.files[g]}, {"places", catchment_of(result, g, result.spacing_m)}});
+        {{"file", goals.files[g]}, {"places", count_catchment(result, g, result.spacing_m)}});
   }
   json["views"] = std::move(views);
   return json;

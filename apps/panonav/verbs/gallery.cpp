@@ -124,17 +124,17 @@ ExitCode gallery(const GalleryArguments& wanted, Session& session) {
       "edges behind it. Below each: the view's id and name, where it was taken and the heading.");
   const auto placed = std::ranges::count_if(
       views, [](const ViewRecord& view) { return view.info.pose.has_value(); });
-  page.figures({{std::to_string(views.size()), "views"},
-                {std::to_string(placed), "with a position"},
-                {std::to_string(std::min(pictured, views.size())), "with a thumbnail"}});
+  page.add_figures({{std::to_string(views.size()), "views"},
+                    {std::to_string(placed), "with a position"},
+                    {std::to_string(std::min(pictured, views.size())), "with a thumbnail"}});
   if (views.size() < found) {
-    page.text("The first " + std::to_string(views.size()) + " of " + std::to_string(found) +
-              " views; --name and --near of panonav gallery choose others.");
+    page.add_text("The first " + std::to_string(views.size()) + " of " + std::to_string(found) +
+                  " views; --name and --near of panonav gallery choose others.");
   }
   Progress progress(session, "drawing", views.size());
   for (const auto& [title, members] : grouped(views)) {
-    page.section(title + " (" + std::to_string(members.size()) +
-                 (members.size() == 1 ? " view)" : " views)"));
+    page.begin_section(title + " (" + std::to_string(members.size()) +
+                       (members.size() == 1 ? " view)" : " views)"));
     std::vector<viewer::ReportPicture> pictures;
     for (const ViewRecord& view : members) {
       std::string picture = picture_of(memory, view);
@@ -142,7 +142,7 @@ ExitCode gallery(const GalleryArguments& wanted, Session& session) {
       pictures.push_back({std::move(picture), std::move(caption)});
       progress.advance();
     }
-    page.thumbnails(pictures);
+    page.add_thumbnails(pictures);
   }
   page.write(wanted.out, page_name, "panonav gallery");
   progress.clear();

@@ -116,7 +116,7 @@ ExitCode home_from_memory(const Arguments& arguments, const HomeArguments& wante
   if (arguments.given("signature", "components")) {
     components = wanted.homing.views.signature.components;
   }
-  const ViewId view = named_view(file, wanted.goal);
+  const ViewId view = find_view_by_name_or_id(file, wanted.goal);
   const auto recording = open_recording(wanted.current, wanted.pictures, file, session);
   const HomingGuide guide(file, wanted.goal, recording.source,
                           homing_options(arguments, wanted.homing, components), components,

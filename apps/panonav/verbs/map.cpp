@@ -44,7 +44,7 @@ struct MapArguments {
 std::vector<StampedPose> trajectory_of(const Dataset& recording, const Mapper::Result& run,
                                        const std::string& dataset) {
   std::vector<StampedPose> trajectory;
-  const std::size_t component = largest_component(run.map);
+  const std::size_t component = find_largest_component(run.map);
   for (std::size_t i = 0; i < run.map.nodes.size(); ++i) {
     if (run.map.nodes[i].component != component) continue;
     const DatasetEntry& entry = recording.entries[run.observations[i]];
@@ -189,7 +189,7 @@ Mapper::Result map_in_view(const MapArguments& wanted, const Dataset& recording,
         StageClock clock;
         const Observation observation = read_observation(recording.entries[i]);
         clock.stage("reading");
-        Seen seen{mapper.encode(observation), recordings::moment_of(observation, i),
+        Seen seen{mapper.encode(observation), recordings::make_moment(observation, i),
                   observation.name};
         clock.stage("unwarping, signature");
         seen.moment.panorama = mapper.encoder().panorama(observation);
@@ -222,7 +222,7 @@ void record_map(const MapArguments& wanted, const Dataset& recording, const Mapp
                 const ViewEncoder& encoder, viewer::RunPage& played, Session& session) {
   RunRecord record({.file = wanted.record.file, .view = std::nullopt},
                    std::array{wanted.dataset, wanted.memory}, false, session, {});
-  const std::size_t component = largest_component(run.map);
+  const std::size_t component = find_largest_component(run.map);
   std::map<std::size_t, std::size_t> nodes;  // by observation
   std::vector<std::string> names;
   for (std::size_t i = 0; i < run.map.nodes.size(); ++i) {
@@ -234,7 +234,7 @@ void record_map(const MapArguments& wanted, const Dataset& recording, const Mapp
       recording.entries.size(), session.executor(),
       [&](std::size_t i) {
         const Observation seen = read_observation(recording.entries[i]);
-        recordings::RunMoment moment = recordings::moment_of(seen, i);
+        recordings::RunMoment moment = recordings::make_moment(seen, i);
         moment.panorama = encoder.panorama(seen);
         return moment;
       },
@@ -300,7 +300,7 @@ ExitCode map(const Arguments& arguments, const MapArguments& wanted, Session& se
     refuse_without_effect(arguments, wanted, recording, memory->header());
   } else {
     const MemoryHeader header =
-        header_from_first_views(recording, wanted.signature, {}, session.executor());
+        make_header_of_recording(recording, wanted.signature, {}, session.executor());
     refuse_without_effect(arguments, wanted, recording, header);
     memory = MemoryFile::create(wanted.memory, header);
   }

@@ -264,7 +264,7 @@ ExitCode navigate(const Arguments& arguments, const NavigateArguments& wanted, S
                                 .base = wanted.mission.base,
                                 .route = wanted.route,
                                 .known_route = wanted.known_route};
-  if (wanted.edges) options.edges = graph_origin(*wanted.edges);
+  if (wanted.edges) options.edges = find_graph_origin(*wanted.edges);
   RobotNavigator robot(wanted.memory, wanted.goal, options, std::nullopt, &session.executor());
   if (robot.memory().header().source.kind != PictureKind::mirror) {
     arguments.refuse_unused({"--vignetting"}, "on the panoramas of this memory");

@@ -18,7 +18,7 @@ ExitCode rename(const RenameArguments& wanted, Session& session) {
   const std::string what = wanted.route ? "route" : "view";
   std::string former = wanted.name;
   const auto find = [&] {
-    const ViewId view = named_view(memory, wanted.name);
+    const ViewId view = find_view_by_name_or_id(memory, wanted.name);
     former = memory.load({&view, 1}).info(view).name;
     return view;
   };

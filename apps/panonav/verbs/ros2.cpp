@@ -93,7 +93,7 @@ ExitCode run_node(Ros2Arguments& wanted, Session& session) {
   wanted.setup.memory = wanted.memory;
   wanted.setup.participant.domain = wanted.domain;
   for (const std::string& text : wanted.remappings) {
-    const auto [from, to] = ros2::remapping_of(text);
+    const auto [from, to] = ros2::parse_remapping(text);
     wanted.setup.participant.remappings.insert_or_assign(from, to);
   }
   if (wanted.teach) {

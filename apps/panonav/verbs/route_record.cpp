@@ -101,7 +101,7 @@ void choose_lines(const Arguments& arguments, const RecordArguments& wanted,
     options.line = wanted.line;
     return;
   }
-  const RouteSource before = route_source(*memory, wanted.name, route->columns());
+  const RouteSource before = read_route_source(*memory, wanted.name, route->columns());
   const std::string as = ", as the route '" + wanted.name + "' in " + wanted.memory +
                          " was recorded; leave it out or take another --name";
   arguments.require_kept("line", wanted.line, before.line, as);
@@ -129,7 +129,7 @@ ExitCode record(const Arguments& arguments, const RecordArguments& wanted, Sessi
   RouteRecorder recorder(
       memory ? std::move(*memory)
              : MemoryFile::create(wanted.memory,
-                                  header_from_first_views(dataset, {}, {}, session.executor())),
+                                  make_header_of_recording(dataset, {}, {}, session.executor())),
       dataset.source, options);
   std::optional<Progress> bar;
   const auto recorded = recorder.record(dataset, poses, session.executor(), [&](std::size_t lines) {

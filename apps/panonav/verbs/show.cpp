@@ -133,7 +133,7 @@ void tell(const ordered_json& view, Session& session) {
 
 ExitCode show(const ShowArguments& wanted, Session& session) {
   const auto file = MemoryFile::open(wanted.memory, Access::read_only);
-  const ViewId view = named_view(file, wanted.view);
+  const ViewId view = find_view_by_name_or_id(file, wanted.view);
   const VisualMemory memory = file.load();
   const ReferenceInfo& info = memory.info(view);
   ordered_json shown{{"memory", wanted.memory},

@@ -70,8 +70,8 @@ void check_out(const std::string& out) {
 }
 
 /// What the robot saw, and where it truly was.
-recordings::RunMoment moment_of(const DatasetEntry& entry, const Image& picture,
-                                const PanoramaReader& panoramas, std::size_t number) {
+recordings::RunMoment make_moment(const DatasetEntry& entry, const Image& picture,
+                                  const PanoramaReader& panoramas, std::size_t number) {
   recordings::RunMoment moment{
       .stamp_s = entry.stamp_s.value_or(static_cast<double>(number)),
       .picture = picture,
@@ -106,7 +106,7 @@ ExitCode simulate(const Arguments& arguments, SimulateArguments wanted, Session&
       simulation::record_dataset(world, out, poses, with_path, session.executor(),
                                  [&](const DatasetEntry& entry, const Image& picture) {
                                    if (record.wanted())
-                                     record.add(moment_of(entry, picture, panoramas, number));
+                                     record.add(make_moment(entry, picture, panoramas, number));
                                    ++number;
                                    progress.advance();
                                  });

@@ -203,7 +203,7 @@ bool start_as_wished(Tracker& tracker, RunRecord& record) {
   constexpr double deviation_m = 0.3;
   constexpr double heading_deviation_deg = 20.0;
   constexpr double any_heading_deg = 180.0;
-  const auto wish = record.take_wish();
+  const auto wish = record.consume_wish();
   if (!wish) return false;
   const double heading_rad = wrap_angle(wish->heading_rad.value_or(0.0));
   tracker.start_at({wish->x_m, wish->y_m, heading_rad}, deviation_m,
@@ -249,7 +249,7 @@ class LiveTrack {
     const bool moved_by_hand = start_as_wished(tracker_, record_);
     if (number % static_cast<std::size_t>(arguments_.every) != 0) return "";
     if (record_.wanted()) {
-      moment_ = record_.moment_of(seen, number);
+      moment_ = record_.make_moment(seen, number);
       moment_->panorama = std::move(unwarped);
       moment_->odometry = odometry_.pose();
       if (number == 0) shown_->put(*moment_);

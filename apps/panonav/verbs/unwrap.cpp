@@ -69,7 +69,7 @@ ExitCode unwrap_series(const UnwrapArguments& wanted, const Dataset& recording, 
       recording.entries.size(), session.executor(),
       [&](std::size_t i) {
         const Observation seen = read_observation(recording.entries[i]);
-        return about_picture(seen, [&] {
+        return rethrow_with_file_name(seen, [&] {
           return reader.convert(std::get<Image>(seen.picture).view(), seen.tilt.value_or(Tilt{}));
         });
       },

@@ -23,8 +23,8 @@ void store_lattice(const Lattice& lattice, const VisualMemory& memory, MemoryFil
   });
 }
 
-std::vector<CoarseMotion> motions_between(const Dataset& recording, const VisualMemory& memory,
-                                          const CoarseMotionOptions& options) {
+std::vector<CoarseMotion> make_coarse_motions(const Dataset& recording, const VisualMemory& memory,
+                                              const CoarseMotionOptions& options) {
   std::vector<CoarseMotion> motions;
   std::optional<std::pair<ViewId, Pose2>> before;
   for (const DatasetEntry& entry : recording.entries) {

@@ -27,7 +27,7 @@ struct PairVector {
   float heading_rad = 0.0F;
 };
 
-std::vector<Pose2> placed(const RecordedViews& views) {
+std::vector<Pose2> to_robot_poses(const RecordedViews& views) {
   std::vector<Pose2> poses;
   for (std::size_t i = 0; i < views.views.size(); ++i) {
     if (!views.poses[i] || !views.poses[i]->heading_rad) {
@@ -39,9 +39,11 @@ std::vector<Pose2> placed(const RecordedViews& views) {
   return poses;
 }
 
-std::vector<PairVector> all_vectors(const RecordedViews& goals, const RecordedViews& places,
-                                    const FourierHomingOptions& homing, const std::string& work,
-                                    Executor& executor, const WorkProgress& progress) {
+std::vector<PairVector> compute_home_vectors(const RecordedViews& goals,
+                                             const RecordedViews& places,
+                                             const FourierHomingOptions& homing,
+                                             const std::string& work, Executor& executor,
+                                             const WorkProgress& progress) {
   const std::size_t count = places.views.size();
   std::vector<PairVector> vectors(goals.views.size() * count);
   const std::size_t batch = 4 * static_cast<std::size_t>(executor.threads());
@@ -63,8 +65,9 @@ std::vector<PairVector> all_vectors(const RecordedViews& goals, const RecordedVi
 }
 
 /// The median over pairs near each other of distance over length.
-double learnt_distance_m(const std::vector<Pose2>& goals, const std::vector<Pose2>& places,
-                         const std::vector<PairVector>& vectors, double near_m) {
+double estimate_typical_distance_m(const std::vector<Pose2>& goals,
+                                   const std::vector<Pose2>& places,
+                                   const std::vector<PairVector>& vectors, double near_m) {
   std::vector<double> ratios;
   for (std::size_t g = 0; g < goals.size(); ++g) {
     for (std::size_t p = 0; p < places.size(); ++p) {
@@ -97,8 +100,8 @@ struct ErrorSum {
   }
 };
 
-void count_pairs(const std::vector<PairVector>& vectors, const CatchmentSettings& settings,
-                 CatchmentResult& result) {
+void summarise_pairs(const std::vector<PairVector>& vectors, const CatchmentSettings& settings,
+                     CatchmentResult& result) {
   const HomingSurvey& survey = result.survey;
   const double bin_m = settings.bin_m.value_or(result.spacing_m);
   const double max_m = settings.up_to_m.value_or(std::numeric_limits<double>::infinity());
@@ -171,15 +174,16 @@ CatchmentResult survey_catchment(const RecordedViews& goals, const RecordedViews
                                  const CatchmentSettings& settings, const std::string& name,
                                  Executor& executor, const WorkProgress& progress) {
   CatchmentResult result;
-  const auto goal_poses = placed(goals);
-  const auto place_poses = placed(places);
+  const auto goal_poses = to_robot_poses(goals);
+  const auto place_poses = to_robot_poses(places);
   result.spacing_m = VoronoiCells(positions_of(place_poses)).spacing_m();
   if (!(result.spacing_m > 0.0)) throw FileError(name, "has no two places that differ");
-  const auto vectors = all_vectors(goals, places, settings.homing, "homing", executor, progress);
+  const auto vectors =
+      compute_home_vectors(goals, places, settings.homing, "homing", executor, progress);
 
   result.run = settings.run;
   const double near_m = 3.0 * result.spacing_m;
-  result.typical_distance_m = learnt_distance_m(goal_poses, place_poses, vectors, near_m);
+  result.typical_distance_m = estimate_typical_distance_m(goal_poses, place_poses, vectors, near_m);
   if (settings.typical_distance_given) {
     result.typical_distance_m = settings.run.typical_distance_m;
   }
@@ -197,13 +201,13 @@ CatchmentResult survey_catchment(const RecordedViews& goals, const RecordedViews
     return survey_homing(goal_poses, place_poses, known, result.run, executor);
   };
   result.survey = surveyed(vectors);
-  count_pairs(vectors, settings, result);
+  summarise_pairs(vectors, settings, result);
 
   std::vector<HomingSurvey> staged;
   for (const int highest : settings.stages) {
     FourierHomingOptions stage = settings.homing;
     stage.highest = highest;
-    staged.push_back(surveyed(all_vectors(
+    staged.push_back(surveyed(compute_home_vectors(
         goals, places, stage, "stage K = " + std::to_string(highest), executor, progress)));
   }
   std::vector<const HomingSurvey*> stages;
@@ -217,7 +221,7 @@ CatchmentResult survey_catchment(const RecordedViews& goals, const RecordedViews
   return result;
 }
 
-std::size_t catchment_of(const CatchmentResult& result, std::size_t goal, double accepted_m) {
+std::size_t count_catchment(const CatchmentResult& result, std::size_t goal, double accepted_m) {
   const std::size_t count = result.survey.places.size();
   const auto ends = std::span(result.final_m).subspan(goal * count, count);
   return static_cast<std::size_t>(std::ranges::count_if(

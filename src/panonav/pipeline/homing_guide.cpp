@@ -11,7 +11,7 @@ namespace panonav {
 
 namespace {
 
-int components_for(const SignatureShape& shape, int requested) {
+int validated_components(const SignatureShape& shape, int requested) {
   if (requested == 0) return shape.components;
   if (requested < 3 || requested > shape.components) {
     throw ContractError("components", requested,
@@ -21,23 +21,24 @@ int components_for(const SignatureShape& shape, int requested) {
 }
 
 /// That view alone.
-VisualMemory goal_in(const MemoryFile& memory, const std::string& goal) {
-  const ViewId view = named_view(memory, goal);
+VisualMemory load_goal_view(const MemoryFile& memory, const std::string& goal) {
+  const ViewId view = find_view_by_name_or_id(memory, goal);
   return memory.load({&view, 1});
 }
 
 }  // namespace
 
 HomingEncoder::HomingEncoder(const PictureSource& source, const HomingViewOptions& options)
-    : pictures_(OwnPictures{PanoramaReader(source, wanted_shape(source, options.signature)),
-                            options.preprocessing}),
+    : pictures_(
+          OwnPictures{PanoramaReader(source, choose_panorama_shape(source, options.signature)),
+                      options.preprocessing}),
       components_(options.signature.components),
       horizon_(options.horizon) {}
 
 HomingEncoder::HomingEncoder(const MemoryHeader& header, const PictureSource& source,
                              int components, bool horizon)
     : pictures_(std::in_place_type<ViewEncoder>, header, source),
-      components_(components_for(header.shape, components)),
+      components_(validated_components(header.shape, components)),
       horizon_(horizon) {}
 
 Panorama HomingEncoder::own_panorama(const OwnPictures& own, const Observation& observation) const {
@@ -62,8 +63,8 @@ Panorama HomingEncoder::panorama(const Observation& observation) const {
   if (const auto* memory = std::get_if<ViewEncoder>(&pictures_)) {
     return memory->panorama(observation);
   }
-  return about_picture(observation,
-                       [&] { return own_panorama(std::get<OwnPictures>(pictures_), observation); });
+  return rethrow_with_file_name(
+      observation, [&] { return own_panorama(std::get<OwnPictures>(pictures_), observation); });
 }
 
 HomingView HomingEncoder::view(const Panorama& panorama) const {
@@ -87,7 +88,7 @@ HomingGuide::HomingGuide(const MemoryFile& memory, const std::string& goal,
                          const FourierHomingOptions& options, int components, bool horizon)
     : HomingGuide(HomingEncoder(memory.header(), source.value_or(memory.header().source),
                                 components, horizon),
-                  goal_in(memory, goal), options) {}
+                  load_goal_view(memory, goal), options) {}
 
 HomingGuide::HomingGuide(const Observation& goal, const PictureSource& source,
                          const HomingViewOptions& views, const FourierHomingOptions& options)
@@ -122,7 +123,7 @@ HomingGuide::HomingGuide(HomingEncoder encoder, std::string goal_name, HomingVie
 
 WayHome HomingGuide::home(const Observation& observation) const {
   const HomingView view = encoder_.view(encoder_.panorama(observation));
-  return about_picture(observation, [&] {
+  return rethrow_with_file_name(observation, [&] {
     if (view.rows() != goal_.rows()) {
       throw ContractError("rows", view.rows(),
                           std::to_string(goal_.rows()) + ", as in " + goal_name_);

@@ -27,15 +27,16 @@ struct HomingViewOptions {
 /// Makes homing views of observations. Several threads may use one object at a time.
 class HomingEncoder {
  public:
-  /// Without a memory; ready-made panoramas keep their size unless the options say otherwise.
+  /// Encodes without a memory; ready-made panoramas keep their size unless the options say
+  /// otherwise.
   HomingEncoder(const PictureSource& source, const HomingViewOptions& options);
-  /// As the views of a memory, of which the first `components` count; 0: all. Throws ContractError
+  /// Encodes like a memory, using the first `components` of its views; 0: all. Throws ContractError
   /// unless the memory has them and they are 3 or more; else as `ViewEncoder`.
   HomingEncoder(const MemoryHeader& header, const PictureSource& source, int components = 0,
                 bool horizon = false);
 
   /// Throws ContractError (FileError where the observation has a file) on a picture that is too
-  /// small for the components wanted or that the masks cover; else as `ViewEncoder::panorama`.
+  /// small for the components or covered by the masks; else as `ViewEncoder::panorama`.
   [[nodiscard]] Panorama panorama(const Observation& observation) const;
   /// Returns what homing compares of a panorama that `panorama` made.
   [[nodiscard]] HomingView view(const Panorama& panorama) const;
@@ -67,34 +68,35 @@ struct WayHome {
   /// noise and other places do not. If false, there is no direction, and distance and turn mean
   /// nothing.
   bool known = false;
-  /// In the frame of the robot as it stands now, counter-clockwise from straight ahead. Empty where
-  /// nothing is known, and at home itself (`points_home`).
+  /// Direction of the goal in the robot's current frame, counter-clockwise from straight ahead.
+  /// Empty if nothing is known, and at the goal itself (`points_home`).
   std::optional<double> direction_rad;
-  double distance_r = 0.0;  ///< in units of R, the typical distance of the things around
-  double turn_rad = 0.0;    ///< by which the robot has turned since it was home
-  /// That the direction is right within 45 degrees (`ChanceMatch::direction_probability`).
+  double distance_r = 0.0;  ///< in units of R, the typical distance of the surroundings
+  double turn_rad = 0.0;    ///< rotation of the robot since it was at the goal
+  /// Probability that the direction is right within 45 degrees
+  /// (`ChanceMatch::direction_probability`).
   double probability = 0.0;
   HomeVector vector;  ///< all that was found, known or not
 };
 
-/// Tells the way back to a goal from one observation: a view of a memory, or an observation made
-/// there. The heading need not be known. Several threads may ask one at a time. Cost: that of the
-/// encoding, of `home_vector`, and some milliseconds for `chance_match`.
+/// Computes the direction back to a goal from one observation. The goal is a view of a memory, or
+/// an observation made there. The heading need not be known. Several threads may use one object.
+/// Cost: that of the encoding, of `home_vector`, and some milliseconds for `chance_match`.
 class HomingGuide {
  public:
-  /// The goal: a view of the memory file, by name or id; the memory's own camera takes the
-  /// pictures. Throws FileError, also when there is no such view. Reads no other view.
+  /// `goal`: name or id of a view of the memory file. Pictures come from the memory's own camera.
+  /// Throws FileError, also when there is no such view. Reads no other view.
   HomingGuide(const std::filesystem::path& memory, const std::string& goal,
               const FourierHomingOptions& options = {});
-  /// Pictures lie as `source` says; empty: as the memory's own. `components`, `horizon`: as
+  /// `source`: layout of the pictures; empty: the memory's own. `components`, `horizon`: as
   /// `HomingEncoder`.
   HomingGuide(const MemoryFile& memory, const std::string& goal,
               const std::optional<PictureSource>& source, const FourierHomingOptions& options,
               int components = 0, bool horizon = false);
-  /// Without a memory: both pictures lie as `source` says.
+  /// Needs no memory: both pictures have the layout `source`.
   HomingGuide(const Observation& goal, const PictureSource& source,
               const HomingViewOptions& views = {}, const FourierHomingOptions& options = {});
-  /// A goal that another encoder made, as where its picture lies otherwise.
+  /// Takes a goal that another encoder made, for example of a picture with another layout.
   HomingGuide(HomingEncoder encoder, std::string goal_name, HomingView goal,
               const FourierHomingOptions& options = {});
 
@@ -106,7 +108,7 @@ class HomingGuide {
   [[nodiscard]] const HomingEncoder& encoder() const noexcept { return encoder_; }
   /// Returns the goal's name in messages: the name of its view or observation.
   [[nodiscard]] const std::string& goal_name() const noexcept { return goal_name_; }
-  /// The goal's view, with which observations are compared.
+  /// Returns the goal's view, with which observations are compared.
   [[nodiscard]] const HomingView& goal() const noexcept { return goal_; }
 
  private:

@@ -26,7 +26,7 @@ std::string fingerprint(const Dataset& recording, const MemoryFile& memory) {
   RecordBytes bytes;
   MemoryHeader read_as = memory.header();
   read_as.source = recording.source;
-  for (const auto& [key, value] : settings_of(read_as)) {
+  for (const auto& [key, value] : to_settings(read_as)) {
     bytes.add(key);
     std::visit([&](const auto& typed) { bytes.add(typed); }, value);
   }
@@ -50,7 +50,7 @@ std::string fingerprint(const Dataset& recording, const MemoryFile& memory) {
   return text.str();
 }
 
-bool met_before(const MemoryFile& memory, const std::string& mark) {
+bool is_known_recording(const MemoryFile& memory, const std::string& mark) {
   std::istringstream marks(memory.parameter(recordings_parameter).value_or(""));
   for (std::string met; marks >> met;) {
     if (met == mark) return true;
@@ -76,7 +76,7 @@ void check_known_views(const Dataset& recording, const MemoryFile& memory,
                         "a view with another pose or stamp under the name");
     }
   }
-  if (known.empty() || met_before(memory, fingerprint(recording, memory))) return;
+  if (known.empty() || is_known_recording(memory, fingerprint(recording, memory))) return;
 
   constexpr std::size_t batch = 32;
   for (std::size_t begin = 0; begin < known.size(); begin += batch) {
@@ -97,7 +97,7 @@ void check_known_views(const Dataset& recording, const MemoryFile& memory,
 
 void remember_recording(const Dataset& recording, MemoryFile& memory) {
   const std::string mark = fingerprint(recording, memory);
-  if (met_before(memory, mark)) return;
+  if (is_known_recording(memory, mark)) return;
   const std::string before = memory.parameter(recordings_parameter).value_or("");
   memory.set_parameter(recordings_parameter, before.empty() ? mark : before + " " + mark);
 }

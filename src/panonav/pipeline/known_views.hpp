@@ -12,12 +12,12 @@
 
 namespace panonav {
 
-/// Names that the memory knows must mean the same views: two recordings with the same file names
-/// must not be mixed. Poses and stamps of all known views are compared. So are their pictures,
-/// unless the memory met this very recording before: same names, poses, sizes and times of change
-/// of all files. Throws FileError at the first view that differs, or whose picture cannot be read.
-/// Cost: one look at each file; for a recording that was changed or copied since, as much
-/// computing as memorising the views that are known; `compared` hears of each few of them.
+/// Checks that the names that the memory knows mean the same views, as two recordings with the same
+/// file names must not be mixed. Compares poses and stamps of all known views, and their pictures
+/// unless the memory knows the recording: same names, poses, sizes and times of change of all
+/// files. Throws FileError at the first view that differs, or whose picture cannot be read. Cost:
+/// reading the size and time of each file; for a recording that was changed or copied since, that
+/// of memorising the known views; `compared` receives their number now and then.
 void check_known_views(const Dataset& recording, const MemoryFile& memory,
                        const ViewEncoder& encoder, Executor& executor,
                        const std::function<void(std::size_t)>& compared = {});

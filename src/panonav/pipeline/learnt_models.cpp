@@ -147,7 +147,7 @@ std::optional<LearntModels> read_models(const MemoryFile& file, const VisualMemo
 
 }  // namespace
 
-FeatureSource features_in(const MemoryFile& file) {
+FeatureSource make_feature_source(const MemoryFile& file) {
   const MemoryHeader& header = file.header();
   if (!header.elevations || !file.has_features()) return {};
   return [&file, shape = PanoramaShape{header.shape.rows, header.panorama_columns},
@@ -182,8 +182,8 @@ LearntModels learn_models(const VisualMemory& memory, const FeatureSource& featu
 
 void keep_models(MemoryFile& file) {
   const VisualMemory memory = file.load();
-  if (memory.empty() || kept_models(file, memory)) return;
-  const LearntModels models = learn_models(memory, features_in(file));
+  if (memory.empty() || load_kept_models(file, memory)) return;
+  const LearntModels models = learn_models(memory, make_feature_source(file));
   Writer writer;
   writer.word(learning_version);
   writer.word(fingerprint(memory));
@@ -196,11 +196,11 @@ void keep_models(MemoryFile& file) {
   file.set_parameter(parameter_name, writer.text());
 }
 
-std::optional<LearntModels> kept_models(const MemoryFile& file, const VisualMemory& memory) {
+std::optional<LearntModels> load_kept_models(const MemoryFile& file, const VisualMemory& memory) {
   return read_models(file, &memory);
 }
 
-std::optional<LearntModels> kept_models(const MemoryFile& file) {
+std::optional<LearntModels> load_kept_models(const MemoryFile& file) {
   return read_models(file, nullptr);
 }
 

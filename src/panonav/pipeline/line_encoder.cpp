@@ -12,12 +12,12 @@ namespace panonav {
 
 namespace {
 
-std::string parameter_of(const std::string& name) {
+std::string parameter_name(const std::string& name) {
   return "route." + name;
 }
 
 /// A cylinder no higher than the line needs, as finely sampled as a usual camera sees the horizon.
-PanoramaShape shape_of(const PictureSource& pictures, const RouteSource& route) {
+PanoramaShape line_panorama_shape(const PictureSource& pictures, const RouteSource& route) {
   if (pictures.kind == PictureKind::panorama) return {};
   constexpr int rows = 5;
   return {rows, std::min(4 * route.line.columns, 4096)};
@@ -32,10 +32,10 @@ PictureSource cut_to_horizon(PictureSource pictures, const RouteSource& route) {
 
 }  // namespace
 
-RouteSource route_source(const MemoryFile& memory, const std::string& name, int columns) {
+RouteSource read_route_source(const MemoryFile& memory, const std::string& name, int columns) {
   RouteSource source;
   source.line.columns = columns;
-  const auto text = memory.parameter(parameter_of(name));
+  const auto text = memory.parameter(parameter_name(name));
   if (!text) return source;
   std::istringstream in(*text);
   std::string word;
@@ -53,24 +53,25 @@ RouteSource route_source(const MemoryFile& memory, const std::string& name, int 
     }
   }
   if (!good) {
-    throw FileError(memory.path().string(), "parameter " + parameter_of(name) + " is '" + *text +
+    throw FileError(memory.path().string(), "parameter " + parameter_name(name) + " is '" + *text +
                                                 "'; allowed: what a RouteRecorder writes");
   }
   return source;
 }
 
-void remember_route_source(MemoryFile& memory, const std::string& name, const RouteSource& source) {
+void store_route_source(MemoryFile& memory, const std::string& name, const RouteSource& source) {
   std::string text = "half_band_rad " + to_text(source.line.half_band_rad);
   if (source.horizon_rows) {
     text += " horizon_rows " + std::to_string(source.horizon_rows->first) + " " +
             std::to_string(source.horizon_rows->second);
   }
   if (source.from_odometry) text += " odometry";
-  memory.set_parameter(parameter_of(name), text);
+  memory.set_parameter(parameter_name(name), text);
 }
 
 LineEncoder::LineEncoder(const PictureSource& pictures, const RouteSource& route)
-    : route_(route), reader_(cut_to_horizon(pictures, route), shape_of(pictures, route)) {
+    : route_(route),
+      reader_(cut_to_horizon(pictures, route), line_panorama_shape(pictures, route)) {
   if (route.horizon_rows &&
       (pictures.kind != PictureKind::panorama || pictures.layout.elevations)) {
     throw ContractError(
@@ -81,7 +82,7 @@ LineEncoder::LineEncoder(const PictureSource& pictures, const RouteSource& route
 }
 
 std::vector<float> LineEncoder::line(const Observation& observation) const {
-  return about_picture(observation, [&] {
+  return rethrow_with_file_name(observation, [&] {
     const Tilt tilt = observation.tilt.value_or(Tilt{});
     if (const auto* ready = std::get_if<Panorama>(&observation.picture))
       return line_of(level_panorama(*ready, tilt));
@@ -105,7 +106,7 @@ std::vector<float> LineEncoder::line_of(const Panorama& panorama) const {
                           route_.line);
 }
 
-std::string route_named(const MemoryFile& memory, const std::optional<std::string>& name) {
+std::string find_route_name(const MemoryFile& memory, const std::optional<std::string>& name) {
   const auto names = memory.route_names();
   std::string all;
   for (const auto& known : names) all += (all.empty() ? "" : ", ") + known;
@@ -124,7 +125,7 @@ std::string route_named(const MemoryFile& memory, const std::optional<std::strin
   return *name;
 }
 
-RoutePanorama route_to_follow(const MemoryFile& memory, const std::string& name) {
+RoutePanorama load_route_to_follow(const MemoryFile& memory, const std::string& name) {
   RoutePanorama route = memory.route(name).value();
   if (route.size() < 2) {
     throw FileError(memory.path().string(), "route '" + name + "' has 1 line; allowed: 2 or more");

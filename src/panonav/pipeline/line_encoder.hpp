@@ -25,11 +25,11 @@ struct RouteSource {
 };
 
 /// Reads the source of the route `name`. Throws FileError when the memory says something else than
-/// `remember_route_source` wrote.
-[[nodiscard]] RouteSource route_source(const MemoryFile& memory, const std::string& name,
-                                       int columns);
+/// `store_route_source` wrote.
+[[nodiscard]] RouteSource read_route_source(const MemoryFile& memory, const std::string& name,
+                                            int columns);
 /// Stores the source in the memory, under the route's name. Throws FileError.
-void remember_route_source(MemoryFile& memory, const std::string& name, const RouteSource& source);
+void store_route_source(MemoryFile& memory, const std::string& name, const RouteSource& source);
 
 /// Makes horizon scanlines of observations, as a route has them. Several threads may use one
 /// object.
@@ -50,11 +50,11 @@ class LineEncoder {
 
 /// Returns the route's name, that of the only route where none is named. Throws FileError when
 /// there is no such route, or several and none is named.
-[[nodiscard]] std::string route_named(const MemoryFile& memory,
-                                      const std::optional<std::string>& name);
+[[nodiscard]] std::string find_route_name(const MemoryFile& memory,
+                                          const std::optional<std::string>& name);
 
 /// Returns the route itself. Throws FileError when it has fewer than two lines: nothing can be
 /// followed.
-[[nodiscard]] RoutePanorama route_to_follow(const MemoryFile& memory, const std::string& name);
+[[nodiscard]] RoutePanorama load_route_to_follow(const MemoryFile& memory, const std::string& name);
 
 }  // namespace panonav

@@ -198,7 +198,7 @@ LiveMemory::Answer LiveMemory::answer(const Observation& observation) {
   }
   bool is_placed_later = false;
   if (self.updater && answer.place && observation.odometry) {
-    self.updater->see(observation, *self.panorama, *answer.place);
+    self.updater->observe(observation, *self.panorama, *answer.place);
     is_placed_later = self.updater->is_near_known_place();
   }
   const bool due = !self.last_added_s || !observation.stamp_s ||

@@ -16,8 +16,8 @@ namespace panonav {
 /// only read.
 struct LiveMemoryOptions {
   bool add = false;  ///< Add the views of places that the memory does not know.
-  /// Keep the views of known places true (`MemoryUpdater`) by observations with odometry. Where
-  /// views are added, too, a memory with few positions and headings only grows.
+  /// Keep the views of known places up to date (`MemoryUpdater`) by observations with odometry.
+  /// Where views are added, too, a memory with few positions and headings only grows.
   bool update = false;
   MemoryUpdateOptions update_options;  ///< of views at known places
   /// Between two views that are added: until the memory has learnt from a view, the following ones
@@ -27,16 +27,17 @@ struct LiveMemoryOptions {
   /// same observations give the same bits; otherwise both happen concurrently on threads of lower
   /// priority.
   bool in_step = false;
-  MemoriserOptions memoriser;  ///< of views that are added; its source serves for both
+  MemoriserOptions memoriser;  ///< of views that are added; its source is that of all pictures
   LocaliserOptions localiser;  ///< of the answers
-  /// Also tell the area where the robot may be (`PlaceRecogniserOptions::areas`); not with `add`.
+  /// Compute also the area where the robot may be (`PlaceRecogniserOptions::areas`); not with
+  /// `add`.
   std::optional<LocalisationAccuracy> areas;
   /// Hold a large memory on a server, too (`PlaceRecogniserOptions::max_held_views`). A memory that
   /// is added to or updated is always held.
   bool hold = false;
 };
 
-/// Memorises and localises in one go, for robots that come to new places:
+/// Memorises and localises at the same time, for robots that come to new places:
 ///   panonav::LiveMemory memory("walk.panonav", {.add = true, .memoriser = {.source = source}});
 ///   while (auto seen = source.next()) use(memory.answer(*seen));
 ///   memory.finish();
@@ -52,37 +53,35 @@ class LiveMemory {
   LiveMemory(LiveMemory&&) noexcept;
   LiveMemory& operator=(LiveMemory&&) noexcept;
 
-  /// Answer to an observation.
+  /// Holds the answer to an observation.
   struct Answer {
-    /// Empty as long as there is no memory to ask: a new one begins with
-    /// `Memoriser::scale_views` views.
+    /// Place; empty while there is no memory: a new one begins with `Memoriser::scale_views` views.
     std::optional<Place> place;
-    /// The place was new, and `add` adds the observation as a view.
+    /// True if the place was new; then `add` adds the observation as a view.
     bool is_new = false;
     std::chrono::steady_clock::duration unwrapping{};  ///< how long it took
   };
-  /// Does not write: what is to be added waits for `add`. Throws as `PlaceRecogniser::localise`.
+  /// Localises an observation. Does not write: `add` does. Throws as `PlaceRecogniser::localise`.
   [[nodiscard]] Answer answer(const Observation& observation);
-  /// Adds the observation that was answered last where its place was new. With an own name; in step
-  /// a view is on the disk when this returns, but for the first ones of a new file, and otherwise
+  /// Adds the observation that was answered last if its place was new. Its name must be unique.
+  /// With `in_step` the view is on the disk on return, but for the first ones of a new file; else
   /// soon after: while `max_waiting` views wait for a slow disk, no observation is new. Throws as
   /// `Memoriser::add`, also about views of earlier calls.
   void add(Observation observation);
   static constexpr std::size_t max_waiting = 8;  ///< Views that wait for the disk at most.
-  /// Returns the panorama of the observation that was answered last, until it is added; empty as
-  /// long as there is no memory to ask.
+  /// Returns the panorama of the observation that was answered last, until it is added; empty while
+  /// there is no memory.
   [[nodiscard]] const std::optional<Panorama>& panorama() const noexcept;
 
-  /// Returns what answers now; null as long as there is no memory to ask. Valid until the next
-  /// `answer`.
+  /// Returns the present recogniser; null while there is no memory. Valid until the next `answer`.
   [[nodiscard]] const PlaceRecogniser* recogniser() const noexcept;
-  /// Views that can be found now, and those that were added.
+  /// Returns the number of views that can be found now, and of those that were added.
   [[nodiscard]] std::size_t views() const noexcept;
-  /// Views that were added since the start, those that wait included.
+  /// Returns the number of views added since the start, waiting ones included.
   [[nodiscard]] std::size_t added() const noexcept;
-  /// Writes what still waits, changes what the run has shown to have changed, and keeps what is
-  /// learnt in the file. Nothing where nothing was added and no place was certain. `what`: the run,
-  /// for the history. Throws as `add`. Gives what was kept true; empty where nothing could be.
+  /// Writes waiting views, updates the views that the run has shown to have changed, and stores the
+  /// models; does nothing if nothing was added and no place was certain. `what`: name of the run in
+  /// the history. Returns the changes of the update; empty without one. Throws as `add`.
   std::optional<MemoryUpdater::Changes> finish(const std::string& what = "update");
 
  private:

@@ -20,7 +20,7 @@ double seconds_since(Clock::time_point start) {
 
 }  // namespace
 
-std::size_t largest_component(const TopologicalMap& map) {
+std::size_t find_largest_component(const TopologicalMap& map) {
   std::map<std::size_t, std::size_t> sizes;
   for (const MapNode& node : map.nodes) ++sizes[node.component];
   std::size_t largest = 0;
@@ -108,7 +108,7 @@ Mapper::Result Mapper::finish() {
     file_.link(links);
     file_.save_map(map_name, run_.map);
     if (!any_pose_) {
-      const std::size_t component = largest_component(run_.map);
+      const std::size_t component = find_largest_component(run_.map);
       for (const MapNode& node : run_.map.nodes) {
         if (node.component != component) continue;
         file_.set_pose(node.view,

@@ -45,7 +45,7 @@ class Mapper {
     double mapping_s = 0.0;  ///< time of the mapping itself, without pictures and files
   };
 
-  /// An observation on its way into the map.
+  /// An encoded observation that is not in the map yet.
   struct EncodedView {
     FourierSignature signature;           ///< not packed, for the odometry
     ReferenceInfo info;                   ///< name, pose and stamp, as the memory keeps them
@@ -53,37 +53,37 @@ class Mapper {
     std::vector<std::uint8_t> thumbnail;  ///< a PNG; empty where none is kept
   };
 
-  /// The memory's own camera takes the pictures. Throws FileError as `MemoryFile::open`,
+  /// Pictures come from the memory's own camera. Throws FileError as `MemoryFile::open`,
   /// OptionError.
   explicit Mapper(const std::filesystem::path& memory, const MapperOptions& options = {});
-  /// A file open for writing. Pictures lie as `source` says; empty: as the memory's own. Throws
-  /// ContractError as `ViewEncoder`, OptionError.
+  /// Takes a file open for writing. `source`: layout of the pictures; empty: the memory's own.
+  /// Throws ContractError as `ViewEncoder`, OptionError.
   Mapper(MemoryFile memory, const std::optional<PictureSource>& source,
          const MapperOptions& options = {});
   Mapper(const Mapper&) = delete;
   Mapper& operator=(const Mapper&) = delete;
 
-  /// The component of `add` that several threads may do beside each other for observations to come.
-  /// Throws as `ViewEncoder::panorama`.
+  /// Encodes an observation for `add`; several threads may encode the next observations
+  /// concurrently. Throws as `ViewEncoder::panorama`.
   [[nodiscard]] EncodedView encode(const Observation& observation) const;
-  /// The next observation; whether it became a node. Throws as `encode`, FileError.
+  /// Adds the next observation. Returns true if it became a node. Throws as `encode`, FileError.
   bool add(EncodedView seen);
-  /// The same of an observation that is encoded here.
+  /// Encodes and adds the next observation.
   bool add(const Observation& observation) { return add(encode(observation)); }
 
-  /// All of a recording, then `finish`. Calls `mapped` after each picture. Throws as `add`, and
-  /// FileError on a picture that cannot be read.
+  /// Adds all observations of a recording and finishes. Calls `mapped` after each picture. Throws
+  /// as `add`, and FileError on a picture that cannot be read.
   Result map(const Dataset& recording, Executor& executor,
              const std::function<void()>& mapped = {});
 
-  /// Optimises what is not yet, and stores the map and a link for each of its edges. Where no
-  /// observation had a pose, the views of the largest component get those of the map. More
-  /// observations may follow. Throws FileError.
+  /// Optimises the nodes that are not optimised yet, and stores the map and a link for each of its
+  /// edges. Where no observation had a pose, the views of the largest component get those of the
+  /// map. More observations may follow. Throws FileError.
   Result finish();
 
-  /// As far as it is made, for people to look at: `finish` still moves nodes. Cost: a copy.
+  /// Returns the map so far, for display: `finish` still moves nodes. Cost: a copy.
   [[nodiscard]] TopologicalMap map_so_far() const { return mapper_.map(); }
-  /// The file that views are appended to.
+  /// Returns the file that views are appended to.
   [[nodiscard]] const MemoryFile& memory() const noexcept { return file_; }
   /// Returns the encoder that makes views of pictures.
   [[nodiscard]] const ViewEncoder& encoder() const noexcept { return encoder_; }
@@ -101,7 +101,7 @@ class Mapper {
   bool any_pose_ = false;
 };
 
-/// The component with the most nodes, of equal ones the first.
-[[nodiscard]] std::size_t largest_component(const TopologicalMap& map);
+/// Returns the component with the largest number of nodes, of equal ones the first.
+[[nodiscard]] std::size_t find_largest_component(const TopologicalMap& map);
 
 }  // namespace panonav

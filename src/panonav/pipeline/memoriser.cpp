@@ -32,7 +32,7 @@ std::string text_of(const Observation& observation) {
 Panorama first_panorama(const Observation& first, const PictureSource& source,
                         const SignatureOptions& signature) {
   if (const auto* ready = std::get_if<Panorama>(&first.picture)) return *ready;
-  const PanoramaReader reader(source, wanted_shape(source, signature));
+  const PanoramaReader reader(source, choose_panorama_shape(source, signature));
   try {
     return reader.convert(std::get<Image>(first.picture).view());
   } catch (const ContractError& error) {
@@ -43,9 +43,9 @@ Panorama first_panorama(const Observation& first, const PictureSource& source,
 
 }  // namespace
 
-MemoryHeader header_from_first(std::span<const Observation> first, const PictureSource& source,
-                               const SignatureOptions& signature,
-                               const PreprocessingOptions& preprocessing, Executor& executor) {
+MemoryHeader make_memory_header(std::span<const Observation> first, const PictureSource& source,
+                                const SignatureOptions& signature,
+                                const PreprocessingOptions& preprocessing, Executor& executor) {
   if (first.empty()) throw ContractError("observations", 0, "1 or more to make a memory of");
   MemoryHeader header;
   header.source = source;
@@ -80,14 +80,14 @@ MemoryHeader header_from_first(std::span<const Observation> first, const Picture
   return header;
 }
 
-MemoryHeader header_from_first_views(const Dataset& recording, const SignatureOptions& signature,
-                                     const PreprocessingOptions& preprocessing,
-                                     Executor& executor) {
+MemoryHeader make_header_of_recording(const Dataset& recording, const SignatureOptions& signature,
+                                      const PreprocessingOptions& preprocessing,
+                                      Executor& executor) {
   const std::size_t count = std::min(Memoriser::scale_views, recording.entries.size());
   std::vector<Observation> first(count, Observation(Image(1, 1)));
   for_each_entry(executor, count,
                  [&](std::size_t i) { first[i] = read_observation(recording.entries[i]); });
-  return header_from_first(first, recording.source, signature, preprocessing, executor);
+  return make_memory_header(first, recording.source, signature, preprocessing, executor);
 }
 
 Memoriser::Memoriser(const std::filesystem::path& memory, MemoriserOptions options)
@@ -118,8 +118,8 @@ void Memoriser::add(std::vector<Observation> observations, Executor& executor) {
 MemoryHeader Memoriser::header_of_waiting(Executor& executor) const {
   const auto first = std::span(waiting_).first(std::min(scale_views, waiting_.size()));
   const auto header_of = [&](std::span<const Observation> some) {
-    return header_from_first(some, *options_.source, options_.signature, options_.preprocessing,
-                             executor);
+    return make_memory_header(some, *options_.source, options_.signature, options_.preprocessing,
+                              executor);
   };
   try {
     return header_of(first);

@@ -16,7 +16,7 @@ namespace panonav {
 
 /// Options for memorising observations, and for new files.
 struct MemoriserOptions {
-  /// Kind and layout of the pictures. Empty: as those of the file; a new file needs it.
+  /// Kind and layout of the pictures. Empty: those of the file; a new file needs it.
   std::optional<PictureSource> source;
   SignatureOptions signature;          ///< of a new file
   PreprocessingOptions preprocessing;  ///< of a new file
@@ -24,50 +24,49 @@ struct MemoriserOptions {
   /// Keep local features, with which places 1 to 2 m apart are found (about 4 kB a view); none are
   /// kept where elevations are unknown.
   bool features = true;
-  /// Hears of an observation whose picture does not fit the others, such as one of another size,
-  /// which is then left out; empty: `add` throws.
+  /// Receives each observation that is left out because its picture does not fit the others, such
+  /// as one of another size; empty: `add` throws.
   std::function<void(const Observation&, const Error&)> left_out;
 };
 
-/// The header of a new memory: sizes from the first observation, the full scale from all of these.
-/// Throws ContractError on options that do not fit the pictures, FileError on observations without
-/// structure.
-[[nodiscard]] MemoryHeader header_from_first(std::span<const Observation> first,
-                                             const PictureSource& source,
-                                             const SignatureOptions& signature,
-                                             const PreprocessingOptions& preprocessing,
-                                             Executor& executor);
+/// Makes the header of a new memory: sizes from the first observation, the full scale from all of
+/// these. Throws ContractError on options that do not fit the pictures, FileError on observations
+/// without structure.
+[[nodiscard]] MemoryHeader make_memory_header(std::span<const Observation> first,
+                                              const PictureSource& source,
+                                              const SignatureOptions& signature,
+                                              const PreprocessingOptions& preprocessing,
+                                              Executor& executor);
 
-/// The same of a recording, whose first views decide the scale of the whole memory, so that nothing
-/// about light or scene need be known beforehand. Throws FileError also on pictures that cannot be
-/// read.
-[[nodiscard]] MemoryHeader header_from_first_views(const Dataset& recording,
-                                                   const SignatureOptions& signature,
-                                                   const PreprocessingOptions& preprocessing,
-                                                   Executor& executor);
+/// Makes the header of a new memory from the first views of a recording, so that nothing about
+/// light or scene need be known beforehand. Throws FileError also on pictures that cannot be read.
+[[nodiscard]] MemoryHeader make_header_of_recording(const Dataset& recording,
+                                                    const SignatureOptions& signature,
+                                                    const PreprocessingOptions& preprocessing,
+                                                    Executor& executor);
 
 /// Appends observations to a memory file, which is made where there is none:
 ///   panonav::Memoriser memoriser("office.panonav", {.source = source});
 ///   memoriser.add(observation);
 ///   memoriser.finish();
-/// A new file appears once as many observations have come as its full scale is taken from; after
-/// that a view is on the disk when `add` returns. In batches of any size and on any number of
-/// threads the same views are stored. One thread at a time.
+/// A new file appears with the `scale_views`th observation; from then on a view is on the disk when
+/// `add` returns. The stored views depend neither on the size of batches nor on the number of
+/// threads. One thread at a time.
 class Memoriser {
  public:
-  /// Observations that the full scale of a new memory is taken from.
+  /// Observations that decide the full scale of a new memory.
   static constexpr std::size_t scale_views = 32;
 
   /// Throws FileError as `MemoryFile::open`, ContractError as `ViewEncoder`, and for a new file
   /// without a source.
   explicit Memoriser(const std::filesystem::path& memory, MemoriserOptions options = {});
 
-  /// The observation's name becomes the view's; a name that the memory knows must come with the
-  /// same pose, stamp and picture, and is not stored again. Throws ContractError on an empty name,
-  /// FileError on another view under a known name, and as `ViewEncoder::panorama`.
+  /// Adds an observation; its name becomes the view's. An observation with a known name must have
+  /// the same pose, stamp and picture, and is not stored again. Throws ContractError on an empty
+  /// name, FileError on another view under a known name, and as `ViewEncoder::panorama`.
   void add(Observation observation);
-  /// The same, encoded on all threads and stored in one transaction. Those before one that is
-  /// refused are stored.
+  /// Adds observations, encoded on all threads and stored in one transaction. Those before a
+  /// refused one are stored.
   void add(std::vector<Observation> observations, Executor& executor);
 
   /// Numbers of observations by what became of them.
@@ -75,13 +74,13 @@ class Memoriser {
     std::size_t appended = 0;      ///< views that the file got
     std::size_t known_before = 0;  ///< observations whose views were there
   };
-  /// Writes what still waits for a new file's full scale, and keeps in the file what is learnt of
-  /// its views (`keep_models`). More may be added afterwards. Throws FileError; ContractError when
+  /// Writes observations that wait for a new file's full scale, and stores the models learnt of the
+  /// views (`keep_models`). More may be added afterwards. Throws FileError; ContractError when
   /// nothing was ever added.
   Counts finish();
-  Counts finish(Executor& executor);  ///< The same on all threads.
+  Counts finish(Executor& executor);  ///< Finishes on all threads.
 
-  /// Null as long as a new file waits for its full scale, as `encoder()`.
+  /// Returns the file; null while a new file waits for its full scale, as `encoder()`.
   [[nodiscard]] MemoryFile* file() noexcept { return file_ ? &*file_ : nullptr; }
   /// Returns the encoder that makes views of pictures; null as `file()`.
   [[nodiscard]] const ViewEncoder* encoder() const noexcept {

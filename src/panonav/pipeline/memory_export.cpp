@@ -26,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// A file within the folder that no other file or folder of the export is in the way of.
-bool names_a_file(const std::string& name) {
+bool is_file_name(const std::string& name) {
   constexpr std::array<std::string_view, 8> own{"dataset.toml", "poses.csv",      "images.csv",
                                                 "views.csv",    "signatures.npy", "memorise.toml",
                                                 "camera.toml",  "camera_mask.png"};
@@ -44,7 +44,7 @@ bool names_a_file(const std::string& name) {
 }
 
 /// The file of each view's picture: its name wherever that can be one.
-std::vector<std::string> picture_files(const std::vector<ViewRecord>& views) {
+std::vector<std::string> choose_picture_names(const std::vector<ViewRecord>& views) {
   std::set<std::string> files;
   std::set<std::string> folders;
   const auto take = [&](const std::string& name) {
@@ -61,7 +61,7 @@ std::vector<std::string> picture_files(const std::vector<ViewRecord>& views) {
   std::vector<std::string> names(views.size());
   for (std::size_t i = 0; i < views.size(); ++i) {
     const std::string& name = views[i].info.name;
-    if (names_a_file(name) && take(name)) names[i] = name;
+    if (is_file_name(name) && take(name)) names[i] = name;
   }
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (!names[i].empty()) continue;
@@ -97,7 +97,7 @@ class OptionText final : public OptionVisitor {
 };
 
 /// NumPy's format 1.0: whole numbers of 8 bit, views x (magnitudes, phases) x components x rows.
-std::vector<std::uint8_t> signature_array(const VisualMemory& memory) {
+std::vector<std::uint8_t> make_npy_array(const VisualMemory& memory) {
   const SignatureShape shape = memory.shape();
   std::string head = "{'descr': '|u1', 'fortran_order': False, 'shape': (" +
                      std::to_string(memory.size()) + ", 2, " + std::to_string(shape.components) +
@@ -134,7 +134,7 @@ MemoryExport export_memory(const MemoryFile& memory, const fs::path& folder,
                            .elevations = header.elevations};
   // Sampled too coarsely for the highest component, a picture would show another one.
   const bool large_enough = thumbnail_columns(header) >= 2 * header.shape.components;
-  std::vector<std::string> files = picture_files(views);
+  std::vector<std::string> files = choose_picture_names(views);
   std::vector<ViewId> ids;
   for (std::size_t i = 0; i < views.size(); ++i) {
     const auto& [view, info, links, thumbnail, component] = views[i];
@@ -155,7 +155,7 @@ MemoryExport export_memory(const MemoryFile& memory, const fs::path& folder,
   done.pictures = dataset.entries.size();
 
   write_file(out / "views.csv", std::string_view(view_table(views, files)));
-  write_file(out / "signatures.npy", signature_array(memory.load(ids)));
+  write_file(out / "signatures.npy", make_npy_array(memory.load(ids)));
   OptionText options;
   options.text = "[signature]\ncomponents = ";  // rows and columns are those of the pictures
   options.text.append(std::to_string(header.shape.components)).append("\n");

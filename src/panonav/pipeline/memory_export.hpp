@@ -10,8 +10,8 @@ namespace panonav {
 
 /// Contents of an export of a memory.
 struct MemoryExport {
-  std::size_t views = 0;  ///< in views.csv and signatures.npy
-  /// Views whose thumbnail is a picture of the data set; 0: there is no data set.
+  std::size_t views = 0;  ///< number in views.csv and signatures.npy
+  /// Number of views whose thumbnail is a picture of the data set; 0: there is no data set.
   std::size_t pictures = 0;
   /// Number of these whose name cannot be that of a file: their pictures have other names.
   std::size_t renamed = 0;
@@ -24,8 +24,8 @@ struct MemoryExport {
 };
 
 /// Writes views, poses, thumbnails and signatures into a new folder (docs/formats.md, section
-/// "Export of a memory"), which appears whole or not at all. Thumbnails that show all components of
-/// a signature become the pictures of a data set, enlarged to the size of the memory's panoramas,
+/// "Export of a memory"), which appears whole or not at all. Thumbnails with all components of a
+/// signature become the pictures of a data set, enlarged to the size of the memory's panoramas,
 /// from which `memorise` makes a memory of the same shape. `advance` is called after each view.
 /// Throws FileError when something but an empty folder is there, when the memory holds no view, and
 /// when a file cannot be written.

@@ -33,7 +33,7 @@ std::optional<Pose2> whole_pose(const ReferenceInfo& info) {
 
 /// All that the file knows of how its views lie to each other. The largest connected component is
 /// number 0.
-TopologicalMap map_of(const MemoryFile& file, const VisualMemory& views) {
+TopologicalMap read_or_make_map(const MemoryFile& file, const VisualMemory& views) {
   TopologicalMap map = file.map(map_name).value_or(TopologicalMap{});
   if (map.nodes.empty()) {
     for (const ViewId view : views.views()) {
@@ -47,7 +47,7 @@ TopologicalMap map_of(const MemoryFile& file, const VisualMemory& views) {
     }
     return map;
   }
-  const std::size_t largest = largest_component(map);
+  const std::size_t largest = find_largest_component(map);
   for (MapNode& node : map.nodes) {
     if (node.component == largest) {
       node.component = 0;
@@ -79,7 +79,7 @@ TopologicalMap map_of(const MemoryFile& file, const VisualMemory& views) {
   return map;
 }
 
-TopologicalMap part_of(const TopologicalMap& map, bool largest) {
+TopologicalMap select_components(const TopologicalMap& map, bool largest) {
   TopologicalMap part;
   for (const MapNode& node : map.nodes) {
     if ((node.component == 0) == largest) part.nodes.push_back(node);
@@ -93,7 +93,7 @@ TopologicalMap part_of(const TopologicalMap& map, bool largest) {
   return part;
 }
 
-TopologicalMap renamed(const TopologicalMap& map, const NewIds& ids) {
+TopologicalMap with_new_ids(const TopologicalMap& map, const NewIds& ids) {
   TopologicalMap result;
   for (MapNode node : map.nodes) {
     node.view = ids.at(node.view);
@@ -146,7 +146,8 @@ void require_comparable(const MemoryFile& first, const MemoryFile& second) {
 
 /// A name that is not taken: as it is, or after the file that it comes from.
 template <class IsTaken>
-std::string free_name(const std::string& name, const MemoryFile& from, const IsTaken& is_taken) {
+std::string make_free_name(const std::string& name, const MemoryFile& from,
+                           const IsTaken& is_taken) {
   if (!is_taken(name)) return name;
   const std::string base = fs::path(memory_name(from.path())).stem().string() + "/" + name;
   std::string new_name = base;
@@ -199,9 +200,10 @@ class Merge {
           ++result_.shared;
           continue;
         }
-        const std::string name = free_name(info.name, *files_[1], [&](const std::string& new_name) {
-          return views_[0].find(new_name) || (new_name != info.name && views.find(new_name));
-        });
+        const std::string name =
+            make_free_name(info.name, *files_[1], [&](const std::string& new_name) {
+              return views_[0].find(new_name) || (new_name != info.name && views.find(new_name));
+            });
         if (name != info.name) ++result_.renamed;
         info.name = name;
       }
@@ -215,9 +217,10 @@ class Merge {
   }
 
   TopologicalMap joined_map(const VisualMemory& all) {
-    const std::array own{map_of(*files_[0], views_[0]), map_of(*files_[1], views_[1])};
-    const std::array maps{renamed(own[0], ids_[0]), renamed(own[1], ids_[1])};
-    const std::array largest{part_of(maps[0], true), part_of(maps[1], true)};
+    const std::array own{read_or_make_map(*files_[0], views_[0]),
+                         read_or_make_map(*files_[1], views_[1])};
+    const std::array maps{with_new_ids(own[0], ids_[0]), with_new_ids(own[1], ids_[1])};
+    const std::array largest{select_components(maps[0], true), select_components(maps[1], true)};
     result_.alignment = align_sessions(all, largest[0], largest[1], alignment_);
     TopologicalMap map = largest[0];
     if (result_.alignment) {
@@ -225,7 +228,7 @@ class Merge {
     } else {
       add_apart(map, largest[1]);
     }
-    for (const TopologicalMap& one : maps) add_apart(map, part_of(one, false));
+    for (const TopologicalMap& one : maps) add_apart(map, select_components(one, false));
     return map;
   }
 
@@ -277,9 +280,10 @@ class Merge {
         route = std::move(moved);
       }
       const auto used_names = file.route_names();
-      const std::string new_name = free_name(name, *files_[from], [&](const std::string& other) {
-        return std::ranges::find(used_names, other) != used_names.end();
-      });
+      const std::string new_name =
+          make_free_name(name, *files_[from], [&](const std::string& other) {
+            return std::ranges::find(used_names, other) != used_names.end();
+          });
       if (new_name != name) ++result_.renamed;
       file.append_route(new_name, route);
     }

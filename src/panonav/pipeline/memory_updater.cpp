@@ -77,7 +77,7 @@ ObservationModel model_for(const MemoryFile& file, const ColumnRanking& ranking)
                         " views with position and heading; allowed where views are updated: " +
                         std::to_string(ObservationModel::min_views) + " or more");
   }
-  const auto models = kept_models(file, memory);
+  const auto models = load_kept_models(file, memory);
   if (models && models->observation) return *models->observation;
   try {
     return learn_observation_model(ranking);
@@ -118,8 +118,8 @@ MemoryUpdater::~MemoryUpdater() = default;
 MemoryUpdater::MemoryUpdater(MemoryUpdater&&) noexcept = default;
 MemoryUpdater& MemoryUpdater::operator=(MemoryUpdater&&) noexcept = default;
 
-void MemoryUpdater::see(const Observation& observation, const Panorama& panorama,
-                        const Place& place) {
+void MemoryUpdater::observe(const Observation& observation, const Panorama& panorama,
+                            const Place& place) {
   auto& self = *implementation_;
   self.require_unfinished();
   if (!observation.odometry) return;

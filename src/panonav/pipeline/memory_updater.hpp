@@ -11,18 +11,18 @@
 
 namespace panonav {
 
-/// Keeps a memory file true while its places change: hears what a robot saw on a run and what the
-/// memory answered, and at the end changes the file (`MemoryUpdate`):
+/// Keeps a memory file up to date while its places change: receives the observations of a run and
+/// the answers of the memory, and at the end changes the file (`MemoryUpdate`):
 ///   panonav::MemoryUpdater updater("office.panonav");
-///   updater.see(observation, panorama, recogniser.localise(observation));
+///   updater.observe(observation, panorama, recogniser.localise(observation));
 ///   updater.finish("update from monday");
 /// All changes of a run are one transaction, which `MemoryFile::undo` takes back. A run in which
-/// the robot's place was never certain leaves the file as it was. Holds what localisation holds of
-/// the memory, once more, and 10 kB a picture of at most 128 pictures and of those that are added.
+/// the robot's place was never certain leaves the file as it was. Holds the memory as
+/// localisation does, and 10 kB a picture of at most 128 pictures and of those that are added.
 class MemoryUpdater {
  public:
-  /// The file can be written and has views enough with positions and headings to learn an
-  /// `ObservationModel`. Throws FileError when not; OptionError.
+  /// Throws FileError if the file cannot be written or has too few views with positions and
+  /// headings to learn an `ObservationModel`; OptionError.
   explicit MemoryUpdater(const std::filesystem::path& memory,
                          const MemoryUpdateOptions& options = {});
   ~MemoryUpdater();
@@ -30,11 +30,11 @@ class MemoryUpdater {
   MemoryUpdater(MemoryUpdater&&) noexcept;
   MemoryUpdater& operator=(MemoryUpdater&&) noexcept;
 
-  /// The next observation, which needs its odometry (another says nothing and is left out), with
-  /// its panorama of the memory's shape and the answer of the memory. Throws ContractError on
-  /// another shape and after `finish`.
-  void see(const Observation& observation, const Panorama& panorama, const Place& place);
-  /// The observation seen last is so near to one whose place was surely known that the update will
+  /// Adds the next observation with its panorama, of the memory's shape, and the answer of the
+  /// memory. Observations without odometry are left out. Throws ContractError on another shape and
+  /// after `finish`.
+  void observe(const Observation& observation, const Panorama& panorama, const Place& place);
+  /// True if the last observation is so near to one whose place was certain that the update will
   /// place it by odometry.
   [[nodiscard]] bool is_near_known_place() const;
 
@@ -48,9 +48,8 @@ class MemoryUpdater {
     std::size_t forgotten = 0;   ///< views that were dropped because they had failed for long
     std::size_t views = 0;       ///< of the memory now
   };
-  /// Changes the file and learns its models again, in one transaction. `what`: the run, for the
-  /// history. Once. Throws FileError; the file is as it was then. Throws ContractError the second
-  /// time.
+  /// Changes the file and learns its models again, in one transaction. `what`: name of the run in
+  /// the history. Throws FileError, which leaves the file as it was; ContractError the second time.
   Changes finish(const std::string& what);
 
  private:
@@ -58,7 +57,7 @@ class MemoryUpdater {
   std::unique_ptr<Implementation> implementation_;
 };
 
-/// "12 views added, 3 replaced, 1 forgotten, 40 reinforced".
+/// Returns "12 views added, 3 replaced, 1 forgotten, 40 reinforced".
 [[nodiscard]] std::string as_text(const MemoryUpdater::Changes& changes);
 
 }  // namespace panonav

@@ -17,40 +17,39 @@
 
 namespace panonav {
 
-/// One moment of a robot: what its camera saw, and what else is known of it. A folder, a video, a
-/// live camera and a recording all become observations, and everything in `pipeline` takes them one
-/// at a time.
+/// A picture of a robot's camera with all that is known of that moment. A folder, a video, a live
+/// camera and a recording all become observations, and everything in `pipeline` takes them one at a
+/// time.
 struct Observation {
   // NOLINTNEXTLINE(google-explicit-constructor): a picture alone is an observation
-  /// A picture as the camera delivered it, and nothing else known.
+  /// Makes an observation of a picture as the camera delivered it, and nothing else known.
   Observation(Image seen) : picture(std::move(seen)) {}
   // NOLINTNEXTLINE(google-explicit-constructor)
-  /// A panoramic cylinder, and nothing else known.
+  /// Makes an observation of a panoramic cylinder, and nothing else known.
   Observation(Panorama seen) : picture(std::move(seen)) {}
 
-  /// As the camera delivered it, or a panoramic cylinder already.
+  /// Picture as the camera delivered it, or a panoramic cylinder.
   std::variant<Image, Panorama> picture;
-  /// The PNG or JPEG that a live picture was decoded from, for who passes it on; may be empty.
+  /// The PNG or JPEG that a live picture was decoded from, to be passed on; may be empty.
   std::vector<std::uint8_t> encoded;
   std::string name;  ///< of the view that a memory keeps; messages name it
-  /// Where the picture was read from; then errors about it are FileErrors that name the file.
+  /// File of the picture, if any; then errors about it are FileErrors that name the file.
   std::filesystem::path file;
   std::optional<double> stamp_s;  ///< when it was taken, seconds; ascending where times count
-  /// Absolute, in the frame of the odometry, which drifts against the world.
+  /// Absolute pose in the frame of the odometry, which drifts against the world.
   std::optional<Pose2> odometry;
-  /// In the world frame, where a survey or a simulation knows it. Memories keep it; no estimate of
-  /// this picture's own place ever reads it.
+  /// Pose in the world frame, from a survey or a simulation. Memories keep it; no estimate of this
+  /// picture's own place reads it.
   std::optional<ReferencePose> pose;
-  /// Measured by an inertial sensor. What is made of the picture is what a level robot would have
-  /// seen; where the elevations of the picture are not known, more than half a degree is refused
-  /// with ContractError.
+  /// Tilt measured by an inertial sensor, which panoramas compensate; where the elevations of the
+  /// picture are not known, more than half a degree is refused with ContractError.
   std::optional<Tilt> tilt;
 };
 
 /// Returns what `make()` returns. Where the picture was read from a file, a ContractError becomes a
 /// FileError that names it.
 template <class Make>
-auto about_picture(const Observation& observation, const Make& make) {
+auto rethrow_with_file_name(const Observation& observation, const Make& make) {
   try {
     return make();
   } catch (const ContractError& error) {

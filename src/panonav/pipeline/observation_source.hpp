@@ -13,19 +13,19 @@
 
 namespace panonav {
 
-/// The picture of an entry and what the data set knows of it; several threads may read at a time.
-/// Throws FileError on a picture that is missing or damaged.
+/// Reads the picture of an entry, and returns it with the entry's data; several threads may read at
+/// a time. Throws FileError on a picture that is missing or damaged.
 [[nodiscard]] Observation read_observation(const DatasetEntry& entry);
 
-/// Poses of all entries in the data set's frame. Where it knows positions but no headings, those
-/// along the way: the tangent fitted to the positions within 0.3 m of way to either side. Empty
-/// where it knows no positions.
+/// Returns the poses of all entries in the data set's frame. Without headings in the data set, they
+/// are those of the path: the tangent fitted to the positions within 0.3 m of path to either side.
+/// Empty without positions.
 [[nodiscard]] std::vector<Pose2> dataset_poses(const Dataset& dataset);
-/// Likewise by its odometry; empty where it has none.
+/// Returns the odometry of all entries likewise; empty without odometry.
 [[nodiscard]] std::vector<Pose2> odometry_poses(const Dataset& dataset);
 
-/// `make(i)` for 0 .. count - 1 on all threads, some at a time, and `use(i, made)` in order on this
-/// one. What one of them throws comes when all before it were used.
+/// Calls `make(i)` for 0 .. count - 1 on all threads, and `use(i, made)` in order on this one. An
+/// exception of `make` is thrown when all before it were used.
 template <class Make, class Use>
 void make_in_order(std::size_t count, Executor& executor, const Make& make, const Use& use) {
   constexpr std::size_t batch = 32;
@@ -47,31 +47,30 @@ void make_in_order(std::size_t count, Executor& executor, const Make& make, cons
   }
 }
 
-/// Where a robot's observations come from, one by one in the order in which they were made: a data
-/// set, a folder, a video, a camera.
+/// Source of a robot's observations, in the order in which they were made: a data set, a folder, a
+/// video, a camera.
 class ObservationSource {
  public:
   virtual ~ObservationSource() = default;
   /// Returns the kind and layout of all its pictures.
   [[nodiscard]] virtual const PictureSource& pictures() const noexcept = 0;
-  /// Empty when there is none left. Throws FileError on a picture that cannot be read; the next
-  /// call continues after it.
+  /// Returns the next observation; empty at the end. Throws FileError on a picture that cannot be
+  /// read; the next call continues after it.
   [[nodiscard]] virtual std::optional<Observation> next() = 0;
 };
 
-/// Those of a data set, a folder or a single picture. Pictures are decoded some ahead, on all
-/// threads of the executor, which must outlive *this; never more than `decoded_ahead` of them are
-/// held.
+/// Observations of a data set, a folder or a single picture. Up to `decoded_ahead` pictures are
+/// decoded in advance and held, on all threads of the executor, which must outlive *this.
 class DatasetObservations final : public ObservationSource {
  public:
   static constexpr std::size_t decoded_ahead = 16;  ///< pictures held at most
 
-  /// All entries of a data set, in its order.
+  /// Takes all entries of a data set, in its order.
   DatasetObservations(Dataset dataset, Executor& executor);
 
   [[nodiscard]] const PictureSource& pictures() const noexcept override { return dataset_.source; }
   [[nodiscard]] std::optional<Observation> next() override;
-  /// Entries in all.
+  /// Returns the number of entries.
   [[nodiscard]] std::size_t size() const noexcept { return dataset_.entries.size(); }
 
  private:

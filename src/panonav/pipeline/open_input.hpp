@@ -6,7 +6,7 @@
 
 namespace panonav {
 
-/// True if the folder has a dataset.toml, which says how its pictures lie.
+/// True if the folder has a dataset.toml, which describes the layout of its pictures.
 [[nodiscard]] bool has_dataset_file(const std::filesystem::path& folder);
 
 /// Opens a data set (a folder with dataset.toml), a folder of pictures, one picture, or what a

@@ -19,7 +19,7 @@ namespace {
 constexpr std::array<std::string_view, 4> origin_names{"map", "lattice", "links", "arrangement"};
 
 /// Empty when the file has nothing of the kind.
-std::optional<NavigationGraph> graph_from(GraphOrigin origin, const MemoryFileViews& source,
+std::optional<NavigationGraph> load_graph(GraphOrigin origin, const MemoryFileViews& source,
                                           Executor& executor) {
   const MemoryFile& file = source.file();
   switch (origin) {
@@ -46,28 +46,29 @@ std::optional<NavigationGraph> graph_from(GraphOrigin origin, const MemoryFileVi
   return std::nullopt;
 }
 
-NavigationGraph graph_of(const MemoryFileViews& source, const std::optional<GraphOrigin>& requested,
-                         GraphOrigin& origin, Executor& executor) {
+NavigationGraph load_requested_graph(const MemoryFileViews& source,
+                                     const std::optional<GraphOrigin>& requested,
+                                     GraphOrigin& origin, Executor& executor) {
   const std::string path = source.file().path().string();
   if (source.views().empty()) throw FileError(path, "holds no views; allowed: 2 or more");
   if (requested) {
     origin = *requested;
-    auto graph = graph_from(origin, source, executor);
+    auto graph = load_graph(origin, source, executor);
     if (graph) return std::move(*graph);
     throw FileError(path, "has no " + std::string(name_of(origin)) +
                               "; leave out the option edges for what there is");
   }
   for (std::size_t i = 0;; ++i) {
     origin = static_cast<GraphOrigin>(i);
-    auto graph = graph_from(origin, source, executor);
+    auto graph = load_graph(origin, source, executor);
     if (graph) return std::move(*graph);
   }
 }
 
 /// The route with those of the views that lie beside it, by their poses: both must have been
 /// recorded with the poses of one data set.
-KnownRoute route_among_views(const MemoryFileViews& source, const std::string& name,
-                             const KnownRouteOptions& options) {
+KnownRoute load_known_route(const MemoryFileViews& source, const std::string& name,
+                            const KnownRouteOptions& options) {
   const MemoryFile& file = source.file();
   const std::string path = file.path().string();
   if (!file.route(name)) {
@@ -76,8 +77,8 @@ KnownRoute route_among_views(const MemoryFileViews& source, const std::string& n
     throw FileError(path, "holds no route '" + name + "'; allowed for the option route: " +
                               (all.empty() ? "none, as none was recorded" : all));
   }
-  const RoutePanorama route = route_to_follow(file, name);
-  if (route_source(file, name, route.columns()).from_odometry) {
+  const RoutePanorama route = load_route_to_follow(file, name);
+  if (read_route_source(file, name, route.columns()).from_odometry) {
     throw FileError(path, "route '" + name +
                               "' is in the frame of its odometry, where no view is known to lie; "
                               "allowed: one recorded with the poses of a data set");
@@ -110,7 +111,7 @@ std::string_view name_of(GraphOrigin origin) {
   return origin_names.at(static_cast<std::size_t>(origin));
 }
 
-std::optional<GraphOrigin> graph_origin(std::string_view name) {
+std::optional<GraphOrigin> find_graph_origin(std::string_view name) {
   const auto found = std::ranges::find(origin_names, name);
   if (found == origin_names.end()) return std::nullopt;
   return static_cast<GraphOrigin>(found - origin_names.begin());
@@ -125,19 +126,19 @@ RobotNavigator::RobotNavigator(const std::filesystem::path& memory, const std::s
   validate(options_.base);
   Executor own(1);
   NavigationGraph graph =
-      graph_of(views_, options_.edges, origin_, executor == nullptr ? own : *executor);
+      load_requested_graph(views_, options_.edges, origin_, executor == nullptr ? own : *executor);
   navigator_.emplace(views_, AreaPlanner(std::move(graph), options_.planner), options_.navigator);
   set_goal(goal);
   if (!options_.route) return;
-  routes_.push_back(route_among_views(views_, *options_.route, options_.known_route));
+  routes_.push_back(load_known_route(views_, *options_.route, options_.known_route));
   const int columns = routes_.front().tracker.lines().columns();
-  route_source_ = route_source(views_.file(), *options_.route, columns);
+  route_source_ = read_route_source(views_.file(), *options_.route, columns);
   line_encoder_.emplace(source.value_or(encoder_.header().source), *route_source_);
   navigator_->set_routes(routes_);
 }
 
 void RobotNavigator::set_goal(const std::string& goal) {
-  const ViewId view = named_view(views_.file(), goal);
+  const ViewId view = find_view_by_name_or_id(views_.file(), goal);
   const auto node = graph().node_of(view);
   if (!node || graph().exits(*node).empty()) {
     throw FileError(views_.file().path().string(),

@@ -20,15 +20,15 @@ namespace panonav {
 
 /// Source of the edges between the views of a memory.
 enum class GraphOrigin {
-  map,          ///< stored by a `Mapper`: motions as the map has them
+  map,          ///< stored by a `Mapper`: the motions of the map
   lattice,      ///< stored by the verb `arrange`: directions from the views' phases
   links,        ///< of the memory: lengths, too
   arrangement,  ///< none of these is there: the views are arranged first
 };
-/// "map", "lattice", "links", "arrangement".
+/// Returns "map", "lattice", "links" or "arrangement".
 [[nodiscard]] std::string_view name_of(GraphOrigin origin);
-/// The origin of that name; empty where there is none.
-[[nodiscard]] std::optional<GraphOrigin> graph_origin(std::string_view name);
+/// Returns the origin of that name; empty if there is none.
+[[nodiscard]] std::optional<GraphOrigin> find_graph_origin(std::string_view name);
 
 /// Options for sending a robot to a goal.
 struct RobotNavigatorOptions {
@@ -36,15 +36,15 @@ struct RobotNavigatorOptions {
   PlannerOptions planner;            ///< how it plans
   BaseOptions base;                  ///< what velocity commands are made for
   std::optional<GraphOrigin> edges;  ///< empty: the first that the memory has
-  /// A recorded route of the memory to go along where the way leads along it.
+  /// Name of a recorded route of the memory, to be followed where the path leads along it.
   std::optional<std::string> route;
   KnownRouteOptions known_route;  ///< how the route is followed
 };
 
-/// Sends a robot to a remembered view by what it sees: a picture in, a velocity out. The views are
-/// read from the memory file when they are needed: those of one area and around it are held, of
-/// the rest the graph. While the graph is made, a map needs the views of its nodes and an
-/// arrangement all views at once; these are let go then. One thread at a time.
+/// Drives a robot to a remembered view by its pictures: a picture in, a velocity out. Views are
+/// read from the memory file when they are needed: those of one area and around it are held, of the
+/// rest only the graph. Making the graph needs the views of all nodes of a map, or all views for an
+/// arrangement; these are released afterwards. One thread at a time.
 class RobotNavigator {
  public:
   /// The robot's next motion after an observation.
@@ -54,9 +54,9 @@ class RobotNavigator {
     bool decided = false;         ///< by this observation; else the previous decision continues
   };
 
-  /// `goal`: name or id of a view. Pictures lie as `source` says; empty: as the memory's own.
-  /// Throws FileError when the memory holds no views, not what is asked for, or no edge leads to
-  /// the goal; OptionError.
+  /// `goal`: name or id of a view. `source`: layout of the pictures; empty: the memory's own.
+  /// Throws FileError when the memory has no views, not the edges or the route of the options, or
+  /// no edge leads to the goal; OptionError.
   RobotNavigator(const std::filesystem::path& memory, const std::string& goal,
                  const RobotNavigatorOptions& options = {},
                  const std::optional<PictureSource>& source = std::nullopt,
@@ -64,27 +64,27 @@ class RobotNavigator {
   RobotNavigator(const RobotNavigator&) = delete;
   RobotNavigator& operator=(const RobotNavigator&) = delete;
 
-  /// Another goal; where the robot is stays known. Throws FileError as the constructor.
+  /// Sets another goal; the robot's place stays known. Throws FileError as the constructor.
   void set_goal(const std::string& goal);
 
-  /// To be called once in each period of the base. The robot decides again when the previous step
-  /// is done, by odometry or else as commanded, and when `report` says that something stopped it;
-  /// only then the picture is evaluated. Throws as `ViewEncoder::signature` and
-  /// `Navigator::observe`.
+  /// Returns the next motion; to be called once in each period of the base. The robot decides again
+  /// when the previous step is done, by odometry or else as commanded, and when `report` says that
+  /// something stopped it; only then the picture is evaluated. Throws as `ViewEncoder::signature`
+  /// and `Navigator::observe`.
   [[nodiscard]] Step step(const Observation& observation, RobotReport report = {});
 
   /// Returns the source of the edges.
   [[nodiscard]] GraphOrigin origin() const noexcept { return origin_; }
   [[nodiscard]] ViewId goal() const noexcept { return goal_; }  ///< The goal's id in the memory.
-  /// The views and the edges between them.
+  /// Returns the views and the edges between them.
   [[nodiscard]] const NavigationGraph& graph() const noexcept { return planner().graph(); }
-  /// Knows the way, and which edges are blocked.
+  /// Returns the planner, which knows the path and the blocked edges.
   [[nodiscard]] const AreaPlanner& planner() const noexcept { return navigator_->planner(); }
-  /// The file that views are read from.
+  /// Returns the file that views are read from.
   [[nodiscard]] const MemoryFile& memory() const noexcept { return views_.file(); }
   /// Reads name, pose and stamp of a view from the file.
   [[nodiscard]] ReferenceInfo info(ViewId view) const;
-  /// For programs that observe and drive themselves.
+  /// Returns the navigator, for programs that observe and drive themselves.
   [[nodiscard]] Navigator& navigator() noexcept { return *navigator_; }
   /// Returns the encoder that makes queries of pictures.
   [[nodiscard]] const ViewEncoder& encoder() const noexcept { return encoder_; }

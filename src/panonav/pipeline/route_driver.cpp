@@ -23,7 +23,7 @@ RouteDriver::RouteDriver(const MemoryFile& memory, const std::optional<PictureSo
   }
 }
 
-void RouteDriver::start_at(Point2 place) {
+void RouteDriver::plan_path_from(Point2 place) {
   // A route that ends where it begins is driven from its beginning.
   constexpr double reach_m = 0.5;
   const auto passes = find_passes(poses(), place, reach_m);
@@ -57,7 +57,7 @@ RouteDriver::Step RouteDriver::step(const Observation& observation,
       if (++searches_ >= max_searches) step.state = RouteDriver::State::lost;
       return step;
     }
-    start_at(step.fix->pose.position());
+    plan_path_from(step.fix->pose.position());
   }
   step.along_m = start_m_ + path_->along_m();
   step.state = RouteDriver::State::lost;

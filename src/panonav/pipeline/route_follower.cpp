@@ -13,10 +13,10 @@ RouteFollower::RouteFollower(const std::filesystem::path& memory,
 RouteFollower::RouteFollower(const MemoryFile& memory, const std::optional<PictureSource>& source,
                              const RouteFollowerOptions& options)
     : options_(options),
-      name_(route_named(memory, options.name)),
-      source_(route_source(memory, name_, memory.route(name_).value().columns())),
+      name_(find_route_name(memory, options.name)),
+      source_(read_route_source(memory, name_, memory.route(name_).value().columns())),
       encoder_(source.value_or(memory.header().source), source_),
-      tracker_(route_to_follow(memory, name_), options.tracker, options.fit),
+      tracker_(load_route_to_follow(memory, name_), options.tracker, options.fit),
       changes_(tracker_.lines().poses()) {}
 
 RouteFollower::Step RouteFollower::step(std::vector<float> line,

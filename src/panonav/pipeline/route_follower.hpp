@@ -13,42 +13,43 @@
 
 namespace panonav {
 
-/// Which route is followed, and how the robot is found on it.
+/// Options for following a route.
 struct RouteFollowerOptions {
-  std::optional<std::string> name;  ///< of the route; empty: the only one that there is
-  RouteTrackerOptions tracker;      ///< where it is looked for, and when a fit is believed
+  std::optional<std::string> name;  ///< of the route; empty: the only one
+  RouteTrackerOptions tracker;      ///< where the robot is searched, and when a fit is believed
   RouteFitOptions fit;              ///< how lines are fitted
-  bool use_odometry = true;         ///< where observations have it; else each one alone
+  bool use_odometry = true;         ///< of observations that have it; else each is located alone
 };
 
-/// Says where a robot is beside a recorded route [Y03], observation by observation. Odometry
-/// predicts where the last observation and this one have it; where the prediction does not hold the
-/// robot is looked for around it, then on the whole route. One thread at a time, except `encode`.
+/// Finds a robot relative to a recorded route [Y03], observation by observation. Odometry, of
+/// observations that have it, predicts the place; where the prediction does not hold, the robot is
+/// searched around it, then on the whole route. One thread at a time, except `encode`.
 class RouteFollower {
  public:
-  /// The robot's position beside the route.
+  /// The robot's position relative to the route.
   struct Step {
-    std::vector<float> line;                          ///< what was seen
+    std::vector<float> line;                          ///< pixels of the observation's line
     std::optional<RouteFix> fix;                      ///< empty: not on this route
-    std::vector<RouteChanges::AzimuthRange> changed;  ///< where the scene is not as remembered
+    std::vector<RouteChanges::AzimuthRange> changed;  ///< where the scene differs from the route's
   };
 
-  /// The memory's own camera takes the pictures. Throws FileError, also when there is no such
+  /// Pictures come from the memory's own camera. Throws FileError, also when there is no such
   /// route, several and none is named, or it has fewer than two lines; OptionError.
   explicit RouteFollower(const std::filesystem::path& memory,
                          const RouteFollowerOptions& options = {});
-  /// Pictures lie as `source` says; empty: as the memory's own.
+  /// `source`: layout of the pictures; empty: the memory's own.
   RouteFollower(const MemoryFile& memory, const std::optional<PictureSource>& source,
                 const RouteFollowerOptions& options = {});
 
-  /// The part of `step` that several threads may do beside each other for observations to come.
-  /// Throws as `LineEncoder::line`.
+  /// Encodes an observation for `step`; several threads may encode the next observations
+  /// concurrently. Throws as `LineEncoder::line`.
   [[nodiscard]] std::vector<float> encode(const Observation& observation) const {
     return encoder_.line(observation);
   }
-  /// The next line, as `encode` gave it, with the odometry of its observation where it had one.
+  /// Finds the robot by the next line, which `encode` made, and the odometry of its observation, if
+  /// any.
   [[nodiscard]] Step step(std::vector<float> line, const std::optional<Pose2>& odometry);
-  /// The next observation. Throws as `encode`.
+  /// Encodes the next observation and finds the robot. Throws as `encode`.
   [[nodiscard]] Step step(const Observation& observation) {
     return step(encode(observation), observation.odometry);
   }
@@ -56,9 +57,9 @@ class RouteFollower {
   [[nodiscard]] const std::string& name() const noexcept {
     return name_;
   }  ///< Name of the route in the memory.
-  /// How its lines were taken, and where its poses came from.
+  /// Returns how the route's lines were made, and where its poses came from.
   [[nodiscard]] const RouteSource& source() const noexcept { return source_; }
-  /// Returns what follows the robot, with its present state.
+  /// Returns the tracker, with its present state.
   [[nodiscard]] const RouteTracker& tracker() const noexcept { return tracker_; }
 
  private:

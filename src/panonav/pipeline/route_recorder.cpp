@@ -13,36 +13,36 @@ constexpr std::size_t lines_at_once = 64;
 /// Largest gap between the end of a route and a line that continues it; chosen.
 constexpr double max_gap_m = 1.0;
 
-std::string route_text(const MemoryFile& file, const std::string& name) {
+std::string describe_route(const MemoryFile& file, const std::string& name) {
   return "the route '" + name + "' in " + file.path().string();
 }
 
 /// Lines can only go on with the same camera and in the same frame.
-RouteSource source_for(const MemoryFile& file, const RouteRecorderOptions& options) {
+RouteSource choose_source(const MemoryFile& file, const RouteRecorderOptions& options) {
   require(options.every_m >= 0.0, "every_m", options.every_m, ">= 0");
   RouteSource source{.line = options.line.value_or(HorizonScanlineOptions{}),
                      .horizon_rows = options.horizon_rows,
                      .from_odometry = options.odometry};
   const auto known = file.route(options.name);
   if (!known) return source;
-  const RouteSource before = route_source(file, options.name, known->columns());
+  const RouteSource before = read_route_source(file, options.name, known->columns());
   if (!options.line) source.line = before.line;
   if (!options.horizon_rows) source.horizon_rows = before.horizon_rows;
   if (source.line != before.line || source.horizon_rows != before.horizon_rows) {
     throw ContractError(
-        route_text(file, options.name) +
+        describe_route(file, options.name) +
         " was recorded with another value of the option columns, the option half_band_rad or "
         "the option horizon_rows; leave them out or take another name");
   }
   if (source.from_odometry != before.from_odometry) {
-    throw ContractError(route_text(file, options.name) + " is in the frame of " +
+    throw ContractError(describe_route(file, options.name) + " is in the frame of " +
                         (before.from_odometry ? "its odometry" : "its data set") +
                         ", these poses are not; take another name");
   }
   return source;
 }
 
-std::optional<Pose2> end_of(const MemoryFile& file, const std::string& name) {
+std::optional<Pose2> find_route_end(const MemoryFile& file, const std::string& name) {
   const auto known = file.route(name);
   if (!known || known->size() == 0) return std::nullopt;
   return known->poses().back();
@@ -63,9 +63,9 @@ RouteRecorder::RouteRecorder(MemoryFile memory, const std::optional<PictureSourc
                              const RouteRecorderOptions& options)
     : options_(options),
       file_(std::move(memory)),
-      source_(source_for(file_, options)),
+      source_(choose_source(file_, options)),
       encoder_(source.value_or(file_.header().source), source_),
-      end_(end_of(file_, options.name)) {}
+      end_(find_route_end(file_, options.name)) {}
 
 std::size_t RouteRecorder::skip_recorded(std::span<const Pose2> drive) {
   const auto route = file_.route(options_.name);
@@ -138,7 +138,7 @@ void RouteRecorder::flush() {
   }
   waiting_.clear();
   file_.change([&] {
-    if (!source_kept_) remember_route_source(file_, options_.name, source_);
+    if (!source_kept_) store_route_source(file_, options_.name, source_);
     appended_ += file_.append_route(options_.name, more);
   });
   source_kept_ = true;

@@ -19,72 +19,74 @@
 
 namespace panonav {
 
-/// Which route is recorded, and how.
+/// Options for recording a route.
 struct RouteRecorderOptions {
-  std::string name = "route";  ///< of the route; it grows if it is there
-  double every_m = 0.1;        ///< way between lines, >= 0
-  /// Empty: as the route has them that is there, else the defaults.
+  std::string name = "route";  ///< of the route; an existing one grows
+  double every_m = 0.1;        ///< distance between lines, >= 0
+  /// Empty: those of the existing route, else the defaults.
   std::optional<HorizonScanlineOptions> line;
   /// First and last row that show the horizon, counted from 0 at the top, of panoramas whose
-  /// elevations are not known. Empty: as the route has them, else all.
+  /// elevations are not known. Empty: those of the existing route, else all.
   std::optional<std::pair<int, int>> horizon_rows;
   bool odometry = false;  ///< remember the odometry's poses, even where observations have poses
 };
 
-/// Remembers a route as a line of pixels a step [Y03] in a memory file, where it is on the disk 64
-/// lines at a time. Poses are those of the observations, which must know their headings, or of
-/// their odometry, as the options say. One thread at a time, except `encode`.
+/// Records a route as one line of pixels a step [Y03] in a memory file, 64 lines in one
+/// transaction. Poses are those of the observations, which need headings, or those of their
+/// odometry, as the options say. One thread at a time, except `encode`.
 class RouteRecorder {
  public:
   /// The recorded route, and what this recorder added to it.
   struct Recorded {
     RoutePanorama route;       ///< all of its lines, those of earlier drives included
     std::size_t appended = 0;  ///< lines
-    std::uint64_t bytes = 0;   ///< of the route's lines and poses as they are kept
+    std::uint64_t bytes = 0;   ///< of the route's lines and poses as stored
     /// Bytes for each kilometre of the route; 0 for a route without length.
     [[nodiscard]] double bytes_per_km() const;
   };
 
-  /// A line on its way into the route.
+  /// A line that is not in the route yet.
   struct EncodedLine {
     Pose2 pose;               ///< in the route's frame
     std::vector<float> line;  ///< as `horizon_scanline` gives it
   };
 
-  /// The memory's own camera takes the pictures. Throws as the other.
+  /// Pictures come from the memory's own camera. Throws as the other.
   explicit RouteRecorder(const std::filesystem::path& memory,
                          const RouteRecorderOptions& options = {});
-  /// A file open for writing. Pictures lie as `source` says; empty: as the memory's own. Throws
-  /// ContractError when the route is there and was recorded otherwise, FileError.
+  /// Takes a file open for writing. `source`: layout of the pictures; empty: the memory's own.
+  /// Throws ContractError when the route is there and was recorded otherwise, FileError.
   RouteRecorder(MemoryFile memory, const std::optional<PictureSource>& source,
                 const RouteRecorderOptions& options = {});
 
   /// True if the place is `every_m` or more from the last line.
   [[nodiscard]] static bool is_due(const std::optional<Pose2>& last, const Pose2& next,
                                    double every_m);
-  /// The part of `add` that several threads may do beside each other for observations to come.
-  /// Throws as `LineEncoder::line`, ContractError on an observation with neither pose nor odometry.
+  /// Encodes an observation for `add`; several threads may encode the next observations
+  /// concurrently. Throws as `LineEncoder::line`, ContractError on an observation with neither pose
+  /// nor odometry.
   [[nodiscard]] EncodedLine encode(const Observation& observation) const;
   /// Returns the number of lines at the beginning of a drive that the route already holds, if it
   /// holds nothing else: an interrupted recording continues after them. 0 for any other route.
   [[nodiscard]] std::size_t skip_recorded(std::span<const Pose2> drive);
-  /// Whatever its distance from the line before. Throws FileError; at the first line also when the
-  /// route is there and ends farther than a metre from it.
+  /// Adds a line, whatever its distance from the line before. Throws FileError; at the first line
+  /// also when the route is there and ends farther than a metre from it.
   void add(EncodedLine line);
-  /// The next observation; whether a line was due. Throws as `encode` and the other.
+  /// Adds a line of the next observation if one is due. Returns true if it was. Throws as `encode`
+  /// and the other.
   bool add(const Observation& observation);
-  /// A whole drive: those entries at which a line is due, at these poses, one for each entry; what
-  /// the route holds of it is skipped. Calls `recorded` with their number after each line. Throws
-  /// as `add` and `finish`; those before a picture that cannot be read are kept.
+  /// Records a whole drive, with a pose for each entry: adds lines of those entries at which one is
+  /// due and skips those that the route already holds. Calls `recorded` with their number after
+  /// each line. Throws as `add` and `finish`; those before a picture that cannot be read are kept.
   Recorded record(const Dataset& drive, std::span<const Pose2> poses, Executor& executor,
                   const std::function<void(std::size_t lines)>& recorded = {});
   /// Writes what was added to the disk. Throws FileError; ContractError when nothing ever was
   /// added.
   Recorded finish();
 
-  /// The file that the route is in.
+  /// Returns the file of the route.
   [[nodiscard]] const MemoryFile& memory() const noexcept { return file_; }
-  /// Returns how its lines are made, and where its poses come from.
+  /// Returns how the route's lines are made, and where its poses come from.
   [[nodiscard]] const RouteSource& source() const noexcept { return source_; }
 
  private:

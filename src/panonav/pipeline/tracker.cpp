@@ -26,7 +26,7 @@ MonteCarloLocaliser localiser_for(const MemoryFile& file, const VisualMemory& me
   try {
     // The filter's seed is that of learning, too; what is kept was learnt with the default one.
     if (options.filter.seed == LearningOptions{}.seed) {
-      if (const auto models = kept_models(file, memory); models && models->observation) {
+      if (const auto models = load_kept_models(file, memory); models && models->observation) {
         return {std::make_shared<const ColumnRanking>(memory), *models->observation, options.filter,
                 options.odometry};
       }

@@ -14,7 +14,7 @@ namespace panonav {
 struct TrackerOptions {
   MonteCarloOptions filter;  ///< how particles are drawn and weighed
   OdometryNoise odometry;    ///< errors of the robot's wheels
-  /// How pictures lie; empty: as those that the memory was made from.
+  /// Layout of the pictures; empty: that of the memory's own.
   std::optional<PictureSource> source;
 };
 
@@ -31,30 +31,30 @@ class Tracker {
   /// The robot starts anywhere in the memorised area. Throws FileError on a file that is missing or
   /// damaged, or whose views do not know enough positions to learn from; OptionError.
   explicit Tracker(const std::filesystem::path& memory, const TrackerOptions& options = {});
-  /// The same of a file that is open.
+  /// Uses an open file.
   explicit Tracker(const MemoryFile& file, const TrackerOptions& options = {});
   ~Tracker();
   /// A moved-from object may only be destroyed or assigned to.
   Tracker(Tracker&&) noexcept;
   Tracker& operator=(Tracker&&) noexcept;
 
-  /// Forgets what is known of the robot, as `MonteCarloLocaliser` does.
+  /// Forgets the robot's pose, as `MonteCarloLocaliser::start_globally`.
   void start_globally(std::optional<double> heading_rad = std::nullopt);
-  /// Around a known pose, in the frame of the memory's positions.
+  /// Starts around a known pose, in the frame of the memory's positions.
   void start_at(const Pose2& pose, double deviation_m, double heading_deviation_rad);
 
   /// Moves by the odometry, where the observation has one, and takes the picture into account.
   /// Throws as `ViewEncoder::panorama`; the robot has moved then all the same.
   MonteCarloEstimate observe(const Observation& observation);
-  /// The picture alone, encoded by `encoder()` on another thread.
+  /// Takes only a picture into account, encoded by `encoder()` on another thread.
   MonteCarloEstimate observe(const PackedSignature& view);
-  /// Odometry between pictures, absolute in its own frame: the robot moves by the difference from
-  /// the one before; the first says nothing yet.
+  /// Moves the robot by the difference from the odometry before; the first call only sets it.
+  /// `odometry`: absolute, in its own frame.
   void move_to(const Pose2& odometry);
 
-  [[nodiscard]] const VisualMemory& memory() const noexcept;  ///< The views that are held.
-  [[nodiscard]] const ViewEncoder& encoder() const noexcept;  ///< Makes queries of pictures.
-  /// The filter, with its particles and its observation model.
+  [[nodiscard]] const VisualMemory& memory() const noexcept;  ///< Returns the held views.
+  [[nodiscard]] const ViewEncoder& encoder() const noexcept;  ///< Returns the encoder.
+  /// Returns the filter, with its particles and its observation model.
   [[nodiscard]] const MonteCarloLocaliser& localiser() const noexcept;
 
  private:

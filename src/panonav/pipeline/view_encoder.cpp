@@ -21,7 +21,7 @@ constexpr PanoramaShape default_shape{80, 512};  // [M04 section 2.1]
 
 /// Pictures that are resampled anyway are cut to the memory's band; ready-made panoramas stay as
 /// they are.
-PictureSource cut_to(const MemoryHeader& header, PictureSource source) {
+PictureSource cut_to_band(const MemoryHeader& header, PictureSource source) {
   if (source.kind != PictureKind::panorama) source.layout.kept_elevations = header.elevations;
   return source;
 }
@@ -30,7 +30,7 @@ bool both_ready_made(const MemoryHeader& header, const PictureSource& source) {
   return source.kind == PictureKind::panorama && header.source.kind == PictureKind::panorama;
 }
 
-PanoramaShape shape_for(const MemoryHeader& header, const PictureSource& source) {
+PanoramaShape panorama_shape_of(const MemoryHeader& header, const PictureSource& source) {
   if (both_ready_made(header, source) && !header.picture_shape) return {};
   return {header.shape.rows, header.panorama_columns};
 }
@@ -41,7 +41,7 @@ std::string band_text(const std::optional<ElevationBand>& band) {
          " degrees";
 }
 
-bool same_band(const std::optional<ElevationBand>& a, const std::optional<ElevationBand>& b) {
+bool is_same_band(const std::optional<ElevationBand>& a, const std::optional<ElevationBand>& b) {
   if (!a || !b) return !a && !b;
   constexpr double tolerance_rad = 1e-6;
   return std::abs(a->bottom_rad - b->bottom_rad) < tolerance_rad &&
@@ -67,12 +67,12 @@ void require_same(std::string_view field, int value, int remembered) {
 /// Buffers of the threads that encode at the moment, kept for those that will.
 class ViewEncoder::Workspaces {
  public:
-  class Taken {
+  class Borrowed {
    public:
-    explicit Taken(Workspaces& from) : from_(from), workspace_(from.take()) {}
-    ~Taken() { from_.give_back(std::move(workspace_)); }
-    Taken(const Taken&) = delete;
-    Taken& operator=(const Taken&) = delete;
+    explicit Borrowed(Workspaces& from) : from_(from), workspace_(from.borrow()) {}
+    ~Borrowed() { from_.return_workspace(std::move(workspace_)); }
+    Borrowed(const Borrowed&) = delete;
+    Borrowed& operator=(const Borrowed&) = delete;
     SignatureExtractor::Workspace& operator*() { return *workspace_; }
 
    private:
@@ -81,14 +81,14 @@ class ViewEncoder::Workspaces {
   };
 
  private:
-  std::unique_ptr<SignatureExtractor::Workspace> take() {
+  std::unique_ptr<SignatureExtractor::Workspace> borrow() {
     const std::lock_guard lock(mutex_);
     if (free_.empty()) return std::make_unique<SignatureExtractor::Workspace>();
     auto workspace = std::move(free_.back());
     free_.pop_back();
     return workspace;
   }
-  void give_back(std::unique_ptr<SignatureExtractor::Workspace> workspace) {
+  void return_workspace(std::unique_ptr<SignatureExtractor::Workspace> workspace) {
     const std::lock_guard lock(mutex_);
     free_.push_back(std::move(workspace));
   }
@@ -99,7 +99,7 @@ class ViewEncoder::Workspaces {
 
 ViewEncoder::ViewEncoder(const MemoryHeader& header, const PictureSource& source)
     : header_(header),
-      reader_(cut_to(header, source), shape_for(header, source)),
+      reader_(cut_to_band(header, source), panorama_shape_of(header, source)),
       extractor_({header.shape.rows, header.panorama_columns}, header.shape.components,
                  header.preprocessing),
       workspaces_(std::make_unique<Workspaces>()) {
@@ -125,13 +125,13 @@ Panorama ViewEncoder::checked(Panorama panorama) const {
 }
 
 void ViewEncoder::check_band(const std::optional<ElevationBand>& band) const {
-  if (same_band(band, header_.elevations)) return;
+  if (is_same_band(band, header_.elevations)) return;
   throw ContractError("elevation band", band_text(band),
                       band_text(header_.elevations) + std::string(as_remembered));
 }
 
 Panorama ViewEncoder::panorama(const Observation& observation) const {
-  return about_picture(observation, [&] {
+  return rethrow_with_file_name(observation, [&] {
     const Tilt tilt = observation.tilt.value_or(Tilt{});
     if (const auto* image = std::get_if<Image>(&observation.picture))
       return panorama(image->view(), tilt);
@@ -141,7 +141,7 @@ Panorama ViewEncoder::panorama(const Observation& observation) const {
 
 FourierSignature ViewEncoder::signature(const Observation& observation) const {
   if (observation.tilt.value_or(Tilt{}) != Tilt{}) return signature(panorama(observation));
-  return about_picture(observation, [&] {
+  return rethrow_with_file_name(observation, [&] {
     return std::visit(
         [this](const auto& picture) {
           if constexpr (std::is_same_v<std::decay_t<decltype(picture)>, Image>) {
@@ -158,7 +158,7 @@ FourierSignature ViewEncoder::signature(ImageView picture) const {
   const Unwarper* const unwarper = reader_.unwarper();
   if (unwarper == nullptr) return signature(panorama(picture));
   check_band(unwarper->elevations());
-  Workspaces::Taken workspace(*workspaces_);
+  Workspaces::Borrowed workspace(*workspaces_);
   return extractor_.signature(*unwarper, picture, *workspace);
 }
 
@@ -166,7 +166,7 @@ FourierSignature ViewEncoder::signature(const Panorama& panorama) const {
   require_same("rows", panorama.rows(), header_.shape.rows);
   require_same("columns", panorama.columns(), header_.panorama_columns);
   check_band(panorama.elevations());
-  Workspaces::Taken workspace(*workspaces_);
+  Workspaces::Borrowed workspace(*workspaces_);
   return extractor_.signature(panorama, *workspace);
 }
 
@@ -195,7 +195,7 @@ Panorama ViewEncoder::read(const DatasetEntry& entry) const {
   }
 }
 
-PanoramaShape wanted_shape(const PictureSource& source, const SignatureOptions& options) {
+PanoramaShape choose_panorama_shape(const PictureSource& source, const SignatureOptions& options) {
   PanoramaShape shape{options.rows, options.columns};
   if (source.kind == PictureKind::panorama) return shape;
   if (shape.rows == 0) shape.rows = default_shape.rows;

@@ -18,7 +18,7 @@
 
 namespace panonav {
 
-/// The cylinders' size that a user wants; 0: 80 x 512 [M04 section 2.1] for mirror and 360 degree
+/// Requested size of the cylinders; 0: 80 x 512 [M04 section 2.1] for mirror and 360 degree
 /// pictures, the picture's own for ready-made panoramas.
 struct SignatureOptions {
   int rows = 0;         ///< 0, or >= 1
@@ -27,11 +27,11 @@ struct SignatureOptions {
 };
 void visit_options(SignatureOptions& options, OptionVisitor& visitor);
 
-/// From a picture to what a memory compares, as the memory's header says. Tables are made once and
+/// Makes of a picture what a memory compares, as the memory's header says. Tables are made once and
 /// buffers are kept for the next picture. Several threads may use one at a time.
 class ViewEncoder {
  public:
-  /// Pictures lie as `source` says; those of the memory's own camera: `header.source`. Throws
+  /// `source`: layout of the pictures; that of the memory's own camera is `header.source`. Throws
   /// ContractError when the elevations of the pictures are not the memory's.
   ViewEncoder(const MemoryHeader& header, const PictureSource& source);
   ~ViewEncoder();
@@ -42,13 +42,14 @@ class ViewEncoder {
   /// Returns the header of the memory.
   [[nodiscard]] const MemoryHeader& header() const noexcept { return header_; }
 
-  /// The panoramic cylinder. Throws ContractError (FileError where the observation has a file) on a
-  /// picture of another size or band than the memory's, and on a tilt (`Observation::tilt`) that
-  /// cannot be compensated.
+  /// Returns the panoramic cylinder of an observation. Throws ContractError (FileError where the
+  /// observation has a file) on a picture of another size or band than the memory's, and on a tilt
+  /// (`Observation::tilt`) that cannot be compensated.
   [[nodiscard]] Panorama panorama(const Observation& observation) const;
-  /// The same of a picture alone.
+  /// Returns the panoramic cylinder of a picture.
   [[nodiscard]] Panorama panorama(ImageView picture, const Tilt& tilt = {}) const;
-  /// Throws FileError on a picture that is missing, damaged or of another size than the memory's.
+  /// Reads a picture. Throws FileError if it is missing, damaged or of another size than the
+  /// memory's.
   [[nodiscard]] Panorama read(const DatasetEntry& entry) const;
 
   /// Computes the signature of an observation; of a picture or of an existing panorama the same
@@ -59,11 +60,11 @@ class ViewEncoder {
   [[nodiscard]] FourierSignature signature(ImageView picture) const;
   /// Computes the signature of a panorama of the memory's shape.
   [[nodiscard]] FourierSignature signature(const Panorama& panorama) const;
-  /// The signature with the memory's full scale.
+  /// Computes the signature with the memory's full scale.
   [[nodiscard]] PackedSignature packed(const Observation& observation) const;
-  /// The same of a picture of a level robot.
+  /// Computes the same of a picture of a level robot.
   [[nodiscard]] PackedSignature packed(ImageView picture) const;
-  /// The same of a panorama of the memory's shape.
+  /// Computes the same of a panorama of the memory's shape.
   [[nodiscard]] PackedSignature packed(const Panorama& panorama) const;
 
   /// Extracts the local features of a panorama of the memory's shape; empty where elevations are
@@ -82,26 +83,27 @@ class ViewEncoder {
   std::optional<PanoramaShape> picture_shape_;  ///< of panoramas that are resampled
 };
 
-/// The size of the cylinders of a new memory, with the defaults filled in; 0: a panorama's own.
-[[nodiscard]] PanoramaShape wanted_shape(const PictureSource& source,
-                                         const SignatureOptions& options);
+/// Returns the size of the cylinders of a new memory, with the defaults filled in; 0: a panorama's
+/// own.
+[[nodiscard]] PanoramaShape choose_panorama_shape(const PictureSource& source,
+                                                  const SignatureOptions& options);
 
-/// The largest magnitude of k >= 1. k = 0 is the mean brightness: much larger than the rest, and it
-/// tells more of the light than of the place, so it may saturate.
+/// Returns the largest magnitude of k >= 1. The mean brightness, k = 0, is much larger than the
+/// rest and depends more on the light than on the place, so it may saturate.
 [[nodiscard]] float largest_structure(const FourierSignature& signature);
 
-/// A small picture of the view for people, as PNG.
+/// Returns a small picture of the view for people, as PNG.
 [[nodiscard]] std::vector<std::uint8_t> thumbnail_png(const Panorama& panorama);
 
-/// The panorama that `thumbnail_png` made a thumbnail of, as far as that kept it: of the memory's
-/// size, enlarged where the thumbnail is smaller. Columns and rows that do not fill a pixel of the
-/// thumbnail are missing there; what is left is stretched over them, by less than one pixel. Empty
-/// when the picture cannot be decoded or is of another size than thumbnails of this memory.
+/// Restores the panorama of a thumbnail of `thumbnail_png`: of the memory's size, enlarged where
+/// the thumbnail is smaller. Columns and rows that did not fill a pixel of the thumbnail are
+/// missing; the rest is stretched over them, by less than one pixel. Empty when the picture cannot
+/// be decoded or is of another size than thumbnails of this memory.
 [[nodiscard]] std::optional<Panorama> thumbnail_panorama(std::span<const std::uint8_t> thumbnail,
                                                          const MemoryHeader& header);
-/// That of a view of the file; empty where it has none.
+/// Restores the panorama of a view's thumbnail; empty if it has none.
 [[nodiscard]] std::optional<Panorama> thumbnail_panorama(const MemoryFile& file, ViewId view);
-/// Columns of a memory's thumbnails: its own up to 256.
+/// Returns the columns of a memory's thumbnails: its own up to 256.
 [[nodiscard]] int thumbnail_columns(const MemoryHeader& header) noexcept;
 
 /// Calls body(i) for 0 .. count - 1 on all threads.

@@ -74,7 +74,7 @@ std::string view_table(std::span<const ViewRecord> views, std::span<const std::s
   return table;
 }
 
-ViewId named_view(const MemoryFile& file, const std::string& name_or_id) {
+ViewId find_view_by_name_or_id(const MemoryFile& file, const std::string& name_or_id) {
   if (const auto named = file.find(name_or_id)) return *named;
   std::uint32_t id = 0;
   const auto [end, error] =

@@ -16,22 +16,24 @@ struct ViewRecord {
   ReferenceInfo info;      ///< name, pose and stamp
   std::size_t links = 0;   ///< to other views of the file
   bool thumbnail = false;  ///< a picture is stored with it
-  /// The connected component of the file's map (that called `map`, else its first) that it belongs
-  /// to; empty without a map, and for views that are not in it.
+  /// Connected component of the file's map (that called `map`, else its first); empty without a
+  /// map, and for views that are not in it.
   std::optional<std::size_t> component;
   friend bool operator==(const ViewRecord&, const ViewRecord&) = default;
 };
 
-/// All views of the file, ascending. Throws FileError on damage. Cost: that of `MemoryFile::load`.
+/// Returns all views of the file, ascending. Throws FileError on damage. Cost: that of
+/// `MemoryFile::load`.
 [[nodiscard]] std::vector<ViewRecord> list_views(const MemoryFile& file);
 
-/// The table of docs/formats.md, section "Tables of views": a header and one line for each view.
-/// `pictures`: empty, or for each view the file that holds its picture, empty where none does.
+/// Returns the table of docs/formats.md, section "Tables of views": a header and one line for each
+/// view. `pictures`: empty, or for each view the file that holds its picture, empty where none
+/// does.
 [[nodiscard]] std::string view_table(std::span<const ViewRecord> views,
                                      std::span<const std::string> pictures = {});
 
 /// Returns the view that a user means: a name first; a number that is no name is an id. Throws
 /// FileError that names the file when there is no such view.
-[[nodiscard]] ViewId named_view(const MemoryFile& file, const std::string& name_or_id);
+[[nodiscard]] ViewId find_view_by_name_or_id(const MemoryFile& file, const std::string& name_or_id);
 
 }  // namespace panonav

@@ -12,14 +12,13 @@
 /// Motion of robots without wheels' odometry, from their pictures.
 namespace panonav {
 
-/// The noise of odometry that is read from pictures, as a map takes it to be.
+/// Returns the noise that a map assumes for odometry from pictures.
 [[nodiscard]] OdometryNoise visual_odometry_noise();
-/// Reads motion from pictures in metres as views of the memory differ over known ways.
+/// Makes visual odometry whose metres are calibrated by views of the memory with known positions.
 [[nodiscard]] VisualOdometry visual_odometry(const VisualMemory& memory);
-/// Fills the odometry of all entries from the pictures themselves (`VisualOdometry`); metres as
-/// views of the memory differ over known ways. Says how many steps could not be read, where the
-/// robot then seems to stand, and which scale it took. Throws FileError on a picture that cannot be
-/// read.
+/// Fills the odometry of all entries from the pictures themselves (`VisualOdometry`), with metres
+/// calibrated by the memory. Returns a message: how many steps could not be read, at which the
+/// robot seems to stand, and the scale. Throws FileError on a picture that cannot be read.
 [[nodiscard]] std::string add_visual_odometry(Dataset& run, const VisualMemory& memory,
                                               const ViewEncoder& encoder, Executor& executor);
 

@@ -16,12 +16,12 @@ namespace panonav {
 /// blobs by their length too, so that different records never give the same bytes.
 class RecordBytes {
  public:
-  void add_null();                  ///< A field without a value.
-  void add(std::int64_t value);     ///< A whole number.
-  void add(double value);           ///< A real number, by its bits; both zeros are the same.
-  void add(std::string_view text);  ///< A text, by its bytes.
-  void add(std::span<const std::uint8_t> blob);  ///< Bytes as they are.
-  /// The value, or a field without one.
+  void add_null();                  ///< Adds a field without a value.
+  void add(std::int64_t value);     ///< Adds a whole number.
+  void add(double value);           ///< Adds a real number, by its bits; both zeros are the same.
+  void add(std::string_view text);  ///< Adds a text, by its bytes.
+  void add(std::span<const std::uint8_t> blob);  ///< Adds bytes.
+  /// Adds the value, or a field without one.
   template <class Value>
   void add(const std::optional<Value>& value) {
     if (value) {

@@ -11,13 +11,13 @@ namespace panonav {
 [[nodiscard]] bool is_server_address(const std::filesystem::path& memory);
 
 /// True if something is at the path, or the server has a memory of that name. Throws FileError when
-/// the server cannot be asked.
+/// the server cannot be reached.
 [[nodiscard]] bool memory_exists(const std::filesystem::path& memory);
 
 /// Returns the name of the memory's file, or its name on the server.
 [[nodiscard]] std::string memory_name(const std::filesystem::path& memory);
 
-/// Returns the text with "***" for each password in addresses of servers: what may be printed.
+/// Returns the text with "***" for each password in addresses of servers, for printing.
 [[nodiscard]] std::string without_passwords(std::string_view text);
 
 }  // namespace panonav

@@ -123,7 +123,7 @@ MemoryFile::MemoryFile(MemoryFile&&) noexcept = default;
 MemoryFile& MemoryFile::operator=(MemoryFile&&) noexcept = default;
 
 MemoryFile MemoryFile::create(const std::filesystem::path& path, const MemoryHeader& header) {
-  make_memory_tables(path, header, {});
+  create_memory_tables(path, header, {});
   return open(path, Access::read_write);
 }
 
@@ -139,12 +139,12 @@ MemoryFile MemoryFile::open(const std::filesystem::path& path, Access access) {
 
 void MemoryFile::copy_to(const std::filesystem::path& path) const {
   implementation_->read([&](MemoryTables& from) {
-    make_memory_tables(path, header(), [&](MemoryTables& to) {
+    create_memory_tables(path, header(), [&](MemoryTables& to) {
       for (const auto& [key, value] : from.settings()) {
         if (key.starts_with("parameter.")) to.write_setting(key, value);
       }
       constexpr std::size_t views_per_part = 1000;  // some megabytes
-      in_parts(views(), views_per_part, [&](std::span<const ViewId> ids) {
+      for_each_part(views(), views_per_part, [&](std::span<const ViewId> ids) {
         const VisualMemory memory = load(ids);
         std::vector<NewView> part;
         for (const ViewId id : ids) {
@@ -270,19 +270,19 @@ std::vector<std::string> MemoryFile::names() const {
 }
 
 std::vector<ViewId> MemoryFile::views_with_thumbnail() const {
-  return implementation_->tables->views_with(BesideViews::thumbnails);
+  return implementation_->tables->views_with_attachment(ViewAttachment::thumbnails);
 }
 
 std::optional<Bytes> MemoryFile::thumbnail(ViewId view) const {
-  return implementation_->tables->checked_bytes(BesideViews::thumbnails, view);
+  return implementation_->tables->read_checked_bytes(ViewAttachment::thumbnails, view);
 }
 
 bool MemoryFile::has_features() const {
-  return implementation_->tables->has_any(BesideViews::features);
+  return implementation_->tables->has_attachments(ViewAttachment::features);
 }
 
 std::optional<Bytes> MemoryFile::features(ViewId view) const {
-  return implementation_->tables->checked_bytes(BesideViews::features, view);
+  return implementation_->tables->read_checked_bytes(ViewAttachment::features, view);
 }
 
 void MemoryFile::set_parameter(std::string_view name, std::string_view value) {
@@ -350,7 +350,7 @@ void MemoryFile::rename_route(std::string_view name, std::string_view new_name) 
     const auto names = route_names();
     if (std::ranges::find(names, name) == names.end()) refuse_unknown("route", name);
     if (std::ranges::find(names, new_name) != names.end()) {
-      refuse_taken_name("route", new_name, path());
+      refuse_used_name("route", new_name, path());
     }
     panonav::rename_route(tables, name, new_name);
     // The source of its lines is renamed with it.

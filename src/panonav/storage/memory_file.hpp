@@ -21,8 +21,8 @@ namespace panonav {
 class RoutePanorama;
 struct TopologicalMap;
 
-/// Properties that all views of a memory share: how a picture becomes a signature that can be
-/// compared with them. Fixed when the file is made.
+/// Properties that all views of a memory share: how a picture becomes a comparable signature. Fixed
+/// when the file is made.
 struct MemoryHeader {
   SignatureShape shape;                     ///< rows and components of every view
   float full_scale = 1.0F;                  ///< magnitude that is packed as 255
@@ -30,7 +30,7 @@ struct MemoryHeader {
   int panorama_columns = 512;               ///< of the cylinders that the signatures are taken from
   /// Steps before the transform, the same for views and queries.
   PreprocessingOptions preprocessing;
-  PictureSource source;  ///< how queries without a data set of their own are read
+  PictureSource source;  ///< layout of queries that have no data set
   /// Rows and columns of ready-made panoramas that are resampled to the memory's; empty: they have
   /// the memory's own, or the pictures are of another kind.
   std::optional<PanoramaShape> picture_shape;
@@ -38,15 +38,15 @@ struct MemoryHeader {
   friend bool operator==(const MemoryHeader&, const MemoryHeader&) = default;
 };
 
-/// A view on its way into a memory file.
+/// A view to be added to a memory file.
 struct NewView {
   ReferenceInfo info;                   ///< name, pose and stamp; the name is new to the file
   PackedSignature signature;            ///< of the header's shape, packed with its full scale
-  std::vector<std::uint8_t> thumbnail;  ///< a PNG or JPEG file for people to look at; empty: none
+  std::vector<std::uint8_t> thumbnail;  ///< a PNG or JPEG file for display; empty: none
   std::vector<std::uint8_t> features;   ///< packed `LocalFeatures`; empty: none
 };
 
-/// For what a memory file is opened.
+/// Access for which a memory file is opened.
 enum class Access {
   read_only,  ///< others may write meanwhile
   read_write  ///< one process at a time
@@ -54,12 +54,12 @@ enum class Access {
 
 /// A visual memory on disk: an SQLite file (docs/formats.md), or with the address of a server
 /// (memory_address.hpp) the same on PostgreSQL (docs/scale.md), where `path` is the address without
-/// a password and a lost connection is a FileError. What a changing member function returned for is
-/// still there after the process is killed or the machine loses its power. One process writes at a
-/// time, any number read beside it, each seeing a state between two changes. A damaged or foreign
-/// file or one of another format version is refused and never changed. One object belongs to one
-/// thread at a time. All member functions throw FileError; those that change something leave the
-/// file as it was when they throw.
+/// a password and a lost connection is a FileError. A change is durable when its member function
+/// returns: it survives a killed process and a power failure. One process writes at a time; any
+/// number read concurrently, each seeing a state between two changes. A damaged or foreign file or
+/// one of another format version is refused and never changed. One object belongs to one thread at
+/// a time. All member functions throw FileError; those that change something leave the file as it
+/// was when they throw.
 class MemoryFile {
  public:
   /// A fault that `verify` found.
@@ -106,34 +106,35 @@ class MemoryFile {
   /// Opens the same memory again, for another thread.
   [[nodiscard]] MemoryFile reopen(Access access) const;
   /// Makes a memory at `path`, in a file or on a server, that holds the same under the same ids:
-  /// whole or not at all. The change that could be undone is not taken along. Throws FileError as
-  /// `create`, and on damage.
+  /// whole or not at all. The history for `undo` is not copied. Throws FileError as `create`, and
+  /// on damage.
   void copy_to(const std::filesystem::path& path) const;
 
-  [[nodiscard]] const MemoryHeader& header() const noexcept;  ///< Fixed when the file was made.
-  /// As it was given to `create` or `open`; of a server the address without its password.
+  [[nodiscard]] const MemoryHeader& header()
+      const noexcept;  ///< Returns the header, fixed when the file was made.
+  /// Returns the path of `create` or `open`; of a server, the address without its password.
   [[nodiscard]] const std::filesystem::path& path() const noexcept;
 
   /// Makes all changes that `changes` makes through the member functions below in one transaction:
   /// all are on the disk when this returns, none when `changes` throws or the process ends before.
-  /// With `undo`, a description for people, what it replaced or dropped is kept in the file, above
-  /// what was kept before, so that `undo` brings it back. Of changes beyond the newest
-  /// `max_undo_levels`, and of those with which more than `max_history_bytes` would be kept, the
-  /// description alone is left, of those beyond `max_history` nothing; a server keeps one. Throws
+  /// With `undo`, a description for people, the replaced and dropped rows are kept in the file for
+  /// `undo`. Of changes beyond the newest `max_undo_levels` or `max_history_bytes` only the
+  /// description is kept, of those beyond `max_history` nothing; a server keeps one. Throws
   /// FileError when the change itself takes more than 200 MiB.
   void change(const std::function<void()>& changes,
               const std::optional<std::string>& undo = std::nullopt);
-  static constexpr std::size_t max_undo_levels = 100;  ///< Changes that can be taken back.
-  /// What they may take in the file; the newest is kept whatever it takes.
+  static constexpr std::size_t max_undo_levels = 100;  ///< Number of changes that can be undone.
+  /// Their size in the file; the newest is kept whatever its size.
   static constexpr std::uint64_t max_history_bytes = 64U << 20U;
-  static constexpr std::size_t max_history = 1000;  ///< Changes whose description is kept.
+  static constexpr std::size_t max_history =
+      1000;  ///< Number of changes whose description is kept.
   /// Returns the changes that were kept for `undo` and not undone, the newest first.
   [[nodiscard]] std::vector<KeptChange> history() const;
   /// Returns the description of the change that `undo` would undo; nullopt: there is none.
   [[nodiscard]] std::optional<std::string> undoable() const;
-  /// Undoes the newest kept change, in one transaction; the one before it is the newest then. What
-  /// was added since stays. Throws ContractError when there is none, FileError when later changes
-  /// are in the way.
+  /// Undoes the newest kept change, in one transaction; the one before it becomes the newest. Views
+  /// added since stay. Throws ContractError when there is none, FileError when later changes are in
+  /// the way.
   void undo();
 
   /// Adds a view and returns once it is on the disk. Throws ContractError on another shape, an
@@ -142,86 +143,84 @@ class MemoryFile {
   ViewId append(const NewView& view);
   /// Adds views in one transaction: all or none. Much faster than one by one.
   std::vector<ViewId> append(std::span<const NewView> views);
-  /// Also drops the view's links, thumbnail and features and its node in maps, in one transaction
-  /// for all. Throws ContractError when there is no such view; then nothing is removed.
+  /// Removes views with their links, thumbnails, features and nodes in maps, in one transaction.
+  /// Throws ContractError when there is no such view; then nothing is removed.
   void remove(std::span<const ViewId> views);
-  /// Replaces what is known of the pose; empty: it is unknown. Throws ContractError when there is
-  /// no such view, and on a pose that is not finite.
+  /// Replaces the pose of a view; empty: it is unknown. Throws ContractError when there is no such
+  /// view, and on a pose that is not finite.
   void set_pose(ViewId view, const std::optional<ReferencePose>& pose);
   /// Gives a view another name. Throws ContractError when there is no such view, and on a name that
   /// another view has, is empty, has control characters or more than 4096 bytes.
   void rename(ViewId view, std::string_view name);
-  /// A second link of the same two views replaces the first. All links in one transaction.
+  /// Adds links in one transaction. A second link of the same two views replaces the first.
   void link(std::span<const Link> links);
-  /// Drops the link of the two views, in whichever order; nothing happens where there is none.
+  /// Removes the link of two views, in either order, if there is one.
   void unlink(ViewId a, ViewId b);
 
   /// Returns the view of that name; nullopt when there is none. Cost: a look-up in an index.
   [[nodiscard]] std::optional<ViewId> find(std::string_view name) const;
-  /// Returns the names of all views by ascending id: those that a resumed recording need not add
-  /// again.
+  /// Returns the names of all views by ascending id; a resumed recording need not add them again.
   [[nodiscard]] std::vector<std::string> names() const;
   /// Returns the views that a picture file was stored with, ascending.
   [[nodiscard]] std::vector<ViewId> views_with_thumbnail() const;
-  /// Returns the picture file that was stored with the view; nullopt where there is none.
+  /// Returns the picture file that was stored with the view; nullopt if there is none.
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> thumbnail(ViewId view) const;
 
   /// True if any view has local features. Cost: a look-up.
   [[nodiscard]] bool has_features() const;
-  /// Returns the packed local features of the view; nullopt where there are none.
+  /// Returns the packed local features of the view; nullopt if there are none.
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> features(ViewId view) const;
 
-  /// Stores what was learnt from the views (a model of unknown places, weights) by name, as text.
+  /// Stores a text by name, such as a model or weights that were learnt from the views.
   void set_parameter(std::string_view name, std::string_view value);
-  /// Returns what `set_parameter` stored under the name; nullopt where there is nothing.
+  /// Returns the text that `set_parameter` stored under the name; nullopt if there is none.
   [[nodiscard]] std::optional<std::string> parameter(std::string_view name) const;
 
-  /// Keeps a map under a name, instead of the one that had it. Throws ContractError on
-  /// an empty name, a view that is not in the file, and as `validate`.
+  /// Stores a map under a name, replacing the map of that name. Throws ContractError on an empty
+  /// name, a view that is not in the file, and as `validate`.
   void save_map(std::string_view name, const TopologicalMap& map);
   /// Returns the same bits as were saved; nullopt when there is no such map.
   [[nodiscard]] std::optional<TopologicalMap> map(std::string_view name) const;
-  /// Throws ContractError when there is no such map.
+  /// Removes a map. Throws ContractError when there is no such map.
   void remove_map(std::string_view name);
-  /// Ascending.
+  /// Returns the names, ascending.
   [[nodiscard]] std::vector<std::string> map_names() const;
 
-  /// Adds lines to the route of that name, which is made where there is none; all of them or none.
-  /// Returns how many were added: the first ones are left out while they lie within a millimetre of
-  /// the last line there. Throws ContractError on
-  /// an empty name, no lines, and another number of columns than the route has. Cost: that of the
-  /// lines and at most 256 more.
+  /// Adds lines to the route of that name, which is made if there is none; all of them or none. The
+  /// first lines are left out while they are within a millimetre of the last line there. Returns
+  /// the number of added lines. Throws ContractError on an empty name, no lines, and another number
+  /// of columns than the route has. Cost: that of the lines and at most 256 more.
   std::size_t append_route(std::string_view name, const RoutePanorama& more);
   /// Returns the same bits as were appended; nullopt when there is no such route.
   [[nodiscard]] std::optional<RoutePanorama> route(std::string_view name) const;
-  /// Returns the size of its lines and poses as they are kept, packed without loss. Throws
+  /// Returns the size of the route's lines and poses as stored, packed without loss. Throws
   /// ContractError when there is no such route.
   [[nodiscard]] std::uint64_t route_bytes(std::string_view name) const;
-  /// Throws ContractError when there is no such route.
+  /// Removes a route. Throws ContractError when there is no such route.
   void remove_route(std::string_view name);
   /// Gives a route another name. Throws ContractError when there is no such route, and on a new
   /// name as `rename`. Cost: every line is written again.
   void rename_route(std::string_view name, std::string_view new_name);
-  /// Ascending.
+  /// Returns the names, ascending.
   [[nodiscard]] std::vector<std::string> route_names() const;
 
   /// Loads all views and links. Checks every view's checksum and throws FileError at the first
   /// fault. 100,000 views of 80 x 15 take about 0.6 s of processor time.
   [[nodiscard]] VisualMemory load() const;
-  /// Loads these views alone, which must ascend, without links; nothing else of the file is read.
-  /// Each view's checksum is checked. Throws ContractError on a view that is not in the file. Cost:
-  /// some 10 microseconds a view.
+  /// Loads these views, which must ascend, without links; nothing else of the file is read. Each
+  /// view's checksum is checked. Throws ContractError on a view that is not in the file. Cost: some
+  /// 10 microseconds a view.
   [[nodiscard]] VisualMemory load(std::span<const ViewId> views) const;
   /// Returns all views, ascending.
   [[nodiscard]] std::vector<ViewId> views() const;
-  /// Returns the views whose position lies in these bounds, each included, ascending. On a server
-  /// an index of positions is used; a file is read through.
+  /// Returns the views whose positions are within these bounds, each included, ascending. On a
+  /// server an index of positions is used; a file is read through.
   [[nodiscard]] std::vector<ViewId> views_within(const PositionBounds& bounds) const;
   /// Returns all links, ascending.
   [[nodiscard]] std::vector<Link> links() const;
-  /// Finds everything that is wrong with the file: structure, then view by view. Empty: intact.
+  /// Returns all faults of the file: of its structure, then view by view. Empty: intact.
   [[nodiscard]] std::vector<Fault> verify() const;
-  /// Counts rows and sizes; nothing is checked. Cost: a pass over the rows of the tables.
+  /// Counts rows and sizes without checks. Cost: a pass over the rows of the tables.
   [[nodiscard]] Info info() const;
 
  private:

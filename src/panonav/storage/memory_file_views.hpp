@@ -10,22 +10,22 @@
 namespace panonav {
 
 /// Reads views of a memory file when they are needed: a robot holds a part of a large memory. The
-/// file is opened for reading only; while others change it, each `load` reads it as it is then. A
+/// file is opened for reading only; while others change it, each `load` reads its present state. A
 /// view whose bytes are damaged is refused when it is loaded, not before. One object belongs to one
 /// thread at a time.
 class MemoryFileViews final : public ViewSource {
  public:
-  /// Throws FileError as `MemoryFile::open`. Holds the ids, no view.
+  /// Opens the file and reads the ids, no view. Throws FileError as `MemoryFile::open`.
   explicit MemoryFileViews(const std::filesystem::path& path)
       : file_(MemoryFile::open(path, Access::read_only)), views_(file_.views()) {}
 
-  /// Returns the views that there were when the file was opened.
+  /// Returns the views that the file had when it was opened.
   [[nodiscard]] std::span<const ViewId> views() const override { return views_; }
-  /// Throws FileError, ContractError as `MemoryFile::load`.
+  /// Loads views. Throws FileError, ContractError as `MemoryFile::load`.
   [[nodiscard]] VisualMemory load(std::span<const ViewId> views) const override {
     return file_.load(views);
   }
-  /// Returns the open file, for what it holds besides views.
+  /// Returns the open file.
   [[nodiscard]] const MemoryFile& file() const noexcept { return file_; }
 
  private:

@@ -322,7 +322,7 @@ void validate(const MemoryHeader& header) {
   }
 }
 
-Settings settings_of(const MemoryHeader& header) {
+Settings to_settings(const MemoryHeader& header) {
   SettingsWriter writer;
   visit_header(writer, header);
   const PictureSource& source = header.source;
@@ -331,7 +331,7 @@ Settings settings_of(const MemoryHeader& header) {
   return std::move(writer.settings);
 }
 
-MemoryHeader header_from(const Settings& settings) {
+MemoryHeader to_header(const Settings& settings) {
   SettingsReader reader(settings);
   MemoryHeader header;
   visit_header(reader, header);

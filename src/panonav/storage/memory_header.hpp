@@ -21,14 +21,14 @@ using Settings = std::map<std::string, SettingValue, std::less<>>;
 /// views are removed or renamed.
 inline constexpr std::string_view recordings_parameter = "recordings";
 
-/// Throws ContractError or OptionError that names the field, its value and its range.
+/// Checks a header. Throws ContractError or OptionError that names the field, its value and its
+/// range.
 void validate(const MemoryHeader& header);
 
-/// The header as settings, and back. `header_from` throws ContractError on a missing, unknown or
-/// impossible entry. Entries whose key starts with "parameter." or "synchronised." are no part of
-/// the header.
-[[nodiscard]] Settings settings_of(const MemoryHeader& header);
-/// The header that such settings tell.
-[[nodiscard]] MemoryHeader header_from(const Settings& settings);
+/// Converts the header to settings.
+[[nodiscard]] Settings to_settings(const MemoryHeader& header);
+/// Converts settings to a header; entries whose key starts with "parameter." or "synchronised." are
+/// no part of it. Throws ContractError on a missing, unknown or impossible entry.
+[[nodiscard]] MemoryHeader to_header(const Settings& settings);
 
 }  // namespace panonav

@@ -12,14 +12,14 @@ namespace panonav {
 
 class MemoryTables;
 
-/// Memories that do not lie in files: they have addresses "SCHEME://...". All functions throw
-/// FileError when what keeps the memories cannot be reached or refuses.
+/// Access to memories that are not in files: they have addresses "SCHEME://...". All functions
+/// throw FileError when the server cannot be reached or refuses.
 class MemoryScheme {
  public:
   virtual ~MemoryScheme() = default;
   /// True if there is a memory at the address.
   [[nodiscard]] virtual bool exists(const std::filesystem::path& address) const = 0;
-  /// Returns what people call the memory. Throws FileError on an address that names none.
+  /// Returns the name of the memory. Throws FileError on an address that names none.
   [[nodiscard]] virtual std::string name_memory(const std::filesystem::path& address) const = 0;
   /// Makes a memory with what `fill` writes, whole or not at all. Throws FileError when there is
   /// one already.
@@ -29,20 +29,19 @@ class MemoryScheme {
   /// the user may not change it.
   [[nodiscard]] virtual std::unique_ptr<MemoryTables> open(const std::filesystem::path& address,
                                                            Access access) const = 0;
-  /// Listens to changes of a memory from here on. The function that it returns does not wait; it
-  /// returns true if the memory was changed since its last call, and throws FileError when what
-  /// keeps the memory cannot be reached. Throws FileError when there is no such memory.
+  /// Listens to changes of a memory from here on. The returned function does not wait; it returns
+  /// true if the memory was changed since its last call, and throws FileError when the server
+  /// cannot be reached. Throws FileError when there is no such memory.
   [[nodiscard]] virtual std::function<bool()> listen(
       const std::filesystem::path& address) const = 0;
-  /// Opens the index of a memory that is searched where it lies. Throws FileError when there is
+  /// Opens the index of a memory that is searched on its server. Throws FileError when there is
   /// none.
   [[nodiscard]] virtual std::unique_ptr<IndexedMemory> open_index(
       const std::filesystem::path& address) const = 0;
 };
 
-/// Makes addresses of this scheme ("postgresql") stand for memories wherever this process takes the
-/// path of a memory file; the scheme that was registered under the name before is replaced. Any
-/// thread may call.
+/// Registers a scheme ("postgresql"), whose addresses this process then accepts wherever it takes
+/// the path of a memory file; replaces the scheme of that name. Any thread may call.
 void register_memory_scheme(std::string_view name, std::shared_ptr<const MemoryScheme> scheme);
 
 /// Returns the scheme of an address, nullptr for the path of a file. Throws FileError on an address

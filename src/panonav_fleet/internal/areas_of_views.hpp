@@ -28,7 +28,7 @@ class AreasOfViews {
   [[nodiscard]] bool has(ViewId view) const {
     return view.value < numbers_.size() && numbers_[view.value] != no_view;
   }
-  /// Ascending. Cost: a pass over all ids.
+  /// Returns the names, ascending. Cost: a pass over all ids.
   [[nodiscard]] std::vector<ViewId> within(const std::set<MemoryArea>& areas) const {
     std::vector<std::uint32_t> known;
     for (const MemoryArea& area : areas) {

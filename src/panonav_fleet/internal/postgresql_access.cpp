@@ -42,13 +42,13 @@ std::optional<FoundMemory> find_memory(MemoriesConnection& memories, const Serve
   return FoundMemory{rows.integer(0, 0), std::string(rows.text(0, 1))};
 }
 
-void refuse_no_memory(const ServerAddress& address) {
+void refuse_missing_memory(const ServerAddress& address) {
   throw FileError(address.shown.native(), "there is no memory '" + address.memory +
                                               "' on this server that this login may see");
 }
 
-void make_postgresql_memory(const ServerAddress& address, const MemoryHeader& header,
-                            const std::function<void(MemoryTables&)>& fill) {
+void create_postgresql_memory(const ServerAddress& address, const MemoryHeader& header,
+                              const std::function<void(MemoryTables&)>& fill) {
   validate(header);
   PostgresqlConnection connection = connect_to_memories(address, true).connection;
   connection.execute("BEGIN");
@@ -65,9 +65,9 @@ void make_postgresql_memory(const ServerAddress& address, const MemoryHeader& he
   }
   PostgresqlTables tables(address, std::move(connection), made.integer(0, 0),
                           std::string(made.text(0, 1)));
-  for (const auto& [key, value] : settings_of(header)) tables.write_setting(key, value);
+  for (const auto& [key, value] : to_settings(header)) tables.write_setting(key, value);
   if (fill) fill(tables);
-  tables.commit_made();
+  tables.commit_creation();
 }
 
 namespace {
@@ -86,7 +86,7 @@ class PostgresqlScheme final : public MemoryScheme {
 
   void create(const std::filesystem::path& address, const MemoryHeader& header,
               const std::function<void(MemoryTables&)>& fill) const override {
-    make_postgresql_memory(parse_server_address(address), header, fill);
+    create_postgresql_memory(parse_server_address(address), header, fill);
   }
 
   [[nodiscard]] std::unique_ptr<MemoryTables> open(const std::filesystem::path& address,
@@ -111,7 +111,7 @@ class PostgresqlScheme final : public MemoryScheme {
   static std::unique_ptr<MemoryTables> open_tables(const ServerAddress& address, Access access) {
     MemoriesConnection memories = connect_to_memories(address, false);
     const auto found = find_memory(memories, address);
-    if (!found) refuse_no_memory(address);
+    if (!found) refuse_missing_memory(address);
     if (access == Access::read_write &&
         memories.connection.run("SELECT has_table_privilege('panonav.views', 'INSERT')::int4::int8")
                 .integer(0, 0) == 0) {

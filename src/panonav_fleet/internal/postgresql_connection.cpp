@@ -40,7 +40,7 @@ void append_big_endian(std::string& bytes, std::uint64_t value, int size) {
   }
 }
 
-std::uint64_t big_endian_word(std::string_view bytes) {
+std::uint64_t read_big_endian(std::string_view bytes) {
   std::uint64_t word = 0;
   for (const char c : bytes) word = (word << 8U) | static_cast<unsigned char>(c);
   return word;
@@ -184,12 +184,12 @@ std::string_view PostgresqlRows::field(int row, int column, std::size_t size) co
 }
 
 std::int64_t PostgresqlRows::integer(int row, int column) const {
-  return static_cast<std::int64_t>(big_endian_word(field(row, column, 8)));
+  return static_cast<std::int64_t>(read_big_endian(field(row, column, 8)));
 }
 
 std::optional<double> PostgresqlRows::real(int row, int column) const {
   if (is_null(row, column)) return std::nullopt;
-  return std::bit_cast<double>(big_endian_word(field(row, column, 8)));
+  return std::bit_cast<double>(read_big_endian(field(row, column, 8)));
 }
 
 std::string_view PostgresqlRows::text(int row, int column) const {
@@ -264,7 +264,7 @@ std::string PostgresqlConnection::message() const {
   return without_passwords(to_readable_line(text));
 }
 
-bool PostgresqlConnection::in_transaction() const noexcept {
+bool PostgresqlConnection::is_in_transaction() const noexcept {
   const auto status = PQtransactionStatus(connection_.get());
   return status == PQTRANS_INTRANS || status == PQTRANS_INERROR;
 }
@@ -327,7 +327,7 @@ PostgresqlRows PostgresqlConnection::run(const std::string& sql, const Postgresq
   return checked(exchange(sql, &values));
 }
 
-void PostgresqlConnection::drain() noexcept {
+void PostgresqlConnection::discard_results() noexcept {
   while (pg_result* rest = PQgetResult(connection_.get())) {
     const auto status = PQresultStatus(rest);
     PQclear(rest);
@@ -355,7 +355,7 @@ void PostgresqlConnection::stream(const std::string& sql, const PostgresqlValues
       if (rows.size() > 0) take(rows);
     }
   } catch (...) {
-    drain();
+    discard_results();
     throw;
   }
 }
@@ -369,13 +369,13 @@ void PostgresqlConnection::copy_in(const std::string& sql, std::string_view byte
   for (std::size_t at = 0; at < bytes.size(); at += piece) {
     const auto size = static_cast<int>(std::min(piece, bytes.size() - at));
     if (PQputCopyData(connection_.get(), bytes.data() + at, size) != 1) {
-      drain();
+      discard_results();
       fail(nullptr);
     }
   }
   if (PQputCopyEnd(connection_.get(), nullptr) != 1) fail(nullptr);
   Result done(PQgetResult(connection_.get()));
-  drain();
+  discard_results();
   if (PQresultStatus(done.get()) != PGRES_COMMAND_OK) fail(done.get());
 }
 
@@ -398,34 +398,34 @@ void PostgresqlConnection::copy_out(
     while ((size = PQgetCopyData(connection_.get(), &sent, 0)) > 0) {
       const std::unique_ptr<char, Free> kept(sent);
       std::string_view rest(sent, static_cast<std::size_t>(size));
-      const auto take_bytes = [&](std::size_t count) {
+      const auto read_bytes_of_row = [&](std::size_t count) {
         if (rest.size() < count) refuse();
         const std::string_view head = rest.substr(0, count);
         rest.remove_prefix(count);
         return head;
       };
       if (std::exchange(begins, false)) {
-        take_bytes(15);  // "PGCOPY", flags
-        take_bytes(big_endian_word(take_bytes(4)));
+        read_bytes_of_row(15);  // "PGCOPY", flags
+        read_bytes_of_row(read_big_endian(read_bytes_of_row(4)));
       }
       while (!rest.empty()) {
-        const std::uint64_t count = big_endian_word(take_bytes(2));
+        const std::uint64_t count = read_big_endian(read_bytes_of_row(2));
         if (count == 0xFFFFU) break;  // the end
         if (count != row.size()) refuse();
         for (auto& field : row) {
-          const std::uint64_t length = big_endian_word(take_bytes(4));
-          field = length == 0xFFFFFFFFU ? std::nullopt : std::optional(take_bytes(length));
+          const std::uint64_t length = read_big_endian(read_bytes_of_row(4));
+          field = length == 0xFFFFFFFFU ? std::nullopt : std::optional(read_bytes_of_row(length));
         }
         take(row);
       }
     }
   } catch (...) {
     try_cancel();
-    drain();
+    discard_results();
     throw;
   }
   Result done(PQgetResult(connection_.get()));
-  drain();
+  discard_results();
   if (size != -1 || PQresultStatus(done.get()) != PGRES_COMMAND_OK) fail(done.get());
 }
 
@@ -435,9 +435,9 @@ std::optional<std::string> PostgresqlConnection::wait_for_notification(double se
   while (true) {
     if (PQconsumeInput(connection_.get()) == 0) fail(nullptr);
     if (PGnotify* notified = PQnotifies(connection_.get())) {
-      std::string said = notified->extra;
+      std::string payload = notified->extra;
       PQfreemem(notified);
-      return said;
+      return payload;
     }
     const auto left = std::chrono::duration<double, std::milli>(end - Clock::now()).count();
     if (left <= 0.0) return std::nullopt;

@@ -99,7 +99,7 @@ class PostgresqlConnection {
   /// Rolls back what can still be rolled back.
   void try_execute(const char* sql) noexcept;
 
-  [[nodiscard]] bool in_transaction() const noexcept;
+  [[nodiscard]] bool is_in_transaction() const noexcept;
   [[nodiscard]] const std::filesystem::path& shown() const noexcept { return shown_; }
 
  private:
@@ -110,7 +110,7 @@ class PostgresqlConnection {
   PostgresqlRows checked(pg_result* result);
   [[noreturn]] void fail(const pg_result* result) const;
   [[nodiscard]] std::string message() const;
-  void drain() noexcept;
+  void discard_results() noexcept;
   /// Asks the server to end the statement that runs.
   void try_cancel() noexcept;
   std::filesystem::path shown_;
@@ -120,7 +120,7 @@ class PostgresqlConnection {
 /// Numbers as PostgreSQL sends them: the most significant byte first.
 void append_big_endian(std::string& bytes, std::uint64_t value, int size);
 /// Reads a number of up to eight bytes.
-[[nodiscard]] std::uint64_t big_endian_word(std::string_view bytes);
+[[nodiscard]] std::uint64_t read_big_endian(std::string_view bytes);
 
 /// Rows in COPY's binary form, for `copy_in`.
 class CopyRows {

@@ -24,7 +24,7 @@ void add_info(Fields& fields, const ReferenceInfo& info) {
 }
 
 /// The same fields of a row, from column `first` on.
-[[nodiscard]] inline ReferenceInfo info_in(const PostgresqlRows& rows, int row, int first) {
+[[nodiscard]] inline ReferenceInfo read_info(const PostgresqlRows& rows, int row, int first) {
   ReferenceInfo info;
   info.name = rows.text(row, first);
   const auto x_m = rows.real(row, first + 1);
@@ -52,7 +52,9 @@ class PostgresqlTables final : public MemoryTables {
   [[nodiscard]] const std::filesystem::path& path() const noexcept override {
     return connection_.shown();
   }
-  [[nodiscard]] const std::filesystem::path& place() const noexcept override { return path(); }
+  [[nodiscard]] const std::filesystem::path& message_path() const noexcept override {
+    return path();
+  }
   [[nodiscard]] std::unique_ptr<Transaction> transaction(Kind kind) override;
 
   [[nodiscard]] Settings settings() override;
@@ -64,22 +66,23 @@ class PostgresqlTables final : public MemoryTables {
   void require_views(std::span<const ViewId> views) override;
   void remove(std::span<const ViewId> views) override;
   void write_info(ViewId view, const ReferenceInfo& info, std::int64_t checksum) override;
-  void read_views(const Take<ViewRow>& take) override;
-  void read_views(std::span<const ViewId> views, const Take<ViewRow>& take) override;
-  void read_views_there(std::span<const ViewId> views, const Take<ViewRow>& take) override;
+  void read_views(const Consume<ViewRow>& consume) override;
+  void read_views(std::span<const ViewId> views, const Consume<ViewRow>& consume) override;
+  void read_available_views(std::span<const ViewId> views,
+                            const Consume<ViewRow>& consume) override;
   void read_magnitudes(ViewId first, ViewId last, std::size_t bytes,
-                       const Take<MagnitudesRow>& take) override;
+                       const Consume<MagnitudesRow>& consume) override;
   [[nodiscard]] std::optional<ViewId> find(std::string_view name) override;
   [[nodiscard]] std::vector<std::string> names() override;
   [[nodiscard]] std::vector<ViewId> views() override;
   [[nodiscard]] std::vector<PositionRow> views_within(const PositionBounds& bounds) override;
-  [[nodiscard]] std::vector<ViewId> views_with(BesideViews table) override;
-  [[nodiscard]] bool has_any(BesideViews table) override;
-  [[nodiscard]] std::optional<StoredBytes> bytes(BesideViews table, ViewId view) override;
+  [[nodiscard]] std::vector<ViewId> views_with_attachment(ViewAttachment table) override;
+  [[nodiscard]] bool has_attachments(ViewAttachment table) override;
+  [[nodiscard]] std::optional<StoredBytes> bytes(ViewAttachment table, ViewId view) override;
 
   void write_links(std::span<const Link> links) override;
   void erase_link(ViewId a, ViewId b) override;
-  void read_links(const Take<LinkRow>& take) override;
+  void read_links(const Consume<LinkRow>& consume) override;
 
   void write_map(std::string_view name, const MapRow& row) override;
   [[nodiscard]] std::optional<MapRow> map(std::string_view name) override;
@@ -107,46 +110,46 @@ class PostgresqlTables final : public MemoryTables {
   [[nodiscard]] MemoryFile::Info info() override;
 
   /// Ends the transaction in which the memory was made.
-  void commit_made() { connection_.execute("COMMIT"); }
+  void commit_creation() { connection_.execute("COMMIT"); }
 
   /// For what only a server is asked (server_exchange.hpp).
   [[nodiscard]] PostgresqlConnection& connection() noexcept { return connection_; }
   [[nodiscard]] std::int64_t memory() const noexcept { return memory_; }
   /// Returns the changed areas as text for a notification, and forgets them; empty for many areas,
   /// and where views without a position were changed.
-  [[nodiscard]] std::string take_areas();
+  [[nodiscard]] std::string consume_changed_areas();
   /// Returns the number of this connection, which views that it adds refer to.
-  std::int64_t session();
+  std::int64_t get_or_create_session();
   /// Notes a change at a position for the notification of the transaction.
-  void changed_at(const std::optional<double>& x_m, const std::optional<double>& y_m) {
+  void note_changed_area(const std::optional<double>& x_m, const std::optional<double>& y_m) {
     if (x_m && y_m) {
       areas_.insert(area_of(*x_m, *y_m));
     } else {
-      elsewhere_ = true;
+      changes_unplaced_views_ = true;
     }
   }
-  void changed_at(const std::optional<ReferencePose>& pose) {
+  void note_changed_area(const std::optional<ReferencePose>& pose) {
     if (pose) {
-      changed_at(pose->x_m, pose->y_m);
+      note_changed_area(pose->x_m, pose->y_m);
     } else {
-      elsewhere_ = true;
+      changes_unplaced_views_ = true;
     }
   }
 
  private:
-  class Part;
+  class ServerTransaction;
   /// With the memory as $1.
   Rows run(const std::string& sql) { return connection_.run(sql, Values().add(memory_)); }
   Rows run(const std::string& sql, std::string_view name) {
     return connection_.run(sql, Values().add(memory_).add(name));
   }
-  [[nodiscard]] ViewId id_in(const Rows& rows, int row, int column) const {
-    return view_id(rows.integer(row, column));
+  [[nodiscard]] ViewId read_view_id(const Rows& rows, int row, int column) const {
+    return to_view_id(rows.integer(row, column));
   }
-  [[nodiscard]] ViewRow view_in(const Rows& rows) const;
-  [[nodiscard]] std::vector<std::string> texts(const std::string& sql);
+  [[nodiscard]] ViewRow read_view_row(const Rows& rows) const;
+  [[nodiscard]] std::vector<std::string> query_texts(const std::string& sql);
   void make_incoming_table_if_needed();
-  void changed_rows(const Rows& rows);
+  void note_changed_rows(const Rows& rows);
   void notify();
 
   std::optional<std::string> robot_;
@@ -154,9 +157,9 @@ class PostgresqlTables final : public MemoryTables {
   std::int64_t memory_;
   std::string channel_;
   std::optional<std::int64_t> session_;
-  bool has_incoming_ = false;   // the table of views on their way
-  std::set<MemoryArea> areas_;  // that the transaction changes
-  bool elsewhere_ = false;      // it also changes views without a position
+  bool has_incoming_ = false;            // the table of views on their way
+  std::set<MemoryArea> areas_;           // that the transaction changes
+  bool changes_unplaced_views_ = false;  // it also changes views without a position
 };
 
 struct FoundMemory {
@@ -174,11 +177,11 @@ struct MemoriesConnection {
                                                      bool make_schema);
 [[nodiscard]] std::optional<FoundMemory> find_memory(MemoriesConnection& memories,
                                                      const ServerAddress& address);
-[[noreturn]] void refuse_no_memory(const ServerAddress& address);
+[[noreturn]] void refuse_missing_memory(const ServerAddress& address);
 /// Makes an empty memory on the server and, with enough rights, the schema and the roles where
 /// there are none (docs/scale.md); `fill` is run in the same transaction. Throws FileError when
 /// there is a memory of that name.
-void make_postgresql_memory(const ServerAddress& address, const MemoryHeader& header,
-                            const std::function<void(MemoryTables&)>& fill);
+void create_postgresql_memory(const ServerAddress& address, const MemoryHeader& header,
+                              const std::function<void(MemoryTables&)>& fill);
 
 }  // namespace panonav::fleet

@@ -32,7 +32,7 @@ void PostgresqlTables::erase_map(std::string_view name) {
 }
 
 std::vector<std::string> PostgresqlTables::map_names() {
-  return texts("SELECT name FROM panonav.maps WHERE memory = $1 ORDER BY name");
+  return query_texts("SELECT name FROM panonav.maps WHERE memory = $1 ORDER BY name");
 }
 
 void PostgresqlTables::write_route(std::string_view name, const RouteRow& row) {
@@ -56,7 +56,7 @@ void PostgresqlTables::erase_route(std::string_view name) {
 }
 
 std::vector<std::string> PostgresqlTables::route_names() {
-  return texts("SELECT name FROM panonav.routes WHERE memory = $1 ORDER BY name");
+  return query_texts("SELECT name FROM panonav.routes WHERE memory = $1 ORDER BY name");
 }
 
 void PostgresqlTables::write_block(std::string_view route, std::int64_t number,
@@ -93,7 +93,7 @@ std::int64_t PostgresqlTables::route_bytes(std::string_view route) {
 }
 
 std::vector<std::string> PostgresqlTables::routes_with_blocks() {
-  return texts("SELECT DISTINCT route FROM panonav.route_blocks WHERE memory = $1");
+  return query_texts("SELECT DISTINCT route FROM panonav.route_blocks WHERE memory = $1");
 }
 
 void PostgresqlTables::keep_for_undo(const std::function<void()>& changes,

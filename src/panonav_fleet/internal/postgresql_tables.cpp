@@ -13,17 +13,17 @@ namespace {
 constexpr const char* view_fields =
     "v.id, v.name, v.x_m, v.y_m, v.heading_rad, v.stamp_s, v.signature, v.checksum";
 
-std::string table_of(BesideViews table) {
-  return table == BesideViews::thumbnails ? "panonav.thumbnails" : "panonav.features";
+std::string table_of(ViewAttachment table) {
+  return table == ViewAttachment::thumbnails ? "panonav.thumbnails" : "panonav.features";
 }
 
 }  // namespace
 
-class PostgresqlTables::Part final : public MemoryTables::Transaction {
+class PostgresqlTables::ServerTransaction final : public MemoryTables::Transaction {
  public:
-  Part(PostgresqlTables& tables, Kind kind)
+  ServerTransaction(PostgresqlTables& tables, Kind kind)
       : tables_(tables),
-        within_another_(tables.connection_.in_transaction()),
+        within_another_(tables.connection_.is_in_transaction()),
         writes_(kind == Kind::writing) {
     PostgresqlConnection& connection = tables_.connection_;
     if (within_another_) {
@@ -42,9 +42,9 @@ class PostgresqlTables::Part final : public MemoryTables::Transaction {
       throw;
     }
   }
-  Part(const Part&) = delete;
-  Part& operator=(const Part&) = delete;
-  ~Part() override {
+  ServerTransaction(const ServerTransaction&) = delete;
+  ServerTransaction& operator=(const ServerTransaction&) = delete;
+  ~ServerTransaction() override {
     if (!open_) return;
     tables_.connection_.try_execute(within_another_ ? "ROLLBACK TO part; RELEASE part"
                                                     : "ROLLBACK");
@@ -54,7 +54,7 @@ class PostgresqlTables::Part final : public MemoryTables::Transaction {
     }
     if (within_another_) return;
     tables_.areas_.clear();
-    tables_.elsewhere_ = false;
+    tables_.changes_unplaced_views_ = false;
   }
   void commit() override {
     if (within_another_) {
@@ -81,33 +81,33 @@ PostgresqlTables::PostgresqlTables(const ServerAddress& address, PostgresqlConne
       channel_(std::move(channel)) {}
 
 std::unique_ptr<MemoryTables::Transaction> PostgresqlTables::transaction(Kind kind) {
-  return std::make_unique<Part>(*this, kind);
+  return std::make_unique<ServerTransaction>(*this, kind);
 }
 
-std::string PostgresqlTables::take_areas() {
+std::string PostgresqlTables::consume_changed_areas() {
   constexpr std::size_t max_bytes = 4000;  // PostgreSQL takes up to 8000
-  std::string said;
+  std::string areas;
   const std::set<MemoryArea> changed = std::exchange(areas_, {});
-  if (std::exchange(elsewhere_, false)) return {};
+  if (std::exchange(changes_unplaced_views_, false)) return {};
   for (const MemoryArea& area : changed) {
-    if (!said.empty()) said += ' ';
-    said += to_text(area.column) + "," + to_text(area.row);
-    if (said.size() > max_bytes) return {};
+    if (!areas.empty()) areas += ' ';
+    areas += to_text(area.column) + "," + to_text(area.row);
+    if (areas.size() > max_bytes) return {};
   }
-  return said;
+  return areas;
 }
 
 void PostgresqlTables::notify() {
-  const std::string said = take_areas();
+  const std::string areas = consume_changed_areas();
   connection_.run("SELECT pg_notify($1, $2)",
-                  Values().add(std::string_view(channel_)).add(std::string_view(said)));
+                  Values().add(std::string_view(channel_)).add(std::string_view(areas)));
 }
 
-ViewRow PostgresqlTables::view_in(const Rows& rows) const {
-  return {id_in(rows, 0, 0), info_in(rows, 0, 1), rows.bytes(0, 6), rows.integer(0, 7)};
+ViewRow PostgresqlTables::read_view_row(const Rows& rows) const {
+  return {read_view_id(rows, 0, 0), read_info(rows, 0, 1), rows.bytes(0, 6), rows.integer(0, 7)};
 }
 
-std::vector<std::string> PostgresqlTables::texts(const std::string& sql) {
+std::vector<std::string> PostgresqlTables::query_texts(const std::string& sql) {
   std::vector<std::string> texts;
   const Rows rows = run(sql);
   for (int i = 0; i < rows.size(); ++i) texts.emplace_back(rows.text(i, 0));
@@ -195,7 +195,7 @@ std::uint32_t PostgresqlTables::last_id() {
 }
 
 // Views say which connection added them.
-std::int64_t PostgresqlTables::session() {
+std::int64_t PostgresqlTables::get_or_create_session() {
   if (session_) return *session_;
   const std::string insert_robot = "INSERT INTO panonav.robots(fleet, name) SELECT fleet, " +
                                    std::string(robot_ ? "$2" : "session_user::text") +
@@ -230,7 +230,7 @@ void PostgresqlTables::make_incoming_table_if_needed() {
 
 void PostgresqlTables::insert(std::span<const ViewId> ids, std::span<const NewView> views) {
   if (views.empty()) return;
-  session();
+  get_or_create_session();
   make_incoming_table_if_needed();
   const std::string memory = std::to_string(memory_);
   std::vector<std::uint8_t> signature;
@@ -238,7 +238,7 @@ void PostgresqlTables::insert(std::span<const ViewId> ids, std::span<const NewVi
   bool thumbnails = false;
   bool features = false;
   CopyRows rows;
-  const auto add_beside = [&](ViewId view, const std::vector<std::uint8_t>& bytes) {
+  const auto add_attachment = [&](ViewId view, const std::vector<std::uint8_t>& bytes) {
     if (bytes.empty()) {
       rows.add_null().add_null();
     } else {
@@ -252,11 +252,11 @@ void PostgresqlTables::insert(std::span<const ViewId> ids, std::span<const NewVi
     add_info(rows, view.info);
     rows.add(std::span<const std::uint8_t>(signature));
     rows.add(view_checksum(scratch, ids[i], view.info, signature));
-    add_beside(ids[i], view.thumbnail);
-    add_beside(ids[i], view.features);
+    add_attachment(ids[i], view.thumbnail);
+    add_attachment(ids[i], view.features);
     thumbnails = thumbnails || !view.thumbnail.empty();
     features = features || !view.features.empty();
-    changed_at(view.info.pose);
+    note_changed_area(view.info.pose);
   }
   connection_.copy_in("COPY pg_temp.panonav_incoming FROM STDIN (FORMAT binary)", rows.finish());
   std::string sql =
@@ -280,7 +280,7 @@ void PostgresqlTables::insert(std::span<const ViewId> ids, std::span<const NewVi
       "WHERE v.memory = $1 AND v.name = i.name) OR EXISTS (SELECT FROM pg_temp.panonav_incoming j "
       "WHERE j.name = i.name AND j.id < i.id) ORDER BY i.id LIMIT 1");
   if (duplicate.size() == 0) fail_damaged("the id of a new view is taken");
-  refuse_taken_name("view", duplicate.text(0, 0), path());
+  refuse_used_name("view", duplicate.text(0, 0), path());
 }
 
 void PostgresqlTables::require_views(std::span<const ViewId> views) {
@@ -293,8 +293,8 @@ void PostgresqlTables::require_views(std::span<const ViewId> views) {
   if (missing.size() > 0) refuse_view({static_cast<std::uint32_t>(missing.integer(0, 0))});
 }
 
-void PostgresqlTables::changed_rows(const Rows& rows) {
-  for (int i = 0; i < rows.size(); ++i) changed_at(rows.real(i, 0), rows.real(i, 1));
+void PostgresqlTables::note_changed_rows(const Rows& rows) {
+  for (int i = 0; i < rows.size(); ++i) note_changed_area(rows.real(i, 0), rows.real(i, 1));
 }
 
 void PostgresqlTables::remove(std::span<const ViewId> views) {
@@ -306,7 +306,7 @@ void PostgresqlTables::remove(std::span<const ViewId> views) {
         "DELETE FROM panonav.features WHERE memory = $1 AND view = ANY($2)"}) {
     connection_.run(sql, values);
   }
-  changed_rows(connection_.run(
+  note_changed_rows(connection_.run(
       "DELETE FROM panonav.views WHERE memory = $1 AND id = ANY($2) RETURNING x_m, y_m", values));
 }
 
@@ -321,19 +321,20 @@ void PostgresqlTables::write_info(ViewId view, const ReferenceInfo& info, std::i
           "UPDATE panonav.views SET checksum = $3, name = $4, x_m = $5, y_m = $6, "
           "heading_rad = $7, stamp_s = $8 WHERE memory = $1 AND id = $2",
           &values)) {
-    refuse_taken_name("view", info.name, path());
+    refuse_used_name("view", info.name, path());
   }
-  changed_rows(before);
-  changed_at(info.pose);
+  note_changed_rows(before);
+  note_changed_area(info.pose);
 }
 
-void PostgresqlTables::read_views(const Take<ViewRow>& take) {
+void PostgresqlTables::read_views(const Consume<ViewRow>& consume) {
   connection_.stream("SELECT " + std::string(view_fields) +
                          " FROM panonav.views v WHERE v.memory = $1 ORDER BY v.id",
-                     Values().add(memory_), [&](const Rows& rows) { take(view_in(rows)); });
+                     Values().add(memory_),
+                     [&](const Rows& rows) { consume(read_view_row(rows)); });
 }
 
-void PostgresqlTables::read_views(std::span<const ViewId> views, const Take<ViewRow>& take) {
+void PostgresqlTables::read_views(std::span<const ViewId> views, const Consume<ViewRow>& consume) {
   const auto numbers = numbers_of(views);
   connection_.stream("SELECT " + std::string(view_fields) +
                          ", w.id FROM unnest($2) WITH ORDINALITY w(id, place) LEFT JOIN "
@@ -343,21 +344,22 @@ void PostgresqlTables::read_views(std::span<const ViewId> views, const Take<View
                        if (rows.is_null(0, 0)) {
                          refuse_view({static_cast<std::uint32_t>(rows.integer(0, 8))});
                        }
-                       take(view_in(rows));
+                       consume(read_view_row(rows));
                      });
 }
 
-void PostgresqlTables::read_views_there(std::span<const ViewId> views, const Take<ViewRow>& take) {
+void PostgresqlTables::read_available_views(std::span<const ViewId> views,
+                                            const Consume<ViewRow>& consume) {
   const auto numbers = numbers_of(views);
   connection_.stream("SELECT " + std::string(view_fields) +
                          " FROM panonav.views v WHERE v.memory = $1 AND v.id = ANY($2)",
                      Values().add(memory_).add(std::span<const std::int64_t>(numbers)),
-                     [&](const Rows& rows) { take(view_in(rows)); });
+                     [&](const Rows& rows) { consume(read_view_row(rows)); });
 }
 
 // By COPY, which takes a third of the time of rows of a statement.
 void PostgresqlTables::read_magnitudes(ViewId first, ViewId last, std::size_t bytes,
-                                       const Take<MagnitudesRow>& take) {
+                                       const Consume<MagnitudesRow>& consume) {
   const std::string sql = "COPY (SELECT id, x_m, y_m, substr(signature, 1, " +
                           std::to_string(bytes) +
                           ") FROM panonav.views WHERE memory = " + std::to_string(memory_) +
@@ -366,9 +368,9 @@ void PostgresqlTables::read_magnitudes(ViewId first, ViewId last, std::size_t by
   connection_.copy_out(sql, 4, [&](std::span<const std::optional<std::string_view>> fields) {
     const auto number = [&](std::size_t field) {
       if (!fields[field] || fields[field]->size() != 8) fail_damaged("a view of a wrong type");
-      return big_endian_word(*fields[field]);
+      return read_big_endian(*fields[field]);
     };
-    MagnitudesRow row{view_id(static_cast<std::int64_t>(number(0))), std::nullopt, {}};
+    MagnitudesRow row{to_view_id(static_cast<std::int64_t>(number(0))), std::nullopt, {}};
     if (fields[1] && fields[2]) {
       row.position = Point2{std::bit_cast<double>(number(1)), std::bit_cast<double>(number(2))};
     }
@@ -376,17 +378,17 @@ void PostgresqlTables::read_magnitudes(ViewId first, ViewId last, std::size_t by
       row.magnitudes = {reinterpret_cast<const std::uint8_t*>(fields[3]->data()),
                         fields[3]->size()};
     }
-    take(row);
+    consume(row);
   });
 }
 
 std::optional<ViewId> PostgresqlTables::find(std::string_view name) {
   const Rows rows = run("SELECT id FROM panonav.views WHERE memory = $1 AND name = $2", name);
-  return rows.size() == 0 ? std::nullopt : std::optional(id_in(rows, 0, 0));
+  return rows.size() == 0 ? std::nullopt : std::optional(read_view_id(rows, 0, 0));
 }
 
 std::vector<std::string> PostgresqlTables::names() {
-  return texts("SELECT name FROM panonav.views WHERE memory = $1 ORDER BY id");
+  return query_texts("SELECT name FROM panonav.views WHERE memory = $1 ORDER BY id");
 }
 
 std::vector<ViewId> PostgresqlTables::views() {
@@ -394,8 +396,8 @@ std::vector<ViewId> PostgresqlTables::views() {
   connection_.copy_out("COPY (SELECT id FROM panonav.views WHERE memory = " +
                            std::to_string(memory_) + " ORDER BY id) TO STDOUT (FORMAT binary)",
                        1, [&](std::span<const std::optional<std::string_view>> fields) {
-                         const std::uint64_t id = fields[0] ? big_endian_word(*fields[0]) : 0;
-                         views.push_back(view_id(static_cast<std::int64_t>(id)));
+                         const std::uint64_t id = fields[0] ? read_big_endian(*fields[0]) : 0;
+                         views.push_back(to_view_id(static_cast<std::int64_t>(id)));
                        });
   return views;
 }
@@ -414,25 +416,25 @@ std::vector<PositionRow> PostgresqlTables::views_within(const PositionBounds& bo
           .add(std::optional(bounds.max_y_m)));
   for (int i = 0; i < rows.size(); ++i) {
     views.push_back(
-        {id_in(rows, i, 0),
+        {read_view_id(rows, i, 0),
          {rows.real(i, 1).value_or(0.0), rows.real(i, 2).value_or(0.0), rows.real(i, 3)}});
   }
   return views;
 }
 
-bool PostgresqlTables::has_any(BesideViews table) {
+bool PostgresqlTables::has_attachments(ViewAttachment table) {
   return run("SELECT (EXISTS (SELECT FROM " + table_of(table) + " WHERE memory = $1))::int4::int8")
              .integer(0, 0) != 0;
 }
 
-std::vector<ViewId> PostgresqlTables::views_with(BesideViews table) {
+std::vector<ViewId> PostgresqlTables::views_with_attachment(ViewAttachment table) {
   std::vector<ViewId> views;
   const Rows rows = run("SELECT view FROM " + table_of(table) + " WHERE memory = $1 ORDER BY view");
-  for (int i = 0; i < rows.size(); ++i) views.push_back(id_in(rows, i, 0));
+  for (int i = 0; i < rows.size(); ++i) views.push_back(read_view_id(rows, i, 0));
   return views;
 }
 
-std::optional<StoredBytes> PostgresqlTables::bytes(BesideViews table, ViewId view) {
+std::optional<StoredBytes> PostgresqlTables::bytes(ViewAttachment table, ViewId view) {
   const Rows rows = connection_.run(
       "SELECT bytes, checksum FROM " + table_of(table) + " WHERE memory = $1 AND view = $2",
       Values().add(memory_).add(std::int64_t{view.value}));
@@ -470,11 +472,12 @@ void PostgresqlTables::erase_link(ViewId a, ViewId b) {
                   Values().add(memory_).add(std::int64_t{a.value}).add(std::int64_t{b.value}));
 }
 
-void PostgresqlTables::read_links(const Take<LinkRow>& take) {
+void PostgresqlTables::read_links(const Consume<LinkRow>& consume) {
   connection_.stream(
       "SELECT a, b, kind, checksum FROM panonav.links WHERE memory = $1 ORDER BY a, b",
       Values().add(memory_), [&](const Rows& rows) {
-        take({id_in(rows, 0, 0), id_in(rows, 0, 1), rows.integer(0, 2), rows.integer(0, 3)});
+        consume({read_view_id(rows, 0, 0), read_view_id(rows, 0, 1), rows.integer(0, 2),
+                 rows.integer(0, 3)});
       });
 }
 

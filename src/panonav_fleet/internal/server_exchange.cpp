@@ -82,19 +82,20 @@ PostgresqlValues ServerExchange::values() const {
 }
 
 // The columns are those of `server_view_fields`.
-ServerView ServerExchange::view_in(const PostgresqlRows& rows, int row) const {
-  return {id_in(rows, row, 0), info_in(rows, row, 1), rows.integer(row, 6)};
+ServerView ServerExchange::read_server_view(const PostgresqlRows& rows, int row) const {
+  return {read_view_id(rows, row, 0), read_info(rows, row, 1), rows.integer(row, 6)};
 }
 
-std::vector<ServerView> ServerExchange::views_in(const PostgresqlRows& rows) const {
+std::vector<ServerView> ServerExchange::read_server_views(const PostgresqlRows& rows) const {
   std::vector<ServerView> views;
-  for (int i = 0; i < rows.size(); ++i) views.push_back(view_in(rows, i));
+  for (int i = 0; i < rows.size(); ++i) views.push_back(read_server_view(rows, i));
   return views;
 }
 
 std::map<ViewId, std::int64_t> ServerExchange::checksums_in(const PostgresqlRows& rows) const {
   std::map<ViewId, std::int64_t> checksums;
-  for (int i = 0; i < rows.size(); ++i) checksums.emplace(id_in(rows, i, 0), rows.integer(i, 1));
+  for (int i = 0; i < rows.size(); ++i)
+    checksums.emplace(read_view_id(rows, i, 0), rows.integer(i, 1));
   return checksums;
 }
 
@@ -113,11 +114,11 @@ ServerExchange::State ServerExchange::read_state() {
 constexpr const char* upload_fields =
     "SELECT u.view, u.signature, u.server_view, u.local_checksum, u.server_checksum, u.sent FROM ";
 
-std::vector<Upload> ServerExchange::uploads_in(const PostgresqlRows& rows) const {
+std::vector<Upload> ServerExchange::to_uploads(const PostgresqlRows& rows) const {
   std::vector<Upload> uploads;
   for (int i = 0; i < rows.size(); ++i) {
-    uploads.push_back({id_in(rows, i, 0), rows.integer(i, 1), id_in(rows, i, 2), rows.integer(i, 3),
-                       rows.integer(i, 4), rows.integer(i, 5)});
+    uploads.push_back({read_view_id(rows, i, 0), rows.integer(i, 1), read_view_id(rows, i, 2),
+                       rows.integer(i, 3), rows.integer(i, 4), rows.integer(i, 5)});
   }
   return uploads;
 }
@@ -126,7 +127,7 @@ std::vector<Upload> ServerExchange::read_uploads(const std::string& file,
                                                  std::span<const ViewId> views) {
   if (views.empty()) return {};
   const auto numbers = numbers_of(views);
-  return uploads_in(connection().run(
+  return to_uploads(connection().run(
       upload_fields + std::string("panonav.uploads u WHERE u.memory = $1 AND u.file = $2 AND "
                                   "u.view = ANY($3) ORDER BY u.server_view"),
       values().add(std::string_view(file)).add(Numbers(numbers))));
@@ -135,7 +136,7 @@ std::vector<Upload> ServerExchange::read_uploads(const std::string& file,
 std::vector<Upload> ServerExchange::read_settled_uploads(const std::string& file,
                                                          std::span<const ViewId> views) {
   const auto numbers = numbers_of(views);
-  return uploads_in(
+  return to_uploads(
       connection().run(upload_fields + std::string("panonav.uploads_of($1, $2, $3) u"),
                        values().add(std::string_view(file)).add(Numbers(numbers))));
 }
@@ -145,7 +146,7 @@ constexpr const char* server_view_fields =
 
 std::vector<ServerView> ServerExchange::find_views_by_name(std::span<const std::string> names) {
   if (names.empty()) return {};
-  return views_in(
+  return read_server_views(
       connection().run(std::string(server_view_fields) +
                            " FROM panonav.views v WHERE v.memory = $1 AND v.name = ANY($2)",
                        values().add(names)));
@@ -154,7 +155,7 @@ std::vector<ServerView> ServerExchange::find_views_by_name(std::span<const std::
 std::vector<ServerView> ServerExchange::read_infos(std::span<const ViewId> ids) {
   if (ids.empty()) return {};
   const auto numbers = numbers_of(ids);
-  return views_in(connection().run(
+  return read_server_views(connection().run(
       std::string(server_view_fields) +
           " FROM panonav.views v WHERE v.memory = $1 AND v.id = ANY($2) ORDER BY v.id",
       values().add(Numbers(numbers))));
@@ -210,8 +211,8 @@ std::vector<Link> ServerExchange::read_links_in_blocks(const KeptAreas& areas,
           block_of_l + " = ANY(" + (areas ? "$4)" : "$2)"),
       bound.add(blocks));
   for (int i = 0; i < rows.size(); ++i) {
-    links.push_back(tables_.checked(
-        LinkRow{id_in(rows, i, 0), id_in(rows, i, 1), rows.integer(i, 2), rows.integer(i, 3)}));
+    links.push_back(tables_.checked(LinkRow{read_view_id(rows, i, 0), read_view_id(rows, i, 1),
+                                            rows.integer(i, 2), rows.integer(i, 3)}));
   }
   return links;
 }
@@ -223,7 +224,8 @@ std::map<ViewId, std::int64_t> ServerExchange::read_signature_checksums(
   const auto numbers = numbers_of(views);
   connection().stream("SELECT id, signature FROM panonav.views WHERE memory = $1 AND id = ANY($2)",
                       values().add(Numbers(numbers)), [&](const PostgresqlRows& rows) {
-                        signatures.emplace(id_in(rows, 0, 0), signature_checksum(rows.bytes(0, 1)));
+                        signatures.emplace(read_view_id(rows, 0, 0),
+                                           signature_checksum(rows.bytes(0, 1)));
                       });
   return signatures;
 }
@@ -240,7 +242,7 @@ std::vector<FullServerView> ServerExchange::read_full_views(std::span<const View
           "LEFT JOIN panonav.features f ON f.memory = v.memory AND f.view = v.id "
           "WHERE v.memory = $1 AND v.id = ANY($2) ORDER BY v.id",
       values().add(Numbers(numbers)), [&](const PostgresqlRows& rows) {
-        ServerView found = view_in(rows, 0);
+        ServerView found = read_server_view(rows, 0);
         const auto signature = rows.bytes(0, 7);
         const auto fail = [&](const char* what) {
           tables_.fail_damaged(what + std::to_string(found.id.value) +
@@ -275,7 +277,7 @@ void ServerExchange::stage_views(std::span<const NewView> views) {
       "STORAGE EXTERNAL, ALTER features SET STORAGE EXTERNAL; TRUNCATE pg_temp.panonav_staged");
   CopyRows rows;
   std::vector<std::uint8_t> signature;
-  const auto add_beside = [&](const std::vector<std::uint8_t>& bytes) {
+  const auto add_attachment = [&](const std::vector<std::uint8_t>& bytes) {
     if (bytes.empty()) {
       rows.add_null();
     } else {
@@ -286,10 +288,10 @@ void ServerExchange::stage_views(std::span<const NewView> views) {
     rows.begin_row(9).add(static_cast<std::int64_t>(i));
     add_info(rows, views[i].info);
     pack_signature(views[i].signature, signature);
-    add_beside(signature);
-    add_beside(views[i].thumbnail);
-    add_beside(views[i].features);
-    tables_.changed_at(views[i].info.pose);
+    add_attachment(signature);
+    add_attachment(views[i].thumbnail);
+    add_attachment(views[i].features);
+    tables_.note_changed_area(views[i].info.pose);
   }
   connection().copy_in("COPY pg_temp.panonav_staged FROM STDIN (FORMAT binary)", rows.finish());
 }
@@ -327,9 +329,9 @@ std::vector<Upload> ServerExchange::submit_views(const std::string& file, std::i
     thumbnails.push_back(view.thumbnail_checksum);
     features.push_back(view.features_checksum);
   }
-  const std::int64_t session = tables_.session();
-  const std::string said = tables_.take_areas();
-  return uploads_in(connection().run(
+  const std::int64_t session = tables_.get_or_create_session();
+  const std::string areas = tables_.consume_changed_areas();
+  return to_uploads(connection().run(
       upload_fields +
           std::string("panonav.take_views($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, "
                       "$13) u"),
@@ -337,7 +339,7 @@ std::vector<Upload> ServerExchange::submit_views(const std::string& file, std::i
           .add(std::string_view(file))
           .add(session)
           .add(sent)
-          .add(std::string_view(said))
+          .add(std::string_view(areas))
           .add(Numbers(views))
           .add(Numbers(signatures))
           .add(Numbers(ids))
@@ -361,27 +363,27 @@ std::vector<Upload> ServerExchange::submit_changes(const std::string& file, std:
     server_checksums.push_back(view.upload.server_checksum);
     rows.begin_row(6).add(std::int64_t{view.upload.server_view.value});
     add_info(rows, view.info);
-    tables_.changed_at(view.info.pose);
+    tables_.note_changed_area(view.info.pose);
   }
   const PostgresqlRows before =
       connection().run("SELECT x_m, y_m FROM panonav.views WHERE memory = $1 AND id = ANY($2)",
                        values().add(Numbers(ids)));
   for (int i = 0; i < before.size(); ++i) {
-    tables_.changed_at(before.real(i, 0), before.real(i, 1));
+    tables_.note_changed_area(before.real(i, 0), before.real(i, 1));
   }
   connection().execute(
       "CREATE TEMPORARY TABLE IF NOT EXISTS panonav_changed(id bigint, name text COLLATE \"C\", "
       "x_m double precision, y_m double precision, heading_rad double precision, stamp_s double "
       "precision); TRUNCATE pg_temp.panonav_changed");
   connection().copy_in("COPY pg_temp.panonav_changed FROM STDIN (FORMAT binary)", rows.finish());
-  const std::string said = tables_.take_areas();
-  return uploads_in(connection().run(
+  const std::string areas = tables_.consume_changed_areas();
+  return to_uploads(connection().run(
       upload_fields +
           std::string("panonav.take_changes($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11) u"),
       values()
           .add(std::string_view(file))
           .add(sent)
-          .add(std::string_view(said))
+          .add(std::string_view(areas))
           .add(empty_recordings_checksum())
           .add(Numbers(views))
           .add(Numbers(signatures))
@@ -401,16 +403,17 @@ std::vector<ViewId> ServerExchange::submit_removals(
   const PostgresqlRows there =
       connection().run("SELECT x_m, y_m FROM panonav.views WHERE memory = $1 AND id = ANY($2)",
                        values().add(Numbers(ids)));
-  for (int i = 0; i < there.size(); ++i) tables_.changed_at(there.real(i, 0), there.real(i, 1));
-  const std::string said = tables_.take_areas();
+  for (int i = 0; i < there.size(); ++i)
+    tables_.note_changed_area(there.real(i, 0), there.real(i, 1));
+  const std::string areas = tables_.consume_changed_areas();
   const PostgresqlRows rows = connection().run("SELECT panonav.take_removals($1, $2, $3, $4, $5)",
                                                values()
-                                                   .add(std::string_view(said))
+                                                   .add(std::string_view(areas))
                                                    .add(empty_recordings_checksum())
                                                    .add(Numbers(ids))
                                                    .add(Numbers(sums)));
   std::vector<ViewId> removed;
-  for (int i = 0; i < rows.size(); ++i) removed.push_back(id_in(rows, i, 0));
+  for (int i = 0; i < rows.size(); ++i) removed.push_back(read_view_id(rows, i, 0));
   return removed;
 }
 

@@ -142,12 +142,12 @@ class ServerExchange {
   [[nodiscard]] PostgresqlConnection& connection() noexcept { return tables_.connection(); }
   [[nodiscard]] PostgresqlValues values() const;
   [[noreturn]] void refuse_removed() const;
-  [[nodiscard]] std::vector<Upload> uploads_in(const PostgresqlRows& rows) const;
-  [[nodiscard]] ServerView view_in(const PostgresqlRows& rows, int row) const;
-  [[nodiscard]] std::vector<ServerView> views_in(const PostgresqlRows& rows) const;
+  [[nodiscard]] std::vector<Upload> to_uploads(const PostgresqlRows& rows) const;
+  [[nodiscard]] ServerView read_server_view(const PostgresqlRows& rows, int row) const;
+  [[nodiscard]] std::vector<ServerView> read_server_views(const PostgresqlRows& rows) const;
   [[nodiscard]] std::map<ViewId, std::int64_t> checksums_in(const PostgresqlRows& rows) const;
-  [[nodiscard]] ViewId id_in(const PostgresqlRows& rows, int row, int column) const {
-    return tables_.view_id(rows.integer(row, column));
+  [[nodiscard]] ViewId read_view_id(const PostgresqlRows& rows, int row, int column) const {
+    return tables_.to_view_id(rows.integer(row, column));
   }
 
   PostgresqlTables tables_;

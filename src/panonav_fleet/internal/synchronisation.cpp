@@ -69,7 +69,7 @@ void Synchronisation::match_with_server() {
   const ServerExchange::State there = server_.read_state();
   if (state_.memory.empty()) {
     const auto reading = server_.tables().transaction(Kind::reading);
-    require_comparable(header_, header_from(server_.tables().settings()), server_.tables().path());
+    require_comparable(header_, to_header(server_.tables().settings()), server_.tables().path());
   } else if (state_.memory != there.identity) {
     throw FileError(file_.path().string(),
                     "is synchronised with another memory than " + server_.tables().path().string() +

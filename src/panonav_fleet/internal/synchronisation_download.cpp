@@ -63,7 +63,7 @@ void Synchronisation::download() {
   apply_server_changes(removed, find_lost_views(removed), changes, reused);
 
   transfer_total_ = added.size();
-  in_parts(added, views_per_batch, [&](std::span<const ViewId> part) {
+  for_each_part(added, views_per_batch, [&](std::span<const ViewId> part) {
     add_downloaded_views(server_.read_full_views(part));
   });
 
@@ -81,7 +81,7 @@ void Synchronisation::classify_changed_views(const std::vector<ViewId>& changed,
                                              std::vector<ViewId>& reused) {
   const auto reading = file_.transaction(Kind::reading);
   local_checksums_ = read_view_checksums(file_);
-  in_parts(changed, rows_per_query, [&](std::span<const ViewId> part) {
+  for_each_part(changed, rows_per_query, [&](std::span<const ViewId> part) {
     for (ServerView& view : server_.read_infos(part)) {
       const auto row = read_local_row(local_by_server_id_.at(view.id));
       if (!row) continue;  // removed from the file
@@ -104,7 +104,7 @@ std::set<ViewId> Synchronisation::find_lost_views(const std::vector<ViewId>& rem
     uploaded.push_back(view);
     lost.insert(id);
   }
-  in_parts(uploaded, rows_per_query, [&](std::span<const ViewId> part) {
+  for_each_part(uploaded, rows_per_query, [&](std::span<const ViewId> part) {
     for (const Upload& upload : server_.read_uploads(state_.file, part)) {
       const SynchronisedView& row = synchronised_.at(upload.view);
       if (upload.signature == row.signature && upload.server_view == row.server_view) {

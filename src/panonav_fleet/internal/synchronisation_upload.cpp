@@ -69,7 +69,7 @@ std::map<std::string, ServerView> Synchronisation::find_server_views(
   std::vector<std::string> all_names;
   for (const auto& [view, name] : names) all_names.push_back(name);
   std::map<std::string, ServerView> views;
-  in_parts(all_names, rows_per_query, [&](std::span<const std::string> part) {
+  for_each_part(all_names, rows_per_query, [&](std::span<const std::string> part) {
     for (ServerView& view : server_.find_views_by_name(part))
       views[view.info.name] = std::move(view);
   });
@@ -162,7 +162,7 @@ std::map<ViewId, std::string> Synchronisation::find_free_names(
     for (const auto& [view, name] : without_name)
       candidates.push_back(robot_prefixed_name(name, count));
     std::set<std::string> occupied;
-    in_parts(candidates, rows_per_query, [&](std::span<const std::string> part) {
+    for_each_part(candidates, rows_per_query, [&](std::span<const std::string> part) {
       for (const ServerView& view : server_.find_views_by_name(part))
         occupied.insert(view.info.name);
     });
@@ -191,7 +191,7 @@ std::vector<ViewId> Synchronisation::find_sent_views(bool are_new) const {
 void Synchronisation::upload_views() {
   const std::vector<ViewId> sent = find_sent_views(true);
   transfer_total_ = sent.size();
-  in_parts(sent, views_per_batch, [&](std::span<const ViewId> part) {
+  for_each_part(sent, views_per_batch, [&](std::span<const ViewId> part) {
     std::vector<ViewId> ids;
     std::vector<NewView> views;
     {
@@ -213,18 +213,18 @@ NewView Synchronisation::to_new_view(ViewId view, LocalRow row) {
   const auto half = static_cast<std::ptrdiff_t>(header_.shape.size());
   whole.signature.magnitudes.assign(row.signature.begin(), row.signature.begin() + half);
   whole.signature.phases.assign(row.signature.begin() + half, row.signature.end());
-  const auto read = [&](BesideViews table, Bytes& bytes) {
+  const auto read = [&](ViewAttachment table, Bytes& bytes) {
     auto stored = file_.bytes(table, view);
     if (!stored) return;
     if (stored->checksum != bytes_checksum(view, stored->bytes)) {
-      file_.fail_damaged(std::string(table == BesideViews::thumbnails ? "thumbnails" : "features") +
-                         " of view " + std::to_string(view.value) +
-                         ": the checksum does not match");
+      file_.fail_damaged(
+          std::string(table == ViewAttachment::thumbnails ? "thumbnails" : "features") +
+          " of view " + std::to_string(view.value) + ": the checksum does not match");
     }
     bytes = std::move(stored->bytes);
   };
-  read(BesideViews::thumbnails, whole.thumbnail);
-  read(BesideViews::features, whole.features);
+  read(ViewAttachment::thumbnails, whole.thumbnail);
+  read(ViewAttachment::features, whole.features);
   return whole;
 }
 
@@ -258,7 +258,7 @@ void Synchronisation::upload_batch(const std::vector<ViewId>& ids,
 }
 
 void Synchronisation::upload_changes() {
-  in_parts(find_sent_views(false), rows_per_query, [&](std::span<const ViewId> part) {
+  for_each_part(find_sent_views(false), rows_per_query, [&](std::span<const ViewId> part) {
     std::vector<ViewId> ids, server_ids;
     std::vector<LocalRow> rows;
     {
@@ -300,7 +300,7 @@ void Synchronisation::upload_changes() {
 }
 
 void Synchronisation::upload_removals() {
-  in_parts(removed_locally_, rows_per_query, [&](std::span<const ViewId> part) {
+  for_each_part(removed_locally_, rows_per_query, [&](std::span<const ViewId> part) {
     std::vector<ViewId> server_ids;
     std::map<ViewId, SynchronisedView> rows;
     local_checksums_ = read_view_checksums(file_);

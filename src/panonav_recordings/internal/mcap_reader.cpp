@@ -15,7 +15,7 @@ constexpr std::size_t head_bytes = 9;
 constexpr std::size_t message_head_bytes = 22;
 constexpr std::size_t footer_bytes = head_bytes + 20 + 8;
 
-std::int64_t mcap_time(std::uint64_t time) {
+std::int64_t to_time_ns(std::uint64_t time) {
   constexpr auto last = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
   return static_cast<std::int64_t>(std::min(time, last));
 }
@@ -77,7 +77,7 @@ class McapFile : public ChunkedFile {
         return false;
       }
       while (list.left() > 0) {
-        const auto time = mcap_time(list.number<std::uint64_t>());
+        const auto time = to_time_ns(list.number<std::uint64_t>());
         const auto offset = list.number<std::uint64_t>();
         if (offset > std::numeric_limits<std::uint32_t>::max()) return false;
         entries.push_back({time, channel->second, static_cast<std::uint32_t>(offset)});
@@ -134,7 +134,7 @@ class McapFile : public ChunkedFile {
     }
     fields.number<std::uint32_t>();  // sequence
     RecordedMessage message;
-    message.time_ns = mcap_time(fields.number<std::uint64_t>());
+    message.time_ns = to_time_ns(fields.number<std::uint64_t>());
     message.topic = channel->second;
     message.bytes = body.subspan(std::min(message_head_bytes, body.size()));
     return message;
@@ -232,8 +232,8 @@ class McapFile : public ChunkedFile {
                         Summary& summary) {
     Fields content(body);
     Block block;
-    const TimeSpan time{mcap_time(content.number<std::uint64_t>()),
-                        mcap_time(content.number<std::uint64_t>())};
+    const TimeSpan time{to_time_ns(content.number<std::uint64_t>()),
+                        to_time_ns(content.number<std::uint64_t>())};
     block.at = content.number<std::uint64_t>();
     const auto chunk_bytes = content.number<std::uint64_t>();
     const auto lists = content.prefixed();

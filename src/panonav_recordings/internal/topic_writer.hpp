@@ -39,7 +39,7 @@ class TopicWriter {
 
 /// The stamp comes back as it was: the whole seconds are exact, and of the rest what a double
 /// cannot hold is dropped, 1700000003.3 is no 1700000003.299999952.
-inline std::int64_t nanoseconds(double stamp_s) {
+inline std::int64_t to_nanoseconds(double stamp_s) {
   require(stamp_s >= 0.0 && stamp_s < 0x1p31, "stamp_s", stamp_s, "0 <= stamp_s < 2147483648");
   constexpr double second_ns = 1e9;
   const double whole = std::floor(stamp_s);

@@ -65,7 +65,7 @@ std::vector<std::uint32_t> pixel_formats(int descriptor) {
   return formats;
 }
 
-std::string name_of(std::uint32_t pixels) {
+std::string format_name(std::uint32_t pixels) {
   std::string name;
   for (int byte = 0; byte < 4; ++byte) {
     const char c = static_cast<char>((pixels >> (8 * byte)) & 0x7fU);
@@ -93,7 +93,7 @@ std::vector<CameraFormat> camera_formats(const std::filesystem::path& device) {
   const int descriptor = open_device(device.string());
   std::vector<CameraFormat> formats;
   for (const std::uint32_t pixels : pixel_formats(descriptor)) {
-    CameraFormat format{name_of(pixels), is_usable(pixels), {}};
+    CameraFormat format{format_name(pixels), is_usable(pixels), {}};
     constexpr std::uint32_t max_sizes = 256;
     for (v4l2_frmsizeenum size{}; size.index < max_sizes; ++size.index) {
       size.pixel_format = pixels;
@@ -127,7 +127,7 @@ void V4l2Camera::start(const std::optional<ImageSize>& size) {
   if (chosen == usable.end()) {
     std::string names;
     for (const std::uint32_t pixels : offered)
-      names += (names.empty() ? "" : ", ") + name_of(pixels);
+      names += (names.empty() ? "" : ", ") + format_name(pixels);
     fail("offers the formats " + (names.empty() ? "none" : names) +
          "; allowed: MJPG, JPEG, YUYV, UYVY, GREY");
   }
@@ -141,13 +141,14 @@ void V4l2Camera::start(const std::optional<ImageSize>& size) {
     format.fmt.pix.height = static_cast<std::uint32_t>(size->height);
   }
   if (!control(descriptor_, VIDIOC_S_FMT, &format)) {
-    fail(std::string("does not take the format ") + name_of(*chosen) + ": " + std::strerror(errno));
+    fail(std::string("does not take the format ") + format_name(*chosen) + ": " +
+         std::strerror(errno));
   }
   const auto& pixels = format.fmt.pix;
   if (!is_usable(pixels.pixelformat) || pixels.width < 1 || pixels.height < 1 ||
       pixels.width > 65535 || pixels.height > 65535) {
     fail("gives pictures of " + std::to_string(pixels.width) + " x " +
-         std::to_string(pixels.height) + " px as " + name_of(pixels.pixelformat));
+         std::to_string(pixels.height) + " px as " + format_name(pixels.pixelformat));
   }
   pixels_ = pixels.pixelformat;
   size_ = {static_cast<int>(pixels.width), static_cast<int>(pixels.height)};

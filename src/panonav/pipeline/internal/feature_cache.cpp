@@ -8,7 +8,9 @@
 namespace panonav {
 
 FeatureCache::FeatureCache(const MemoryFile& memory, std::optional<ViewId> last_view)
-    : file_(memory.reopen(Access::read_only)), last_view_(last_view), read_(features_in(file_)) {}
+    : file_(memory.reopen(Access::read_only)),
+      last_view_(last_view),
+      read_(make_feature_source(file_)) {}
 
 std::optional<LocalFeatures> FeatureCache::features(ViewId view) {
   if (last_view_ && *last_view_ < view) return std::nullopt;
@@ -19,7 +21,7 @@ std::optional<LocalFeatures> FeatureCache::features(ViewId view) {
   try {
     if (std::exchange(is_lost_, false)) {
       file_ = file_.reopen(Access::read_only);
-      read_ = features_in(file_);
+      read_ = make_feature_source(file_);
     }
     if (read_) features = read_(view);
   } catch (const ContractError&) {  // somebody has removed the view since

@@ -132,7 +132,7 @@ std::int64_t Database::integer(const char* sql) {
   return statement.integer(0);
 }
 
-bool Database::in_transaction() const noexcept {
+bool Database::is_in_transaction() const noexcept {
   return sqlite3_get_autocommit(handle_.get()) == 0;
 }
 
@@ -303,7 +303,7 @@ std::span<const std::uint8_t> Statement::blob(int column) const {
 }
 
 DatabaseTransaction::DatabaseTransaction(Database& database, MemoryTables::Kind kind)
-    : database_(database), within_another_(database.in_transaction()) {
+    : database_(database), within_another_(database.is_in_transaction()) {
   if (within_another_) {
     open_ = kind == MemoryTables::Kind::writing;
     if (open_) database_.execute("SAVEPOINT part");
@@ -320,7 +320,8 @@ DatabaseTransaction::DatabaseTransaction(Database& database, MemoryTables::Kind 
 }
 
 DatabaseTransaction::~DatabaseTransaction() {
-  if (!open_ || !database_.in_transaction()) return;  // SQLite rolls back by itself when it fails
+  if (!open_ || !database_.is_in_transaction())
+    return;  // SQLite rolls back by itself when it fails
   sqlite3_exec(database_.handle(), within_another_ ? "ROLLBACK TO part; RELEASE part" : "ROLLBACK",
                nullptr, nullptr, nullptr);
 }

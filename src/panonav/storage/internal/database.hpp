@@ -31,7 +31,7 @@ class Database {
 
   void execute(const char* sql);
   [[nodiscard]] std::int64_t integer(const char* sql);
-  [[nodiscard]] bool in_transaction() const noexcept;
+  [[nodiscard]] bool is_in_transaction() const noexcept;
   /// From now on every transaction throws when the file was deleted, moved or replaced.
   void watch_for_moves() noexcept { watches_for_moves_ = true; }
   void require_unmoved() const;

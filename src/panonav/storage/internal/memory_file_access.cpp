@@ -23,11 +23,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string cause() {
+std::string system_message() {
   return std::generic_category().message(errno);
 }
 
-fs::path folder_of(const fs::path& path) {
+fs::path parent_folder(const fs::path& path) {
   const fs::path folder = path.parent_path();
   return folder.empty() ? fs::path(".") : folder;
 }
@@ -38,7 +38,7 @@ fs::path with_suffix(const fs::path& path, const char* suffix) {
   return result;
 }
 
-bool writable(const fs::path& path) {
+bool is_writable(const fs::path& path) {
   return ::faccessat(AT_FDCWD, path.c_str(), W_OK, AT_EACCESS) == 0;
 }
 
@@ -50,7 +50,7 @@ void sync_folder(const fs::path& folder) {
   ::close(descriptor);
 }
 
-void remove_beside(const fs::path& path) {
+void remove_log_files(const fs::path& path) {
   for (const char* suffix : {"-journal", "-wal", "-shm"}) {
     ::unlink(with_suffix(path, suffix).c_str());
   }
@@ -62,7 +62,7 @@ Database open_memory_database(const fs::path& path, Access access) {
   // SQLite lays its log beside the file that a link points at.
   std::error_code ignored;
   const fs::path file = fs::weakly_canonical(path, ignored);
-  const bool may_write = writable(file) && writable(folder_of(file));
+  const bool may_write = is_writable(file) && is_writable(parent_folder(file));
   if (access == Access::read_write) {
     if (!may_write) {
       throw FileError(name, "cannot be changed: no permission to write the file and its folder");
@@ -122,11 +122,11 @@ void require_free_name(const fs::path& path) {
   std::error_code ignored;
   const std::string name = path.string();
   if (fs::exists(fs::symlink_status(path, ignored))) refuse_existing(path);
-  const fs::path folder = folder_of(path);
+  const fs::path folder = parent_folder(path);
   if (!fs::is_directory(folder, ignored)) {
     throw FileError(name, "cannot be made: there is no folder " + folder.string());
   }
-  if (!writable(folder)) {
+  if (!is_writable(folder)) {
     throw FileError(name, "cannot be made: no permission to write in " + folder.string());
   }
   // A log without its file would be taken for this file's own.
@@ -140,26 +140,26 @@ void require_free_name(const fs::path& path) {
 }
 
 // A link refuses a name that was taken meanwhile; a rename would replace that file.
-void give_name(const fs::path& unfinished, const fs::path& path) {
+void link_to_final_name(const fs::path& unfinished, const fs::path& path) {
   if (::link(unfinished.c_str(), path.c_str()) != 0) {
     if (errno == EEXIST) refuse_existing(path);
     if ((errno != EPERM && errno != EOPNOTSUPP && errno != ENOSYS) ||
         ::rename(unfinished.c_str(), path.c_str()) != 0) {
-      throw FileError(path.string(), "cannot be made: " + cause());
+      throw FileError(path.string(), "cannot be made: " + system_message());
     }
   }
-  sync_folder(folder_of(path));
+  sync_folder(parent_folder(path));
 }
 
 }  // namespace
 
-void make_memory_tables(const fs::path& path, const MemoryHeader& header,
-                        const std::function<void(MemoryTables&)>& fill) {
+void create_memory_tables(const fs::path& path, const MemoryHeader& header,
+                          const std::function<void(MemoryTables&)>& fill) {
   validate(header);
   if (const auto scheme = find_memory_scheme(path)) return scheme->create(path, header, fill);
   require_free_name(path);
   const TemporaryFile unfinished(path);
-  remove_beside(unfinished.path());
+  remove_log_files(unfinished.path());
   try {
     Database database(unfinished.path(), DatabaseMode::create);
     database.execute("PRAGMA synchronous=FULL");
@@ -167,7 +167,7 @@ void make_memory_tables(const fs::path& path, const MemoryHeader& header,
     database.execute("PRAGMA page_size=8192");
     DatabaseTransaction transaction(database, MemoryTables::Kind::writing);
     create_schema(database);
-    for (const auto& [key, value] : settings_of(header)) write_setting(database, key, value);
+    for (const auto& [key, value] : to_settings(header)) write_setting(database, key, value);
     transaction.commit();
     database.execute("PRAGMA journal_mode=WAL");
     if (fill) {
@@ -177,10 +177,10 @@ void make_memory_tables(const fs::path& path, const MemoryHeader& header,
       filling->commit();
     }
   } catch (...) {
-    remove_beside(unfinished.path());
+    remove_log_files(unfinished.path());
     throw;
   }
-  give_name(unfinished.path(), path);
+  link_to_final_name(unfinished.path(), path);
 }
 
 OpenedMemory open_memory_tables(const fs::path& path, Access access) {
@@ -188,7 +188,7 @@ OpenedMemory open_memory_tables(const fs::path& path, Access access) {
   if (const auto scheme = find_memory_scheme(path)) {
     auto tables = scheme->open(path, access);
     try {
-      header = header_from(tables->settings());
+      header = to_header(tables->settings());
     } catch (const ContractError& error) {
       tables->fail_damaged(error.what());
     }
@@ -198,7 +198,7 @@ OpenedMemory open_memory_tables(const fs::path& path, Access access) {
   try {
     const DatabaseTransaction reading(database, MemoryTables::Kind::reading);
     require_schema(database);
-    header = header_from(read_settings(database));
+    header = to_header(read_settings(database));
   } catch (const FileError&) {
     database.leave_log_on_close();
     throw;

@@ -11,8 +11,8 @@ namespace panonav {
 
 /// Makes a memory, in a file or on a server, with what `fill` writes, whole or not at all. Throws
 /// FileError when something is there.
-void make_memory_tables(const std::filesystem::path& path, const MemoryHeader& header,
-                        const std::function<void(MemoryTables&)>& fill);
+void create_memory_tables(const std::filesystem::path& path, const MemoryHeader& header,
+                          const std::function<void(MemoryTables&)>& fill);
 
 struct OpenedMemory {
   std::unique_ptr<MemoryTables> tables;

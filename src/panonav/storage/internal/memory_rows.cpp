@@ -62,8 +62,8 @@ void refuse_view(ViewId view) {
   throw ContractError("view", std::to_string(view.value), "a view of the memory file");
 }
 
-void refuse_taken_name(std::string_view what, std::string_view name,
-                       const std::filesystem::path& file) {
+void refuse_used_name(std::string_view what, std::string_view name,
+                      const std::filesystem::path& file) {
   throw ContractError(std::string(what) + " name",
                       "\"" + std::string(name) + "\", which " + file.string() + " already holds",
                       "a name that is unique");

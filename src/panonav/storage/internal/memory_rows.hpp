@@ -18,7 +18,7 @@ namespace panonav {
 
 /// Calls work(part) for one part of the rows after the other.
 template <class Row, class Work>
-void in_parts(const std::vector<Row>& rows, std::size_t at_once, const Work& work) {
+void for_each_part(const std::vector<Row>& rows, std::size_t at_once, const Work& work) {
   for (std::size_t at = 0; at < rows.size(); at += at_once) {
     work(std::span(rows).subspan(at, std::min(at_once, rows.size() - at)));
   }
@@ -42,8 +42,8 @@ void pack_signature(const PackedSignature& signature, std::vector<std::uint8_t>&
 [[noreturn]] void refuse_view(ViewId view);
 
 /// Throws the ContractError for a name that another `what` ("view", "route") of the file has.
-[[noreturn]] void refuse_taken_name(std::string_view what, std::string_view name,
-                                    const std::filesystem::path& file);
+[[noreturn]] void refuse_used_name(std::string_view what, std::string_view name,
+                                   const std::filesystem::path& file);
 
 /// Throws ContractError on a new name that people could not type or read.
 void require_name(std::string_view what, std::string_view name);

@@ -8,7 +8,7 @@
 
 namespace panonav {
 
-ViewId MemoryTables::view_id(std::int64_t number) const {
+ViewId MemoryTables::to_view_id(std::int64_t number) const {
   if (number < 1 || number > std::int64_t{UINT32_MAX}) fail_damaged("a view id is out of range");
   return {static_cast<std::uint32_t>(number)};
 }
@@ -40,16 +40,16 @@ const ViewRow& MemoryTables::checked(const ViewRow& row, SignatureShape shape,
 }
 
 void MemoryTables::fail_damaged(std::string_view what) const {
-  throw FileError(place().string(), "is damaged: " + std::string(what));
+  throw FileError(message_path().string(), "is damaged: " + std::string(what));
 }
 
-std::optional<std::vector<std::uint8_t>> MemoryTables::checked_bytes(BesideViews table,
-                                                                     ViewId view) {
+std::optional<std::vector<std::uint8_t>> MemoryTables::read_checked_bytes(ViewAttachment table,
+                                                                          ViewId view) {
   require_views(std::span(&view, 1));
   auto stored = bytes(table, view);
   if (!stored) return std::nullopt;
   if (stored->checksum != bytes_checksum(view, stored->bytes)) {
-    fail_damaged(table == BesideViews::thumbnails
+    fail_damaged(table == ViewAttachment::thumbnails
                      ? "the thumbnail of view " + std::to_string(view.value) +
                            " does not match its checksum"
                      : "the local features of view " + std::to_string(view.value) +

@@ -63,7 +63,7 @@ struct StoredBytes {
 };
 
 /// Tables of bytes that some views have.
-enum class BesideViews { thumbnails, features };
+enum class ViewAttachment { thumbnails, features };
 
 /// Storage of the rows of one memory: an SQLite file or a PostgreSQL server. `MemoryFile`,
 /// map_tables.hpp and route_tables.hpp decide what the rows mean and what is refused. Everything
@@ -84,7 +84,7 @@ class MemoryTables {
     virtual void commit() = 0;
   };
   template <class Row>
-  using Take = std::function<void(const Row&)>;
+  using Consume = std::function<void(const Row&)>;
   /// Runs a part of `verify` and keeps what it throws.
   using Check = std::function<void(const std::function<void()>&)>;
 
@@ -96,10 +96,10 @@ class MemoryTables {
   /// Returns the path or address as it was passed.
   [[nodiscard]] virtual const std::filesystem::path& path() const noexcept = 0;
   /// Returns the path that messages of damage name.
-  [[nodiscard]] virtual const std::filesystem::path& place() const noexcept = 0;
+  [[nodiscard]] virtual const std::filesystem::path& message_path() const noexcept = 0;
   [[noreturn]] void fail_damaged(std::string_view what) const;
   /// Throws FileError on a number that no view has.
-  [[nodiscard]] ViewId view_id(std::int64_t number) const;
+  [[nodiscard]] ViewId to_view_id(std::int64_t number) const;
   /// The row itself. Throws FileError when it does not match its checksum.
   const ViewRow& checked(const ViewRow& row, SignatureShape shape, RecordBytes& scratch) const;
   /// The link that the row tells. Throws as above, and on a row that no link has.
@@ -114,56 +114,57 @@ class MemoryTables {
 
   /// The largest id that was ever given to a view; 0: none.
   [[nodiscard]] virtual std::uint32_t last_id() = 0;
-  /// Views with ids above `last_id`, ascending. Throws as `refuse_taken_name`.
+  /// Views with ids above `last_id`, ascending. Throws as `refuse_used_name`.
   virtual void insert(std::span<const ViewId> ids, std::span<const NewView> views) = 0;
   /// Throws as `refuse_view` for the first that is not there.
   virtual void require_views(std::span<const ViewId> views) = 0;
   /// With their links, thumbnails and features.
   virtual void remove(std::span<const ViewId> views) = 0;
-  /// Replaces all but the signature. Throws as `refuse_taken_name`.
+  /// Replaces all but the signature. Throws as `refuse_used_name`.
   virtual void write_info(ViewId view, const ReferenceInfo& info, std::int64_t checksum) = 0;
   /// All, ascending.
-  virtual void read_views(const Take<ViewRow>& take) = 0;
+  virtual void read_views(const Consume<ViewRow>& consume) = 0;
   /// These, in this order. Throws as `refuse_view`.
-  virtual void read_views(std::span<const ViewId> views, const Take<ViewRow>& take) = 0;
+  virtual void read_views(std::span<const ViewId> views, const Consume<ViewRow>& consume) = 0;
   /// Those of them that are there, in any order.
-  virtual void read_views_there(std::span<const ViewId> views, const Take<ViewRow>& take) = 0;
+  virtual void read_available_views(std::span<const ViewId> views,
+                                    const Consume<ViewRow>& consume) = 0;
   /// Those with ids first .. last, ascending; of each signature the first `bytes`.
   virtual void read_magnitudes(ViewId first, ViewId last, std::size_t bytes,
-                               const Take<MagnitudesRow>& take) = 0;
+                               const Consume<MagnitudesRow>& consume) = 0;
   [[nodiscard]] virtual std::optional<ViewId> find(std::string_view name) = 0;
   /// Returns the names of all views by ascending id.
   [[nodiscard]] virtual std::vector<std::string> names() = 0;
-  /// Ascending.
+  /// Returns the names, ascending.
   [[nodiscard]] virtual std::vector<ViewId> views() = 0;
-  /// Ascending.
+  /// Returns the names, ascending.
   [[nodiscard]] virtual std::vector<PositionRow> views_within(const PositionBounds& bounds) = 0;
-  /// Ascending.
-  [[nodiscard]] virtual std::vector<ViewId> views_with(BesideViews table) = 0;
-  [[nodiscard]] virtual bool has_any(BesideViews table) = 0;
-  [[nodiscard]] virtual std::optional<StoredBytes> bytes(BesideViews table, ViewId view) = 0;
+  /// Returns the names, ascending.
+  [[nodiscard]] virtual std::vector<ViewId> views_with_attachment(ViewAttachment table) = 0;
+  [[nodiscard]] virtual bool has_attachments(ViewAttachment table) = 0;
+  [[nodiscard]] virtual std::optional<StoredBytes> bytes(ViewAttachment table, ViewId view) = 0;
   /// The same bytes, checked. Throws as `refuse_view`, and FileError when they do not match their
   /// checksum.
-  [[nodiscard]] std::optional<std::vector<std::uint8_t>> checked_bytes(BesideViews table,
-                                                                       ViewId view);
+  [[nodiscard]] std::optional<std::vector<std::uint8_t>> read_checked_bytes(ViewAttachment table,
+                                                                            ViewId view);
 
   /// With a < b; a pair that is there gets the new kind.
   virtual void write_links(std::span<const Link> links) = 0;
   virtual void erase_link(ViewId a, ViewId b) = 0;
-  /// Ascending.
-  virtual void read_links(const Take<LinkRow>& take) = 0;
+  /// Returns the names, ascending.
+  virtual void read_links(const Consume<LinkRow>& consume) = 0;
 
   virtual void write_map(std::string_view name, const MapRow& row) = 0;
   [[nodiscard]] virtual std::optional<MapRow> map(std::string_view name) = 0;
   virtual void erase_map(std::string_view name) = 0;
-  /// Ascending.
+  /// Returns the names, ascending.
   [[nodiscard]] virtual std::vector<std::string> map_names() = 0;
 
   virtual void write_route(std::string_view name, const RouteRow& row) = 0;
   [[nodiscard]] virtual std::optional<RouteRow> route(std::string_view name) = 0;
   /// With its blocks.
   virtual void erase_route(std::string_view name) = 0;
-  /// Ascending.
+  /// Returns the names, ascending.
   [[nodiscard]] virtual std::vector<std::string> route_names() = 0;
   virtual void write_block(std::string_view route, std::int64_t number,
                            std::span<const std::uint8_t> lines, std::int64_t checksum) = 0;

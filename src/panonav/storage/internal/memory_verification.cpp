@@ -22,9 +22,9 @@ class MemoryVerification {
     const auto reading = tables_.transaction(MemoryTables::Kind::reading);
     const MemoryTables::Check check_part = [this](const auto& part) { check(part); };
     views_ = tables_.verify_structure(check_part);
-    check([&] { static_cast<void>(header_from(tables_.settings())); });
+    check([&] { static_cast<void>(to_header(tables_.settings())); });
     verify_views();
-    for (const BesideViews table : {BesideViews::thumbnails, BesideViews::features}) {
+    for (const ViewAttachment table : {ViewAttachment::thumbnails, ViewAttachment::features}) {
       check([&] { verify_bytes(table); });
     }
     check([&] { verify_links(); });
@@ -42,7 +42,7 @@ class MemoryVerification {
     } catch (const Error& error) {
       std::string what = error.what();
       for (const std::string& prefix :
-           {tables_.place().string() + ": ", std::string("is damaged: ")}) {
+           {tables_.message_path().string() + ": ", std::string("is damaged: ")}) {
         if (what.starts_with(prefix)) what.erase(0, prefix.size());
       }
       faults_.push_back({view, std::move(what)});
@@ -59,16 +59,16 @@ class MemoryVerification {
     }
   }
 
-  void verify_bytes(BesideViews table) {
+  void verify_bytes(ViewAttachment table) {
     const auto verify_entry = [&](ViewId view) {
       if (!views_.contains(view)) {
         tables_.fail_damaged(std::string("an entry of ") +
-                             (table == BesideViews::thumbnails ? "thumbnails" : "features") +
+                             (table == ViewAttachment::thumbnails ? "thumbnails" : "features") +
                              " without a view");
       }
-      static_cast<void>(tables_.checked_bytes(table, view));
+      static_cast<void>(tables_.read_checked_bytes(table, view));
     };
-    for (const ViewId view : tables_.views_with(table)) {
+    for (const ViewId view : tables_.views_with_attachment(table)) {
       check([&] { verify_entry(view); }, view);
     }
   }

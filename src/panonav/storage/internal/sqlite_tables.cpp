@@ -35,8 +35,8 @@ std::vector<std::uint8_t> copy_bytes(std::span<const std::uint8_t> bytes) {
   return {bytes.begin(), bytes.end()};
 }
 
-const char* name_of(BesideViews table) {
-  return table == BesideViews::thumbnails ? "thumbnails" : "features";
+const char* name_of(ViewAttachment table) {
+  return table == ViewAttachment::thumbnails ? "thumbnails" : "features";
 }
 
 }  // namespace
@@ -56,13 +56,13 @@ std::unique_ptr<MemoryTables::Transaction> SqliteTables::transaction(Kind kind) 
   return std::make_unique<DatabaseTransaction>(database_, kind);
 }
 
-ViewId SqliteTables::id_in(const Statement& row, int column) const {
-  return view_id(row.integer(column));
+ViewId SqliteTables::read_view_id(const Statement& row, int column) const {
+  return to_view_id(row.integer(column));
 }
 
-ViewRow SqliteTables::view_in(const Statement& row) const {
+ViewRow SqliteTables::read_view_row(const Statement& row) const {
   ViewRow view;
-  view.id = id_in(row, 0);
+  view.id = read_view_id(row, 0);
   view.info.name = row.text(1);
   const auto x_m = optional_real(row, 2);
   const auto y_m = optional_real(row, 3);
@@ -73,7 +73,7 @@ ViewRow SqliteTables::view_in(const Statement& row) const {
   return view;
 }
 
-std::vector<std::string> SqliteTables::texts(const char* sql) {
+std::vector<std::string> SqliteTables::query_texts(const char* sql) {
   std::vector<std::string> texts;
   Statement rows(database_, sql);
   while (rows.step()) texts.emplace_back(rows.text(0));
@@ -121,17 +121,17 @@ void SqliteTables::insert(std::span<const ViewId> ids, std::span<const NewView> 
     bind_info(insert_view_, 2, view.info);
     insert_view_.bind(7, signature_).bind(8, view_checksum(scratch_, id, view.info, signature_));
     const int constraint = insert_view_.run();
-    if (constraint == SQLITE_CONSTRAINT_UNIQUE) refuse_taken_name("view", view.info.name, path_);
+    if (constraint == SQLITE_CONSTRAINT_UNIQUE) refuse_used_name("view", view.info.name, path_);
     if (constraint != 0) fail_damaged("the id of a new view is taken");
-    insert_beside(BesideViews::thumbnails, id, view.thumbnail);
-    insert_beside(BesideViews::features, id, view.features);
+    insert_attachment(ViewAttachment::thumbnails, id, view.thumbnail);
+    insert_attachment(ViewAttachment::features, id, view.features);
   }
 }
 
-void SqliteTables::insert_beside(BesideViews table, ViewId view,
-                                 std::span<const std::uint8_t> bytes) {
+void SqliteTables::insert_attachment(ViewAttachment table, ViewId view,
+                                     std::span<const std::uint8_t> bytes) {
   if (bytes.empty()) return;
-  const char* const sql = table == BesideViews::thumbnails
+  const char* const sql = table == ViewAttachment::thumbnails
                               ? "INSERT INTO thumbnails(view, picture, checksum) VALUES(?, ?, ?)"
                               : "INSERT INTO features(view, features, checksum) VALUES(?, ?, ?)";
   if (run_statement(database_, sql, view, bytes, bytes_checksum(view, bytes)) != 0) {
@@ -165,15 +165,15 @@ void SqliteTables::write_info(ViewId view, const ReferenceInfo& info, std::int64
                   "checksum = ? WHERE id = ?");
   bind_info(write, 1, info);
   write.bind(6, checksum).bind(7, view);
-  if (write.run() != 0) refuse_taken_name("view", info.name, path_);
+  if (write.run() != 0) refuse_used_name("view", info.name, path_);
 }
 
-void SqliteTables::read_views(const Take<ViewRow>& take) {
+void SqliteTables::read_views(const Consume<ViewRow>& consume) {
   std::int64_t read = 0;
   Statement rows(database_,
                  "SELECT id, name, x_m, y_m, heading_rad, stamp_s, signature, checksum FROM views "
                  "ORDER BY id");
-  for (; rows.step(); ++read) take(view_in(rows));
+  for (; rows.step(); ++read) consume(read_view_row(rows));
   // A page that lost its cells loses views without a fault of their own; the index of the names,
   // which lies on other pages, still counts them.
   const std::int64_t count = database_.integer(
@@ -183,7 +183,7 @@ void SqliteTables::read_views(const Take<ViewRow>& take) {
   }
 }
 
-void SqliteTables::read_views(std::span<const ViewId> views, const Take<ViewRow>& take) {
+void SqliteTables::read_views(std::span<const ViewId> views, const Consume<ViewRow>& consume) {
   for (const ViewId view : views) {
     find_view_.reset();  // what was taken last may have thrown
     if (!find_view_.bind(1, view).step()) {
@@ -193,21 +193,22 @@ void SqliteTables::read_views(std::span<const ViewId> views, const Take<ViewRow>
       if (!named.step()) refuse_view(view);
       fail_damaged("view " + std::to_string(view.value) + " is missing");
     }
-    take(view_in(find_view_));
+    consume(read_view_row(find_view_));
   }
   find_view_.reset();
 }
 
-void SqliteTables::read_views_there(std::span<const ViewId> views, const Take<ViewRow>& take) {
+void SqliteTables::read_available_views(std::span<const ViewId> views,
+                                        const Consume<ViewRow>& consume) {
   for (const ViewId view : views) {
     find_view_.reset();
-    if (find_view_.bind(1, view).step()) take(view_in(find_view_));
+    if (find_view_.bind(1, view).step()) consume(read_view_row(find_view_));
   }
   find_view_.reset();
 }
 
 void SqliteTables::read_magnitudes(ViewId first, ViewId last, std::size_t bytes,
-                                   const Take<MagnitudesRow>& take) {
+                                   const Consume<MagnitudesRow>& consume) {
   Statement rows(database_,
                  "SELECT id, x_m, y_m, signature FROM views WHERE id BETWEEN ? AND ? ORDER BY id",
                  first, last);
@@ -215,14 +216,14 @@ void SqliteTables::read_magnitudes(ViewId first, ViewId last, std::size_t bytes,
     const auto x_m = optional_real(rows, 1);
     const auto y_m = optional_real(rows, 2);
     const auto signature = rows.blob(3);
-    take({id_in(rows, 0), x_m && y_m ? std::optional(Point2{*x_m, *y_m}) : std::nullopt,
-          signature.first(std::min(bytes, signature.size()))});
+    consume({read_view_id(rows, 0), x_m && y_m ? std::optional(Point2{*x_m, *y_m}) : std::nullopt,
+             signature.first(std::min(bytes, signature.size()))});
   }
 }
 
 std::optional<ViewId> SqliteTables::find(std::string_view name) {
   std::optional<ViewId> found;
-  if (find_name_.bind(1, name).step()) found = id_in(find_name_, 0);
+  if (find_name_.bind(1, name).step()) found = read_view_id(find_name_, 0);
   find_name_.reset();
   return found;
 }
@@ -243,7 +244,7 @@ std::vector<ViewId> SqliteTables::views() {
   std::vector<ViewId> views;
   // The index of the names holds the ids, too, on far fewer pages than the table.
   Statement ids(database_, "SELECT id FROM views INDEXED BY sqlite_autoindex_views_1");
-  while (ids.step()) views.push_back(id_in(ids, 0));
+  while (ids.step()) views.push_back(read_view_id(ids, 0));
   std::ranges::sort(views);
   return views;
 }
@@ -255,24 +256,24 @@ std::vector<PositionRow> SqliteTables::views_within(const PositionBounds& bounds
                  "BETWEEN ? AND ? ORDER BY id",
                  bounds.min_x_m, bounds.max_x_m, bounds.min_y_m, bounds.max_y_m);
   while (rows.step()) {
-    views.push_back({id_in(rows, 0),
+    views.push_back({read_view_id(rows, 0),
                      {optional_real(rows, 1).value_or(0.0), optional_real(rows, 2).value_or(0.0),
                       optional_real(rows, 3)}});
   }
   return views;
 }
 
-bool SqliteTables::has_any(BesideViews table) {
+bool SqliteTables::has_attachments(ViewAttachment table) {
   const std::string sql = "SELECT EXISTS (SELECT 1 FROM " + std::string(name_of(table)) + ")";
   return database_.integer(sql.c_str()) != 0;
 }
 
-std::vector<ViewId> SqliteTables::views_with(BesideViews table) {
+std::vector<ViewId> SqliteTables::views_with_attachment(ViewAttachment table) {
   std::vector<ViewId> views;
   const std::string sql = "SELECT view FROM " + std::string(name_of(table)) + " ORDER BY view";
   Statement rows(database_, sql.c_str());
   while (rows.step()) {
-    const ViewId view = id_in(rows, 0);
+    const ViewId view = read_view_id(rows, 0);
     if (!views.empty() && view <= views.back()) {
       fail_damaged(std::string(name_of(table)) + " are out of order");
     }
@@ -281,9 +282,9 @@ std::vector<ViewId> SqliteTables::views_with(BesideViews table) {
   return views;
 }
 
-std::optional<StoredBytes> SqliteTables::bytes(BesideViews table, ViewId view) {
+std::optional<StoredBytes> SqliteTables::bytes(ViewAttachment table, ViewId view) {
   Statement row(database_,
-                table == BesideViews::thumbnails
+                table == ViewAttachment::thumbnails
                     ? "SELECT picture, checksum FROM thumbnails WHERE view = ?"
                     : "SELECT features, checksum FROM features WHERE view = ?",
                 view);
@@ -305,12 +306,13 @@ void SqliteTables::erase_link(ViewId a, ViewId b) {
   run_statement(database_, "DELETE FROM links WHERE a = ? AND b = ?", a, b);
 }
 
-void SqliteTables::read_links(const Take<LinkRow>& take) {
+void SqliteTables::read_links(const Consume<LinkRow>& consume) {
   Statement check(database_, "PRAGMA quick_check(links)");
   if (!check.step() || check.text(0) != "ok") fail_damaged("table links");
   check.reset();
   Statement rows(database_, "SELECT a, b, kind, checksum FROM links ORDER BY a, b");
-  while (rows.step()) take({id_in(rows, 0), id_in(rows, 1), rows.integer(2), rows.integer(3)});
+  while (rows.step())
+    consume({read_view_id(rows, 0), read_view_id(rows, 1), rows.integer(2), rows.integer(3)});
 }
 
 void SqliteTables::write_map(std::string_view name, const MapRow& row) {
@@ -333,7 +335,7 @@ void SqliteTables::erase_map(std::string_view name) {
 }
 
 std::vector<std::string> SqliteTables::map_names() {
-  return texts("SELECT name FROM maps ORDER BY name");
+  return query_texts("SELECT name FROM maps ORDER BY name");
 }
 
 void SqliteTables::write_route(std::string_view name, const RouteRow& row) {
@@ -357,7 +359,7 @@ void SqliteTables::erase_route(std::string_view name) {
 }
 
 std::vector<std::string> SqliteTables::route_names() {
-  return texts("SELECT name FROM routes ORDER BY name");
+  return query_texts("SELECT name FROM routes ORDER BY name");
 }
 
 void SqliteTables::write_block(std::string_view route, std::int64_t number,
@@ -390,7 +392,7 @@ std::int64_t SqliteTables::route_bytes(std::string_view route) {
 }
 
 std::vector<std::string> SqliteTables::routes_with_blocks() {
-  return texts("SELECT DISTINCT route FROM route_blocks");
+  return query_texts("SELECT DISTINCT route FROM route_blocks");
 }
 
 std::set<ViewId> SqliteTables::verify_structure(const Check& check) {
@@ -401,7 +403,7 @@ std::set<ViewId> SqliteTables::verify_structure(const Check& check) {
     if (!intact) break;
     intact = false;
     check([&] {
-      std::vector<std::string> lines = texts(sql);
+      std::vector<std::string> lines = query_texts(sql);
       intact = lines == std::vector<std::string>{"ok"};
       for (std::string& line : lines) {
         std::ranges::replace(line, '\n', ' ');
@@ -418,7 +420,7 @@ std::set<ViewId> SqliteTables::verify_structure(const Check& check) {
                           "SELECT id FROM views INDEXED BY sqlite_autoindex_views_1"}) {
     check([&] {
       Statement ids(database_, sql);
-      while (ids.step()) views.insert(id_in(ids, 0));
+      while (ids.step()) views.insert(read_view_id(ids, 0));
     });
   }
   return views;

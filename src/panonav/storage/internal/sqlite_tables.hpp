@@ -15,7 +15,7 @@ class SqliteTables final : public MemoryTables {
   SqliteTables(std::filesystem::path path, Database database);
 
   [[nodiscard]] const std::filesystem::path& path() const noexcept override { return path_; }
-  [[nodiscard]] const std::filesystem::path& place() const noexcept override {
+  [[nodiscard]] const std::filesystem::path& message_path() const noexcept override {
     return database_.path();
   }
   [[nodiscard]] std::unique_ptr<Transaction> transaction(Kind kind) override;
@@ -29,22 +29,23 @@ class SqliteTables final : public MemoryTables {
   void require_views(std::span<const ViewId> views) override;
   void remove(std::span<const ViewId> views) override;
   void write_info(ViewId view, const ReferenceInfo& info, std::int64_t checksum) override;
-  void read_views(const Take<ViewRow>& take) override;
-  void read_views(std::span<const ViewId> views, const Take<ViewRow>& take) override;
-  void read_views_there(std::span<const ViewId> views, const Take<ViewRow>& take) override;
+  void read_views(const Consume<ViewRow>& consume) override;
+  void read_views(std::span<const ViewId> views, const Consume<ViewRow>& consume) override;
+  void read_available_views(std::span<const ViewId> views,
+                            const Consume<ViewRow>& consume) override;
   void read_magnitudes(ViewId first, ViewId last, std::size_t bytes,
-                       const Take<MagnitudesRow>& take) override;
+                       const Consume<MagnitudesRow>& consume) override;
   [[nodiscard]] std::optional<ViewId> find(std::string_view name) override;
   [[nodiscard]] std::vector<std::string> names() override;
   [[nodiscard]] std::vector<ViewId> views() override;
   [[nodiscard]] std::vector<PositionRow> views_within(const PositionBounds& bounds) override;
-  [[nodiscard]] std::vector<ViewId> views_with(BesideViews table) override;
-  [[nodiscard]] bool has_any(BesideViews table) override;
-  [[nodiscard]] std::optional<StoredBytes> bytes(BesideViews table, ViewId view) override;
+  [[nodiscard]] std::vector<ViewId> views_with_attachment(ViewAttachment table) override;
+  [[nodiscard]] bool has_attachments(ViewAttachment table) override;
+  [[nodiscard]] std::optional<StoredBytes> bytes(ViewAttachment table, ViewId view) override;
 
   void write_links(std::span<const Link> links) override;
   void erase_link(ViewId a, ViewId b) override;
-  void read_links(const Take<LinkRow>& take) override;
+  void read_links(const Consume<LinkRow>& consume) override;
 
   void write_map(std::string_view name, const MapRow& row) override;
   [[nodiscard]] std::optional<MapRow> map(std::string_view name) override;
@@ -74,10 +75,10 @@ class SqliteTables final : public MemoryTables {
   [[nodiscard]] Database& database() noexcept { return database_; }
 
  private:
-  [[nodiscard]] ViewId id_in(const Statement& row, int column) const;
-  [[nodiscard]] ViewRow view_in(const Statement& row) const;
-  void insert_beside(BesideViews table, ViewId view, std::span<const std::uint8_t> bytes);
-  [[nodiscard]] std::vector<std::string> texts(const char* sql);
+  [[nodiscard]] ViewId read_view_id(const Statement& row, int column) const;
+  [[nodiscard]] ViewRow read_view_row(const Statement& row) const;
+  void insert_attachment(ViewAttachment table, ViewId view, std::span<const std::uint8_t> bytes);
+  [[nodiscard]] std::vector<std::string> query_texts(const char* sql);
   /// Drops what exceeds the bounds of `MemoryFile::change`.
   void shorten_history();
 

@@ -43,9 +43,9 @@ SynchronisedViews read_synchronised_views(SqliteTables& file) {
                  "SELECT view, server_view, local_checksum, server_checksum, signature, uploaded, "
                  "sent, checksum FROM synchronised ORDER BY view");
   while (rows.step()) {
-    const ViewId view = file.view_id(rows.integer(0));
+    const ViewId view = file.to_view_id(rows.integer(0));
     SynchronisedView row;
-    if (!rows.is_null(1)) row.server_view = file.view_id(rows.integer(1));
+    if (!rows.is_null(1)) row.server_view = file.to_view_id(rows.integer(1));
     row.local_checksum = rows.integer(2);
     row.server_checksum = rows.integer(3);
     row.signature = rows.integer(4);
@@ -77,7 +77,8 @@ SynchronisedLinks read_synchronised_links(SqliteTables& file) {
   SynchronisedLinks links;
   Statement rows(file.database(), "SELECT a, b, kind, checksum FROM synchronised_links");
   while (rows.step()) {
-    Link link{file.view_id(rows.integer(0)), file.view_id(rows.integer(1)), LinkKind::sequence};
+    Link link{file.to_view_id(rows.integer(0)), file.to_view_id(rows.integer(1)),
+              LinkKind::sequence};
     const std::int64_t kind = rows.integer(2);
     link.kind = static_cast<LinkKind>(kind);
     if (kind < 0 || kind > static_cast<int>(LinkKind::closure) ||
@@ -103,7 +104,7 @@ void erase_synchronised_link(SqliteTables& file, ViewId a, ViewId b) {
 std::map<ViewId, std::int64_t> read_view_checksums(SqliteTables& file) {
   std::map<ViewId, std::int64_t> checksums;
   Statement rows(file.database(), "SELECT id, checksum FROM views ORDER BY id");
-  while (rows.step()) checksums.emplace(file.view_id(rows.integer(0)), rows.integer(1));
+  while (rows.step()) checksums.emplace(file.to_view_id(rows.integer(0)), rows.integer(1));
   return checksums;
 }
 
@@ -120,7 +121,7 @@ std::map<ViewId, std::pair<double, double>> read_positions(SqliteTables& file) {
   std::map<ViewId, std::pair<double, double>> positions;
   Statement rows(file.database(),
                  "SELECT id, x_m, y_m FROM views WHERE x_m IS NOT NULL AND y_m IS NOT NULL");
-  while (rows.step()) positions[file.view_id(rows.integer(0))] = {rows.real(1), rows.real(2)};
+  while (rows.step()) positions[file.to_view_id(rows.integer(0))] = {rows.real(1), rows.real(2)};
   return positions;
 }
 

@@ -39,7 +39,7 @@ struct FileMark {
 
 // The only row of the table `log` in its only page (SQLite's file format, section 1.6): a leaf with
 // one cell of 36 bytes and row id 1, whose record of 4 bytes says: id, two blobs of 16 bytes.
-std::optional<Marks> marks_in(std::span<const std::uint8_t> page) {
+std::optional<Marks> find_marks(std::span<const std::uint8_t> page) {
   constexpr std::array<std::uint8_t, 6> head{36, 1, 4, 0, 44, 44};
   if (page[0] != 0x0D || page[3] != 0 || page[4] != 1) return std::nullopt;
   const std::size_t at = std::size_t{page[8]} * 256 + page[9];
@@ -52,7 +52,7 @@ std::optional<Marks> marks_in(std::span<const std::uint8_t> page) {
   return marks;
 }
 
-FileMark mark_of(const fs::path& file) {
+FileMark read_file_mark(const fs::path& file) {
   Database database(file, DatabaseMode::immutable);
   // A writer that was killed while the log went into the file may have left it shorter than its
   // first page says; with this, SQLite reads it nevertheless.
@@ -110,7 +110,7 @@ class LogReader {
         break;
       }
       if (big_endian(frame.data()) == page_of_marks) {
-        if (const auto marks = marks_in(page)) content.marks.push_back(*marks);
+        if (const auto marks = find_marks(page)) content.marks.push_back(*marks);
       }
       if (big_endian(&frame[4]) == 0) continue;
       ++content.changes;
@@ -145,8 +145,8 @@ class LogReader {
   std::array<std::uint32_t, 2> sums_{};
 };
 
-bool is_own(const fs::path& file, const fs::path& log) {
-  const auto mark = mark_of(file);
+bool is_own_log(const fs::path& file, const fs::path& log) {
+  const auto mark = read_file_mark(file);
   const auto content = LogReader(log).read_all(mark.page);
   if (content.changes == 0) return true;  // SQLite finds nothing in it either
   if (!content.starts_with_mark) return false;
@@ -182,7 +182,7 @@ void require_own_log(const fs::path& file) {
   constexpr int max_looks = 20;
   constexpr std::chrono::milliseconds pause(20);
   for (int look = 0; look < max_looks; ++look) {
-    if (size(log) == 0 || is_own(file, log)) return;
+    if (size(log) == 0 || is_own_log(file, log)) return;
     std::this_thread::sleep_for(pause);
   }
   refuse(log);
