@@ -34,7 +34,7 @@ struct HomeAnswered {
 
 HomeAnswered find_home(const Panorama& goal, const Panorama& current) {
   const HomingGuide guide(Observation(goal), PictureSource{});
-  const WayHome way = guide.home(Observation(current));
+  const HomingResult way = guide.home(Observation(current));
   return {way.direction_rad.has_value(), way.direction_rad.value_or(0.0), way.probability};
 }
 

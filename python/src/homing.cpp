@@ -12,7 +12,7 @@ namespace panonav::python {
 namespace {
 
 /// An answer and what was asked.
-struct NamedWay : WayHome {
+struct NamedWay : HomingResult {
   std::string name;
 };
 
@@ -204,9 +204,9 @@ void bind_catchment(py::module_& m) {
         HomingViewOptions views{.horizon = horizon};
         CatchmentSettings settings{.stages = stages, .bin_m = bin_m, .up_to_m = up_to_m};
         Keywords taken(keywords);
-        settings.typical_distance_given = taken.given("typical_distance_m");
-        settings.longest_step_given = taken.given("max_step_m");
-        settings.obstacle_given = taken.given("obstacle_m");
+        settings.has_typical_distance = taken.given("typical_distance_m");
+        settings.has_longest_step = taken.given("max_step_m");
+        settings.has_obstacle = taken.given("obstacle_m");
         taken.options(views.signature).options(views.preprocessing).options(settings.run);
         taken.options(settings.homing).finish();
         if (published) {

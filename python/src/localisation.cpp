@@ -359,7 +359,7 @@ void bind_tracker(py::module_& m) {
 void bind_updater(py::module_& m) {
   using Changes = MemoryUpdater::Changes;
   Record<Changes>(m, "MemoryUpdaterChanges", "What a run did to its memory.")
-      .field("seen", &Changes::seen, "Observations with odometry.")
+      .field("seen", &Changes::observations, "Observations with odometry.")
       .field("certain", &Changes::certain, "Of these, whose place was certain and new.")
       .field("reinforced", &Changes::reinforced,
              "Views of the memory that explained what the robot saw.")

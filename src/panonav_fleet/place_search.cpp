@@ -31,7 +31,7 @@ std::optional<MemoryArea> area_at(const std::optional<Point2>& position) {
   return area_of(position->x_m, position->y_m);
 }
 
-/// Views on their way into sketches.
+/// Views that are being sketched.
 class Sketcher {
  public:
   explicit Sketcher(SignatureShape shape) : sketches(shape) {}
@@ -88,7 +88,7 @@ struct PlaceSearch::Implementation {
   }
 
   /// The range of ids is cut into a part for each connection; a part is in the order of the ids,
-  /// which is mostly that in which the views were taken.
+  /// which is mostly the order of recording.
   void read_all() {
     const std::uint32_t last = own->last_id();
     const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());
@@ -366,7 +366,7 @@ SearchResult PlaceSearch::Snapshot::search(const PackedSignature& query,
                                            const SearchOptions& options, const SearchMask& mask) {
   Implementation& own = *implementation_;
   const auto start = std::chrono::steady_clock::now();
-  // A search alone takes all cores; several at a time share them.
+  // A single search uses all cores; several at a time share them.
   struct Running {
     explicit Running(std::atomic<int>& all_) : all(all_), number(++all_) {}
     ~Running() { --all; }

@@ -108,7 +108,7 @@ std::optional<std::vector<std::uint8_t>> JpegStream::next() {
       if (buffer_.size() < beginning.size()) return std::nullopt;
       walked_ = 2;
     }
-    // Entropy-coded data lies between segments: on to the next marker.
+    // Entropy-coded data is between segments: skip to the next marker.
     const auto at =
         std::find(buffer_.begin() + static_cast<std::ptrdiff_t>(walked_), buffer_.end(), marker) -
         buffer_.begin();

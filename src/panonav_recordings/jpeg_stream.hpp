@@ -22,9 +22,9 @@ class JpegStream {
   /// Takes the next bytes of the stream. Throws FileError on `name` when one picture is longer than
   /// `max_bytes`.
   void add(std::span<const std::uint8_t> bytes, const std::string& name);
-  /// The next whole picture; empty until more bytes come.
+  /// Returns the next complete picture; empty until more bytes come.
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> next();
-  /// Bytes of a picture that has begun and not ended.
+  /// Returns the number of bytes of an incomplete picture.
   [[nodiscard]] std::size_t unfinished() const noexcept { return buffer_.size(); }
 
  private:
@@ -32,9 +32,9 @@ class JpegStream {
   std::size_t walked_ = 0;            // into it; 0: the beginning is still looked for
 };
 
-/// All pictures of such a stream as a data set: it is read to its end into a temporary file, which
-/// goes with the data set, so memory does not grow. Names are "000001.jpg" and so on. Throws
-/// FileError on `name` when no picture comes, or the temporary folder (TMPDIR) is full.
+/// Reads such a stream to its end, into a temporary file, as a data set; the file is removed with
+/// the data set. Names are "000001.jpg" and so on. Throws FileError on `name` when no picture
+/// comes, or the temporary folder (TMPDIR) is full.
 [[nodiscard]] Dataset read_jpeg_stream(int descriptor, const std::string& name,
                                        PictureSource source);
 

@@ -7,20 +7,20 @@
 namespace panonav::recordings {
 
 std::optional<Observation> LiveObservations::next() {
-  auto seen = live_.next();
-  if (!seen) return std::nullopt;
-  Observation observation(std::move(seen->picture));
-  observation.encoded = std::move(seen->encoded);
-  // Names are unique in a memory. Pictures that come in one piece have the same time, to the
+  auto live_picture = live_.next();
+  if (!live_picture) return std::nullopt;
+  Observation observation(std::move(live_picture->picture));
+  observation.encoded = std::move(live_picture->encoded);
+  // Names are unique in a memory. Pictures that arrive together have the same time, to the
   // microsecond; a clock that is set back leaves more between.
   constexpr std::int64_t second_us = 1'000'000;
-  auto stamp_us = static_cast<std::int64_t>(std::floor(1e6 * seen->stamp_s));
+  auto stamp_us = static_cast<std::int64_t>(std::floor(1e6 * live_picture->stamp_s));
   if (last_us_ && stamp_us <= *last_us_ && *last_us_ - stamp_us < second_us) {
     stamp_us = *last_us_ + 1;
   }
   last_us_ = stamp_us;
   observation.stamp_s = 1e-6 * static_cast<double>(stamp_us);
-  timing_ = {seen->arrived, seen->decoding};
+  timing_ = {live_picture->arrived, live_picture->decoding};
   const auto micro = (stamp_us % second_us + second_us) % second_us;
   const auto whole_s = static_cast<std::time_t>((stamp_us - micro) / second_us);
   std::tm utc{};

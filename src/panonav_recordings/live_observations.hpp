@@ -11,7 +11,7 @@
 
 namespace panonav::recordings {
 
-/// Those of a live source, the newest each time (`LivePictures`), named by their stamps
+/// Observations of a live source, the newest each time (`LivePictures`), named by their stamps
 /// ("2026-11-23T05:06:07.123456Z").
 class LiveObservations final : public ObservationSource {
  public:
@@ -22,14 +22,14 @@ class LiveObservations final : public ObservationSource {
 
   [[nodiscard]] const PictureSource& pictures() const noexcept override { return pictures_; }
   [[nodiscard]] std::optional<Observation> next() override;
-  /// The source itself, to stop it and for its counts.
+  /// Returns the source, to stop it and for its counts.
   [[nodiscard]] LivePictures& live() noexcept { return live_; }
-  /// When a picture came, and what it cost.
+  /// Times of a picture.
   struct Timing {
     std::chrono::steady_clock::time_point arrived{};  ///< by the clock that is never set
     std::chrono::steady_clock::duration decoding{};   ///< how long decoding took, where we do it
   };
-  /// Times of the last picture of `next`.
+  /// Returns the times of the last picture of `next`.
   [[nodiscard]] const Timing& timing() const noexcept { return timing_; }
 
  private:

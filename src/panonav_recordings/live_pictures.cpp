@@ -37,7 +37,7 @@ double now_s() {
   return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
-/// A picture as it came.
+/// A picture as received.
 struct RawPicture {
   std::variant<std::vector<std::uint8_t>, Image> picture;
   double stamp_s = 0.0;
@@ -45,11 +45,12 @@ struct RawPicture {
   std::uint64_t lost = 0;  ///< before it, where the source tells
 };
 
-/// Where pictures come from, once it is open.
+/// An open source of pictures.
 class Input {
  public:
   virtual ~Input() = default;
-  /// Waits. Empty at the end, and after `stop`. Throws Error when the source has gone.
+  /// Waits for the next picture; empty at the end, and after `stop`. Throws Error when the source
+  /// broke off.
   virtual std::optional<RawPicture> take() = 0;
   virtual Image decode(std::span<const std::uint8_t> bytes, const ImageLimits& limits) const {
     return decode_image(bytes, "the picture", limits);
@@ -158,11 +159,11 @@ struct LivePictures::Implementation {
     while (auto picture = input->take()) {
       std::unique_lock lock(mutex);
       counts.dropped += picture->lost;
-      if (address == "-") taken_away.wait(lock, [&] { return !newest || stopped; });
+      if (address == "-") consumed.wait(lock, [&] { return !newest || stopped; });
       if (stopped) return;
       if (newest) ++counts.dropped;
       newest = std::pair(std::move(*picture), input);
-      came.notify_one();
+      arrived.notify_one();
     }
   }
 
@@ -193,15 +194,15 @@ struct LivePictures::Implementation {
     }
     const std::lock_guard lock(mutex);
     ended = true;
-    came.notify_all();
+    arrived.notify_all();
   }
 
   std::string address;
   LiveOptions options;
   int stop_event = -1;
   mutable std::mutex mutex;
-  std::condition_variable came;
-  std::condition_variable taken_away;
+  std::condition_variable arrived;
+  std::condition_variable consumed;
   std::shared_ptr<Input> input;
   std::optional<std::pair<RawPicture, std::shared_ptr<Input>>> newest;
   Counts counts;
@@ -223,7 +224,7 @@ LivePictures::LivePictures(std::string address, const LiveOptions& options)
   if (self.stop_event < 0) throw Error("no event can be made");
   try {
     self.input = self.open();
-    // Only its first picture tells whether an address can be opened.
+    // Only the first picture shows whether an address can be opened.
     if (self.address != "-" && !is_camera(self.address)) {
       self.newest = std::pair(self.input->take().value(), self.input);
     }
@@ -247,8 +248,8 @@ void LivePictures::stop() noexcept {
   (void)!write(self.stop_event, &one, sizeof(one));
   const std::lock_guard lock(self.mutex);
   if (self.input) self.input->stop();
-  self.came.notify_all();
-  self.taken_away.notify_all();
+  self.arrived.notify_all();
+  self.consumed.notify_all();
 }
 
 std::optional<LivePicture> LivePictures::next() {
@@ -258,22 +259,22 @@ std::optional<LivePicture> LivePictures::next() {
     {
       std::unique_lock lock(self.mutex);
       if (!std::exchange(self.asked, true)) self.counts.dropped = 0;
-      self.came.wait(lock, [&] { return self.newest || self.ended || self.stopped; });
+      self.arrived.wait(lock, [&] { return self.newest || self.ended || self.stopped; });
       if (self.stopped || !self.newest) return std::nullopt;
       newest = std::exchange(self.newest, std::nullopt);
-      self.taken_away.notify_one();
+      self.consumed.notify_one();
     }
-    auto& [came, input] = *newest;
-    if (auto* const picture = std::get_if<Image>(&came.picture)) {
-      return LivePicture{std::move(*picture), {}, came.stamp_s, came.arrived, {}};
+    auto& [received, input] = *newest;
+    if (auto* const picture = std::get_if<Image>(&received.picture)) {
+      return LivePicture{std::move(*picture), {}, received.stamp_s, received.arrived, {}};
     }
     try {
       const auto before = Steady::now();
-      auto& bytes = std::get<std::vector<std::uint8_t>>(came.picture);
+      auto& bytes = std::get<std::vector<std::uint8_t>>(received.picture);
       LivePicture decoded{input->decode(bytes, self.options.limits),
                           {},
-                          came.stamp_s,
-                          came.arrived,
+                          received.stamp_s,
+                          received.arrived,
                           Steady::now() - before};
       if (is_whole_jpeg(bytes)) decoded.encoded = std::move(bytes);
       return decoded;

@@ -13,16 +13,16 @@
 
 namespace panonav::recordings {
 
-/// True if it names a live source of pictures: "-" (JPEG pictures that follow each other on
-/// standard input), a camera (/dev/video0), or an address that the program ffmpeg opens: rtsp://,
-/// rtmp://, http://, https://, tcp:// or udp://.
+/// True if the address is that of a live source of pictures: "-" (JPEG pictures that follow each
+/// other on standard input), a camera (/dev/video0), or an address that the program ffmpeg opens:
+/// rtsp://, rtmp://, http://, https://, tcp:// or udp://.
 [[nodiscard]] bool is_live(const std::string& address);
 
-/// A picture as it came, and when.
+/// A live picture and its times.
 struct LivePicture {
   Image picture;                      ///< decoded and upright
-  std::vector<std::uint8_t> encoded;  ///< the JPEG it was decoded from; empty where it was none
-  /// When it arrived, in seconds since 1970-01-01 UTC; from a camera: when it was taken.
+  std::vector<std::uint8_t> encoded;  ///< the JPEG it was decoded from; empty if it was none
+  /// Time of arrival, or from a camera of the exposure, in seconds since 1970-01-01 UTC.
   double stamp_s = 0.0;
   /// The same moment by the clock that is never set.
   std::chrono::steady_clock::time_point arrived{};
@@ -37,23 +37,23 @@ struct LiveOptions {
   ImageLimits limits;           ///< of each picture; those beyond count as damaged
 };
 
-/// Pictures of a source that does not wait. A thread takes them as they come, and `next` gives the
-/// newest; those between are dropped and counted. Standard input waits instead, and nothing of it
-/// is dropped. A camera or address that breaks off is opened again until `stop`. Pictures that
-/// cannot be decoded are counted as damaged. Memory: two pictures, packed or not.
+/// Reads pictures of a source that does not wait. A thread receives them, and `next` returns the
+/// newest; those between are dropped and counted. Standard input waits instead, and none of its
+/// pictures is dropped. A camera or address that breaks off is opened again until `stop`. Pictures
+/// that cannot be decoded are counted as damaged. Memory: two pictures, packed or not.
 class LivePictures {
  public:
-  /// Waits for an address's first picture. Throws FileError: not live, or a camera or address that
-  /// cannot be opened at first.
+  /// Opens the source, and waits for the first picture of an address. Throws FileError if it is not
+  /// live or cannot be opened.
   explicit LivePictures(std::string address, const LiveOptions& options = {});
   ~LivePictures();
   LivePictures(const LivePictures&) = delete;
   LivePictures& operator=(const LivePictures&) = delete;
 
-  /// Waits for a picture. Empty at the end of standard input and after `stop`. One thread at a
-  /// time.
+  /// Waits for a picture and returns it; empty at the end of standard input and after `stop`. One
+  /// thread at a time.
   [[nodiscard]] std::optional<LivePicture> next();
-  /// `next` gives nothing more. Any thread may call.
+  /// Ends `next`, which then returns empty. Any thread may call.
   void stop() noexcept;
 
   /// Numbers of pictures that did not reach the caller.
@@ -71,7 +71,7 @@ class LivePictures {
   std::unique_ptr<Implementation> implementation_;
 };
 
-/// One way in which a camera delivers pictures.
+/// A pixel format of a camera, with its sizes.
 struct CameraFormat {
   std::string pixels;            ///< "MJPG", "YUYV", "GREY", ...: the driver's name
   bool usable = false;           ///< MJPG, JPEG, YUYV, UYVY and GREY are

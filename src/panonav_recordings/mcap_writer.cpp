@@ -93,7 +93,7 @@ struct McapWriter::State {
     if (descriptor < 0) throw ContractError("recording " + path.string(), "closed", "open");
   }
 
-  // `known`: the checksum of the bytes, where somebody has it.
+  // `known`: the checksum of the bytes, if it is known.
   void put(std::span<const std::uint8_t> bytes, std::optional<std::uint32_t> known = {}) {
     const std::uint32_t own = known ? *known : sum_of(bytes);
     sum = static_cast<std::uint32_t>(::crc32_combine(sum, own, static_cast<z_off_t>(bytes.size())));

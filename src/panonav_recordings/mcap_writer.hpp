@@ -24,7 +24,7 @@ struct McapWriterOptions {
   std::string profile = "ros2";         ///< of the file's header; empty: none
 };
 
-/// Writes an MCAP file (https://mcap.dev/spec, version 0) with everything that readers can use:
+/// Writes an MCAP file (https://mcap.dev/spec, version 0) with all that readers can use:
 /// chunks with checksums, indexes of messages and chunks, statistics.
 ///
 /// The file has its name from the first byte on, and nothing in it is ever changed: what a killed
@@ -35,26 +35,26 @@ class McapWriter {
  public:
   /// Creates the file, or empties the one that is there, and writes its header.
   explicit McapWriter(const std::filesystem::path& path, const McapWriterOptions& options = {});
-  ~McapWriter();  ///< Finishes the file as `close` does, but says nothing when that fails.
+  ~McapWriter();  ///< Finishes the file as `close` does, and ignores failures.
   /// A moved-from object may only be destroyed or assigned to.
   McapWriter(McapWriter&&) noexcept;
   McapWriter& operator=(McapWriter&&) noexcept;
 
-  /// The format of messages: `name` as "sensor_msgs/msg/Imu", `encoding` as "ros2msg" of the
+  /// Adds the format of messages: `name` as "sensor_msgs/msg/Imu", `encoding` as "ros2msg" of the
   /// definition `data`. Returns its number, from 1 on. At most 65535.
   std::uint16_t add_schema(std::string_view name, std::string_view encoding, std::string_view data);
-  /// A topic, whose messages are encoded as "cdr", say. `schema`: 0 for none. Returns its number,
-  /// from 0 on. At most 65535.
+  /// Adds a topic, whose messages are encoded as "cdr", for example. `schema`: 0 for none. Returns
+  /// its number, from 0 on. At most 65535.
   std::uint16_t add_channel(std::string_view topic, std::string_view message_encoding,
                             std::uint16_t schema);
   /// Appends a message to the chunk in memory, which is written when it is large enough. Times are
-  /// >= 0. Throws ContractError on a channel that is none. Cost: a copy of the bytes, and packing.
+  /// >= 0. Throws ContractError on an unknown channel. Cost: a copy of the bytes, and packing.
   void write(std::uint16_t channel, std::int64_t log_time_ns, std::int64_t publish_time_ns,
              std::span<const std::uint8_t> message);
   /// Writes the messages in memory as a chunk of their own, so that a reader finds them.
   void flush();
-  /// The last chunk, summary and footer; all is on the disk when it returns. Nothing more can be
-  /// written then. Closing twice does nothing.
+  /// Writes the last chunk, summary and footer; all is on the disk when it returns. Nothing more
+  /// can be written afterwards. Closing twice does nothing.
   void close();
 
  private:

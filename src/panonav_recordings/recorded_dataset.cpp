@@ -28,7 +28,7 @@ std::string named_by_stamp(std::int64_t ns) {
   return std::to_string(seconds) + "_" + fraction.substr(1);
 }
 
-/// Both parts are exact, so that a stamp in seconds survives the way there and back.
+/// Both parts are exact, so that a stamp in seconds survives a round trip.
 double seconds_of(std::int64_t ns) {
   return static_cast<double>(ns / second_ns) +
          static_cast<double>(ns % second_ns) / static_cast<double>(second_ns);
@@ -182,7 +182,7 @@ class EntryMaker {
 };
 
 /// Size and encoding of a picture message.
-std::string shown(MessageBytes bytes, const RecordedTopic& topic) {
+std::string describe_picture(MessageBytes bytes, const RecordedTopic& topic) {
   if (topic.type == ros::CompressedImage::type) {
     return ros::read_message<ros::CompressedImage>(bytes, topic.encoding).format;
   }
@@ -237,7 +237,7 @@ RecordingSummary describe_recording(const fs::path& path) {
     if (span_s > 0.0) each.rate_hz = static_cast<double>(places.size() - 1) / span_s;
     if (!has_pictures(topics[i])) continue;
     try {
-      each.shows = to_readable_line(shown(recording->read(places.front()), topics[i]));
+      each.shows = to_readable_line(describe_picture(recording->read(places.front()), topics[i]));
     } catch (const Error& error) {
       each.shows = to_readable_line(error.what());
     }

@@ -14,21 +14,21 @@
 namespace panonav::recordings {
 
 /// Reads a recording of topics (`Recording::open`) as a data set: the pictures of one topic, named
-/// by their stamps ("1700000000_250000000") and read when they are needed; `source` says how they
-/// lie. docs/recordings.md has the rules for topics, stamps and frames. Odometry and
+/// by their stamps ("1700000000_250000000") and read when they are needed; `source` is their
+/// layout. docs/recordings.md has the rules for topics, stamps and frames. Odometry and
 /// "/ground_truth" are interpolated between messages at most a second apart; tilt comes from the
-/// only Imu with an orientation.
-/// Throws FileError: no or several topics of pictures and none named, a topic that is missing or of
-/// another type, named frames that no transforms connect, and what `Recording::open` throws. Cost:
-/// one pass over the messages. Memory: 400 bytes a picture and 80 a message.
+/// only Imu with an orientation. Throws FileError: no or several topics of pictures and none named,
+/// a topic that is missing or of another type, named frames that no transforms connect, and what
+/// `Recording::open` throws. Cost: one pass over the messages. Memory: 400 bytes a picture and 80 a
+/// message.
 [[nodiscard]] Dataset read_recording(const std::filesystem::path& path, PictureSource source,
                                      const InputOptions::Topics& topics = {});
-/// The same of a recording that is open; `path` stands in errors and entries.
+/// Reads an open recording; errors and entries name `path`.
 [[nodiscard]] Dataset read_recording(std::shared_ptr<const Recording> recording,
                                      const std::filesystem::path& path, PictureSource source,
                                      const InputOptions::Topics& topics = {});
 
-/// One topic as `describe_recording` knows it.
+/// Summary of a topic.
 struct TopicSummary {
   RecordedTopic topic;               ///< its name, type and number of messages
   std::optional<TimeSpan> time;      ///< log times of its first and last message

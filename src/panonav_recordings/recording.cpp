@@ -88,7 +88,7 @@ class FilesRecording : public Recording {
                 const std::function<void(const MessagePlace&, std::span<const std::uint8_t>)>& use)
       const override {
     const Filter filter = make_filter(topics, within);
-    // The messages of a block that are still to come. Blocks are opened as time reaches them.
+    // The remaining messages of a block. Blocks are opened as time reaches them.
     struct Open {
       std::vector<MessagePlace> places;
       std::size_t next = 0;
@@ -164,7 +164,7 @@ class FilesRecording : public Recording {
     return filter;
   }
 
-  // Appends; `listed`: beside what is in `places`.
+  // Appends; `listed`: number of places in addition to `places`.
   void list(const Block& block, const Filter& filter, std::vector<MessagePlace>& places,
             std::size_t listed = 0) const {
     if (block.time.begin_ns > filter.within.end_ns || block.time.end_ns < filter.within.begin_ns) {

@@ -15,14 +15,14 @@
 
 /// The messages of ROS that panonav reads and writes, as plain values. Members are named and
 /// ordered as in the .msg files, `type` is the type's name; a stamp is one number, `seq` of ROS 1
-/// is left out. Bulk data (pictures, clouds) belongs to somebody else: of a message that was read,
-/// to its bytes.
+/// is left out. Bulk data (pictures, clouds) is not owned: of a message that was read, to its
+/// bytes.
 namespace panonav::recordings::ros {
 
 /// The type std_msgs/Header: when, and in which frame.
 struct Header {
   std::int64_t stamp_ns = 0;  ///< since 1970, or since the start of a simulation
-  std::string frame_id;       ///< name of the frame that coordinates are in
+  std::string frame_id;       ///< name of the frame of coordinates
 };
 
 /// The types geometry_msgs/Vector3 and geometry_msgs/Point: x forward, y left, z up in frames of
@@ -50,18 +50,19 @@ struct Pose {
 /// Tolerance of the length of a quaternion that is read; the same as tf2's.
 inline constexpr double quaternion_tolerance = 0.1;
 
-/// A pose, or a transform parent_from_child: q_parent = position + orientation * q_child.
+/// Composes poses, or transforms parent_from_child: q_parent = position + orientation * q_child.
 [[nodiscard]] Pose operator*(const Pose& a_from_b, const Pose& b_from_c);
-/// The pose of a in the frame of b. The orientation must be of unit length.
+/// Returns the pose of a in the frame of b. The orientation must be of unit length.
 [[nodiscard]] Pose inverse(const Pose& a_from_b);
-/// On the line between the positions and on the great circle between the orientations; `share` 0
-/// gives the bits of `a`, 1 those of `b`; beyond them the motion continues.
+/// Interpolates on the line between the positions and on the great circle between the orientations;
+/// `share` 0 gives the bits of `a`, 1 those of `b`; beyond them the motion continues.
 [[nodiscard]] Pose between(const Pose& a, const Pose& b, double share);
-/// Heading about the vertical, then roll and pitch as in `Tilt`: R_z(heading) R_y R_x.
+/// Returns a pose with the heading about the vertical, then roll and pitch as in `Tilt`:
+/// R_z(heading) R_y R_x.
 [[nodiscard]] Pose pose_of(const Pose2& pose, const Tilt& tilt = {});
-/// The pose seen from above: x, y and the turn about the vertical.
+/// Returns the pose seen from above: x, y and the yaw.
 [[nodiscard]] Pose2 planar(const Pose& pose);
-/// Roll and pitch, in radians, of any quaternion but zero.
+/// Returns roll and pitch, in radians, of any quaternion but zero.
 [[nodiscard]] Tilt tilt_of(const Quaternion& orientation);
 
 using Covariance3 = std::array<double, 9>;   ///< row-major; [0] = -1: there is no such measurement
@@ -106,7 +107,7 @@ struct PoseWithCovariance {
   Covariance6 covariance{};  ///< m^2, m rad and rad^2
 };
 
-/// Where wheels, or another estimate without a map, have the robot.
+/// Pose of the robot by wheels, or by another estimate without a map.
 struct Odometry {
   static constexpr std::string_view type = "nav_msgs/Odometry";  ///< ROS 1's name of the type
   Header header;                                                 ///< frame_id: of the odometry
@@ -251,16 +252,15 @@ struct String {
 /// Returns ROS 2's name of the `type` of a message: "sensor_msgs/msg/Image".
 [[nodiscard]] std::string ros2_type_name(std::string_view type);
 
-/// The message that the bytes are, in ROS 1's serialisation or as CDR of either byte order (XCDR1,
-/// as ROS 2 writes it). Memory: at most some 20 times the bytes, whatever they say. Throws
-/// ContractError, one line, on bytes that end too early or too late, on stamps out of range and on
-/// poses (of Odometry, transforms, points and poses) that are not finite or whose quaternion is
-/// not near unit length.
+/// Reads a message in ROS 1's serialisation or as CDR of either byte order (XCDR1, as ROS 2 writes
+/// it). Memory: at most some 20 times the bytes. Throws ContractError, one line, on bytes that end
+/// too early or too late, on stamps out of range and on poses (of Odometry, transforms, points and
+/// poses) that are not finite or whose quaternion is not near unit length.
 template <class Message>
 [[nodiscard]] Message read_message(std::span<const std::uint8_t> bytes, MessageEncoding encoding);
 
-/// Little endian. Throws ContractError on a stamp that the encoding cannot hold (ROS 2: beyond
-/// 2038).
+/// Writes a message, little endian. Throws ContractError on a stamp that the encoding cannot hold
+/// (ROS 2: beyond 2038).
 template <class Message>
 [[nodiscard]] std::vector<std::uint8_t> write_message(
     const Message& message, MessageEncoding encoding = MessageEncoding::cdr);
@@ -269,16 +269,16 @@ template <class Message>
 /// that it is made of. Throws ContractError on another type.
 [[nodiscard]] std::string ros2_schema(std::string_view type);
 
-/// The pixels as `read_image` gives them: one channel for grey, three for colour.
+/// Returns the picture like `read_image`: one channel for grey, three for colour.
 /// - mono8, 8UC1: as they are. mono16: scaled from 0 .. 65535 as a PNG of 16 bits is.
 /// - rgb8, bgr8, rgba8, bgra8, 8UC3 and 8UC4 (OpenCV's order: blue first): alpha is dropped.
 /// - bayer_rggb8, bayer_bggr8, bayer_gbrg8, bayer_grbg8: bilinear interpolation.
-/// - yuv422 or uyvy, yuv422_yuy2 or yuyv: ITU-R BT.601, luma 16 .. 235, as OpenCV takes them.
+/// - yuv422 or uyvy, yuv422_yuy2 or yuyv: ITU-R BT.601, luma 16 .. 235, as in OpenCV.
 /// Throws ContractError on other encodings, sizes beyond the limits, a step shorter than a row and
 /// data of another length than height x step.
 [[nodiscard]] panonav::Image picture_of(const Image& message, const ImageLimits& limits = {});
-/// JPEG or PNG, told apart by content. `name` stands in errors. Throws ContractError on another
-/// format (compressedDepth, h264), FileError on bytes that cannot be decoded.
+/// Decodes a JPEG or PNG, distinguished by content. Errors name `name`. Throws ContractError on
+/// another format (compressedDepth, h264), FileError on bytes that cannot be decoded.
 [[nodiscard]] panonav::Image picture_of(const CompressedImage& message, std::string_view name,
                                         const ImageLimits& limits = {});
 

@@ -21,9 +21,9 @@ Quaternion operator*(const Quaternion& a, const Quaternion& b) {
 }
 
 Vector3 rotated(const Quaternion& q, const Vector3& v) {
-  const Quaternion turned = q * Quaternion{v.x, v.y, v.z, 0.0} * Quaternion{-q.x, -q.y, -q.z, q.w};
+  const Quaternion rotated = q * Quaternion{v.x, v.y, v.z, 0.0} * Quaternion{-q.x, -q.y, -q.z, q.w};
   const double scale = 1.0 / dot(q, q);
-  return {scale * turned.x, scale * turned.y, scale * turned.z};
+  return {scale * rotated.x, scale * rotated.y, scale * rotated.z};
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ struct Definition {
 };
 
 // From ROS 2's common_interfaces, without comments (Apache-2.0). `uint8 FLOAT32=7` and the like are
-// constants, which take no room.
+// constants, which have no bytes.
 constexpr std::array definitions{
     Definition{"builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n"},
     Definition{"std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n"},

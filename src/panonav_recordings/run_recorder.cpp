@@ -61,7 +61,7 @@ std::optional<ros::OccupancyGrid> visited_grid(const std::vector<Point2>& positi
   return grid;
 }
 
-/// Points along the edges, near enough to look like lines, but not more than viewers take.
+/// Points along the edges, dense enough to look like lines, but few enough for viewers.
 PointValues edge_points(const std::vector<RunEdge>& edges) {
   constexpr double max_points = 1e5;
   double length_m = 0.0;
@@ -82,14 +82,14 @@ PointValues edge_points(const std::vector<RunEdge>& edges) {
 
 }  // namespace
 
-RunMoment make_moment(const Observation& seen, std::size_t number) {
-  RunMoment moment{.stamp_s = seen.stamp_s.value_or(static_cast<double>(number)),
-                   .odometry = seen.odometry,
-                   .tilt = seen.tilt,
-                   .truth = seen.pose};
-  moment.encoded_picture = seen.encoded;
-  const auto* const picture = std::get_if<Image>(&seen.picture);
-  if (picture != nullptr && seen.encoded.empty()) moment.picture = *picture;
+RunMoment make_moment(const Observation& observation, std::size_t number) {
+  RunMoment moment{.stamp_s = observation.stamp_s.value_or(static_cast<double>(number)),
+                   .odometry = observation.odometry,
+                   .tilt = observation.tilt,
+                   .truth = observation.pose};
+  moment.encoded_picture = observation.encoded;
+  const auto* const picture = std::get_if<Image>(&observation.picture);
+  if (picture != nullptr && observation.encoded.empty()) moment.picture = *picture;
   return moment;
 }
 

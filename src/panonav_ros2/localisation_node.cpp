@@ -101,7 +101,7 @@ struct LocalisationNode::Implementation {
     if (!map_from_odom) return;
     const auto ahead_ns = static_cast<std::int64_t>(1e9 * setup.node.transform_tolerance_s);
     const std::int64_t stamp_ns = sensors.now_ns() + ahead_ns;
-    // While a clock stands nothing is sent: TF takes no two transforms of one time.
+    // Nothing is sent while the clock stands: TF accepts no two transforms of one time.
     if (std::exchange(last_transform_ns, stamp_ns) == stamp_ns) return;
     transforms.publish({{{{stamp_ns, setup.frames.map},
                           setup.frames.odom,

@@ -14,7 +14,7 @@ MotionHistory::Added MotionHistory::add(std::int64_t stamp_ns, const Pose2& odom
     const Sample& last = samples_.back();
     const std::int64_t step_ns = stamp_ns - last.stamp_ns;
     if (step_ns <= 0 && step_ns > -late_ns) return Added::late;
-    // A robot may stand still for as long as it likes: what counts is how far it got meanwhile.
+    // A robot may stand still for any time: only the distance counts.
     const double seconds = std::max(0.1, 1e-9 * static_cast<double>(step_ns));
     const bool jumped = distance(odom_from_base.position(), last.odom_from_base.position()) >
                         max_speed_m_s * seconds;

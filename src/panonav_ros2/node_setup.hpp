@@ -32,7 +32,7 @@ struct LocalisationNodeOptions {
   double camera_x_m = 0.0;
   double camera_y_m = 0.0;
 
-  /// The camera is upright, and looks where the robot does.
+  /// The camera is upright and faces forward.
   [[nodiscard]] Pose2 base_from_camera() const { return {camera_x_m, camera_y_m, 0.0}; }
 };
 void visit_options(LocalisationNodeOptions& options, OptionVisitor& visitor);

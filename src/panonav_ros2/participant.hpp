@@ -23,7 +23,7 @@ namespace panonav::ros2 {
 struct Qos {
   int depth = 5;
   bool reliable = true;
-  /// Those who subscribe later receive what was written last.
+  /// Later subscribers receive the last message.
   bool transient_local = false;
 };
 
@@ -74,7 +74,7 @@ class Participant {
   };
   [[nodiscard]] Writer advertise(const std::string& topic, std::string_view type, const Qos& qos);
 
-  /// Waits for messages and passes those that came, at most `Qos::depth` of a topic, to the
+  /// Waits for messages and passes the received ones, at most `Qos::depth` of a topic, to the
   /// callbacks. Returns at the latest after `longest`, or once `stop` was called.
   void wait(std::chrono::nanoseconds longest);
   /// Waits for messages until `stop` is called, and calls `tick` once in each period.

@@ -27,8 +27,8 @@ class RobotMotion {
     const std::lock_guard lock(mutex_);
     return history_.newest_ns();
   }
-  /// Waits up to 0.3 s for the odometry of that time, which may still be under way. `nullopt` when
-  /// it does not come.
+  /// Waits up to 0.3 s for the odometry of that time, which may still arrive. `nullopt` if it does
+  /// not.
   [[nodiscard]] std::optional<Motion> wait_for(std::int64_t stamp_ns) {
     std::unique_lock lock(mutex_);
     std::optional<Motion> found;

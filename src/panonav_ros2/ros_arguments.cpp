@@ -115,7 +115,7 @@ struct RosOption {
   }
 };
 
-/// Appends what stands outside `--ros-args ... --` to `others`, and returns the options inside.
+/// Appends the arguments outside `--ros-args ... --` to `others`, and returns the options inside.
 std::vector<RosOption> split_words(std::span<const std::string> words,
                                    std::vector<std::string>& others) {
   std::vector<RosOption> options;

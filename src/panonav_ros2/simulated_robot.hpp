@@ -20,8 +20,8 @@ struct SimulatedRobotOptions {
 };
 void visit_options(SimulatedRobotOptions& options, OptionVisitor& visitor);
 
-/// Where the robot is put, what it may not run into, and what it sees. `picture` is asked on a
-/// thread of its own, one picture at a time.
+/// Start pose, obstacles and pictures of a robot. `picture` is asked on a thread of its own, one
+/// picture at a time.
 struct SimulatedSurroundings {
   Pose2 start;
   std::function<bool(Point2 place)> is_free;
@@ -29,9 +29,9 @@ struct SimulatedSurroundings {
 };
 
 /// A simulated robot as ROS 2 sees a real one, in time of its own: /clock, odom, odom -> base_link
-/// on /tf and pictures on image out, and for those who judge, ground_truth; cmd_vel in, and
-/// set_pose (PoseStamped), which carries the robot elsewhere without its odometry knowing.
-/// Something that is in its way stops it.
+/// on /tf, pictures on image and, for evaluation, ground_truth out; cmd_vel in, and set_pose
+/// (PoseStamped), which carries the robot elsewhere without changing its odometry. Obstacles stop
+/// it.
 class SimulatedRobot {
  public:
   /// Throws OptionError, and as `Participant`.

@@ -67,7 +67,7 @@ class WorkQueue {
     return dropped_;
   }
 
-  /// Returns the time since the last picture came; before the first, since the queue was made.
+  /// Returns the time since the last picture arrived; before the first, since the queue was made.
   [[nodiscard]] std::chrono::nanoseconds time_without_picture() const {
     const std::lock_guard lock(mutex_);
     return std::chrono::steady_clock::now() - last_picture_came_;

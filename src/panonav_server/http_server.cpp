@@ -133,7 +133,7 @@ Connection& connection_of(MHD_Connection* handle) {
       MHD_get_connection_info(handle, MHD_CONNECTION_INFO_SOCKET_CONTEXT)->socket_context);
 }
 
-/// Copies what comes next of an answer without an end into the buffer of libmicrohttpd.
+/// Copies the next part of a stream into the buffer of libmicrohttpd.
 ssize_t read_more(void* connection, std::uint64_t /*position*/, char* buffer, std::size_t size) {
   Connection& one = *static_cast<Connection*>(connection);
   if (one.evicted) return MHD_CONTENT_READER_END_WITH_ERROR;
@@ -203,8 +203,7 @@ bool is_same_secret(std::string_view sent, std::string_view secret) {
 }
 
 /// libmicrohttpd parses requests and sends answers on a thread of ours. It knows time-outs between
-/// two bytes alone, and lets nobody make room: late requests and the oldest strangers are evicted
-/// here.
+/// two bytes alone, and makes no room: late requests and the oldest strangers are evicted here.
 struct HttpServer::Implementation {
   Implementation(const HttpServerOptions& server_options, Handler request_handler)
       : options(server_options), handler(std::move(request_handler)) {
@@ -281,7 +280,7 @@ struct HttpServer::Implementation {
     MHD_run(daemon);
   }
 
-  /// Asks for what a connection waits for; evicts it where it is late, or its client has gone.
+  /// Gets the answer that a connection waits for; evicts it if it is late or its client has left.
   static void tick(Connection& one) {
     if (one.evicted) return;
     if (!one.suspended) {
@@ -309,7 +308,7 @@ struct HttpServer::Implementation {
     one.evict();
   }
 
-  /// True while answers with an end are on their way.
+  /// True while answers other than streams are being sent.
   bool has_last_answers() const {
     return std::ranges::any_of(connections, [](const Connection& one) {
       return !one.evicted && one.stage == Stage::answering && !one.more;

@@ -309,7 +309,7 @@ struct LocalisationServer::Implementation {
     return {.type = "text/plain; version=0.0.4; charset=utf-8", .content = std::move(text)};
   }
 
-  /// Metrics of memories that are searched where they lie.
+  /// Returns metrics of memories that are searched on their server.
   [[nodiscard]] std::string search_metrics() const {
     const auto of_each = [this](const std::string& name, const std::string& type,
                                 const std::string& help, const auto& value) {
@@ -370,10 +370,10 @@ struct LocalisationServer::Implementation {
     bool decoded = false;
     try {
       const auto* const bytes = reinterpret_cast<const std::uint8_t*>(job.picture.data());
-      const Observation seen(
+      const Observation observation(
           decode_image(std::span(bytes, job.picture.size()), "the picture", picture_limits));
       decoded = true;
-      const Place place = memory.recogniser.localise(seen);
+      const Place place = memory.recogniser.localise(observation);
       known = place.known;
       ordered_json json{{"memory", job.memory}};
       json.update(place_json(place));

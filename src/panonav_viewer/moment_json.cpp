@@ -10,7 +10,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// JSON knows no NaN. Digits that nobody can see only make the text longer.
+/// JSON has no NaN. Invisible digits only make the text longer.
 Json number(double value) {
   if (!std::isfinite(value)) return nullptr;
   return std::round(value * 1e4) / 1e4;
@@ -101,7 +101,7 @@ std::string moment_json(const recordings::RunMoment& moment, std::size_t count) 
   return text_of(json);
 }
 
-std::string staying_json(const recordings::RunMoment& moment) {
+std::string retained_json(const recordings::RunMoment& moment) {
   Json json;
   if (!moment.references.empty()) {
     json["references"] = numbers(moment.references);
@@ -130,7 +130,7 @@ std::string staying_json(const recordings::RunMoment& moment) {
   return json.is_null() ? std::string() : text_of(json);
 }
 
-void StayingParts::take(const recordings::RunMoment& from) {
+void RetainedParts::take(const recordings::RunMoment& from) {
   const auto replace = [this](auto& kept, const auto& update) {
     if (update.empty()) return;
     kept = update;

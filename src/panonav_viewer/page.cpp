@@ -34,7 +34,7 @@ std::string percent_encoded(std::string_view text) {
   return encoded;
 }
 
-/// Browsers load no module from a file beside a page that is itself a file. An import map gives
+/// Browsers load no module from a file next to a page that is itself a file. An import map gives
 /// each module an address that holds its text.
 std::string import_map() {
   const std::array modules{
@@ -141,13 +141,13 @@ void RunPage::add(const recordings::RunMoment& moment) {
   const std::size_t number = moments_.size();
   moments_.push_back(moment_json(moment, number));
   pictures_.emplace_back();
-  staying_.take(moment);
+  retained_.take(moment);
   // Changes during the run are stored with their moment.
   recordings::RunMoment changed;
   changed.plan = moment.plan;
   changed.directions = moment.directions;
   changed.goal = moment.goal;
-  if (const std::string changes = staying_json(changed); !changes.empty()) {
+  if (const std::string changes = retained_json(changed); !changes.empty()) {
     moments_.back().back() = ',';
     moments_.back() += "\"changes\":" + changes + "}";
   }
@@ -161,8 +161,8 @@ void RunPage::add(const recordings::RunMoment& moment) {
   }
   Json pictures = Json::object();
   if (moment.panorama) {
-    const Image seen = to_picture(*moment.panorama);
-    pictures["panorama"] = data_url("image/jpeg", encode_jpeg(seen.view()));
+    const Image image = to_picture(*moment.panorama);
+    pictures["panorama"] = data_url("image/jpeg", encode_jpeg(image.view()));
   }
   if (!moment.best_match.empty()) {
     const Image best = decode_image(moment.best_match, "best match", {.side_px = 4096});
@@ -188,7 +188,7 @@ void RunPage::route(const PicturePlot& panorama, const std::vector<RouteMark>& m
 }
 
 std::string RunPage::json() const {
-  const std::string staying = staying_json(staying_.moment);
+  const std::string retained = retained_json(retained_.moment);
   std::string all = "{\"moments\":[";
   for (std::size_t i = 0; i < moments_.size(); ++i) {
     if (i > 0) all += ",\n";
@@ -197,7 +197,7 @@ std::string RunPage::json() const {
     all.back() = ',';
     all += "\"data\":" + pictures_[i] + "}";
   }
-  return all + "],\"staying\":" + (staying.empty() ? "{}" : staying) +
+  return all + "],\"retained\":" + (retained.empty() ? "{}" : retained) +
          (unordered_ ? ",\"unordered\":true" : "") +
          (route_.empty() ? "" : ",\"route\":" + route_) + "}";
 }

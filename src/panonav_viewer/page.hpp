@@ -17,8 +17,8 @@
 /// The page that shows a run, and the run as a part of a report (report_page.hpp).
 namespace panonav::viewer {
 
-/// Reads "events" and "picture/N/NAME" beside its own address; of a replay its buttons post to
-/// "control", and so do clicks where the run takes a "goal" or a "pose".
+/// Returns a page that reads "events" and "picture/N/NAME" next to its own address. Buttons of a
+/// replay post to "control", and so do clicks if the run `takes` a "goal" or a "pose".
 [[nodiscard]] std::string live_page(std::string_view title, bool replay,
                                     std::string_view takes = "");
 
@@ -26,29 +26,29 @@ namespace panonav::viewer {
 struct RouteMark {
   std::optional<double> along_m;       ///< of the matched line; empty: not on the route
   std::optional<double> true_along_m;  ///< where it is known
-  /// Directions in which the scene is not as remembered: from, to, degrees, left positive,
+  /// Directions in which the scene differs from the route's: from, to, degrees, left positive,
   /// counter-clockwise.
   std::vector<std::pair<double, double>> changed_deg;
 };
 
-/// A run that is over, with its moments in it: it plays by itself. Pictures (panorama and best
-/// match) are those of about 300 moments, evenly chosen; of at most 600 where more moments come
-/// than were expected.
+/// A page with a finished run, which plays by itself. Pictures (panorama and best match) are those
+/// of about 300 moments, evenly chosen; of at most 600 if there are more moments than expected.
 class RunPage {
  public:
-  /// `moments`: that are expected.
+  /// `moments`: expected number of moments.
   RunPage(std::string title, std::size_t moments);
   void add(const recordings::RunMoment& moment);
-  /// Its pictures follow no path: none is drawn.
+  /// Draws no path, as the pictures follow none.
   void unordered() noexcept { unordered_ = true; }
-  /// Picture of the remembered route over azimuth and path length, with a mark for each moment.
+  /// Adds a picture of the remembered route over azimuth and path length, with a mark for each
+  /// moment.
   void route(const PicturePlot& panorama, const std::vector<RouteMark>& marks);
 
-  /// Moments that were added.
+  /// Returns the number of moments.
   [[nodiscard]] std::size_t size() const noexcept { return moments_.size(); }
-  /// A page of its own, which needs no other file.
+  /// Returns a page that needs no other file.
   [[nodiscard]] std::string html() const;
-  /// The part of a page that shows it.
+  /// Returns the part of a page that shows the run.
   [[nodiscard]] std::string element() const;
 
  private:
@@ -60,17 +60,17 @@ class RunPage {
   std::vector<std::string> pictures_;  // likewise, of each moment; empty: none
   std::string route_;                  // likewise, empty: none
   bool unordered_ = false;
-  StayingParts staying_;
+  RetainedParts retained_;
 };
 
-/// One HTML text with styles and scripts in it. `body` is HTML; `generator`: what made it, for
-/// machines, may be empty.
+/// Returns an HTML page with styles and scripts in it. `body` is HTML; `generator`: name of the
+/// program, may be empty.
 [[nodiscard]] std::string whole_page(std::string_view title, std::string_view generator,
                                      std::string body);
 
-/// Text of any origin as HTML shows it, in elements and between the quotes of attributes.
+/// Returns text escaped for elements and quoted attributes of HTML.
 [[nodiscard]] std::string html_escaped(std::string_view text);
-/// JSON within a script element.
+/// Returns JSON within a script element.
 [[nodiscard]] std::string data_element(std::string_view json);
 
 }  // namespace panonav::viewer

@@ -140,7 +140,7 @@ PlotAxis make_y_axis(const LinePlot& plot) {
   return make_axis(plot.y_label, plot.log_y, plot.y_range, values, has_bars(plot));
 }
 
-/// Draws the bars of series `number`; those of several series stand next to each other.
+/// Draws the bars of series `number`; those of several series are side by side.
 void draw_bars(SvgDrawing& drawing, const PlotArea& area, const LinePlot& plot, std::size_t number,
                PlotColour colour) {
   const Series& series = plot.series[number];

@@ -12,7 +12,7 @@
 namespace panonav::viewer {
 
 /// The colours of all plots: those of Okabe and Ito, which colour-blind readers tell apart, and
-/// greys for what lies behind.
+/// greys for backgrounds.
 enum class PlotColour {
   blue,
   vermilion,
@@ -27,7 +27,7 @@ enum class PlotColour {
   light_grey,
   pale_grey,
 };
-/// "#0072b2".
+/// Returns "#0072b2", for example.
 [[nodiscard]] std::string_view hex(PlotColour colour);
 
 enum class SeriesStyle { lines, points, lines_and_points, bars };
@@ -94,19 +94,19 @@ struct MapPlot {
   std::string title;
   std::vector<MapLayer> layers;  ///< drawn in this order
   std::string unit = "m";        ///< of both axes
-  /// Two corners of what is shown; empty: everything.
+  /// Two corners of the shown part; empty: everything.
   std::optional<std::pair<Point2, Point2>> shown = {};
 };
 
 /// Writes an SVG or, for a path that does not end in .svg, a PNG, which the program ffmpeg makes of
 /// the SVG; the file appears whole or not at all. Throws FileError when it cannot be written, Error
 /// when it is a PNG and ffmpeg is not installed, ContractError on series whose x and y differ in
-/// size. What holds no point does not appear in the legend.
+/// size. Layers and series without points do not appear in the legend.
 void write_plot(const std::filesystem::path& path, const LinePlot& plot);
 void write_plot(const std::filesystem::path& path, const HeatMap& plot);
 void write_plot(const std::filesystem::path& path, const MapPlot& plot);
-/// Several maps side by side in one picture, of one size and with one legend (as in [M04] figures 9
-/// and 10).
+/// Writes several maps side by side in one picture, of one size and with one legend (as in [M04]
+/// figures 9 and 10).
 void write_plot(const std::filesystem::path& path, const std::vector<MapPlot>& panels,
                 int panel_columns);
 

@@ -17,12 +17,12 @@ struct PlotAxis {
   double to = 1.0;
   bool is_log = false;
   double tick = 0.0;  ///< between marks; 0: chosen by the range
-  /// Marks with text instead of numbers, where there are any.
+  /// Marks with text instead of numbers, if any.
   std::vector<std::pair<double, std::string>> names = {};
 
-  /// Returns 0 at `from` and 1 at `to`; NaN for what the axis cannot show.
+  /// Returns 0 at `from` and 1 at `to`; NaN for values that the axis cannot show.
   [[nodiscard]] double share_of(double value) const;
-  /// Returns where marks are: 0.2, 0.5, 1, 2, ... apart, about `max_count` at most.
+  /// Returns the positions of marks: 0.2, 0.5, 1, 2, ... apart, about `max_count` at most.
   [[nodiscard]] std::vector<double> ticks(double max_count) const;
   /// Makes the axis show all values, with a little room; `with_zero`: zero, too.
   void fit(std::span<const double> values, bool with_zero);
@@ -43,11 +43,11 @@ struct PlotArea {
 
   [[nodiscard]] Point2 to_px(double x_value, double y_value) const;
   [[nodiscard]] std::vector<Point2> to_px(std::span<const Point2> points) const;
-  /// Height of the turned names of x below the area, beyond the usual margin.
+  /// Returns the height of the rotated names of x below the area, beyond the usual margin.
   [[nodiscard]] double extra_margin_px() const;
-  /// Draws what lies behind the values.
+  /// Draws the grid behind the values.
   void draw_grid(SvgDrawing& drawing) const;
-  /// Frame, numbers, labels and title.
+  /// Draws frame, numbers, labels and title.
   void draw_axes(SvgDrawing& drawing, const std::string& title) const;
 
  private:

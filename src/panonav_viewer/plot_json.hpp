@@ -11,10 +11,10 @@
 /// `write_plot`.
 namespace panonav::viewer {
 
-/// Name of the style's variable: "vermilion" for --vermilion.
+/// Returns the name of the style's variable: "vermilion" for --vermilion.
 [[nodiscard]] std::string_view name_of(PlotColour colour);
 
-/// Series of different length in x and y are refused.
+/// Returns a plot as JSON. Throws ContractError on series of different length in x and y.
 [[nodiscard]] std::string plot_json(const LinePlot& plot);
 [[nodiscard]] std::string plot_json(const HeatMap& plot);
 /// Several frames are shown one after the other; the title of each says which it is. At least one;

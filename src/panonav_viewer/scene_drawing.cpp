@@ -17,7 +17,7 @@ namespace {
 
 using Triangle = std::array<simulation::Vector3, 3>;
 
-/// Triangles that share corners, to the millimetre, belong together.
+/// Triangles that share corners, to the millimetre, are of one object.
 std::vector<std::vector<Triangle>> bodies_of(const std::vector<Triangle>& triangles) {
   std::map<std::array<long, 3>, std::size_t> body_at;  // a corner's body, as first numbered
   std::vector<std::size_t> joined;                     // to this body; itself: its own
@@ -45,7 +45,8 @@ std::vector<std::vector<Triangle>> bodies_of(const std::vector<Triangle>& triang
   return result;
 }
 
-/// Counter-clockwise; two points where all lie on one line, to a hundredth of a square millimetre.
+/// Returns the convex hull, counter-clockwise; two points if all are on one line, to a hundredth of
+/// a square millimetre.
 std::vector<Point2> convex_hull(std::vector<Point2> points) {
   std::ranges::sort(points, {}, [](const Point2& p) { return std::pair(p.x_m, p.y_m); });
   const auto is_left = [](const Point2& a, const Point2& b, const Point2& c) {
@@ -88,7 +89,7 @@ std::vector<MapLayer> scene_layers(const simulation::Scene& scene) {
   constexpr double around_m = 3.0;    // far trees would make the floor a spot
   constexpr std::size_t max_bodies = 30;
   MapLayer walls{.label = "walls", .colour = PlotColour::dark_grey};
-  MapLayer things{.label = "furniture and other things", .colour = PlotColour::grey};
+  MapLayer objects{.label = "furniture and other things", .colour = PlotColour::grey};
   const auto is_near = [&](const std::vector<Point2>& points) {
     return std::ranges::any_of(points, [&](const Point2& p) {
       return p.x_m > scene.floor_low.x_m - around_m && p.x_m < scene.floor_high.x_m + around_m &&
@@ -130,14 +131,14 @@ std::vector<MapLayer> scene_layers(const simulation::Scene& scene) {
       } else if (outline.size() == 2) {
         thin.push_back(outline);
       } else {
-        things.filled_polygons.push_back(outline);
+        objects.filled_polygons.push_back(outline);
         ++solid;
       }
     }
     // A screen or a wall; not the faces of a shelf.
     if (solid == 0) walls.lines.insert(walls.lines.end(), thin.begin(), thin.end());
   }
-  return {things, walls};
+  return {objects, walls};
 }
 
 std::vector<std::vector<Point2>> scene_outlines(const simulation::Scene& scene) {

@@ -7,7 +7,7 @@
 
 namespace panonav::viewer {
 
-/// A scene from above, behind everything else in a plot: what stands around as it is (its convex
+/// Returns a scene from above, as the background of a plot: objects as they are (their convex
 /// bodies, so that screens are slanted and the crowns of trees round), and walls, cut at the height
 /// of the camera so that doors are open.
 [[nodiscard]] std::vector<MapLayer> scene_layers(const simulation::Scene& scene);

@@ -102,8 +102,8 @@ class Frame {
     if (which == "best") {
       if (!moment_.best_match.empty()) return safe_picture(moment_.best_match);
     } else if (which == "panorama" && moment_.panorama) {
-      const Image seen = to_picture(*moment_.panorama);
-      bytes = encode_jpeg(seen.view());
+      const Image image = to_picture(*moment_.panorama);
+      bytes = encode_jpeg(image.view());
     } else if (which == "camera" && moment_.picture) {
       bytes = encode_jpeg(moment_.picture->view());
     } else if (which == "camera") {
@@ -171,12 +171,12 @@ struct ViewServer::Implementation {
     return picture(*number, std::string(rest.substr(slash + 1)));
   }
 
-  /// The picture of a reference, by its place among those that were told.
+  /// Returns the picture of a reference, by its index among those sent.
   [[nodiscard]] server::HttpAnswer reference(std::size_t number) {
     std::string name;
     {
       const std::lock_guard lock(mutex);
-      const auto& known = staying.moment.reference_views;
+      const auto& known = retained.moment.reference_views;
       if (!options.thumbnail || number >= known.size()) return {.status = 404};
       name = known[number].name;
     }
@@ -221,9 +221,9 @@ struct ViewServer::Implementation {
     Viewer& operator=(const Viewer&) = delete;
 
     std::optional<std::string> more() {
-      if (told_end_) return std::nullopt;
+      if (sent_end_) return std::nullopt;
       std::string text;
-      std::vector<std::shared_ptr<Frame>> untold;
+      std::vector<std::shared_ptr<Frame>> unsent;
       {
         const std::lock_guard lock(all_.mutex);
         if (!greeted_) {
@@ -231,22 +231,22 @@ struct ViewServer::Implementation {
           if (!all_.frames.empty()) next_ = all_.frames.back()->number();
           greeted_ = true;
         }
-        if (staying_ != all_.staying.times) {
-          text += event("staying", staying_json(all_.staying.moment));
-          staying_ = all_.staying.times;
+        if (retained_ != all_.retained.times) {
+          text += event("retained", retained_json(all_.retained.moment));
+          retained_ = all_.retained.times;
         }
         for (const auto& frame : all_.frames) {
-          if (frame->number() >= next_) untold.push_back(frame);
+          if (frame->number() >= next_) unsent.push_back(frame);
         }
-        told_end_ = all_.ended;
+        sent_end_ = all_.ended;
       }
-      for (const auto& frame : untold) {
+      for (const auto& frame : unsent) {
         text += event("moment", frame->json());
         next_ = frame->number() + 1;
       }
-      if (told_end_) text += event("ended", "{}");
+      if (sent_end_) text += event("ended", "{}");
       const auto now = Clock::now();
-      // So that a viewer who has gone without a word is noticed.
+      // Detects viewers that left without closing the connection.
       if (text.empty() && now - said_ > std::chrono::seconds(2)) text = ": still there\n\n";
       if (!text.empty()) said_ = now;
       return text;
@@ -255,9 +255,9 @@ struct ViewServer::Implementation {
    private:
     Implementation& all_;
     bool greeted_ = false;
-    bool told_end_ = false;
-    std::size_t next_ = 0;     // number of the frame that is still to be told
-    std::size_t staying_ = 0;  // as of `StayingParts::times`
+    bool sent_end_ = false;
+    std::size_t next_ = 0;      // number of the frame that is still to be told
+    std::size_t retained_ = 0;  // as of `RetainedParts::times`
     Clock::time_point said_ = Clock::now();
   };
 
@@ -308,7 +308,7 @@ struct ViewServer::Implementation {
       constexpr double max_heading = 6.3;  // a turn
       if (!(std::abs(*pose.heading_rad) <= max_heading)) return false;
     }
-    const auto& known = staying.moment.references;
+    const auto& known = retained.moment.references;
     if (known.empty()) return false;
     constexpr double beside_m = 10.0;
     const auto is_beside = [&](double value, double Point2::*axis) {
@@ -329,8 +329,8 @@ struct ViewServer::Implementation {
     const double gap_s = pace.last_s ? std::clamp(stamp_s - *pace.last_s, 0.0, max_gap_s) : 0.0;
     pace.last_s = stamp_s;
     while (pace.steps == 0) {
-      const auto due = pace.shown + std::chrono::duration_cast<Clock::duration>(
-                                        std::chrono::duration<double>(gap_s / pace.speed));
+      const auto due = pace.released + std::chrono::duration_cast<Clock::duration>(
+                                           std::chrono::duration<double>(gap_s / pace.speed));
       const auto now = Clock::now();
       const bool alone = viewing == 0;
       if ((pace.playing && now >= due) || (alone && now >= left + grace)) break;
@@ -344,7 +344,7 @@ struct ViewServer::Implementation {
     }
     if (pace.steps > 0) --pace.steps;
     if (viewing == 0 && !pace.playing) pace.playing = true;  // whoever held it is gone
-    pace.shown = Clock::now();
+    pace.released = Clock::now();
   }
 
   void add(recordings::RunMoment moment) {
@@ -360,10 +360,10 @@ struct ViewServer::Implementation {
         for (std::size_t i = 1; 2 * i < past.size(); ++i) past[i] = std::move(past[2 * i]);
         past.resize(max_past / 2);
       }
-      staying.take(moment);
+      retained.take(moment);
       frames.push_back(std::make_shared<Frame>(std::move(moment), number++));
       kept_bytes += frames.back()->bytes();
-      // A viewer asks for the pictures of a moment some time after it heard of it.
+      // A viewer requests the pictures of a moment some time after its event.
       const std::size_t max_frames = viewing > 0 ? 16 : 1;
       constexpr std::size_t max_bytes = 64U << 20U;
       while (frames.size() > max_frames || (frames.size() > 1 && kept_bytes > max_bytes)) {
@@ -384,14 +384,14 @@ struct ViewServer::Implementation {
   std::deque<std::shared_ptr<Frame>> frames;
   std::size_t kept_bytes = 0;  // of the frames
   std::vector<PastMoment> past;
-  StayingParts staying;
+  RetainedParts retained;
   std::optional<ReferencePose> wish;
   struct {
     bool playing = true;
     double speed = 1.0;
     std::size_t steps = 0;
     std::optional<double> last_s;  // stamp of the moment before
-    Clock::time_point shown;
+    Clock::time_point released;
   } pace;
   Clock::time_point left;  // when a viewer did, the last time
   std::size_t number = 0;

@@ -37,7 +37,7 @@ struct ViewServerOptions {
 /// Shows a run in browsers while it runs: a page over HTTP, moments as server-sent events, pictures
 /// on request. A thread encodes a moment or picture once, when the first viewer requests it. A slow
 /// viewer misses moments and never delays a live run or other viewers. References, edges, plan and
-/// the path so far are kept for viewers who come later.
+/// the path so far are kept for later viewers.
 ///
 /// The address of the page holds a random token of 128 bits. Requests without it get nothing, and
 /// neither does a page of another origin, or one that used a name other than "localhost" (DNS
@@ -47,7 +47,7 @@ class ViewServer {
   /// Begins to listen. Throws Error if address and port are not available, ContractError if the
   /// port is out of range.
   explicit ViewServer(const ViewServerOptions& options = {});
-  /// Viewers are told that the run has ended; those who are there get 0.3 s for the last pictures.
+  /// Notifies viewers of the end of the run; connected ones get 0.3 s for the last pictures.
   ~ViewServer();
   ViewServer(const ViewServer&) = delete;
   ViewServer& operator=(const ViewServer&) = delete;

@@ -98,7 +98,7 @@ TEST_F(Home, TheLibraryGivesTheSameBits) {
   const HomingGuide to_picture(read_image(folder / "home.png"), run.source);
   std::size_t pointing = 0;
   for (const DatasetEntry& entry : run.entries) {
-    const auto expect_same = [&](const json& answer, const WayHome& way) {
+    const auto expect_same = [&](const json& answer, const HomingResult& way) {
       ASSERT_EQ(answer["known"].get<bool>(), way.known);
       if (!way.known) return;
       EXPECT_EQ(answer["xi"].get<double>(), way.vector.xi);
@@ -177,7 +177,7 @@ TEST_F(Home, BetweenPicturesOfNoiseThereIsNoAnswer) {
     EXPECT_TRUE(contains(text.out, "no answer: the views match no better than chance"));
     EXPECT_FALSE(contains(text.out, "probability"));
     PictureSource source;
-    const WayHome way =
+    const HomingResult way =
         HomingGuide(read_image(folder / "a.png"), source).home(read_image(folder / "b.png"));
     EXPECT_FALSE(way.known);
     EXPECT_FALSE(way.direction_rad);

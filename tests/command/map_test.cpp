@@ -154,7 +154,7 @@ TEST_F(Map, SaysWhatItWroteAndWhatAPictureShows) {
   const nlohmann::json run = panels_of(page).front().data;
   EXPECT_GE(run["moments"].size(), 5U);
   EXPECT_FALSE(run["moments"][0].contains("truth")) << "it is in another frame";
-  EXPECT_GE(run["staying"]["references"].size(), 4U);
+  EXPECT_GE(run["retained"]["references"].size(), 4U);
   EXPECT_TRUE(contains(result.out, memory() + " holds the map"));
   EXPECT_TRUE(contains(result.out, std::string(folder_ / "m.tum") + " holds the poses"));
   EXPECT_TRUE(contains(result.out, std::string(folder_ / "m.svg") + " shows the"));

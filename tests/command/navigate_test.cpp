@@ -114,7 +114,7 @@ TEST_F(Navigate, ArrivesAndReportsEachStep) {
   const json run = panels_of(page).front().data;
   EXPECT_EQ(run["moments"].size(), told.size() - 1);
   EXPECT_EQ(run["moments"].back()["state"], "arrived");
-  EXPECT_TRUE(run["staying"].contains("goal"));
+  EXPECT_TRUE(run["retained"].contains("goal"));
 }
 
 TEST_F(Navigate, IsLostInAnotherBuilding) {

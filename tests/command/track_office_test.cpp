@@ -150,7 +150,7 @@ TEST_F(TrackOffice, TheReportHoldsPicturesAndARunToPlay) {
   const auto images = follow({memory(), run()}).images;
   ASSERT_EQ(data["moments"].size(), images.size());
   const auto info = answer_of({"info", memory(), "--json"});
-  EXPECT_EQ(data["staying"]["references"].size(), 2 * info["views"].get<std::size_t>());
+  EXPECT_EQ(data["retained"]["references"].size(), 2 * info["views"].get<std::size_t>());
   for (std::size_t i = 0; i < images.size(); ++i) {
     const json& shown = data["moments"][i];
     EXPECT_EQ(shown["values"]["picture"], images[i]["file"]);

@@ -285,7 +285,7 @@ TEST_F(MemoryUpdating, NoiseAndAnotherBuildingLeaveTheFileAsItIs) {
   for (std::size_t i = 0; i < pictures.size(); ++i) {
     SCOPED_TRACE(i);
     const auto changes = run(pictures[i]);
-    EXPECT_EQ(changes.seen, 21U);
+    EXPECT_EQ(changes.observations, 21U);
     EXPECT_EQ(changes.certain, 0U);
     EXPECT_TRUE(file().history().empty());
     EXPECT_EQ(remembered(), untouched);
@@ -333,7 +333,7 @@ TEST_F(MemoryUpdating, WithoutOdometryNothingIsSaidAndNothingLearnt) {
   const Observation seen = picture_of(world, {1.0, 1.0, 0.0}, 0);
   updater.observe(seen, recogniser.encoder().panorama(seen), recogniser.localise(seen));
   const auto changes = updater.finish("nothing");
-  EXPECT_EQ(changes.seen, 0U);
+  EXPECT_EQ(changes.observations, 0U);
   EXPECT_TRUE(file().history().empty());
   EXPECT_THROW((void)updater.finish("nothing"), ContractError);
   EXPECT_THROW(

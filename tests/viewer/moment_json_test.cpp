@@ -27,7 +27,7 @@ TEST(MomentJson, HoldsWhatIsKnownWhateverItIs) {
   EXPECT_EQ(parsed["values"]["a \"name\"\n</script>"], "\uFFFD\uFFFD");
   EXPECT_EQ(parsed["values"]["event"], "one, two");
   EXPECT_EQ(moment_json(moment, 0).find('\n'), std::string::npos);  // one line of an event
-  EXPECT_EQ(staying_json(moment), "");
+  EXPECT_EQ(retained_json(moment), "");
 }
 
 TEST(MomentJson, TellsModesComparisonsAndStages) {
@@ -51,18 +51,18 @@ TEST(MomentJson, TellsWhatStays) {
   moment.reference_views = {{"a\xff", 0.5}, {"b", std::nullopt}};
   moment.regions = {{{{0.0, 0.0}, {1.0, 0.0}, {0.0, 1.0}}, 3}};
   moment.walls = {{{0.0, 0.0}, {5.0, 0.0}}};
-  const json parsed = json::parse(staying_json(moment));
+  const json parsed = json::parse(retained_json(moment));
   EXPECT_EQ(parsed["names"], json::parse(R"(["a\ufffd", "b"])"));
   EXPECT_EQ(parsed["headings"], json::parse("[0.5, null]"));
   EXPECT_EQ(parsed["regions"], json::parse("[[3, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0]]"));
   EXPECT_EQ(parsed["walls"], json::parse("[[0.0, 0.0, 5.0, 0.0]]"));
   // Other references without names have not those of the ones before.
-  StayingParts staying;
-  staying.take(moment);
+  RetainedParts retained;
+  retained.take(moment);
   recordings::RunMoment later{.stamp_s = 1.0};
   later.references = {{5.0, 6.0}};
-  staying.take(later);
-  const json kept = json::parse(staying_json(staying.moment));
+  retained.take(later);
+  const json kept = json::parse(retained_json(retained.moment));
   EXPECT_EQ(kept["references"], json::parse("[5.0, 6.0]"));
   EXPECT_FALSE(kept.contains("names"));
   EXPECT_EQ(kept["walls"], parsed["walls"]);

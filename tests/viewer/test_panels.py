@@ -95,7 +95,7 @@ def made_up_run():
             "data": {"panorama": striped(0), "best": striped(70)}})
     grid = [(0.9 * column - 0.5, 0.9 * row - 1.0) for row in range(5) for column in range(7)]
     edges = [[*grid[i], *grid[i + 1], i % 4] for i in range(0, 34, 2) if i % 7 != 6]
-    return {"moments": moments, "staying": {
+    return {"moments": moments, "retained": {
         "references": [value for at in grid for value in at],
         "regions": [[i % 7 // 4, *(v for dx, dy in ((-.4, -.4), (.4, -.4), (.4, .4), (-.4, .4)) for v in (x + dx, y + dy))]
                     for i, (x, y) in enumerate(grid)],
@@ -107,7 +107,7 @@ def made_up_run():
 def without(run, layer):
     """The run as if it told nothing of one layer."""
     run = json.loads(json.dumps(run))
-    run["staying"].pop(layer, None)
+    run["retained"].pop(layer, None)
     for moment in run["moments"]:
         moment.pop(layer, None)
     return run

@@ -155,7 +155,7 @@ def look(browser, url, shots):
     assert browser.ask("document.querySelector('pn-card').hidden && document.activeElement.localName === 'pn-map'")
     # A click on a reference names it.
     at = browser.ask("""(() => { const map = document.querySelector('pn-map'), box = map.getBoundingClientRect();
-      const [x, y] = map.run.staying.references; return [box.x + map.px(x), box.y + map.py(y)]; })()""")
+      const [x, y] = map.run.retained.references; return [box.x + map.px(x), box.y + map.py(y)]; })()""")
     for kind in ("mousePressed", "mouseReleased"):
         browser.call("Input.dispatchMouseEvent", type=kind, x=at[0], y=at[1], button="left", clickCount=1, buttons=1)
     assert "view 0" in text_of(browser, "pn-map .said"), text_of(browser, "pn-map .said")
@@ -235,7 +235,7 @@ def watch_verbs(folder):
         "navigate": ([memory, "--goal", "view_00011.png", "--scene", "hall"], {"pose", "probability"},
                      {"references", "plan", "directions", "goal", "walls", "regions"}),
     }
-    for verb, (arguments, shown, staying) in verbs.items():
+    for verb, (arguments, shown, retained) in verbs.items():
         events = watch([*verb.split(), *arguments])
         moments = [data for name, data in events if name == "moment"]
         assert [moment["n"] for moment in moments] == list(range(len(moments))), verb
@@ -243,10 +243,10 @@ def watch_verbs(folder):
         assert any(shown <= moment.keys() for moment in moments), (verb, moments[-1].keys())
         assert {"camera", "panorama"} <= set(moments[-1]["pictures"]), verb
         assert all(ms >= 0 for moment in moments for ms in moment["stages"].values()), verb
-        assert staying <= {key for name, data in events if name == "staying" for key in data}, verb
+        assert retained <= {key for name, data in events if name == "retained" for key in data}, verb
         assert events[0][0] == "past" and events[-1] == ("ended", {}), verb
         if verb == "map":
-            grown = [len(data["references"]) // 2 for name, data in events if name == "staying"]
+            grown = [len(data["references"]) // 2 for name, data in events if name == "retained"]
             assert grown[0] == 1 and grown == sorted(grown) and len(grown) > 3, grown
     assert (folder / "track.mcap").stat().st_size > 100_000, "a run that is shown is recorded, too"
 
@@ -257,7 +257,7 @@ def tell_verbs(folder):
     views = [("GET", "view/0", None, 200), ("GET", "view/12", None, 404), ("GET", "view/../0", None, 404)]
     wishes = lambda pose, goal: [("POST", "control", json.dumps({"pose": pose}), 204 if not goal else 400),
                                  ("POST", "control", json.dumps({"goal": goal or [1, 2]}), 204 if goal else 400)]
-    references = lambda events: next(data["references"] for name, data in events if name == "staying")
+    references = lambda events: next(data["references"] for name, data in events if name == "retained")
     events = watch(["localise", memory, drive], [*views, ("POST", "control", '{"pose": [0, 0, 0]}', 400)])
     # The robot is told to be where its last reference is: its estimates go there.
     first, last = references(events)[:2], references(events)[-2:]
@@ -269,7 +269,7 @@ def tell_verbs(folder):
     # It is sent to the first reference instead of the last: goal and end are there.
     events = watch(["navigate", memory, "--goal", "view_00011.png", "--scene", "hall"],
                    [*views, *wishes([0, 0, 0], [first[0] + 0.01, first[1]])])
-    goals = [data["goal"] for name, data in events if name == "staying" and "goal" in data]
+    goals = [data["goal"] for name, data in events if name == "retained" and "goal" in data]
     assert math.dist(goals[-1][:2], first) < 1e-3 and goals[0] != goals[-1], goals
 
 

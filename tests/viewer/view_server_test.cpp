@@ -163,10 +163,10 @@ TEST(ViewServer, TellsWhoComesLateWhatWas) {
               json::parse(R"([4.0, 4.0, 2.0, 0.5, 0.75, true, "localised", 5.0, 6.0])"));
     EXPECT_EQ(past[0][7],
               json::parse(R"([7.0, 7.0, 2.0, 0.5, 0.75, true, "localised", null, null])"));
-    const auto staying = peer.events("staying");
-    ASSERT_EQ(staying.size(), 1U);
-    EXPECT_EQ(staying[0]["references"], json::parse("[1.0, 2.0, 3.0, 4.0]"));
-    EXPECT_EQ(staying[0]["goal"], json::parse("[7.0, 8.0, 0.0]"));
+    const auto retained = peer.events("retained");
+    ASSERT_EQ(retained.size(), 1U);
+    EXPECT_EQ(retained[0]["references"], json::parse("[1.0, 2.0, 3.0, 4.0]"));
+    EXPECT_EQ(retained[0]["goal"], json::parse("[7.0, 8.0, 0.0]"));
     const auto moments = peer.events("moment");
     ASSERT_EQ(moments.size(), 1U);
     EXPECT_EQ(moments[0]["n"], 29);

@@ -24,7 +24,7 @@ std::string turn_in_words(double heading_rad) {
   return "the robot has turned by " + in_words(turned);
 }
 
-std::string why_none(const WayHome& way) {
+std::string why_none(const HomingResult& way) {
   if (!way.known) return "the views match no better than chance";
   // Above it more than half of the energy of either view is found in the other.
   constexpr double alike = std::numbers::sqrt2 / 2.0;

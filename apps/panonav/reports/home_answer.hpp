@@ -22,7 +22,7 @@ struct Goal {
 struct HomeAnswer {
   std::string file;
   std::optional<ReferencePose> pose;
-  WayHome way;
+  HomingResult way;
 };
 
 /// "34 degrees to the left", "straight ahead".
@@ -30,6 +30,6 @@ struct HomeAnswer {
 /// How the robot faces compared with the home view.
 [[nodiscard]] std::string turn_in_words(double heading_rad);
 /// Why there is no direction.
-[[nodiscard]] std::string why_none(const WayHome& way);
+[[nodiscard]] std::string why_none(const HomingResult& way);
 
 }  // namespace panonav::command

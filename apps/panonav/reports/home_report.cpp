@@ -26,7 +26,7 @@ std::set<std::size_t> shown_of(std::size_t count) {
 }
 
 std::string caption_of(const HomeAnswer& answer) {
-  const WayHome& way = answer.way;
+  const HomingResult& way = answer.way;
   if (!way.direction_rad) return answer.file + ": no direction home, " + why_none(way);
   return answer.file + ": home is " + in_words(*way.direction_rad) + ", about " +
          format_fixed(way.distance_r, 2) + " R away; " + turn_in_words(way.vector.heading_rad);
@@ -96,7 +96,7 @@ void write_home_report(const std::filesystem::path& folder, const Goal& goal,
       "From one view of a place, " + goal.name +
           ", and what the robot sees now: which way to go, without a map and without "
           "knowing the heading.");
-  const WayHome& first = answers.front().way;
+  const HomingResult& first = answers.front().way;
   if (answers.size() == 1 && !first.known) {
     page.add_figures({{"no answer", why_none(first)}});
   } else if (answers.size() == 1) {
@@ -127,7 +127,7 @@ void write_home_report(const std::filesystem::path& folder, const Goal& goal,
   page.begin_section("Numbers");
   std::vector<std::vector<std::string>> rows;
   for (const HomeAnswer& answer : answers) {
-    const WayHome& way = answer.way;
+    const HomingResult& way = answer.way;
     const auto if_known = [&](double value, int digits) {
       return way.known ? format_fixed(value, digits) : std::string("no answer");
     };

@@ -300,7 +300,7 @@ class LocalisedRun {
     if (changes) {
       has_changed_ = changes->certain > 0;
       text += "; " + as_text(*changes) + "; " + std::to_string(changes->certain) + " of " +
-              std::to_string(changes->seen) + " places certain";
+              std::to_string(changes->observations) + " places certain";
     }
     if (route_) text += ", " + std::to_string(route_->finish()) + " lines of the route";
     if (arguments_.out) write_file(*arguments_.out, std::string_view(table_));

@@ -131,7 +131,7 @@ ExitCode look_ahead(const CatchmentArguments& wanted, const RecordedViews& views
     const HomeVector found = home_vector(views.views[i + ahead], views.views[i], options);
     if (!(found.length() > 0.0)) continue;
     // As if the robot had not been turned.
-    directions.push_back(wrap_angle(found.direction_rad() + views.turned_rad[i]));
+    directions.push_back(wrap_angle(found.direction_rad() + views.rotation_rad[i]));
     sideways += std::abs(directions.back()) > radians(90.0) ? 1 : 0;
   }
   const auto mean = circular_mean(directions);
@@ -225,9 +225,9 @@ ExitCode catchment(const Arguments& arguments, const CatchmentArguments& wanted,
     settings.stages =
         read_stages(*wanted.stages, std::min(62, wanted.homing.views.signature.components - 2));
   }
-  settings.typical_distance_given = arguments.given("run", "typical_distance_m");
-  settings.longest_step_given = arguments.given("run", "max_step_m");
-  settings.obstacle_given = arguments.given("run", "obstacle_m");
+  settings.has_typical_distance = arguments.given("run", "typical_distance_m");
+  settings.has_longest_step = arguments.given("run", "max_step_m");
+  settings.has_obstacle = arguments.given("run", "obstacle_m");
   const auto recording =
       wanted.ahead ? open_recording(wanted.dataset, wanted.pictures, std::nullopt, session)
                    : read_described(wanted.dataset, wanted.pictures, std::nullopt, pose_columns,

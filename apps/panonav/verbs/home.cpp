@@ -29,7 +29,7 @@ struct HomeArguments {
 };
 
 ordered_json as_json(const std::string& goal, const HomeAnswer& answer) {
-  const WayHome& way = answer.way;
+  const HomingResult& way = answer.way;
   const HomeVector& found = way.vector;
   const auto if_known = [&](double value) {
     return way.known ? ordered_json(value) : ordered_json();
@@ -50,7 +50,7 @@ ordered_json as_json(const std::string& goal, const HomeAnswer& answer) {
 }
 
 std::string as_text(const HomeAnswer& answer, Session& session) {
-  const WayHome& way = answer.way;
+  const HomingResult& way = answer.way;
   if (!way.known) return answer.file + "  " + session.bad("no answer") + ": " + why_none(way);
   const std::string sure = "; probability " + format_fixed(way.probability, 2);
   if (way.direction_rad) {

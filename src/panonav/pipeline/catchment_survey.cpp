@@ -34,7 +34,7 @@ std::vector<Pose2> to_robot_poses(const RecordedViews& views) {
       throw ContractError("pose of " + views.files[i], "not known", "a position and a heading");
     }
     const ReferencePose& pose = *views.poses[i];
-    poses.push_back({pose.x_m, pose.y_m, wrap_angle(*pose.heading_rad + views.turned_rad[i])});
+    poses.push_back({pose.x_m, pose.y_m, wrap_angle(*pose.heading_rad + views.rotation_rad[i])});
   }
   return poses;
 }
@@ -133,24 +133,24 @@ void summarise_pairs(const std::vector<PairVector>& vectors, const CatchmentSett
 }  // namespace
 
 RecordedViews read_views(const Dataset& recording, const HomingViewOptions& options,
-                         const std::optional<std::uint64_t>& turn_seed, Executor& executor,
+                         const std::optional<std::uint64_t>& rotation_seed, Executor& executor,
                          const WorkProgress& progress) {
   const HomingEncoder encoder(recording.source, options);
   const std::size_t total = recording.entries.size();
   RecordedViews result;
-  result.turned_rad.resize(total);
+  result.rotation_rad.resize(total);
   if (progress) progress("reading", 0, total);
   make_in_order(
       total, executor,
       [&](std::size_t index) {
         Panorama panorama = encoder.panorama(read_observation(recording.entries[index]));
-        if (turn_seed) {
-          Random random(*turn_seed, index);
+        if (rotation_seed) {
+          Random random(*rotation_seed, index);
           const auto columns = static_cast<std::uint64_t>(panorama.columns());
-          const auto turned = static_cast<int>(random.index(columns));
-          panorama = rotate_columns(panorama, turned);
-          result.turned_rad[index] =
-              wrap_angle(2.0 * std::numbers::pi * turned / static_cast<double>(columns));
+          const auto rotation_columns = static_cast<int>(random.index(columns));
+          panorama = rotate_columns(panorama, rotation_columns);
+          result.rotation_rad[index] =
+              wrap_angle(2.0 * std::numbers::pi * rotation_columns / static_cast<double>(columns));
         }
         return encoder.view(panorama);
       },
@@ -184,12 +184,12 @@ CatchmentResult survey_catchment(const RecordedViews& goals, const RecordedViews
   result.run = settings.run;
   const double near_m = 3.0 * result.spacing_m;
   result.typical_distance_m = estimate_typical_distance_m(goal_poses, place_poses, vectors, near_m);
-  if (settings.typical_distance_given) {
+  if (settings.has_typical_distance) {
     result.typical_distance_m = settings.run.typical_distance_m;
   }
   result.run.typical_distance_m = result.typical_distance_m;
-  if (!settings.longest_step_given) result.run.max_step_m = 2.0 * result.spacing_m;
-  if (!settings.obstacle_given) result.run.obstacle_m = 0.8 * result.spacing_m;
+  if (!settings.has_longest_step) result.run.max_step_m = 2.0 * result.spacing_m;
+  if (!settings.has_obstacle) result.run.obstacle_m = 0.8 * result.spacing_m;
   const auto surveyed = [&](const std::vector<PairVector>& all) {
     const HomingRule known = [&](std::size_t goal, std::size_t place) {
       const PairVector& found = all[goal * place_poses.size() + place];

@@ -19,8 +19,8 @@ struct RecordedViews {
   std::vector<std::string> files;  ///< of the pictures, as the data set names them
   /// Poses in the data set, before the robot was rotated; empty: unknown.
   std::vector<std::optional<ReferencePose>> poses;
-  std::vector<double> turned_rad;  ///< rotation of the robot before each view
-  std::vector<HomingView> views;   ///< of the pictures as the rotated robot sees them
+  std::vector<double> rotation_rad;  ///< rotation of the robot before each view
+  std::vector<HomingView> views;     ///< of the pictures as the rotated robot sees them
 };
 
 /// Receives, on the caller's thread, the name of the current work, the number of its steps since
@@ -31,7 +31,7 @@ using WorkProgress =
 /// Reads all pictures on all threads. With a seed, the robot rotates by a random number of whole
 /// columns before each. Throws FileError, also when the pictures differ in rows.
 [[nodiscard]] RecordedViews read_views(const Dataset& recording, const HomingViewOptions& options,
-                                       const std::optional<std::uint64_t>& turn_seed,
+                                       const std::optional<std::uint64_t>& rotation_seed,
                                        Executor& executor, const WorkProgress& progress = {});
 
 /// Options of a survey of two recordings.
@@ -40,12 +40,12 @@ struct CatchmentSettings {
   /// Highest frequency of each stage of a run, which continues with the next stage where one stops
   /// [S06 section 5]; empty: one stage, as `homing` says. Averages are always those of `homing`.
   std::vector<int> stages;
-  HomingSurveyOptions run;              ///< steps and obstacles; unset values are learnt
-  bool typical_distance_given = false;  ///< else it is learnt from the pairs
-  bool longest_step_given = false;      ///< else twice the spacing, as [S06 section 4.4]
-  bool obstacle_given = false;          ///< else 0.8 of the spacing
-  std::optional<double> bin_m;          ///< else the spacing
-  std::optional<double> up_to_m;        ///< pairs farther apart do not count in averages
+  HomingSurveyOptions run;            ///< steps and obstacles; unset values are learnt
+  bool has_typical_distance = false;  ///< else it is learnt from the pairs
+  bool has_longest_step = false;      ///< else twice the spacing, as [S06 section 4.4]
+  bool has_obstacle = false;          ///< else 0.8 of the spacing
+  std::optional<double> bin_m;        ///< else the spacing
+  std::optional<double> up_to_m;      ///< pairs farther apart do not count in averages
 };
 
 /// Results of all home vectors between two recordings.

@@ -121,7 +121,7 @@ HomingGuide::HomingGuide(HomingEncoder encoder, std::string goal_name, HomingVie
   validate(options_);
 }
 
-WayHome HomingGuide::home(const Observation& observation) const {
+HomingResult HomingGuide::home(const Observation& observation) const {
   const HomingView view = encoder_.view(encoder_.panorama(observation));
   return rethrow_with_file_name(observation, [&] {
     if (view.rows() != goal_.rows()) {
@@ -131,7 +131,7 @@ WayHome HomingGuide::home(const Observation& observation) const {
     const HomeVector found = home_vector(goal_, view, options_);
     const ChanceMatch match = compare_with_chance(goal_, view, options_);
     const bool known = match.is_beyond_chance();
-    return WayHome{
+    return HomingResult{
         known,
         known && points_home(found) ? std::optional(found.direction_rad()) : std::nullopt,
         found.length(),

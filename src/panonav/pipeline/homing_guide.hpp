@@ -63,7 +63,7 @@ class HomingEncoder {
 }
 
 /// Result of comparing an observation with a homing goal.
-struct WayHome {
+struct HomingResult {
   /// True if the observation and the goal have more in common than chance gives (`chance_match`);
   /// noise and other places do not. If false, there is no direction, and distance and turn mean
   /// nothing.
@@ -102,7 +102,7 @@ class HomingGuide {
 
   /// Throws as `HomingEncoder::panorama`, and ContractError (likewise) where the view has other
   /// rows than the goal.
-  [[nodiscard]] WayHome home(const Observation& observation) const;
+  [[nodiscard]] HomingResult home(const Observation& observation) const;
 
   /// Returns the encoder that makes views of observations.
   [[nodiscard]] const HomingEncoder& encoder() const noexcept { return encoder_; }

@@ -81,13 +81,13 @@ void check_known_views(const Dataset& recording, const MemoryFile& memory,
   constexpr std::size_t batch = 32;
   for (std::size_t begin = 0; begin < known.size(); begin += batch) {
     const std::size_t count = std::min(batch, known.size() - begin);
-    std::vector<std::optional<PackedSignature>> seen(count);
+    std::vector<std::optional<PackedSignature>> signatures(count);
     for_each_entry(executor, count, [&](std::size_t i) {
-      seen[i] = encoder.packed(read_observation(*known[begin + i]));
+      signatures[i] = encoder.packed(read_observation(*known[begin + i]));
     });
     for (std::size_t i = 0; i < count; ++i) {
       const auto& entry = *known[begin + i];
-      if (!is_same_picture(*seen[i], views.packed(*views.find(entry.file)))) {
+      if (!is_same_picture(*signatures[i], views.packed(*views.find(entry.file)))) {
         refuse_known_view(memory.path(), entry.file, "another picture under the name");
       }
     }

@@ -25,10 +25,10 @@ void check_known_views(const Dataset& recording, const MemoryFile& memory,
 /// Notes that all views of the recording that the memory knows are the recording's, or will be.
 void remember_recording(const Dataset& recording, MemoryFile& memory);
 
-/// A view that was dropped may come back from another recording, so no recording counts as met.
+/// A view that was dropped may come back from another recording, so no recording counts as known.
 void forget_recordings(MemoryFile& memory);
 
-/// Equal but for rounding: another processor's instructions may round a value the other way.
+/// True if they are equal but for rounding, as processors round differently.
 [[nodiscard]] bool is_same_picture(const PackedSignature& a, const PackedSignature& b);
 
 /// Throws the FileError for a name that the memory holds with another view.

@@ -125,7 +125,7 @@ std::string fingerprint(const VisualMemory& memory) {
   return text.str();
 }
 
-/// Those of other views than the memory's are not taken; null: of whichever views.
+/// Models of other views than the memory's are ignored; null: those of any views.
 std::optional<LearntModels> read_models(const MemoryFile& file, const VisualMemory* memory) {
   const auto text = file.parameter(parameter_name);
   if (!text) return std::nullopt;

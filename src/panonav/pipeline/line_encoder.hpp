@@ -14,7 +14,7 @@
 namespace panonav {
 
 /// Describes how the lines of a route were made of pictures, and the source of its poses. The
-/// memory keeps it beside the route.
+/// memory stores it with the route.
 struct RouteSource {
   HorizonScanlineOptions line;  ///< columns and band of the lines
   /// First and last row that show the horizon, counted from 0 at the top; for panoramas whose

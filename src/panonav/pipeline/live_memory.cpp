@@ -138,7 +138,8 @@ struct LiveMemory::Implementation {
     return std::make_unique<PlaceRecogniser>(path, recogniser_options);
   }
 
-  /// Learns from all views when a quarter of them is new, and takes over what was learnt beside.
+  /// Learns from all views when a quarter of them is new, and then uses models that were learnt
+  /// concurrently.
   void refresh() {
     constexpr std::size_t min_new = 16;
     const std::size_t views = recogniser ? recogniser->size() : 0;

@@ -37,9 +37,9 @@ struct LiveMemoryOptions {
   bool hold = false;
 };
 
-/// Memorises and localises at the same time, for robots that come to new places:
+/// Memorises and localises at the same time, for robots that explore new places:
 ///   panonav::LiveMemory memory("walk.panonav", {.add = true, .memoriser = {.source = source}});
-///   while (auto seen = source.next()) use(memory.answer(*seen));
+///   while (auto observation = source.next()) use(memory.answer(*observation));
 ///   memory.finish();
 /// A view that was added is found from the next observation on. What is learnt of all views (models
 /// of places and positions) is learnt again whenever a quarter of them is new.

@@ -40,8 +40,8 @@ Mapper::Mapper(MemoryFile memory, const std::optional<PictureSource>& source,
     : options_(options),
       file_(std::move(memory)),
       encoder_(file_.header(), source.value_or(file_.header().source)),
-      seen_(file_.header().shape, file_.header().full_scale, file_.header().elevations),
-      mapper_(seen_, options.mapping, options.odometry, options.closure, options.graph) {}
+      node_views_(file_.header().shape, file_.header().full_scale, file_.header().elevations),
+      mapper_(node_views_, options.mapping, options.odometry, options.closure, options.graph) {}
 
 Mapper::EncodedView Mapper::encode(const Observation& observation) const {
   const ReferenceInfo info{observation.name, observation.pose, observation.stamp_s};
@@ -52,11 +52,11 @@ Mapper::EncodedView Mapper::encode(const Observation& observation) const {
   return {encoder_.signature(panorama), info, observation.odometry, thumbnail_png(panorama)};
 }
 
-bool Mapper::add(EncodedView seen) {
+bool Mapper::add(EncodedView encoded) {
   const std::size_t number = count_++;
-  all_odometry_ = all_odometry_ && seen.odometry.has_value();
-  any_pose_ = any_pose_ || seen.info.pose.has_value();
-  OdometryView view(std::move(seen.signature));
+  all_odometry_ = all_odometry_ && encoded.odometry.has_value();
+  any_pose_ = any_pose_ || encoded.info.pose.has_value();
+  OdometryView view(std::move(encoded.signature));
   auto start = Clock::now();
   const bool is_node = mapper_.is_new(view);
   run_.mapping_s += seconds_since(start);
@@ -64,22 +64,23 @@ bool Mapper::add(EncodedView seen) {
     ++run_.skipped;
     return false;
   }
-  const NewView added{std::move(seen.info), pack(view.signature, file_.header().full_scale),
-                      std::move(seen.thumbnail)};
+  const NewView added{std::move(encoded.info), pack(view.signature, file_.header().full_scale),
+                      std::move(encoded.thumbnail)};
   const auto known = file_.find(added.info.name);
   const ViewId id = known ? *known : file_.append(added);
   std::optional<Pose2> moved;
-  if (odometry_of_node_ && seen.odometry) moved = inverse(*odometry_of_node_) * *seen.odometry;
+  if (odometry_of_node_ && encoded.odometry)
+    moved = inverse(*odometry_of_node_) * *encoded.odometry;
   start = Clock::now();
   try {
-    seen_.append_with_id(id, added.signature, added.info);
+    node_views_.append_with_id(id, added.signature, added.info);
     static_cast<void>(mapper_.add(id, std::move(view), moved));
   } catch (const ContractError& error) {
     throw FileError(file_.path().string(), added.info.name + ": " + error.what());
   }
   run_.mapping_s += seconds_since(start);
   run_.observations.push_back(number);
-  odometry_of_node_ = seen.odometry;
+  odometry_of_node_ = encoded.odometry;
   return true;
 }
 
@@ -88,8 +89,8 @@ Mapper::Result Mapper::map(const Dataset& recording, Executor& executor,
   make_in_order(
       recording.entries.size(), executor,
       [&](std::size_t i) { return encode(read_observation(recording.entries[i])); },
-      [&](std::size_t, EncodedView&& seen) {
-        add(std::move(seen));
+      [&](std::size_t, EncodedView&& encoded) {
+        add(std::move(encoded));
         if (mapped) mapped();
       });
   return finish();

@@ -67,7 +67,7 @@ class Mapper {
   /// concurrently. Throws as `ViewEncoder::panorama`.
   [[nodiscard]] EncodedView encode(const Observation& observation) const;
   /// Adds the next observation. Returns true if it became a node. Throws as `encode`, FileError.
-  bool add(EncodedView seen);
+  bool add(EncodedView encoded);
   /// Encodes and adds the next observation.
   bool add(const Observation& observation) { return add(encode(observation)); }
 
@@ -92,7 +92,7 @@ class Mapper {
   MapperOptions options_;
   MemoryFile file_;
   ViewEncoder encoder_;
-  VisualMemory seen_;  // the nodes so far
+  VisualMemory node_views_;  // the nodes so far
   TopologicalMapper mapper_;
   Result run_;
   std::size_t count_ = 0;

@@ -148,17 +148,17 @@ void Memoriser::store(std::span<const Observation> observations, Executor& execu
   std::vector<NewView> views(observations.size());
   std::vector<std::exception_ptr> failures(observations.size());
   for_each_entry(executor, observations.size(), [&](std::size_t i) {
-    const Observation& seen = observations[i];
+    const Observation& observation = observations[i];
     try {
-      views[i].info = {seen.name, seen.pose, seen.stamp_s};
+      views[i].info = {observation.name, observation.pose, observation.stamp_s};
       const bool features = options_.features && file_->header().elevations;
       if (options_.thumbnails || features) {
-        const Panorama panorama = encoder_->panorama(seen);
+        const Panorama panorama = encoder_->panorama(observation);
         views[i].signature = encoder_->packed(panorama);
         if (options_.thumbnails) views[i].thumbnail = thumbnail_png(panorama);
         if (features) views[i].features = pack(encoder_->features(panorama).value());
       } else {
-        views[i].signature = encoder_->packed(seen);
+        views[i].signature = encoder_->packed(observation);
       }
     } catch (const Error&) {
       failures[i] = std::current_exception();
@@ -193,16 +193,16 @@ void Memoriser::store(std::span<const Observation> observations, Executor& execu
   append();
 }
 
-void Memoriser::require_same_view(const Observation& seen, const PackedSignature& signature,
+void Memoriser::require_same_view(const Observation& observation, const PackedSignature& signature,
                                   ViewId view) {
   const VisualMemory there = file_->load(std::array{view});
   const ReferenceInfo& info = there.info(view);
   // A map may have given the view its pose.
-  if ((seen.pose && info.pose != seen.pose) || info.stamp_s != seen.stamp_s) {
-    refuse_known_view(path_, seen.name, "a view with another pose or stamp under the name");
+  if ((observation.pose && info.pose != observation.pose) || info.stamp_s != observation.stamp_s) {
+    refuse_known_view(path_, observation.name, "a view with another pose or stamp under the name");
   }
   if (!is_same_picture(signature, there.packed(view))) {
-    refuse_known_view(path_, seen.name, "another picture under the name");
+    refuse_known_view(path_, observation.name, "another picture under the name");
   }
 }
 

@@ -91,7 +91,8 @@ class Memoriser {
   void make_file(Executor& executor);
   [[nodiscard]] MemoryHeader header_of_waiting(Executor& executor) const;
   void store(std::span<const Observation> observations, Executor& executor);
-  void require_same_view(const Observation& seen, const PackedSignature& signature, ViewId view);
+  void require_same_view(const Observation& observation, const PackedSignature& signature,
+                         ViewId view);
 
   std::filesystem::path path_;
   MemoriserOptions options_;

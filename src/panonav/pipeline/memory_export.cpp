@@ -25,7 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A file within the folder that no other file or folder of the export is in the way of.
+/// Returns a file name within the folder that no other file or folder of the export uses.
 bool is_file_name(const std::string& name) {
   constexpr std::array<std::string_view, 8> own{"dataset.toml", "poses.csv",      "images.csv",
                                                 "views.csv",    "signatures.npy", "memorise.toml",

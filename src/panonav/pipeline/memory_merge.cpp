@@ -31,8 +31,7 @@ std::optional<Pose2> whole_pose(const ReferenceInfo& info) {
   return Pose2{info.pose->x_m, info.pose->y_m, *info.pose->heading_rad};
 }
 
-/// All that the file knows of how its views lie to each other. The largest connected component is
-/// number 0.
+/// Relative poses of the file's views. The largest connected component is number 0.
 TopologicalMap read_or_make_map(const MemoryFile& file, const VisualMemory& views) {
   TopologicalMap map = file.map(map_name).value_or(TopologicalMap{});
   if (map.nodes.empty()) {
@@ -144,7 +143,7 @@ void require_comparable(const MemoryFile& first, const MemoryFile& second) {
   require_same("preprocessing", a.preprocessing == b.preprocessing);
 }
 
-/// A name that is not taken: as it is, or after the file that it comes from.
+/// Returns a free name: the name itself, or prefixed by its file's.
 template <class IsTaken>
 std::string make_free_name(const std::string& name, const MemoryFile& from,
                            const IsTaken& is_taken) {

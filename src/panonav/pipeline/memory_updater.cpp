@@ -103,7 +103,7 @@ struct MemoryUpdater::Implementation {
   ColumnRanking ranking;
   MemoryUpdate update;
   std::map<std::size_t, NewView> kept;  // by their numbers in the run
-  std::size_t seen = 0;
+  std::size_t observations = 0;
   bool finished = false;
 
   void require_unfinished() const {
@@ -127,14 +127,14 @@ void MemoryUpdater::observe(const Observation& observation, const Panorama& pano
   view.info.name = observation.name;
   view.info.stamp_s = observation.stamp_s;
   view.signature = self.encoder.packed(panorama);
-  MemoryUpdate::AnsweredView seen{
+  MemoryUpdate::AnsweredView answered{
       *observation.odometry, view.signature, place.known_probability, {}, {}};
   if (place.position && place.heading_rad) {
-    seen.pose = Pose2{place.position->x_m, place.position->y_m, *place.heading_rad};
-    seen.radius_m = place.position->radius_m;
+    answered.pose = Pose2{place.position->x_m, place.position->y_m, *place.heading_rad};
+    answered.radius_m = place.position->radius_m;
   }
-  const std::size_t number = self.seen++;
-  self.update.add(std::move(seen));
+  const std::size_t number = self.observations++;
+  self.update.add(std::move(answered));
   std::erase_if(self.kept,
                 [&](const auto& one) { return !self.update.can_become_view(one.first); });
   if (!self.update.can_become_view(number)) return;
@@ -152,7 +152,8 @@ MemoryUpdater::Changes MemoryUpdater::finish(const std::string& what) {
   self.require_unfinished();
   self.finished = true;
   MemoryUpdate::Changes planned = self.update.finish();
-  Changes changes{.seen = self.seen, .certain = planned.certain, .views = self.memory.size()};
+  Changes changes{
+      .observations = self.observations, .certain = planned.certain, .views = self.memory.size()};
   if (planned.certain == 0) return changes;
   changes.reinforced = planned.matched.size();
   changes.added = planned.added.size();

@@ -40,13 +40,13 @@ class MemoryUpdater {
 
   /// Changes that a run made to its memory.
   struct Changes {
-    std::size_t seen = 0;        ///< observations with odometry
-    std::size_t certain = 0;     ///< of these, whose place was certain and new
-    std::size_t reinforced = 0;  ///< views of the memory that explained what the robot saw
-    std::size_t added = 0;       ///< views of this run
-    std::size_t replaced = 0;    ///< views that were dropped for added ones
-    std::size_t forgotten = 0;   ///< views that were dropped because they had failed for long
-    std::size_t views = 0;       ///< of the memory now
+    std::size_t observations = 0;  ///< observations with odometry
+    std::size_t certain = 0;       ///< of these, whose place was certain and new
+    std::size_t reinforced = 0;    ///< views of the memory that explained what the robot saw
+    std::size_t added = 0;         ///< views of this run
+    std::size_t replaced = 0;      ///< views that were dropped for added ones
+    std::size_t forgotten = 0;     ///< views that were dropped because they had failed for long
+    std::size_t views = 0;         ///< of the memory now
   };
   /// Changes the file and learns its models again, in one transaction. `what`: name of the run in
   /// the history. Throws FileError, which leaves the file as it was; ContractError the second time.

@@ -23,10 +23,10 @@ namespace panonav {
 struct Observation {
   // NOLINTNEXTLINE(google-explicit-constructor): a picture alone is an observation
   /// Makes an observation of a picture as the camera delivered it, and nothing else known.
-  Observation(Image seen) : picture(std::move(seen)) {}
+  Observation(Image image) : picture(std::move(image)) {}
   // NOLINTNEXTLINE(google-explicit-constructor)
   /// Makes an observation of a panoramic cylinder, and nothing else known.
-  Observation(Panorama seen) : picture(std::move(seen)) {}
+  Observation(Panorama panorama) : picture(std::move(panorama)) {}
 
   /// Picture as the camera delivered it, or a panoramic cylinder.
   std::variant<Image, Panorama> picture;

@@ -81,7 +81,7 @@ struct PlaceRecogniser::Implementation {
     learn_held(file);
     if (options.areas) areas.emplace(*memory);
   }
-  /// Searches the memory where it lies.
+  /// Searches the memory on its server.
   Implementation(std::unique_ptr<IndexedMemory> index_, const MemoryFile& file,
                  std::filesystem::path path_, const PlaceRecogniserOptions& options_)
       : options(options_),

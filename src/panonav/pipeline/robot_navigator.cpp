@@ -65,8 +65,8 @@ NavigationGraph load_requested_graph(const MemoryFileViews& source,
   }
 }
 
-/// The route with those of the views that lie beside it, by their poses: both must have been
-/// recorded with the poses of one data set.
+/// Returns the route with the views near it, by their poses: both must have been recorded with the
+/// poses of one data set.
 KnownRoute load_known_route(const MemoryFileViews& source, const std::string& name,
                             const KnownRouteOptions& options) {
   const MemoryFile& file = source.file();
@@ -179,11 +179,11 @@ RobotNavigator::Step RobotNavigator::step(const Observation& observation, RobotR
   if (last_.decided) {
     last_.decision = observe(observation, report);
     moved_ = {};
-    const double way_m = last_.decision.advance_m;
+    const double advance_m = last_.decision.advance_m;
     const double direction_rad = last_.decision.direction_rad;
-    target_ = {way_m * std::cos(direction_rad), way_m * std::sin(direction_rad)};
-    // Twice as long as it takes: wheels may slip.
-    time_left_s_ = 2.0 * (std::numbers::pi / base.turn_rad_s + way_m / base.speed_m_s) + 1.0;
+    target_ = {advance_m * std::cos(direction_rad), advance_m * std::sin(direction_rad)};
+    // Twice the expected time: wheels may slip.
+    time_left_s_ = 2.0 * (std::numbers::pi / base.turn_rad_s + advance_m / base.speed_m_s) + 1.0;
   }
   last_.velocity = {};
   const double left_m = std::hypot(target_.x_m, target_.y_m);

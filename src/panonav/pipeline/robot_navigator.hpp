@@ -105,7 +105,7 @@ class RobotNavigator {
   std::optional<RouteSource> route_source_;
   std::optional<LineEncoder> line_encoder_;
   std::optional<Navigator> navigator_;
-  // The step that is under way.
+  // The current step.
   Step last_;
   Point2 target_;                  // in the current robot frame
   double time_left_s_ = 0.0;       // after which it counts as done

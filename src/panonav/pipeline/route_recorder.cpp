@@ -90,7 +90,7 @@ std::size_t RouteRecorder::skip_recorded(std::span<const Pose2> drive) {
 }
 
 bool RouteRecorder::is_due(const std::optional<Pose2>& last, const Pose2& next, double every_m) {
-  // A robot that goes every_m from picture to picture takes them a little nearer or farther.
+  // A robot that drives every_m between pictures is sometimes a little nearer or farther.
   return !last || distance(last->position(), next.position()) >= 0.999 * every_m;
 }
 
@@ -148,23 +148,24 @@ RouteRecorder::Recorded RouteRecorder::record(
     const Dataset& drive, std::span<const Pose2> poses, Executor& executor,
     const std::function<void(std::size_t lines)>& recorded) {
   std::vector<std::size_t> chosen;
-  std::vector<Pose2> way;
+  std::vector<Pose2> due_poses;
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    if (!is_due(way.empty() ? std::nullopt : std::optional(way.back()), poses[i],
+    if (!is_due(due_poses.empty() ? std::nullopt : std::optional(due_poses.back()), poses[i],
                 options_.every_m)) {
       continue;
     }
     chosen.push_back(i);
-    way.push_back(poses[i]);
+    due_poses.push_back(poses[i]);
   }
-  const std::size_t first = skip_recorded(way);
+  const std::size_t first = skip_recorded(due_poses);
   make_in_order(
       chosen.size() - first, executor,
       [&](std::size_t i) {
-        Observation seen = read_observation(drive.entries[chosen[first + i]]);
-        const Pose2& pose = way[first + i];
-        if (!options_.odometry) seen.pose = ReferencePose{pose.x_m, pose.y_m, pose.heading_rad};
-        return encode(seen);
+        Observation observation = read_observation(drive.entries[chosen[first + i]]);
+        const Pose2& pose = due_poses[first + i];
+        if (!options_.odometry)
+          observation.pose = ReferencePose{pose.x_m, pose.y_m, pose.heading_rad};
+        return encode(observation);
       },
       [&](std::size_t, EncodedLine&& line) {
         add(std::move(line));

@@ -23,7 +23,7 @@ struct TrackerOptions {
 ///   panonav::Tracker tracker("office.panonav");
 ///   const auto estimate = tracker.observe(observation);
 ///   if (estimate.state == panonav::LocalisationState::localised) use(*estimate.pose);
-/// Pictures become signatures as the file says, and the observation model comes from the file, too
+/// Pictures become signatures as the file says, and the observation model is that of the file
 /// (`keep_models`); one that does not fit the views any more is learnt again. Holds the whole
 /// memory; the file is not needed afterwards. Same file, options and observations: same bits.
 class Tracker {

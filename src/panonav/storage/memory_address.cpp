@@ -34,21 +34,21 @@ std::shared_ptr<const MemoryScheme> find_registered(const std::filesystem::path&
 
 // An address with what may hide a password replaced: all between the first colon of the host part
 // and the last @, whatever was forgotten to be escaped, and the parameter.
-std::string shown_address(std::string_view address, std::size_t scheme) {
-  std::string shown(address);
-  const std::size_t query = std::min(shown.find('?'), shown.size());
-  const std::size_t at = shown.rfind('@');
-  const std::size_t colon = shown.find(':', scheme);
-  if (at != std::string::npos && colon < at) shown.replace(colon + 1, at - colon - 1, "***");
+std::string mask_password(std::string_view address, std::size_t scheme) {
+  std::string masked(address);
+  const std::size_t query = std::min(masked.find('?'), masked.size());
+  const std::size_t at = masked.rfind('@');
+  const std::size_t colon = masked.find(':', scheme);
+  if (at != std::string::npos && colon < at) masked.replace(colon + 1, at - colon - 1, "***");
   for (const std::string_view name : {"password=", "sslpassword="}) {
-    std::size_t from = std::min(query, shown.size());
-    while ((from = shown.find(name, from)) != std::string::npos) {
+    std::size_t from = std::min(query, masked.size());
+    while ((from = masked.find(name, from)) != std::string::npos) {
       from += name.size();
-      const std::size_t end = std::min(shown.find('&', from), shown.size());
-      shown.replace(from, end - from, "***");
+      const std::size_t end = std::min(masked.find('&', from), masked.size());
+      masked.replace(from, end - from, "***");
     }
   }
-  return shown;
+  return masked;
 }
 
 }  // namespace
@@ -99,7 +99,7 @@ std::string without_passwords(std::string_view text) {
     result += text.substr(0, begin);
     text.remove_prefix(begin);
     const std::size_t end = std::min(text.find_first_of(" \t\n\"'"), text.size());
-    result += shown_address(text.substr(0, end), scheme);
+    result += mask_password(text.substr(0, end), scheme);
     text.remove_prefix(end);
   }
   return result;

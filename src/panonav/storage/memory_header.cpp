@@ -285,7 +285,7 @@ void require_camera(const Camera& camera) {
 
 void validate(const MemoryHeader& header) {
   require_picture(header.shape.rows, header.panorama_columns, "rows", "panorama_columns");
-  // The memory itself knows what shapes and scales it takes.
+  // The memory checks shape and scale itself.
   static_cast<void>(VisualMemory(header.shape, header.full_scale, header.elevations));
   require(header.panorama_columns / 2 >= header.shape.components, "panorama_columns",
           header.panorama_columns, ">= 2 x components");

@@ -12,8 +12,7 @@
 
 namespace panonav::fleet {
 
-/// In which area each view lies, by its id: what a change of an area is compared with. Four bytes a
-/// view.
+/// The area of each view, by its id, for comparison with a changed area. Four bytes a view.
 class AreasOfViews {
  public:
   void set(ViewId view, const std::optional<MemoryArea>& area) {

@@ -11,9 +11,9 @@
 
 namespace panonav::fleet {
 
-/// Allocates on borders of large pages, which the system is asked for: bytes that are read here and
-/// there then cost no look-up of small pages. Straight from the system, as a heap keeps gaps
-/// between blocks on such borders.
+/// Allocates on borders of large pages, requested from the system: scattered reads then cost no
+/// look-up of small pages. Directly from the system, as a heap keeps gaps between blocks on such
+/// borders.
 template <class T>
 struct LargePageAllocator {
   static constexpr std::size_t page = std::size_t{2} << 20U;

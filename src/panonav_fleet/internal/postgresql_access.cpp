@@ -22,7 +22,7 @@ MemoriesConnection connect_to_memories(const ServerAddress& address, bool make_s
     version = schema_version(connection);
   }
   if (version && *version != postgresql_schema_version) {
-    throw FileError(address.shown.native(),
+    throw FileError(address.printable.native(),
                     "has schema version " + std::to_string(*version) +
                         "; allowed: " + std::to_string(postgresql_schema_version));
   }
@@ -43,8 +43,8 @@ std::optional<FoundMemory> find_memory(MemoriesConnection& memories, const Serve
 }
 
 void refuse_missing_memory(const ServerAddress& address) {
-  throw FileError(address.shown.native(), "there is no memory '" + address.memory +
-                                              "' on this server that this login may see");
+  throw FileError(address.printable.native(), "there is no memory '" + address.memory +
+                                                  "' on this server that this login may see");
 }
 
 void create_postgresql_memory(const ServerAddress& address, const MemoryHeader& header,
@@ -61,7 +61,7 @@ void create_postgresql_memory(const ServerAddress& address, const MemoryHeader& 
                          ") ON CONFLICT DO NOTHING RETURNING id, channel",
                      values);
   if (made.size() == 0) {
-    throw FileError(address.shown.native(), "is there already; allowed: a name that is free");
+    throw FileError(address.printable.native(), "is there already; allowed: a name that is free");
   }
   PostgresqlTables tables(address, std::move(connection), made.integer(0, 0),
                           std::string(made.text(0, 1)));
@@ -115,7 +115,7 @@ class PostgresqlScheme final : public MemoryScheme {
     if (access == Access::read_write &&
         memories.connection.run("SELECT has_table_privilege('panonav.views', 'INSERT')::int4::int8")
                 .integer(0, 0) == 0) {
-      throw FileError(address.shown.native(),
+      throw FileError(address.printable.native(),
                       "cannot be changed: this login is no member of panonav_contributor, which "
                       "adds, or of panonav_curator, which also changes and removes");
     }

@@ -176,9 +176,9 @@ bool PostgresqlRows::is_null(int row, int column) const {
 std::string_view PostgresqlRows::field(int row, int column, std::size_t size) const {
   const auto length = static_cast<std::size_t>(PQgetlength(result_.get(), row, column));
   if (is_null(row, column) || (size != 0 && length != size)) {
-    throw FileError(shown_->native(), std::string("is damaged: column ") +
-                                          PQfname(result_.get(), column) +
-                                          " holds a value of a wrong type");
+    throw FileError(printable_address_->native(), std::string("is damaged: column ") +
+                                                      PQfname(result_.get(), column) +
+                                                      " holds a value of a wrong type");
   }
   return {PQgetvalue(result_.get(), row, column), length};
 }
@@ -210,12 +210,13 @@ void PostgresqlConnection::Close::operator()(pg_conn* connection) const noexcept
   PQfinish(connection);
 }
 
-PostgresqlConnection::PostgresqlConnection(const ServerAddress& address) : shown_(address.shown) {
+PostgresqlConnection::PostgresqlConnection(const ServerAddress& address)
+    : printable_address_(address.printable) {
   char* fault = nullptr;
   PQconninfoOption* parsed = PQconninfoParse(address.uri.c_str(), &fault);
   PQfreemem(fault);  // it may quote a part of the password
   if (parsed == nullptr) {
-    throw FileError(shown_.native(),
+    throw FileError(printable_address_.native(),
                     "is no address that libpq reads; allowed: "
                     "postgresql://USER@HOST:PORT/DATABASE?memory=NAME, special characters as %40");
   }
@@ -228,15 +229,16 @@ PostgresqlConnection::PostgresqlConnection(const ServerAddress& address) : shown
   const std::array<const char*, 9> values{"10",      "20000", "10",   "5", "3", address.uri.c_str(),
                                           "panonav", "UTF8",  nullptr};
   connection_.reset(PQconnectdbParams(keys.data(), values.data(), 1));
-  if (connection_ == nullptr) throw FileError(shown_.native(), "cannot be opened: out of memory");
+  if (connection_ == nullptr)
+    throw FileError(printable_address_.native(), "cannot be opened: out of memory");
   if (PQstatus(connection_.get()) != CONNECTION_OK) {
-    throw FileError(shown_.native(), "cannot be opened: " + message());
+    throw FileError(printable_address_.native(), "cannot be opened: " + message());
   }
   PQsetNoticeProcessor(
       connection_.get(), [](void*, const char*) {}, nullptr);
   constexpr int oldest = 150000;
   if (PQserverVersion(connection_.get()) < oldest) {
-    throw FileError(shown_.native(),
+    throw FileError(printable_address_.native(),
                     "cannot be used: the server is PostgreSQL " +
                         std::to_string(PQserverVersion(connection_.get()) / 10000) +
                         "; allowed: 15 and newer");
@@ -271,7 +273,7 @@ bool PostgresqlConnection::is_in_transaction() const noexcept {
 
 void PostgresqlConnection::fail(const pg_result* result) const {
   if (PQstatus(connection_.get()) != CONNECTION_OK) {
-    throw FileError(shown_.native(),
+    throw FileError(printable_address_.native(),
                     "lost the connection to its server; a change that was under "
                     "way is there whole or not at all: " +
                         message());
@@ -281,18 +283,19 @@ void PostgresqlConnection::fail(const pg_result* result) const {
       result == nullptr ? nullptr : PQresultErrorField(result, PG_DIAG_MESSAGE_PRIMARY);
   const std::string text = primary == nullptr ? message() : to_readable_line(primary);
   if (state == "42501") {
-    throw FileError(shown_.native(), "cannot be read or changed so: " + text +
-                                         "; allowed: to read for members of panonav_reader, to "
-                                         "add of panonav_contributor, to change and remove of "
-                                         "panonav_curator");
+    throw FileError(printable_address_.native(),
+                    "cannot be read or changed so: " + text +
+                        "; allowed: to read for members of panonav_reader, to "
+                        "add of panonav_contributor, to change and remove of "
+                        "panonav_curator");
   }
   if (state == "55P03" || state == "40001" || state == "40P01") {
-    throw FileError(shown_.native(), "is being written by another program");
+    throw FileError(printable_address_.native(), "is being written by another program");
   }
   if (state == "53100") {
-    throw FileError(shown_.native(), "cannot be written: the server's disk is full");
+    throw FileError(printable_address_.native(), "cannot be written: the server's disk is full");
   }
-  throw FileError(shown_.native(), "cannot be used: " + text);
+  throw FileError(printable_address_.native(), "cannot be used: " + text);
 }
 
 PostgresqlRows PostgresqlConnection::checked(pg_result* raw) {
@@ -301,7 +304,7 @@ PostgresqlRows PostgresqlConnection::checked(pg_result* raw) {
   if (status != PGRES_TUPLES_OK && status != PGRES_COMMAND_OK && status != PGRES_SINGLE_TUPLE) {
     fail(raw);
   }
-  return {shown_, result.release()};
+  return {printable_address_, result.release()};
 }
 
 pg_result* PostgresqlConnection::exchange(const std::string& sql, const PostgresqlValues* values) {
@@ -389,7 +392,9 @@ void PostgresqlConnection::copy_out(
   struct Free {
     void operator()(char* bytes) const noexcept { PQfreemem(bytes); }
   };
-  const auto refuse = [this] { throw FileError(shown_.native(), "sends rows that are cut off"); };
+  const auto refuse = [this] {
+    throw FileError(printable_address_.native(), "sends rows that are cut off");
+  };
   std::vector<std::optional<std::string_view>> row(static_cast<std::size_t>(fields));
   bool begins = true;
   int size = 0;

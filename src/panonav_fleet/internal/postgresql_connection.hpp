@@ -64,10 +64,10 @@ class PostgresqlRows {
   struct Clear {
     void operator()(pg_result* result) const noexcept;
   };
-  PostgresqlRows(const std::filesystem::path& shown, pg_result* result)
-      : shown_(&shown), result_(result) {}
+  PostgresqlRows(const std::filesystem::path& printable, pg_result* result)
+      : printable_address_(&printable), result_(result) {}
   [[nodiscard]] std::string_view field(int row, int column, std::size_t size) const;
-  const std::filesystem::path* shown_;
+  const std::filesystem::path* printable_address_;
   std::unique_ptr<pg_result, Clear> result_;
 };
 
@@ -94,13 +94,15 @@ class PostgresqlConnection {
   void copy_out(const std::string& sql, int fields,
                 const std::function<void(std::span<const std::optional<std::string_view>>)>& take);
   /// Not within a transaction: waits until the server sends a notification and returns what it
-  /// says; empty when none came within the time.
+  /// says; empty when none arrived within the time.
   [[nodiscard]] std::optional<std::string> wait_for_notification(double seconds);
   /// Rolls back what can still be rolled back.
   void try_execute(const char* sql) noexcept;
 
   [[nodiscard]] bool is_in_transaction() const noexcept;
-  [[nodiscard]] const std::filesystem::path& shown() const noexcept { return shown_; }
+  [[nodiscard]] const std::filesystem::path& printable() const noexcept {
+    return printable_address_;
+  }
 
  private:
   struct Close {
@@ -113,7 +115,7 @@ class PostgresqlConnection {
   void discard_results() noexcept;
   /// Asks the server to end the statement that runs.
   void try_cancel() noexcept;
-  std::filesystem::path shown_;
+  std::filesystem::path printable_address_;
   std::unique_ptr<pg_conn, Close> connection_;
 };
 

@@ -50,7 +50,7 @@ class PostgresqlTables final : public MemoryTables {
                    std::int64_t memory, std::string channel);
 
   [[nodiscard]] const std::filesystem::path& path() const noexcept override {
-    return connection_.shown();
+    return connection_.printable();
   }
   [[nodiscard]] const std::filesystem::path& message_path() const noexcept override {
     return path();
@@ -112,7 +112,7 @@ class PostgresqlTables final : public MemoryTables {
   /// Ends the transaction in which the memory was made.
   void commit_creation() { connection_.execute("COMMIT"); }
 
-  /// For what only a server is asked (server_exchange.hpp).
+  /// Returns the connection, for statements that only servers have (server_exchange.hpp).
   [[nodiscard]] PostgresqlConnection& connection() noexcept { return connection_; }
   [[nodiscard]] std::int64_t memory() const noexcept { return memory_; }
   /// Returns the changed areas as text for a notification, and forgets them; empty for many areas,

@@ -132,7 +132,7 @@ void PostgresqlTables::undo() {
   }
 }
 
-// The server looks after its pages itself.
+// The server manages its pages itself.
 std::set<ViewId> PostgresqlTables::verify_structure(const Check& check) {
   std::set<ViewId> views;
   check([&] { static_cast<void>(last_id()); });

@@ -9,7 +9,7 @@ namespace panonav::fleet {
 
 namespace {
 
-// "PNAV" in the upper half: nobody else locks that number.
+// "PNAV" in the upper half: no other program locks that number.
 constexpr const char* lock_schema = "SELECT pg_advisory_xact_lock(5786634408840658944)";
 
 }  // namespace
@@ -22,7 +22,7 @@ std::optional<int> schema_version(PostgresqlConnection& connection) {
     if (there.integer(0, 1) != 0 &&
         connection.run("SELECT has_schema_privilege('panonav', 'USAGE')::int4::int8")
                 .integer(0, 0) != 0) {
-      throw FileError(connection.shown().native(),
+      throw FileError(connection.printable().native(),
                       "cannot be used: the database has a schema panonav of another program");
     }
     return std::nullopt;

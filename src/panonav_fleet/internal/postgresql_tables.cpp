@@ -214,8 +214,8 @@ std::int64_t PostgresqlTables::get_or_create_session() {
   return *session_;
 }
 
-// COPY does not look at rows' owners (row-level security), so new views are first brought to a
-// table of the connection's own.
+// COPY ignores row-level security, so new views are first brought to a table of the connection's
+// own.
 void PostgresqlTables::make_incoming_table_if_needed() {
   if (has_incoming_) return;
   connection_.execute(
@@ -357,7 +357,7 @@ void PostgresqlTables::read_available_views(std::span<const ViewId> views,
                      [&](const Rows& rows) { consume(read_view_row(rows)); });
 }
 
-// By COPY, which takes a third of the time of rows of a statement.
+// By COPY, in a third of the time of a statement's rows.
 void PostgresqlTables::read_magnitudes(ViewId first, ViewId last, std::size_t bytes,
                                        const Consume<MagnitudesRow>& consume) {
   const std::string sql = "COPY (SELECT id, x_m, y_m, substr(signature, 1, " +

@@ -44,9 +44,9 @@ bool is_postgresql_address(const std::filesystem::path& memory) {
 ServerAddress parse_server_address(const std::filesystem::path& memory) {
   const std::string& text = memory.native();
   fleet::ServerAddress address;
-  address.shown = without_passwords(text);
+  address.printable = without_passwords(text);
   const auto refuse = [&](const std::string& what) {
-    throw FileError(address.shown.native(), what);
+    throw FileError(address.printable.native(), what);
   };
   const std::size_t query = std::min(text.find('?'), text.size());
   address.uri = text.substr(0, query);

@@ -8,8 +8,8 @@ namespace panonav::fleet {
 
 /// The parts of the address of a memory on a server (memory_address.hpp).
 struct ServerAddress {
-  std::string uri;              ///< what libpq reads: without panonav's own parameters
-  std::filesystem::path shown;  ///< the address without its password
+  std::string uri;                  ///< what libpq reads: without panonav's own parameters
+  std::filesystem::path printable;  ///< the address without its password
   std::string memory;
   std::optional<std::string> fleet;
   std::optional<std::string> robot;

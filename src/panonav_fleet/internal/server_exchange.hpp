@@ -99,7 +99,7 @@ class ServerExchange {
   // The following functions are one statement each, outside of transactions, so that no other
   // client waits for this one's network.
 
-  /// Returns the same as `read_uploads`, once nobody is writing.
+  /// Returns the same as `read_uploads`, once no writer is active.
   [[nodiscard]] std::vector<Upload> read_settled_uploads(const std::string& file,
                                                          std::span<const ViewId> views);
   /// Copies views to a table of this connection, numbered by their index in `views`, and notes
@@ -121,8 +121,8 @@ class ServerExchange {
     ReferenceInfo info;
     std::int64_t former_checksum = 0;  ///< as the file knows it
   };
-  /// Changes names, poses and stamps of views that nobody else changed first. Returns the accepted
-  /// uploads.
+  /// Changes names, poses and stamps of views that no other robot changed first. Returns the
+  /// accepted uploads.
   [[nodiscard]] std::vector<Upload> submit_changes(const std::string& file, std::int64_t sent,
                                                    std::span<const ChangedView> views);
   /// Removes views that still have these checksums, with all that belongs to them. Returns which.

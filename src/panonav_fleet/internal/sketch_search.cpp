@@ -14,7 +14,7 @@ namespace panonav::fleet {
 
 namespace {
 
-/// A view on its way through the levels.
+/// A view between levels of the search.
 struct SketchedView {
   std::uint32_t bound = 0;
   std::uint32_t segment = 0;  // its number
@@ -168,8 +168,8 @@ class SketchSearch {
     result_.bytes_read += scratch.bytes_read;
   }
 
-  /// A first limit, within which `top` views lie: from the segments of which a sample of the views
-  /// looks best. Views that were taken near each other lie near each other there.
+  /// Returns a first limit for the `top` views, from the segments with the best samples. Views of
+  /// nearby places are adjacent in a segment.
   void find_limit() {
     if (segments_.empty()) return;
     for (std::size_t i = 0; i < segments_.size(); ++i) {
@@ -222,7 +222,7 @@ class SketchSearch {
     return min_bound;
   }
 
-  /// Those views of a segment that look best by their cells.
+  /// Finds the best views of a segment by their cells.
   void take_best(std::uint32_t number, SegmentScratch& scratch,
                  std::vector<SketchedView>& best) const {
     const LiveSegment& segment = segments_[number];
@@ -286,7 +286,7 @@ class SketchSearch {
     const SketchSegment& sketches = *segment.sketches;
     sketches.make_tables(layout_, kernels_, query_, scratch.tables);
     const auto passed = cells(sketches, limit, 0, sketches.blocks(), scratch);
-    // In place: what is kept lies before what is looked at.
+    // In place: kept entries are before the current one.
     const std::span<std::uint32_t> rows(scratch.indices.data(), passed.size());
     std::size_t kept = 0;
     for (const std::uint32_t row : rows) {

@@ -130,7 +130,7 @@ std::uint64_t SketchSegment::bytes() const noexcept {
   return bytes;
 }
 
-// Each code stands for about as many views as each other one.
+// Each code represents about the same number of views.
 void SketchSegment::make_cells(const SegmentLayout& layout, const std::vector<std::int32_t>& sums) {
   constexpr unsigned max_bins = 1024;
   const std::size_t cells = layout.dimensions(0);
@@ -268,7 +268,7 @@ std::span<const std::uint32_t> SketchSegment::cell_bounds(
 SketchSegment::Encoded::Encoded(const SegmentLayout& layout)
     : values(layout.dimensions(2)), mask(layout.dimensions(2)) {}
 
-// All views lie within the scale, so what the query lies outside of it is part of the distance.
+// All views are within the scale, so the query's excess over it is part of the distance.
 void SketchSegment::bounds_at(const SegmentLayout& layout, const kernels::DistanceKernels& kernels,
                               const SegmentQuery& query, int level,
                               std::span<const std::uint32_t> rows, Encoded& room,

@@ -59,7 +59,7 @@ struct SegmentQuery {
   std::vector<float> factors;         ///< of the cells: `counted` over `unit`
   std::uint32_t unit = 1;             ///< of bounds by cells
 
-  /// Bounds up to `largest` are told apart.
+  /// Bounds up to `largest` are distinguished.
   void choose_unit(const SegmentLayout& layout, std::uint32_t largest);
 };
 
@@ -103,7 +103,7 @@ class SketchSegment {
                  Encoded& room, std::uint32_t* bounds) const;
 
  private:
-  /// A sum s is kept as the code nearest to (s - offset) / step; all sums of the segment lie within
+  /// A sum s is kept as the code nearest to (s - offset) / step; all sums of the segment are within
   /// offset .. highest.
   struct Scale {
     std::vector<std::int32_t> offsets, highest;  // one a sum

@@ -18,8 +18,8 @@
 namespace panonav::fleet {
 
 /// Synchronises an open file with an open memory on a server, once. The members hold what is stored
-/// in the file or about to be; `unsaved_` and `stored_links_` tell which. Functions are in three
-/// sources: what both directions need, the upload, and the download.
+/// in the file or about to be; `unsaved_` and `stored_links_` distinguish them. Functions are in
+/// three sources: what both directions need, the upload, and the download.
 class Synchronisation {
  public:
   Synchronisation(SqliteTables& file, MemoryHeader header, ServerExchange& server,
@@ -118,7 +118,7 @@ class Synchronisation {
   void classify_changed_views(const std::vector<ViewId>& changed, std::vector<ServerView>& changes,
                               std::vector<ViewId>& reused);
   /// Returns which of the views that the server does not have it has lost, as after a restored
-  /// backup; the others were removed by somebody.
+  /// backup; the others were removed by other robots.
   std::set<ViewId> find_lost_views(const std::vector<ViewId>& removed);
   void apply_server_changes(const std::vector<ViewId>& removed, const std::set<ViewId>& lost,
                             const std::vector<ServerView>& changes,

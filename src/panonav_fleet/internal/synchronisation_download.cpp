@@ -56,7 +56,7 @@ void Synchronisation::download() {
   std::vector<ServerView> changes;
   std::vector<ViewId> reused;
   classify_changed_views(changed, changes, reused);
-  // Damage is found before anything is taken for another view.
+  // Damage is found before a row is matched with another view.
   static_cast<void>(server_.read_full_views(reused));
   added.insert(added.end(), reused.begin(), reused.end());
   std::ranges::sort(added);

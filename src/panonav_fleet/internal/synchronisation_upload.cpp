@@ -245,7 +245,8 @@ void Synchronisation::upload_batch(const std::vector<ViewId>& ids,
                       bytes_checksum(id, view.thumbnail),
                       bytes_checksum(id, view.features)});
   }
-  // Views whose names were taken just now are not among them: the next time finds other names.
+  // Views whose names were used just now are not among them: the next synchronisation finds other
+  // names.
   for (const Upload& upload : server_.submit_views(state_.file, upload_number_, staged)) {
     SynchronisedView row = synchronised_.at(upload.view);
     if (upload.signature != row.signature) continue;
@@ -283,7 +284,7 @@ void Synchronisation::upload_changes() {
     }
     if (changes.empty()) return;
     const auto accepted = server_.submit_changes(state_.file, upload_number_, changes);
-    // Where somebody was first, `download` sees what.
+    // If another robot was first, `download` shows its change.
     for (const ViewId view : ids) {
       SynchronisedView row = synchronised_.at(view);
       row.sent.reset();

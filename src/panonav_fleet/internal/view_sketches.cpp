@@ -28,7 +28,8 @@ struct ViewSketches::Implementation {
 
   std::shared_ptr<const SegmentLayout> layout;
   std::vector<LiveSegment> segments;  // full ones, then the one that grows
-  /// Of the last segment while it is not full: it is sketched again when views come.
+  /// Magnitudes of the last segment while it is not full: it is sketched again when views are
+  /// added.
   std::shared_ptr<const std::vector<std::uint8_t>> growing;
   std::size_t size = 0;
 

@@ -12,15 +12,15 @@
 
 namespace panonav::fleet {
 
-/// Sketches of views that are held elsewhere, such as on a server: what a search needs to tell the
-/// few views that can be among the nearest, which alone are read in full (docs/search.md). Of 80 x
-/// 15 they take 350 bytes a view in place of 2400. A copy shares the sketches with the original and
-/// costs little, so that one thread changes a copy while others search the original.
+/// Sketches of views that are held elsewhere, such as on a server: enough for a search to select
+/// the few views that can be among the nearest, which alone are read in full (docs/search.md). Of
+/// 80 x 15 they take 350 bytes a view in place of 2400. A copy shares the sketches with the
+/// original and costs little, so that one thread changes a copy while others search the original.
 class ViewSketches {
  public:
   /// Takes a view that was read and its magnitudes, component-major.
   using TakeView = std::function<void(ViewId view, std::span<const std::uint8_t> magnitudes)>;
-  /// Reads views in full, in any order; those that are gone are left out.
+  /// Reads views in full, in any order; removed ones are left out.
   using ReadViews = std::function<void(std::span<const ViewId> views, const TakeView& take)>;
 
   /// Throws ContractError as `VisualMemory`.
@@ -39,8 +39,8 @@ class ViewSketches {
   [[nodiscard]] std::vector<ViewId> views() const;      ///< Ascending. Cost: a sort.
 
   /// Adds views, none of which may be there already, with their magnitudes one view after the
-  /// other. Those that are added together should have been taken near each other. Throws
-  /// ContractError on another number of magnitudes. Cost: some microseconds a view.
+  /// other. Views that are added together should be of nearby places. Throws ContractError on
+  /// another number of magnitudes. Cost: some microseconds a view.
   void insert(std::span<const ViewId> views, std::span<const std::uint8_t> magnitudes);
   /// Adds all views of the other, none of which may be there already. Throws ContractError on
   /// another shape.
@@ -50,8 +50,8 @@ class ViewSketches {
 
   /// The nearest views: exactly what `VisualMemory::search` finds in a memory of those of the views
   /// that `read` knows. Calls `read` a few times, in a steady state: what it gave once must not be
-  /// gone within one search. `views_in_full` of the result are those read. The same on any number
-  /// of threads. Throws ContractError as `VisualMemory::search`, and what `read` throws.
+  /// removed within one search. `views_in_full` of the result are those read. The same on any
+  /// number of threads. Throws ContractError as `VisualMemory::search`, and what `read` throws.
   [[nodiscard]] SearchResult search(const PackedSignature& query, const SearchOptions& options,
                                     const SearchMask& mask, const ReadViews& read,
                                     Executor& executor) const;

@@ -28,7 +28,7 @@ DecodedVideo::DecodedVideo(const std::vector<std::string>& input, const std::str
   std::vector<std::string> arguments{"ffmpeg",   "-nostdin",  "-hide_banner",
                                      "-nostats", "-loglevel", "level+info"};
   arguments.insert(arguments.end(), input.begin(), input.end());
-  // showinfo tells stamp and size of a picture on standard error before its bytes come.
+  // showinfo writes stamp and size of a picture to standard error before its bytes arrive.
   const std::string filter = (chosen.empty() ? "" : "select='" + chosen + "',") +
                              std::string("format=rgb24,showinfo=checksum=0");
   for (const char* word : {"-map", "0:v:0", "-fps_mode", "passthrough", "-vf", filter.c_str(), "-f",
@@ -99,7 +99,7 @@ std::optional<DecodedFrame> DecodedVideo::next() {
   auto pixels = frame.picture.pixels();
   std::size_t filled = 0;
   while (filled < pixels.size()) {
-    // Messages are read on the way: a full pipe of them would stop the program.
+    // Messages are read meanwhile: a full pipe would stop the program.
     std::array<pollfd, 2> pipes{pollfd{child_->output(), POLLIN, 0},
                                 pollfd{messages_end_ ? -1 : child_->errors(), POLLIN, 0}};
     if (poll(pipes.data(), pipes.size(), -1) < 0) continue;

@@ -28,7 +28,7 @@ struct DecodedFrame {
 class DecodedVideo {
  public:
   /// `input`: ffmpeg's words up to the input. `chosen`: an expression of its filter `select`; empty
-  /// takes all pictures. `about` stands in messages. Throws as `start_ffmpeg`.
+  /// takes all pictures. Messages name `about`. Throws as `start_ffmpeg`.
   DecodedVideo(const std::vector<std::string>& input, const std::string& chosen, std::string about,
                const ImageLimits& limits);
 

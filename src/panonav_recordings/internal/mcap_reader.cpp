@@ -243,7 +243,7 @@ class McapFile : public ChunkedFile {
         chunk_bytes > summary_at - block.at || block.index_bytes > summary_at - block.index_at) {
       return false;
     }
-    // Each list of times and offsets has 15 bytes beside its pairs of 16.
+    // Each list of times and offsets has 15 bytes in addition to its pairs of 16.
     const std::uint64_t beside = lists.size() / 10 * 15;
     if (block.index_bytes < beside || (block.index_bytes - beside) % 16 != 0) {
       summary.is_complete = false;

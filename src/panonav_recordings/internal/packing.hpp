@@ -17,7 +17,7 @@ enum class Packing { none, lz4, zstd, bz2 };
 /// Finds the compression by its name in recordings: "" or "none", "lz4", "zstd", "bz2".
 [[nodiscard]] std::optional<Packing> packing_named(std::string_view name) noexcept;
 
-/// Bytes that are not cleared first, so that memory is taken only as it is filled.
+/// Bytes that are not cleared first, so that memory is used only as it is filled.
 struct Buffer {
   Buffer() = default;
   explicit Buffer(std::size_t bytes)

@@ -115,7 +115,7 @@ class TopicChooser {
   [[nodiscard]] TopicChoice take() { return std::move(choice_); }
 
  private:
-  /// Returns the topics of one name and type; a topic may change its type on the way.
+  /// Returns the topics of one name and type; a topic may change its type within a recording.
   [[nodiscard]] TopicNumbers numbers_of(std::string_view name, IsType is_type) const {
     TopicNumbers found;
     const auto& topics = recording_.topics();

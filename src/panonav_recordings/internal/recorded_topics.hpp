@@ -30,8 +30,9 @@ struct TopicChoice {
 /// True if messages of this topic are pictures that can be read.
 [[nodiscard]] bool has_pictures(const RecordedTopic& topic);
 
-/// Chooses topics by name, or else by type (`read_recording`); the pictures lie as `source` says.
-/// Throws FileError, naming `path`, and ContractError on a topic of odometry beside frames.
+/// Chooses topics by name, or else by type (`read_recording`); `source` is the layout of the
+/// pictures. Throws FileError, naming `path`, and ContractError on a topic of odometry together
+/// with frames.
 [[nodiscard]] TopicChoice choose_topics(const Recording& recording,
                                         const std::filesystem::path& path,
                                         const InputOptions::Topics& names,

@@ -38,8 +38,9 @@ bool begins_with(std::span<const std::uint8_t> bytes, std::string_view text) noe
 std::vector<std::string> RecordingFile::warnings() const {
   const std::lock_guard lock(warnings_mutex_);
   auto lines = warnings_;
-  if (untold_ > 0) {
-    lines.push_back(path_.string() + ": " + std::to_string(untold_) + " more warnings");
+  if (suppressed_warnings_ > 0) {
+    lines.push_back(path_.string() + ": " + std::to_string(suppressed_warnings_) +
+                    " more warnings");
   }
   return lines;
 }
@@ -63,7 +64,7 @@ void RecordingFile::warn(const FileError& error) const {
   if (warnings_.size() < max_warnings) {
     warnings_.push_back(line);
   } else {
-    ++untold_;
+    ++suppressed_warnings_;
   }
 }
 

@@ -35,7 +35,7 @@ class RecordingFile {
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
   [[nodiscard]] const std::vector<RecordedTopic>& topics() const noexcept { return topics_; }
   [[nodiscard]] std::vector<std::string> warnings() const;
-  /// The times between which the messages of each block lie; nothing where it has none.
+  /// Returns the span of the messages' times of each block; nullopt for a block without messages.
   [[nodiscard]] virtual std::vector<std::optional<TimeSpan>> blocks() const = 0;
   /// Appends the places of the messages of a block that are of the wanted topics and within the
   /// span, in any order. Throws FileError beyond `max_places` places in all.
@@ -66,7 +66,7 @@ class RecordingFile {
   std::unordered_map<std::string, std::uint32_t> topic_numbers_;
   mutable std::mutex warnings_mutex_;
   mutable std::vector<std::string> warnings_;
-  mutable std::size_t untold_ = 0;
+  mutable std::size_t suppressed_warnings_ = 0;
 };
 
 /// Little-endian fields of bytes that may end early: what is missing is 0 or empty, and `good` is

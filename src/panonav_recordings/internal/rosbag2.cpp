@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Nobody changes the file meanwhile, unless a recorder has a log beside it.
+// The file does not change meanwhile, unless a recorder has a log next to it.
 std::string uri_of(const fs::path& path) {
   std::string uri = "file:";
   constexpr char digits[] = "0123456789ABCDEF";
@@ -46,12 +46,12 @@ class DatabaseFile : public RecordingFile {
     handle_.reset(handle);
     if (code != SQLITE_OK) fail_as(code);
     // A foreign or damaged file must not make SQLite run code, take much memory or never end.
-    constexpr int steps_between_looks = 20000;
+    constexpr int steps_per_check = 20000;
     sqlite3_progress_handler(
-        handle, steps_between_looks,
+        handle, steps_per_check,
         [](void* left) {
           auto& steps = *static_cast<std::int64_t*>(left);
-          steps -= steps_between_looks;
+          steps -= steps_per_check;
           return steps < 0 ? 1 : 0;
         },
         &steps_left_);
@@ -236,7 +236,7 @@ std::vector<fs::path> read_rosbag2_folder(const fs::path& folder) {
       throw FileError(path.string(), "names no files (relative_file_paths)");
     }
     for (const YAML::Node& file : list) {
-      // Some versions name the folder, too; what lies elsewhere is none of this recording.
+      // Some versions name the folder, too; files elsewhere are not of this recording.
       files.push_back(folder / fs::path(file.as<std::string>()).filename());
     }
   } catch (const YAML::Exception& error) {

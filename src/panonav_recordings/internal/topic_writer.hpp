@@ -37,8 +37,8 @@ class TopicWriter {
   std::optional<std::uint16_t> channel_;
 };
 
-/// The stamp comes back as it was: the whole seconds are exact, and of the rest what a double
-/// cannot hold is dropped, 1700000003.3 is no 1700000003.299999952.
+/// Converts a stamp to nanoseconds: the whole seconds are exact, and the rest is rounded to the
+/// precision of a double, so that 1700000003.3 is not 1700000003.299999952.
 inline std::int64_t to_nanoseconds(double stamp_s) {
   require(stamp_s >= 0.0 && stamp_s < 0x1p31, "stamp_s", stamp_s, "0 <= stamp_s < 2147483648");
   constexpr double second_ns = 1e9;
@@ -50,7 +50,7 @@ inline std::int64_t to_nanoseconds(double stamp_s) {
          std::llround(is_whole_us ? 1e3 * rest_us : rest_ns);
 }
 
-/// Writes odometry, tilt and true pose of a robot on the topics where `read_recording` looks for
+/// Writes odometry, tilt and true pose of a robot on the topics where `read_recording` expects
 /// them.
 class RobotTopics {
  public:

@@ -9,9 +9,9 @@ struct ddsi_sertype;
 
 namespace panonav::ros2 {
 
-/// A type of this name without a key, whose samples are bytes of CDR that nobody looks into: the
-/// readers and writers of `ros_messages` serve files and the wire. A sample that is written with
-/// `dds_write` is a `std::span<const std::uint8_t>`. Belongs to the topic that is made of it.
+/// A type of this name without a key, whose samples are opaque bytes of CDR: the readers and
+/// writers of `ros_messages` serve files and the wire. A sample that is written with `dds_write` is
+/// a `std::span<const std::uint8_t>`. Belongs to the topic that is made of it.
 [[nodiscard]] ddsi_sertype* make_raw_type(const std::string& name);
 
 /// Returns the bytes with their encapsulation header, as received.

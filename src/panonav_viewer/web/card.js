@@ -29,7 +29,7 @@ class Card extends HTMLElement {
   show(reference, at) {
     this.hidden = reference === undefined;
     if (this.hidden) return;
-    const { references, names, headings } = this.run.staying, place = [references[2 * reference], references[2 * reference + 1]];
+    const { references, names, headings } = this.run.retained, place = [references[2 * reference], references[2 * reference + 1]];
     const heading = headings?.[reference], away = at ? Math.hypot(at[0] - place[0], at[1] - place[1]) : 0;
     const metres = ([x, y]) => `x ${x.toFixed(2)} m, y ${y.toFixed(2)} m`;
     this.at = at ?? place;
@@ -54,7 +54,7 @@ class Card extends HTMLElement {
   }
   // Lists the views connected by edges; where there are none the four nearest views.
   showNeighbours(reference) {
-    const { references, edges = [], names } = this.run.staying, [x, y] = [references[2 * reference], references[2 * reference + 1]];
+    const { references, edges = [], names } = this.run.retained, [x, y] = [references[2 * reference], references[2 * reference + 1]];
     const number = new Map();
     for (let i = 0; i < references.length; i += 2) number.set(`${references[i]} ${references[i + 1]}`, i / 2);
     let near = new Set();

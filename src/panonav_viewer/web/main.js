@@ -21,10 +21,10 @@ const skeleton = `
 const panels = { map: 'Map', pictures: 'Pictures', facts: 'Facts', route: 'Route', timeline: 'Timeline' };
 
 // Returns the names of the panels that have something to show.
-function usable({ live, moments = [], staying = {}, route }) {
+function usable({ live, moments = [], retained = {}, route }) {
   if (live) return ['map', 'pictures', 'facts', 'timeline'];
   const has = {
-    map: staying.references || staying.plan || staying.edges || moments.some(({ pose, truth, particles }) => pose || truth || particles),
+    map: retained.references || retained.plan || retained.edges || moments.some(({ pose, truth, particles }) => pose || truth || particles),
     pictures: moments.some(({ data }) => data && Object.keys(data).length),
     facts: true,
     route,
@@ -34,7 +34,7 @@ function usable({ live, moments = [], staying = {}, route }) {
 }
 
 // Shows a run with its panels and controls. A script element within holds { live: address of events, replay: true if the
-// run can be controlled } or, for a run that is over, { moments, staying, route }.
+// run can be controlled } or, for a run that is over, { moments, retained, route }.
 class RunPlayer extends HTMLElement {
   connectedCallback() {
     if (this.run) return;
@@ -72,8 +72,8 @@ class RunPlayer extends HTMLElement {
       run.moments = content.moments;
       let changes = {};
       for (const moment of run.moments) moment.changes = changes = moment.changes ? { ...changes, ...moment.changes } : changes;
-      run.addEventListener('moment', () => Object.assign(run.staying, run.moment.changes));
-      run.stay(content.staying);
+      run.addEventListener('moment', () => Object.assign(run.retained, run.moment.changes));
+      run.retain(content.retained);
       run.say('grown');
       run.show(0);
       this.play(false);

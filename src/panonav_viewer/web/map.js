@@ -23,7 +23,7 @@ class MapPanel extends Drawing {
     this.zoom = 1;
     this.shift = [0, 0];  // px
     this.run.addEventListener('moment', () => this.redraw());
-    this.run.addEventListener('staying', () => this.redraw());
+    this.run.addEventListener('retained', () => this.redraw());
     this.pointers = new Map();
     this.canvas.addEventListener('pointerdown', event => this.press(event));
     this.canvas.addEventListener('pointermove', event => this.drag(event));
@@ -95,7 +95,7 @@ class MapPanel extends Drawing {
   }
   // Chooses a view by its index among the references; `at`: the clicked position.
   choose(reference, at) {
-    const { references = [], names } = this.run.staying;
+    const { references = [], names } = this.run.retained;
     this.selected = reference;
     this.clicked = reference === undefined ? undefined : at;
     if (reference !== undefined) {
@@ -110,7 +110,7 @@ class MapPanel extends Drawing {
   }
   // Chooses the next view in a direction of the screen; at first that nearest to the robot, or in the middle.
   chooseTowards(right, down) {
-    const all = this.run.staying.references ?? [], { pose } = this.run.moment ?? {};
+    const all = this.run.retained.references ?? [], { pose } = this.run.moment ?? {};
     const from = this.selected !== undefined ? [this.px(all[2 * this.selected]), this.py(all[2 * this.selected + 1])]
       : pose ? [this.px(pose[0]), this.py(pose[1])] : [this.clientWidth / 2, this.clientHeight / 2];
     let best, minCost = Infinity;
@@ -124,7 +124,7 @@ class MapPanel extends Drawing {
   }
   // Chooses the reference nearest to a click.
   select(x, y) {
-    const all = this.run.staying.references ?? [];
+    const all = this.run.retained.references ?? [];
     let best = Infinity, nearest;
     for (let i = 0; i < all.length; i += 2) {
       const apart = Math.hypot(this.px(all[i]) - x, this.py(all[i + 1]) - y);
@@ -143,7 +143,7 @@ class MapPanel extends Drawing {
       box[0] = Math.min(box[0], x); box[1] = Math.min(box[1], y);
       box[2] = Math.max(box[2], x); box[3] = Math.max(box[3], y);
     };
-    const { references = [], edges = [], goal, plan = [], walls = [] } = this.run.staying;
+    const { references = [], edges = [], goal, plan = [], walls = [] } = this.run.retained;
     for (let i = 0; i < references.length; i += 2) include(references[i], references[i + 1]);
     for (let i = 0; i < edges.length; i += 5) { include(edges[i], edges[i + 1]); include(edges[i + 2], edges[i + 3]); }
     for (let i = 0; i < plan.length; i += 3) include(plan[i], plan[i + 1]);
@@ -177,7 +177,7 @@ class MapPanel extends Drawing {
     this.origin = [width / 2 + this.shift[0] - (box[0] + box[2]) / 2 * this.scale,
       height / 2 + this.shift[1] + (box[1] + box[3]) / 2 * this.scale];
     const keys = new Map();
-    const { references = [], edges = [], plan = [], directions = [], goal, walls = [], regions = [] } = this.run.staying;
+    const { references = [], edges = [], plan = [], directions = [], goal, walls = [], regions = [] } = this.run.retained;
 
     this.drawRegions(context, regions, keys, colour);
     this.drawWalls(context, walls, keys, colour);
@@ -276,10 +276,10 @@ class MapPanel extends Drawing {
     const text = ['Map of the run', references.length && `${references.length / 2} remembered views`,
       moment?.compared && `most similar view ${this.nameOf(moment.compared[0])}`, moment?.pose && `robot at ${at(moment.pose)}`,
       moment?.modes?.length > 1 && `or at ${moment.modes.slice(1, 4).map(([weight, x, y]) => `${at([x, y])} with ${Math.round(100 * weight)} %`).join('; ')}`,
-      this.run.staying.goal && `goal at ${at(this.run.staying.goal)}`].filter(Boolean).join(', ');
+      this.run.retained.goal && `goal at ${at(this.run.retained.goal)}`].filter(Boolean).join(', ');
     if (this.canvas.getAttribute('aria-label') !== text) this.canvas.setAttribute('aria-label', text);
   }
-  nameOf(reference) { return this.run.staying.names?.[reference] ?? reference; }
+  nameOf(reference) { return this.run.retained.names?.[reference] ?? reference; }
 
   drawRegions(context, regions, keys, colour) {
     if (!regions.length) return;

@@ -1,6 +1,6 @@
 // Holds the run. Panels read it and listen to its events:
 //   'moment'   another moment is shown
-//   'staying'  references, edges, plan, directions or goal are new
+//   'retained'  references, edges, plan, directions or goal are new
 //   'grown'    moments were added
 //   'sought'   somebody chose a moment: the run is paused
 const maxMoments = 5000;  // of a live run, without their pictures
@@ -9,7 +9,7 @@ export class Run extends EventTarget {
   constructor() {
     super();
     this.moments = [];
-    this.staying = {};
+    this.retained = {};
     this.index = -1;
     this.following = true;  // the newest moment is shown
     this.ended = false;
@@ -39,9 +39,9 @@ export class Run extends EventTarget {
     this.say('grown');
     if (this.following || this.index < 0) this.show(this.last);
   }
-  stay(staying) {
-    Object.assign(this.staying, staying);
-    this.say('staying');
+  retain(retained) {
+    Object.assign(this.retained, retained);
+    this.say('retained');
   }
   show(index) {
     this.index = Math.max(0, Math.min(this.last, index));
@@ -65,7 +65,7 @@ export function follow(run, address, connected) {
   events.addEventListener('open', () => connected(true));
   events.addEventListener('error', () => { if (!run.ended) connected(false); });
   events.addEventListener('past', event => run.takePast(JSON.parse(event.data)));
-  events.addEventListener('staying', event => run.stay(JSON.parse(event.data)));
+  events.addEventListener('retained', event => run.retain(JSON.parse(event.data)));
   events.addEventListener('moment', event => run.add(JSON.parse(event.data)));
   events.addEventListener('ended', () => { run.ended = true; events.close(); run.say('moment'); });
 }

@@ -14,11 +14,11 @@ namespace panonav {
 /// and kept, up to a number. Several threads may use it.
 class FeatureCache {
  public:
-  /// Opens the memory once more. Views above `last_view` came later and have no features here;
+  /// Opens the memory again. Views above `last_view` were added later and have no features here;
   /// empty: all views count.
   explicit FeatureCache(const MemoryFile& memory, std::optional<ViewId> last_view = std::nullopt);
 
-  /// Returns the features of a view; empty where it has none or is gone. Throws FileError when the
+  /// Returns the features of a view; empty if it has none or is removed. Throws FileError when the
   /// memory cannot be read; the next call opens it again.
   [[nodiscard]] std::optional<LocalFeatures> features(ViewId view);
 

@@ -59,7 +59,7 @@ void remove_log_files(const fs::path& path) {
 Database open_memory_database(const fs::path& path, Access access) {
   require_memory_file(path);
   const std::string name = path.string();
-  // SQLite lays its log beside the file that a link points at.
+  // SQLite puts its log next to the target of a link.
   std::error_code ignored;
   const fs::path file = fs::weakly_canonical(path, ignored);
   const bool may_write = is_writable(file) && is_writable(parent_folder(file));
@@ -88,7 +88,7 @@ Database open_memory_database(const fs::path& path, Access access) {
     // no statement may write.
     Database database(file, may_write ? DatabaseMode::change : DatabaseMode::read);
     database.execute("PRAGMA query_only=ON");
-    // The first look at the file: now SQLite makes or finds its log.
+    // The first access to the file: now SQLite makes or finds its log.
     static_cast<void>(database.integer("PRAGMA schema_version"));
     return database;
   } catch (const FileError&) {
@@ -129,7 +129,7 @@ void require_free_name(const fs::path& path) {
   if (!is_writable(folder)) {
     throw FileError(name, "cannot be made: no permission to write in " + folder.string());
   }
-  // A log without its file would be taken for this file's own.
+  // A log without its file would be used as this file's own.
   for (const char* suffix : {"-wal", "-shm", "-journal"}) {
     const fs::path stray = with_suffix(path, suffix);
     if (fs::exists(fs::symlink_status(stray, ignored))) {
@@ -139,7 +139,7 @@ void require_free_name(const fs::path& path) {
   }
 }
 
-// A link refuses a name that was taken meanwhile; a rename would replace that file.
+// A link refuses a name that is used meanwhile; a rename would replace that file.
 void link_to_final_name(const fs::path& unfinished, const fs::path& path) {
   if (::link(unfinished.c_str(), path.c_str()) != 0) {
     if (errno == EEXIST) refuse_existing(path);

@@ -19,10 +19,10 @@ struct OpenedMemory {
   MemoryHeader header;
 };
 
-/// Opens an existing memory on a server, or a file after a look at its first bytes, and checks its
-/// schema and header. With read_only nothing that is asked of it can change the file. A file in
-/// another journal mode is given what changes need. Throws FileError: missing, no memory file, of
-/// another format version, damaged, no permission, or another program is using it just then.
+/// Opens an existing memory on a server, or a file after checking its first bytes, and checks its
+/// schema and header. With read_only nothing can change the file. A file in another journal mode is
+/// given what changes need. Throws FileError: missing, no memory file, of another format version,
+/// damaged, no permission, or another program is using it just then.
 [[nodiscard]] OpenedMemory open_memory_tables(const std::filesystem::path& path, Access access);
 
 }  // namespace panonav

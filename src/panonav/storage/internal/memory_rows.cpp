@@ -12,7 +12,7 @@ void pack_signature(const PackedSignature& signature, std::vector<std::uint8_t>&
   bytes.insert(bytes.end(), signature.phases.begin(), signature.phases.end());
 }
 
-// The signature is hashed where it lies; the short fields are its seed.
+// The signature is hashed in place; the hash of the short fields is its seed.
 std::int64_t view_checksum(RecordBytes& scratch, ViewId id, const ReferenceInfo& info,
                            std::span<const std::uint8_t> signature) {
   scratch.clear();

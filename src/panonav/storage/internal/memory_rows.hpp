@@ -48,7 +48,7 @@ void pack_signature(const PackedSignature& signature, std::vector<std::uint8_t>&
 /// Throws ContractError on a new name that people could not type or read.
 void require_name(std::string_view what, std::string_view name);
 
-/// More than this is not kept for an undo: SQLite takes fields of 256 MiB.
+/// Largest size of a change kept for undo: SQLite's fields have at most 256 MiB.
 inline constexpr std::int64_t max_undo_bytes = 200 << 20;
 
 /// Throws FileError when that many bytes are too many.

@@ -29,7 +29,7 @@ struct Table {
 };
 
 // Links have a < b. Every checksum is XXH64 over the other fields of its row (docs/formats.md). The
-// table `log` comes first, so that it lies on the second page of every file.
+// table `log` comes first, so that it is on the second page of every file.
 constexpr std::array<Table, 12> tables{{
     {"log",
      "CREATE TABLE log(id INTEGER PRIMARY KEY, before BLOB NOT NULL, now BLOB NOT NULL) STRICT"},

@@ -73,7 +73,7 @@ class MemoryTables {
   enum class Kind { reading, writing };
 
   /// Rolls back unless committed. Within a writing transaction it is a part of that one, which is
-  /// taken back alone or committed with the whole.
+  /// rolled back alone or committed with the whole.
   class Transaction {
    public:
     Transaction() = default;
@@ -102,7 +102,7 @@ class MemoryTables {
   [[nodiscard]] ViewId to_view_id(std::int64_t number) const;
   /// The row itself. Throws FileError when it does not match its checksum.
   const ViewRow& checked(const ViewRow& row, SignatureShape shape, RecordBytes& scratch) const;
-  /// The link that the row tells. Throws as above, and on a row that no link has.
+  /// Returns the link of the row. Throws as above, and on values that no link has.
   [[nodiscard]] Link checked(const LinkRow& row) const;
   [[nodiscard]] virtual std::unique_ptr<Transaction> transaction(Kind kind) = 0;
 
@@ -180,11 +180,11 @@ class MemoryTables {
   virtual void keep_for_undo(const std::function<void()>& changes, const std::string& what) = 0;
   /// The newest first.
   [[nodiscard]] virtual std::vector<MemoryFile::KeptChange> history() = 0;
-  /// Within a writing transaction; takes back the newest, which can be undone.
+  /// Undoes the newest change, within a writing transaction.
   virtual void undo() = 0;
 
   /// Passes every part of the check of the tables themselves to `check`; nothing after it is safe
-  /// to read where that found faults. Returns the ids of all views that are found by any way.
+  /// to read despite faults. Returns the ids of all views found.
   [[nodiscard]] virtual std::set<ViewId> verify_structure(const Check& check) = 0;
   [[nodiscard]] virtual MemoryFile::Info info() = 0;
 };

@@ -6,8 +6,8 @@
 
 namespace panonav {
 
-/// Everything that is wrong with a memory: structure, then view by view, then what belongs to the
-/// views. Empty: intact.
+/// Finds all faults of a memory: structure, then view by view, then what belongs to the views.
+/// Empty: intact.
 [[nodiscard]] std::vector<MemoryFile::Fault> verify_memory(MemoryTables& tables,
                                                            const MemoryHeader& header);
 

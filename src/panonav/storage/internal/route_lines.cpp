@@ -14,7 +14,7 @@ namespace panonav {
 namespace {
 
 // A line's words: x_m, y_m, heading_rad (8 bytes each) and its turn (2 bytes). Byte k of all lines
-// stands together, so that what hardly changes along the route lies side by side.
+// stands together, so that values that hardly change along the route are adjacent.
 constexpr std::size_t reals_of_pose = 3;
 constexpr std::size_t head_bytes = 8 * reals_of_pose + 2;
 
@@ -22,8 +22,8 @@ double& real_of(Pose2& pose, std::size_t i) {
   return i == 0 ? pose.x_m : i == 1 ? pose.y_m : pose.heading_rad;
 }
 
-// Columns by which the line before is turned to look as from the heading of this one.
-std::size_t turn_between(const Pose2& before, const Pose2& now, std::size_t columns) {
+// Returns the columns by which the line before is shifted to the heading of this one.
+std::size_t columns_between(const Pose2& before, const Pose2& now, std::size_t columns) {
   const auto size = static_cast<long long>(columns);
   const auto turn = std::llround((now.heading_rad - before.heading_rad) *
                                  static_cast<double>(columns) / (2.0 * std::numbers::pi));
@@ -75,7 +75,7 @@ std::vector<std::uint8_t> pack_route_lines(const RoutePanorama& route, std::size
     std::size_t turn = 0;
     if (n > 0) {
       before = route.line(first + n - 1);
-      turn = turn_between(route.poses()[first + n - 1], pose, columns);
+      turn = columns_between(route.poses()[first + n - 1], pose, columns);
     }
     plain[8 * reals_of_pose * count + n] = static_cast<std::uint8_t>(turn & 255U);
     plain[(8 * reals_of_pose + 1) * count + n] = static_cast<std::uint8_t>(turn >> 8U);

@@ -9,15 +9,14 @@
 
 namespace panonav {
 
-/// Lines `first` .. `first + count` of a route and their poses as bytes that take less room,
-/// without loss (docs/formats.md, route_blocks): what a line differs by from a guess. The guess
-/// knows the line before, turned as the robot turned, and the columns of the line itself up to
-/// there.
+/// Lines `first` .. `first + count` of a route and their poses as packed bytes, without loss
+/// (docs/formats.md, route_blocks): what a line differs by from a guess. The guess knows the line
+/// before, turned as the robot turned, and the columns of the line itself up to there.
 [[nodiscard]] std::vector<std::uint8_t> pack_route_lines(const RoutePanorama& route,
                                                          std::size_t first, std::size_t count);
 
 /// Lines unpack to no more than this for each byte, so that what a file unpacks to is bounded by
-/// its size. Pictures of a real place come nowhere near it.
+/// its size. Pictures of real places are far below.
 inline constexpr std::size_t max_unpacked_for_each_byte = 100;
 
 /// Appends `count` lines that `pack_route_lines` packed. False where `bytes` are anything else; the

@@ -13,8 +13,8 @@ namespace panonav {
 
 namespace {
 
-// Lines of a full block. Many, so that what SQLite adds to a block is small beside it; not more, as
-// the last block is written again with every append.
+// Lines of a full block. Many, so that SQLite's overhead for each block is relatively small; not
+// more, as the last block is written again with every append.
 constexpr std::int64_t lines_of_block = 256;
 
 std::int64_t row_checksum(std::string_view name, const RouteRow& row) {
@@ -109,7 +109,7 @@ std::size_t append_to_route(MemoryTables& tables, std::string_view name,
     throw ContractError("columns", more.columns(),
                         std::to_string(row.columns) + ", as in the route " + std::string(name));
   }
-  // The last block is taken up again: as it is when it is full, to see the last line.
+  // Reopens the last block; a full one only to read the last line.
   std::int64_t number = std::max<std::int64_t>(0, blocks_of(row) - 1);
   RoutePanorama open(static_cast<int>(row.columns));
   if (row.lines > 0) read_block(tables, name, row, number, open);

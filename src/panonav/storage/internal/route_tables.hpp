@@ -16,7 +16,7 @@ namespace panonav {
 /// there (memory_schema.hpp). All throw FileError on damage.
 
 /// Adds the lines of `more` behind those of the route of that name, which is made where there is
-/// none, and returns how many: the first ones are left out while they lie within a millimetre of
+/// none, and returns how many: the first ones are left out while they are within a millimetre of
 /// the last line there. Throws ContractError on an empty name, a route without lines, and another
 /// number of columns than the route's. Cost: that of `more` and at most one block of lines.
 std::size_t append_to_route(MemoryTables& tables, std::string_view name, const RoutePanorama& more);

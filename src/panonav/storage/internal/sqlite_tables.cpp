@@ -93,7 +93,7 @@ void SqliteTables::erase_setting(const std::string& key) {
 }
 
 std::uint32_t SqliteTables::last_id() {
-  // SQLite keeps it in a table without types, in which anything can stand.
+  // SQLite keeps it in a table without types, which can contain anything.
   Statement rows(database_, "SELECT name, seq FROM sqlite_sequence");
   std::int64_t last = 0;
   for (int count = 0; rows.step(); ++count) {
@@ -175,7 +175,7 @@ void SqliteTables::read_views(const Consume<ViewRow>& consume) {
                  "ORDER BY id");
   for (; rows.step(); ++read) consume(read_view_row(rows));
   // A page that lost its cells loses views without a fault of their own; the index of the names,
-  // which lies on other pages, still counts them.
+  // which is on other pages, still counts them.
   const std::int64_t count = database_.integer(
       "SELECT count(*) FROM views INDEXED BY sqlite_autoindex_views_1 WHERE name > ''");
   if (count != read) {
@@ -187,7 +187,7 @@ void SqliteTables::read_views(std::span<const ViewId> views, const Consume<ViewR
   for (const ViewId view : views) {
     find_view_.reset();  // what was taken last may have thrown
     if (!find_view_.bind(1, view).step()) {
-      // The index of the names lies on other pages: it still knows what the table has lost.
+      // The index of the names is on other pages: it still has rows that the table has lost.
       Statement named(database_,
                       "SELECT 1 FROM views INDEXED BY sqlite_autoindex_views_1 WHERE id = ?", view);
       if (!named.step()) refuse_view(view);

@@ -33,7 +33,7 @@ using SynchronisedViews = std::map<ViewId, SynchronisedView>;
 /// Kinds of links that both sides had, by the server's ids, the smaller first.
 using SynchronisedLinks = std::map<std::pair<ViewId, ViewId>, LinkKind>;
 
-/// The tables of a file that tell what a server has. All throw FileError on damage; those that
+/// The tables of a file with the state of a server. All throw FileError on damage; those that
 /// change something are to be called within a writing transaction.
 [[nodiscard]] SynchronisedViews read_synchronised_views(SqliteTables& file);
 void write_synchronised_view(SqliteTables& file, ViewId view, const SynchronisedView& row);
@@ -51,7 +51,7 @@ void erase_synchronised_link(SqliteTables& file, ViewId a, ViewId b);
 /// 128 random bits, hexadecimal.
 [[nodiscard]] std::string random_identity(SqliteTables& file);
 
-/// Which file and which memory on a server belong together.
+/// Identifies a file and the memory on a server with which it is synchronised.
 struct SynchronisedState {
   std::string file;            ///< random identity of the file; empty: none yet
   std::string memory;          ///< identity of the memory; empty: never synchronised

@@ -178,7 +178,7 @@ void require_own_log(const fs::path& file) {
   if (size(journal) > 0 && std::ifstream(journal).peek() != 0) refuse(journal);
 
   const fs::path log = beside("-wal");
-  // A writer at work may bring its log into the file between the two looks.
+  // A writer may move its log into the file between the two checks.
   constexpr int max_looks = 20;
   constexpr std::chrono::milliseconds pause(20);
   for (int look = 0; look < max_looks; ++look) {
