@@ -50,7 +50,7 @@ std::uint32_t sum_of(std::span<const std::uint8_t> bytes, std::uint32_t before =
   return static_cast<std::uint32_t>(::crc32_z(before, bytes.data(), bytes.size()));
 }
 
-std::uint64_t checked_time(std::int64_t time_ns) {
+std::uint64_t check_time(std::int64_t time_ns) {
   require(time_ns >= 0, "time of a message", static_cast<double>(time_ns), ">= 0 nanoseconds");
   return static_cast<std::uint64_t>(time_ns);
 }
@@ -276,8 +276,8 @@ void McapWriter::write(std::uint16_t channel, std::int64_t log_time_ns,
   s.require_open();
   require(channel < s.channels.size(), "channel", channel,
           "less than " + std::to_string(s.channels.size()));
-  const std::uint64_t time = checked_time(log_time_ns);
-  const std::uint64_t published = checked_time(publish_time_ns);
+  const std::uint64_t time = check_time(log_time_ns);
+  const std::uint64_t published = check_time(publish_time_ns);
   State::Channel& used = s.channels[channel];
   if (used.in_chunk.empty()) s.used_in_chunk.push_back(channel);
   used.in_chunk.emplace_back(time, s.chunk.size());

@@ -21,7 +21,7 @@ using MessageBytes = std::span<const std::uint8_t>;
 
 constexpr std::int64_t second_ns = 1'000'000'000;
 
-std::string named_by_stamp(std::int64_t ns) {
+std::string name_by_stamp(std::int64_t ns) {
   const std::string fraction =
       std::to_string(second_ns + ((ns % second_ns) + second_ns) % second_ns);
   const std::int64_t seconds = ns / second_ns - (ns % second_ns < 0 ? 1 : 0);
@@ -29,7 +29,7 @@ std::string named_by_stamp(std::int64_t ns) {
 }
 
 /// Both parts are exact, so that a stamp in seconds survives a round trip.
-double seconds_of(std::int64_t ns) {
+double to_seconds(std::int64_t ns) {
   return static_cast<double>(ns / second_ns) +
          static_cast<double>(ns % second_ns) / static_cast<double>(second_ns);
 }
@@ -58,7 +58,7 @@ Image RecordedPictures::read(std::size_t index) const {
   const RecordedTopic& topic = recording_->topics()[place.topic];
   const auto bytes = recording_->read(place);
   const std::string name =
-      path_.string() + ": picture at " + to_text(seconds_of(place.time_ns)) + " s";
+      path_.string() + ": picture at " + to_text(to_seconds(place.time_ns)) + " s";
   try {
     if (topic.type == ros::Image::type) {
       return ros::picture_of(ros::read_message<ros::Image>(bytes, topic.encoding));
@@ -94,7 +94,7 @@ class EntryMaker {
     previous_ns_ = ns;
     DatasetEntry entry;
     entry.file = make_unique_name(ns);
-    entry.stamp_s = seconds_of(ns);
+    entry.stamp_s = to_seconds(ns);
     set_odometry(entry, ns);
     set_tilt(entry, ns);
     set_truth(entry, ns);
@@ -133,9 +133,9 @@ class EntryMaker {
 
  private:
   [[nodiscard]] std::string make_unique_name(std::int64_t ns) {
-    std::string name = named_by_stamp(ns);
+    std::string name = name_by_stamp(ns);
     for (int copy = 2; !names_.insert(name).second; ++copy) {
-      name = named_by_stamp(ns) + "_" + std::to_string(copy);
+      name = name_by_stamp(ns) + "_" + std::to_string(copy);
     }
     return name;
   }
@@ -233,7 +233,7 @@ RecordingSummary describe_recording(const fs::path& path) {
     const auto places = recording->places(std::span(&i, 1));
     if (places.empty()) continue;
     each.time = TimeSpan{places.front().time_ns, places.back().time_ns};
-    const double span_s = seconds_of(each.time->end_ns - each.time->begin_ns);
+    const double span_s = to_seconds(each.time->end_ns - each.time->begin_ns);
     if (span_s > 0.0) each.rate_hz = static_cast<double>(places.size() - 1) / span_s;
     if (!has_pictures(topics[i])) continue;
     try {

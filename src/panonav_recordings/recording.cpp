@@ -221,7 +221,7 @@ class FilesRecording : public Recording {
 
 enum class FileKind { other, mcap, bag, old_bag, database, packed };
 
-FileKind kind_of(const fs::path& path) {
+FileKind detect_kind(const fs::path& path) {
   std::array<char, 100> first{};
   std::error_code code;
   if (!fs::is_regular_file(path, code)) return FileKind::other;
@@ -294,7 +294,7 @@ std::unique_ptr<RecordingFile> open_packed(const fs::path& path, const Recording
 }
 
 std::unique_ptr<RecordingFile> open_file(const fs::path& path, const RecordingLimits& limits) {
-  switch (kind_of(path)) {
+  switch (detect_kind(path)) {
     case FileKind::mcap:
       return open_mcap(path, limits);
     case FileKind::bag:
@@ -349,7 +349,7 @@ std::unique_ptr<const Recording> Recording::open(const fs::path& path,
 
 bool is_recording(const fs::path& path) noexcept {
   try {
-    return kind_of(path) != FileKind::other || is_rosbag2_folder(path);
+    return detect_kind(path) != FileKind::other || is_rosbag2_folder(path);
   } catch (...) {
     return false;
   }

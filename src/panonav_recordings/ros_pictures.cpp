@@ -43,7 +43,7 @@ constexpr std::array encodings{
   throw ContractError("sensor_msgs/Image " + std::string(field), to_readable_line(value), allowed);
 }
 
-std::uint8_t clamped(int value) {
+std::uint8_t clamp_to_byte(int value) {
   return static_cast<std::uint8_t>(std::clamp(value, 0, 255));
 }
 
@@ -70,9 +70,9 @@ void convert_yuv_row(Row row, const Encoding& from, int width, std::uint8_t* to)
     const int y = 298 * (pair[from.order[0] + 2 * (u % 2)] - 16) + 128;
     const int blue = pair[from.order[1]] - 128;
     const int red = pair[from.order[2]] - 128;
-    *to++ = clamped((y + 409 * red) >> 8);
-    *to++ = clamped((y - 100 * blue - 208 * red) >> 8);
-    *to++ = clamped((y + 516 * blue) >> 8);
+    *to++ = clamp_to_byte((y + 409 * red) >> 8);
+    *to++ = clamp_to_byte((y - 100 * blue - 208 * red) >> 8);
+    *to++ = clamp_to_byte((y + 516 * blue) >> 8);
   }
 }
 

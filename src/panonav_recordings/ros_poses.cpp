@@ -20,7 +20,7 @@ Quaternion operator*(const Quaternion& a, const Quaternion& b) {
       a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w, a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z};
 }
 
-Vector3 rotated(const Quaternion& q, const Vector3& v) {
+Vector3 rotate(const Quaternion& q, const Vector3& v) {
   const Quaternion rotated = q * Quaternion{v.x, v.y, v.z, 0.0} * Quaternion{-q.x, -q.y, -q.z, q.w};
   const double scale = 1.0 / dot(q, q);
   return {scale * rotated.x, scale * rotated.y, scale * rotated.z};
@@ -29,7 +29,7 @@ Vector3 rotated(const Quaternion& q, const Vector3& v) {
 }  // namespace
 
 Pose operator*(const Pose& a_from_b, const Pose& b_from_c) {
-  const Vector3 moved = rotated(a_from_b.orientation, b_from_c.position);
+  const Vector3 moved = rotate(a_from_b.orientation, b_from_c.position);
   const Vector3& at = a_from_b.position;
   return {{at.x + moved.x, at.y + moved.y, at.z + moved.z},
           a_from_b.orientation * b_from_c.orientation};
@@ -38,7 +38,7 @@ Pose operator*(const Pose& a_from_b, const Pose& b_from_c) {
 Pose inverse(const Pose& a_from_b) {
   const Quaternion& q = a_from_b.orientation;
   const Quaternion back{-q.x, -q.y, -q.z, q.w};
-  const Vector3 at = rotated(back, a_from_b.position);
+  const Vector3 at = rotate(back, a_from_b.position);
   return {{-at.x, -at.y, -at.z}, back};
 }
 

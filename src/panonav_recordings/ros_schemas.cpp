@@ -81,7 +81,7 @@ constexpr std::array definitions{
                "std_msgs/Header header\ndiagnostic_msgs/DiagnosticStatus[] status\n"},
 };
 
-const Definition& definition_of(std::string_view type) {
+const Definition& find_definition(std::string_view type) {
   const auto found = std::ranges::find(definitions, type, &Definition::type);
   if (found != definitions.end()) return *found;
   std::string known;
@@ -104,7 +104,7 @@ std::string ros2_schema(std::string_view type) {
   std::vector<std::string_view> types{type};
   std::string schema;
   for (std::size_t i = 0; i < types.size(); ++i) {
-    const std::string_view text = definition_of(types[i]).text;
+    const std::string_view text = find_definition(types[i]).text;
     if (i > 0) {
       schema += std::string(80, '=') + "\nMSG: " + std::string(types[i]) + "\n";
     }

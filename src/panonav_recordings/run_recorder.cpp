@@ -26,8 +26,8 @@ namespace {
 
 /// Free where a camera has stood, with as much around it; nothing is known of the rest. Empty where
 /// the references are too far apart for a grid.
-std::optional<ros::OccupancyGrid> visited_grid(const std::vector<Point2>& positions,
-                                               std::int64_t stamp_ns) {
+std::optional<ros::OccupancyGrid> make_visited_grid(const std::vector<Point2>& positions,
+                                                    std::int64_t stamp_ns) {
   constexpr double cell_m = 0.1;
   constexpr int around = 2;  // cells
   constexpr double max_cells = 4e6;
@@ -62,7 +62,7 @@ std::optional<ros::OccupancyGrid> visited_grid(const std::vector<Point2>& positi
 }
 
 /// Points along the edges, dense enough to look like lines, but few enough for viewers.
-PointValues edge_points(const std::vector<RunEdge>& edges) {
+PointValues sample_edges(const std::vector<RunEdge>& edges) {
   constexpr double max_points = 1e5;
   double length_m = 0.0;
   for (const RunEdge& edge : edges) length_m += distance(edge.from, edge.to);
@@ -186,7 +186,7 @@ struct RunRecorder::Implementation {
     write_transforms(moment, ns);
     write_references(moment.references, ns);
     if (!moment.edges.empty()) {
-      edges.write(log_ns, ns, edge_points(moment.edges).message(ns, "map", "kind"));
+      edges.write(log_ns, ns, sample_edges(moment.edges).message(ns, "map", "kind"));
     }
     write_plan(moment.plan, ns);
     if (!moment.directions.empty())
@@ -197,7 +197,7 @@ struct RunRecorder::Implementation {
       write_path(ns, *moment.pose);
     }
     if (!moment.particles.empty()) {
-      particles.write(log_ns, ns, cloud_of(moment.particles).message(ns, "map", "heading"));
+      particles.write(log_ns, ns, make_cloud(moment.particles).message(ns, "map", "heading"));
       particle_poses.write(log_ns, ns, poses_message(moment.particles, ns, "map"));
     }
     if (moment.state.empty()) return;
@@ -219,17 +219,17 @@ struct RunRecorder::Implementation {
     transforms.write(log_ns, ns, tf);
   }
 
-  static PointValues cloud_of(const std::vector<Pose2>& poses) {
+  static PointValues make_cloud(const std::vector<Pose2>& poses) {
     PointValues cloud;
     for (const Pose2& pose : poses) cloud.add(pose.position(), pose.heading_rad);
     return cloud;
   }
   /// As PointCloud2 and as Path, whose poses have the stamp of their message.
-  void write_plan(const std::vector<Pose2>& way, std::int64_t ns) {
-    if (way.empty()) return;
+  void write_plan(const std::vector<Pose2>& path, std::int64_t ns) {
+    if (path.empty()) return;
     ros::Path message{{ns, "map"}, {}};
-    for (const Pose2& pose : way) message.poses.push_back({{ns, "map"}, ros::pose_of(pose)});
-    plan_points.write(log_ns, ns, cloud_of(way).message(ns, "map", "heading"));
+    for (const Pose2& pose : path) message.poses.push_back({{ns, "map"}, ros::pose_of(pose)});
+    plan_points.write(log_ns, ns, make_cloud(path).message(ns, "map", "heading"));
     plan.write(log_ns, ns, message);
   }
 
@@ -262,7 +262,7 @@ struct RunRecorder::Implementation {
       cloud.add(positions[i], static_cast<double>(i));
     }
     references.write(log_ns, ns, cloud.message(ns, "map", "number"));
-    if (const auto visited = visited_grid(positions, ns)) grid.write(log_ns, ns, *visited);
+    if (const auto visited = make_visited_grid(positions, ns)) grid.write(log_ns, ns, *visited);
   }
 
   void add(RunMoment&& moment) {

@@ -32,7 +32,7 @@ struct VideoIndex {
 };
 
 /// Standard output of a program that ends by itself.
-std::string output_of(const std::vector<std::string>& arguments, const std::string& file) {
+std::string read_output(const std::vector<std::string>& arguments, const std::string& file) {
   constexpr std::size_t max_bytes = std::size_t{256} << 20;
   const auto child = start_ffmpeg(arguments, file);
   std::string text;
@@ -64,7 +64,7 @@ std::string output_of(const std::vector<std::string>& arguments, const std::stri
   return text;
 }
 
-std::vector<std::string> fields_of(std::string_view line) {
+std::vector<std::string> parse_fields(std::string_view line) {
   std::vector<std::string> fields(1);
   for (const char c : line) {
     if (c == ',') {
@@ -76,7 +76,7 @@ std::vector<std::string> fields_of(std::string_view line) {
   return fields;
 }
 
-std::optional<std::int64_t> whole_number(std::string_view text) {
+std::optional<std::int64_t> parse_whole_number(std::string_view text) {
   std::int64_t value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
@@ -85,7 +85,7 @@ std::optional<std::int64_t> whole_number(std::string_view text) {
 
 /// `entries` of the container's packets, or of its decoded frames where packets have no stamps.
 std::optional<VideoIndex> read_index(const std::string& file, const std::string& entries) {
-  const std::string text = output_of(
+  const std::string text = read_output(
       {"ffprobe", "-v", "error", "-protocol_whitelist", "file,pipe", "-select_streams", "v:0",
        "-show_entries", "stream=time_base:" + entries, "-of", "csv", "file:" + file},
       file);
@@ -93,21 +93,22 @@ std::optional<VideoIndex> read_index(const std::string& file, const std::string&
   std::size_t begin = 0;
   while (begin < text.size()) {
     const std::size_t end = std::min(text.find('\n', begin), text.size());
-    const auto fields = fields_of(std::string_view(text).substr(begin, end - begin));
+    const auto fields = parse_fields(std::string_view(text).substr(begin, end - begin));
     begin = end + 1;
     if (fields.size() < 2) continue;
     if (fields[0] == "stream") {
       const auto slash = fields[1].find('/');
-      const auto over = whole_number(fields[1].substr(0, slash));
-      const auto under =
-          slash == std::string::npos ? std::nullopt : whole_number(fields[1].substr(slash + 1));
+      const auto over = parse_whole_number(fields[1].substr(0, slash));
+      const auto under = slash == std::string::npos
+                             ? std::nullopt
+                             : parse_whole_number(fields[1].substr(slash + 1));
       if (!over || !under || *over <= 0 || *under <= 0) {
         throw FileError(file, "has no unit of time");
       }
       index.unit_s = static_cast<double>(*over) / static_cast<double>(*under);
     } else {
       if (fields.size() > 2 && fields[2].find('D') != std::string::npos) continue;  // not shown
-      const auto stamp = whole_number(fields[1]);
+      const auto stamp = parse_whole_number(fields[1]);
       if (!stamp) return std::nullopt;
       index.stamps.push_back(*stamp);
     }

@@ -20,7 +20,7 @@ struct SimulatedRobotOptions {
 };
 void visit_options(SimulatedRobotOptions& options, OptionVisitor& visitor);
 
-/// Start pose, obstacles and pictures of a robot. `picture` is asked on a thread of its own, one
+/// Start pose, obstacles and pictures of a robot. `picture` is called on a thread of its own, one
 /// picture at a time.
 struct SimulatedSurroundings {
   Pose2 start;

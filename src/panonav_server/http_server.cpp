@@ -128,7 +128,7 @@ MHD_Result read_field(void* reader, MHD_ValueKind /*kind*/, const char* name, co
   return MHD_YES;
 }
 
-Connection& connection_of(MHD_Connection* handle) {
+Connection& get_connection(MHD_Connection* handle) {
   return *static_cast<Connection*>(
       MHD_get_connection_info(handle, MHD_CONNECTION_INFO_SOCKET_CONTEXT)->socket_context);
 }
@@ -336,7 +336,7 @@ struct HttpServer::Implementation {
 
   static void complete(void* /*self*/, MHD_Connection* handle, void** /*request*/,
                        MHD_RequestTerminationCode /*why*/) {
-    Connection& one = connection_of(handle);
+    Connection& one = get_connection(handle);
     one.more = nullptr;
     one.later = nullptr;
     one.answer.reset();
@@ -352,7 +352,7 @@ struct HttpServer::Implementation {
                          const char* /*version*/, const char* data, std::size_t* size,
                          void** /*request*/) {
     auto& server = *static_cast<Implementation*>(self);
-    Connection& one = connection_of(handle);
+    Connection& one = get_connection(handle);
     if (one.evicted) return MHD_NO;
     if (!one.has_head) return server.take_head(one, path, method);
     if (*size > 0) {

@@ -45,7 +45,7 @@ bool is_name(std::string_view name) {
 }
 
 /// Empty where the text is no name.
-std::string percent_decoded(std::string_view text) {
+std::string decode_percent(std::string_view text) {
   std::string decoded;
   for (std::size_t i = 0; i < text.size(); ++i) {
     if (text[i] != '%') {
@@ -63,14 +63,14 @@ std::string percent_decoded(std::string_view text) {
   return decoded;
 }
 
-HttpAnswer json_answer(const ordered_json& document, int status = 200) {
+HttpAnswer make_json_answer(const ordered_json& document, int status = 200) {
   return {.status = status,
           .type = "application/json",
           .content = document.dump(-1, ' ', false, ordered_json::error_handler_t::replace) + "\n"};
 }
 
-HttpAnswer refusal(int status, std::string_view why) {
-  return json_answer({{"error", to_readable_line(std::string(why))}}, status);
+HttpAnswer make_refusal(int status, std::string_view why) {
+  return make_json_answer({{"error", to_readable_line(std::string(why))}}, status);
 }
 
 }  // namespace
@@ -157,29 +157,31 @@ struct LocalisationServer::Implementation {
     constexpr std::string_view memories = "/v1/memories";
     const std::string_view path = request.path;
     if (path == "/health") {
-      if (request.method != "GET") return refusal(405, "allowed: GET");
+      if (request.method != "GET") return make_refusal(405, "allowed: GET");
       const std::lock_guard lock(mutex);
-      return json_answer({{"status", ending ? "ending" : "ok"}}, ending ? 503 : 200);
+      return make_json_answer({{"status", ending ? "ending" : "ok"}}, ending ? 503 : 200);
     }
     if (!options.token.empty()) {
       constexpr std::string_view bearer = "Bearer ";
       const std::string_view sent = request.authorization;
       if (!sent.starts_with(bearer) || !is_same_secret(sent.substr(bearer.size()), options.token)) {
-        return refusal(401, "the token of this server is missing: Authorization: Bearer TOKEN");
+        return make_refusal(401,
+                            "the token of this server is missing: Authorization: Bearer TOKEN");
       }
     } else if (!is_own_page(request)) {
-      return refusal(403,
-                     "without a token this server answers programs that call it by its number or "
-                     "as localhost");
+      return make_refusal(
+          403,
+          "without a token this server answers programs that call it by its number or "
+          "as localhost");
     }
     if (path == "/metrics" || path == memories || path == "/") {
-      if (request.method != "GET") return refusal(405, "allowed: GET");
+      if (request.method != "GET") return make_refusal(405, "allowed: GET");
       if (path == "/metrics") return metrics();
       return list();
     }
     if (!path.starts_with(memories) || path.size() < memories.size() + 2 ||
         path[memories.size()] != '/') {
-      return refusal(404, "no such path; GET /v1/memories lists what there is");
+      return make_refusal(404, "no such path; GET /v1/memories lists what there is");
     }
     const std::string_view rest = path.substr(memories.size() + 1);
     const std::size_t slash = std::min(rest.find('/'), rest.size());
@@ -188,23 +190,24 @@ struct LocalisationServer::Implementation {
     {
       const std::lock_guard lock(mutex);
       if (!served.contains(name)) {
-        return refusal(404, "no memory " + name + "; GET /v1/memories lists those that there are");
+        return make_refusal(404,
+                            "no memory " + name + "; GET /v1/memories lists those that there are");
       }
     }
     if (below == "/localise") {
-      if (request.method != "POST") return refusal(405, "allowed: POST, with a PNG or JPEG");
+      if (request.method != "POST") return make_refusal(405, "allowed: POST, with a PNG or JPEG");
       return enqueue(name, std::move(request.body));
     }
-    if (request.method != "GET") return refusal(405, "allowed: GET");
-    if (below.empty()) return json_answer(describe(name));
+    if (request.method != "GET") return make_refusal(405, "allowed: GET");
+    if (below.empty()) return make_json_answer(describe(name));
     constexpr std::string_view views = "/views/";
     constexpr std::string_view picture = "/picture";
     if (below.starts_with(views) && below.ends_with(picture) &&
         below.size() > views.size() + picture.size()) {
-      return thumbnail(name, percent_decoded(below.substr(
+      return thumbnail(name, decode_percent(below.substr(
                                  views.size(), below.size() - views.size() - picture.size())));
     }
-    return refusal(404, "no such path; allowed: localise and views/NAME/picture");
+    return make_refusal(404, "no such path; allowed: localise and views/NAME/picture");
   }
 
   HttpAnswer enqueue(const std::string& name, std::string picture) {
@@ -216,7 +219,7 @@ struct LocalisationServer::Implementation {
       const std::lock_guard lock(mutex);
       if (ending || waiting.size() >= options.max_waiting ||
           waiting_bytes + bytes > max_waiting_bytes) {
-        return refusal(
+        return make_refusal(
             503, ending ? "the server is ending" : "too many pictures wait; try again in a moment");
       }
       waiting_bytes += bytes;
@@ -237,7 +240,7 @@ struct LocalisationServer::Implementation {
     }
     auto found = ordered_json::array();
     for (const std::string& name : names) found.push_back(describe(name));
-    return json_answer({{"memories", std::move(found)}});
+    return make_json_answer({{"memories", std::move(found)}});
   }
 
   [[nodiscard]] std::shared_ptr<LoadedMemory> loaded(const std::string& name) const {
@@ -258,12 +261,12 @@ struct LocalisationServer::Implementation {
     const auto memory = loaded(name);
     try {
       const auto picture = memory->thumbnail(view);
-      if (!picture) return refusal(404, "the memory has no view of that name with a picture");
+      if (!picture) return make_refusal(404, "the memory has no view of that name with a picture");
       const bool jpeg = image_format(*picture, "the picture") == ImageFormat::jpeg;
       return {.type = jpeg ? "image/jpeg" : "image/png",
               .content = std::string(picture->begin(), picture->end())};
     } catch (const Error& error) {
-      return refusal(500, error.what());
+      return make_refusal(500, error.what());
     }
   }
 
@@ -377,13 +380,13 @@ struct LocalisationServer::Implementation {
       known = place.known;
       ordered_json json{{"memory", job.memory}};
       json.update(place_json(place));
-      return json_answer(json);
+      return make_json_answer(json);
     } catch (const FileError& error) {  // the picture's, or the memory's server
-      return refusal(decoded ? 503 : 422, error.what());
+      return make_refusal(decoded ? 503 : 422, error.what());
     } catch (const Error& error) {
-      return refusal(422, error.what());
+      return make_refusal(422, error.what());
     } catch (const std::exception& error) {
-      return refusal(500, error.what());
+      return make_refusal(500, error.what());
     }
   }
 

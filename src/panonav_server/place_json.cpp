@@ -10,7 +10,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-ordered_json or_null(const std::optional<double>& value) {
+ordered_json to_json_or_null(const std::optional<double>& value) {
   return value ? ordered_json(*value) : ordered_json();
 }
 
@@ -22,7 +22,7 @@ ordered_json place_json(const Place& place) {
     matches.push_back({{"file", match.name},
                        {"dissimilarity", match.dissimilarity},
                        {"column_difference", match.column_difference},
-                       {"heading_rad", or_null(match.heading_rad)}});
+                       {"heading_rad", to_json_or_null(match.heading_rad)}});
     if (match.verified_features) {
       matches.back()["verified_features"] = *match.verified_features;
     }
@@ -31,13 +31,13 @@ ordered_json place_json(const Place& place) {
                     {"known_probability", place.known_probability},
                     {"matches", std::move(matches)},
                     {"position", nullptr},
-                    {"heading_rad", or_null(place.heading_rad)},
+                    {"heading_rad", to_json_or_null(place.heading_rad)},
                     {"components", place.components},
                     {"bytes_read", place.bytes_read}};
   if (place.position) {
     json["position"] = {{"x_m", place.position->x_m},
                         {"y_m", place.position->y_m},
-                        {"radius_m", or_null(place.position->radius_m)}};
+                        {"radius_m", to_json_or_null(place.position->radius_m)}};
   }
   return json;
 }

@@ -24,7 +24,7 @@ Point2 ahead(Point2 from, double direction_rad, double distance_m) {
 }
 
 /// An arrow with its tail at `from`.
-std::vector<Point2> arrow(Point2 from, double direction_rad, double length_m) {
+std::vector<Point2> make_arrow(Point2 from, double direction_rad, double length_m) {
   constexpr double barb_rad = std::numbers::pi - 0.5;
   const Point2 tip = ahead(from, direction_rad, length_m);
   return {from, tip, ahead(tip, direction_rad + barb_rad, 0.4 * length_m), tip,
@@ -32,8 +32,8 @@ std::vector<Point2> arrow(Point2 from, double direction_rad, double length_m) {
 }
 
 /// Each reference, and where it sends the robot.
-std::vector<MapLayer> field_layers(const simulation::RememberedPlace& remembered,
-                                   const FieldOptions& options, ViewId goal) {
+std::vector<MapLayer> make_field_layers(const simulation::RememberedPlace& remembered,
+                                        const FieldOptions& options, ViewId goal) {
   constexpr double share_of_spacing = 0.55;
   MapLayer references{.label = "references", .colour = PlotColour::blue};
   MapLayer arrows{.label = "their directions to the goal", .colour = PlotColour::sky};
@@ -43,15 +43,16 @@ std::vector<MapLayer> field_layers(const simulation::RememberedPlace& remembered
     if (!is_known(pose)) continue;
     references.dots.push_back(pose.position());
     if (!field[i].direction_rad || !std::isfinite(pose.heading_rad)) continue;
-    arrows.lines.push_back(arrow(pose.position(), pose.heading_rad + *field[i].direction_rad,
-                                 share_of_spacing * remembered.spacing_m));
+    arrows.lines.push_back(make_arrow(pose.position(), pose.heading_rad + *field[i].direction_rad,
+                                      share_of_spacing * remembered.spacing_m));
   }
   return {arrows, references};
 }
 
 /// Over the references, from that which the robot was nearest to at first.
-MapLayer planned_layer(const simulation::RememberedPlace& remembered, const PlannerOptions& options,
-                       ViewId goal, const simulation::MissionRun& run) {
+MapLayer make_planned_layer(const simulation::RememberedPlace& remembered,
+                            const PlannerOptions& options, ViewId goal,
+                            const simulation::MissionRun& run) {
   MapLayer layer{.label = "way planned", .colour = PlotColour::orange};
   const auto known = std::ranges::find_if(
       run.decisions, [](const auto& step) { return step.nearest.has_value(); });
@@ -66,7 +67,7 @@ MapLayer planned_layer(const simulation::RememberedPlace& remembered, const Plan
   return layer;
 }
 
-MapLayer driven_layer(const simulation::MissionRun& run) {
+MapLayer make_driven_layer(const simulation::MissionRun& run) {
   MapLayer layer{.label = "way driven", .colour = PlotColour::vermilion, .lines = {{}}};
   for (std::size_t i = 0; i < run.path.size(); ++i) {
     layer.lines.back().push_back(run.path[i].position());
@@ -82,12 +83,12 @@ MapPlot mission_plot(const std::string& title, const simulation::MissionPlace& p
                      ViewId goal, const simulation::MissionRun& run) {
   const std::vector<MapLayer> scene = scene_layers(place.scene);
   MapPlot plot{.title = title, .layers = {scene.front()}};
-  for (MapLayer& layer : field_layers(remembered, options.field, goal)) {
+  for (MapLayer& layer : make_field_layers(remembered, options.field, goal)) {
     plot.layers.push_back(std::move(layer));
   }
   plot.layers.push_back(scene.back());  // a screen stands among the references
-  plot.layers.push_back(planned_layer(remembered, options, goal, run));
-  plot.layers.push_back(driven_layer(run));
+  plot.layers.push_back(make_planned_layer(remembered, options, goal, run));
+  plot.layers.push_back(make_driven_layer(run));
   plot.layers.push_back(
       {.label = "start", .colour = PlotColour::green, .squares = {run.path.front().position()}});
   if (run.kidnapped_at) {

@@ -18,7 +18,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 /// Escapes the characters that an address with text must not contain.
-std::string percent_encoded(std::string_view text) {
+std::string encode_percent(std::string_view text) {
   std::string encoded;
   for (const char c : text) {
     const auto byte = static_cast<unsigned char>(c);
@@ -48,7 +48,7 @@ std::string import_map() {
   Json imports;
   for (const auto& [name, text] : modules) {
     imports["panonav/" + std::string(name)] =
-        "data:text/javascript;charset=utf-8," + percent_encoded(text);
+        "data:text/javascript;charset=utf-8," + encode_percent(text);
   }
   return Json{{"imports", imports}}.dump();
 }

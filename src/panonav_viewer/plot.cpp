@@ -206,7 +206,7 @@ void draw_series(SvgDrawing& drawing, Legend& legend, const PlotArea& area, cons
 
 /// Returns the colour of the viewer (plan.js): from black over blue and green to yellow, rising in
 /// lightness. `share`: 0 .. 1.
-std::array<std::uint8_t, 3> colour_of(double share) {
+std::array<std::uint8_t, 3> choose_colour(double share) {
   constexpr std::array<std::array<double, 3>, 6> stops{{{0, 34, 78},
                                                         {53, 69, 108},
                                                         {102, 105, 112},
@@ -229,7 +229,7 @@ Image paint_cells(const HeatMap& plot, double low, double high) {
   for (int row = 0; row < plot.rows; ++row) {
     for (int column = 0; column < plot.columns; ++column) {
       const double value = plot.values[static_cast<std::size_t>(row) * plot.columns + column];
-      const auto colour = std::isfinite(value) ? colour_of((value - low) / (high - low))
+      const auto colour = std::isfinite(value) ? choose_colour((value - low) / (high - low))
                                                : std::array<std::uint8_t, 3>{255, 255, 255};
       for (int i = 0; i < 3; ++i) {
         image.at(column, plot.rows - 1 - row, i) = colour[static_cast<std::size_t>(i)];
@@ -244,7 +244,7 @@ void draw_colour_bar(SvgDrawing& drawing, const SvgBox& box, const PlotAxis& axi
   constexpr double tick_px = 34.0;
   Image gradient(1, steps, 3);
   for (int v = 0; v < steps; ++v) {
-    const auto colour = colour_of(1.0 - (v + 0.5) / steps);
+    const auto colour = choose_colour(1.0 - (v + 0.5) / steps);
     for (int i = 0; i < 3; ++i) gradient.at(0, v, i) = colour[static_cast<std::size_t>(i)];
   }
   drawing.add_image(box, gradient.view());

@@ -17,7 +17,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json six_digits(double value) {
+Json round_to_six_digits(double value) {
   if (!std::isfinite(value)) return nullptr;
   std::array<char, 32> text;
   const auto end =
@@ -28,14 +28,14 @@ Json six_digits(double value) {
   return rounded;
 }
 
-Json all_of(const std::vector<double>& values) {
+Json to_json_array(const std::vector<double>& values) {
   Json all = Json::array();
-  for (const double value : values) all.push_back(six_digits(value));
+  for (const double value : values) all.push_back(round_to_six_digits(value));
   return all;
 }
 
 Json pair(const std::pair<double, double>& values) {
-  return {six_digits(values.first), six_digits(values.second)};
+  return {round_to_six_digits(values.first), round_to_six_digits(values.second)};
 }
 
 /// Metres to a tenth of a millimetre; other units are as large.
@@ -55,7 +55,7 @@ Json lists(const std::vector<std::vector<Point2>>& source) {
   return all;
 }
 
-Json layer_json(const MapLayer& layer) {
+Json make_layer_json(const MapLayer& layer) {
   Json json{{"label", layer.label}, {"colour", name_of(layer.colour)}};
   if (!layer.circles.empty()) json["circles"] = points(layer.circles);
   if (!layer.crosses.empty()) json["crosses"] = points(layer.crosses);
@@ -67,7 +67,7 @@ Json layer_json(const MapLayer& layer) {
 }
 
 /// Names in labels may be any bytes.
-std::string dumped(const Json& json) {
+std::string dump_json(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
@@ -89,11 +89,11 @@ std::string plot_json(const LinePlot& plot) {
     constexpr std::array styles{"lines", "points", "lines_and_points", "bars"};
     Json one{{"label", series.label},
              {"style", styles.at(static_cast<std::size_t>(series.style))},
-             {"x", all_of(series.x)},
-             {"y", all_of(series.y)}};
+             {"x", to_json_array(series.x)},
+             {"y", to_json_array(series.y)}};
     if (!series.y_low.empty()) {
-      one["low"] = all_of(series.y_low);
-      one["high"] = all_of(series.y_high);
+      one["low"] = to_json_array(series.y_low);
+      one["high"] = to_json_array(series.y_high);
     }
     all.push_back(std::move(one));
   }
@@ -102,18 +102,19 @@ std::string plot_json(const LinePlot& plot) {
   if (plot.x_range) json["x_range"] = pair(*plot.x_range);
   if (plot.y_range) json["y_range"] = pair(*plot.y_range);
   if (!plot.x_tick_labels.empty()) json["names"] = plot.x_tick_labels;
-  return dumped(json);
+  return dump_json(json);
 }
 
 std::string plot_json(const HeatMap& plot) {
-  return dumped(
+  return dump_json(
       Json{{"title", plot.title},
            {"heat",
             {{"columns", plot.columns},
              {"rows", plot.rows},
-             {"first", {six_digits(plot.first_cell.x_m), six_digits(plot.first_cell.y_m)}},
-             {"spacing", six_digits(plot.spacing_m)},
-             {"values", all_of(plot.values)},
+             {"first",
+              {round_to_six_digits(plot.first_cell.x_m), round_to_six_digits(plot.first_cell.y_m)}},
+             {"spacing", round_to_six_digits(plot.spacing_m)},
+             {"values", to_json_array(plot.values)},
              {"label", plot.value_label},
              {"crosses", points(plot.crosses)}}}});
 }
@@ -130,7 +131,7 @@ std::string plot_json(std::string_view title, const std::vector<MapPlot>& frames
   }
   const auto layers_json = [](const std::vector<MapLayer>& layers) {
     Json all = Json::array();
-    for (const MapLayer& layer : layers) all.push_back(layer_json(layer));
+    for (const MapLayer& layer : layers) all.push_back(make_layer_json(layer));
     return all;
   };
   if (!backdrop.empty()) json["backdrop"] = layers_json(backdrop);
@@ -138,7 +139,7 @@ std::string plot_json(std::string_view title, const std::vector<MapPlot>& frames
   for (const MapPlot& frame : frames) {
     all.push_back({{"title", frame.title}, {"layers", layers_json(frame.layers)}});
   }
-  return dumped(json);
+  return dump_json(json);
 }
 
 std::string plot_json(const PicturePlot& plot) {
@@ -149,7 +150,7 @@ std::string plot_json(const PicturePlot& plot) {
       {"y_range", pair(plot.y_range)}, {"image", data_url("image/png", encode_png(image.view()))}};
   if (plot.x_tick > 0.0) json["x_tick"] = plot.x_tick;
   if (plot.y_tick > 0.0) json["y_tick"] = plot.y_tick;
-  return dumped(json);
+  return dump_json(json);
 }
 
 }  // namespace panonav::viewer

@@ -20,45 +20,45 @@ std::string element(std::string_view name, std::string_view text) {
   return result.append("</").append(name).append(">");
 }
 
-std::string table_row(std::string_view cell, const std::vector<std::string>& texts) {
+std::string make_table_row(std::string_view cell, const std::vector<std::string>& texts) {
   std::string row = "<tr>";
   for (const auto& text : texts) row += element(cell, text);
   return row + "</tr>\n";
 }
 
-std::string panel(std::string_view name, std::string_view title, const std::string& json,
-                  std::string_view caption) {
+std::string make_panel(std::string_view name, std::string_view title, const std::string& json,
+                       std::string_view caption) {
   return "<figure>" + (title.empty() ? std::string() : element("h3", title)) + "<pn-" +
          std::string(name) + ">" + data_element(json) + "</pn-" + std::string(name) + ">" +
          (caption.empty() ? std::string() : element("figcaption", caption)) + "</figure>\n";
 }
 
-std::string command_block(const std::vector<std::string>& command_lines) {
+std::string make_command_block(const std::vector<std::string>& command_lines) {
   std::string html = "<pre>";
   for (const auto& line : command_lines) html += html_escaped(line) + "\n";
   return html + "</pre>\n";
 }
 
-std::string plot_element(const ReportPlot& report_plot) {
+std::string make_plot_element(const ReportPlot& report_plot) {
   return std::visit(
       [&](const auto& plot) {
         using Plot = std::decay_t<decltype(plot)>;
         if constexpr (std::is_same_v<Plot, UnfoldingMap>) {
-          return panel("plan", plot.title, plot_json(plot.title, plot.frames, plot.backdrop),
-                       report_plot.caption);
+          return make_panel("plan", plot.title, plot_json(plot.title, plot.frames, plot.backdrop),
+                            report_plot.caption);
         } else if constexpr (std::is_same_v<Plot, MapPlot>) {
-          return panel("plan", plot.title, plot_json(plot.title, {plot}), report_plot.caption);
+          return make_panel("plan", plot.title, plot_json(plot.title, {plot}), report_plot.caption);
         } else if constexpr (std::is_same_v<Plot, HeatMap>) {
-          return panel("plan", plot.title, plot_json(plot), report_plot.caption);
+          return make_panel("plan", plot.title, plot_json(plot), report_plot.caption);
         } else {
-          return panel("chart", plot.title, plot_json(plot), report_plot.caption);
+          return make_panel("chart", plot.title, plot_json(plot), report_plot.caption);
         }
       },
       report_plot.plot);
 }
 
 /// The picture itself: as it is where it is PNG or JPEG, as SVG otherwise.
-std::string embedded(const std::filesystem::path& path) {
+std::string embed_file(const std::filesystem::path& path) {
   constexpr std::size_t max_bytes = std::size_t{64} << 20U;
   const auto bytes = read_file(path, max_bytes);
   if (path.extension() == ".svg") return data_url("image/svg+xml", bytes);
@@ -66,7 +66,7 @@ std::string embedded(const std::filesystem::path& path) {
   return data_url(png ? "image/png" : "image/jpeg", bytes);
 }
 
-std::string view_element(const ReportView& view) {
+std::string make_view_element(const ReportView& view) {
   const Image picture = to_picture(view.panorama);
   // As wide as high in angle would be true to the eye, but a small view must be seen at all.
   const double shape =
@@ -118,11 +118,11 @@ void ReportPage::add_figures(
 
 void ReportPage::add_table(const std::vector<std::string>& header,
                            const std::vector<std::vector<std::string>>& rows) {
-  std::string html = "<div class=\"wide\" tabindex=\"0\"><table>\n" + table_row("th", header);
+  std::string html = "<div class=\"wide\" tabindex=\"0\"><table>\n" + make_table_row("th", header);
   for (const auto& row : rows) {
     require(row.size() == header.size(), "cells of a table row", static_cast<double>(row.size()),
             "as many as the header has");
-    html += table_row("td", row);
+    html += make_table_row("td", row);
   }
   body_.emplace_back(html + "</table></div>\n", "");
 }
@@ -154,13 +154,13 @@ void ReportPage::add_thumbnails(const std::vector<ReportPicture>& pictures) {
 
 void ReportPage::add_plots(const std::vector<ReportPlot>& plots) {
   std::string html = "<div class=\"pictures\">\n";
-  for (const auto& plot : plots) html += plot_element(plot);
+  for (const auto& plot : plots) html += make_plot_element(plot);
   body_.emplace_back(html + "</div>\n", "");
 }
 
 void ReportPage::add_views(const std::vector<ReportView>& views) {
   std::string html = "<div class=\"pictures above\">\n";
-  for (const auto& view : views) html += view_element(view);
+  for (const auto& view : views) html += make_view_element(view);
   body_.emplace_back(html + "</div>\n", "");
 }
 
@@ -175,7 +175,7 @@ void ReportPage::add_link(std::string_view file, std::string_view text) {
 }
 
 void ReportPage::add_commands(const std::vector<std::string>& command_lines) {
-  body_.emplace_back(command_block(command_lines), "");
+  body_.emplace_back(make_command_block(command_lines), "");
 }
 
 void ReportPage::add_story(const std::vector<StoryCard>& cards, std::string_view commands_title,
@@ -188,13 +188,13 @@ void ReportPage::add_story(const std::vector<StoryCard>& cards, std::string_view
       story_ += "<figure><img alt=\"" + html_escaped(picture->caption) + "\" src=\"" +
                 html_escaped(picture->file) + "\"></figure>\n";
     } else {
-      story_ += plot_element(std::get<ReportPlot>(card.shown));
+      story_ += make_plot_element(std::get<ReportPlot>(card.shown));
     }
     story_ +=
         "<p>" + element("b", card.value) + " " + html_escaped(card.meaning) + "</p></section>\n";
   }
   story_ += "</div>\n<div class=\"begin\">" + element("h2", commands_title) +
-            command_block(command_lines) + "</div>\n";
+            make_command_block(command_lines) + "</div>\n";
 }
 
 void ReportPage::write(const std::filesystem::path& folder, std::string_view file,
@@ -206,7 +206,7 @@ void ReportPage::write(const std::filesystem::path& folder, std::string_view fil
   for (const auto& [html, picture] : body_) {
     body += html;
     if (picture.empty()) continue;
-    body += picture.starts_with("data:") ? html_escaped(picture) : embedded(folder / picture);
+    body += picture.starts_with("data:") ? html_escaped(picture) : embed_file(folder / picture);
   }
   const std::string page = whole_page(title_, generator, body + "</main>");
   write_file(folder / file, std::string_view(page));

@@ -18,7 +18,7 @@ namespace {
 using Triangle = std::array<simulation::Vector3, 3>;
 
 /// Triangles that share corners, to the millimetre, are of one object.
-std::vector<std::vector<Triangle>> bodies_of(const std::vector<Triangle>& triangles) {
+std::vector<std::vector<Triangle>> find_bodies(const std::vector<Triangle>& triangles) {
   std::map<std::array<long, 3>, std::size_t> body_at;  // a corner's body, as first numbered
   std::vector<std::size_t> joined;                     // to this body; itself: its own
   const auto body = [&](std::size_t number) {
@@ -47,7 +47,7 @@ std::vector<std::vector<Triangle>> bodies_of(const std::vector<Triangle>& triang
 
 /// Returns the convex hull, counter-clockwise; two points if all are on one line, to a hundredth of
 /// a square millimetre.
-std::vector<Point2> convex_hull(std::vector<Point2> points) {
+std::vector<Point2> compute_convex_hull(std::vector<Point2> points) {
   std::ranges::sort(points, {}, [](const Point2& p) { return std::pair(p.x_m, p.y_m); });
   const auto is_left = [](const Point2& a, const Point2& b, const Point2& c) {
     return (b.x_m - a.x_m) * (c.y_m - a.y_m) - (b.y_m - a.y_m) * (c.x_m - a.x_m) > 1e-8;
@@ -68,7 +68,7 @@ std::vector<Point2> convex_hull(std::vector<Point2> points) {
 }
 
 /// Intersects it with a horizontal plane: both ends, or fewer points.
-std::vector<Point2> cut(const Triangle& triangle, double height_m) {
+std::vector<Point2> cut_triangle(const Triangle& triangle, double height_m) {
   std::vector<Point2> ends;
   for (std::size_t i = 0; i < 3; ++i) {
     const simulation::Vector3& a = triangle[i];
@@ -104,7 +104,7 @@ std::vector<MapLayer> scene_layers(const simulation::Scene& scene) {
     }
   }
   for (const auto& [name, object] : objects) {
-    std::vector<std::vector<Triangle>> bodies = bodies_of(object);
+    std::vector<std::vector<Triangle>> bodies = find_bodies(object);
     if (bodies.size() > max_bodies) bodies = {object};
     std::vector<std::vector<Point2>> thin;
     std::size_t solid = 0;
@@ -120,12 +120,12 @@ std::vector<MapLayer> scene_layers(const simulation::Scene& scene) {
         }
       }
       if (top_m < lowest_m || bottom_m > headroom_m || !is_near(corners)) continue;
-      const std::vector<Point2> outline = convex_hull(std::move(corners));
+      const std::vector<Point2> outline = compute_convex_hull(std::move(corners));
       const auto [west, east] = std::ranges::minmax(outline, {}, &Point2::x_m);
       const auto [south, north] = std::ranges::minmax(outline, {}, &Point2::y_m);
       if (std::max(east.x_m - west.x_m, north.y_m - south.y_m) > room_m) {
         for (const Triangle& triangle : body) {
-          std::vector<Point2> line = cut(triangle, scene.camera_height_m);
+          std::vector<Point2> line = cut_triangle(triangle, scene.camera_height_m);
           if (line.size() == 2 && is_near(line)) walls.lines.push_back(std::move(line));
         }
       } else if (outline.size() == 2) {

@@ -29,46 +29,47 @@ namespace {
 namespace fs = std::filesystem;
 
 /// To a hundredth of a pixel.
-std::string px_text(double value) {
+std::string format_px(double value) {
   const double rounded = std::round(value * 100.0) / 100.0;
   std::array<char, 32> text;
   const auto end = std::to_chars(text.data(), text.data() + text.size(), rounded + 0.0).ptr;
   return {text.data(), end};
 }
 
-std::string point_text(double x, double y) {
-  return px_text(x) + "," + px_text(y);
+std::string format_point(double x, double y) {
+  return format_px(x) + "," + format_px(y);
 }
 
 bool is_finite(const Point2& point) {
   return std::isfinite(point.x_m) && std::isfinite(point.y_m);
 }
 
-std::string stroke_text(PlotColour colour, double width) {
-  return " fill='none' stroke='" + std::string(hex(colour)) + "' stroke-width='" + px_text(width) +
-         "' stroke-linejoin='round'";
+std::string format_stroke(PlotColour colour, double width) {
+  return " fill='none' stroke='" + std::string(hex(colour)) + "' stroke-width='" +
+         format_px(width) + "' stroke-linejoin='round'";
 }
 
-std::string box_text(const SvgBox& box) {
-  return " x='" + px_text(box.left) + "' y='" + px_text(box.top) + "' width='" +
-         px_text(box.width) + "' height='" + px_text(box.height) + "'";
+std::string format_box(const SvgBox& box) {
+  return " x='" + format_px(box.left) + "' y='" + format_px(box.top) + "' width='" +
+         format_px(box.width) + "' height='" + format_px(box.height) + "'";
 }
 
 std::string mark_text(const Point2& at, MarkShape shape, double radius) {
-  const std::string r = px_text(radius);
-  const std::string side = px_text(2.0 * radius);
+  const std::string r = format_px(radius);
+  const std::string side = format_px(2.0 * radius);
   const double left = at.x_m - radius;
   switch (shape) {
     case MarkShape::dot:  // a line without length, round at its ends
-      return "M" + point_text(at.x_m, at.y_m) + "h0";
+      return "M" + format_point(at.x_m, at.y_m) + "h0";
     case MarkShape::ring:
-      return "M" + point_text(left, at.y_m) + "a" + r + "," + r + " 0 1 0 " + side + ",0a" + r +
+      return "M" + format_point(left, at.y_m) + "a" + r + "," + r + " 0 1 0 " + side + ",0a" + r +
              "," + r + " 0 1 0 -" + side + ",0";
     case MarkShape::cross:
-      return "M" + point_text(left, at.y_m - radius) + "l" + side + "," + side + "M" +
-             point_text(left, at.y_m + radius) + "l" + side + ",-" + side;
+      return "M" + format_point(left, at.y_m - radius) + "l" + side + "," + side + "M" +
+             format_point(left, at.y_m + radius) + "l" + side + ",-" + side;
     case MarkShape::square:
-      return "M" + point_text(left, at.y_m - radius) + "h" + side + "v" + side + "h-" + side + "z";
+      return "M" + format_point(left, at.y_m - radius) + "h" + side + "v" + side + "h-" + side +
+             "z";
   }
   return {};
 }
@@ -117,12 +118,12 @@ void SvgDrawing::add_path(std::span<const Point2> points, PlotColour colour,
   bool is_continued = false;
   for (const Point2& point : points) {
     const bool is_shown = is_finite(point);
-    if (is_shown) path += (is_continued ? 'L' : 'M') + point_text(point.x_m, point.y_m);
+    if (is_shown) path += (is_continued ? 'L' : 'M') + format_point(point.x_m, point.y_m);
     is_continued = is_shown;
   }
   if (path.empty()) return;
   const std::string_view dashes = patterns.at(static_cast<std::size_t>(style.dashes) % 5);
-  body_ += "<path d='" + path + "'" + stroke_text(colour, style.width);
+  body_ += "<path d='" + path + "'" + format_stroke(colour, style.width);
   if (!dashes.empty()) body_ += " stroke-dasharray='" + std::string(dashes) + "'";
   body_ += "/>\n";
 }
@@ -130,23 +131,23 @@ void SvgDrawing::add_path(std::span<const Point2> points, PlotColour colour,
 void SvgDrawing::add_polygon(std::span<const Point2> corners, PlotColour colour, double opacity) {
   std::string text;
   for (const Point2& corner : corners) {
-    if (is_finite(corner)) text += point_text(corner.x_m, corner.y_m) + " ";
+    if (is_finite(corner)) text += format_point(corner.x_m, corner.y_m) + " ";
   }
   if (text.empty()) return;
   text.pop_back();
   body_ += "<polygon points='" + text + "' fill='" + std::string(hex(colour)) + "' fill-opacity='" +
-           px_text(opacity) + "'/>\n";
+           format_px(opacity) + "'/>\n";
 }
 
 void SvgDrawing::add_box(const SvgBox& box, PlotColour colour, double opacity) {
-  body_ += "<rect" + box_text(box) + " fill='" + std::string(hex(colour)) + "' fill-opacity='" +
-           px_text(opacity) + "'/>\n";
+  body_ += "<rect" + format_box(box) + " fill='" + std::string(hex(colour)) + "' fill-opacity='" +
+           format_px(opacity) + "'/>\n";
 }
 
 void SvgDrawing::add_frame(const SvgBox& box, PlotColour colour) {
-  body_ += "<path d='M" + point_text(box.left, box.top) + " L" +
-           point_text(box.left, box.bottom()) + " L" + point_text(box.right(), box.bottom()) +
-           " L" + point_text(box.right(), box.top) + " Z'" + stroke_text(colour, 1.0) + "/>\n";
+  body_ += "<path d='M" + format_point(box.left, box.top) + " L" +
+           format_point(box.left, box.bottom()) + " L" + format_point(box.right(), box.bottom()) +
+           " L" + format_point(box.right(), box.top) + " Z'" + format_stroke(colour, 1.0) + "/>\n";
 }
 
 void SvgDrawing::add_marks(std::span<const Point2> points, PlotColour colour,
@@ -161,7 +162,7 @@ void SvgDrawing::add_marks(std::span<const Point2> points, PlotColour colour,
     body_ += " fill='" + std::string(hex(colour)) + "'/>\n";
   } else {
     const bool is_dot = style.shape == MarkShape::dot;
-    body_ += stroke_text(colour, is_dot ? 2.0 * style.radius : style.line_width) +
+    body_ += format_stroke(colour, is_dot ? 2.0 * style.radius : style.line_width) +
              (is_dot ? " stroke-linecap='round'/>\n" : "/>\n");
   }
 }
@@ -172,25 +173,25 @@ void SvgDrawing::add_text(Point2 at, std::string_view text, const TextStyle& sty
   for (const char c : shorten_middle(to_readable_line(text), max_characters)) {
     escaped += c == '&' ? "&amp;" : c == '<' ? "&lt;" : std::string(1, c);
   }
-  const std::string place = point_text(at.x_m, at.y_m);
-  body_ += "<text x='" + px_text(at.x_m) + "' y='" + px_text(at.y_m) + "'";
+  const std::string place = format_point(at.x_m, at.y_m);
+  body_ += "<text x='" + format_px(at.x_m) + "' y='" + format_px(at.y_m) + "'";
   if (style.anchor != "start") body_ += " text-anchor='" + std::string(style.anchor) + "'";
-  if (style.size != TextStyle().size) body_ += " font-size='" + px_text(style.size) + "'";
+  if (style.size != TextStyle().size) body_ += " font-size='" + format_px(style.size) + "'";
   if (style.rotation_deg != 0.0) {
-    body_ += " transform='rotate(" + px_text(style.rotation_deg) + "," + place + ")'";
+    body_ += " transform='rotate(" + format_px(style.rotation_deg) + "," + place + ")'";
   }
   body_ += ">" + escaped + "</text>\n";
 }
 
 void SvgDrawing::add_image(const SvgBox& box, ImageView image) {
-  body_ += "<image" + box_text(box) +
+  body_ += "<image" + format_box(box) +
            " preserveAspectRatio='none' style='image-rendering:pixelated' href='" +
            data_url("image/png", encode_png(image)) + "'/>\n";
 }
 
 void SvgDrawing::begin_clip(const SvgBox& box) {
-  body_ += "<svg" + box_text(box) + " viewBox='" + px_text(box.left) + " " + px_text(box.top) +
-           " " + px_text(box.width) + " " + px_text(box.height) + "'>\n";
+  body_ += "<svg" + format_box(box) + " viewBox='" + format_px(box.left) + " " +
+           format_px(box.top) + " " + format_px(box.width) + " " + format_px(box.height) + "'>\n";
 }
 
 void SvgDrawing::end_clip() {
@@ -198,8 +199,8 @@ void SvgDrawing::end_clip() {
 }
 
 std::string SvgDrawing::to_text(double width, double height) const {
-  const std::string w = px_text(width);
-  const std::string h = px_text(height);
+  const std::string w = format_px(width);
+  const std::string h = format_px(height);
   return "<svg xmlns='http://www.w3.org/2000/svg' width='" + w + "' height='" + h +
          "' viewBox='0 0 " + w + " " + h +
          "' font-family='sans-serif' font-size='12'>\n<rect width='100%' height='100%' "

@@ -38,7 +38,7 @@ constexpr auto answer_headers =
     "style-src 'unsafe-inline'; img-src 'self' blob: data:; frame-ancestors 'none'\r\n"
     "Cache-Control: no-store\r\n";
 
-std::string random_token() {
+std::string make_random_token() {
   std::random_device device;
   std::string text;
   for (int i = 0; i < 32; ++i) text += "0123456789abcdef"[device() & 15U];
@@ -127,7 +127,7 @@ std::string event(const std::string& name, const std::string& data) {
 struct ViewServer::Implementation {
   explicit Implementation(const ViewServerOptions& number)
       : options(number),
-        token(random_token()),
+        token(make_random_token()),
         page(live_page(options.title, options.replay, name_of(options.takes))),
         server({.address = options.address, .port = options.port, .headers = answer_headers},
                [this](const server::HttpRequest& request) { return answer(request); }) {}

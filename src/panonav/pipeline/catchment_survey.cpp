@@ -93,7 +93,7 @@ struct ErrorSum {
     sine += std::sin(error_rad);
     ++count;
   }
-  [[nodiscard]] double deviation() const {
+  [[nodiscard]] double compute_deviation() const {
     if (count == 0) return std::numeric_limits<double>::quiet_NaN();
     const double length = std::hypot(cosine, sine) / static_cast<double>(count);
     return std::sqrt(std::max(0.0, -2.0 * std::log(length)));

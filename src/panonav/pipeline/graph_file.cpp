@@ -22,7 +22,7 @@ std::string_view name_of(LinkKind kind) {
   return "";
 }
 
-std::string escaped(std::string_view text) {
+std::string escape_xml(std::string_view text) {
   std::string safe;
   for (const char c : to_readable_line(text)) {
     switch (c) {
@@ -49,7 +49,7 @@ std::string data(std::string_view key, std::string_view value) {
   return "<data key=\"" + std::string(key) + "\">" + std::string(value) + "</data>";
 }
 
-std::string pose_data(const Pose2& pose) {
+std::string format_pose(const Pose2& pose) {
   return data("x_m", to_text(pose.x_m)) + data("y_m", to_text(pose.y_m)) +
          data("heading_rad", to_text(pose.heading_rad));
 }
@@ -74,13 +74,13 @@ void write_graph(const std::filesystem::path& path, const TopologicalMap& map,
       "<graph edgedefault=\"directed\">\n";
   for (const MapNode& node : map.nodes) {
     text += "<node id=\"" + std::to_string(node.view.value) + "\">" +
-            data("name", escaped(name(node.view))) + pose_data(node.pose) +
+            data("name", escape_xml(name(node.view))) + format_pose(node.pose) +
             data("component", std::to_string(node.component)) + "</node>\n";
   }
   for (const MapEdge& edge : map.edges) {
     text += "<edge source=\"" + std::to_string(edge.a.value) + "\" target=\"" +
             std::to_string(edge.b.value) + "\">" + data("kind", name_of(edge.kind)) +
-            data("weight", to_text(edge.weight)) + pose_data(edge.a_from_b) + "</edge>\n";
+            data("weight", to_text(edge.weight)) + format_pose(edge.a_from_b) + "</edge>\n";
   }
   text += "</graph>\n</graphml>\n";
   write_file(path, text);

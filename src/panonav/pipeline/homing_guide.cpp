@@ -11,7 +11,7 @@ namespace panonav {
 
 namespace {
 
-int validated_components(const SignatureShape& shape, int requested) {
+int check_components(const SignatureShape& shape, int requested) {
   if (requested == 0) return shape.components;
   if (requested < 3 || requested > shape.components) {
     throw ContractError("components", requested,
@@ -38,7 +38,7 @@ HomingEncoder::HomingEncoder(const PictureSource& source, const HomingViewOption
 HomingEncoder::HomingEncoder(const MemoryHeader& header, const PictureSource& source,
                              int components, bool horizon)
     : pictures_(std::in_place_type<ViewEncoder>, header, source),
-      components_(validated_components(header.shape, components)),
+      components_(check_components(header.shape, components)),
       horizon_(horizon) {}
 
 Panorama HomingEncoder::own_panorama(const OwnPictures& own, const Observation& observation) const {

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 /// Returns a text that changes with every change of a name, a pose, a file's size or time, or of
 /// how the pictures lie.
-std::string fingerprint(const Dataset& recording, const MemoryFile& memory) {
+std::string compute_fingerprint(const Dataset& recording, const MemoryFile& memory) {
   RecordBytes bytes;
   MemoryHeader read_as = memory.header();
   read_as.source = recording.source;
@@ -76,7 +76,7 @@ void check_known_views(const Dataset& recording, const MemoryFile& memory,
                         "a view with another pose or stamp under the name");
     }
   }
-  if (known.empty() || is_known_recording(memory, fingerprint(recording, memory))) return;
+  if (known.empty() || is_known_recording(memory, compute_fingerprint(recording, memory))) return;
 
   constexpr std::size_t batch = 32;
   for (std::size_t begin = 0; begin < known.size(); begin += batch) {
@@ -96,7 +96,7 @@ void check_known_views(const Dataset& recording, const MemoryFile& memory,
 }
 
 void remember_recording(const Dataset& recording, MemoryFile& memory) {
-  const std::string mark = fingerprint(recording, memory);
+  const std::string mark = compute_fingerprint(recording, memory);
   if (is_known_recording(memory, mark)) return;
   const std::string before = memory.parameter(recordings_parameter).value_or("");
   memory.set_parameter(recordings_parameter, before.empty() ? mark : before + " " + mark);

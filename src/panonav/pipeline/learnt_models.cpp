@@ -104,7 +104,7 @@ class Reader {
 };
 
 /// Changes with every change of the views, of their signatures and of their poses.
-std::string fingerprint(const VisualMemory& memory) {
+std::string compute_fingerprint(const VisualMemory& memory) {
   RecordBytes scratch;
   std::uint64_t hash = checksum({}, memory.shape().size());
   for (const ViewId view : memory.views()) {
@@ -132,7 +132,7 @@ std::optional<LearntModels> read_models(const MemoryFile& file, const VisualMemo
   const Reader reader(*text);
   if (reader.word() != learning_version) return std::nullopt;
   const std::string views = reader.word();
-  if (memory != nullptr && views != fingerprint(*memory)) return std::nullopt;
+  if (memory != nullptr && views != compute_fingerprint(*memory)) return std::nullopt;
   LearntModels models;
   visit_members(models.place, reader);
   visit_members(models.position, reader);
@@ -186,7 +186,7 @@ void keep_models(MemoryFile& file) {
   const LearntModels models = learn_models(memory, make_feature_source(file));
   Writer writer;
   writer.word(learning_version);
-  writer.word(fingerprint(memory));
+  writer.word(compute_fingerprint(memory));
   visit_members(models.place, writer);
   visit_members(models.position, writer);
   writer(models.spacing_m);

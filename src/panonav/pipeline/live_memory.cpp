@@ -93,7 +93,7 @@ class Storer {
 };
 
 /// The same moment with its panorama, which is that of a level robot.
-Observation unwrapped(const Observation& observation, Panorama panorama) {
+Observation with_panorama(const Observation& observation, Panorama panorama) {
   Observation same(std::move(panorama));
   same.name = observation.name;
   same.file = observation.file;
@@ -195,7 +195,7 @@ LiveMemory::Answer LiveMemory::answer(const Observation& observation) {
     self.panorama = self.recogniser->encoder().panorama(observation);
     answer.unwrapping = std::chrono::steady_clock::now() - before;
     self.answered = observation.name;
-    answer.place = self.recogniser->localise(unwrapped(observation, *self.panorama));
+    answer.place = self.recogniser->localise(with_panorama(observation, *self.panorama));
   }
   bool is_placed_later = false;
   if (self.updater && answer.place && observation.odometry) {
@@ -231,7 +231,7 @@ void LiveMemory::add(Observation observation) {
     }
     ReferenceInfo info{observation.name, observation.pose, observation.stamp_s};
     PackedSignature signature = encoder.packed(*self.panorama);
-    store(unwrapped(observation, *std::exchange(self.panorama, std::nullopt)));
+    store(with_panorama(observation, *std::exchange(self.panorama, std::nullopt)));
     self.recogniser->append(info, signature);
     self.added.emplace_back(std::move(info), std::move(signature));
   } else {

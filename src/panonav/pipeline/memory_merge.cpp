@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 using Bytes = std::vector<std::uint8_t>;
 using NewIds = std::map<ViewId, ViewId>;  // in the new memory, by that in the old
 
-std::optional<Pose2> whole_pose(const ReferenceInfo& info) {
+std::optional<Pose2> get_complete_pose(const ReferenceInfo& info) {
   if (!info.pose || !info.pose->heading_rad) return std::nullopt;
   return Pose2{info.pose->x_m, info.pose->y_m, *info.pose->heading_rad};
 }
@@ -36,7 +36,7 @@ TopologicalMap read_or_make_map(const MemoryFile& file, const VisualMemory& view
   TopologicalMap map = file.map(map_name).value_or(TopologicalMap{});
   if (map.nodes.empty()) {
     for (const ViewId view : views.views()) {
-      const auto pose = whole_pose(views.info(view));
+      const auto pose = get_complete_pose(views.info(view));
       if (!pose) continue;
       if (!map.nodes.empty()) {
         const MapNode& before = map.nodes.back();
@@ -62,7 +62,7 @@ TopologicalMap read_or_make_map(const MemoryFile& file, const VisualMemory& view
     if (node.component != 0) continue;
     ++nodes;
     positions += views.info(node.view).pose.has_value() ? 1 : 0;
-    poses += whole_pose(views.info(node.view)).has_value() ? 1 : 0;
+    poses += get_complete_pose(views.info(node.view)).has_value() ? 1 : 0;
   }
   if (poses < nodes && positions > 0) {
     throw FileError(file.path().string(),
@@ -72,7 +72,7 @@ TopologicalMap read_or_make_map(const MemoryFile& file, const VisualMemory& view
   }
   if (poses == nodes) {
     for (MapNode& node : map.nodes) {
-      if (node.component == 0) node.pose = *whole_pose(views.info(node.view));
+      if (node.component == 0) node.pose = *get_complete_pose(views.info(node.view));
     }
   }
   return map;
@@ -166,7 +166,7 @@ class Merge {
   MergedMemory write(MemoryFile& file, const std::function<void()>& advance) {
     for (std::size_t i = 0; i < 2; ++i) add_views(file, i, advance);
     const VisualMemory all = file.load();
-    TopologicalMap map = joined_map(all);
+    TopologicalMap map = join_maps(all);
     add_links(file);
     if (!map.nodes.empty()) file.save_map(map_name, map);
     set_poses(file, map);
@@ -215,7 +215,7 @@ class Merge {
     append();
   }
 
-  TopologicalMap joined_map(const VisualMemory& all) {
+  TopologicalMap join_maps(const VisualMemory& all) {
     const std::array own{read_or_make_map(*files_[0], views_[0]),
                          read_or_make_map(*files_[1], views_[1])};
     const std::array maps{with_new_ids(own[0], ids_[0]), with_new_ids(own[1], ids_[1])};

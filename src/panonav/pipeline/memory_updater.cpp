@@ -43,7 +43,7 @@ std::string to_parameter(const MemoryUse& use) {
 }
 
 // A text of an unknown version counts as none.
-MemoryUse from_parameter(const std::optional<std::string>& text) {
+MemoryUse parse_memory_use(const std::optional<std::string>& text) {
   MemoryUse use;
   if (!text) return use;
   std::istringstream words(*text);
@@ -65,7 +65,7 @@ MemoryUse from_parameter(const std::optional<std::string>& text) {
   return use;
 }
 
-ObservationModel model_for(const MemoryFile& file, const ColumnRanking& ranking) {
+ObservationModel make_model(const MemoryFile& file, const ColumnRanking& ranking) {
   const VisualMemory& memory = ranking.memory();
   const auto oriented = std::ranges::count_if(memory.views(), [&](ViewId view) {
     const auto& pose = memory.info(view).pose;
@@ -94,7 +94,7 @@ struct MemoryUpdater::Implementation {
         memory(file.load()),
         encoder(file.header(), file.header().source),
         ranking(memory),
-        update(ranking, model_for(file, ranking), from_parameter(file.parameter(use_parameter)),
+        update(ranking, make_model(file, ranking), parse_memory_use(file.parameter(use_parameter)),
                options) {}
 
   MemoryFile file;

@@ -47,7 +47,7 @@ void warn_of_left_out(Dataset& opened) {
 
 /// Size of the first picture; nullopt where it cannot be read: who reads its pixels says what is
 /// wrong.
-std::optional<ImageSize> first_picture_size(const Dataset& dataset) {
+std::optional<ImageSize> read_first_picture_size(const Dataset& dataset) {
   const DatasetEntry& first = dataset.entries.front();
   try {
     return first.store ? read_picture(first).size() : read_image_size(first.path);
@@ -67,7 +67,7 @@ void warn_of_low_band(Dataset& opened) {
   const double low_deg = degrees(band->bottom_rad);
   const double high_deg = degrees(band->top_rad);
   if (high_deg - low_deg >= min_band_deg) return;
-  const auto size = first_picture_size(opened);
+  const auto size = read_first_picture_size(opened);
   if (!size || 360.0 * size->height < max_stretch * (high_deg - low_deg) * size->width) return;
   opened.warnings.push_back("hint: the elevation band of " +
                             to_readable_line(opened.folder.string()) + " is " +
@@ -83,7 +83,7 @@ void warn_of_other_kind(Dataset& opened) {
   if (dataset.source.kind != PictureKind::panorama) return;
   const auto& band = dataset.source.layout.elevations;
   if (band && band->top_rad - band->bottom_rad < radians(max_band_deg)) return;
-  const auto size = first_picture_size(dataset);
+  const auto size = read_first_picture_size(dataset);
   if (!size || size->width != 2 * size->height) return;
   opened.warnings.push_back(
       "hint: " + to_readable_line(dataset.entries.front().path.string()) + " is " +
@@ -127,8 +127,8 @@ void refuse_unregistered(const fs::path& path) {
   }
 }
 
-const PictureSource& stated_source(const fs::path& path, const InputOptions& options,
-                                   std::string_view why) {
+const PictureSource& make_stated_source(const fs::path& path, const InputOptions& options,
+                                        std::string_view why) {
   if (options.source) return *options.source;
   if (options.default_source) return *options.default_source;
   throw FileError(path.string(), std::string(why) + " with 'source' (a PictureSource)");
@@ -142,7 +142,7 @@ Dataset open_registered(const fs::path& path, const DatasetReader& reader,
         "the option odometry_topic and the option odometry_frames do not go together");
   }
   const PictureSource& source =
-      stated_source(path, options, "does not say how its pictures lie; say what they show");
+      make_stated_source(path, options, "does not say how its pictures lie; say what they show");
   if (options.recursive) {
     throw OptionError(path.string() + " is a " + reader.name + "; leave out the option recursive");
   }
@@ -171,7 +171,7 @@ Dataset open_described(const fs::path& folder, const InputOptions& options) {
 Dataset open_pictures(const fs::path& path, const InputOptions& options) {
   refuse_unregistered(path);
   const PictureSource& source =
-      stated_source(path, options, "has no dataset.toml; say what the pictures show");
+      make_stated_source(path, options, "has no dataset.toml; say what the pictures show");
   std::error_code ignored;
   Dataset opened;
   if (fs::is_directory(path, ignored)) {

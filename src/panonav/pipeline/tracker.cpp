@@ -11,8 +11,8 @@ namespace panonav {
 
 namespace {
 
-MonteCarloLocaliser localiser_for(const MemoryFile& file, const VisualMemory& memory,
-                                  const TrackerOptions& options) {
+MonteCarloLocaliser make_localiser(const MemoryFile& file, const VisualMemory& memory,
+                                   const TrackerOptions& options) {
   const auto posed = std::ranges::count_if(
       memory.views(), [&](ViewId view) { return memory.info(view).pose.has_value(); });
   if (posed < ObservationModel::min_views) {
@@ -43,7 +43,7 @@ struct Tracker::Implementation {
   Implementation(const MemoryFile& file, const TrackerOptions& options)
       : memory(file.load()),
         encoder(file.header(), options.source.value_or(file.header().source)),
-        localiser(localiser_for(file, memory, options)) {}
+        localiser(make_localiser(file, memory, options)) {}
 
   VisualMemory memory;
   ViewEncoder encoder;

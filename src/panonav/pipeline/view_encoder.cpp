@@ -26,16 +26,16 @@ PictureSource cut_to_band(const MemoryHeader& header, PictureSource source) {
   return source;
 }
 
-bool both_ready_made(const MemoryHeader& header, const PictureSource& source) {
+bool are_ready_made(const MemoryHeader& header, const PictureSource& source) {
   return source.kind == PictureKind::panorama && header.source.kind == PictureKind::panorama;
 }
 
-PanoramaShape panorama_shape_of(const MemoryHeader& header, const PictureSource& source) {
-  if (both_ready_made(header, source) && !header.picture_shape) return {};
+PanoramaShape choose_resampled_shape(const MemoryHeader& header, const PictureSource& source) {
+  if (are_ready_made(header, source) && !header.picture_shape) return {};
   return {header.shape.rows, header.panorama_columns};
 }
 
-std::string band_text(const std::optional<ElevationBand>& band) {
+std::string format_band(const std::optional<ElevationBand>& band) {
   if (!band) return "unknown";
   return format_number(degrees(band->bottom_rad)) + " to " + format_number(degrees(band->top_rad)) +
          " degrees";
@@ -51,7 +51,7 @@ bool is_same_band(const std::optional<ElevationBand>& a, const std::optional<Ele
 constexpr std::string_view as_remembered = ", as in the views of the memory";
 
 /// Pixels of a panorama that become one pixel of its thumbnail, in each direction.
-int thumbnail_step(int columns) {
+int compute_thumbnail_step(int columns) {
   constexpr int max_columns = 256;
   return (columns + max_columns - 1) / max_columns;
 }
@@ -99,11 +99,11 @@ class ViewEncoder::Workspaces {
 
 ViewEncoder::ViewEncoder(const MemoryHeader& header, const PictureSource& source)
     : header_(header),
-      reader_(cut_to_band(header, source), panorama_shape_of(header, source)),
+      reader_(cut_to_band(header, source), choose_resampled_shape(header, source)),
       extractor_({header.shape.rows, header.panorama_columns}, header.shape.components,
                  header.preprocessing),
       workspaces_(std::make_unique<Workspaces>()) {
-  if (both_ready_made(header, source)) picture_shape_ = header.picture_shape;
+  if (are_ready_made(header, source)) picture_shape_ = header.picture_shape;
 }
 ViewEncoder::~ViewEncoder() = default;
 ViewEncoder::ViewEncoder(ViewEncoder&&) noexcept = default;
@@ -126,8 +126,8 @@ Panorama ViewEncoder::checked(Panorama panorama) const {
 
 void ViewEncoder::check_band(const std::optional<ElevationBand>& band) const {
   if (is_same_band(band, header_.elevations)) return;
-  throw ContractError("elevation band", band_text(band),
-                      band_text(header_.elevations) + std::string(as_remembered));
+  throw ContractError("elevation band", format_band(band),
+                      format_band(header_.elevations) + std::string(as_remembered));
 }
 
 Panorama ViewEncoder::panorama(const Observation& observation) const {
@@ -224,7 +224,7 @@ float largest_structure(const FourierSignature& signature) {
 
 std::vector<std::uint8_t> thumbnail_png(const Panorama& panorama) {
   const Image picture = to_picture(panorama);
-  const int step = thumbnail_step(picture.width());
+  const int step = compute_thumbnail_step(picture.width());
   if (step == 1) return encode_png(picture.view());
   Image small(picture.width() / step, std::max(1, picture.height() / step));
   const int rows_averaged = std::min(step, picture.height());
@@ -243,7 +243,7 @@ std::vector<std::uint8_t> thumbnail_png(const Panorama& panorama) {
 std::optional<Panorama> thumbnail_panorama(std::span<const std::uint8_t> thumbnail,
                                            const MemoryHeader& header) {
   const PanoramaShape shape{header.shape.rows, header.panorama_columns};
-  const int step = thumbnail_step(shape.columns);
+  const int step = compute_thumbnail_step(shape.columns);
   const int width = shape.columns / step;
   try {
     const Image picture = decode_image(thumbnail, "thumbnail", {.side_px = 4096});
@@ -263,7 +263,7 @@ std::optional<Panorama> thumbnail_panorama(const MemoryFile& file, ViewId view) 
 }
 
 int thumbnail_columns(const MemoryHeader& header) noexcept {
-  return header.panorama_columns / thumbnail_step(header.panorama_columns);
+  return header.panorama_columns / compute_thumbnail_step(header.panorama_columns);
 }
 
 void for_each_entry(Executor& executor, std::size_t count,

@@ -13,7 +13,7 @@ namespace panonav {
 
 namespace {
 
-std::map<ViewId, std::size_t> components_of(const MemoryFile& file) {
+std::map<ViewId, std::size_t> find_components(const MemoryFile& file) {
   const auto names = file.map_names();
   if (names.empty()) return {};
   const bool driven = std::ranges::find(names, "map") != names.end();
@@ -27,7 +27,7 @@ std::map<ViewId, std::size_t> components_of(const MemoryFile& file) {
 
 std::vector<ViewRecord> list_views(const MemoryFile& file) {
   const VisualMemory memory = file.load();
-  const auto components = components_of(file);
+  const auto components = find_components(file);
   const auto pictured = file.views_with_thumbnail();
   std::map<ViewId, std::size_t> links;
   for (const Link& link : memory.links()) {

@@ -56,7 +56,7 @@ void require_view(const NewView& view, SignatureShape shape) {
   throw ContractError(kind, std::string(name), "a " + std::string(kind) + " of the memory file");
 }
 
-std::string parameter_key(std::string_view name) {
+std::string make_parameter_key(std::string_view name) {
   return "parameter." + std::string(name);
 }
 
@@ -83,7 +83,7 @@ struct MemoryFile::Implementation {
     return work(*tables);
   }
 
-  [[nodiscard]] VisualMemory empty_memory() const {
+  [[nodiscard]] VisualMemory make_empty_memory() const {
     return {header.shape, header.full_scale, header.elevations};
   }
   /// Appends a row to a memory. Throws FileError when it does not match its checksum.
@@ -286,13 +286,14 @@ std::optional<Bytes> MemoryFile::features(ViewId view) const {
 }
 
 void MemoryFile::set_parameter(std::string_view name, std::string_view value) {
-  implementation_->write(
-      [&](MemoryTables& tables) { tables.write_setting(parameter_key(name), std::string(value)); });
+  implementation_->write([&](MemoryTables& tables) {
+    tables.write_setting(make_parameter_key(name), std::string(value));
+  });
 }
 
 std::optional<std::string> MemoryFile::parameter(std::string_view name) const {
   const Settings settings = implementation_->tables->settings();
-  const auto found = settings.find(parameter_key(name));
+  const auto found = settings.find(make_parameter_key(name));
   if (found == settings.end()) return std::nullopt;
   const auto* text = std::get_if<std::string>(&found->second);
   if (text == nullptr) implementation_->tables->fail_damaged("parameter " + std::string(name));
@@ -357,7 +358,7 @@ void MemoryFile::rename_route(std::string_view name, std::string_view new_name) 
     const std::string from = "route." + std::string(name);
     if (const auto lines = parameter(from)) {
       set_parameter("route." + std::string(new_name), *lines);
-      tables.erase_setting(parameter_key(from));
+      tables.erase_setting(make_parameter_key(from));
     }
   });
 }

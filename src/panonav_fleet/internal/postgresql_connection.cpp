@@ -27,7 +27,7 @@ struct ClearResult {
 };
 using Result = std::unique_ptr<pg_result, ClearResult>;
 
-std::string sqlstate_of(const pg_result* result) {
+std::string get_sqlstate(const pg_result* result) {
   const char* state = result == nullptr ? nullptr : PQresultErrorField(result, PG_DIAG_SQLSTATE);
   return state == nullptr ? "" : state;
 }
@@ -278,7 +278,7 @@ void PostgresqlConnection::fail(const pg_result* result) const {
                     "way is there whole or not at all: " +
                         message());
   }
-  const std::string state = sqlstate_of(result);
+  const std::string state = get_sqlstate(result);
   const char* primary =
       result == nullptr ? nullptr : PQresultErrorField(result, PG_DIAG_MESSAGE_PRIMARY);
   const std::string text = primary == nullptr ? message() : to_readable_line(primary);
@@ -321,7 +321,7 @@ void PostgresqlConnection::execute(const std::string& sql) {
 
 bool PostgresqlConnection::try_unique(const std::string& sql, const PostgresqlValues* values) {
   Result result(exchange(sql, values));
-  if (sqlstate_of(result.get()) == "23505") return false;
+  if (get_sqlstate(result.get()) == "23505") return false;
   static_cast<void>(checked(result.release()));
   return true;
 }

@@ -10,7 +10,7 @@ namespace panonav::fleet {
 
 namespace {
 
-std::optional<int> hexadecimal_digit(char c) {
+std::optional<int> parse_hexadecimal_digit(char c) {
   if (c >= '0' && c <= '9') return c - '0';
   if (c >= 'a' && c <= 'f') return c - 'a' + 10;
   if (c >= 'A' && c <= 'F') return c - 'A' + 10;
@@ -18,7 +18,7 @@ std::optional<int> hexadecimal_digit(char c) {
 }
 
 // "%41" is "A". Empty where the text is nothing of the kind.
-std::optional<std::string> percent_decoded(std::string_view text) {
+std::optional<std::string> decode_percent(std::string_view text) {
   std::string decoded;
   for (std::size_t i = 0; i < text.size(); ++i) {
     if (text[i] != '%') {
@@ -26,8 +26,8 @@ std::optional<std::string> percent_decoded(std::string_view text) {
       continue;
     }
     if (i + 2 >= text.size()) return std::nullopt;
-    const auto high = hexadecimal_digit(text[i + 1]);
-    const auto low = hexadecimal_digit(text[i + 2]);
+    const auto high = parse_hexadecimal_digit(text[i + 1]);
+    const auto low = parse_hexadecimal_digit(text[i + 2]);
     if (!high || !low || (*high == 0 && *low == 0)) return std::nullopt;
     decoded += static_cast<char>(*high * 16 + *low);
     i += 2;
@@ -64,7 +64,7 @@ ServerAddress parse_server_address(const std::filesystem::path& memory) {
     }
     const auto value = equals == std::string_view::npos
                            ? std::nullopt
-                           : percent_decoded(parameter.substr(equals + 1));
+                           : decode_percent(parameter.substr(equals + 1));
     if (!value) refuse(std::string(key) + " is not written as in a URL; allowed: %20 for a blank");
     constexpr std::size_t max_bytes = 500;
     const bool control = std::ranges::any_of(

@@ -13,7 +13,7 @@ namespace {
 constexpr std::size_t codes_of_a_cell = 16;  // of four bits
 constexpr std::size_t sums_of_a_step = 8;    // that share a step
 
-std::size_t rounded_up(std::size_t count, std::size_t multiple) {
+std::size_t round_up(std::size_t count, std::size_t multiple) {
   return (count + multiple - 1) / multiple * multiple;
 }
 
@@ -42,7 +42,7 @@ SegmentLayout::SegmentLayout(SignatureShape shape) : shape_(shape) {
       blocks_[level].push_back(blocks);
       sums += static_cast<std::size_t>(blocks);
     }
-    dimensions_[level] = rounded_up(sums, level == 0 ? 2 : 64);
+    dimensions_[level] = round_up(sums, level == 0 ? 2 : 64);
   }
   constexpr std::size_t page = LargePageAllocator<std::uint8_t>::page;
   max_rows_ =
@@ -108,7 +108,7 @@ SketchSegment::SketchSegment(const SegmentLayout& layout, std::span<const ViewId
   }
   const std::size_t padded = blocks() * kernels::cell_block;
   // Views of the byte levels on whole cache lines.
-  begins_[1] = rounded_up(padded * layout.dimensions(0) / 2, 64);
+  begins_[1] = round_up(padded * layout.dimensions(0) / 2, 64);
   begins_[2] = begins_[1] + padded * layout.dimensions(1);
   codes_.resize(begins_[2] + padded * layout.dimensions(2));
   make_cells(layout, sums);

@@ -12,7 +12,7 @@ namespace panonav::fleet {
 
 namespace {
 
-LiveSegment all_live(std::shared_ptr<const SketchSegment> sketches) {
+LiveSegment make_live_segment(std::shared_ptr<const SketchSegment> sketches) {
   LiveSegment segment{std::move(sketches), {}, 0};
   segment.count = segment.sketches->rows();
   segment.live.assign(segment.sketches->blocks(), ~std::uint64_t{0});
@@ -108,14 +108,14 @@ void ViewSketches::insert(std::span<const ViewId> views, std::span<const std::ui
     const std::size_t count = std::min(views.size(), max_rows - ids.size());
     const auto of_these = magnitudes.first(count * view_bytes);
     if (ids.empty() && count == max_rows) {
-      own.segments.push_back(all_live(
+      own.segments.push_back(make_live_segment(
           std::make_shared<const SketchSegment>(*own.layout, views.first(count), of_these)));
     } else {
       ids.insert(ids.end(), views.begin(), views.begin() + static_cast<std::ptrdiff_t>(count));
       bytes.insert(bytes.end(), of_these.begin(), of_these.end());
       if (ids.size() == max_rows || count == views.size()) {
         own.segments.push_back(
-            all_live(std::make_shared<const SketchSegment>(*own.layout, ids, bytes)));
+            make_live_segment(std::make_shared<const SketchSegment>(*own.layout, ids, bytes)));
         if (ids.size() < max_rows) {
           own.growing = std::make_shared<const std::vector<std::uint8_t>>(std::move(bytes));
         }

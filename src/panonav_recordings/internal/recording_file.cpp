@@ -25,7 +25,7 @@ std::string system_message() {
   return std::generic_category().message(errno);
 }
 
-std::string chunk_at(std::uint64_t at) {
+std::string describe_chunk(std::uint64_t at) {
   return "the chunk at byte " + std::to_string(at);
 }
 
@@ -162,7 +162,7 @@ Buffer ChunkedFile::unpack_block(const Block& block) const {
   if (block.is_loose) return bytes_at(block.at, block.bytes);
   const ChunkHead head = chunk_head(block);
   if (std::max(head.packed_bytes, head.unpacked_bytes) > limits_.chunk_bytes) {
-    fail(chunk_at(block.at) + " has " +
+    fail(describe_chunk(block.at) + " has " +
          std::to_string(std::max(head.packed_bytes, head.unpacked_bytes)) +
          " bytes; allowed: up to " + std::to_string(limits_.chunk_bytes));
   }
@@ -171,19 +171,19 @@ Buffer ChunkedFile::unpack_block(const Block& block) const {
   Buffer packed = bytes_at(head.at, count);
   if (head.packing == Packing::none) {
     if (head.unpacked_bytes != head.packed_bytes) {
-      fail(chunk_at(block.at) + " is damaged: it tells two sizes");
+      fail(describe_chunk(block.at) + " is damaged: it tells two sizes");
     }
   } else {
     auto unpacked =
         unpack(packed.bytes(), head.packing, static_cast<std::size_t>(head.unpacked_bytes));
     packed = std::move(unpacked.content);
     if (!block.is_cut && !(unpacked.whole && packed.size == head.unpacked_bytes)) {
-      fail(chunk_at(block.at) + " is damaged: it cannot be unpacked");
+      fail(describe_chunk(block.at) + " is damaged: it cannot be unpacked");
     }
   }
   if (!block.is_cut && head.sum != 0 &&
       ::crc32(0, packed.data.get(), static_cast<uInt>(packed.size)) != head.sum) {
-    fail(chunk_at(block.at) + " is damaged: its checksum is wrong");
+    fail(describe_chunk(block.at) + " is damaged: its checksum is wrong");
   }
   return packed;
 }
@@ -215,10 +215,10 @@ void ChunkedFile::list(std::size_t block, const std::vector<bool>& chosen_topics
   const Block& from = blocks_.at(block);
   std::vector<Entry> read;
   if (!from.entries && (!list_index(from, read) || read.size() != from.messages)) {
-    warn("the index of " + chunk_at(from.at) + " is damaged; the chunk itself is read");
+    warn("the index of " + describe_chunk(from.at) + " is damaged; the chunk itself is read");
     read.clear();
     if (!walk(content(block)->bytes(), read)) {
-      warn(chunk_at(from.at) + " is damaged; what comes before the damage is read");
+      warn(describe_chunk(from.at) + " is damaged; what comes before the damage is read");
     }
   }
   for (const Entry& entry : from.entries ? *from.entries : read) {
@@ -236,7 +236,7 @@ RecordedMessage ChunkedFile::read(const MessagePlace& place) const {
   std::optional<RecordedMessage> message;
   if (place.offset < block->size) message = message_at(block->bytes(), place.offset);
   if (!message) {
-    fail(chunk_at(blocks_[place.block].at) + " has no message where its index says");
+    fail(describe_chunk(blocks_[place.block].at) + " has no message where its index says");
   }
   message->owner = std::move(block);
   return *std::move(message);
@@ -259,7 +259,7 @@ void ChunkedFile::add_chunk(std::uint64_t at, bool is_cut) {
     declare(content.bytes());
     std::vector<Entry> entries;
     if (!walk(content.bytes(), entries) && !is_cut) {
-      warn(chunk_at(at) + " is damaged; what comes before the damage is read");
+      warn(describe_chunk(at) + " is damaged; what comes before the damage is read");
     }
     if (entries.empty()) return;
     for (const Entry& entry : entries) note(block, entry);

@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 
 // The file does not change meanwhile, unless a recorder has a log next to it.
-std::string uri_of(const fs::path& path) {
+std::string make_uri(const fs::path& path) {
   std::string uri = "file:";
   constexpr char digits[] = "0123456789ABCDEF";
   for (const char c : fs::absolute(path).string()) {
@@ -40,7 +40,7 @@ class DatabaseFile : public RecordingFile {
   DatabaseFile(const fs::path& path, const RecordingLimits& limits) : RecordingFile(path) {
     sqlite3* handle = nullptr;
     const int code = sqlite3_open_v2(
-        uri_of(path).c_str(), &handle,
+        make_uri(path).c_str(), &handle,
         SQLITE_OPEN_READONLY | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_EXRESCODE,
         nullptr);
     handle_.reset(handle);

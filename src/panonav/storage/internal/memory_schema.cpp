@@ -76,7 +76,7 @@ constexpr std::string_view names_index = "sqlite_autoindex_views_1";
 // The second end of a link, so that a view's links are found from either.
 constexpr const char* links_index = "CREATE INDEX links_b ON links(b)";
 
-std::string hexadecimal(std::uint32_t value) {
+std::string to_hexadecimal(std::uint32_t value) {
   std::array<char, 16> text{};
   std::snprintf(text.data(), text.size(), "0x%08x", static_cast<unsigned>(value));
   return text.data();
@@ -126,8 +126,8 @@ void require_memory_file(const std::filesystem::path& path) {
   const std::uint32_t application_id = big_endian(head.data() + 68);
   if (application_id != memory_application_id) {
     throw FileError(name, "is an SQLite file of another program: application_id is " +
-                              hexadecimal(application_id) +
-                              "; allowed: " + hexadecimal(memory_application_id));
+                              to_hexadecimal(application_id) +
+                              "; allowed: " + to_hexadecimal(memory_application_id));
   }
   const std::uint32_t version = big_endian(head.data() + 60);
   if (version != static_cast<std::uint32_t>(memory_format_version)) {

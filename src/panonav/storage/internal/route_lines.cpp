@@ -18,7 +18,7 @@ namespace {
 constexpr std::size_t reals_of_pose = 3;
 constexpr std::size_t head_bytes = 8 * reals_of_pose + 2;
 
-double& real_of(Pose2& pose, std::size_t i) {
+double& to_real(Pose2& pose, std::size_t i) {
   return i == 0 ? pose.x_m : i == 1 ? pose.y_m : pose.heading_rad;
 }
 
@@ -31,13 +31,13 @@ std::size_t columns_between(const Pose2& before, const Pose2& now, std::size_t c
 }
 
 // Predicts the value of a column: the mean of its left neighbour and of the line before there.
-int guess(std::span<const std::uint8_t> before, std::size_t turn,
-          std::span<const std::uint8_t> line, std::size_t column) {
+int predict_pixel(std::span<const std::uint8_t> before, std::size_t turn,
+                  std::span<const std::uint8_t> line, std::size_t column) {
   const int above = before.empty() ? 0 : before[(column + turn) % before.size()];
   return (above + (column == 0 ? above : line[column - 1])) / 2;
 }
 
-std::vector<std::uint8_t> compressed(std::span<const std::uint8_t> plain, int strategy) {
+std::vector<std::uint8_t> compress_bytes(std::span<const std::uint8_t> plain, int strategy) {
   z_stream stream{};
   constexpr int window_bits = 15;
   constexpr int memory_level = 8;
@@ -66,7 +66,7 @@ std::vector<std::uint8_t> pack_route_lines(const RoutePanorama& route, std::size
   for (std::size_t n = 0; n < count; ++n) {
     Pose2 pose = route.poses()[first + n];
     for (std::size_t i = 0; i < reals_of_pose; ++i) {
-      const auto word = std::bit_cast<std::uint64_t>(real_of(pose, i));
+      const auto word = std::bit_cast<std::uint64_t>(to_real(pose, i));
       for (std::size_t k = 0; k < 8; ++k) {
         plain[(8 * i + k) * count + n] = static_cast<std::uint8_t>((word >> (8 * k)) & 255U);
       }
@@ -82,12 +82,12 @@ std::vector<std::uint8_t> pack_route_lines(const RoutePanorama& route, std::size
     const auto line = route.line(first + n);
     std::uint8_t* const to = plain.data() + count * head_bytes + n * columns;
     for (std::size_t c = 0; c < columns; ++c) {
-      to[c] = static_cast<std::uint8_t>((line[c] - guess(before, turn, line, c)) & 255);
+      to[c] = static_cast<std::uint8_t>((line[c] - predict_pixel(before, turn, line, c)) & 255);
     }
   }
-  std::vector<std::uint8_t> packed = compressed(plain, Z_DEFAULT_STRATEGY);
+  std::vector<std::uint8_t> packed = compress_bytes(plain, Z_DEFAULT_STRATEGY);
   if (plain.size() > max_unpacked_for_each_byte * packed.size()) {
-    packed = compressed(plain, Z_HUFFMAN_ONLY);  // a bit a byte at least
+    packed = compress_bytes(plain, Z_HUFFMAN_ONLY);  // a bit a byte at least
   }
   return packed;
 }
@@ -112,13 +112,13 @@ bool unpack_route_lines(std::span<const std::uint8_t> bytes, std::size_t count,
       for (std::size_t k = 0; k < 8; ++k) {
         word |= std::uint64_t{plain[(8 * i + k) * count + n]} << (8 * k);
       }
-      real_of(pose, i) = std::bit_cast<double>(word);
+      to_real(pose, i) = std::bit_cast<double>(word);
     }
     const std::size_t turn = plain[8 * reals_of_pose * count + n] +
                              256U * std::size_t{plain[(8 * reals_of_pose + 1) * count + n]};
     const std::uint8_t* const from = plain.data() + count * head_bytes + n * columns;
     for (std::size_t c = 0; c < columns; ++c) {
-      line[c] = static_cast<std::uint8_t>((guess(before, turn, line, c) + from[c]) & 255);
+      line[c] = static_cast<std::uint8_t>((predict_pixel(before, turn, line, c) + from[c]) & 255);
     }
     try {
       if (!route.append(pose, std::span<const std::uint8_t>(line))) return false;

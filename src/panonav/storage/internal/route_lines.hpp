@@ -11,7 +11,7 @@ namespace panonav {
 
 /// Lines `first` .. `first + count` of a route and their poses as packed bytes, without loss
 /// (docs/formats.md, route_blocks): what a line differs by from a guess. The guess knows the line
-/// before, turned as the robot turned, and the columns of the line itself up to there.
+/// before, rotated with the robot, and the columns of the line itself up to there.
 [[nodiscard]] std::vector<std::uint8_t> pack_route_lines(const RoutePanorama& route,
                                                          std::size_t first, std::size_t count);
 

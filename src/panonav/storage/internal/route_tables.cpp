@@ -17,7 +17,7 @@ namespace {
 // more, as the last block is written again with every append.
 constexpr std::int64_t lines_of_block = 256;
 
-std::int64_t row_checksum(std::string_view name, const RouteRow& row) {
+std::int64_t compute_row_checksum(std::string_view name, const RouteRow& row) {
   RecordBytes record;
   record.add(name);
   record.add(row.columns);
@@ -25,17 +25,17 @@ std::int64_t row_checksum(std::string_view name, const RouteRow& row) {
   return static_cast<std::int64_t>(checksum(record.bytes()));
 }
 
-std::int64_t blocks_of(const RouteRow& row) {
+std::int64_t count_blocks(const RouteRow& row) {
   return (row.lines - 1) / lines_of_block + 1;
 }
 
 // Lines of block `number`: all are full but the last.
-std::int64_t lines_of(const RouteRow& row, std::int64_t number) {
+std::int64_t count_lines(const RouteRow& row, std::int64_t number) {
   return std::min(lines_of_block, row.lines - number * lines_of_block);
 }
 
-std::int64_t block_checksum(std::string_view name, std::int64_t number,
-                            std::span<const std::uint8_t> lines) {
+std::int64_t compute_block_checksum(std::string_view name, std::int64_t number,
+                                    std::span<const std::uint8_t> lines) {
   RecordBytes record;
   record.add(name);
   record.add(number);
@@ -55,13 +55,13 @@ std::optional<RouteRow> read_row(MemoryTables& tables, std::string_view name) {
     fail_route(tables, name,
                "columns are " + std::to_string(row->columns) + "; allowed: 16 to 16384");
   }
-  if (row->lines < 1 || row->checksum != row_checksum(name, *row)) {
+  if (row->lines < 1 || row->checksum != compute_row_checksum(name, *row)) {
     fail_route(tables, name, "does not match its checksum");
   }
   // Its last block must be there: a count that the file has no room for is found at once.
-  if (!tables.block(name, blocks_of(*row) - 1)) {
+  if (!tables.block(name, count_blocks(*row) - 1)) {
     fail_route(tables, name,
-               "its last block of " + std::to_string(blocks_of(*row)) + " is missing");
+               "its last block of " + std::to_string(count_blocks(*row)) + " is missing");
   }
   return row;
 }
@@ -69,21 +69,21 @@ std::optional<RouteRow> read_row(MemoryTables& tables, std::string_view name) {
 // Replaces the block of that number.
 void write_block(MemoryTables& tables, std::string_view name, std::int64_t number,
                  std::span<const std::uint8_t> lines) {
-  tables.write_block(name, number, lines, block_checksum(name, number, lines));
+  tables.write_block(name, number, lines, compute_block_checksum(name, number, lines));
 }
 
 void write_row(MemoryTables& tables, std::string_view name, RouteRow row) {
-  row.checksum = row_checksum(name, row);
+  row.checksum = compute_row_checksum(name, row);
   tables.write_route(name, row);
 }
 
 // The packed lines of block `number`, checked.
-std::vector<std::uint8_t> block_of(MemoryTables& tables, std::string_view name,
-                                   std::int64_t number) {
+std::vector<std::uint8_t> read_block(MemoryTables& tables, std::string_view name,
+                                     std::int64_t number) {
   const std::string block = "block " + std::to_string(number);
   auto stored = tables.block(name, number);
   if (!stored) fail_route(tables, name, block + " is missing");
-  if (stored->checksum != block_checksum(name, number, stored->bytes)) {
+  if (stored->checksum != compute_block_checksum(name, number, stored->bytes)) {
     fail_route(tables, name, block + " does not match its checksum");
   }
   return std::move(stored->bytes);
@@ -92,8 +92,8 @@ std::vector<std::uint8_t> block_of(MemoryTables& tables, std::string_view name,
 // Appends the lines of block `number` to `route`.
 void read_block(MemoryTables& tables, std::string_view name, const RouteRow& row,
                 std::int64_t number, RoutePanorama& route) {
-  if (!unpack_route_lines(block_of(tables, name, number),
-                          static_cast<std::size_t>(lines_of(row, number)), route)) {
+  if (!unpack_route_lines(read_block(tables, name, number),
+                          static_cast<std::size_t>(count_lines(row, number)), route)) {
     fail_route(tables, name, "block " + std::to_string(number) + " cannot be unpacked");
   }
 }
@@ -110,7 +110,7 @@ std::size_t append_to_route(MemoryTables& tables, std::string_view name,
                         std::to_string(row.columns) + ", as in the route " + std::string(name));
   }
   // Reopens the last block; a full one only to read the last line.
-  std::int64_t number = std::max<std::int64_t>(0, blocks_of(row) - 1);
+  std::int64_t number = std::max<std::int64_t>(0, count_blocks(row) - 1);
   RoutePanorama open(static_cast<int>(row.columns));
   if (row.lines > 0) read_block(tables, name, row, number, open);
   const std::size_t known = open.size();
@@ -138,9 +138,9 @@ std::optional<RoutePanorama> read_route(MemoryTables& tables, std::string_view n
     if (blocks > 0) fail_route(tables, name, "blocks without the route");
     return std::nullopt;
   }
-  if (blocks != blocks_of(*row)) {
+  if (blocks != count_blocks(*row)) {
     fail_route(tables, name,
-               "it holds " + std::to_string(blocks) + " of " + std::to_string(blocks_of(*row)) +
+               "it holds " + std::to_string(blocks) + " of " + std::to_string(count_blocks(*row)) +
                    " blocks");
   }
   RoutePanorama route(static_cast<int>(row->columns));
@@ -153,8 +153,8 @@ std::optional<RoutePanorama> read_route(MemoryTables& tables, std::string_view n
 void rename_route(MemoryTables& tables, std::string_view name, std::string_view new_name) {
   const auto row = read_row(tables, name);
   if (!row) fail_route(tables, name, "is missing");
-  for (std::int64_t number = 0; number < blocks_of(*row); ++number) {
-    write_block(tables, new_name, number, block_of(tables, name, number));
+  for (std::int64_t number = 0; number < count_blocks(*row); ++number) {
+    write_block(tables, new_name, number, read_block(tables, name, number));
   }
   write_row(tables, new_name, *row);
   erase_route(tables, name);
