@@ -158,7 +158,7 @@ def look(browser, url, shots):
       const [x, y] = map.run.retained.references; return [box.x + map.px(x), box.y + map.py(y)]; })()""")
     for kind in ("mousePressed", "mouseReleased"):
         browser.call("Input.dispatchMouseEvent", type=kind, x=at[0], y=at[1], button="left", clickCount=1, buttons=1)
-    assert "view 0" in text_of(browser, "pn-map .said"), text_of(browser, "pn-map .said")
+    assert "view 0" in text_of(browser, "pn-map .readout"), text_of(browser, "pn-map .readout")
     for dark in (False, True):
         browser.show(DESK, dark)
         browser.picture(shots / f"desk{'_dark' * dark}.png")

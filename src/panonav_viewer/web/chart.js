@@ -15,7 +15,7 @@ export class Chart extends Plot {
       this.offerNumbers();
     }
     this.canvas.addEventListener('pointermove', event => this.tell(event.offsetX, event.offsetY));
-    this.canvas.addEventListener('pointerleave', () => { this.said.textContent = ''; this.at = undefined; this.redraw(); });
+    this.canvas.addEventListener('pointerleave', () => { this.readout.textContent = ''; this.at = undefined; this.redraw(); });
     this.addEventListener('keydown', event => {
       const by = { ArrowLeft: -1, ArrowRight: 1 }[event.key], all = this.content.series?.[0]?.x.length;
       if (!by || !all) return;
@@ -91,16 +91,16 @@ export class Chart extends Plot {
   }
   drawSeries(context, { style, x, y, low, high }, i, colour) {
     const { px, py } = this, [, { log }] = this.axis, shape = shapes[i % 6];
-    const usable = value => value !== null && (!log || value > 0);
-    let beside = 0;  // of bars of several series
+    const canDraw = value => value !== null && (!log || value > 0);
+    let offset = 0;  // of bars of several series
     context.strokeStyle = context.fillStyle = colour(seriesColours[i % 6]);
     context.lineWidth = 2;
     if (style === 'bars') {
       const count = this.content.series.length, wide = (px(1) - px(0)) * 0.8 / count;
-      beside = (i - (count - 1) / 2) * wide;
+      offset = (i - (count - 1) / 2) * wide;
       x.forEach((value, n) => {
-        if (!usable(y[n])) return;
-        const at = px(value) + beside, base = py(log ? this.axis[1].from : 0);
+        if (!canDraw(y[n])) return;
+        const at = px(value) + offset, base = py(log ? this.axis[1].from : 0);
         context.fillRect(at - wide * 0.45, Math.min(base, py(y[n])), wide * 0.9, Math.abs(base - py(y[n])));
       });
     } else if (style !== 'points') {
@@ -108,7 +108,7 @@ export class Chart extends Plot {
       context.beginPath();
       let going = false;
       x.forEach((value, n) => {
-        if (!usable(y[n])) { going = false; return; }
+        if (!canDraw(y[n])) { going = false; return; }
         if (going) context.lineTo(px(value), py(y[n])); else context.moveTo(px(value), py(y[n]));
         going = true;
       });
@@ -117,12 +117,12 @@ export class Chart extends Plot {
     }
     if (style === 'points' || style === 'lines_and_points' && x.length < 80) {
       context.lineWidth = 1.5;
-      x.forEach((value, n) => { if (usable(y[n])) mark(context, shape, px(value), py(y[n]), x.length > 300 ? 2 : 3); });
+      x.forEach((value, n) => { if (canDraw(y[n])) mark(context, shape, px(value), py(y[n]), x.length > 300 ? 2 : 3); });
     }
     if (!low?.length) return;
     context.lineWidth = 1;
     context.strokeStyle = colour(style === 'bars' ? 'ink' : seriesColours[i % 6]);
-    x.forEach((value, n) => { if (usable(low[n]) && usable(high[n])) line(context, px(value) + beside, py(low[n]), px(value) + beside, py(high[n])); });
+    x.forEach((value, n) => { if (canDraw(low[n]) && canDraw(high[n])) line(context, px(value) + offset, py(low[n]), px(value) + offset, py(high[n])); });
   }
   // The values next to the pointer.
   tell(x, y) {
@@ -131,7 +131,7 @@ export class Chart extends Plot {
     if (this.content.image) {
       const [across, up] = this.axis, share = (from, to, s) => from + (to - from) * s;
       const inside = x >= left && x <= right && y >= top && y <= bottom;
-      this.said.textContent = inside ? `${text(share(across.from, across.to, (x - left) / (right - left)))}; ` +
+      this.readout.textContent = inside ? `${text(share(across.from, across.to, (x - left) / (right - left)))}; ` +
         text(share(up.from, up.to, (bottom - y) / (bottom - top))) : '';
       return;
     }
@@ -147,7 +147,7 @@ export class Chart extends Plot {
     const { series, names } = this.content, at = series[0].x[this.at];
     if (at === undefined) return;
     const values = series.map(({ label, x, y }) => [label, y[x.indexOf(at)]]).filter(([, value]) => value !== undefined);
-    this.said.textContent = `${names?.[at] ?? text(at, 4)}: ${values.map(([label, value]) => `${label} ${text(value)}`.trim()).join(', ')}`;
+    this.readout.textContent = `${names?.[at] ?? text(at, 4)}: ${values.map(([label, value]) => `${label} ${text(value)}`.trim()).join(', ')}`;
   }
 }
 customElements.define('pn-chart', Chart);

@@ -19,9 +19,9 @@ class Facts extends HTMLElement {
       const { event } = moment.values ?? {}, changed = moment.state && moment.state !== moments[i - 1]?.state;
       if (event || changed) happened.push([i, moment.t, [changed && moment.state, event].filter(Boolean).join(': ')]);
     });
-    const newest = happened.slice(-50).reverse(), said = JSON.stringify(newest.map(([, ...rest]) => rest));
-    if (said === this.said) return;
-    this.said = said;
+    const newest = happened.slice(-50).reverse(), json = JSON.stringify(newest.map(([, ...rest]) => rest));
+    if (json === this.json) return;
+    this.json = json;
     this.querySelector('ol').replaceChildren(...newest.map(([, t, text]) => {
       const item = document.createElement('li'), button = document.createElement('button');
       button.type = 'button';

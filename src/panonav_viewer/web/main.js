@@ -21,7 +21,7 @@ const skeleton = `
 const panels = { map: 'Map', pictures: 'Pictures', facts: 'Facts', route: 'Route', timeline: 'Timeline' };
 
 // Returns the names of the panels that have something to show.
-function usable({ live, moments = [], retained = {}, route }) {
+function choosePanels({ live, moments = [], retained = {}, route }) {
   if (live) return ['map', 'pictures', 'facts', 'timeline'];
   const has = {
     map: retained.references || retained.plan || retained.edges || moments.some(({ pose, truth, particles }) => pose || truth || particles),
@@ -48,7 +48,7 @@ class RunPlayer extends HTMLElement {
     this.insertAdjacentHTML('beforeend', skeleton);
     if (title) this.querySelector('.head').prepend(Object.assign(document.createElement('h1'), { textContent: title }));
     const address = this.live ? (moment, which) => `picture/${moment.n}/${which}` : (moment, which) => moment.data?.[which];
-    usable(content).forEach((name, i) => this.addPanel(name, i, address));
+    choosePanels(content).forEach((name, i) => this.addPanel(name, i, address));
     // Ids by which links and scripts find the first run of a page.
     if (document.querySelector('pn-run') === this) {
       for (const name of ['state', 'clock', 'panels', 'play', 'slider', 'speed']) this.find(name).id = name;
@@ -60,7 +60,7 @@ class RunPlayer extends HTMLElement {
     this.find('speed').closest('label').hidden = this.live && !content.replay;
     this.find('speed').addEventListener('change', () => this.control({ speed: this.speed }));
     for (const event of ['moment', 'grown']) run.addEventListener(event, () => this.tell());
-    run.addEventListener('sought', () => this.hold());
+    run.addEventListener('selected', () => this.hold());
     if (!this.classList.contains('whole')) {  // the page scrolls when the pointer is above the map
       this.addEventListener('wheel', event => { if (!event.ctrlKey) event.stopPropagation(); }, { capture: true });
     }
@@ -74,7 +74,7 @@ class RunPlayer extends HTMLElement {
       for (const moment of run.moments) moment.changes = changes = moment.changes ? { ...changes, ...moment.changes } : changes;
       run.addEventListener('moment', () => Object.assign(run.retained, run.moment.changes));
       run.retain(content.retained);
-      run.say('grown');
+      run.dispatch('grown');
       run.show(0);
       this.play(false);
       if (run.last > 0) watch(this);
@@ -96,7 +96,7 @@ class RunPlayer extends HTMLElement {
       panel.hidden = !panel.hidden;
       button.setAttribute('aria-pressed', String(!panel.hidden));
       shown.classList.toggle(`has-${name}`, !panel.hidden);
-      this.run.say('moment');
+      this.run.dispatch('moment');
     });
     this.find('panels').append(button);
   }

@@ -15,11 +15,11 @@ class MapPanel extends Drawing {
     this.setAttribute('aria-label', 'Map');
     this.canvas.setAttribute('role', 'img');
     this.insertAdjacentHTML('beforeend',
-      '<div class="legend"></div><div class="said" aria-live="polite"></div><pn-card></pn-card>');
+      '<div class="legend"></div><div class="readout" aria-live="polite"></div><pn-card></pn-card>');
     this.card = this.querySelector('pn-card');
     this.card.attach(this.run, reference => { this.choose(reference); this.focus(); });
     this.legend = this.querySelector('.legend');
-    this.said = this.querySelector('.said');
+    this.readout = this.querySelector('.readout');
     this.zoom = 1;
     this.shift = [0, 0];  // px
     this.run.addEventListener('moment', () => this.redraw());
@@ -99,10 +99,10 @@ class MapPanel extends Drawing {
     this.selected = reference;
     this.clicked = reference === undefined ? undefined : at;
     if (reference !== undefined) {
-      this.said.textContent = `remembered view ${reference}${names ? `, ${names[reference]}` : ''}: ` +
+      this.readout.textContent = `remembered view ${reference}${names ? `, ${names[reference]}` : ''}: ` +
         `x ${references[2 * reference].toFixed(2)} m, y ${references[2 * reference + 1].toFixed(2)} m`;
     } else {
-      this.said.textContent = '';
+      this.readout.textContent = '';
     }
     this.card.show(reference, at);
     this.card.classList.toggle('left', reference !== undefined && this.scale && this.px(references[2 * reference]) > this.clientWidth / 2);
@@ -133,7 +133,7 @@ class MapPanel extends Drawing {
     this.choose(nearest, best > 12 ? this.at(x, y) : undefined);
     if (nearest !== undefined) return;
     const [at_x, at_y] = this.at(x, y);
-    this.said.textContent = `x ${at_x.toFixed(2)} m, y ${at_y.toFixed(2)} m`;
+    this.readout.textContent = `x ${at_x.toFixed(2)} m, y ${at_y.toFixed(2)} m`;
   }
 
   // Returns the bounds of the whole run, so that the map does not jump.

@@ -11,7 +11,7 @@ class Pictures extends HTMLElement {
 <figure class="best"><canvas role="img" aria-label="Most similar remembered view"></canvas><figcaption></figcaption></figure>
 <figure class="difference"><canvas role="img" aria-label="Difference by column"></canvas><figcaption>Difference by column: higher is less similar</figcaption></figure>
 <figure class="camera"><img alt="Picture of the camera"><figcaption>Camera</figcaption></figure>
-<p class="said"></p>`;
+<p class="readout"></p>`;
     for (const figure of this.querySelectorAll('figure')) {
       figure.hidden = true;
       const id = `${figure.className}-figure`;
@@ -30,11 +30,11 @@ class Pictures extends HTMLElement {
     if (this.run.over) while (index > 0 && !this.run.moments[index].data) --index;  // not all have pictures
     const moment = this.run.moments[index];
     const found = await Promise.all(['camera', 'panorama', 'best'].map(which => this.load(moment, which)));
-    const said = this.querySelector('.said');
+    const readout = this.querySelector('.readout');
     if (!found.some(Boolean) && !this.run.over && moment !== this.run.moments[this.run.last]) {
-      said.textContent = 'Pictures of earlier moments of a live run are not kept; use --record to keep them.';
+      readout.textContent = 'Pictures of earlier moments of a live run are not kept; use --record to keep them.';
     } else {
-      said.textContent = '';
+      readout.textContent = '';
       this.images = found;
       this.moment = moment;
       this.draw();

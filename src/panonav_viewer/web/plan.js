@@ -2,7 +2,7 @@ import { scaleBar } from 'panonav/draw';
 import { Plot, mark, text } from 'panonav/plot';
 import { moves, watch, watchTogether } from 'panonav/sight';
 
-// Colours from black over blue and green to yellow: rises in lightness, so that nobody needs to tell the hues apart.
+// Colours from black over blue and green to yellow: rising in lightness, so that hues need not be distinguished.
 const ramp = [[0, 34, 78], [53, 69, 108], [102, 105, 112], [148, 142, 119], [200, 184, 102], [254, 232, 56]];
 const shade = share => {
   const at = Math.max(0, Math.min(1, share)) * (ramp.length - 1), i = Math.min(ramp.length - 2, Math.floor(at));
@@ -32,7 +32,7 @@ class Plan extends Plot {
       }
       this.tell(event.offsetX, event.offsetY);
     });
-    this.canvas.addEventListener('pointerleave', () => { this.said.textContent = ''; });
+    this.canvas.addEventListener('pointerleave', () => { this.readout.textContent = ''; });
     this.canvas.addEventListener('wheel', event => {
       if (!event.ctrlKey) return;  // the page scrolls
       event.preventDefault();
@@ -193,10 +193,10 @@ class Plan extends Plot {
     if (!this.scale) return;
     const at = [(x - this.origin[0]) / this.scale, (this.origin[1] - y) / this.scale], { heat, unit = 'm' } = this.content;
     const place = unit === 'm' ? `x ${at[0].toFixed(2)} m, y ${at[1].toFixed(2)} m` : '';
-    if (!heat) { this.said.textContent = place; return; }
+    if (!heat) { this.readout.textContent = place; return; }
     const column = Math.round((at[0] - heat.first[0]) / heat.spacing), row = Math.round((at[1] - heat.first[1]) / heat.spacing);
     const value = column >= 0 && column < heat.columns && row >= 0 && row < heat.rows ? heat.values[row * heat.columns + column] : null;
-    this.said.textContent = value === null ? place : `${place}: ${text(value)}`;
+    this.readout.textContent = value === null ? place : `${place}: ${text(value)}`;
   }
 }
 customElements.define('pn-plan', Plan);

@@ -1,7 +1,7 @@
 import { Drawing, niceStep } from 'panonav/draw';
 import { whenNear } from 'panonav/sight';
 
-// In the order of series. Shapes and dashes differ, too, for those who do not tell the colours apart.
+// In the order of series. Shapes and dashes differ, too, for colour-blind viewers.
 export const seriesColours = ['blue', 'vermilion', 'green', 'purple', 'orange', 'sky'];
 export const text = (value, digits = 3) => {
   if (value === null || value === undefined || !Number.isFinite(value)) return 'none';
@@ -9,7 +9,7 @@ export const text = (value, digits = 3) => {
   return String(Number(value.toPrecision(Math.max(digits, Math.ceil(Math.log10(Math.abs(value) + 1))))));
 };
 
-// Draws data that never change, which a script element within holds as JSON. Below it, `key` explains colours; `said`
+// Draws data that never change, which a script element within holds as JSON. Below it, `key` explains colours; `readout`
 // shows the values under the pointer.
 export class Plot extends Drawing {
   connectedCallback() {
@@ -24,8 +24,8 @@ export class Plot extends Drawing {
       this.key = document.createElement('div');
       this.key.className = 'key';
       this.after(this.key);
-      this.insertAdjacentHTML('beforeend', '<div class="said" aria-live="polite"></div>');
-      this.said = this.querySelector('.said');
+      this.insertAdjacentHTML('beforeend', '<div class="readout" aria-live="polite"></div>');
+      this.readout = this.querySelector('.readout');
       this.attach();
       this.redraw();
     });
@@ -34,9 +34,9 @@ export class Plot extends Drawing {
   // [[name, colour, kind], ...]; kind: dot, ring, line, dashes, cross, area.
   explain(keys) {
     const html = keys.map(() => '<span></span>').join('');
-    const said = JSON.stringify(keys);
-    if (this.explained === said) return;
-    this.explained = said;
+    const json = JSON.stringify(keys);
+    if (this.explained === json) return;
+    this.explained = json;
     this.key.innerHTML = html;
     keys.forEach(([name, colour, kind], i) => {
       const entry = this.key.children[i];

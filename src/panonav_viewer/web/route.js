@@ -9,9 +9,9 @@ class RoutePanel extends Chart {
     this.content = run.content.route;
     this.setAttribute('role', 'img');
     this.setAttribute('aria-label', this.content.title);
-    this.insertAdjacentHTML('beforeend', '<div class="legend"></div><div class="said"></div>');
+    this.insertAdjacentHTML('beforeend', '<div class="legend"></div><div class="readout"></div>');
     this.key = this.querySelector('.legend');
-    this.said = this.querySelector('.said');
+    this.readout = this.querySelector('.readout');
     super.attach(run);
     run.addEventListener('moment', () => this.redraw());
   }
@@ -48,7 +48,7 @@ class RoutePanel extends Chart {
       across(along, 'vermilion', []);
       keys.push(['matched line', 'vermilion', 'line']);
     }
-    this.said.textContent = along === null ? 'not on this route'
+    this.readout.textContent = along === null ? 'not on this route'
       : `at ${along.toFixed(2)} m` + (truth === null ? '' : `, ${(100 * Math.abs(along - truth)).toFixed(1)} cm off`);
     this.explain(keys);
   }

@@ -2,7 +2,7 @@
 //   'moment'   another moment is shown
 //   'retained'  references, edges, plan, directions or goal are new
 //   'grown'    moments were added
-//   'sought'   somebody chose a moment: the run is paused
+//   'selected'   a moment was selected: the run is paused
 const maxMoments = 5000;  // of a live run, without their pictures
 
 export class Run extends EventTarget {
@@ -17,15 +17,15 @@ export class Run extends EventTarget {
 
   get moment() { return this.moments[this.index]; }
   get last() { return this.moments.length - 1; }
-  say(name) { this.dispatchEvent(new Event(name)); }
+  dispatch(name) { this.dispatchEvent(new Event(name)); }
 
-  // Adds the moments before the viewer came: [[t, x, y, heading, probability, sure, state, true x, true y], ...].
+  // Adds the moments before the viewer connected: [[t, x, y, heading, probability, sure, state, true x, true y], ...].
   takePast(past) {
     this.moments = past.map(([t, x, y, heading, probability, sure, state, trueX, trueY]) =>
       ({ t, pose: x === null ? undefined : [x, y, heading], truth: trueX === null ? undefined : [trueX, trueY, null], probability: probability ?? undefined, sure, state, past: true }));
     this.index = this.last;
-    this.say('grown');
-    if (this.moment) this.say('moment');
+    this.dispatch('grown');
+    if (this.moment) this.dispatch('moment');
   }
   add(moment) {
     const newest = this.moments[this.last];
@@ -36,16 +36,16 @@ export class Run extends EventTarget {
       this.moments.splice(0, gone);
       this.index -= gone;
     }
-    this.say('grown');
+    this.dispatch('grown');
     if (this.following || this.index < 0) this.show(this.last);
   }
   retain(retained) {
     Object.assign(this.retained, retained);
-    this.say('retained');
+    this.dispatch('retained');
   }
   show(index) {
     this.index = Math.max(0, Math.min(this.last, index));
-    this.say('moment');
+    this.dispatch('moment');
   }
   // Shows the moment at a time.
   seek(t) {
@@ -54,7 +54,7 @@ export class Run extends EventTarget {
       const middle = (low + high) >> 1;
       if (this.moments[middle].t < t) low = middle + 1; else high = middle;
     }
-    this.say('sought');
+    this.dispatch('selected');
     this.show(low);
   }
 }
@@ -67,7 +67,7 @@ export function follow(run, address, connected) {
   events.addEventListener('past', event => run.takePast(JSON.parse(event.data)));
   events.addEventListener('retained', event => run.retain(JSON.parse(event.data)));
   events.addEventListener('moment', event => run.add(JSON.parse(event.data)));
-  events.addEventListener('ended', () => { run.ended = true; events.close(); run.say('moment'); });
+  events.addEventListener('ended', () => { run.ended = true; events.close(); run.dispatch('moment'); });
 }
 
 // True if the pose is the true one, as of a simulated robot that estimates none.

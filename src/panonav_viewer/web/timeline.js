@@ -6,8 +6,8 @@ class Timeline extends Drawing {
   attached() {
     this.setAttribute('role', 'img');
     this.setAttribute('aria-label', 'State and probability over time');
-    this.insertAdjacentHTML('beforeend', '<div class="said"></div>');
-    this.said = this.querySelector('.said');
+    this.insertAdjacentHTML('beforeend', '<div class="readout"></div>');
+    this.readout = this.querySelector('.readout');
     this.run.addEventListener('moment', () => this.redraw());
     this.run.addEventListener('grown', () => this.redraw());
     const seek = event => {
@@ -44,7 +44,7 @@ class Timeline extends Drawing {
       context.moveTo(34, y(probability)); context.lineTo(width - 10, y(probability));
       context.stroke();
     }
-    // The height shows the state, too, for those who cannot distinguish the colours.
+    // The height shows the state, too, for colour-blind viewers.
     const heights = { good: 12, doubt: 8, bad: 4 };
     moments.forEach((moment, i) => {
       if (!moment.state) return;
@@ -76,7 +76,7 @@ class Timeline extends Drawing {
     context.beginPath();
     context.moveTo(at, 4); context.lineTo(at, height - 6);
     context.stroke();
-    this.said.textContent = moment.probability === undefined ? this.hasProbability ? 'probability of the state' : moment.state ?? ''
+    this.readout.textContent = moment.probability === undefined ? this.hasProbability ? 'probability of the state' : moment.state ?? ''
       : `probability ${moment.probability.toFixed(2)}`;
   }
 }
