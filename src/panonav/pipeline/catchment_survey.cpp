@@ -123,10 +123,10 @@ void summarise_pairs(const std::vector<PairVector>& vectors, const CatchmentSett
   }
   for (std::size_t i = 0; i < homeward.size(); ++i) {
     if (homeward[i].pairs == 0) continue;
-    result.bins.push_back({homeward[i], errors[i].deviation()});
+    result.bins.push_back({homeward[i], errors[i].compute_deviation()});
   }
   result.pairs = all.count;
-  result.orientation_error_rad = all.deviation();
+  result.orientation_error_rad = all.compute_deviation();
   result.component = mean_homeward_component(survey, max_m + rounding_m);
 }
 

@@ -12,7 +12,7 @@ namespace panonav {
 
 namespace {
 
-std::string parameter_name(const std::string& name) {
+std::string make_parameter_name(const std::string& name) {
   return "route." + name;
 }
 
@@ -35,7 +35,7 @@ PictureSource cut_to_horizon(PictureSource pictures, const RouteSource& route) {
 RouteSource read_route_source(const MemoryFile& memory, const std::string& name, int columns) {
   RouteSource source;
   source.line.columns = columns;
-  const auto text = memory.parameter(parameter_name(name));
+  const auto text = memory.parameter(make_parameter_name(name));
   if (!text) return source;
   std::istringstream in(*text);
   std::string word;
@@ -53,8 +53,8 @@ RouteSource read_route_source(const MemoryFile& memory, const std::string& name,
     }
   }
   if (!good) {
-    throw FileError(memory.path().string(), "parameter " + parameter_name(name) + " is '" + *text +
-                                                "'; allowed: what a RouteRecorder writes");
+    throw FileError(memory.path().string(), "parameter " + make_parameter_name(name) + " is '" +
+                                                *text + "'; allowed: what a RouteRecorder writes");
   }
   return source;
 }
@@ -66,7 +66,7 @@ void store_route_source(MemoryFile& memory, const std::string& name, const Route
             std::to_string(source.horizon_rows->second);
   }
   if (source.from_odometry) text += " odometry";
-  memory.set_parameter(parameter_name(name), text);
+  memory.set_parameter(make_parameter_name(name), text);
 }
 
 LineEncoder::LineEncoder(const PictureSource& pictures, const RouteSource& route)

@@ -369,7 +369,7 @@ std::vector<std::string> MemoryFile::route_names() const {
 
 VisualMemory MemoryFile::load() const {
   return implementation_->read([&](MemoryTables& tables) {
-    VisualMemory memory = implementation_->empty_memory();
+    VisualMemory memory = implementation_->make_empty_memory();
     try {
       tables.read_views([&](const ViewRow& row) { implementation_->append_row(row, memory); });
       tables.read_links([&](const LinkRow& row) { memory.link(tables.checked(row)); });
@@ -385,7 +385,7 @@ VisualMemory MemoryFile::load(std::span<const ViewId> views) const {
     require(views[i - 1] < views[i], "views", static_cast<double>(views[i].value), "ascending");
   }
   return implementation_->read([&](MemoryTables& tables) {
-    VisualMemory memory = implementation_->empty_memory();
+    VisualMemory memory = implementation_->make_empty_memory();
     tables.read_views(views, [&](const ViewRow& row) {
       try {
         implementation_->append_row(row, memory);
