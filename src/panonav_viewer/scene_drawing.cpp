@@ -89,7 +89,7 @@ std::vector<MapLayer> scene_layers(const simulation::Scene& scene) {
   constexpr double around_m = 3.0;    // far trees would make the floor a spot
   constexpr std::size_t max_bodies = 30;
   MapLayer walls{.label = "walls", .colour = PlotColour::dark_grey};
-  MapLayer objects{.label = "furniture and other things", .colour = PlotColour::grey};
+  MapLayer furniture{.label = "furniture and other things", .colour = PlotColour::grey};
   const auto is_near = [&](const std::vector<Point2>& points) {
     return std::ranges::any_of(points, [&](const Point2& p) {
       return p.x_m > scene.floor_low.x_m - around_m && p.x_m < scene.floor_high.x_m + around_m &&
@@ -131,14 +131,14 @@ std::vector<MapLayer> scene_layers(const simulation::Scene& scene) {
       } else if (outline.size() == 2) {
         thin.push_back(outline);
       } else {
-        objects.filled_polygons.push_back(outline);
+        furniture.filled_polygons.push_back(outline);
         ++solid;
       }
     }
     // A screen or a wall; not the faces of a shelf.
     if (solid == 0) walls.lines.insert(walls.lines.end(), thin.begin(), thin.end());
   }
-  return {objects, walls};
+  return {furniture, walls};
 }
 
 std::vector<std::vector<Point2>> scene_outlines(const simulation::Scene& scene) {
