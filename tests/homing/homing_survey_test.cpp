@@ -132,7 +132,7 @@ TEST(HomingSurvey, NoStepLeadsOverAGapAndStagesGoOnWhereTheLastStopped) {
   const std::vector<Pose2> goals{{0.0, 0.0, 0.0}};
   HomingSurveyOptions options{.max_step_m = 0.025};
   Executor executor(1);
-  // The first stage stops 2 spacings before the goal, the second goes on to it.
+  // The first stage stops 2 spacings before the goal, the second continues to it.
   const auto survey_until = [&](double stop_m) {
     return survey_homing(
         goals, places,
@@ -161,10 +161,10 @@ TEST(HomingSurvey, SameBitsOnAnyNumberOfThreads) {
   };
   Executor one(1);
   Executor two(2);
-  double told = 0.0;
-  const auto a = survey_homing(poses, poses, rule, {}, one, [&](double done) { told = done; });
+  double reported = 0.0;
+  const auto a = survey_homing(poses, poses, rule, {}, one, [&](double done) { reported = done; });
   const auto b = survey_homing(poses, poses, rule, {}, two);
-  EXPECT_EQ(told, 1.0);
+  EXPECT_EQ(reported, 1.0);
   EXPECT_EQ(a.next, b.next);
   EXPECT_EQ(mean_homeward_component(a, 0.2), mean_homeward_component(b, 0.2));
 }

@@ -228,10 +228,10 @@ TEST(MemoryUpdate, SameRunGivesTheSameChangesAndHoldsAFewPicturesOnly) {
   for (int i = 0; i < 500; ++i) {
     update.add({Pose2{0.2 * i, 0.0, 0.0}, view, 0.0, std::nullopt, std::nullopt});
   }
-  int wanted = 0;
-  for (std::size_t i = 0; i < 500; ++i) wanted += update.can_become_view(i) ? 1 : 0;
-  EXPECT_GT(wanted, 0);
-  EXPECT_LE(wanted, 65);
+  int candidates = 0;
+  for (std::size_t i = 0; i < 500; ++i) candidates += update.can_become_view(i) ? 1 : 0;
+  EXPECT_GT(candidates, 0);
+  EXPECT_LE(candidates, 65);
   EXPECT_THROW(MemoryUpdate(ranking, learn_observation_model(ranking), {}, {.appearances = 0}),
                OptionError);
 }

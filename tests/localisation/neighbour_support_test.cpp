@@ -23,7 +23,7 @@ TEST(NeighbourSupport, NeighboursOfAGridAreTheEightAround) {
       EXPECT_NE(other, view);
       EXPECT_LE(distance(place.memory.info(other).pose->position(), at), 0.5 * 1.5);
     }
-    // By brute force.
+    // Compares all by brute force.
     const auto near = std::ranges::count_if(place.memory.views(), [&](ViewId other) {
       return other != view && distance(place.memory.info(other).pose->position(), at) <= 0.75;
     });

@@ -28,10 +28,10 @@ TEST(MoveParticles, MovesThemAsTheSamplerOneByOne) {
       Random second(count);
       move_particles(moved, sampler, first);
       for (std::size_t i = 0; i < count; ++i) {
-        const Pose2 wanted = sampler.move(particles.pose(i), second);
-        ASSERT_NEAR(moved.x_m[i], wanted.x_m, 1e-6);
-        ASSERT_NEAR(moved.y_m[i], wanted.y_m, 1e-6);
-        ASSERT_NEAR(angle_difference(moved.heading_rad[i], wanted.heading_rad), 0.0, 1e-6);
+        const Pose2 expected = sampler.move(particles.pose(i), second);
+        ASSERT_NEAR(moved.x_m[i], expected.x_m, 1e-6);
+        ASSERT_NEAR(moved.y_m[i], expected.y_m, 1e-6);
+        ASSERT_NEAR(angle_difference(moved.heading_rad[i], expected.heading_rad), 0.0, 1e-6);
         ASSERT_GE(moved.heading_rad[i], -std::numbers::pi);
         ASSERT_LT(moved.heading_rad[i], std::numbers::pi);
         ASSERT_EQ(moved.weight[i], 0.5);

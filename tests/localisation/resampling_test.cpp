@@ -37,22 +37,22 @@ TEST(LowVarianceResample, TakesEachAsOftenAsItsShareUpToOne) {
     EXPECT_TRUE(std::ranges::is_sorted(survivors));
     for (std::size_t i = 0; i < weights.size(); ++i) {
       const double share = static_cast<double>(count) * weights[i] / sum;
-      const auto taken = static_cast<double>(std::ranges::count(survivors, i));
-      EXPECT_GE(taken, std::floor(share - 1e-9));
-      EXPECT_LE(taken, std::ceil(share + 1e-9));
+      const auto draws = static_cast<double>(std::ranges::count(survivors, i));
+      EXPECT_GE(draws, std::floor(share - 1e-9));
+      EXPECT_LE(draws, std::ceil(share + 1e-9));
     }
   }
 }
 
 TEST(LowVarianceResample, IsRightOnAverage) {
   const std::vector<double> weights{0.05, 0.6, 0.35};
-  std::vector<double> taken(3);
+  std::vector<double> counts(3);
   constexpr int trials = 20000;
   Random random(4);
   for (int trial = 0; trial < trials; ++trial) {
-    for (const std::size_t i : resample_systematically(weights, 2, random)) taken[i] += 1.0;
+    for (const std::size_t i : resample_systematically(weights, 2, random)) counts[i] += 1.0;
   }
-  for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(taken[i] / (2.0 * trials), weights[i], 0.01);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(counts[i] / (2.0 * trials), weights[i], 0.01);
 }
 
 TEST(LowVarianceResample, RefusesWeightsThatAreNone) {

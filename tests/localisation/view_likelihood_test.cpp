@@ -129,13 +129,13 @@ TEST(ViewLikelihood, ManyParticlesGetWhatEachGetsAlone) {
   particles.add({1e300, -1e300, 0.0}, 1.0);
   std::vector<double> ratios(particles.size());
   likelihood.compute_log_ratios(particles, ratios);
-  double most = 0.0;
+  double highest = 0.0;
   for (std::size_t i = 0; i < particles.size(); ++i) {
     EXPECT_EQ(ratios[i], log_ratio(likelihood, particles.pose(i)));
     EXPECT_GE(ratios[i], 0.0);
-    most = std::max(most, ratios[i]);
+    highest = std::max(highest, ratios[i]);
   }
-  EXPECT_GT(most, 0.0);
+  EXPECT_GT(highest, 0.0);
   EXPECT_EQ(ratios.back(), 0.0);
 
   // In another order they are the same particles, and those of one cell follow each other.

@@ -76,7 +76,7 @@ TEST(GroundDisplacement, LevelGroundTellsTheWayInCameraHeights) {
     for (const double direction : {0.0, 1.2, -2.5}) {
       const Pose2 motion{0.12 * std::cos(direction), 0.12 * std::sin(direction), 0.2};
       const HomingView after = homing_view(plain.seen_from(earlier * motion));
-      // From a start that is a quarter too short.
+      // The start is a quarter too short.
       const double start = 0.75 / height_m;
       const auto found = ground_displacement(
           before, after, {start * motion.x_m, start * motion.y_m, motion.heading_rad});

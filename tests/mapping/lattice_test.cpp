@@ -18,7 +18,7 @@
 namespace panonav::testing {
 namespace {
 
-constexpr RoomKind kRoom{.width_m = 6.0, .depth_m = 5.0, .boxes = 3, .contrast = 0.2};
+constexpr RoomKind room_kind{.width_m = 6.0, .depth_m = 5.0, .boxes = 3, .contrast = 0.2};
 
 /// A memory of every free place of a grid in the middle of a room, in random headings.
 struct Place {
@@ -26,7 +26,8 @@ struct Place {
   std::vector<Pose2> poses;
   VisualMemory memory;
 
-  Place(std::uint64_t seed, double step_m) : room(seed, kRoom), memory(remember(seed, step_m)) {}
+  Place(std::uint64_t seed, double step_m)
+      : room(seed, room_kind), memory(remember(seed, step_m)) {}
 
  private:
   VisualMemory remember(std::uint64_t seed, double step_m) {
@@ -227,8 +228,8 @@ TEST(Lattice, CoarseMotionGivesMetres) {
 }
 
 TEST(Lattice, DisconnectedGroupsStayParts) {
-  const Room one(21, kRoom);
-  const Room other(22, kRoom);
+  const Room one(21, room_kind);
+  const Room other(22, room_kind);
   std::vector<FourierSignature> signatures;
   std::vector<int> room_of;
   for (const auto& [room, number] : {std::pair{&one, 0}, std::pair{&other, 1}}) {
@@ -247,7 +248,7 @@ TEST(Lattice, DisconnectedGroupsStayParts) {
 }
 
 TEST(Lattice, DegenerateMemories) {
-  const Room room(31, kRoom);
+  const Room room(31, room_kind);
   const VisualMemory none({24, 15}, 1.0F, std::nullopt);
   EXPECT_TRUE(arrange(none).nodes.empty());
 
@@ -278,7 +279,7 @@ TEST(Lattice, DegenerateMemories) {
 }
 
 TEST(Lattice, AViewTwiceLiesAtOnePlace) {
-  const Room room(32, kRoom);
+  const Room room(32, room_kind);
   std::vector<FourierSignature> signatures;
   for (const Point2 p : inner_grid(room, 0.4))
     signatures.push_back(seen(room, {p.x_m, p.y_m, 0.0}));

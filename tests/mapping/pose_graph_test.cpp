@@ -38,7 +38,7 @@ struct Graph {
   std::vector<PoseEdge> edges;
 };
 
-// What a robot with noisy odometry knows of it.
+// The edges that a robot with noisy odometry gives.
 Graph driven(const std::vector<Pose2>& truth, std::uint64_t seed) {
   Graph graph{{truth.front()}, {}};
   Random random(seed);

@@ -18,7 +18,7 @@
 namespace panonav::testing {
 namespace {
 
-// What the lines show does not matter here.
+// The lines do not matter here.
 constexpr KnownRouteOptions unlearnt{.tracker = {.min_correlation = 0.5}};
 
 RoutePanorama blank_route(const std::vector<Pose2>& path) {
@@ -117,7 +117,7 @@ TEST(KnownRoute, EndsWhereTheWayGoesAcross) {
   EXPECT_DOUBLE_EQ(whole->to_m, 10.0);
 }
 
-// Of several rounds the one that needs no other is taken, in the direction of the way.
+// Several rounds: the one that needs no other is followed, in the direction of the path.
 TEST(KnownRoute, GoesAlongTheRoundThatIsNearest) {
   std::vector<Pose2> path;
   std::vector<KnownRoute::View> views;

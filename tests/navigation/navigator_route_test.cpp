@@ -134,7 +134,7 @@ TEST(NavigatorOnARoute, RepeatsItTowardsGoalsAtBothEndsAndArrives) {
       if (!decision.on_route) continue;
       EXPECT_FALSE(decision.homing);
       EXPECT_TRUE(contains(describe(decision), "along a route"));
-      // From the first half metre on it is on the way that was driven.
+      // After half a metre it is on the path that was driven.
       const double off_m = world().off_m(run.path[i].position());
       EXPECT_LT(off_m, steps > 3 ? 0.1 : beside_m) << "step " << i + 1;
     }

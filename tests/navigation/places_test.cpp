@@ -1,4 +1,4 @@
-// What the navigator is made of: scales of similarity, views by area, obstacles, graphs from views.
+// Parts of the navigator: scales of similarity, views by area, obstacles, graphs from views.
 
 #include <gtest/gtest.h>
 
@@ -61,10 +61,10 @@ TEST(NavigationGraph, PhasesAloneTellDirections) {
   Executor executor(1);
   const NavigationGraph graph = graph_of_memory(grid.memory, executor);
   ASSERT_EQ(graph.edges().size(), grid.memory.links().size());
-  std::size_t told = 0;
+  std::size_t counted = 0;
   for (const NavigationGraph::Edge& edge : graph.edges()) {
     if (!edge.a_from_b) continue;
-    ++told;
+    ++counted;
     const Pose2 truth = inverse(grid.poses[edge.a.value]) * grid.poses[edge.b.value];
     EXPECT_LT(std::abs(angle_difference(std::atan2(edge.a_from_b->y_m, edge.a_from_b->x_m),
                                         std::atan2(truth.y_m, truth.x_m))),
@@ -72,7 +72,7 @@ TEST(NavigationGraph, PhasesAloneTellDirections) {
     EXPECT_LT(std::abs(angle_difference(edge.a_from_b->heading_rad, truth.heading_rad)),
               radians(15.0));
   }
-  EXPECT_GT(told, graph.edges().size() * 9 / 10);
+  EXPECT_GT(counted, graph.edges().size() * 9 / 10);
   Executor two(2);
   const NavigationGraph again = graph_of_memory(grid.memory, two);
   EXPECT_TRUE(std::ranges::equal(graph.edges(), again.edges()));
@@ -230,7 +230,7 @@ TEST(NavigationGraph, LeavesOutEdgesToPlacesThatLookAlike) {
   EXPECT_TRUE(has_edge(graph, alike, alike + columns));
 }
 
-// What is left out for that comes back where nothing else joins two components.
+// Edges that are left out for that come back where nothing else joins two components.
 TEST(NavigationGraph, KeepsTheOnlyEdgeBetweenTwoParts) {
   constexpr std::size_t side = 6;
   Lattice lattice = exact_grid(side, 2 * side);

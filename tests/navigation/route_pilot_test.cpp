@@ -82,7 +82,7 @@ TEST(RoutePilot, DrivesToTheEndOfTheWayInBothDirections) {
       const Pose2 moved = robot.go(*pilot.target());
       pilot.track(route.room.line(robot.pose), moved);
       EXPECT_EQ(pilot.unknown_steps(), 0);
-      // From the first half metre on it is on the route.
+      // After half a metre it is on the route.
       if (steps > 2) {
         EXPECT_LT(std::abs(project_onto_route(route.path, robot.pose.position()).lateral_m), 0.05);
       }

@@ -24,7 +24,7 @@ HeadingWindow heading_window(double middle_rad, double half_width_rad) {
 
 constexpr ElevationBand band{-0.6, 0.6};
 
-// What stands on a cylinder of radius 1 m around the place of the home view.
+// Texture on a cylinder of radius 1 m around the place of the home view.
 ToyWorld random_surroundings(std::uint64_t seed, double height_rate = 0.0) {
   Random random(seed);
   std::vector<CylinderWave> waves;
@@ -203,7 +203,7 @@ TEST(FourierHoming, IterationsExplainAFarViewBetter) {
   EXPECT_LT(length_often, length_once);
 }
 
-// What a robot sees that pitches: the direction u comes from u - omega x u.
+// View of a robot that pitches: the direction u comes from u - omega x u.
 Panorama tilted_panorama(const Panorama& level, double tilt) {
   Panorama result = level;
   const double row_rad = (band.top_rad - band.bottom_rad) / level.rows();

@@ -74,7 +74,7 @@ TEST(RelativeTilt, IsFoundWhateverTheHeading) {
     const Tilt found = relative_tilt(home, current, -heading + radians(4.0));
     largest_error = std::max({largest_error, std::abs(found.roll_rad - tilt.roll_rad),
                               std::abs(found.pitch_rad - tilt.pitch_rad)});
-    // What is left of the difference.
+    // The remaining difference.
     const HomingView level = rotate(level_view(current, found), -heading);
     double before = 0.0;
     double after = 0.0;

@@ -42,12 +42,12 @@ TEST(HorizonScanline, LiesBetweenRowsWhereTheHorizonDoes) {
 
 TEST(HorizonScanline, KeepsAzimuthsAtAnyNumberOfColumns) {
   for (const int columns : {90, 128, 360, 512, 720}) {
-    for (const int wanted : {90, 360, 1000}) {
+    for (const int samples : {90, 360, 1000}) {
       const auto panorama = wave(3, columns, std::nullopt);
-      const auto line = horizon_scanline(panorama, {.columns = wanted});
-      ASSERT_EQ(line.size(), static_cast<std::size_t>(wanted));
-      for (int c = 0; c < wanted; ++c) {
-        EXPECT_NEAR(line[c], 0.01 + 0.2 * std::sin(2.0 * std::numbers::pi * 3.0 * c / wanted),
+      const auto line = horizon_scanline(panorama, {.columns = samples});
+      ASSERT_EQ(line.size(), static_cast<std::size_t>(samples));
+      for (int c = 0; c < samples; ++c) {
+        EXPECT_NEAR(line[c], 0.01 + 0.2 * std::sin(2.0 * std::numbers::pi * 3.0 * c / samples),
                     0.012);
       }
     }

@@ -67,7 +67,7 @@ TEST(RouteChanges, UnchangedRoomsShowNothingAndAMovedPillarIsNamedWhereItStands)
   EXPECT_GE(rooms_with_change, 7);
 }
 
-// What lies between two lines is interpolated: pictures from one gap share its error.
+// Pictures between two lines are interpolated: pictures from one gap share its error.
 TEST(RouteChanges, PicturesNearestToTheSameLineCountOnce) {
   std::vector<Pose2> line_poses;
   for (int i = 0; i < 12; ++i) line_poses.push_back({0.1 * i, 0.0, 0.0});

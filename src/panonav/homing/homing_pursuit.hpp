@@ -8,7 +8,7 @@
 
 namespace panonav {
 
-/// How a run home goes, and when it ends.
+/// Options of a run home.
 struct HomingPursuitOptions {
   /// Which frequencies count at which stage.
   enum class Strategy {

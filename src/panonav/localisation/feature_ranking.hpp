@@ -31,7 +31,7 @@ inline constexpr int verified_candidates = 24;
 void rank_by_verified_features(const LocalFeatures& query, const FeatureSource& features,
                                std::vector<RankedMatch>& ranked);
 
-/// How well local features find the places of a memory, by views left out in turn.
+/// Statistics of how well local features find the places of a memory, by views left out in turn.
 struct FeatureTrial {
   int sampled_views = 0;   ///< left out in turn, at most 100
   int columns_right = 0;   ///< best match within 1.5 times the distance of the nearest view

@@ -47,19 +47,14 @@ class Localiser {
   /// Learnt at construction, or as passed to the constructor.
   [[nodiscard]] const PositionModel& position_model() const noexcept { return position_model_; }
 
-  /// Topological localisation. The exact search finds the views of least dissimilarity; comparing
-  /// columns orders them. When the best of them differs more than neighbouring views of the memory
-  /// do, a part of the view may be hidden, which changes the dissimilarity: then up to
-  /// `reranked_views` views are compared. Between places that look alike the references around each
-  /// decide (`NeighbourSupport`). The visual compass, near the rotation at which the columns fit,
-  /// gives the heading relative to each match. Then follow whether the place is known, the position
-  /// between the references [M04 footnote 1] and the absolute heading: the weighted mean over the
-  /// four nearest references, so that the opposite parallaxes of references on opposite sides
-  /// cancel. Throws ContractError on a query of another shape, and where the memory is not held.
-  /// Cost: one exact search and about 0.2 ms; 3 ms and a second search when 1000 views are
-  /// compared; 2 ms more where features decide between matches, 3 ms where columns are
-  /// inconclusive, 4 ms for both. `features`: makes those of the query where they are needed, each
-  /// at most once; empty: they do not count.
+  /// Topological localisation. The exact search finds the views of smallest dissimilarity;
+  /// comparing columns orders them, up to `reranked_views` of them if a part of the view may be
+  /// hidden. Between places that look alike the references around each decide (`NeighbourSupport`).
+  /// The visual compass gives the heading relative to each match. Then follow whether the place is
+  /// known, the position between references [M04 footnote 1] and the absolute heading. `features`:
+  /// makes those of the query, at most once; empty: they do not count. Throws ContractError on a
+  /// query of another shape, and if the memory is not held. Cost: one exact search and 0.2 ms; 3 ms
+  /// and a second search for 1000 views; 2 to 4 ms with features.
   [[nodiscard]] Place localise(const PackedSignature& query, const SearchMask& mask = {},
                                const QueryFeatures& features = {}) const;
   /// Localises by an index of the memory. Of a memory that is not held, it loads the views that the

@@ -4,7 +4,7 @@
 
 namespace panonav {
 
-/// How much a localisation compares and lists.
+/// Number of views that a localisation compares and lists.
 struct LocaliserOptions {
   int top = 10;        ///< matches listed
   int components = 0;  ///< Fourier components compared, 0 for all

@@ -16,7 +16,7 @@ namespace panonav {
 
 struct PoseWitness;
 
-/// How many views a memory may keep, and when one is forgotten.
+/// Limits of a memory: the views it may keep, and when one is forgotten.
 struct MemoryUpdateOptions {
   int appearances = 3;  ///< views of one place, at most
   int failures = 10;    ///< runs in a row in which a view failed before it is forgotten
@@ -24,9 +24,10 @@ struct MemoryUpdateOptions {
 };
 void visit_options(MemoryUpdateOptions& options, OptionVisitor& visitor);
 
-/// What updates of a memory know of earlier runs. Plain numbers, to be stored with the memory.
+/// Knowledge of earlier runs that updates of a memory need. Plain numbers, to be stored with the
+/// memory.
 struct MemoryUse {
-  /// How useful a view has been.
+  /// Usefulness of one view so far.
   struct View {
     int matched = 0;   ///< runs in which it explained the robot's view at its place
     int failed = 0;    ///< runs in a row in which another view of the place did, but not this one
@@ -47,23 +48,18 @@ struct MemoryUse {
   friend bool operator==(const MemoryUse&, const MemoryUse&) = default;
 };
 
-/// Decides what a robot's run through its memory's places changes there, so that the memory stays
-/// true while the places change. Where the robot certainly was (`find_witnessed_pose`), the
-/// references around are compared with its view:
-/// - one that explains the view is reinforced;
-/// - one that does not while another does has failed;
-/// - where none does, the view is added as another appearance of the place, one a run at most;
-///   where one does but the answer to this image was unsure or wrong, only if there is room. Of
-///   more than `appearances` within half a spacing the least useful one is replaced: one that never
-///   matched since it was learnt, else the one that failed in most runs in a row, else the one that
-///   matched longest ago.
-/// A view that failed in `failures` runs in a row is forgotten. A place keeps at least one view,
-/// and the memory never has more than `max_views`.
+/// Decides which changes a run through the places of a memory makes there. Where the robot
+/// certainly was (`find_witnessed_pose`), the references around are compared with its view; one
+/// explains it if their similarity is at least half of that expected at their distance
+/// (`ObservationModel`).
+/// - A reference that explains the view is reinforced; one that does not while another does has
+///   failed, and is forgotten after `failures` runs in a row.
+/// - If none does, the view is added, one a run at most. Of more than `appearances` the least
+///   useful is replaced.
+/// - A place keeps at least one view.
 ///
-/// A view at distance d from a reference is explained if their similarity (`ObservationModel`) is
-/// at least half of the one expected there before the first update. Cost: a comparison with each
-/// reference around, 10 microseconds each. Holds at most 128 images of the run. Same run: same
-/// changes.
+/// Cost: 10 microseconds for each reference around. Holds at most 128 images of the run. Same run:
+/// same changes.
 class MemoryUpdate {
  public:
   /// One image of a run, as a `Localiser` answered it by the memory at the beginning of the run.
@@ -75,7 +71,7 @@ class MemoryUpdate {
     std::optional<double> radius_m;  ///< of 95 %, of the position
   };
 
-  /// What a run changes in its memory.
+  /// Changes that a run makes in its memory.
   struct Changes {
     /// An image of the run that becomes a view.
     struct Added {

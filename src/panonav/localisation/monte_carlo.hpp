@@ -17,7 +17,7 @@
 
 namespace panonav {
 
-/// How many particles there are, and how they are weighed and renewed.
+/// Options of the filter: its particles, and how they are weighed and renewed.
 struct MonteCarloOptions {
   /// Particle injection: how many particles are replaced at each image, so that a kidnapped robot
   /// is found again, and where the new ones are drawn.
@@ -37,7 +37,7 @@ struct MonteCarloOptions {
 };
 void visit_options(MonteCarloOptions& options, OptionVisitor& visitor);
 
-/// What a filter knows of the robot's place.
+/// Estimate of the robot's place, and the particles behind it.
 enum class LocalisationState {
   localised,  ///< one mode, no wider than the references' spacing resolves, explains the views
   ambiguous,  ///< the views are of this memory, but several places or a large area explain them
@@ -124,7 +124,7 @@ class MonteCarloLocaliser {
 
   /// The hypotheses after the last step.
   [[nodiscard]] const Particles& particles() const noexcept;
-  /// How similar this memory's views are at a distance.
+  /// Similarity of this memory's views by their distance.
   [[nodiscard]] const ObservationModel& model() const noexcept;
 
  private:

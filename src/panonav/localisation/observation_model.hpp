@@ -5,7 +5,7 @@
 
 namespace panonav {
 
-/// How similar views are at a distance in one memory, and how well that determines a position.
+/// Similarity of the views of one memory by their distance, and how well it determines a position.
 /// Plain numbers, learnt from the memory's posed views, to be stored with it.
 ///
 /// The similarity of two views is far_difference^2 - difference^2 (`ColumnMatch`), never below 0. A

@@ -76,7 +76,7 @@ struct PositionEstimate {
   /// Holds the true position in 95 % of the cases; nullopt when nothing could be learnt.
   std::optional<double> radius_m;
   std::vector<Share> shares;                                    ///< nearest first
-  [[nodiscard]] Point2 position() const { return {x_m, y_m}; }  ///< As a point.
+  [[nodiscard]] Point2 position() const { return {x_m, y_m}; }  ///< The position as a point.
 };
 
 /// The answer to one query: where the robot is, as far as one view shows.

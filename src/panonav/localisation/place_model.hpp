@@ -13,10 +13,10 @@
 
 namespace panonav {
 
-/// How views of one memory differ (`ColumnMatch`), learnt from it: above which difference the
-/// nearest views do not explain a query (`neighbouring`), and up to which a view counts as
-/// explained when nothing else is known of it (`threshold`). Plain numbers, to be stored with the
-/// memory.
+/// Distribution of the differences of views of one memory (`ColumnMatch`), learnt from it: above
+/// which difference the nearest views do not explain a query (`neighbouring`), and up to which a
+/// view counts as explained when nothing else is known of it (`threshold`). Plain numbers, to be
+/// stored with the memory.
 struct PlaceModel {
   /// Places that have nothing in common differ by at least this in scenes of all kinds
   /// (docs/decisions.md): the threshold is never above it.
@@ -41,19 +41,17 @@ struct PlaceModel {
   friend bool operator==(const PlaceModel&, const PlaceModel&) = default;
 };
 
-/// Learns from the memory itself; no other scene and no label is needed.
+/// Learns the model from the memory itself; no other scene and no label is needed.
 ///
-/// A view mirrored left to right shows a place that does not exist, with all the brightness, edges
-/// and textures of this memory: the difference that its best match reaches by chance, a place
-/// elsewhere reaches too. A query between the references is nearer to one of them than they are to
-/// each other. So the threshold lies in the middle between the medians of views of the memory among
-/// all others and of mirrored ones. In a place that is its own mirror image, a corridor, mirrored
-/// views do find their match, and this shows nothing; therefore the threshold is at least
-/// `related_share` of the median difference between arbitrary views, as far as that stays below
-/// `unrelated_difference` and, where positions are known, below `beside`.
+/// A view mirrored left to right shows a place that does not exist: the difference that its best
+/// match reaches by chance, a place elsewhere reaches too. The threshold is the middle between the
+/// medians of views among all others and of mirrored ones. In a corridor mirrored views do find
+/// their match; therefore it is at least `related_share` of the median difference between any
+/// views, as far as that stays below `unrelated_difference` and, where positions are known,
+/// `beside`.
 ///
-/// Throws OptionError. Cost: two comparisons of columns for each pair of a sampled and a compared
-/// view: 0.2 s for the defaults and a memory of 1000 views.
+/// Throws OptionError. Cost: two comparisons of columns for each pair of views: 0.2 s for the
+/// defaults and a memory of 1000 views.
 [[nodiscard]] PlaceModel learn_place_model(const ColumnRanking& ranking,
                                            const LearningOptions& options = {.sampled_views = 40});
 

@@ -9,7 +9,7 @@
 
 namespace panonav {
 
-/// How positions follow from differences of views in one memory; learnt from its posed views by
+/// Model of positions by differences of views in one memory; learnt from its posed views by
 /// leaving one out. Plain numbers, to be stored with the memory.
 struct PositionModel {
   /// Smallest number of posed views to learn from.
@@ -43,29 +43,25 @@ struct PositionModel {
   friend bool operator==(const PositionModel&, const PositionModel&) = default;
 };
 
-/// Learns the neighbourhood and the exponent that place the views of the memory best when each is
-/// left out in turn, and then how large a radius holds 95 % of the errors of those that were found
-/// near their place. Where more than 1 of 40 was found elsewhere, in a place that looks alike,
-/// those are recognised by how little better they match than elsewhere, and have a radius of their
-/// own. With a view its double at each place that looks alike is left out: a query is as far from
-/// the references there as from its own. Views left out are farther from the other references than
-/// queries between the references are, so the radius rather holds too many than too few. Throws
-/// OptionError. Cost: `sampled_views` searches and about 1 ms for each.
+/// Learns the neighbourhood and the exponent that locate the views of the memory best when each is
+/// left out in turn, and then the radius that holds 95 % of the errors of those found near their
+/// place. If more than 1 of 40 was found elsewhere, in a place that looks alike, those are
+/// recognised by how little better they match than elsewhere, and have a radius of their own. Views
+/// left out are farther from the other references than queries are, so the radius rather holds too
+/// many. Throws OptionError. Cost: `sampled_views` searches and about 1 ms for each.
 [[nodiscard]] PositionModel learn_position_model(const ColumnRanking& ranking,
                                                  const LearningOptions& options = {
                                                      .sampled_views = 200});
 
 /// Ordinary kriging in the space of the views: the position is the weighted mean of the
-/// neighbouring references' positions whose expected squared error is smallest, when half the mean
+/// neighbouring references' positions whose expected squared error is smallest, if half the mean
 /// square distance between two places grows as the square of their views' difference
-/// (`ColumnMatch`) to the power of the exponent. References that show the same share their weight,
-/// and at a memorised view the result is that view's position. [M04 section 2.2: dissimilarity
-/// grows linearly with distance at short range; so does the squared difference.]
+/// (`ColumnMatch`) to the power of the exponent [cf. M04 section 2.2]. At a memorised view the
+/// result is that view's position.
 ///
 /// `matches`: the best first, over as many components as the model was learnt over; views without a
-/// pose and views far from the best one, which only look alike, are left out. nullopt when the best
-/// view has no pose. Cost: 240 comparisons of columns and a dense solution of at most 17 unknowns,
-/// 0.7 ms.
+/// pose and views far from the best one are left out. nullopt if the best view has no pose. Cost:
+/// 240 comparisons of columns and a dense solution, 0.7 ms.
 [[nodiscard]] std::optional<PositionEstimate> interpolate_position(
     const ColumnRanking& ranking, const PositionModel& model, std::span<const RankedMatch> matches);
 

@@ -9,7 +9,7 @@
 
 namespace panonav {
 
-/// How many views a model is learnt from.
+/// Number of views that a model is learnt from.
 struct LearningOptions {
   int sampled_views = 100;    ///< left out in turn; all of smaller memories
   int compared_views = 1000;  ///< with which each is compared; all of smaller memories

@@ -73,7 +73,7 @@ DissimilarityCurve::DissimilarityCurve(std::span<const DissimilarityCurve::Sampl
     return a.dissimilarity != b.dissimilarity ? a.dissimilarity < b.dissimilarity
                                               : a.distance < b.distance;
   });
-  // As many groups as the pairs allow: the deviation of a group's mean and its place on the axis
+  // The pairs limit the number of groups: the deviation of a group's mean and its place on the axis
   // shrink alike.
   const std::size_t count = std::clamp<std::size_t>(
       static_cast<std::size_t>(std::sqrt(static_cast<double>(sorted.size()))), 1, 40);

@@ -316,7 +316,7 @@ void visit_options(LatticeOptions& options, OptionVisitor& visitor) {
       option<&T::components>("Fourier components compared, 0 for all", 0),
       option<&T::phases>("take directions and headings from phases"),
       option<&T::landmarks>("views from which the initial arrangement is made", 3, 2000),
-      option<&T::rounds>("times that curve and springs are made anew from the arrangement", 1, 20),
+      option<&T::rounds>("times that curve and springs are made again from the arrangement", 1, 20),
   };
   table.visit(options, visitor);
 }

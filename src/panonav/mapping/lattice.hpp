@@ -16,7 +16,7 @@
 
 namespace panonav {
 
-/// How the arrangement is made.
+/// Options of an arrangement.
 struct LatticeOptions {
   int neighbours = 12;  ///< springs from each view to the most similar ones
   int components = 0;   ///< of the signatures; 0 takes all
@@ -106,30 +106,16 @@ struct Lattice {
 using LatticeWatch =
     std::function<void(std::span<const Pose2> poses, std::span<const std::size_t> components)>;
 
-/// Arranges the views of a memory, in any order, by their similarity alone [M04 section 3], without
-/// poses of the memory.
+/// Arranges the views of a memory by their similarity alone [M04 section 3], without poses of it:
+/// 1. Each view gets springs to its `neighbours` most similar views.
+/// 2. With phases and no motion, components grow from the most certain springs.
+/// 3. Otherwise multidimensional scaling starts and the energy of the springs is minimised.
+/// 4. The curve from dissimilarity to distance is fitted, views near each other get springs, and 2
+///    or 3 are repeated, `rounds` times in all.
 ///
-/// 1. Each view gets springs to its `neighbours` most similar views, so cost grows with the views
-///    and not with their pairs.
-/// 2. With phases, both views of a spring give direction and turn of the other one. Pairs that
-///    disagree by more than 45 degrees are unrelated and get no spring. Without motion, connected
-///    components then grow from the most certain springs, without those that contradict
-///    (internal/lattice_growth.hpp); in each round views near each other are measured, too.
-///    Components that nothing certain joins stay apart.
-/// 3. Otherwise pairs of whose triangles with third views not more than half close get no spring,
-///    and the start is deterministic: multidimensional scaling of the shortest paths along the
-///    springs. Directions distinguish a mirror image; without phases it cannot be distinguished.
-/// 4. There the energy of springs and, with phases, of directions and turns is minimised; outliers
-///    are rejected (internal/lattice_solver.hpp).
-/// 5. The curve from dissimilarity to distance is fitted to the arrangement, pairs beyond its range
-///    are left out, views near each other get springs too, and 3 or 4 are repeated, `rounds` times
-///    in all.
-///
-/// `motion` [M04 section 3.4]: any number of motions of the robot between views. Views that they
-/// connect are laid out by them first, and similarity gives consistent springs only, so that places
-/// that look alike are not confused. Motions make the map metric. Throws OptionError, and
-/// ContractError on a motion with an unknown view or numbers that are not finite. The same input
-/// gives the same bits on any number of threads, watched or not.
+/// `motion` [M04 section 3.4]: motions of the robot between views. It makes the map metric;
+/// similarity then gives consistent springs only. Throws OptionError; ContractError on a motion
+/// with an unknown view or numbers that are not finite. Same bits on any number of threads.
 [[nodiscard]] Lattice arrange(const VisualMemory& memory, const LatticeOptions& options,
                               std::span<const CoarseMotion> motion, Executor& executor,
                               const LatticeWatch& watch = {});

@@ -14,8 +14,8 @@ namespace panonav {
 /// three, and neither all at one place.
 [[nodiscard]] bool is_comparable(std::span<const Point2> map, std::span<const Point2> truth);
 
-/// How well a map preserves neighbourhoods (Venna and Kaski 2001); 1 is perfect, chance gives about
-/// 0.5.
+/// Quality of a map by the neighbourhoods it preserves (Venna and Kaski 2001); 1 is perfect, chance
+/// gives about 0.5.
 struct NeighbourPreservation {
   double trustworthiness = 1.0;  ///< neighbours in the map are neighbours in truth
   double continuity = 1.0;       ///< neighbours in truth are neighbours in the map

@@ -81,7 +81,7 @@ std::vector<LoopClosure> find_matches(const VisualMemory& memory, const Topologi
 /// Returns the metric scale of visual displacements by the map's first edges; nullopt where none
 /// can be read. Cost: 0.3 ms an edge.
 std::optional<double> view_scale_m(const VisualMemory& memory, const TopologicalMap& map) {
-  constexpr std::size_t max_edges = 200;  // the median of so many ratios errs by a few percent
+  constexpr std::size_t max_edges = 200;  // the median of 200 ratios errs by a few percent
   const auto pose_of = [&](ViewId view) {
     return std::ranges::lower_bound(map.nodes, view, {}, &MapNode::view)->pose;
   };

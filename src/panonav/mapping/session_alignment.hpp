@@ -43,13 +43,12 @@ struct SessionAlignment {
 };
 
 /// Finds the places that two sessions have in common, by appearance alone: for each view of the
-/// second in turn, closures are searched among those of the first. Each closure
-/// gives the frame of the second map in the first; the largest set of closures that agree
-/// counts. nullopt where they are too few, or others nearly as many. All nodes of a map are in one
-/// frame. `memory` holds the views of both, as far as they have different ids; a view that is in
-/// both is a place in common by itself. Throws OptionError, ContractError on a map that `validate`
-/// refuses or whose views are not in the memory. Cost: two searches of
-/// the memory and some home vectors of 0.3 ms for each node of the second.
+/// second in turn, closures are searched among those of the first. Each gives the frame of the
+/// second map in the first; the largest set that agrees counts. nullopt if they are too few, or
+/// others nearly as many. All nodes of a map are in one frame. `memory` holds the views of both; a
+/// view that is in both is a place in common. Throws OptionError, ContractError on a map that
+/// `validate` refuses or whose views are not in the memory. Cost: two searches and some home
+/// vectors of 0.3 ms for each node of the second.
 [[nodiscard]] std::optional<SessionAlignment> align_sessions(
     const VisualMemory& memory, const TopologicalMap& first, const TopologicalMap& second,
     const SessionAlignmentOptions& options = {});

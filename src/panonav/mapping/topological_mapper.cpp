@@ -34,7 +34,8 @@ constexpr double refuted_weight = 0.1;
 /// Error of a closure in standard deviations from which on the whole map is optimised: normal
 /// errors exceed it once in 370 times.
 constexpr double max_closure_deviations = 3.0;
-/// Growth of the map, one in so many nodes, after which it is optimised again as a whole.
+/// Growth of the map, one node for each of this number, after which it is optimised again as a
+/// whole.
 constexpr std::size_t nodes_per_new_node = 100;
 
 double length(const Pose2& step) {

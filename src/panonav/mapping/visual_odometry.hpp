@@ -13,11 +13,11 @@
 
 namespace panonav {
 
-/// How a step is estimated from two views.
+/// Options of the estimate of a step from two views.
 struct VisualOdometryOptions {
-  /// How the motion between two views is estimated.
+  /// Rule by which the motion between two views is estimated.
   enum class Rule {
-    /// As published: the distance is that of the signatures [F11 eq. 2], the turn that of the
+    /// The published rule: the distance is that of the signatures [F11 eq. 2], the turn that of the
     /// compass [F11 section 3.2], and the robot goes the way it faces at the middle of the step.
     published,
     /// Ours: the home vector [S06] from the one view to the other gives direction, turn and length.
@@ -34,7 +34,7 @@ struct VisualOdometryOptions {
   /// Height of the camera above level ground; with it `VisualOdometry` and maps read lengths from
   /// the ground, in metres (`GroundLengths`). 0: not known.
   double camera_height_m = 0.0;
-  /// Of `published`: components compared for the distance (k1) and for the turn (k2); 0 takes all.
+  /// For `published`: components compared for the distance (k1) and for the turn (k2); 0 takes all.
   int distance_components = 0;
   int turn_components = 0;  ///< for the turn
   /// Refinements of the solution of `home_vector`.

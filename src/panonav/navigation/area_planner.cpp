@@ -93,15 +93,15 @@ void AreaPlanner::choose_gates(Border& border) const {
   for (const std::size_t gate : border.edges) {
     if (blocked_[gate] == 0) open.push_back(gate);
   }
-  const auto most = static_cast<std::size_t>(options_.gates_per_border);
-  if (most == 0 || open.size() <= most) {
+  const auto max_gates = static_cast<std::size_t>(options_.gates_per_border);
+  if (max_gates == 0 || open.size() <= max_gates) {
     border.gates = std::move(open);
     return;
   }
   border.gates.clear();
   std::vector<double> nearest(open.size(), unreachable);
   std::size_t next = 0;
-  while (border.gates.size() < most) {
+  while (border.gates.size() < max_gates) {
     border.gates.push_back(open[next]);
     const auto guides = search_from(border.low, ends_of(open[next], border.low).first);
     nearest[next] = -1.0;  // chosen

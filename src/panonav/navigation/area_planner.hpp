@@ -14,7 +14,7 @@
 
 namespace panonav {
 
-/// How areas are made, and how plans lead over them.
+/// Options of areas and of plans over them.
 struct PlannerOptions {
   FieldOptions field;    ///< of the directions within an area
   SubAreaOptions areas;  ///< of the areas' size
@@ -35,7 +35,7 @@ class AreaPlanner {
   /// Plans over areas made before. Throws ContractError when they are not those of this graph.
   AreaPlanner(NavigationGraph graph, SubAreas areas, const PlannerOptions& options = {});
 
-  /// As passed to the constructor.
+  /// Options that the constructor was given.
   [[nodiscard]] const NavigationGraph& graph() const noexcept { return graph_; }
   /// Made at construction, or as passed to the constructor.
   [[nodiscard]] const SubAreas& areas() const noexcept { return areas_; }

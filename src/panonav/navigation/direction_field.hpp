@@ -12,7 +12,7 @@
 
 namespace panonav {
 
-/// How far ahead of a node its direction of motion is read.
+/// Distance ahead of a node at which its direction of motion is read.
 struct FieldOptions {
   /// Edges ahead that count for a direction, as far as the path is straight.
   int links_ahead = 3;

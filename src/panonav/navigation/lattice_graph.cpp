@@ -15,7 +15,7 @@ namespace panonav {
 
 namespace {
 
-/// What navigation needs of a spring.
+/// The part of a spring that navigation needs.
 struct Spring {
   EdgeEnds ends;
   std::optional<Pose2> motion;  // a_from_b by the phases; unit R
@@ -34,7 +34,7 @@ constexpr double max_position_error = 0.4;
 /// views of a square grid have others at 1.41 and 2.
 constexpr double max_spacings = 2.3;
 /// The same of springs that a torn arrangement rejected although they are right: as short as those
-/// to nearest views are, and confirmed by so many third views.
+/// to nearest views are, and confirmed by this number of third views.
 constexpr double max_spacings_of_rejected = 1.5;
 constexpr int min_support_of_rejected = 3;
 /// Share of their neighbours that the ends of an edge have in common. On an open square grid with

@@ -28,7 +28,7 @@ void require_valid(const NavigationGraph::Edge& edge) {
   }
 }
 
-/// How far the heading of a map may be off where its views are compared: about 30 degrees, less
+/// Largest error of the heading of a map where its views are compared: about 30 degrees, less
 /// than half of the quarter turn after which rooms look alike.
 constexpr float max_heading_error_rad = 0.5F;
 

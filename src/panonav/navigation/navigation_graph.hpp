@@ -105,8 +105,8 @@ inline constexpr double max_disagreement_rad = 0.78539816339744831;
 /// arrangement, of rejected springs those of the phases. Cost: the springs times those of a view.
 [[nodiscard]] NavigationGraph graph_from_lattice(const Lattice& lattice, double min_weight = 0.1);
 
-/// As `graph_from_lattice` of a lattice that was stored as a map (`to_topological_map`): the phases
-/// are read again from the views, with the support that the edges of links need. Throws
+/// Same as `graph_from_lattice` for a lattice that was stored as a map (`to_topological_map`): the
+/// phases are read again from the views, with the support that the edges of links need. Throws
 /// ContractError as `validate`, and on a view that the source does not have. Cost: two home vectors
 /// an edge.
 [[nodiscard]] NavigationGraph graph_from_stored_lattice(const TopologicalMap& arrangement,

@@ -21,7 +21,7 @@ namespace {
 constexpr double max_correction_rad = std::numbers::pi / 3.0;
 /// A step that leads aside by more is no attempt of the edge ahead, of which it makes half or less.
 constexpr double max_aside_rad = 1.0;
-/// An edge of so many typical lengths is followed to its end: no reference stands along it.
+/// An edge of this number of typical lengths is followed to its end: no reference stands along it.
 constexpr double min_long_edge = 2.0;
 /// Steps for each typical length of an edge: `step_m` is half of one.
 constexpr double steps_per_length = 2.0;

@@ -17,11 +17,11 @@
 
 namespace panonav {
 
-/// How a robot is led over the memory, and when it counts as blocked or lost.
+/// Options of a navigator, and when a robot counts as blocked or lost.
 struct NavigatorOptions {
   /// Longest step between two observations; about half the references' spacing.
   double step_m = 0.25;
-  int near_links = 2;  ///< the next place is searched within so many edges of the last one
+  int near_links = 2;  ///< the next place is searched within this number of edges of the last one
   /// Components compared in the open: 3 or more, or 0 for all. All are compared around narrow gates
   /// and the goal, and where a place is doubtful.
   int coarse_components = 6;
@@ -43,7 +43,7 @@ struct NavigatorOptions {
 };
 void visit_options(NavigatorOptions& options, OptionVisitor& visitor);
 
-/// How far a run to a goal has come.
+/// Progress of a run to a goal.
 enum class NavigationState {
   moving,       ///< the run continues
   arrived,      ///< the views show the goal
@@ -71,7 +71,7 @@ enum class NavigationEvent {
 /// In lower case with underscores, as logs and JSON have it: "relocalised", "entered_area", ...
 [[nodiscard]] std::string_view name_of(NavigationEvent event);
 
-/// What a robot reports besides its view.
+/// Report of a robot besides its view.
 struct RobotReport {
   bool obstacle = false;  ///< something stopped the robot before the last step was done
   /// The reference nearest to the position of another estimate, as of `MonteCarloLocaliser` or
@@ -113,15 +113,14 @@ struct NavigationDecision {
 [[nodiscard]] std::string describe(const NavigationDecision& decision);
 
 /// Leads a robot to a place of the memory by views alone [M04 section 3.5]: observe, find the
-/// nearest reference, take its direction, move, observe again; near the goal by homing. As every
-/// observation decides again, neither a distorted map nor a step that leads elsewhere matters.
-/// Where the path follows a recorded route and the robot reports its horizon scanlines, it repeats
-/// the route instead [Y03]; views still show its place, and that it was kidnapped.
+/// nearest reference, take its direction, move, observe again; near the goal by homing. Where the
+/// path follows a recorded route and the robot reports its horizon scanlines, it repeats the route
+/// instead [Y03].
 ///
-/// Holds the state of a run and the views of one area, two at a border. Does not depend on how the
-/// robot moves: `command_towards` (motion/velocity.hpp) makes the commands. Same calls, same bits.
-/// Cost of an observation without a change of area: the search among the loaded views and three
-/// home vectors at most; with a line near a route also a plan, the begin of a leg, or a fit.
+/// Holds the state of a run and the views of one area, two at a border. `command_towards`
+/// (motion/velocity.hpp) makes the robot's commands. Same calls, same bits. Cost of an observation
+/// without a change of area: the search among the loaded views and three home vectors at most; near
+/// a route also a plan or a fit.
 class Navigator {
  public:
   /// The source must hold all views of the planner's graph and outlive *this. Throws OptionError,
@@ -139,7 +138,7 @@ class Navigator {
   /// Sets recorded routes to follow, which must outlive *this. Without any, `RobotReport::line` is
   /// ignored.
   void set_routes(std::span<const KnownRoute> routes);
-  [[nodiscard]] std::span<const KnownRoute> routes() const noexcept;  ///< As they were set.
+  [[nodiscard]] std::span<const KnownRoute> routes() const noexcept;  ///< Same as were set.
 
   /// Forgets where the robot is: the next observation is searched for in the whole memory.
   void forget_place();

@@ -9,7 +9,7 @@
 
 namespace panonav {
 
-/// How large areas are, and how carefully they are cut.
+/// Size of areas, and the effort of the cut.
 struct SubAreaOptions {
   int views_per_area = 200;  ///< aimed at
   int iterations = 300;      ///< relaxation steps for each cut

@@ -5,7 +5,7 @@
 
 namespace panonav {
 
-/// How well two views match, compared with how well one of them matches noise. Any two views
+/// Match of two views, compared with how well one of them matches noise. Any two views
 /// correlate at the best of all turns and displacements, so a correlation alone shows nothing.
 struct ChanceMatch {
   /// Sum of the correlations of both home vectors, there and back, -2 .. 2.

@@ -95,7 +95,7 @@ class PairOfViews {
   double home_energy_ = 0.0;
   double current_energy_ = 0.0;
   PerFrequency component_weights_{};
-  // By row: how fast things rise as the robot approaches, and the tangent of the elevation.
+  // Per row: how fast things rise as the robot approaches, and the tangent of the elevation.
   std::vector<float> approach_, tangent_;
   std::vector<float> row_weights_;  // empty: all alike
   PairEquations normal_;

@@ -34,7 +34,7 @@ inline constexpr int max_starting_estimates = 6;
 
 /// The defaults are our own rule; `published_homing_options` is S06's.
 struct FourierHomingOptions {
-  /// How the heading between the views is estimated first.
+  /// Rule by which the heading between the views is estimated first.
   enum class TurnEstimate {
     sequential,  ///< S06's rule: each component refines those before [S06 eq. 40-43]
     global,      ///< the maximum of the correlation over all headings
@@ -80,17 +80,14 @@ void visit_options(FourierHomingOptions& options, OptionVisitor& visitor);
 /// Returns the options of hs_Fi as published, with K = `highest`.
 [[nodiscard]] FourierHomingOptions published_homing_options(int highest, int iterations = 0);
 
-/// Computes the home vector by Fourier homing [S06 section 2.3, eq. 16-30; signs and missing terms
-/// as in docs/equations.md]: the heading first, then displacement and a correction of the heading
-/// in least squares over the components of all rows. Iterations move the current view by the result
-/// and solve again. The heading of either robot only rotates the vector's frame. Identical views
-/// give the zero vector with confidence 0; views without structure give all zeros and residual 1.
-/// With `window` only headings within it are considered, before least squares correct them, as in
-/// places that look alike after a quarter turn; where no heading there fits better than its
-/// neighbours, the vector is all zeros with residual 1.
-/// Throws OptionError; ContractError when the views differ in rows or share fewer than K + 2
-/// components, and for a window unless 0 < half_width_rad <= pi and the turn estimate is global.
-/// Cost: O(rows K) and no allocation for K <= 62; for one row and K = 5 less than a microsecond.
+/// Computes the home vector by Fourier homing [S06 section 2.3, eq. 16-30; see docs/equations.md]:
+/// the heading first, then displacement and a correction of the heading in least squares over the
+/// components of all rows. Iterations move the current view by the result and solve again.
+/// Identical views give the zero vector with confidence 0; without structure all zeros and
+/// residual 1, as does a `window` in which no heading fits better than its neighbours. Throws
+/// OptionError; ContractError if the views differ in rows or share fewer than K + 2 components, and
+/// for a window unless 0 < half_width_rad <= pi and the turn estimate is global. Cost: O(rows K),
+/// below a microsecond for one row and K = 5.
 [[nodiscard]] HomeVector home_vector(const HomingView& home, const HomingView& current,
                                      const FourierHomingOptions& options = {},
                                      const std::optional<HeadingWindow>& window = std::nullopt);

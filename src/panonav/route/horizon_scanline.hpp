@@ -8,7 +8,7 @@
 
 namespace panonav {
 
-/// How a scanline is cut out of a panorama.
+/// Part of a panorama that a scanline is cut from.
 struct HorizonScanlineOptions {
   int columns = 360;  ///< of the line: a byte a degree [Y03 section 2.2]
   /// Elevation up to which rows are averaged. Light in the plane of the horizon goes straight from

@@ -12,7 +12,7 @@
 
 namespace panonav {
 
-/// How a scanline is fitted into a route panorama.
+/// Options of the fit of a scanline into a route panorama.
 struct RouteFitOptions {
   double coarse_deg = 8.0;  ///< standard deviation of the smoothing where a fit starts, in azimuth
   int levels = 3;           ///< from coarse to not smoothed
@@ -25,7 +25,7 @@ void visit_options(RouteFitOptions& options, OptionVisitor& visitor);
 
 /// The pose from which a scanline was taken, and how well it fits there.
 struct RouteFix {
-  /// How a tracker found it.
+  /// Source of the position in a tracker.
   enum class Origin {
     prediction,  ///< fitted from the odometry's prediction
     recovery,    ///< the prediction failed; found around it
@@ -42,8 +42,8 @@ struct RouteFix {
   /// Robust standard deviation of the scanline from the expected line, 0 .. 1; at least a grey
   /// level.
   double noise = 0.0;
-  /// By column: the residual that a shift by a degree does not explain, 0 .. 1, as edges in depth
-  /// are off by that much between lines; NaN where the path is not crossed.
+  /// For each column: the residual that a shift by a degree does not explain, 0 .. 1, as edges in
+  /// depth are off by that much between lines; NaN where the path is not crossed.
   std::vector<float> unexplained;
   Origin origin = Origin::prediction;  ///< set by `RouteTracker`, as the two below
   double along_m = 0.0;    ///< path length from the start to the point nearest to the robot

@@ -42,7 +42,7 @@ RouteTracker::RouteTracker(const RoutePanorama& route, const RouteTrackerOptions
 
 double RouteTracker::learn_min_correlation(const RoutePanorama& route,
                                            const RouteFitOptions& options) const {
-  // Where nothing can be learnt: half of the variance is explained.
+  // If nothing can be learnt: half of the variance is explained.
   constexpr double default_correlation = 0.7071;
   constexpr std::size_t samples = 40;
   if (route.size() < 6) return default_correlation;

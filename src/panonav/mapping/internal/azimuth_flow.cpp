@@ -17,7 +17,7 @@ namespace {
 
 /// Azimuths at which views are compared: two for each period of 32 frequencies.
 constexpr int columns = 64;
-/// Rows of taller views are averaged to so many.
+/// Number of rows to which those of taller views are averaged.
 constexpr int max_bands = 40;
 constexpr int unknowns = 5;  // of AzimuthFlow
 

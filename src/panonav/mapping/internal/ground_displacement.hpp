@@ -16,13 +16,12 @@ struct GroundDisplacement {
 };
 
 /// Estimates the displacement by level ground below the horizon, whose distance in a row at
-/// elevation -e is the camera's height over tan e: lengths thus do not depend on how far walls are.
-/// Least squares from `start` (before_from_after, x and y in camera heights), whose heading stays;
-/// pixels that move otherwise get low weights. `start` must be right to about a quarter of a camera
-/// height. Objects on the ground hide it, are nearer, and make lengths up to 15 % too long in
-/// narrow rooms. nullopt where elevations are unknown or differ, the views reach less than about 17
-/// degrees below the horizon, or have less than a quarter of that in common. Throws ContractError
-/// on views of different rows. Cost: about 0.1 ms for 80 x 15.
+/// elevation -e is the camera's height over tan e, so that lengths do not depend on the distance of
+/// walls. Least squares from `start` (before_from_after, x and y in camera heights; right to about
+/// a quarter of a camera height), whose heading stays; pixels that move otherwise get low weights.
+/// Objects on the ground make lengths up to 15 % too long in narrow rooms. nullopt if elevations
+/// are unknown or differ, or the views have too little ground in common. Throws ContractError on
+/// views of different rows. Cost: about 0.1 ms for 80 x 15.
 [[nodiscard]] std::optional<GroundDisplacement> ground_displacement(const HomingView& before,
                                                                     const HomingView& after,
                                                                     const Pose2& start);

@@ -100,7 +100,7 @@ class LinksBetween {
     }
     if (longer == 0.0) return 0.0;
     const double share = more_alike / longer;
-    // Of each of the two views.
+    // The sums of each of the two views.
     return 2.0 * (share * std::log(p_discordant / 0.5) +
                   (1.0 - share) * std::log((1.0 - p_discordant) / 0.5));
   }

@@ -68,7 +68,7 @@ Strain compute_strain(const SpringTerm& spring, const Pose2& a, const Pose2& b) 
     strain.add(length, dy, {0.0, -1.0, 0.0, 0.0, 1.0, 0.0}, spring.length_deviation);
   } else {
     const double distance = std::hypot(dx, dy);
-    // Where the nodes coincide any direction will do.
+    // If the nodes coincide any direction is right.
     const double ux = distance > 0.0 ? dx / distance : 1.0;
     const double uy = distance > 0.0 ? dy / distance : 0.0;
     const Row slope{-ux, -uy, 0.0, ux, uy, 0.0};

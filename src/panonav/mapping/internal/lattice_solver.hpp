@@ -50,15 +50,14 @@ struct LatticeSolution {
   int iterations = 0;
 };
 
-/// Moves the poses to the least energy of the springs [M04 section 3.2], by sparse non-linear least
-/// squares with damping. Springs that contradict the rest are rejected gradually: Geman-McClure
-/// loss whose width shrinks from that of the worst spring to three deviations, or more where the
-/// median strain shows that the deviations are too small (graduated non-convexity). So the result
-/// depends little on the start. Direction and turn are rejected together, lengths each by itself:
-/// far views show the direction well and the distance badly. `moving`: one entry per pose, 0 fixes
-/// the pose; empty: all move. A component without a fixed pose stays about where it was. Throws
-/// ContractError on indices or numbers out of range. `on_step`: called after each step that moved
-/// the poses. The same input gives the same bits. Cost per iteration: one sparse factorisation.
+/// Moves the poses to the minimal energy of the springs [M04 section 3.2], by sparse non-linear
+/// least squares with damping. Springs that contradict the rest are rejected gradually: Geman-
+/// McClure loss whose width shrinks to three deviations (graduated non-convexity), so that the
+/// result depends little on the start. Direction and turn are rejected together, lengths each by
+/// itself. `moving`: one entry per pose, 0 fixes the pose; empty: all move. A component without a
+/// fixed pose stays about where it was. `on_step`: called after each step that moved the poses.
+/// Throws ContractError on indices or numbers out of range. Deterministic. Cost per iteration: one
+/// sparse factorisation.
 LatticeSolution solve_lattice(std::span<const SpringTerm> springs, std::span<Pose2> poses,
                               std::span<const unsigned char> moving = {},
                               const std::function<void()>& on_step = {});

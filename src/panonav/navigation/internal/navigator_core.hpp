@@ -17,7 +17,7 @@ namespace panonav {
 /// A home vector of less confidence is as likely as not only the error of reading it.
 inline constexpr double min_vector_confidence = 0.5;
 
-/// What a navigator learns once of its memory.
+/// Knowledge that a navigator gains once of its memory.
 struct MemoryScales {
   PlaceScale place;   ///< by all components
   PlaceScale coarse;  ///< by the first ones
@@ -49,7 +49,7 @@ struct PlaceDoubt {
   std::optional<std::size_t> other_node;  ///< that place
 };
 
-/// Where the robot is. Lasts from goal to goal, until `Navigator::forget_place`.
+/// Position of the robot in the memory. Lasts from goal to goal, until `Navigator::forget_place`.
 struct NavigationPlace {
   std::optional<std::size_t> node;
   std::optional<std::size_t> known_node;   ///< where the place last matched
@@ -79,7 +79,7 @@ struct EdgeAttempts {
   int obstructed_steps = 0;
 };
 
-/// How far the run has come. Reset with each goal.
+/// Progress of the run. Reset with each goal.
 struct Progress {
   int steps = 0;
   int attempts = 0;
@@ -120,7 +120,7 @@ struct Step {
 };
 
 struct Navigator::Core {
-  /// As the constructor of `Navigator`.
+  /// Same as the constructor of `Navigator`.
   Core(const ViewSource& source, AreaPlanner planner, const NavigatorOptions& options);
 
   const ViewSource* source;

@@ -58,7 +58,7 @@ Navigator::Core::PlaceCandidates Navigator::Core::find_candidates(const QueryVie
   PlaceCandidates found;
   found.around = nodes_around(graph(), {&*place.node, 1}, options.near_links);
   found.here = views.find_nearest(graph(), found.around, view);
-  // Where references stand densely a step leads beyond those: the search continues around the
+  // If references stand densely, a step leads beyond those: the search continues around the
   // outermost one while it finds more similar ones.
   std::size_t centre = *place.node;
   for (int round = 0; round < max_search_rounds && found.here; ++round) {

@@ -1,4 +1,4 @@
-// Whether a navigator comes nearer to its goal, and what to do where it does not.
+// Progress of a navigator towards its goal, and its reaction if there is none.
 
 #include <algorithm>
 #include <array>

@@ -5,8 +5,8 @@
 
 namespace panonav {
 
-/// How much views of one memory differ (`image_difference`): decides whether a reference shows the
-/// place of the robot.
+/// Differences of the views of one memory (`image_difference`): they decide whether a reference
+/// shows the place of the robot.
 struct PlaceScale {
   double neighbour_difference = 0.0;  ///< median between views with an edge
   double stranger_difference = 1.0;   ///< median between random views

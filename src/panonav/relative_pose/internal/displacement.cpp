@@ -181,7 +181,7 @@ BestDisplacement find_displacement(std::span<const float> home_a, std::span<cons
       }
       std::array<float, 1> turn{};
       if (find_highest_peaks(correlation, turn, window) == 0) continue;
-      // Of two displacements that explain the views equally the nearer is more likely.
+      // If two displacements explain the views equally, the nearer is more likely.
       const auto ring_square = static_cast<float>(ring * ring);
       const float difference = (home_energy + energy - 2.0F * correlation.at(turn[0])) *
                                (1.0F + far_penalty * ring_square);

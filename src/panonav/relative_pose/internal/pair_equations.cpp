@@ -165,7 +165,7 @@ PairEquations eliminate_tilt(PairEquations equations, const TiltEquations& tilt,
   return equations;
 }
 
-// By Cholesky's decomposition [S06 eq. 30].
+// Solves by Cholesky's decomposition [S06 eq. 30].
 PairSolution solve(const PairEquations& equations) noexcept {
   const auto& m = equations.matrix;
   // A pivot below this share of its own size is rounding.
