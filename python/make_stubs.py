@@ -16,14 +16,14 @@ OPTION = re.compile(r"^    (\w+): (int|float|bool|str) = (.+)$", re.MULTILINE)
 
 
 def clean(text: str) -> str:
-    for given, wanted in NAMES.items():
-        text = text.replace(given, wanted)
+    for shown, name in NAMES.items():
+        text = text.replace(shown, name)
     text = re.sub(r"numpy\.ndarray\[Any, [\w.]+\]", "numpy.ndarray", text)
     return text.replace("PathLike", "Union[str, os.PathLike]") if "Union[str" not in text else text
 
 
 def parameters(text: str, doc: str) -> str:
-    """As Python writes them; defaults that are no literals become `...`."""
+    """Writes parameters as Python does; defaults that are no literals become `...`."""
     parts, depth, part = [], 0, ""
     for letter in text + ",":
         depth += letter in "([{<"
@@ -33,10 +33,10 @@ def parameters(text: str, doc: str) -> str:
             part = ""
         else:
             part += letter
-    told = []
+    written = []
     for one in filter(None, parts):
         if one.startswith("self:") or one == "**kwargs":
-            told.append("self" if one.startswith("self:") else "**kwargs")
+            written.append("self" if one.startswith("self:") else "**kwargs")
             continue
         one = clean(one)
         name, equals, default = one.partition(" = ")
@@ -45,11 +45,11 @@ def parameters(text: str, doc: str) -> str:
                 ast.literal_eval(default)
             except (ValueError, SyntaxError):
                 default = "..."
-        told.append(name + equals + default)
-    if "**kwargs" in told:
+        written.append(name + equals + default)
+    if "**kwargs" in written:
         options = [f"{name}: {kind} = {value}" for name, kind, value in OPTION.findall(doc)]
-        told[-1:] = ([] if "*" in told or not options else ["*"]) + options
-    return ", ".join(told)
+        written[-1:] = ([] if "*" in written or not options else ["*"]) + options
+    return ", ".join(written)
 
 
 def function(name: str, doc: str, indent: str) -> list:

@@ -42,8 +42,8 @@ std::string dtype_text(const py::array& array) {
 
 }  // namespace
 
-PictureArray::PictureArray(const py::handle& given, const char* what)
-    : array_(as_array(given, what)) {
+PictureArray::PictureArray(const py::handle& value, const char* what)
+    : array_(as_array(value, what)) {
   if (!has_type<std::uint8_t>(array_)) {
     throw ContractError(std::string("dtype of ") + what, dtype_text(array_), "uint8");
   }
@@ -75,9 +75,9 @@ Image PictureArray::image() const {
   return image;
 }
 
-Panorama panorama_from_array(const py::handle& given,
+Panorama panorama_from_array(const py::handle& value,
                              const std::optional<ElevationBand>& elevations) {
-  const py::array array = as_array(given, "values");
+  const py::array array = as_array(value, "values");
   if (array.ndim() != 2 || array.shape(0) > 1 << 24 || array.shape(1) > 1 << 24) {
     throw ContractError("shape of values", shape_text(array), "(rows, columns)");
   }
@@ -102,9 +102,9 @@ Panorama panorama_from_array(const py::handle& given,
 }
 
 template <class Value>
-py::array_t<Value, py::array::c_style> exact_array(const py::handle& given, const char* what,
+py::array_t<Value, py::array::c_style> exact_array(const py::handle& value, const char* what,
                                                    std::vector<py::ssize_t> shape) {
-  const py::array array = as_array(given, what);
+  const py::array array = as_array(value, what);
   if (!has_type<Value>(array)) {
     throw ContractError(std::string("dtype of ") + what, dtype_text(array),
                         std::string(py::str(py::dtype::of<Value>())));
@@ -125,7 +125,7 @@ template py::array_t<float, py::array::c_style> exact_array(const py::handle&, c
 
 namespace {
 
-/// Of structured poses, as many as columns: x_m, y_m, heading_rad, or stamp_s first.
+/// Returns the field names of structured poses: x_m, y_m, heading_rad; stamp_s first of four.
 py::list field_names(py::ssize_t columns) {
   py::list names;
   if (columns == 4) names.append("stamp_s");
@@ -136,30 +136,30 @@ py::list field_names(py::ssize_t columns) {
 }
 
 /// The fields of structured poses side by side; another array is handed through.
-py::object without_structure(const py::handle& given, const char* what, py::ssize_t columns) {
-  auto array = py::reinterpret_borrow<py::object>(given);
-  if (!py::isinstance<py::array>(given) || array.attr("dtype").attr("names").is_none())
+py::object without_structure(const py::handle& value, const char* what, py::ssize_t columns) {
+  auto array = py::reinterpret_borrow<py::object>(value);
+  if (!py::isinstance<py::array>(value) || array.attr("dtype").attr("names").is_none())
     return array;
-  const py::list wanted = field_names(columns);
-  if (!py::list(array.attr("dtype").attr("names")).equal(wanted)) {
+  const py::list expected = field_names(columns);
+  if (!py::list(array.attr("dtype").attr("names")).equal(expected)) {
     throw ContractError(std::string("fields of ") + what,
                         std::string(py::str(array.attr("dtype").attr("names"))),
-                        std::string(py::str(py::tuple(wanted))));
+                        std::string(py::str(py::tuple(expected))));
   }
   py::list fields;
-  for (const auto& name : wanted) fields.append(array[name]);
+  for (const auto& name : expected) fields.append(array[name]);
   return py::module_::import("numpy").attr("stack")(fields, py::arg("axis") = -1);
 }
 
 }  // namespace
 
-py::array_t<double, py::array::c_style> number_rows(const py::handle& given, const char* what,
+py::array_t<double, py::array::c_style> number_rows(const py::handle& value, const char* what,
                                                     py::ssize_t columns) {
   const auto numbers = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(
-      without_structure(given, what, columns));
+      without_structure(value, what, columns));
   if (!numbers) {
     PyErr_Clear();
-    throw ContractError(what, std::string(py::str(py::type::of(given).attr("__name__"))),
+    throw ContractError(what, std::string(py::str(py::type::of(value).attr("__name__"))),
                         "an array of numbers");
   }
   if (numbers.ndim() != 2 || numbers.shape(1) != columns) {

@@ -23,8 +23,8 @@
 #include "panonav/panorama/picture.hpp"
 #include "panonav/pipeline/observation.hpp"
 
-/// What the sources of the Python module share: how arrays, options, records and errors travel. No
-/// source computes anything of its own: each function hands over to the library.
+/// Shared by the sources of the Python module: conversion of arrays, options, records and errors.
+/// All functions only call the library.
 namespace panonav::python {
 
 namespace py = pybind11;
@@ -46,8 +46,8 @@ class PictureArray {
 /// float32, or uint8 (0 .. 255 as 0 .. 1), of shape (rows, columns) and with any strides.
 [[nodiscard]] Panorama panorama_from_array(const py::handle& array,
                                            const std::optional<ElevationBand>& elevations);
-/// Of exactly this dtype and shape (-1: any size); the same array where it is C-contiguous, else a
-/// copy that is.
+/// Returns an array of exactly this dtype and shape (-1: any size): the same if it is C-contiguous,
+/// else a copy that is.
 template <class Value>
 [[nodiscard]] py::array_t<Value, py::array::c_style> exact_array(const py::handle& array,
                                                                  const char* what,
@@ -56,7 +56,7 @@ template <class Value>
 [[nodiscard]] py::array_t<double, py::array::c_style> number_rows(const py::handle& array,
                                                                   const char* what,
                                                                   py::ssize_t columns);
-/// Of (n, 4): stamp_s, x_m, y_m, heading_rad. Throws ContractError.
+/// Makes a trajectory of rows of stamp_s, x_m, y_m, heading_rad. Throws ContractError.
 [[nodiscard]] Trajectory trajectory_of(const py::array_t<double, py::array::c_style>& rows);
 /// A read-only array of what `owner` holds; it keeps the owner alive.
 template <class Value>
@@ -79,10 +79,10 @@ template <class Value>
 
 // Options.
 
-/// The keyword arguments of a call. Each is taken once; what is left over is no option.
+/// Reads the keyword arguments of a call, each once; those left over are no options.
 class Keywords {
  public:
-  explicit Keywords(const py::kwargs& given);
+  explicit Keywords(const py::kwargs& arguments);
   /// Fills the members of an options struct and checks their ranges. With a prefix "graph" a
   /// member `iterations` is the argument `graph_iterations`.
   template <class Options>
@@ -91,15 +91,15 @@ class Keywords {
     validate(values);
     return *this;
   }
-  /// Whether the caller gave this argument, taken or not.
-  [[nodiscard]] bool given(const std::string& name) const { return all_.contains(name); }
-  /// Throws OptionError on arguments that nothing took, with the nearest name.
+  /// True if the caller passed this argument, read or not.
+  [[nodiscard]] bool has(const std::string& name) const { return all_.contains(name); }
+  /// Throws OptionError on arguments that were not read, with the nearest name.
   void finish() const;
 
  private:
   void apply(const std::string& prefix, const std::function<void(OptionVisitor&)>& visit);
   py::kwargs all_;
-  py::dict given_;  // and not taken yet
+  py::dict unread_;
   std::vector<std::string> known_;
 };
 
@@ -135,8 +135,8 @@ class InterruptibleExecutor {
   Executor executor_;
 };
 
-/// What threads of Python share: any number read at a time, one changes. The GIL is free
-/// meanwhile, so what `use` gives must hold nothing of Python.
+/// A value shared by threads of Python: any number read at a time, one changes. The GIL is released
+/// meanwhile, so the result of `use` must hold nothing of Python.
 template <class T>
 class Shared {
  public:

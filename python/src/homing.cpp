@@ -56,26 +56,26 @@ void bind_vectors(py::module_& m) {
                              "Number of rows, from the highest elevation to the lowest.")
       .def_property_readonly("components", &HomingView::components,
                              "Number of frequencies, from 0 on.");
-  const std::string options = with_options("", {options_of<FourierHomingOptions>()});
+  const std::string option_text = with_options("", {options_of<FourierHomingOptions>()});
   m.def(
       "home_vector",
       [](const HomingView& home, const HomingView& current, const py::kwargs& keywords) {
-        FourierHomingOptions wanted;
-        Keywords(keywords).options(wanted).finish();
-        return home_vector(home, current, wanted);
+        FourierHomingOptions options;
+        Keywords(keywords).options(options).finish();
+        return home_vector(home, current, options);
       },
       py::arg("home"), py::arg("current"),
-      ("The home vector by Fourier homing." + options).c_str());
+      ("The home vector by Fourier homing." + option_text).c_str());
   m.def(
       "chance_match",
       [](const HomingView& home, const HomingView& current, const py::kwargs& keywords) {
-        FourierHomingOptions wanted;
-        Keywords(keywords).options(wanted).finish();
+        FourierHomingOptions options;
+        Keywords(keywords).options(options).finish();
         const py::gil_scoped_release free;
-        return compare_with_chance(home, current, wanted);
+        return compare_with_chance(home, current, options);
       },
       py::arg("home"), py::arg("current"),
-      ("How well two views match, beside how well noise does." + options).c_str());
+      ("How well two views match, beside how well noise does." + option_text).c_str());
   m.def(
       "image_difference",
       [](const HomingView& a, const HomingView& b, int highest) {
@@ -93,16 +93,16 @@ std::unique_ptr<HomingGuide> guide_to(const py::object& goal, const py::object& 
                                       const py::kwargs& keywords) {
   FourierHomingOptions homing;
   HomingViewOptions views{.horizon = horizon};
-  Keywords taken(keywords);
-  taken.options(homing);
+  Keywords parsed(keywords);
+  parsed.options(homing);
   if (memory.is_none()) {
-    taken.options(views.signature).options(views.preprocessing).finish();
-    const Observation seen = observation_from(goal);
+    parsed.options(views.signature).options(views.preprocessing).finish();
+    const Observation observation = observation_from(goal);
     if (!source) throw ContractError("source", "None", "a PictureSource, without a memory");
     const py::gil_scoped_release free;
-    return std::make_unique<HomingGuide>(seen, *source, views, homing);
+    return std::make_unique<HomingGuide>(observation, *source, views, homing);
   }
-  taken.finish();
+  parsed.finish();
   const auto name = goal.cast<std::string>();
   const auto make = [&](const MemoryFile& file) {
     return std::make_unique<HomingGuide>(file, name, source, homing, 0, horizon);
@@ -113,8 +113,8 @@ std::unique_ptr<HomingGuide> guide_to(const py::object& goal, const py::object& 
   return make(MemoryFile::open(path, Access::read_only));
 }
 
-NamedWay way_from(const HomingGuide& guide, const Observation& seen) {
-  return {guide.home(seen), seen.name};
+NamedWay way_from(const HomingGuide& guide, const Observation& observation) {
+  return {guide.home(observation), observation.name};
 }
 
 /// A survey and the pictures that it is about.
@@ -123,21 +123,22 @@ struct NamedSurvey : CatchmentResult {
   std::vector<std::string> place_names;
 };
 
-/// Of (goals, places).
+/// Returns an array of (goals, places).
 template <class Value>
-py::array_t<Value> by_pair(const NamedSurvey& found, const std::vector<Value>& values) {
+py::array_t<Value> to_pair_matrix(const NamedSurvey& found, const std::vector<Value>& values) {
   return py::array_t<Value>({static_cast<py::ssize_t>(found.survey.goals.size()),
                              static_cast<py::ssize_t>(found.survey.places.size())},
                             values.data());
 }
 
 NamedSurvey survey(const Dataset& homes, const std::optional<Dataset>& current,
-                   const HomingViewOptions& wanted, const CatchmentSettings& settings,
+                   const HomingViewOptions& options, const CatchmentSettings& settings,
                    std::optional<std::uint64_t> turn_seed, int threads) {
   InterruptibleExecutor executor(threads);
-  const auto goals = read_views(homes, wanted, std::nullopt, executor);
+  const auto goals = read_views(homes, options, std::nullopt, executor);
   const Dataset& there = current ? *current : homes;
-  const auto places = current || turn_seed ? read_views(there, wanted, turn_seed, executor) : goals;
+  const auto places =
+      current || turn_seed ? read_views(there, options, turn_seed, executor) : goals;
   return {survey_catchment(goals, places, settings, there.folder.string(), executor), goals.files,
           places.files};
 }
@@ -166,7 +167,7 @@ void bind_catchment(py::module_& m) {
           "(places, 3) of x_m, y_m, heading_rad, as the robot was turned.")
       .field("spacing_m", &NamedSurvey::spacing_m, "Of the places.")
       .field("typical_distance_m", &NamedSurvey::typical_distance_m,
-             "What a home vector of length 1 is worth.")
+             "Distance for a home vector of length 1, metres.")
       .field("pairs", &NamedSurvey::pairs, "At different places.")
       .field("homeward_component", &NamedSurvey::component,
              "Mean cosine between home vector and true direction: 1 straight home, 0 chance.")
@@ -177,13 +178,13 @@ void bind_catchment(py::module_& m) {
       .field("areas", &NamedSurvey::areas,
              "Mean number of places from which runs end so near, for each of accepted_m.")
       .field(
-          "homeward", [](const NamedSurvey& s) { return by_pair(s, s.survey.homeward); },
+          "homeward", [](const NamedSurvey& s) { return to_pair_matrix(s, s.survey.homeward); },
           "float32 of (goals, places): cosine between home vector and true direction; nan at home.")
       .field(
-          "next", [](const NamedSurvey& s) { return by_pair(s, s.survey.next); },
+          "next", [](const NamedSurvey& s) { return to_pair_matrix(s, s.survey.next); },
           "uint32 of (goals, places): the place to which the step leads.")
       .field(
-          "end_m", [](const NamedSurvey& s) { return by_pair(s, s.final_m); },
+          "end_m", [](const NamedSurvey& s) { return to_pair_matrix(s, s.final_m); },
           "float32 of (goals, places): how far from home the run from this place ends.")
       .type()
       .def(
@@ -203,12 +204,12 @@ void bind_catchment(py::module_& m) {
          std::optional<std::uint64_t> turn_seed, int threads, const py::kwargs& keywords) {
         HomingViewOptions views{.horizon = horizon};
         CatchmentSettings settings{.stages = stages, .bin_m = bin_m, .up_to_m = up_to_m};
-        Keywords taken(keywords);
-        settings.has_typical_distance = taken.given("typical_distance_m");
-        settings.has_longest_step = taken.given("max_step_m");
-        settings.has_obstacle = taken.given("obstacle_m");
-        taken.options(views.signature).options(views.preprocessing).options(settings.run);
-        taken.options(settings.homing).finish();
+        Keywords parsed(keywords);
+        settings.has_typical_distance = parsed.has("typical_distance_m");
+        settings.has_longest_step = parsed.has("max_step_m");
+        settings.has_obstacle = parsed.has("obstacle_m");
+        parsed.options(views.signature).options(views.preprocessing).options(settings.run);
+        parsed.options(settings.homing).finish();
         if (published) {
           const int iterations = std::exchange(settings.homing.iterations, 0);
           if (settings.homing != FourierHomingOptions{}) {
@@ -232,7 +233,7 @@ void bind_catchment(py::module_& m) {
           "home vectors between all pairs of views, and runs from place to place.\n\n"
           "`current`: the recording of the views to go home from; None: the same. `horizon`: "
           "compare the mean of the rows near the horizon alone. `published`: the rule as published "
-          "with so many frequencies, in place of the options of homing. `stages`: the highest "
+          "with this many frequencies, in place of the options of homing. `stages`: the highest "
           "frequency of each stage of a run. `up_to_m`: leave pairs that are farther apart out of "
           "the averages. `turn_seed`: turn the robot before each current view at random. Where "
           "they are not given, max_step_m is twice the spacing of the places, obstacle_m 0.8 of "
@@ -247,7 +248,7 @@ void bind_catchment(py::module_& m) {
 void bind_homing(py::module_& m) {
   bind_vectors(m);
   bind_catchment(m);
-  Record<NamedWay>(m, "WayHome", "What an observation tells of the way home.")
+  Record<NamedWay>(m, "WayHome", "The direction home computed from an observation.")
       .field("name", &NamedWay::name, "Of the picture, where it has one.")
       .field("known", &NamedWay::known, "Whether the views have more in common than chance gives.")
       .field("direction_rad", &NamedWay::direction_rad,
@@ -257,7 +258,7 @@ void bind_homing(py::module_& m) {
       .field("probability", &NamedWay::probability,
              "That the direction is right within 45 degrees.")
       .field("vector", &NamedWay::vector, "All that was found, known or not.");
-  const std::string options =
+  const std::string option_text =
       with_options("", {options_of<FourierHomingOptions>(), options_of<SignatureOptions>(),
                         options_of<PreprocessingOptions>()});
   py::class_<HomingGuide>(m, "HomingGuide",
@@ -269,7 +270,7 @@ void bind_homing(py::module_& m) {
             "an observation made there, and `source` says how pictures lie. `horizon`: compare the "
             "mean of the rows near the horizon alone. Options of signature and preprocessing go "
             "without a memory only." +
-            options)
+            option_text)
                .c_str())
       .def(
           "home",

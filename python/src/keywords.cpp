@@ -6,59 +6,60 @@ namespace panonav::python {
 
 namespace {
 
-/// Takes the given values of the options that it visits.
-class Taker final : public OptionVisitor {
+/// Reads the keyword arguments of the options that it visits.
+class KeywordReader final : public OptionVisitor {
  public:
-  Taker(py::dict& given, std::vector<std::string>& known, std::string prefix)
-      : given_(given), known_(known), prefix_(std::move(prefix)) {}
+  KeywordReader(py::dict& argument, std::vector<std::string>& known, std::string prefix)
+      : unread_(argument), known_(known), prefix_(std::move(prefix)) {}
 
   void visit(const OptionInfo& info, int& value) override {
-    take(info, value, "whole numbers " + describe_range(info));
+    read(info, value, "whole numbers " + describe_range(info));
   }
   void visit(const OptionInfo& info, double& value) override {
-    take(info, value, "numbers " + describe_range(info));
+    read(info, value, "numbers " + describe_range(info));
   }
   void visit(const OptionInfo& info, bool& value) override {
-    const auto [name, given] = find(info);
-    if (!given) return;
-    if (!py::isinstance<py::bool_>(given)) refuse(name, given, "True, False");
-    value = given.cast<bool>();
+    const auto [name, argument] = find(info);
+    if (!argument) return;
+    if (!py::isinstance<py::bool_>(argument)) refuse(name, argument, "True, False");
+    value = argument.cast<bool>();
   }
   void visit(const OptionInfo& info, std::span<const std::string_view> choices,
              int& value) override {
-    const auto [name, given] = find(info);
-    if (!given) return;
+    const auto [name, argument] = find(info);
+    if (!argument) return;
     std::string all;
     for (std::size_t i = 0; i < choices.size(); ++i) {
-      if (py::isinstance<py::str>(given) && given.cast<std::string>() == choices[i]) {
+      if (py::isinstance<py::str>(argument) && argument.cast<std::string>() == choices[i]) {
         value = static_cast<int>(i);
         return;
       }
       all += (all.empty() ? "'" : ", '") + std::string(choices[i]) + "'";
     }
-    refuse(name, given, all);
+    refuse(name, argument, all);
   }
 
  private:
   std::pair<std::string, py::object> find(const OptionInfo& info) {
     const std::string name = prefix_ + std::string(info.name);
     known_.push_back(name);
-    return {name, given_.contains(name) ? given_.attr("pop")(name) : py::object()};
+    return {name, unread_.contains(name) ? unread_.attr("pop")(name) : py::object()};
   }
-  [[noreturn]] static void refuse(const std::string& name, const py::handle& given,
+  [[noreturn]] static void refuse(const std::string& name, const py::handle& argument,
                                   const std::string& allowed) {
-    throw ContractError(name, std::string(py::repr(given)), allowed);
+    throw ContractError(name, std::string(py::repr(argument)), allowed);
   }
   template <class Number>
-  void take(const OptionInfo& info, Number& value, const std::string& allowed) {
-    const auto [name, given] = find(info);
-    if (!given) return;
+  void read(const OptionInfo& info, Number& value, const std::string& allowed) {
+    const auto [name, argument] = find(info);
+    if (!argument) return;
     py::detail::make_caster<Number> number;
-    if (py::isinstance<py::bool_>(given) || !number.load(given, true)) refuse(name, given, allowed);
+    if (py::isinstance<py::bool_>(argument) || !number.load(argument, true))
+      refuse(name, argument, allowed);
     value = number;
   }
 
-  py::dict& given_;
+  py::dict& unread_;
   std::vector<std::string>& known_;
   std::string prefix_;
 };
@@ -101,16 +102,16 @@ class Lister final : public OptionVisitor {
 
 }  // namespace
 
-Keywords::Keywords(const py::kwargs& given) : all_(given), given_(given.attr("copy")()) {}
+Keywords::Keywords(const py::kwargs& argument) : all_(argument), unread_(argument.attr("copy")()) {}
 
 void Keywords::apply(const std::string& prefix, const std::function<void(OptionVisitor&)>& visit) {
-  Taker taker(given_, known_, joined(prefix));
-  visit(taker);
+  KeywordReader reader(unread_, known_, joined(prefix));
+  visit(reader);
 }
 
 void Keywords::finish() const {
-  if (given_.empty()) return;
-  const auto name = py::str(given_.begin()->first);
+  if (unread_.empty()) return;
+  const auto name = py::str(unread_.begin()->first);
   const auto near = py::module_::import("difflib").attr("get_close_matches")(name, known_, 1);
   std::string line = "there is no option '" + std::string(name) + "'";
   if (py::len(near) > 0) {

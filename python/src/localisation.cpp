@@ -50,7 +50,7 @@ void bind_places(py::module_& m) {
       .field("area_m2", &LocalisationLevel::area_m2, "Of the candidates' cells, or None.")
       .field("region", &LocalisationLevel::region, "A circle that covers them, or None.")
       .field("bytes_read", &LocalisationLevel::bytes_read, "By all levels so far.");
-  Record<NamedPlace>(m, "Place", "What one picture tells of where it was taken.")
+  Record<NamedPlace>(m, "Place", "The position and heading of an image.")
       .field("name", &NamedPlace::name, "Of the picture, where it has one.")
       .field("known", &NamedPlace::known, "Whether the place is one of the memory's.")
       .field("known_probability", &NamedPlace::known_probability, "That it is.")
@@ -64,22 +64,22 @@ void bind_places(py::module_& m) {
 
 using SharedRecogniser = Shared<PlaceRecogniser>;
 
-NamedPlace localise_one(const PlaceRecogniser& recogniser, const Observation& seen,
+NamedPlace localise_one(const PlaceRecogniser& recogniser, const Observation& observation,
                         std::span<const std::string> excluded_names) {
-  return {recogniser.localise(seen, excluded_names), seen.name};
+  return {recogniser.localise(observation, excluded_names), observation.name};
 }
 
 PlaceRecogniserOptions recogniser_options(const std::optional<PictureSource>& source, bool areas,
                                           const py::kwargs& keywords) {
   PlaceRecogniserOptions options{.source = source};
   LocalisationAccuracy accuracy;
-  Keywords taken(keywords);
-  taken.options(options.localiser);
+  Keywords parsed(keywords);
+  parsed.options(options.localiser);
   if (areas) {
-    taken.options(accuracy, "area");
+    parsed.options(accuracy, "area");
     options.areas = accuracy;
   }
-  taken.finish();
+  parsed.finish();
   return options;
 }
 
@@ -114,7 +114,7 @@ std::vector<NamedPlace> localise_all(const SharedRecogniser& recogniser, const D
 }
 
 void bind_recogniser(py::module_& m) {
-  const std::string options =
+  const std::string option_text =
       with_options("", {options_of<LocaliserOptions>(), options_of<LocalisationAccuracy>("area")});
   py::class_<SharedRecogniser>(
       m, "PlaceRecogniser",
@@ -128,7 +128,7 @@ void bind_recogniser(py::module_& m) {
            ("`memory`: the path of a memory file, or a MemoryFile. `source`: how pictures lie; "
             "None: as the memory's own. `areas`: also tell the area where the robot may be; only "
             "then there are options area_*." +
-            options)
+            option_text)
                .c_str())
       .def(
           "localise",
@@ -205,7 +205,7 @@ void bind_recogniser(py::module_& m) {
        "`memory`: the path of a memory file, or a MemoryFile. `observation`: an Observation, a "
        "Panorama, an array of pixels (uint8), or the path of a picture, which lies as those of "
        "the memory." +
-       options)
+       option_text)
           .c_str());
 }
 
@@ -358,7 +358,7 @@ void bind_tracker(py::module_& m) {
 
 void bind_updater(py::module_& m) {
   using Changes = MemoryUpdater::Changes;
-  Record<Changes>(m, "MemoryUpdaterChanges", "What a run did to its memory.")
+  Record<Changes>(m, "MemoryUpdaterChanges", "Changes of a memory by a run.")
       .field("seen", &Changes::observations, "Observations with odometry.")
       .field("certain", &Changes::certain, "Of these, whose place was certain and new.")
       .field("reinforced", &Changes::reinforced,
@@ -408,7 +408,7 @@ void bind_updater(py::module_& m) {
             return updater.change([&](MemoryUpdater& u) { return u.finish(what); });
           },
           py::arg("what"),
-          "Changes the file and learns its models anew. `what`: the run, for the file's history. "
+          "Changes the file and learns its models again. `what`: the run, for the file's history. "
           "Once.");
 }
 

@@ -25,17 +25,17 @@ py::array_t<double> poses_of(const Nodes& nodes) {
 
 MapperOptions mapper_options(const py::kwargs& keywords, SignatureOptions* signature) {
   MapperOptions options;
-  Keywords taken(keywords);
-  taken.options(options.mapping)
+  Keywords parsed(keywords);
+  parsed.options(options.mapping)
       .options(options.odometry)
       .options(options.closure, "closure")
       .options(options.graph, "graph");
-  if (signature) taken.options(*signature);
-  taken.finish();
+  if (signature) parsed.options(*signature);
+  parsed.finish();
   return options;
 }
 
-/// As the verb `map`: views that the file does not know are appended to it.
+/// Does the same as the verb `map`: views that the file does not know are appended to it.
 Mapper::Result make_map(const Dataset& recording, const std::filesystem::path& path,
                         const SignatureOptions& signature, const MapperOptions& options,
                         int threads) {
@@ -70,14 +70,14 @@ void bind_maps(py::module_& m) {
       .def(
           "poses", [](const TopologicalMap& map) { return poses_of(map.nodes); },
           "(n, 3) of x_m, y_m, heading_rad, a row a node.");
-  Record<Mapper::Result>(m, "MappedRun", "What a Mapper made of its observations.")
+  Record<Mapper::Result>(m, "MappedRun", "The map of a Mapper's observations.")
       .field("map", &Mapper::Result::map, "All nodes and edges.")
       .field("observations", &Mapper::Result::observations, "By node: its number, from 0.")
       .field("skipped", &Mapper::Result::skipped, "Observations that differed too little.")
       .field("scale_m", &Mapper::Result::scale_m, "Metres for a unit of length of the views.")
       .field("wheels", &Mapper::Result::wheels, "Steps come from odometry.")
       .field("mapping_s", &Mapper::Result::mapping_s, "Time of the mapping itself.");
-  const std::string options = with_options(
+  const std::string option_text = with_options(
       "", {options_of<MappingOptions>(), options_of<VisualOdometryOptions>(),
            options_of<LoopClosureOptions>("closure"), options_of<PoseGraphOptions>("graph")});
   using SharedMapper = Shared<Mapper>;
@@ -86,12 +86,12 @@ void bind_maps(py::module_& m) {
                            "stores it in a memory file as \"map\".")
       .def(py::init([](const std::filesystem::path& memory,
                        const std::optional<PictureSource>& source, const py::kwargs& keywords) {
-             const MapperOptions wanted = mapper_options(keywords, nullptr);
+             const MapperOptions options = mapper_options(keywords, nullptr);
              return std::make_unique<SharedMapper>(MemoryFile::open(memory, Access::read_write),
-                                                   source, wanted);
+                                                   source, options);
            }),
            py::arg("memory"), py::arg("source") = py::none(),
-           ("`memory`: a memory file that is there." + options).c_str())
+           ("`memory`: a memory file that is there." + option_text).c_str())
       .def(
           "add",
           [](SharedMapper& mapper, const py::object& observation) {
@@ -111,17 +111,17 @@ void bind_maps(py::module_& m) {
          const std::optional<PictureSource>& source, bool thumbnails, int threads,
          const py::kwargs& keywords) {
         SignatureOptions signature;
-        MapperOptions wanted = mapper_options(keywords, &signature);
-        wanted.thumbnails = thumbnails;
+        MapperOptions options = mapper_options(keywords, &signature);
+        options.thumbnails = thumbnails;
         const Dataset dataset = dataset_from(recording, source, remembered_source(memory));
         const py::gil_scoped_release free;
-        return make_map(dataset, memory, signature, wanted, threads);
+        return make_map(dataset, memory, signature, options, threads);
       },
       py::arg("recording"), py::arg("memory"), py::arg("source") = py::none(),
       py::arg("thumbnails") = true, py::arg("threads") = 0,
       ("Makes a map of a recording in its order, as `panonav map` does. `memory` is made where "
        "there is none; views that it does not know are appended." +
-       options)
+       option_text)
           .c_str());
 }
 
@@ -130,7 +130,7 @@ void bind_lattices(py::module_& m) {
       .field("view", &Lattice::Node::view, "Its id in the memory.")
       .field("pose", &Lattice::Node::pose, "In its component's frame.")
       .field("component", &Lattice::Node::component, "Index of its connected component.");
-  Record<Lattice::Spring>(m, "LatticeSpring", "What two views say of where they lie.")
+  Record<Lattice::Spring>(m, "LatticeSpring", "The relative position of two views.")
       .field("a", &Lattice::Spring::a, "Number of a node.")
       .field("b", &Lattice::Spring::b, "Number of the other, larger than a.")
       .field("dissimilarity", &Lattice::Spring::dissimilarity,
@@ -163,10 +163,10 @@ void bind_lattices(py::module_& m) {
          const py::kwargs& keywords) {
         LatticeOptions options;
         CoarseMotionOptions motion;
-        Keywords taken(keywords);
-        taken.options(options);
-        if (!odometry.is_none()) taken.options(motion, "motion");
-        taken.finish();
+        Keywords parsed(keywords);
+        parsed.options(options);
+        if (!odometry.is_none()) parsed.options(motion, "motion");
+        parsed.finish();
         const auto path = memory.cast<std::filesystem::path>();
         std::optional<Dataset> recording;
         if (!odometry.is_none()) recording = dataset_from(odometry, std::nullopt);
@@ -206,7 +206,7 @@ void bind_merging(py::module_& m) {
              "Where both maps lie upon each other.")
       .field("confirmed_places", &SessionAlignment::confirmed_places, "Of these, that match.")
       .field("refuted", &SessionAlignment::refuted, "Matches that lead elsewhere.");
-  Record<MergedMemory>(m, "MergedMemory", "What merge_memories made.")
+  Record<MergedMemory>(m, "MergedMemory", "The result of merge_memories.")
       .field("views", &MergedMemory::views, "Of the new memory.")
       .field("shared", &MergedMemory::shared, "Views that both had, kept once.")
       .field("renamed", &MergedMemory::renamed,
@@ -221,9 +221,9 @@ void bind_merging(py::module_& m) {
          const std::filesystem::path& memory, const py::kwargs& keywords) {
         SessionAlignmentOptions alignment;
         PoseGraphOptions graph;
-        Keywords taken(keywords);
-        taken.options(alignment).options(graph, "graph");
-        taken.finish();
+        Keywords parsed(keywords);
+        parsed.options(alignment).options(graph, "graph");
+        parsed.finish();
         const py::gil_scoped_release free;
         return merge_memories(first, second, memory, alignment, graph, check_signals);
       },

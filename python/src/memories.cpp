@@ -89,12 +89,12 @@ void bind_visual_memory(py::module_& m) {
   Record<Match>(m, "Match", "A view that a search found.")
       .field("view", &Match::view, "Its id.")
       .field("dissimilarity", &Match::dissimilarity, "Integer L1 of packed magnitudes.");
-  Record<SearchResult>(m, "SearchResult", "What an exact search found.")
+  Record<SearchResult>(m, "SearchResult", "The result of an exact search.")
       .field("matches", &SearchResult::matches, "Ascending (dissimilarity, view).")
       .field("bytes_read", &SearchResult::bytes_read, "That the search touched.")
       .field("bytes_in_full", &SearchResult::bytes_in_full, "That a scan over all would read.")
       .field("views_in_full", &SearchResult::views_in_full, "Views whose whole sum was computed.");
-  Record<ReferenceInfo>(m, "ReferenceInfo", "What a memory knows of a view beside its signature.")
+  Record<ReferenceInfo>(m, "ReferenceInfo", "Data of a view besides its signature.")
       .field("name", &ReferenceInfo::name, "Unique within a memory.")
       .field("pose", &ReferenceInfo::pose, "Where it was taken, or None.")
       .field("stamp_s", &ReferenceInfo::stamp_s, "When, or None.");
@@ -255,7 +255,7 @@ void bind_memory_file(py::module_& m) {
       .field("file_bytes", &MemoryFile::Info::file_bytes,
              "With what is still in the write-ahead log.")
       .field("format_version", &MemoryFile::Info::format_version, "Of the file, >= 1.");
-  Record<MemoryFile::Fault>(m, "MemoryFault", "What is wrong in a memory file.")
+  Record<MemoryFile::Fault>(m, "MemoryFault", "A fault in a memory file.")
       .field("view", &MemoryFile::Fault::view, "Where it concerns one.")
       .field("what", &MemoryFile::Fault::what, "One line.");
   Record<MemoryFile::KeptChange>(m, "KeptChange", "A change of a memory that was kept for `undo`.")
@@ -265,7 +265,7 @@ void bind_memory_file(py::module_& m) {
       .field("undoable", &MemoryFile::KeptChange::undoable,
              "False: too old, only its description is left.");
   Record<MemoryHeader>(m, "MemoryHeader",
-                       "What a memory file says of all its views: how pictures become signatures.")
+                       "Properties of all views of a memory file: how images become signatures.")
       .field(
           "shape", [](const MemoryHeader& h) { return h.shape; }, "(rows, components)")
       .field("full_scale", &MemoryHeader::full_scale, "The magnitude that is packed as 255.")
@@ -379,7 +379,7 @@ void bind_memory_file(py::module_& m) {
 
 void bind_synchronisation(py::module_& m) {
   using Report = fleet::SynchronisationReport;
-  Record<Report>(m, "SynchronisationReport", "What synchronise_memory did.")
+  Record<Report>(m, "SynchronisationReport", "The changes made by synchronise_memory.")
       .field("views", &Report::views, "Of the file, afterwards.")
       .field("uploaded", &Report::uploaded, "Views that the server got.")
       .field("downloaded", &Report::downloaded, "Views that the file got.")

@@ -15,10 +15,10 @@ RobotNavigatorOptions navigator_options(const std::optional<std::string>& edges,
       throw ContractError("edges", "'" + *edges + "'", "map, lattice, links, arrangement");
     }
   }
-  Keywords taken(keywords);
-  taken.options(options.navigator).options(options.planner).options(options.base);
-  if (route) taken.options(options.known_route, "route");
-  taken.finish();
+  Keywords parsed(keywords);
+  parsed.options(options.navigator).options(options.planner).options(options.base);
+  if (route) parsed.options(options.known_route, "route");
+  parsed.finish();
   return options;
 }
 
@@ -45,7 +45,7 @@ void bind_navigation(py::module_& m) {
       .field("area", &NavigationDecision::area, "That is loaded.")
       .field("difference", &NavigationDecision::difference,
              "Of what is seen from `nearest`, homing: from the goal.")
-      .field("way", &NavigationDecision::path_length,
+      .field("path_length", &NavigationDecision::path_length,
              "That is left along the edges, in their unit.")
       .field("components", &NavigationDecision::components, "Compared.")
       .field("bytes_read", &NavigationDecision::bytes_read,
@@ -57,12 +57,12 @@ void bind_navigation(py::module_& m) {
             for (const NavigationEvent event : d.events) names.push_back(name_of(event));
             return names;
           },
-          "What made it differ from going on, such as 'kidnapped' or 'closed'.");
-  Record<RobotNavigator::Step>(m, "NavigationStep", "What a robot is to do after an observation.")
+          "Reasons for a decision other than to continue, such as 'kidnapped' or 'closed'.");
+  Record<RobotNavigator::Step>(m, "NavigationStep", "The motion of a robot after an observation.")
       .field("decision", &RobotNavigator::Step::decision, "The last one.")
       .field("velocity", &RobotNavigator::Step::velocity, "For the next period of the base.")
       .field("decided", &RobotNavigator::Step::decided,
-             "By this observation; else the step decided before goes on.");
+             "By this observation; else the step decided before continues.");
   using SharedNavigator = Shared<RobotNavigator>;
   const auto view_name = [](SharedNavigator& navigator, std::uint32_t view) {
     return navigator.change([&](RobotNavigator& n) { return n.info(ViewId{view}).name; });

@@ -209,7 +209,7 @@ void bind_panoramas(py::module_& m) {
       .def(
           "turned", [](const Panorama& p, int columns) { return rotate_columns(p, columns); },
           py::arg("columns"),
-          "What the robot sees after turning on the spot by so many columns, counter-clockwise.")
+          "The view after a rotation of the robot by this many columns, counter-clockwise.")
       .def(
           "to_picture", [](const Panorama& p) { return array_of(to_picture(p)); },
           "As a picture for people: uint8, clockwise, forward in the middle.")
@@ -225,7 +225,7 @@ void bind_panoramas(py::module_& m) {
       "level_panorama",
       [](const Panorama& seen, const Tilt& tilt) { return level_panorama(seen, tilt); },
       py::arg("panorama"), py::arg("tilt"), py::call_guard<py::gil_scoped_release>(),
-      "What the robot would see if its axis were vertical; `tilt` is (roll, pitch) in radians.");
+      "The view of a robot with a vertical axis; `tilt` is (roll, pitch) in radians.");
   m.def(
       "preprocess",
       [](const Panorama& panorama, const py::kwargs& keywords) {
@@ -235,7 +235,7 @@ void bind_panoramas(py::module_& m) {
         return preprocess(panorama, options);
       },
       py::arg("panorama"),
-      with_options("What is done to a panorama before its signature is taken.",
+      with_options("Processing of a panorama before its signature is computed.",
                    {options_of<PreprocessingOptions>()})
           .c_str());
 

@@ -45,9 +45,10 @@ std::optional<PictureSource> remembered_source(const std::filesystem::path& memo
 
 namespace {
 
-py::object picture_of(const Observation& seen) {
-  if (const auto* panorama = std::get_if<Panorama>(&seen.picture)) return py::cast(*panorama);
-  return array_of(std::get<Image>(seen.picture));
+py::object picture_of(const Observation& observation) {
+  if (const auto* panorama = std::get_if<Panorama>(&observation.picture))
+    return py::cast(*panorama);
+  return array_of(std::get<Image>(observation.picture));
 }
 
 void bind_observations(py::module_& m) {
@@ -57,13 +58,13 @@ void bind_observations(py::module_& m) {
       .def(py::init([](const py::object& picture, const std::string& name,
                        std::optional<double> stamp_s, const std::optional<Pose2>& odometry,
                        const std::optional<ReferencePose>& pose, const std::optional<Tilt>& tilt) {
-             Observation seen = observation_from(picture);
-             if (!name.empty()) seen.name = name;
-             seen.stamp_s = stamp_s;
-             seen.odometry = odometry;
-             seen.pose = pose;
-             seen.tilt = tilt;
-             return seen;
+             Observation observation = observation_from(picture);
+             if (!name.empty()) observation.name = name;
+             observation.stamp_s = stamp_s;
+             observation.odometry = odometry;
+             observation.pose = pose;
+             observation.tilt = tilt;
+             return observation;
            }),
            py::arg("picture"), py::kw_only(), py::arg("name") = "", py::arg("stamp_s") = py::none(),
            py::arg("odometry") = py::none(), py::arg("pose") = py::none(),
@@ -126,7 +127,7 @@ void bind_datasets(py::module_& m) {
           "out or looks wrong is a UserWarning.")
       .def_readonly("source", &Dataset::source, "How all pictures lie.")
       .def_readonly("entries", &Dataset::entries, "In the order in which they were taken.")
-      .def_readonly("left_out", &Dataset::left_out, "What lies in a folder and is no picture.")
+      .def_readonly("left_out", &Dataset::left_out, "Files of a folder that are no images.")
       .def("__len__", [](const Dataset& d) { return d.entries.size(); })
       .def(
           "__getitem__",
@@ -179,17 +180,17 @@ void bind_images(py::module_& m) {
 }
 
 void bind_memorising(py::module_& m) {
-  Record<Memoriser::Counts>(m, "MemorisedCounts", "What was added to a memory.")
+  Record<Memoriser::Counts>(m, "MemorisedCounts", "Numbers of views added to a memory.")
       .field("appended", &Memoriser::Counts::appended, "Views.")
       .field("known_before", &Memoriser::Counts::known_before,
              "Observations whose views were there.");
-  const std::string options =
+  const std::string option_text =
       with_options("", {options_of<SignatureOptions>(), options_of<PreprocessingOptions>()});
   const auto options_from = [](const std::optional<PictureSource>& source, bool thumbnails,
                                bool features, const py::kwargs& keywords) {
-    MemoriserOptions wanted{.source = source, .thumbnails = thumbnails, .features = features};
-    Keywords(keywords).options(wanted.signature).options(wanted.preprocessing).finish();
-    return wanted;
+    MemoriserOptions options{.source = source, .thumbnails = thumbnails, .features = features};
+    Keywords(keywords).options(options.signature).options(options.preprocessing).finish();
+    return options;
   };
   using SharedMemoriser = Shared<Memoriser>;
   py::class_<SharedMemoriser>(m, "Memoriser",
@@ -205,7 +206,7 @@ void bind_memorising(py::module_& m) {
            py::arg("features") = true,
            ("`source` says how pictures lie; a new file needs it. Options are those of a new "
             "file." +
-            options)
+            option_text)
                .c_str())
       .def(
           "add",
@@ -229,10 +230,10 @@ void bind_memorising(py::module_& m) {
           const std::optional<PictureSource>& source, bool thumbnails, bool features, int threads,
           const py::kwargs& keywords) {
         const Dataset dataset = dataset_from(recording, source, remembered_source(memory));
-        const auto wanted = options_from(dataset.source, thumbnails, features, keywords);
+        const auto options = options_from(dataset.source, thumbnails, features, keywords);
         const py::gil_scoped_release free;
         InterruptibleExecutor executor(threads);
-        Memoriser memoriser(memory, wanted);
+        Memoriser memoriser(memory, options);
         DatasetObservations observations(dataset, executor);
         std::vector<Observation> batch;
         const auto add = [&] {
@@ -252,7 +253,7 @@ void bind_memorising(py::module_& m) {
        "`recording`: a Dataset or a path; `memory`: the file, which grows if it is there. A "
        "picture that cannot be read raises FileError; those before it are kept. threads: 0 takes "
        "one for each core." +
-       options)
+       option_text)
           .c_str());
 }
 

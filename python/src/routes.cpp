@@ -72,8 +72,8 @@ void bind_following(py::module_& m) {
           [](const NamedStep& s) {
             return py::array_t<float>(static_cast<py::ssize_t>(s.line.size()), s.line.data());
           },
-          "What was seen, float32.");
-  const std::string options =
+          "The scanline of the observation, float32.");
+  const std::string option_text =
       with_options("", {options_of<RouteTrackerOptions>(), options_of<RouteFitOptions>()});
   using SharedFollower = Shared<RouteFollower>;
   py::class_<SharedFollower>(m, "RouteFollower",
@@ -82,14 +82,14 @@ void bind_following(py::module_& m) {
       .def(py::init([](const std::filesystem::path& memory, const std::optional<std::string>& name,
                        const std::optional<PictureSource>& source, bool use_odometry,
                        const py::kwargs& keywords) {
-             const auto wanted = follower_options(name, use_odometry, keywords);
+             const auto options = follower_options(name, use_odometry, keywords);
              const py::gil_scoped_release free;
              return std::make_unique<SharedFollower>(MemoryFile::open(memory, Access::read_only),
-                                                     source, wanted);
+                                                     source, options);
            }),
            py::arg("memory"), py::arg("name") = py::none(), py::arg("source") = py::none(),
            py::arg("use_odometry") = true,
-           ("`name`: of the route; None: the only one that there is." + options).c_str())
+           ("`name`: of the route; None: the only one that there is." + option_text).c_str())
       .def(
           "step",
           [](SharedFollower& follower, const py::object& observation) {
@@ -104,12 +104,13 @@ void bind_following(py::module_& m) {
       [](const std::filesystem::path& memory, const py::object& recording,
          const std::optional<std::string>& name, const std::optional<PictureSource>& source,
          bool use_odometry, int threads, const py::kwargs& keywords) {
-        auto wanted = follower_options(name, use_odometry, keywords);
+        auto options = follower_options(name, use_odometry, keywords);
         const Dataset dataset = dataset_from(recording, source, remembered_source(memory));
         const py::gil_scoped_release free;
         InterruptibleExecutor executor(threads);
-        wanted.use_odometry = use_odometry && !odometry_poses(dataset).empty();
-        RouteFollower follower(MemoryFile::open(memory, Access::read_only), dataset.source, wanted);
+        options.use_odometry = use_odometry && !odometry_poses(dataset).empty();
+        RouteFollower follower(MemoryFile::open(memory, Access::read_only), dataset.source,
+                               options);
         std::vector<NamedStep> steps;
         make_in_order(
             dataset.entries.size(), executor,
@@ -124,7 +125,7 @@ void bind_following(py::module_& m) {
       py::arg("source") = py::none(), py::kw_only(), py::arg("use_odometry") = true,
       py::arg("threads") = 0,
       ("Where the robot of a recording is beside a route, as `panonav route follow` says." +
-       options)
+       option_text)
           .c_str());
 }
 
@@ -146,8 +147,8 @@ RouteRecorder::Recorded record_route(const Dataset& dataset, const std::filesyst
 }
 
 void bind_recording(py::module_& m) {
-  py::class_<RoutePanorama>(
-      m, "RoutePanorama", "What a robot saw at its camera's height along a route: a line a place.")
+  py::class_<RoutePanorama>(m, "RoutePanorama",
+                            "Horizon scanlines along a route, one for each place.")
       .def("__len__", &RoutePanorama::size)
       .def_property_readonly("columns", &RoutePanorama::columns,
                              "Bytes of a line: azimuths of a full turn.")
@@ -170,7 +171,7 @@ void bind_recording(py::module_& m) {
         return "RoutePanorama(" + std::to_string(route.size()) + " lines, " +
                std::to_string(route.columns()) + " columns)";
       });
-  Record<RouteRecorder::Recorded>(m, "RecordedRoute", "What a memory file has of a route.")
+  Record<RouteRecorder::Recorded>(m, "RecordedRoute", "A route as stored in a memory file.")
       .field("route", &RouteRecorder::Recorded::route,
              "All of its lines, those of earlier drives included.")
       .field("appended", &RouteRecorder::Recorded::appended, "Lines.")

@@ -10,38 +10,38 @@ namespace {
 
 using World = std::shared_ptr<const simulation::SimulatedWorld>;
 
-/// The options of a world as keyword arguments; its recording is taken by the caller.
-World make_world(const std::string& scene, simulation::SimulatedWorldOptions wanted,
-                 Keywords& taken, int threads) {
-  taken.options(wanted.simulation)
-      .options(wanted.frame)
-      .options(wanted.sensor)
-      .options(wanted.free_space)
-      .options(wanted.odometry, "odometry")
+/// Makes a world of the keyword arguments; the caller reads those of its recording.
+World make_world(const std::string& scene, simulation::SimulatedWorldOptions options,
+                 Keywords& parsed, int threads) {
+  parsed.options(options.simulation)
+      .options(options.frame)
+      .options(options.sensor)
+      .options(options.free_space)
+      .options(options.odometry, "odometry")
       .finish();
-  std::vector<std::string> given;
+  std::vector<std::string> chosen;
   for (const char* name : {"scene_seed", "moved_objects", "moved_seed", "camera_height_m",
                            "robot_radius_m", "robot_height_m", "step_height_m", "cell_m"}) {
-    if (taken.given(name)) given.emplace_back(name);
+    if (parsed.has(name)) chosen.emplace_back(name);
   }
   const py::gil_scoped_release free;
   InterruptibleExecutor executor(threads);
   return std::make_shared<const simulation::SimulatedWorld>(
-      scene, std::move(wanted),
+      scene, std::move(options),
       [&](const std::string&, const std::string& name) {
-        const auto found = std::ranges::find(given, name);
-        return found == given.end() ? std::nullopt : std::optional(*found);
+        const auto found = std::ranges::find(chosen, name);
+        return found == chosen.end() ? std::nullopt : std::optional(*found);
       },
       executor);
 }
 
-simulation::SimulatedWorldOptions recording_options(Keywords& taken) {
-  simulation::SimulatedWorldOptions wanted;
-  taken.options(wanted.recording);
-  if (!taken.given("heading")) {
-    wanted.recording.heading = simulation::default_heading(wanted.recording.path);
+simulation::SimulatedWorldOptions recording_options(Keywords& parsed) {
+  simulation::SimulatedWorldOptions options;
+  parsed.options(options.recording);
+  if (!parsed.has("heading")) {
+    options.recording.heading = simulation::default_heading(options.recording.path);
   }
-  return wanted;
+  return options;
 }
 
 std::optional<Trajectory> trajectory_from(const py::object& rows) {
@@ -93,11 +93,11 @@ void bind_worlds(py::module_& m) {
       "time.")
       .def(py::init([](const std::string& scene, const std::optional<Camera>& mirror, int threads,
                        const py::kwargs& keywords) {
-             Keywords taken(keywords);
-             simulation::SimulatedWorldOptions wanted;
-             wanted.mirror = mirror;
+             Keywords parsed(keywords);
+             simulation::SimulatedWorldOptions options;
+             options.mirror = mirror;
              return std::const_pointer_cast<simulation::SimulatedWorld>(
-                 make_world(scene, std::move(wanted), taken, threads));
+                 make_world(scene, std::move(options), parsed, threads));
            }),
            py::arg("scene"), py::kw_only(), py::arg("mirror") = py::none(), py::arg("threads") = 0,
            with_options("`scene`: one of `scenes`, or the path of a Gazebo world or a mesh file. "
@@ -110,7 +110,7 @@ void bind_worlds(py::module_& m) {
           "Of the built-in scene or of the file.")
       .def_property_readonly(
           "warnings", [](const simulation::SimulatedWorld& w) { return w.scene().warnings; },
-          "What of a file could not be shown.")
+          "Parts of a file that cannot be rendered.")
       .def_property_readonly("source", &simulation::SimulatedWorld::source, "How its pictures lie.")
       .def_property_readonly(
           "camera_height_m",
@@ -119,7 +119,7 @@ void bind_worlds(py::module_& m) {
       .def_property_readonly(
           "robot_radius_m",
           [](const simulation::SimulatedWorld& w) { return w.options().free_space.robot_radius_m; },
-          "Of the robot, which is taken for a cylinder.")
+          "Of the robot, which is parsed for a cylinder.")
       .def_property_readonly(
           "free_area_m2",
           [](const simulation::SimulatedWorld& w) { return w.free_space().area_m2(); },
@@ -185,12 +185,12 @@ void bind_worlds(py::module_& m) {
       .def(
           "plan",
           [](const simulation::SimulatedWorld& w, const py::kwargs& keywords) {
-            Keywords taken(keywords);
-            const auto wanted = recording_options(taken);
-            taken.finish();
+            Keywords parsed(keywords);
+            const auto options = recording_options(parsed);
+            parsed.finish();
             std::vector<Pose2> poses;
             for (const auto& one :
-                 w.with(wanted.recording, w.options().simulation.scene.seed).plan()) {
+                 w.with(options.recording, w.options().simulation.scene.seed).plan()) {
               poses.push_back(one.pose);
             }
             return pose_rows(poses);
@@ -204,13 +204,13 @@ void bind_worlds(py::module_& m) {
           [](const simulation::SimulatedWorld& w, const std::filesystem::path& folder,
              const py::object& trajectory, std::optional<int> seed, int threads,
              const py::kwargs& keywords) {
-            Keywords taken(keywords);
-            const auto wanted = recording_options(taken);
-            taken.finish();
+            Keywords parsed(keywords);
+            const auto options = recording_options(parsed);
+            parsed.finish();
             const auto along = trajectory_from(trajectory);
             const py::gil_scoped_release free;
             return record(
-                w.with(wanted.recording, seed.value_or(w.options().simulation.scene.seed)), folder,
+                w.with(options.recording, seed.value_or(w.options().simulation.scene.seed)), folder,
                 along, threads);
           },
           py::arg("folder"), py::kw_only(), py::arg("trajectory") = py::none(),
@@ -230,11 +230,11 @@ void bind_worlds(py::module_& m) {
       [](const std::string& scene, const std::filesystem::path& folder,
          const std::optional<Camera>& mirror, const py::object& trajectory, int threads,
          const py::kwargs& keywords) {
-        Keywords taken(keywords);
-        auto wanted = recording_options(taken);
-        wanted.mirror = mirror;
+        Keywords parsed(keywords);
+        auto options = recording_options(parsed);
+        options.mirror = mirror;
         const auto along = trajectory_from(trajectory);
-        const World world = make_world(scene, std::move(wanted), taken, threads);
+        const World world = make_world(scene, std::move(options), parsed, threads);
         const py::gil_scoped_release free;
         return record(*world, folder, along, threads);
       },
@@ -303,13 +303,13 @@ void bind_robots(py::module_& m) {
           "observe",
           [](SharedRobot& robot) {
             return robot.change([](Robot& r) {
-              Observation seen(
+              Observation observation(
                   picture_at(*r.world, r.base.pose(), Random(r.seed, ++r.pictures).next()));
               const Pose2& pose = r.base.pose();
-              seen.stamp_s = r.time_s;
-              seen.odometry = r.base.odometry();
-              seen.pose = ReferencePose{pose.x_m, pose.y_m, pose.heading_rad};
-              return seen;
+              observation.stamp_s = r.time_s;
+              observation.odometry = r.base.odometry();
+              observation.pose = ReferencePose{pose.x_m, pose.y_m, pose.heading_rad};
+              return observation;
             });
           },
           "What it sees now, with stamp, odometry and, for the record, its true pose, which no "

@@ -1,4 +1,4 @@
-"""What the tests share: a simulated office, its memory, and the command."""
+"""Shared by the tests: a simulated office, its memory, and the command."""
 import json
 import os
 import pathlib
@@ -12,7 +12,7 @@ COMMAND = pathlib.Path(panonav.__file__).with_name("panonav")
 
 
 def run_command(*arguments, code=0):
-    """What the command prints."""
+    """Returns the JSON that the command prints."""
     ended = subprocess.run([COMMAND, *map(str, arguments)], capture_output=True, text=True, check=False)
     assert ended.returncode == code, ended.stderr
     return ended.stdout

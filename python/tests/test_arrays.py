@@ -153,13 +153,13 @@ def test_structured_poses_are_rows():
 
 def test_stubs_know_every_name_and_option():
     text = (pathlib.Path(panonav.__file__).parent / "_core.pyi").read_text()
-    told = {node.name for node in ast.parse(text).body if isinstance(node, (ast.ClassDef, ast.FunctionDef))}
-    assert told == {name for name in vars(panonav._core) if name[0] != "_"} - {"camera_models", "scenes"}
+    reported = {node.name for node in ast.parse(text).body if isinstance(node, (ast.ClassDef, ast.FunctionDef))}
+    assert reported == {name for name in vars(panonav._core) if name[0] != "_"} - {"camera_models", "scenes"}
     assert "top: int = 10" in text and "::" not in text and "_core" not in text.replace("python/make_stubs", "")
 
 
 def texts_of(name, value):
-    """What the docstring says beside signatures: of a function one text for each overload."""
+    """Returns the docstring without signatures: for a function one text for each overload."""
     doc = "" if value.__doc__ in (None, type(value).__doc__) else value.__doc__
     texts = re.split(rf"^(?:\d+\. )?{name}\(.*$", doc.replace("Overloaded function.", ""), flags=re.MULTILINE)
     return [text.strip() for text in texts[2 if len(texts) > 2 else len(texts) - 1:]]
@@ -167,8 +167,8 @@ def texts_of(name, value):
 
 def test_every_public_name_has_a_text():
     # camera_models and scenes are tuples, which hold no text: comments of __init__.py, which Sphinx reads, are theirs.
-    told = re.findall(r"^#: .+\n(\w+): tuple$", pathlib.Path(panonav.__file__).read_text(), re.MULTILINE)
-    names = [(name, name, value) for name, value in vars(panonav).items() if name[0] != "_" and name not in told]
+    reported = re.findall(r"^#: .+\n(\w+): tuple$", pathlib.Path(panonav.__file__).read_text(), re.MULTILINE)
+    names = [(name, name, value) for name, value in vars(panonav).items() if name[0] != "_" and name not in reported]
     for kind, _, value in names[:]:
         if isinstance(value, type):
             names += [(f"{kind}.{name}", name, member) for name, member in vars(value).items()

@@ -165,8 +165,8 @@ def test_synchronise_memory(office, tmp_path):
             pytest.skip(str(error)) if "without PostgreSQL" in str(error) else pytest.fail(str(error))
         views = panonav.MemoryFile(file).names()
         assert report.uploaded == report.views == len(views) > 10 and report.downloaded == 0
-        told, = command_json("synchronise", tmp_path / "two.panonav", address)
-        assert told["downloaded"] == len(views)
+        reported, = command_json("synchronise", tmp_path / "two.panonav", address)
+        assert reported["downloaded"] == len(views)
         part = panonav.synchronise_memory(tmp_path / "part.panonav", address, panonav.areas_around(900.0, 0.0, 1.0))
         assert part.downloaded == part.views == 0
         again = panonav.synchronise_memory(memory_of("three.panonav"), address)

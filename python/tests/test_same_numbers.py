@@ -23,15 +23,15 @@ def plain(place, areas=False):
         if match.verified_features is not None:
             one["verified_features"] = match.verified_features
         matches.append(one)
-    told = {"file": place.name, "known": place.known, "known_probability": place.known_probability,
+    reported = {"file": place.name, "known": place.known, "known_probability": place.known_probability,
             "matches": matches, "position": place.position and place.position.to_dict(),
             "heading_rad": place.heading_rad, "components": place.components, "bytes_read": place.bytes_read,
             "turned_rad": 0.0}
     if areas:
-        told["areas"] = [{"components": level.components, "candidates": len(level.candidates),
+        reported["areas"] = [{"components": level.components, "candidates": len(level.candidates),
                           "area_m2": level.area_m2, "radius_m": level.region and level.region.radius_m,
                           "bytes_read": level.bytes_read} for level in place.areas]
-    return told
+    return reported
 
 
 def test_localise_office(office):
@@ -45,22 +45,22 @@ def test_localise_office(office):
 
 
 def estimate_as_printed(estimate):
-    told = estimate.to_dict()
-    told["file"] = told.pop("name")
-    for mode in told["modes"]:
+    reported = estimate.to_dict()
+    reported["file"] = reported.pop("name")
+    for mode in reported["modes"]:
         mode["covariance"] = list(mode["covariance"].ravel())
-    return told
+    return reported
 
 
 def same_estimates(printed, ours):
     printed = [line for line in printed if "file" in line]
     assert len(printed) == len(ours) > 5
     for one, other in zip(printed, ours):
-        told = estimate_as_printed(other)
+        reported = estimate_as_printed(other)
         for key, value in one.items():
             if key not in ("modes", "stamp_s", "ground_truth"):
-                assert told[key] == value, key
-        modes = [{**mode.pop("mean"), **mode} for mode in told["modes"]]
+                assert reported[key] == value, key
+        modes = [{**mode.pop("mean"), **mode} for mode in reported["modes"]]
         assert one["modes"] == modes
 
 
@@ -228,8 +228,8 @@ def same_map(recording, folder):
     run = panonav.make_map(recording, folder / "ours.panonav", capture_difference=0.05, graph_max_iterations=15)
     printed = command_json("map", recording, folder / "theirs.panonav", "--capture-difference", 0.05,
                            "--graph-max-iterations", 15, "--tum", folder / "theirs.csv")[0]
-    told = mapped_as_printed(run)
-    assert told == {key: printed[key] for key in told}
+    reported = mapped_as_printed(run)
+    assert reported == {key: printed[key] for key in reported}
     one, other = (panonav.MemoryFile(folder / f"{whose}.panonav") for whose in ("ours", "theirs"))
     assert panonav.read_map(one, "map").to_dict() == panonav.read_map(other, "map").to_dict() == run.map.to_dict()
     assert numpy.array_equal(run.map.poses(), panonav.read_map(other).poses())
@@ -255,12 +255,12 @@ def same_arrangement(memory, **odometry):
 def test_merge_office(office, tmp_path):
     copy = tmp_path / "copy.panonav"
     shutil.copy(office / "office.panonav", copy)
-    told, = command_json("merge", office / "office.panonav", copy, "-o", tmp_path / "by_command.panonav")
+    reported, = command_json("merge", office / "office.panonav", copy, "-o", tmp_path / "by_command.panonav")
     merged = panonav.merge_memories(office / "office.panonav", copy, tmp_path / "by_python.panonav")
-    assert merged.shared == told["shared"] == merged.views == told["views"] > 10
-    assert merged.alignment.places == told["alignment"]["places"]
+    assert merged.shared == reported["shared"] == merged.views == reported["views"] > 10
+    assert merged.alignment.places == reported["alignment"]["places"]
     assert tuple(merged.alignment.first_from_second) == tuple(
-        told["alignment"][key] for key in ("x_m", "y_m", "heading_rad"))
+        reported["alignment"][key] for key in ("x_m", "y_m", "heading_rad"))
     views = [panonav.MemoryFile(tmp_path / f"by_{who}.panonav").load() for who in ("command", "python")]
     assert numpy.array_equal(views[0].poses(), views[1].poses())
     with pytest.raises(ValueError, match="min_confirmed"):
@@ -310,13 +310,13 @@ def test_catchment_office(office):
 
 
 def step_as_printed(step):
-    told = step.to_dict()
-    told["file"] = told.pop("name")
-    del told["line"]
-    told["columns"] = told["columns"] or 0
+    reported = step.to_dict()
+    reported["file"] = reported.pop("name")
+    del reported["line"]
+    reported["columns"] = reported["columns"] or 0
     if step.on_route:
-        told["covariance"] = list(told["covariance"].ravel())
-    return told
+        reported["covariance"] = list(reported["covariance"].ravel())
+    return reported
 
 
 def same_route(recording, folder, every_m):

@@ -53,7 +53,7 @@ std::vector<MapLayer> make_field_layers(const simulation::RememberedPlace& remem
 MapLayer make_planned_layer(const simulation::RememberedPlace& remembered,
                             const PlannerOptions& options, ViewId goal,
                             const simulation::MissionRun& run) {
-  MapLayer layer{.label = "way planned", .colour = PlotColour::orange};
+  MapLayer layer{.label = "planned path", .colour = PlotColour::orange};
   const auto known = std::ranges::find_if(
       run.decisions, [](const auto& step) { return step.nearest.has_value(); });
   if (known == run.decisions.end()) return layer;
@@ -68,7 +68,7 @@ MapLayer make_planned_layer(const simulation::RememberedPlace& remembered,
 }
 
 MapLayer make_driven_layer(const simulation::MissionRun& run) {
-  MapLayer layer{.label = "way driven", .colour = PlotColour::vermilion, .lines = {{}}};
+  MapLayer layer{.label = "driven path", .colour = PlotColour::vermilion, .lines = {{}}};
   for (std::size_t i = 0; i < run.path.size(); ++i) {
     layer.lines.back().push_back(run.path[i].position());
     if (run.kidnapped_at == i) layer.lines.emplace_back();

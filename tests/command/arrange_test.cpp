@@ -40,7 +40,7 @@ TEST_F(Arrange, TheReportUnfolds) {
   const std::string page = bytes_of(report + "/index.html");
   (void)text_of_page(page);
   EXPECT_EQ(plots_of(page),
-            (std::vector<std::string>{"The arrangement as it unfolds", "as they were taken",
+            (std::vector<std::string>{"The arrangement, step by step", "as they were taken",
                                       "as the views arrange themselves"}));
   const json frames = panels_of(page).front().data["frames"];
   ASSERT_GE(frames.size(), 5U);
@@ -122,7 +122,7 @@ TEST_F(Arrange, TellsHowManyViewsTheLargestComponentHolds) {
                                 std::to_string(poses.size()) + " views"))
       << out;
   EXPECT_TRUE(contains(out, " over " + std::to_string(largest) + " views")) << out;
-  EXPECT_TRUE(contains(out, "no way leads from one to another")) << out;
+  EXPECT_TRUE(contains(out, "no path leads from one to another")) << out;
 }
 
 TEST_F(Arrange, RefusesInOneLine) {

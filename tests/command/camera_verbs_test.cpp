@@ -176,7 +176,7 @@ TEST_F(CameraVerbs, RecordingsAreCalibratedAndUnwrappedAsTheirPicturesAre) {
 
   run_well({"unwrap", picture(1), "--camera", true_camera(), "-o", out_ / "one.png"});
   const auto said = answer_of({"unwrap", run, "-o", out_ / "by_folder", "--json"});
-  EXPECT_EQ(said["pictures"], 3);
+  EXPECT_EQ(said["images"], 3);
   EXPECT_EQ(said["rows"], 80);
   EXPECT_EQ(read_image(out_ / "by_folder/view_00001.png"), read_image(out_ / "one.png"));
   run_well({"unwrap", recording, "--camera", true_camera(), "-o", out_ / "by_recording"});

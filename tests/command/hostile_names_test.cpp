@@ -120,7 +120,7 @@ TEST_F(HostileNames, GalleryExportAndAnswersShowThem) {
 
   const fs::path out = folder / "e`touch run`\n'\"<i>";
   const auto said = answer_of({"export", memory, "-o", out, "--json"});
-  EXPECT_EQ(said["pictures"], 25);
+  EXPECT_EQ(said["images"], 25);
   EXPECT_FALSE(fs::exists(folder / "outside.png"));
   EXPECT_FALSE(fs::exists(out.parent_path().parent_path() / "outside.png"));
   EXPECT_EQ(said["renamed"], 2) << "the long name and the one that leads outside";

@@ -289,7 +289,7 @@ TEST_F(Localise, TheReportShowsEachPictureAboveItsBestMatch) {
         view_name(i) + ": " +
         (is_known ? "near " + best["file"].get<std::string>() : "unknown place");
     const json& shown = run["moments"][i];
-    EXPECT_EQ(shown["values"]["picture"].get<std::string>() + ": " +
+    EXPECT_EQ(shown["values"]["image"].get<std::string>() + ": " +
                   shown["values"]["answer"].get<std::string>(),
               title);
     EXPECT_TRUE(shown["values"]["difference to the best match"].get<std::string>().starts_with(

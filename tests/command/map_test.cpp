@@ -47,7 +47,7 @@ class Map : public ::testing::Test {
 
 TEST_F(Map, EveryPictureBecomesANodeOfTheMap) {
   const json said = map({"--tum", folder_ / "m.tum", "--graphml", folder_ / "m.graphml"});
-  for (const char* key : {"memory", "pictures", "nodes", "skipped", "connected_components",
+  for (const char* key : {"memory", "images", "nodes", "skipped", "connected_components",
                           "closures", "scale_m", "wheels", "step_ms", "ground_truth"}) {
     EXPECT_TRUE(said.contains(key)) << key;
   }

@@ -188,7 +188,7 @@ TEST_F(Memorise, WhereNoPictureCanBeReadThereIsNoMemory) {
   write_text(file, "no picture");
   const auto result = run_panonav({"memorise", file, memory(), "--kind", "panorama"});
   EXPECT_EQ(result.exit_code, 2);
-  EXPECT_TRUE(contains(result.err, "holds no picture that can be read"));
+  EXPECT_TRUE(contains(result.err, "holds no image that can be read"));
   EXPECT_FALSE(fs::exists(memory()));
 }
 

@@ -261,12 +261,12 @@ TEST_F(Recordings, BecomeTheDataSetThatTheyWere) {
   write_walk(tilted, *world_, grid_poses(4), true);
   const std::string recording = *folder_ / "tilted.mcap";
   const auto there = answer_of({"convert", tilted, recording, "--json"});
-  EXPECT_EQ(there["pictures"], 16);
+  EXPECT_EQ(there["images"], 16);
   const std::string back = *folder_ / "back";
   EXPECT_EQ(answer_of(with({"convert", recording, back, "--json"}, kind)),
             (json{{"input", recording},
                   {"output", back},
-                  {"pictures", 16},
+                  {"images", 16},
                   {"stamps", true},
                   {"odometry", true},
                   {"positions", true},
@@ -316,7 +316,7 @@ TEST_F(Recordings, InfoSaysWhatIsInThem) {
   EXPECT_EQ(pictures["type"], "sensor_msgs/CompressedImage");
   EXPECT_EQ(pictures["messages"], 16);
   EXPECT_NEAR(pictures["rate_hz"].get<double>(), 2.5, 1e-6);
-  EXPECT_EQ(pictures["first_picture"], "png");
+  EXPECT_EQ(pictures["first_image"], "png");
   EXPECT_EQ(info["topics"][2]["type"], "nav_msgs/Odometry");
   const auto said = run_panonav({"info", walk("_lz4.mcap")});
   EXPECT_EQ(said.exit_code, 0);

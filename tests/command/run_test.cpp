@@ -121,7 +121,7 @@ TEST_F(Walk, AVideoGivesTheMemoryAndTheAnswersOfItsPictures) {
 
 TEST_F(Walk, InfoSaysWhatIsInAVideo) {
   const json info = answer_of({"info", path("walk.mp4"), "--json"});
-  EXPECT_EQ(info.at("pictures"), count);
+  EXPECT_EQ(info.at("images"), count);
   EXPECT_EQ(info.at("width"), 96);
   EXPECT_EQ(info.at("height"), 12);
   EXPECT_NEAR(info.at("end_s").get<double>(), 3.5, 1e-3);

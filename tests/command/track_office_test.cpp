@@ -153,7 +153,7 @@ TEST_F(TrackOffice, TheReportHoldsPicturesAndARunToPlay) {
   EXPECT_EQ(data["retained"]["references"].size(), 2 * info["views"].get<std::size_t>());
   for (std::size_t i = 0; i < images.size(); ++i) {
     const json& shown = data["moments"][i];
-    EXPECT_EQ(shown["values"]["picture"], images[i]["file"]);
+    EXPECT_EQ(shown["values"]["image"], images[i]["file"]);
     EXPECT_TRUE(
         shown["data"]["panorama"].get<std::string>().starts_with("data:image/jpeg;base64,"));
     EXPECT_EQ(shown["state"], images[i]["state"]);

@@ -172,7 +172,7 @@ TEST_F(Views, AThumbnailThatIsNoPictureReachesNoPage) {
   expect_refusal({"show", memory, "17", "-o", folder / "x.png"}, "thumbnail");
   const json said = answer_of({"export", memory, "-o", folder / "out", "--json"});
   EXPECT_EQ(said["views"], 17);
-  EXPECT_EQ(said["pictures"], 16);
+  EXPECT_EQ(said["images"], 16);
   EXPECT_TRUE(contains(run_panonav({"export", memory, "-o", folder / "other"}).out,
                        "1 views without a thumbnail are not in it."));
 }
@@ -182,7 +182,7 @@ TEST_F(Views, ExportMemorisedAgainIsTheSameMemory) {
   const fs::path again = folder / "again.panonav";
   const json said = answer_of({"export", memory, "-o", out, "--json"});
   EXPECT_EQ(said["views"], 16);
-  EXPECT_EQ(said["pictures"], 16);
+  EXPECT_EQ(said["images"], 16);
   EXPECT_EQ(said["enlarged"], false);
   const std::vector<std::string> back{"memorise", out, again, "--config", out / "memorise.toml",
                                       "--json"};
@@ -230,7 +230,7 @@ TEST_F(Views, ExportWithoutThumbnailsSaysThatNothingComesBack) {
   const fs::path out = folder / "out";
   const auto told = run_panonav({"export", bare(), "-o", out});
   EXPECT_EQ(told.exit_code, 0) << told.err;
-  EXPECT_TRUE(contains(told.out, "holds no thumbnails. memorise cannot take this back."));
+  EXPECT_TRUE(contains(told.out, "holds no thumbnails. memorise cannot read this folder."));
   EXPECT_FALSE(fs::exists(out / "dataset.toml"));
   const std::string array = bytes_of(out / "signatures.npy");
   EXPECT_TRUE(contains(array, "'shape': (16, 2, 15, 12)"));

@@ -15,7 +15,7 @@
 
 namespace panonav::testing {
 
-/// How a run of the command ended, and what it said.
+/// Exit code and output of a run of the command.
 struct CommandResult {
   int exit_code = -1;  ///< -1: ended by a signal
   int signal = 0;

@@ -45,14 +45,14 @@ struct Arguments::Implementation {
 namespace {
 
 /// `--cell-size-m` as `cell_size_m`.
-std::string member_of(std::string_view flag) {
+std::string to_member_name(std::string_view flag) {
   std::string name(flag.substr(2));
   std::replace(name.begin(), name.end(), '-', '_');
   return name;
 }
 
 template <class Number>
-Number whole_number(const std::string& flag, const std::string& text, Number low) {
+Number parse_whole_number(const std::string& flag, const std::string& text, Number low) {
   Number value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size() || value < low) {
@@ -63,7 +63,7 @@ Number whole_number(const std::string& flag, const std::string& text, Number low
 }
 
 /// The longest of a flag's forms: "--out" of "-o,--out FILE".
-std::string long_form(const std::string& declared) {
+std::string long_flag(const std::string& declared) {
   const std::string forms = declared.substr(0, declared.find(' '));
   return forms.substr(forms.rfind(',') + 1);
 }
@@ -82,7 +82,7 @@ Arguments::~Arguments() = default;
 ArgumentInfo& Arguments::add(const std::string& declared, const std::string& value,
                              const std::string& help, Take take) {
   ArgumentInfo info;
-  info.name = long_form(declared);
+  info.name = long_flag(declared);
   const std::size_t comma = declared.find(',');
   if (comma < declared.find(' ')) info.short_form = declared.substr(0, comma);
   const std::size_t blank = declared.find(' ');
@@ -129,16 +129,15 @@ void Arguments::option(const std::string& flag, std::optional<std::string>& valu
 
 void Arguments::option(const std::string& flag, std::optional<std::uint64_t>& value,
                        const std::string& help) {
-  add(flag, "INT", help, [&value, name = long_form(flag)](auto words) {
-    value = whole_number<std::uint64_t>(name, words.front(), 0);
+  add(flag, "INT", help, [&value, name = long_flag(flag)](auto words) {
+    value = parse_whole_number<std::uint64_t>(name, words.front(), 0);
   }).range = "from 0";
 }
 
 void Arguments::option(const std::string& flag, std::optional<double>& value,
                        const std::string& help) {
-  add(flag, "NUMBER", help, [&value, name = long_form(flag)](auto words) {
-    value = number_from_text(name, words.front());
-  });
+  add(flag, "NUMBER", help,
+      [&value, name = long_flag(flag)](auto words) { value = parse_number(name, words.front()); });
 }
 
 void Arguments::option(const std::string& flag, std::optional<std::pair<double, double>>& value,
@@ -148,8 +147,8 @@ void Arguments::option(const std::string& flag, std::optional<std::pair<double, 
 
 void Arguments::option(const std::string& flag, const std::string& words,
                        std::optional<std::pair<double, double>>& value, const std::string& help) {
-  add(flag, words, help, [&value, name = long_form(flag)](auto typed) {
-    value = {number_from_text(name, typed[0]), number_from_text(name, typed[1])};
+  add(flag, words, help, [&value, name = long_flag(flag)](auto typed) {
+    value = {parse_number(name, typed[0]), parse_number(name, typed[1])};
   });
 }
 
@@ -160,8 +159,8 @@ void Arguments::option(const std::string& flag, const std::string& words,
 }
 
 void Arguments::option(const std::string& flag, int& value, int low, const std::string& help) {
-  auto& info = add(flag, "INT", help, [&value, low, name = long_form(flag)](auto words) {
-    value = whole_number(name, words.front(), low);
+  auto& info = add(flag, "INT", help, [&value, low, name = long_flag(flag)](auto words) {
+    value = parse_whole_number(name, words.front(), low);
   });
   info.initial = std::to_string(value);
   info.range = "from " + std::to_string(low);
@@ -169,14 +168,14 @@ void Arguments::option(const std::string& flag, int& value, int low, const std::
 
 void Arguments::option(const std::string& flag, std::optional<int>& value, int low,
                        const std::string& help) {
-  add(flag, "INT", help, [&value, low, name = long_form(flag)](auto words) {
-    value = whole_number(name, words.front(), low);
+  add(flag, "INT", help, [&value, low, name = long_flag(flag)](auto words) {
+    value = parse_whole_number(name, words.front(), low);
   }).range = "from " + std::to_string(low);
 }
 
 void Arguments::choice(const std::string& flag, std::optional<std::string>& value,
                        std::vector<std::string> choices, const std::string& help) {
-  auto& info = add(flag, "NAME", help, [&value, name = long_form(flag), choices](auto words) {
+  auto& info = add(flag, "NAME", help, [&value, name = long_flag(flag), choices](auto words) {
     const std::string& text = words.front();
     if (std::ranges::find(choices, text) == choices.end()) {
       throw UsageError(name + " is '" + text + "'; allowed: " + listed(choices));
@@ -202,7 +201,7 @@ void Arguments::add_section(const std::string& section, const std::string& prefi
     if (help.size() > 1 && help[1] >= 'a' && help[1] <= 'z' && help[0] >= 'a' && help[0] <= 'z') {
       help[0] = static_cast<char>(help[0] - 'a' + 'A');
     }
-    const std::string flag = flag_of(before + std::string(option.info.name));
+    const std::string flag = to_flag(before + std::string(option.info.name));
     auto& info =
         add(flag, std::string(option.type), help, [&text](auto words) { text = words.front(); });
     info.initial = option.value;
@@ -232,7 +231,7 @@ void Arguments::set_common(std::initializer_list<std::string_view> flags, bool c
   }
 }
 
-std::string Arguments::unknown_flag(const std::string& typed) const {
+std::string Arguments::explain_unknown_flag(const std::string& typed) const {
   std::vector<std::string_view> names;
   for (const auto& info : infos()) {
     if (!info.positional()) names.emplace_back(info.name);
@@ -263,27 +262,27 @@ void Arguments::read(std::span<const std::string> words, std::string_view verb, 
     const bool is_long = word.starts_with("--");
     const std::string name = word.substr(0, is_long ? word.find('=') : 2);
     const auto found = find(name);
-    if (found == infos.end()) throw UsageError(unknown_flag(is_long ? name : word));
+    if (found == infos.end()) throw UsageError(explain_unknown_flag(is_long ? name : word));
     std::vector<std::string> values;
     if (name.size() < word.size()) values.push_back(word.substr(name.size() + (is_long ? 1 : 0)));
-    const auto wanted = static_cast<std::size_t>(
+    const auto value_count = static_cast<std::size_t>(
         found->value.empty() ? 0 : 1 + std::ranges::count(found->value, ' '));
-    if (values.size() > wanted) throw UsageError(found->name + " takes no value");
-    while (values.size() < wanted) {
+    if (values.size() > value_count) throw UsageError(found->name + " takes no value");
+    while (values.size() < value_count) {
       if (i + 1 == words.size() || find(words[i + 1]) != infos.end()) {
-        throw UsageError(found->name + " wants a value: " + found->value);
+        throw UsageError(found->name + " needs a value: " + found->value);
       }
       values.push_back(words[++i]);
     }
     const auto number = static_cast<std::size_t>(found - infos.begin());
-    if (seen[number] && wanted > 0) throw UsageError(found->name + " is given twice");
+    if (seen[number] && value_count > 0) throw UsageError(found->name + " is given twice");
     seen[number] = true;
     implementation_->typed.insert(found->name);
     implementation_->takes[number](values);
     const auto plain = implementation_->plain.find(found->name);
     if (plain != implementation_->plain.end()) plain->second = values.front();
   }
-  take_positionals(loose, verb, may_miss);
+  read_positionals(loose, verb, may_miss);
   for (std::size_t i = 0; i < infos.size() && !may_miss; ++i) {
     if (infos[i].required && !infos[i].positional() && !seen[i]) {
       throw UsageError(infos[i].name + " is required");
@@ -291,16 +290,16 @@ void Arguments::read(std::span<const std::string> words, std::string_view verb, 
   }
 }
 
-void Arguments::take_positionals(std::span<const std::string> words, std::string_view verb,
+void Arguments::read_positionals(std::span<const std::string> words, std::string_view verb,
                                  bool may_miss) {
   const auto& infos = implementation_->infos;
-  std::vector<std::size_t> wanted;
+  std::vector<std::size_t> positionals;
   for (std::size_t i = 0; i < infos.size(); ++i) {
-    if (infos[i].positional()) wanted.push_back(i);
+    if (infos[i].positional()) positionals.push_back(i);
   }
   // A memory file where something else belongs, and no memory in its place.
-  for (std::size_t i = 0; i < std::min(wanted.size(), words.size()); ++i) {
-    if (infos[wanted[i]].name != "MEMORY" || words[i].ends_with(".panonav") ||
+  for (std::size_t i = 0; i < std::min(positionals.size(), words.size()); ++i) {
+    if (infos[positionals[i]].name != "MEMORY" || words[i].ends_with(".panonav") ||
         is_server_address(words[i])) {
       continue;
     }
@@ -312,11 +311,11 @@ void Arguments::take_positionals(std::span<const std::string> words, std::string
     std::string command = "panonav " + std::string(verb);
     for (const auto& word : swapped) command.append(" ").append(quote_for_shell(word));
     throw UsageError("MEMORY is '" + words[i] + "' and " +
-                     infos[wanted[std::min(there, wanted.size() - 1)]].name + " is '" + *other +
-                     "': they seem to be swapped (did you mean '" + command + "'?)");
+                     infos[positionals[std::min(there, positionals.size() - 1)]].name + " is '" +
+                     *other + "': they seem to be swapped (did you mean '" + command + "'?)");
   }
   std::size_t next = 0;
-  for (const std::size_t i : wanted) {
+  for (const std::size_t i : positionals) {
     if (next == words.size()) {
       if (infos[i].required && !may_miss) throw UsageError(infos[i].name + " is required");
       continue;
@@ -345,7 +344,7 @@ void Arguments::resolve(const std::optional<std::string>& config,
     const ArgumentInfo& info = implementation_->infos[i];
     const auto plain = implementation_->plain.find(info.name);
     if (plain == implementation_->plain.end()) continue;
-    const auto text = file->take_text(info.section, member_of(info.name));
+    const auto text = file->take_text(info.section, to_member_name(info.name));
     if (text && !implementation_->typed.contains(info.name)) {
       implementation_->takes[i](std::span(&*text, 1));
       plain->second = text;
@@ -365,8 +364,8 @@ void Arguments::resolve(const std::optional<std::string>& config,
   }
 }
 
-void Arguments::used_only(std::vector<std::string> options, std::function<bool()> used,
-                          std::string why) {
+void Arguments::refuse_unless(std::vector<std::string> options, std::function<bool()> used,
+                              std::string why) {
   implementation_->used_only.push_back({std::move(options), std::move(used), std::move(why)});
 }
 
@@ -374,30 +373,31 @@ void Arguments::refuse_unused(std::span<const std::string> options, const std::s
   const auto refuse = [&](const std::string& flag) {
     throw UsageError(flag + " has no effect " + why + "; leave it out");
   };
-  for (const std::string& wanted : options) {
-    if (implementation_->typed.contains(wanted)) refuse(wanted);
+  for (const std::string& option : options) {
+    if (implementation_->typed.contains(option)) refuse(option);
     for (const auto& section : implementation_->sections) {
-      if ("[" + section.name + "]" != wanted) continue;
+      if ("[" + section.name + "]" != option) continue;
       for (const auto& [name, entry] : section.entries) {
-        if (entry.text) refuse(flag_of(section.prefix + name));
+        if (entry.text) refuse(to_flag(section.prefix + name));
       }
     }
   }
 }
 
-void Arguments::compare(const std::string& section, const Visit& wanted, const Visit& kept,
-                        const std::string& as) const {
-  std::vector<std::pair<std::string, std::string>> asked;
-  OptionLister list_wanted(
-      [&](const ListedOption& option) { asked.emplace_back(option.info.name, option.value); });
-  wanted(list_wanted);
+void Arguments::require_equal(const std::string& section, const Visit& typed, const Visit& kept,
+                              const std::string& as) const {
+  std::vector<std::pair<std::string, std::string>> typed_values;
+  OptionLister list_typed([&](const ListedOption& option) {
+    typed_values.emplace_back(option.info.name, option.value);
+  });
+  typed(list_typed);
   std::size_t next = 0;
   OptionLister list_kept([&](const ListedOption& option) {
-    const auto& [name, value] = asked[next++];
-    if (value == option.value || !given(section, name)) return;
+    const auto& [name, value] = typed_values[next++];
+    if (value == option.value || !is_set(section, name)) return;
     const auto declared =
         std::ranges::find(implementation_->sections, section, &Implementation::Section::name);
-    throw ContractError(flag_of(declared->prefix + name), value, option.value + as);
+    throw ContractError(to_flag(declared->prefix + name), value, option.value + as);
   });
   kept(list_kept);
 }
@@ -412,7 +412,7 @@ const std::vector<ArgumentInfo>& Arguments::infos() const {
   return implementation_->infos;
 }
 
-bool Arguments::given(const std::string& section, const std::string& name) const {
+bool Arguments::is_set(const std::string& section, const std::string& name) const {
   for (const auto& candidate : implementation_->sections) {
     if (candidate.name != section) continue;
     for (const auto& [option, entry] : candidate.entries) {
@@ -433,15 +433,15 @@ std::string Arguments::config_template(std::string_view verb) const {
       const std::string range = option.choices.empty() ? option.range : listed(option.choices);
       const bool is_name = option.type == "NAME";
       text += "# " + std::string(option.info.help) + (range.empty() ? "" : " (" + range + ")") +
-              "\n" + (given(section.name, name) ? "" : "# ") + name + " = " +
+              "\n" + (is_set(section.name, name) ? "" : "# ") + name + " = " +
               (is_name ? toml_text(option.value) : option.value) + "\n";
     });
     section.visit(lister);
     for (const ArgumentInfo& info : implementation_->infos) {
       const auto plain = implementation_->plain.find(info.name);
       if (info.section != section.name || plain == implementation_->plain.end()) continue;
-      text += "# " + info.help + "\n" + (plain->second ? "" : "# ") + member_of(info.name) + " = " +
-              toml_text(plain->second.value_or(info.initial)) + "\n";
+      text += "# " + info.help + "\n" + (plain->second ? "" : "# ") + to_member_name(info.name) +
+              " = " + toml_text(plain->second.value_or(info.initial)) + "\n";
     }
   }
   if (implementation_->sections.empty()) {

@@ -24,7 +24,7 @@ class UsageError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// What every verb takes.
+/// The arguments of every verb.
 struct CommonArguments {
   SessionOptions session;
   std::optional<std::string> config;
@@ -112,15 +112,14 @@ class Arguments {
   void common(std::initializer_list<std::string_view> flags) { set_common(flags, true); }
   void uncommon(std::initializer_list<std::string_view> flags) { set_common(flags, false); }
 
-  /// Whether the user gave this member by flag or file; an empty name: any member of the section.
-  /// Meaningful once the verb runs.
-  [[nodiscard]] bool given(const std::string& section, const std::string& name = "") const;
+  /// True if the user set this member by flag or file; with an empty name, any member of the
+  /// section. Valid once the verb runs.
+  [[nodiscard]] bool is_set(const std::string& section, const std::string& name = "") const;
 
-  /// Of options that count only where `used` holds: typed elsewhere they are refused once
-  /// everything is read, in one line that ends in `why` ("without --areas"). An entry is a flag, or
-  /// "[section]" for each option of one. What a --config file says is left alone: it may serve
-  /// several verbs.
-  void used_only(std::vector<std::string> options, std::function<bool()> used, std::string why);
+  /// Refuses options that were typed although `used` is false, once everything is read, in one
+  /// line that ends in `why` ("without --areas"). An entry is a flag, or "[section]" for each
+  /// option of one. Options of a --config file are ignored: it may serve several verbs.
+  void refuse_unless(std::vector<std::string> options, std::function<bool()> used, std::string why);
   /// The same where the input decides: throws UsageError when one of the options was typed.
   void refuse_unused(std::span<const std::string> options, const std::string& why) const;
   void refuse_unused(std::initializer_list<std::string> options, const std::string& why) const {
@@ -130,10 +129,10 @@ class Arguments {
   /// Throws ContractError when the user gave an option of the section, by flag or file, another
   /// value than what is there already has. `as` ends the line: whose value counts, and what to do.
   template <class Options>
-  void require_kept(const std::string& section, Options wanted, Options kept,
+  void require_same(const std::string& section, Options typed, Options kept,
                     const std::string& as) const {
-    compare(
-        section, [&](OptionVisitor& visitor) { visit_options(wanted, visitor); },
+    require_equal(
+        section, [&](OptionVisitor& visitor) { visit_options(typed, visitor); },
         [&](OptionVisitor& visitor) { visit_options(kept, visitor); }, as);
   }
 
@@ -157,11 +156,11 @@ class Arguments {
                     Take take);
   void add_section(const std::string& section, const std::string& prefix, Visit visit,
                    std::function<void()> check);
-  void compare(const std::string& section, const Visit& wanted, const Visit& kept,
-               const std::string& as) const;
+  void require_equal(const std::string& section, const Visit& typed, const Visit& kept,
+                     const std::string& as) const;
   void set_common(std::initializer_list<std::string_view> flags, bool common);
-  [[nodiscard]] std::string unknown_flag(const std::string& typed) const;
-  void take_positionals(std::span<const std::string> words, std::string_view verb, bool may_miss);
+  [[nodiscard]] std::string explain_unknown_flag(const std::string& typed) const;
+  void read_positionals(std::span<const std::string> words, std::string_view verb, bool may_miss);
 
   struct Implementation;
   std::unique_ptr<Implementation> implementation_;
@@ -179,10 +178,11 @@ struct ParsedCommand {
 [[nodiscard]] ParsedCommand parse(std::span<const Verb> verbs, std::span<const std::string> words);
 
 /// The verb that the words begin with, under its name or its alias; null when there is none.
-[[nodiscard]] const Verb* verb_in(std::span<const Verb> verbs, std::span<const std::string> words);
+[[nodiscard]] const Verb* find_verb(std::span<const Verb> verbs,
+                                    std::span<const std::string> words);
 
 /// The same where there must be one: throws UsageError with the verb that may have been meant.
-[[nodiscard]] const Verb& required_verb(std::span<const Verb> verbs,
-                                        std::span<const std::string> words);
+[[nodiscard]] const Verb& find_required_verb(std::span<const Verb> verbs,
+                                             std::span<const std::string> words);
 
 }  // namespace panonav::command

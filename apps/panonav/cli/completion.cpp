@@ -8,21 +8,21 @@ namespace panonav::command {
 
 namespace {
 
-bool takes_files(const ArgumentInfo& argument) {
+bool accepts_files(const ArgumentInfo& argument) {
   constexpr std::array<std::string_view, 2> names{"FILE", "FOLDER"};
   constexpr std::array<std::string_view, 5> no_files{"VIEW", "NEW_NAME", "VERB", "SHELL", "PAPER"};
   return argument.positional() ? std::ranges::find(no_files, argument.name) == no_files.end()
                                : std::ranges::find(names, argument.value) != names.end();
 }
 
-std::string joined(const std::vector<std::string>& words) {
+std::string join_words(const std::vector<std::string>& words) {
   std::string text;
   for (const auto& word : words) text += (text.empty() ? "" : " ") + word;
   return text;
 }
 
 /// All that may be typed for the options of a verb.
-std::string flags(const Description& description) {
+std::string list_flags(const Description& description) {
   std::string text;
   for (const auto& argument : description.arguments) {
     if (argument.positional()) continue;
@@ -33,8 +33,8 @@ std::string flags(const Description& description) {
   return text;
 }
 
-/// What may stand for the positionals of a verb, besides files.
-std::vector<std::string> proposals(const Description& description) {
+/// Returns the values that may be proposed for the positionals of a verb, besides files.
+std::vector<std::string> list_proposals(const Description& description) {
   std::vector<std::string> words;
   for (const auto& argument : description.arguments) {
     if (argument.positional()) {
@@ -46,7 +46,7 @@ std::vector<std::string> proposals(const Description& description) {
 
 bool positionals_are_files(const Description& description) {
   return std::ranges::any_of(description.arguments, [](const ArgumentInfo& argument) {
-    return argument.positional() && takes_files(argument);
+    return argument.positional() && accepts_files(argument);
   });
 }
 
@@ -76,7 +76,7 @@ std::vector<std::pair<std::string, std::vector<std::string>>> second_words(
 }
 
 /// `'localise'|'localize'`: a pattern of `case`.
-std::string pattern(const Verb& verb) {
+std::string case_pattern(const Verb& verb) {
   std::string text = "'";
   text.append(verb.name).append("'");
   if (!verb.alias.empty()) text.append("|'").append(verb.alias).append("'");
@@ -92,28 +92,29 @@ std::string bash_script(std::span<const Description> verbs) {
       "  COMPREPLY=()\n"
       "  if ((COMP_CWORD == 1)); then\n"
       "    COMPREPLY=($(compgen -W '" +
-      joined(first_words(verbs)) + " --help --version' -- \"$current\"))\n    return\n  fi\n";
+      join_words(first_words(verbs)) + " --help --version' -- \"$current\"))\n    return\n  fi\n";
   for (const auto& [first, seconds] : second_words(verbs)) {
     script += "  if [[ $verb == " + first +
               " ]]; then\n"
               "    if ((COMP_CWORD == 2)); then\n"
               "      COMPREPLY=($(compgen -W '" +
-              joined(seconds) +
+              join_words(seconds) +
               "' -- \"$current\"))\n      return\n    fi\n"
               "    verb=\"$verb ${COMP_WORDS[2]}\"\n  fi\n";
   }
   script += "  case $verb in\n";
   for (const auto& description : verbs) {
-    script += "  " + pattern(description.verb) + ")\n    flags='" + flags(description) + "'\n";
-    const auto words = proposals(description);
-    if (!words.empty()) script += "    words='" + joined(words) + "'\n";
+    script +=
+        "  " + case_pattern(description.verb) + ")\n    flags='" + list_flags(description) + "'\n";
+    const auto words = list_proposals(description);
+    if (!words.empty()) script += "    words='" + join_words(words) + "'\n";
     if (positionals_are_files(description)) script += "    files=1\n";
     std::string cases;
     for (const auto& argument : description.arguments) {
       if (argument.positional() || argument.value.empty()) continue;
       cases += "    " + (argument.short_form.empty() ? "" : argument.short_form + "|") +
-               argument.name + ") values=1 words='" + joined(argument.choices) +
-               "' files=" + (takes_files(argument) ? "1" : "") + " ;;\n";
+               argument.name + ") values=1 words='" + join_words(argument.choices) +
+               "' files=" + (accepts_files(argument) ? "1" : "") + " ;;\n";
     }
     script += "    case $before in\n" + cases + "    esac\n    ;;\n";
   }
@@ -128,7 +129,7 @@ std::string bash_script(std::span<const Description> verbs) {
 }
 
 /// Text within single quotes of zsh; `special` also get a backslash.
-std::string quoted(std::string_view text, std::string_view special) {
+std::string quote_for_zsh(std::string_view text, std::string_view special) {
   std::string result;
   for (const char c : text) {
     if (special.find(c) != std::string_view::npos) result += '\\';
@@ -143,12 +144,12 @@ std::string zsh_values(const ArgumentInfo& argument) {
   std::string_view left = argument.positional() ? argument.name : argument.value;
   while (!left.empty()) {
     const std::size_t end = std::min(left.find(' '), left.size());
-    std::string action = takes_files(argument) ? "_files" : " ";
+    std::string action = accepts_files(argument) ? "_files" : " ";
     if (!argument.choices.empty()) {
       // Built-in names beside files, or nothing but the choices.
-      const bool files = takes_files(argument);
+      const bool files = accepts_files(argument);
       action = files ? "{_alternative \"names\\:name\\:(" : "(";
-      action += joined(argument.choices);
+      action += join_words(argument.choices);
       action += files ? ")\" \"files\\:file\\:_files\"}" : ")";
     }
     text.append(":").append(left.substr(0, end)).append(":").append(action);
@@ -157,8 +158,8 @@ std::string zsh_values(const ArgumentInfo& argument) {
   return text;
 }
 
-/// Of the verb that a first word stands for.
-std::string summary_of(std::string_view word, std::span<const Description> verbs) {
+/// Returns the summary of the verb that begins with the word.
+std::string find_summary(std::string_view word, std::span<const Description> verbs) {
   const auto found = std::ranges::find_if(verbs, [word](const Description& description) {
     return description.verb.name == word || description.verb.alias == word;
   });
@@ -174,20 +175,20 @@ std::string zsh_script(std::span<const Description> verbs) {
       "  local -a verbs\n"
       "  if (( CURRENT == 2 )); then\n    verbs=(\n";
   for (const auto& word : first_words(verbs)) {
-    script += "      '" + word + ":" + quoted(summary_of(word, verbs), "") + "'\n";
+    script += "      '" + word + ":" + quote_for_zsh(find_summary(word, verbs), "") + "'\n";
   }
   script += "    )\n    _describe verb verbs\n    return\n  fi\n";
   for (const auto& [first, seconds] : second_words(verbs)) {
     script += "  if [[ $verb == " + first +
               " ]]; then\n"
               "    if (( CURRENT == 3 )); then\n      compadd " +
-              joined(seconds) +
+              join_words(seconds) +
               "\n      return\n    fi\n"
               "    verb=\"$verb $words[3]\"\n    shift words\n    (( CURRENT-- ))\n  fi\n";
   }
   script += "  shift words\n  (( CURRENT-- ))\n  case $verb in\n";
   for (const auto& description : verbs) {
-    script += "  " + pattern(description.verb) + ")\n    _arguments";
+    script += "  " + case_pattern(description.verb) + ")\n    _arguments";
     for (const auto& argument : description.arguments) {
       if (argument.positional()) {
         script +=
@@ -199,7 +200,7 @@ std::string zsh_script(std::span<const Description> verbs) {
         const bool attached = !argument.value.empty() && form.starts_with("--") &&
                               argument.value.find(' ') == std::string::npos;
         script += " \\\n      '" + form + (attached ? "=" : "") + "[" +
-                  quoted(help_line(argument), "[]:\\") + "]" + zsh_values(argument) + "'";
+                  quote_for_zsh(help_line(argument), "[]:\\") + "]" + zsh_values(argument) + "'";
       }
     }
     script += "\n    ;;\n";
@@ -211,7 +212,7 @@ std::string zsh_script(std::span<const Description> verbs) {
 }
 
 /// Text within single quotes of fish.
-std::string fish_quoted(std::string_view text) {
+std::string quote_for_fish(std::string_view text) {
   std::string result = "'";
   for (const char c : text) {
     if (c == '\'' || c == '\\') result += '\\';
@@ -232,27 +233,28 @@ std::string fish_script(std::span<const Description> verbs) {
       "complete -c panonav -f\n";
   for (const auto& word : first_words(verbs)) {
     script += "complete -c panonav -n __fish_use_subcommand -a " + word + " -d " +
-              fish_quoted(summary_of(word, verbs)) + "\n";
+              quote_for_fish(find_summary(word, verbs)) + "\n";
   }
   for (const auto& [first, seconds] : second_words(verbs)) {
     script += "complete -c panonav -n '__panonav_verb " + first +
-              "; and test (count (commandline -opc)) -eq 2' -a " + fish_quoted(joined(seconds)) +
-              "\n";
+              "; and test (count (commandline -opc)) -eq 2' -a " +
+              quote_for_fish(join_words(seconds)) + "\n";
   }
   for (const auto& description : verbs) {
     for (const auto name : {description.verb.name, description.verb.alias}) {
       if (name.empty()) continue;
       const std::string start = "complete -c panonav -n '__panonav_verb " + std::string(name) + "'";
-      const auto words = proposals(description);
-      if (!words.empty()) script += start + " -a " + fish_quoted(joined(words)) + "\n";
+      const auto words = list_proposals(description);
+      if (!words.empty()) script += start + " -a " + quote_for_fish(join_words(words)) + "\n";
       if (positionals_are_files(description)) script += start + " -F\n";
       for (const auto& argument : description.arguments) {
         if (argument.positional()) continue;
         script += start + " -l " + argument.name.substr(2);
         if (!argument.short_form.empty()) script += " -s " + argument.short_form.substr(1);
-        if (!argument.value.empty()) script += takes_files(argument) ? " -r -F" : " -x";
-        if (!argument.choices.empty()) script += " -a " + fish_quoted(joined(argument.choices));
-        script += " -d " + fish_quoted(argument.help) + "\n";
+        if (!argument.value.empty()) script += accepts_files(argument) ? " -r -F" : " -x";
+        if (!argument.choices.empty())
+          script += " -a " + quote_for_fish(join_words(argument.choices));
+        script += " -d " + quote_for_fish(argument.help) + "\n";
       }
     }
   }

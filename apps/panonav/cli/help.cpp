@@ -8,7 +8,7 @@ namespace panonav::command {
 namespace {
 
 /// An argument and its help beside it, or below it where it is long.
-std::string row(const std::string& left, std::string_view right, std::size_t column) {
+std::string format_row(const std::string& left, std::string_view right, std::size_t column) {
   std::string line = "  " + left;
   if (line.size() + 2 > column) {
     line += "\n";
@@ -19,8 +19,8 @@ std::string row(const std::string& left, std::string_view right, std::size_t col
   return line + wrapped(right, column, column) + "\n";
 }
 
-/// The lines of the examples, at most so many.
-std::string examples(std::string_view text, std::size_t count) {
+/// Returns the first `count` lines of the examples.
+std::string first_examples(std::string_view text, std::size_t count) {
   std::size_t end = 0;
   while (count-- > 0 && end < text.size())
     end = std::min(text.find('\n', end), text.size() - 1) + 1;
@@ -114,7 +114,7 @@ std::string help_text(const Description& description, bool all) {
   std::string text = wrapped(std::string(verb.summary) + ".", 0, 0) + "\n\n";
   text += "Usage: panonav " + name + " " + usage(description) + "\n";
   if (!verb.alias.empty()) text += "Also: panonav " + std::string(verb.alias) + "\n";
-  text += "\nExamples:\n" + examples(verb.example, all ? arguments.size() + 100 : 2);
+  text += "\nExamples:\n" + first_examples(verb.example, all ? arguments.size() + 100 : 2);
   std::string title;
   std::size_t hidden = 0;
   for (const bool positional : {true, false}) {
@@ -128,7 +128,7 @@ std::string help_text(const Description& description, bool all) {
       const std::string group = positional ? "Arguments" : all ? group_title(argument) : "Options";
       if (group != title) text += "\n" + group + ":\n";
       title = group;
-      text += row(forms(argument), help_line(argument), 28);
+      text += format_row(forms(argument), help_line(argument), 28);
     }
   }
   if (!verb.details.empty()) text.append("\n").append(wrapped(verb.details, 0, 0)).append("\n");
@@ -141,13 +141,13 @@ std::string help_text(const Description& description, bool all) {
 }
 
 std::string overview(std::span<const Verb> verbs) {
-  std::string text =
-      wrapped(
-          "Image-based memory for robot navigation from omnidirectional images: it remembers what "
-          "places look like, and knows from that where the robot is and which way it faces.",
-          0, 0) +
-      "\n\nUsage: panonav VERB [OPTIONS] ARGUMENTS\n\nVerbs:\n";
-  for (const auto& verb : verbs) text += row(std::string(verb.name), verb.summary, 17);
+  std::string text = wrapped(
+                         "Image-based memory for robot navigation from omnidirectional images: it "
+                         "remembers what places look like and compares new images with them to "
+                         "find the robot's position and heading.",
+                         0, 0) +
+                     "\n\nUsage: panonav VERB [OPTIONS] ARGUMENTS\n\nVerbs:\n";
+  for (const auto& verb : verbs) text += format_row(std::string(verb.name), verb.summary, 17);
   text += "\n";
   text += wrapped(
       "panonav help VERB shows how a verb is used, panonav VERB --help-all all its options, "
@@ -155,7 +155,7 @@ std::string overview(std::span<const Verb> verbs) {
       0, 0);
   text += "\n\nExit codes:\n";
   for (const auto& [code, meaning] : exit_meanings()) {
-    text += row(std::to_string(static_cast<int>(code)), meaning, 5);
+    text += format_row(std::to_string(static_cast<int>(code)), meaning, 5);
   }
   text.pop_back();
   return text;

@@ -30,7 +30,7 @@ void report(std::string_view verb, std::string_view message) {
 ExitCode run(std::string_view& verb, std::span<const std::string> words) {
   panonav::command::register_outbuildings();
   const auto verbs = panonav::command::all_verbs();
-  if (const auto* known = panonav::command::verb_in(verbs, words)) verb = known->name;
+  if (const auto* known = panonav::command::find_verb(verbs, words)) verb = known->name;
   const auto command = panonav::command::parse(verbs, words);
   panonav::command::Session session(command.session);
   session.detail("panonav " PANONAV_VERSION " " + std::string(command.verb) + " on " +

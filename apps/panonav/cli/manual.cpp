@@ -27,13 +27,13 @@ constexpr std::array<Meaning, 4> files{{
     {"NAME.panonav",
      "A memory: an SQLite database. NAME.panonav-wal and NAME.panonav-shm lie beside it while it "
      "is open for writing, and belong to it."},
-    {"dataset.toml", "Says how the pictures of a data set lie; it is in the folder of them."},
+    {"dataset.toml", "Says how the images of a data set lie; it is in the folder of them."},
     {"camera.toml", "The calibration of a mirror camera, as panonav calibrate writes it."},
     {"FILE of --config", "Options by section; panonav VERB --config-template prints one."},
 }};
 
 /// Text that roff shows as it is; lines are filled.
-std::string roff(std::string_view text) {
+std::string escape_roff(std::string_view text) {
   std::string shown;
   for (const char c : text) {
     if (c == '\\') {
@@ -49,31 +49,31 @@ std::string roff(std::string_view text) {
   return !shown.empty() && (shown.front() == '.' || shown.front() == '\'') ? "\\&" + shown : shown;
 }
 
-std::string entry(std::string_view term, std::string_view text) {
-  return ".TP\n\\fB" + roff(term) + "\\fR\n" + roff(text) + "\n";
+std::string format_entry(std::string_view term, std::string_view text) {
+  return ".TP\n\\fB" + escape_roff(term) + "\\fR\n" + escape_roff(text) + "\n";
 }
 
 template <class Meanings>
-std::string entries(std::string_view title, const Meanings& meanings) {
+std::string format_entries(std::string_view title, const Meanings& meanings) {
   std::string text = ".SH " + std::string(title) + "\n";
-  for (const auto& [name, meaning] : meanings) text += entry(name, meaning);
+  for (const auto& [name, meaning] : meanings) text += format_entry(name, meaning);
   return text;
 }
 
-std::string exit_status() {
+std::string format_exit_status() {
   std::string text = ".SH EXIT STATUS\n";
   for (const auto& [code, meaning] : exit_meanings()) {
-    text += entry(std::to_string(static_cast<int>(code)), std::string(meaning) + ".");
+    text += format_entry(std::to_string(static_cast<int>(code)), std::string(meaning) + ".");
   }
   return text;
 }
 
-std::string header(std::string_view page, std::string_view summary) {
+std::string format_header(std::string_view page, std::string_view summary) {
   std::string upper(page);
   for (char& c : upper) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
-  return ".TH \"" + roff(upper) +
+  return ".TH \"" + escape_roff(upper) +
          "\" 1 \"\" \"panonav " PANONAV_VERSION "\" \"panonav manual\"\n.nh\n.ad l\n.SH NAME\n" +
-         roff(page) + " \\- " + roff(summary) + "\n.SH SYNOPSIS\n";
+         escape_roff(page) + " \\- " + escape_roff(summary) + "\n.SH SYNOPSIS\n";
 }
 
 }  // namespace
@@ -86,14 +86,14 @@ std::string manual_name(const Verb& verb) {
 
 std::string manual_page(const Description& description) {
   const auto& [verb, arguments] = description;
-  std::string text = header(manual_name(verb), verb.summary);
+  std::string text = format_header(manual_name(verb), verb.summary);
   for (const auto name : {verb.name, verb.alias}) {
     if (name.empty()) continue;
-    text += (name == verb.name ? "" : ".br\n") + std::string("\\fBpanonav ") + roff(name) +
-            "\\fR " + roff(usage(description)) + "\n";
+    text += (name == verb.name ? "" : ".br\n") + std::string("\\fBpanonav ") + escape_roff(name) +
+            "\\fR " + escape_roff(usage(description)) + "\n";
   }
-  text += ".SH DESCRIPTION\n" + roff(verb.summary) + ".\n";
-  if (!verb.details.empty()) text += roff(verb.details) + "\n";
+  text += ".SH DESCRIPTION\n" + escape_roff(verb.summary) + ".\n";
+  if (!verb.details.empty()) text += escape_roff(verb.details) + "\n";
   std::string title = "Options";
   for (const bool positional : {true, false}) {
     if (!positional) text += ".SH OPTIONS\n";
@@ -101,38 +101,41 @@ std::string manual_page(const Description& description) {
       if (argument.positional() != positional) continue;
       const std::string group = positional ? "Arguments" : group_title(argument);
       if (group != title)
-        text += (positional ? ".SH ARGUMENTS\n" : ".SS \"" + roff(group) + "\"\n");
+        text += (positional ? ".SH ARGUMENTS\n" : ".SS \"" + escape_roff(group) + "\"\n");
       title = group;
-      text += entry(forms(argument), help_line(argument) + ".");
+      text += format_entry(forms(argument), help_line(argument) + ".");
     }
   }
   text += ".SH EXAMPLES\n.nf\n";
   std::string_view left = verb.example;
   while (!left.empty()) {
     const std::size_t end = std::min(left.find('\n'), left.size());
-    text += roff(left.substr(0, end)) + "\n";
+    text += escape_roff(left.substr(0, end)) + "\n";
     left.remove_prefix(std::min(end + 1, left.size()));
   }
-  return text + ".fi\n" + exit_status() + entries("ENVIRONMENT", environment) +
-         entries("FILES", files) + ".SH SEE ALSO\n\\fBpanonav\\fR(1)";
+  return text + ".fi\n" + format_exit_status() + format_entries("ENVIRONMENT", environment) +
+         format_entries("FILES", files) + ".SH SEE ALSO\n\\fBpanonav\\fR(1)";
 }
 
 std::string manual_overview(std::span<const Description> verbs) {
-  std::string text = header("panonav", "image-based memory for robot navigation");
+  std::string text = format_header("panonav", "image-based memory for robot navigation");
   text +=
-      "\\fBpanonav\\fR \\fIVERB\\fR [OPTIONS] ARGUMENTS\n.SH DESCRIPTION\n"
-      "Panonav remembers what places look like in omnidirectional images, and knows from that "
-      "where a robot is and which way it faces.\nEach verb has a page of its own.\n.SH VERBS\n";
+      "\\fBpanonav\\fR \\fIVERB\\fR [OPTIONS] ARGUMENTS\n"
+      ".SH DESCRIPTION\n"
+      "Panonav remembers what places look like in omnidirectional images, and knows from that a "
+      "robot's position and heading.\n"
+      "Each verb has a page of its own.\n"
+      ".SH VERBS\n";
   for (const auto& [verb, arguments] : verbs)
-    text += entry(verb.name, std::string(verb.summary) + ".");
+    text += format_entry(verb.name, std::string(verb.summary) + ".");
   text += ".SH OPTIONS\n";
   for (const auto& argument : verbs.front().arguments) {
-    if (argument.of_every_verb) text += entry(forms(argument), help_line(argument) + ".");
+    if (argument.of_every_verb) text += format_entry(forms(argument), help_line(argument) + ".");
   }
-  text += exit_status() + entries("ENVIRONMENT", environment) + entries("FILES", files) +
-          ".SH SEE ALSO\n";
+  text += format_exit_status() + format_entries("ENVIRONMENT", environment) +
+          format_entries("FILES", files) + ".SH SEE ALSO\n";
   for (const auto& [verb, arguments] : verbs) {
-    text += "\\fB" + roff(manual_name(verb)) + "\\fR(1)" +
+    text += "\\fB" + escape_roff(manual_name(verb)) + "\\fR(1)" +
             (verb.name == verbs.back().verb.name ? "" : ",\n");
   }
   return text;

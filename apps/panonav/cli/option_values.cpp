@@ -19,7 +19,7 @@ namespace {
 
 }  // namespace
 
-std::string flag_of(std::string_view option) {
+std::string to_flag(std::string_view option) {
   std::string flag = "--" + std::string(option);
   std::replace(flag.begin(), flag.end(), '_', '-');
   return flag;
@@ -33,7 +33,7 @@ std::string name_flags(std::string_view message) {
     const std::size_t end =
         std::min(message.find_first_not_of("abcdefghijklmnopqrstuvwxyz_", begin), message.size());
     named += message.substr(0, begin == end ? end : at);
-    if (begin < end) named += flag_of(message.substr(begin, end - begin));
+    if (begin < end) named += to_flag(message.substr(begin, end - begin));
     message.remove_prefix(end);
   }
   return named.append(message);
@@ -44,7 +44,7 @@ bool looks_like_flag(std::string_view word) {
          std::string_view("0123456789.").find(word[1]) == std::string_view::npos;
 }
 
-double number_from_text(std::string_view flag, std::string_view text) {
+double parse_number(std::string_view flag, std::string_view text) {
   double value = 0.0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) {
@@ -68,7 +68,7 @@ void TextApplier::visit(const OptionInfo& info, int& value) {
 }
 
 void TextApplier::visit(const OptionInfo& info, double& value) {
-  if (const std::string* typed = text(info)) value = number_from_text(info.name, *typed);
+  if (const std::string* typed = text(info)) value = parse_number(info.name, *typed);
 }
 
 void TextApplier::visit(const OptionInfo& info, bool& value) {
@@ -89,27 +89,27 @@ void TextApplier::visit(const OptionInfo& info, std::span<const std::string_view
 
 namespace {
 
-// As people write it: 1000000, not 1e+06.
-std::string bound_text(double value) {
+// Writes whole numbers without exponent: 1000000, not 1e+06.
+std::string format_bound(double value) {
   const bool whole = std::abs(value) < 1e12 && value == std::floor(value);
   return whole ? std::to_string(static_cast<long long>(value)) : to_text(value);
 }
 
-std::string range_of(const OptionInfo& info) {
+std::string format_range(const OptionInfo& info) {
   std::string text;
-  if (std::isfinite(info.low)) text = (info.low_open ? "above " : "from ") + bound_text(info.low);
+  if (std::isfinite(info.low)) text = (info.low_open ? "above " : "from ") + format_bound(info.low);
   if (!std::isfinite(info.high)) return text;
-  return text + (text.empty() ? "up to " : " to ") + bound_text(info.high);
+  return text + (text.empty() ? "up to " : " to ") + format_bound(info.high);
 }
 
 }  // namespace
 
 void OptionLister::visit(const OptionInfo& info, int& value) {
-  list_({info, "INT", std::to_string(value), range_of(info), {}});
+  list_({info, "INT", std::to_string(value), format_range(info), {}});
 }
 
 void OptionLister::visit(const OptionInfo& info, double& value) {
-  list_({info, "NUMBER", to_text(value), range_of(info), {}});
+  list_({info, "NUMBER", to_text(value), format_range(info), {}});
 }
 
 void OptionLister::visit(const OptionInfo& info, bool& value) {

@@ -11,17 +11,17 @@
 
 namespace panonav::command {
 
-/// What the user said of one option of a struct.
+/// The values that the user set for one option of a struct.
 struct OptionEntry {
   std::optional<std::string> text;  ///< typed on the command line
   bool in_file = false;             ///< given in the --config file
 };
 
-/// By the option's name.
+/// The entries by name of the option.
 using OptionEntries = std::map<std::string, OptionEntry>;
 
 /// `cell_size_m` as `--cell-size-m`.
-[[nodiscard]] std::string flag_of(std::string_view option);
+[[nodiscard]] std::string to_flag(std::string_view option);
 
 /// Replaces "the option NAME", as messages of the library have it, by the flag: "the option
 /// image_topic" becomes "--image-topic".
@@ -41,7 +41,7 @@ using OptionEntries = std::map<std::string, OptionEntry>;
 [[nodiscard]] bool looks_like_flag(std::string_view word);
 
 /// Throws UsageError unless the whole text is one finite number.
-[[nodiscard]] double number_from_text(std::string_view flag, std::string_view text);
+[[nodiscard]] double parse_number(std::string_view flag, std::string_view text);
 
 /// Writes texts into the members that it visits. Throws UsageError on a text of the wrong type;
 /// ranges are left to `validate`.

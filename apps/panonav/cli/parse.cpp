@@ -9,32 +9,32 @@ namespace panonav::command {
 namespace {
 
 /// "route record": a verb of two words; the second one is empty where there is none.
-std::pair<std::string_view, std::string_view> words_of(std::string_view verb) {
+std::pair<std::string_view, std::string_view> split_verb(std::string_view verb) {
   const std::size_t blank = verb.find(' ');
   if (blank == std::string_view::npos) return {verb, {}};
   return {verb.substr(0, blank), verb.substr(blank + 1)};
 }
 
 /// All verbs of two words that begin with this one.
-std::vector<std::string_view> verbs_beginning_with(std::span<const Verb> verbs,
-                                                   std::string_view first) {
+std::vector<std::string_view> find_verbs_beginning_with(std::span<const Verb> verbs,
+                                                        std::string_view first) {
   std::vector<std::string_view> found;
   for (const auto& verb : verbs) {
-    const auto words = words_of(verb.name);
+    const auto words = split_verb(verb.name);
     if (words.first == first && !words.second.empty()) found.push_back(verb.name);
   }
   return found;
 }
 
-bool asks_for_help(std::string_view word) {
+bool is_help_flag(std::string_view word) {
   return word == "-h" || word == "--help" || word == "--help-all";
 }
 
 }  // namespace
 
-const Verb* verb_in(std::span<const Verb> verbs, std::span<const std::string> words) {
+const Verb* find_verb(std::span<const Verb> verbs, std::span<const std::string> words) {
   for (const auto& verb : verbs) {
-    const auto [first, second] = words_of(verb.name);
+    const auto [first, second] = split_verb(verb.name);
     if (words.empty() || (first != words[0] && (verb.alias.empty() || verb.alias != words[0]))) {
       continue;
     }
@@ -43,12 +43,12 @@ const Verb* verb_in(std::span<const Verb> verbs, std::span<const std::string> wo
   return nullptr;
 }
 
-const Verb& required_verb(std::span<const Verb> verbs, std::span<const std::string> words) {
-  if (const Verb* verb = verb_in(verbs, words)) return *verb;
+const Verb& find_required_verb(std::span<const Verb> verbs, std::span<const std::string> words) {
+  if (const Verb* verb = find_verb(verbs, words)) return *verb;
   if (words.empty()) throw UsageError("a verb is missing");
-  const auto longer = verbs_beginning_with(verbs, words[0]);
+  const auto longer = find_verbs_beginning_with(verbs, words[0]);
   if (!longer.empty() && words.size() == 1) {
-    throw UsageError("'" + words[0] + "' wants a second word: " + listed(longer));
+    throw UsageError("'" + words[0] + "' needs a second word: " + listed(longer));
   }
   const std::string typed = longer.empty() ? words[0] : words[0] + " " + words[1];
   if (looks_like_flag(typed)) throw UsageError("no such option: " + typed + "; a verb is missing");
@@ -73,9 +73,9 @@ std::vector<std::string> verb_names() {
   return names;
 }
 
-const Verb& named_verb(std::span<const Verb> verbs, const std::vector<std::string>& words) {
-  const Verb& verb = required_verb(verbs, words);
-  const std::size_t own = words_of(verb.name).second.empty() ? 1 : 2;
+const Verb& find_named_verb(std::span<const Verb> verbs, const std::vector<std::string>& words) {
+  const Verb& verb = find_required_verb(verbs, words);
+  const std::size_t own = split_verb(verb.name).second.empty() ? 1 : 2;
   if (words.size() > own) throw UsageError("'" + words[own] + "' is one argument too many");
   return verb;
 }
@@ -143,26 +143,27 @@ ParsedCommand parse(std::span<const Verb> verbs, std::span<const std::string> wo
   if (words.size() == 1 && words[0] == "--version") {
     return printing({}, "panonav " PANONAV_VERSION);
   }
-  if (!words.empty() && asks_for_help(words[0])) return printing({}, overview(verbs));
-  if (words.size() > 1 && asks_for_help(words[1])) {
-    const auto longer = verbs_beginning_with(verbs, words[0]);
+  if (!words.empty() && is_help_flag(words[0])) return printing({}, overview(verbs));
+  if (words.size() > 1 && is_help_flag(words[1])) {
+    const auto longer = find_verbs_beginning_with(verbs, words[0]);
     if (!longer.empty()) return printing({}, "Verbs of two words: " + listed(longer));
   }
-  const Verb& verb = required_verb(verbs, words);
+  const Verb& verb = find_required_verb(verbs, words);
   const auto declared = declare(verb);
-  const std::size_t own_words = words_of(verb.name).second.empty() ? 1 : 2;
-  const auto behind = words.subspan(own_words);
-  const std::vector<std::string> rest = verb.translate == nullptr
-                                            ? std::vector<std::string>(behind.begin(), behind.end())
-                                            : verb.translate(behind, declared->arguments.infos());
-  for (const auto& word : rest) {
+  const std::size_t own_words = split_verb(verb.name).second.empty() ? 1 : 2;
+  const auto remaining = words.subspan(own_words);
+  const std::vector<std::string> translated =
+      verb.translate == nullptr ? std::vector<std::string>(remaining.begin(), remaining.end())
+                                : verb.translate(remaining, declared->arguments.infos());
+  for (const auto& word : translated) {
     if (word == "--") break;
-    if (!asks_for_help(word)) continue;
+    if (!is_help_flag(word)) continue;
     return printing(verb.name, help_text(declared->description(verb), word == "--help-all"));
   }
-  const bool wants_template = std::ranges::find(rest, "--config-template") != rest.end();
+  const bool wants_template =
+      std::ranges::find(translated, "--config-template") != translated.end();
   const auto& common = declared->common;
-  declared->arguments.read(rest, verb.name, wants_template);
+  declared->arguments.read(translated, verb.name, wants_template);
   if (common.session.quiet && common.session.verbose) {
     throw UsageError("--quiet and --verbose exclude each other");
   }

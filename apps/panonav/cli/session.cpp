@@ -18,7 +18,7 @@ namespace panonav::command {
 
 namespace {
 
-bool wants_colours(int descriptor) {
+bool supports_colours(int descriptor) {
   const char* terminal = std::getenv("TERM");
   return isatty(descriptor) == 1 && std::getenv("NO_COLOR") == nullptr && terminal != nullptr &&
          std::string_view(terminal) != "dumb";
@@ -26,7 +26,7 @@ bool wants_colours(int descriptor) {
 
 // A name may hold anything, also what a terminal takes for a command. Lines and our own styles
 // stay.
-std::string readable(std::string_view text) {
+std::string escape_control_characters(std::string_view text) {
   constexpr std::array<std::string_view, 5> kept{"\n", "\033[0m", "\033[1m", "\033[31m",
                                                  "\033[32m"};
   std::string result;
@@ -46,8 +46,8 @@ std::string readable(std::string_view text) {
   return result;
 }
 
-// From the rate so far. Empty until that means something: a few steps of many, and some seconds.
-std::string time_left(double elapsed_s, std::size_t done, std::size_t total) {
+// Estimates the time left from the rate so far; empty for the first steps and seconds.
+std::string estimate_time_left(double elapsed_s, std::size_t done, std::size_t total) {
   if (elapsed_s < 2.0 || total < 10 || done < 5 || 20 * done < total || done >= total) return {};
   const double left_s = elapsed_s * static_cast<double>(total - done) / static_cast<double>(done);
   if (left_s < 90.0) return ", about " + format_fixed(std::max(1.0, left_s), 0) + " s left";
@@ -58,33 +58,33 @@ std::string time_left(double elapsed_s, std::size_t done, std::size_t total) {
 
 Session::Session(const SessionOptions& options)
     : options_(options),
-      colours_(!options.json && wants_colours(STDOUT_FILENO)),
+      colours_(!options.json && supports_colours(STDOUT_FILENO)),
       executor_(options.threads) {}
 
-void Session::say(std::string_view line) {
+void Session::write_line(std::string_view line) {
   clear_bar();
-  std::cerr << readable(without_passwords(name_flags(line))) << '\n';
+  std::cerr << escape_control_characters(without_passwords(name_flags(line))) << '\n';
 }
 
 void Session::print(std::string_view text) {
   clear_bar();
   const std::string line = without_passwords(text);
-  std::cout << (options_.json ? line : readable(line)) << '\n';
+  std::cout << (options_.json ? line : escape_control_characters(line)) << '\n';
 }
 
 void Session::note(std::string_view line) {
-  if (!options_.quiet) say(line);
+  if (!options_.quiet) write_line(line);
 }
 
 void Session::detail(std::string_view line) {
   if (!options_.verbose) return;
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start_;
   std::string text = "[";
-  say(text.append(format_fixed(elapsed.count(), 2)).append(" s] ").append(line));
+  write_line(text.append(format_fixed(elapsed.count(), 2)).append(" s] ").append(line));
 }
 
 ExitCode Session::no_answer(std::string_view line) {
-  say(line);
+  write_line(line);
   return ExitCode::no_answer;
 }
 
@@ -115,19 +115,19 @@ void Session::finish_output() {
   if (!std::cout) throw FileError("standard output", "cannot be written; is the disk full?");
 }
 
-std::string Session::styled(std::string_view text, std::string_view code) const {
+std::string Session::apply_style(std::string_view text, std::string_view code) const {
   if (!colours_) return std::string(text);
   return "\033[" + std::string(code) + "m" + std::string(text) + "\033[0m";
 }
 
-std::string Session::strong(std::string_view text) const {
-  return styled(text, "1");
+std::string Session::bold(std::string_view text) const {
+  return apply_style(text, "1");
 }
-std::string Session::good(std::string_view text) const {
-  return styled(text, "32");
+std::string Session::green(std::string_view text) const {
+  return apply_style(text, "32");
 }
-std::string Session::bad(std::string_view text) const {
-  return styled(text, "31");
+std::string Session::red(std::string_view text) const {
+  return apply_style(text, "31");
 }
 
 Progress::Progress(Session& session, std::string label, std::size_t total)
@@ -167,7 +167,7 @@ void Progress::draw() {
   const std::chrono::duration<double> elapsed = Clock::now() - start_;
   session_.draw_bar(label_ + " [" + std::string(filled, '=') + std::string(width - filled, ' ') +
                     "] " + std::to_string(done_) + "/" + std::to_string(total_) +
-                    time_left(elapsed.count(), done_, total_));
+                    estimate_time_left(elapsed.count(), done_, total_));
 }
 
 }  // namespace panonav::command

@@ -12,7 +12,7 @@
 
 namespace panonav::command {
 
-/// How a verb speaks, and on how many threads it works.
+/// Verbosity and number of threads of a verb.
 struct SessionOptions {
   bool json = false;     ///< results as JSON
   bool quiet = false;    ///< results and errors only
@@ -20,7 +20,7 @@ struct SessionOptions {
   int threads = 0;       ///< 0: one per core
 };
 
-/// What a verb needs of its surroundings: threads, and how to speak to people and to machines.
+/// The environment of a verb: its threads, and its output for people and machines.
 class Session {
  public:
   explicit Session(const SessionOptions& options);
@@ -35,30 +35,30 @@ class Session {
   /// One line on standard error that is no error: a warning or a hint. Silent with --quiet.
   void note(std::string_view line);
   /// One line on standard error that the user needs to go on: not silent with --quiet either.
-  void ask(std::string_view line) { say(line); }
+  void prompt(std::string_view line) { write_line(line); }
   /// With --verbose: the line on standard error, behind the seconds since the start.
   void detail(std::string_view line);
   /// Says why there is no answer, on standard error.
   [[nodiscard]] ExitCode no_answer(std::string_view line);
   /// A command to type, on standard output, its words as a shell wants them. Silent with --quiet.
   void suggest(std::initializer_list<std::string_view> command, std::string_view lead = "Next:");
-  /// What was printed reaches its reader now.
+  /// Flushes standard output.
   void flush();
   /// Throws FileError when standard output could not be written (a full disk behind a redirection).
   void finish_output();
 
   /// The text in bold or in colour where standard output is a terminal that wants it.
-  [[nodiscard]] std::string strong(std::string_view text) const;
-  [[nodiscard]] std::string good(std::string_view text) const;
-  [[nodiscard]] std::string bad(std::string_view text) const;
+  [[nodiscard]] std::string bold(std::string_view text) const;
+  [[nodiscard]] std::string green(std::string_view text) const;
+  [[nodiscard]] std::string red(std::string_view text) const;
 
   /// A line on standard error that the next one takes away; only for terminals.
   void draw_bar(std::string_view bar);
   void clear_bar();
 
  private:
-  [[nodiscard]] std::string styled(std::string_view text, std::string_view code) const;
-  void say(std::string_view line);
+  [[nodiscard]] std::string apply_style(std::string_view text, std::string_view code) const;
+  void write_line(std::string_view line);
   SessionOptions options_;
   bool colours_;
   bool bar_drawn_ = false;
@@ -77,7 +77,7 @@ class Progress {
   Progress& operator=(const Progress&) = delete;
 
   void advance(std::size_t steps = 1);
-  /// What runs now; drawn at once.
+  /// Changes the label and draws the bar at once.
   void relabel(std::string label);
   /// Takes the bar away until the next advance.
   void clear() { session_.clear_bar(); }

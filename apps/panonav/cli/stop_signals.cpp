@@ -14,7 +14,7 @@ namespace panonav::command {
 
 namespace {
 
-// What a handler may use is static.
+// Signal handlers may only use static variables.
 volatile std::sig_atomic_t signal_pipe = -1;
 std::atomic<std::int64_t> asked_at_ns = 0;  // 0: not yet
 

@@ -35,9 +35,9 @@ struct ExitMeaning {
 /// Lines of at most 80 characters behind `indent` blanks; the first one begins at `column`.
 [[nodiscard]] std::string wrapped(std::string_view text, std::size_t indent, std::size_t column);
 
-/// What `panonav VERB --help` prints, or `--help-all`.
+/// Returns the text of `panonav VERB --help`, or of `--help-all`.
 [[nodiscard]] std::string help_text(const Description& description, bool all);
-/// What `panonav --help` prints.
+/// Returns the text of `panonav --help`.
 [[nodiscard]] std::string overview(std::span<const Verb> verbs);
 
 /// Shells that have a completion script.

@@ -12,7 +12,7 @@ class Arguments;
 struct ArgumentInfo;
 class Session;
 
-/// What the program tells its caller.
+/// The exit codes of the program.
 enum class ExitCode : int {
   done = 0,
   no_answer = 1,  ///< lost, no path; for a data set only if nothing at all was answered

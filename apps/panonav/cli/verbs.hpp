@@ -12,8 +12,8 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
 
-/// What each verb's file includes. It defines the function NAME_verb, which CMake puts into the
-/// list of all.
+/// Included by each verb's file, which defines the function NAME_verb; CMake puts it into the list
+/// of all verbs.
 namespace panonav::command {
 
 /// Makes what this build has beside the library known to it; called once, before a verb runs.
@@ -23,8 +23,8 @@ void register_outbuildings();
 [[nodiscard]] std::vector<Verb> all_verbs();
 [[nodiscard]] std::vector<std::string> verb_names();
 /// Returns the verb that the words name. Throws UsageError when they name none or say more.
-[[nodiscard]] const Verb& named_verb(std::span<const Verb> verbs,
-                                     const std::vector<std::string>& words);
+[[nodiscard]] const Verb& find_named_verb(std::span<const Verb> verbs,
+                                          const std::vector<std::string>& words);
 
 /// Prints the text as it is, or as {"text": ...}.
 ExitCode print_text(const std::string& text, Session& session);

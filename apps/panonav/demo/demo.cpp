@@ -33,19 +33,19 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string percent(double share) {
+std::string format_percent(double share) {
   return format_fixed(100.0 * share, 0) + " %";
 }
 
 // Raw picture, what calibration found in it, and the cylinder made of it. Gives the first for the
 // page's beginning.
-viewer::ReportPicture show_camera(const DemoRecordings& recordings, Session& session,
-                                  viewer::ReportPage& page) {
-  const Dataset& asked = recordings.query_run;
-  const Image colour = recordings.colour_picture(asked.entries.front(), session.executor());
+viewer::ReportPicture add_camera_part(const DemoRecordings& recordings, Session& session,
+                                      viewer::ReportPage& page) {
+  const Dataset& queries = recordings.query_run;
+  const Image colour = recordings.colour_picture(queries.entries.front(), session.executor());
   const Image overlay = draw_mirror(colour.view(), recordings.mirror);
-  const PanoramaReader reader(asked.source, {});
-  Panorama cylinder = reader.read(asked.entries.front().path);
+  const PanoramaReader reader(queries.source, {});
+  Panorama cylinder = reader.read(queries.entries.front().path);
 
   const Camera truth = recordings.true_camera;
   const MirrorCircle& found = recordings.mirror;
@@ -53,29 +53,28 @@ viewer::ReportPicture show_camera(const DemoRecordings& recordings, Session& ses
       std::hypot(found.centre.u_px - truth.centre.u_px, found.centre.v_px - truth.centre.v_px), 2);
   page.begin_part("What the robot sees",
                   {centre_px + " pixels",
-                   "is how far off it finds the middle of its mirror, in its own pictures alone"});
+                   "is the error of the mirror's centre, calibrated from the robot's own images"});
   page.add_text(
       "A camera looks up into a curved mirror and sees all around at once. The dark disc in the "
-      "middle is the camera itself. Before anything else, calibration finds the mirror in some of "
-      "the raw pictures: centre, rim and inner radius. Everything below uses what it found, not "
-      "the simulator's own numbers.");
-  viewer::ReportPicture mirror = picture_in_page(
-      colour.view(), "Raw picture of the mirror camera, " + std::to_string(truth.image_size.width) +
+      "middle is the camera itself. First, calibration finds the mirror in some of the raw images: "
+      "centre, rim and inner radius. Everything below uses these values, not the simulator's.");
+  viewer::ReportPicture mirror = embed_image(
+      colour.view(), "Raw image of the mirror camera, " + std::to_string(truth.image_size.width) +
                          " x " + std::to_string(truth.image_size.height) +
                          " (in colour for you; the robot works on grey)");
   page.add_pictures(
       {mirror,
-       picture_in_page(
-           overlay.view(),
-           "What calibration found in " + std::to_string(recordings.calibrated_on) +
-               " raw pictures: rim green, inner radius orange, centre red. The centre is off by " +
-               centre_px + " pixels, the rim by " +
-               format_fixed(std::abs(found.rim_radius_px - truth.rim_radius_px), 2) + ".")});
+       embed_image(overlay.view(),
+                   "Calibration from " + std::to_string(recordings.calibrated_on) +
+                       " raw images: rim green, inner radius orange, centre red. The centre "
+                       "has an error of " +
+                       centre_px + " pixels, the rim of " +
+                       format_fixed(std::abs(found.rim_radius_px - truth.rim_radius_px), 2) +
+                       ".")});
   page.add_text(
-      "The picture is then unwrapped to a panoramic cylinder. Of each of its 80 rows only the "
-      "first 15 Fourier components are kept, 2.4 kB a view. Their magnitudes do not change when "
-      "the robot turns, so they tell the place whichever way it faces; their phases tell the "
-      "heading.");
+      "The image is then unwrapped to a panoramic cylinder. Of each of its 80 rows only the first "
+      "15 Fourier components are kept, 2.4 kB a view. Their magnitudes do not change when the "
+      "robot rotates, so they identify the place at any heading; their phases give the heading.");
   page.add_views(
       {{std::move(cylinder),
         {},
@@ -84,23 +83,23 @@ viewer::ReportPicture show_camera(const DemoRecordings& recordings, Session& ses
   return mirror;
 }
 
-std::vector<AskedView> ask(const Localiser& localiser, const ViewEncoder& pipeline,
-                           const Dataset& queries, Executor& executor) {
-  std::vector<std::optional<AskedView>> asked(queries.entries.size());
+std::vector<LocalisedView> localise_all(const Localiser& localiser, const ViewEncoder& pipeline,
+                                        const Dataset& queries, Executor& executor) {
+  std::vector<std::optional<LocalisedView>> answers(queries.entries.size());
   for_each_entry(executor, queries.entries.size(), [&](std::size_t i) {
     const auto& entry = queries.entries[i];
     PackedSignature signature = pipeline.packed(pipeline.read(entry));
     Place found = localiser.localise(signature);
     const ReferencePose& pose = *entry.pose;
-    asked[i] =
-        AskedView{{pose.x_m, pose.y_m, *pose.heading_rad}, std::move(signature), std::move(found)};
+    answers[i] = LocalisedView{
+        {pose.x_m, pose.y_m, *pose.heading_rad}, std::move(signature), std::move(found)};
   });
-  std::vector<AskedView> all;
-  for (auto& view : asked) all.push_back(std::move(*view));
+  std::vector<LocalisedView> all;
+  for (auto& view : answers) all.push_back(std::move(*view));
   return all;
 }
 
-/// What the answers are worth.
+/// Statistics of the answers.
 struct Outcome {
   std::vector<double> errors_m;
   std::vector<double> nearest_errors_m;
@@ -109,12 +108,12 @@ struct Outcome {
   double bytes_share = 0.0;  ///< of a full scan
 };
 
-Outcome outcome_of(const std::vector<AskedView>& asked, const VisualMemory& memory) {
+Outcome summarise_outcome(const std::vector<LocalisedView>& queries, const VisualMemory& memory) {
   Outcome outcome;
   std::uint64_t read = 0;
   std::uint64_t in_full = 0;
   std::size_t known = 0;
-  for (const auto& [truth, signature, found] : asked) {
+  for (const auto& [truth, signature, found] : queries) {
     known += found.known ? 1 : 0;
     read += found.bytes_read;
     in_full += found.bytes_in_full;
@@ -130,60 +129,61 @@ Outcome outcome_of(const std::vector<AskedView>& asked, const VisualMemory& memo
           std::abs(angle_difference(*found.heading_rad, truth.heading_rad)));
     }
   }
-  outcome.known = static_cast<double>(known) / static_cast<double>(asked.size());
+  outcome.known = static_cast<double>(known) / static_cast<double>(queries.size());
   outcome.bytes_share = static_cast<double>(read) / static_cast<double>(in_full);
   return outcome;
 }
 
-std::string median_text(const std::vector<double>& values, double unit, int digits,
-                        std::string_view name) {
+std::string format_median(const std::vector<double>& values, double unit, int digits,
+                          std::string_view name) {
   if (values.empty()) return "none";
   return format_fixed(unit * median(values), digits) + " " + std::string(name);
 }
 
-void show_answers(const VisualMemory& memory, const std::vector<viewer::MapLayer>& scene,
-                  const std::vector<AskedView>& asked, const Outcome& own, const Outcome& foreign,
-                  double spacing_m, viewer::ReportPage& page) {
+void add_answers_part(const VisualMemory& memory, const std::vector<viewer::MapLayer>& scene,
+                      const std::vector<LocalisedView>& queries, const Outcome& own,
+                      const Outcome& foreign, double spacing_m, viewer::ReportPage& page) {
   const std::string spacing = format_fixed(100.0 * spacing_m, 0) + " cm";
-  page.begin_part("It remembers and localises itself",
-                  {median_text(own.errors_m, 100.0, 1, "cm"),
-                   "is how far off it says that it is, from one picture (median)"});
+  page.begin_part("Localisation", {format_median(own.errors_m, 100.0, 1, "cm"),
+                                   "is the median error of its position, from one image"});
   page.add_text(
       "The robot took a view every " + spacing + " and remembered it. Then it was put down at " +
-      std::to_string(asked.size()) +
-      " random places between them, facing anywhere, and asked from one new picture each: "
-      "where are you, and which way do you face? It was also put into another room, where "
-      "the right answer is that it does not know the place.");
-  page.add_figures({{std::to_string(memory.size()), "views remembered, " + spacing + " apart"},
-                    {median_text(own.errors_m, 100.0, 1, "cm"), "median error of the position"},
-                    {median_text(own.heading_errors_rad, degrees(1.0), 2, "degrees"),
-                     "median error of the heading"},
-                    {percent(own.known), "of its own places recognised"},
-                    {percent(foreign.known), "of the views of another room taken for this one"}});
+      std::to_string(queries.size()) +
+      " random places between them, facing anywhere, and asked from one new image each: "
+      "where are you, and what is your heading? It was also put into another room, where the "
+      "right answer is that it does not know the place.");
+  page.add_figures(
+      {{std::to_string(memory.size()), "views remembered, " + spacing + " apart"},
+       {format_median(own.errors_m, 100.0, 1, "cm"), "median error of the position"},
+       {format_median(own.heading_errors_rad, degrees(1.0), 2, "degrees"),
+        "median error of the heading"},
+       {format_percent(own.known), "of its own places recognised"},
+       {format_percent(foreign.known), "of the views of another room taken for this one"}});
   page.add_text(
       "On the map, circles are the remembered views and green crosses the places where the robot "
       "was put down. From each a line runs to where its memory says it is; the shorter, the "
       "better. The nearest remembered view alone would be " +
-      median_text(own.nearest_errors_m, 100.0, 1, "cm") +
+      format_median(own.nearest_errors_m, 100.0, 1, "cm") +
       " off (median): the position is interpolated between views.");
   page.add_plots(
-      {{map_of_answers(memory, scene, asked), "True places, and the error of each answer"}});
+      {{draw_answers(memory, scene, queries), "True places, and the error of each answer"}});
 }
 
 /// The first place that was recognised stands for all.
-const AskedView& shown_view(const std::vector<AskedView>& asked) {
-  const auto known =
-      std::find_if(asked.begin(), asked.end(), [](const auto& view) { return view.found.known; });
-  return known == asked.end() ? asked.front() : *known;
+const LocalisedView& choose_view(const std::vector<LocalisedView>& queries) {
+  const auto known = std::find_if(queries.begin(), queries.end(),
+                                  [](const auto& view) { return view.found.known; });
+  return known == queries.end() ? queries.front() : *known;
 }
 
-viewer::UnfoldingMap show_levels(const VisualMemory& memory,
-                                 const std::vector<viewer::MapLayer>& scene, const AskedView& view,
-                                 double spacing_m, viewer::ReportPage& page) {
-  AreasShown areas = map_of_areas(memory, scene, view);
+viewer::UnfoldingMap add_levels_part(const VisualMemory& memory,
+                                     const std::vector<viewer::MapLayer>& scene,
+                                     const LocalisedView& view, double spacing_m,
+                                     viewer::ReportPage& page) {
+  AreasShown areas = draw_areas(memory, scene, view);
   const std::string first = format_fixed(areas.areas_m2.front(), 1);
   const std::string last = format_fixed(areas.areas_m2.back(), 2);
-  page.begin_part("As accurate as needed",
+  page.begin_part("Accuracy on demand",
                   {first + " to " + last + " m²",
                    "is the area where it may be: a coarse look is cheap, a fine one exact"});
   page.add_text(
@@ -194,22 +194,22 @@ viewer::UnfoldingMap show_levels(const VisualMemory& memory,
       {{areas.map,
         "The orange area is where the robot may be, with ever more components; the cross is where "
         "it is."},
-       {map_of_similarity(memory, spacing_m, view),
+       {draw_similarity(memory, spacing_m, view),
         "How similar each remembered view is to the one asked for, taken at the cross: the nearest "
         "view is the most similar, and similarity falls with distance on all sides. That is what "
         "the areas are read from."}});
   return std::move(areas.map);
 }
 
-void show_what_next(const DemoOptions& wanted, const DemoRecordings& recordings,
-                    const DemoNavigation& navigation, viewer::ReportPage& page) {
-  const auto in_out = [&](const char* name) { return (wanted.out / name).string(); };
+void add_commands(const DemoOptions& options, const DemoRecordings& recordings,
+                  const DemoNavigation& navigation, viewer::ReportPage& page) {
+  const auto in_out = [&](const char* name) { return (options.out / name).string(); };
   page.begin_section("Try it yourself");
   page.add_text(
-      "The recordings and the memory of this run lie beside this page. Each command shows more "
-      "with --help.");
+      "The recordings and the memory of this run are in the folder of this page. Each command "
+      "shows more with --help.");
   const std::string memory = in_out("office.panonav");
-  const simulation::SimulatedWorldOptions seen = simulation_of(wanted, 0);
+  const simulation::SimulatedWorldOptions seen = demo_world_options(options, 0);
   std::string mission;
   for (const std::string& word : navigation.first_mission) mission += " " + word;
   page.add_commands(
@@ -224,12 +224,12 @@ void show_what_next(const DemoOptions& wanted, const DemoRecordings& recordings,
            " --memory " + memory + " --report " + in_out("way_home"),
        "panonav navigate " + memory + " --scene office --scene-seed " +
            std::to_string(seen.simulation.scene.scene_seed) + " --exposure " +
-           format_number(seen.sensor.exposure) + mission + " --picture " + in_out("way.svg"),
+           format_number(seen.sensor.exposure) + mission + " --picture " + in_out("path.svg"),
        "panonav unwrap " + recordings.query_run.entries.front().path.string() + " --camera " +
            (recordings.query_run.folder / "camera.toml").string() + " -o panorama.png"});
 }
 
-/// What came of all parts.
+/// The results of all parts.
 struct DemoResults {
   std::size_t views = 0;
   std::size_t questions = 0;
@@ -291,7 +291,7 @@ ordered_json as_json(const DemoResults& done, const fs::path& out) {
           {"seconds", done.seconds}};
 }
 
-std::string images_text(const std::optional<std::size_t>& images) {
+std::string format_delay(const std::optional<std::size_t>& images) {
   return images ? "after " + std::to_string(*images) + (*images == 1 ? " image" : " images")
                 : "never";
 }
@@ -305,37 +305,38 @@ void print(const DemoResults& done, Session& session) {
                 std::to_string(done.questions) + " questions asked, " +
                 format_fixed(done.seconds, 0) + " s");
   session.print(
-      "  position: median error " + median_text(done.own.errors_m, 100.0, 1, "cm") +
-      "; heading: " + median_text(done.own.heading_errors_rad, degrees(1.0), 2, "degrees"));
-  session.print("  own places recognised: " + percent(done.own.known) +
-                "; views of another room taken for this one: " + percent(done.foreign.known));
-  session.print("  tracked: localised " + images_text(done.track.until_localised) +
-                "; kidnapped, found again " + images_text(done.track.until_found_again) +
-                "; median error " + median_text(done.track.errors_m, 100.0, 1, "cm") + "; " +
+      "  position: median error " + format_median(done.own.errors_m, 100.0, 1, "cm") +
+      "; heading: " + format_median(done.own.heading_errors_rad, degrees(1.0), 2, "degrees"));
+  session.print(
+      "  own places recognised: " + format_percent(done.own.known) +
+      "; views of another room taken for this one: " + format_percent(done.foreign.known));
+  session.print("  tracked: localised " + format_delay(done.track.until_localised) +
+                "; kidnapped, found again " + format_delay(done.track.until_found_again) +
+                "; median error " + format_median(done.track.errors_m, 100.0, 1, "cm") + "; " +
                 of(done.track.wrong, done.track.localised) + " answers wrong");
   const auto centimetres = [](double metres) { return format_fixed(100.0 * metres, 0) + " cm"; };
   session.print("  arranged by similarity alone: " +
                 (done.maps.lattice ? centimetres(done.maps.lattice->rms_m) : "none") +
                 " from the true places; map of a drive: " + centimetres(done.maps.map_rms_m) +
-                " from the true way, its wheels alone " + centimetres(done.maps.wheels_rms_m));
+                " from the true path, its odometry alone " + centimetres(done.maps.wheels_rms_m));
   session.print("  home from one metre away: " + of(done.homing.arrived, done.homing.runs.size()) +
                 " runs ended within 10 cm; median " +
                 format_fixed(100.0 * median(done.homing.distances_m), 1) + " cm");
   session.print("  a route of " + format_fixed(done.route.length_m, 0) +
                 " m repeated from 0.3 m off: " + of(done.route.completed, done.route.runs.size()) +
                 " runs reached its end; distance from it: median " +
-                median_text(done.route.lateral_m, 100.0, 1, "cm"));
+                format_median(done.route.lateral_m, 100.0, 1, "cm"));
   const DemoNavigation& navigation = done.navigation;
   session.print(
-      "  missions by views alone: " + of(navigation.arrived, navigation.runs.size()) +
-      " arrived; way driven over the shortest: median " +
+      "  missions over views alone: " + of(navigation.arrived, navigation.runs.size()) +
+      " arrived; driven over shortest path: median " +
       (navigation.detours.empty() ? "none" : format_fixed(median(navigation.detours), 2)) +
-      "; kidnapped half way: " + std::string(name_of(navigation.kidnapped.end)) +
-      "; a screen in the way: " +
+      "; kidnapped on its path: " + std::string(name_of(navigation.kidnapped.end)) +
+      "; a screen across the path: " +
       (navigation.screened ? std::string(name_of(navigation.screened->end)) : "none"));
 }
 
-MemoryFile remember(const Dataset& run, const fs::path& path, Executor& executor) {
+MemoryFile memorise_run(const Dataset& run, const fs::path& path, Executor& executor) {
   {
     Memoriser memoriser(path, {.source = run.source});
     DatasetObservations source(run, executor);
@@ -347,9 +348,9 @@ MemoryFile remember(const Dataset& run, const fs::path& path, Executor& executor
   return MemoryFile::open(path, Access::read_write);
 }
 
-ExitCode demonstrate(const DemoOptions& wanted, Session& session) {
+ExitCode demonstrate(const DemoOptions& options, Session& session) {
   const auto start = std::chrono::steady_clock::now();
-  const fs::path& out = wanted.out;
+  const fs::path& out = options.out;
   prepare_demo_folder(out);
   constexpr int parts = 8;
   int part = 0;
@@ -360,54 +361,59 @@ ExitCode demonstrate(const DemoOptions& wanted, Session& session) {
                      what);
   };
   next_part("simulates what the robot sees");
-  const auto recordings = record_demo(wanted, session);
+  const auto recordings = record_demo(options, session);
   if (!recordings) {
-    return session.no_answer("panonav demo: no mirror was found in the simulated pictures");
+    return session.no_answer("panonav demo: no mirror was found in the simulated images");
   }
   viewer::ReportPage page(
       "panonav: a robot that remembers what places look like",
-      "A robot with one camera remembers views of a place. By what it sees it then knows where it "
-      "is, makes maps, finds home, repeats routes and goes where it is told. All of this was just "
-      "simulated on this computer and measured against the truth. What moves stops at a click.");
-  DemoStory story{.mirror = show_camera(*recordings, session, page)};
+      "A robot with one camera remembers views of a place. It compares what it sees with the "
+      "remembered views to find its position, make maps, home, repeat routes and drive to goals. "
+      "All of this was simulated on this computer and compared with the true positions. Click an "
+      "animation to pause it.");
+  DemoStory story{.mirror = add_camera_part(*recordings, session, page)};
 
   next_part("remembers and localises itself");
-  MemoryFile file = remember(recordings->memory_run, out / "office.panonav", session.executor());
+  MemoryFile file =
+      memorise_run(recordings->memory_run, out / "office.panonav", session.executor());
   const auto pipeline =
       std::make_shared<const ViewEncoder>(file.header(), recordings->memory_run.source);
   const VisualMemory memory = file.load();
   const Localiser localiser(memory);
-  const auto asked = ask(localiser, *pipeline, recordings->query_run, session.executor());
-  const auto elsewhere = ask(localiser, *pipeline, recordings->elsewhere_run, session.executor());
-  DemoResults done{.views = memory.size(), .questions = asked.size()};
-  done.own = outcome_of(asked, memory);
-  done.foreign = outcome_of(elsewhere, memory);
+  const auto queries =
+      localise_all(localiser, *pipeline, recordings->query_run, session.executor());
+  const auto elsewhere =
+      localise_all(localiser, *pipeline, recordings->elsewhere_run, session.executor());
+  DemoResults done{.views = memory.size(), .questions = queries.size()};
+  done.own = summarise_outcome(queries, memory);
+  done.foreign = summarise_outcome(elsewhere, memory);
   const std::vector<viewer::MapLayer> scene = viewer::scene_layers(recordings->office_scene);
-  show_answers(memory, scene, asked, done.own, done.foreign, wanted.spacing_m(), page);
-  story.position_error = median_text(done.own.errors_m, 100.0, 1, "cm");
+  add_answers_part(memory, scene, queries, done.own, done.foreign, options.spacing_m(), page);
+  story.position_error = format_median(done.own.errors_m, 100.0, 1, "cm");
   next_part("as accurate as needed");
-  story.areas = show_levels(memory, scene, shown_view(asked), wanted.spacing_m(), page);
+  story.areas = add_levels_part(memory, scene, choose_view(queries), options.spacing_m(), page);
   next_part("tracks itself");
   const MemoryFile corridor =
-      remember(recordings->corridor_run, out / "corridor.panonav", session.executor());
-  done.track = show_track(wanted, *recordings, corridor, session, page);
+      memorise_run(recordings->corridor_run, out / "corridor.panonav", session.executor());
+  done.track = demonstrate_tracking(options, *recordings, corridor, session, page);
   next_part("arranges what it remembers");
-  done.maps = show_maps(memory, wanted.seed, wanted.quick, session, page);
+  done.maps = demonstrate_maps(memory, options.seed, options.quick, session, page);
   store_lattice(done.maps.arranged, memory, file);
   next_part("goes home");
-  done.homing =
-      show_homing(recordings->office_scene, wanted.runs_home(), wanted.seed, session, page);
+  done.homing = demonstrate_homing(recordings->office_scene, options.homing_run_count(),
+                                   options.seed, session, page);
   next_part("repeats a route");
-  done.route = show_route(recordings->office_scene, wanted.route_m(), wanted.seed, session, page);
+  done.route =
+      demonstrate_route(recordings->office_scene, options.route_m(), options.seed, session, page);
   next_part("goes where it is told");
-  done.navigation = show_navigation(wanted, *recordings, file, memory, done.maps.arranged, pipeline,
-                                    session, page);
-  show_what_next(wanted, *recordings, done.navigation, page);
-  story.found_again = pictures_text(done.track.until_found_again);
+  done.navigation = demonstrate_navigation(options, *recordings, file, memory, done.maps.arranged,
+                                           pipeline, session, page);
+  add_commands(options, *recordings, done.navigation, page);
+  story.found_again = format_image_count(done.track.until_found_again);
   story.gathering = std::move(done.track.gathering);
   story.arrived = of(done.navigation.arrived, done.navigation.runs.size());
   story.missions = std::move(done.navigation.all);
-  tell_story(std::move(story), page);
+  add_story(std::move(story), page);
   page.write(out, "index.html", "panonav demo");
   progress.clear();
 
@@ -416,35 +422,34 @@ ExitCode demonstrate(const DemoOptions& wanted, Session& session) {
     session.print(json_line(as_json(done, out)));
   } else {
     print(done, session);
-    tell_report(out, session);
+    print_report_path(out, session);
   }
   return ExitCode::done;
 }
 
 Run declare_demo(Arguments& arguments) {
-  auto wanted = std::make_shared<DemoOptions>();
+  auto values = std::make_shared<DemoOptions>();
   auto out = std::make_shared<std::string>("demo");
   auto seed = std::make_shared<std::optional<std::uint64_t>>();
   arguments.option("-o,--out FOLDER", *out,
                    "Folder for the report: a new one, or that of an earlier demo");
   arguments.option("--seed", *seed, "Seed of the simulated office (default: 1)");
-  arguments.flag("--quick", wanted->quick,
-                 "A smoke run: fewer and smaller pictures, fewer questions and missions");
-  return [wanted, out, seed](Session& session) {
-    wanted->out = *out;
-    wanted->seed = seed->value_or(1);
-    return demonstrate(*wanted, session);
+  arguments.flag("--quick", values->quick,
+                 "A smoke run: fewer and smaller images, fewer questions and missions");
+  return [values, out, seed](Session& session) {
+    values->out = *out;
+    values->seed = seed->value_or(1);
+    return demonstrate(*values, session);
   };
 }
 
 }  // namespace
 
 Verb demo_verb() {
-  return {"demo", "The whole story on a simulated office, with a report to look at",
-          "A robot sees, remembers, localises and tracks itself, arranges what it remembers, goes "
-          "home, repeats a route and goes where it is told. It takes about a minute on two cores "
-          "and needs nothing but this program. What an earlier demo left in the folder is written "
-          "anew; a folder that holds anything else is refused.",
+  return {"demo", "Demonstrate everything in a simulated office, and write a page about it",
+          "A robot memorises views, localises and tracks itself, arranges its views, homes, "
+          "repeats a route and navigates to goals. It takes about a minute on two cores. Files of "
+          "an earlier demo in the folder are replaced; a folder with other files is refused.",
           "  panonav demo\n  panonav demo --seed 5 -o other_office", declare_demo};
 }
 

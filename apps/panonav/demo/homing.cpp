@@ -20,15 +20,16 @@ constexpr double close_m = 0.1;
 
 /// Places like the one that a user would come back to: a start one metre off in the open, so that
 /// no wall stands in between.
-std::vector<lab::HomingTask> tasks_in(const lab::HomingPlace& place, int count,
-                                      std::uint64_t seed) {
+std::vector<lab::HomingTask> sample_tasks(const lab::HomingPlace& place, int count,
+                                          std::uint64_t seed) {
   constexpr double away_m = 1.0;
   std::vector<lab::HomingTask> tasks;
   Random random(seed, 1);
   while (tasks.size() < static_cast<std::size_t>(count)) {
     const Pose2 goal = place.free_space->random_pose(random);
-    const double way_rad = random.uniform(-std::numbers::pi, std::numbers::pi);
-    const Pose2 start{goal.x_m + away_m * std::cos(way_rad), goal.y_m + away_m * std::sin(way_rad),
+    const double direction_rad = random.uniform(-std::numbers::pi, std::numbers::pi);
+    const Pose2 start{goal.x_m + away_m * std::cos(direction_rad),
+                      goal.y_m + away_m * std::sin(direction_rad),
                       random.uniform(-std::numbers::pi, std::numbers::pi)};
     if (place.free_space->is_free_between(goal.position(), start.position())) {
       tasks.push_back({goal, start});
@@ -38,8 +39,8 @@ std::vector<lab::HomingTask> tasks_in(const lab::HomingPlace& place, int count,
 }
 
 /// All robots at once, step by step.
-viewer::UnfoldingMap map_of_runs(const simulation::Scene& office,
-                                 const std::vector<lab::HomingRun>& runs) {
+viewer::UnfoldingMap draw_runs(const simulation::Scene& office,
+                               const std::vector<lab::HomingRun>& runs) {
   viewer::MapLayer homes{.label = "home", .colour = viewer::PlotColour::black};
   viewer::MapLayer starts{.label = "start", .colour = viewer::PlotColour::green};
   std::size_t longest = 0;
@@ -53,7 +54,7 @@ viewer::UnfoldingMap map_of_runs(const simulation::Scene& office,
   map.backdrop.push_back(homes);
   map.backdrop.push_back(starts);
   for (std::size_t step = 0; step < longest; ++step) {
-    viewer::MapLayer good{.label = "way home", .colour = viewer::PlotColour::blue};
+    viewer::MapLayer good{.label = "path home", .colour = viewer::PlotColour::blue};
     viewer::MapLayer bad{.label = "ended elsewhere", .colour = viewer::PlotColour::vermilion};
     for (const lab::HomingRun& run : runs) {
       std::vector<Point2> line = positions_of(run.path);
@@ -69,8 +70,8 @@ viewer::UnfoldingMap map_of_runs(const simulation::Scene& office,
 }
 
 /// The view at home, turned as the robot faces, above what it sees.
-std::vector<viewer::ReportView> views_of(const Panorama& home, const Panorama& current,
-                                         const HomeVector& vector) {
+std::vector<viewer::ReportView> make_report_views(const Panorama& home, const Panorama& current,
+                                                  const HomeVector& vector) {
   std::vector<viewer::ViewMark> marks{{.azimuth_rad = 0.0, .colour = viewer::PlotColour::grey}};
   if (vector.length() > 0.0) {
     marks.push_back({vector.direction_rad(), viewer::PlotColour::vermilion, true});
@@ -79,18 +80,18 @@ std::vector<viewer::ReportView> views_of(const Panorama& home, const Panorama& c
   }
   const double columns = -vector.heading_rad / (2.0 * std::numbers::pi) * home.columns();
   return {{rotate_columns(home, static_cast<int>(std::lround(columns))), marks,
-           "The first run: what was seen at home, turned as the robot faces at the start."},
+           "The first run: the view at home, rotated to the robot's heading at the start."},
           {current, marks,
-           "What it sees at the start. Orange: the direction home, where things spread out on the "
-           "way; blue: the opposite one; grey: straight ahead."}};
+           "The view at the start. Orange: the direction home, from which the image expands on the "
+           "way; blue: the opposite direction; grey: straight ahead."}};
 }
 
 }  // namespace
 
-DemoHoming show_homing(const simulation::Scene& office, int runs, std::uint64_t seed,
-                       Session& session, viewer::ReportPage& page) {
+DemoHoming demonstrate_homing(const simulation::Scene& office, int runs, std::uint64_t seed,
+                              Session& session, viewer::ReportPage& page) {
   const lab::HomingPlace place = lab::make_homing_place(office, {}, session.executor());
-  const auto tasks = tasks_in(place, runs, seed);
+  const auto tasks = sample_tasks(place, runs, seed);
   DemoHoming homing;
   homing.runs = lab::run_home(place, tasks, {}, seed, session.executor());
   std::size_t steps = 0;
@@ -106,27 +107,28 @@ DemoHoming show_homing(const simulation::Scene& office, int runs, std::uint64_t 
   };
   const lab::HomingRun& shown = homing.runs.front();
 
-  page.begin_part("Back home", {std::to_string(homing.arrived) + " of " + std::to_string(runs),
-                                "robots found home from a metre away, by one remembered picture"});
+  page.begin_part("Homing",
+                  {std::to_string(homing.arrived) + " of " + std::to_string(runs),
+                   "robots found home from a distance of one metre, with one remembered view"});
   page.add_text(
-      "From one view of a place the robot finds its way back to it, without a map and without "
-      "knowing which way it faces: the Fourier components of both views tell the direction home. "
-      "It was put down one metre away from " +
+      "From one view of a place the robot finds the direction back to it, without a map and "
+      "without knowing its heading, by comparing the Fourier components of both views. It was put "
+      "down one metre away from " +
       std::to_string(runs) +
-      " places, with random heading, and made step after step, each after a new picture. Its "
-      "wheels and its camera are noisy.");
+      " places, with random heading, and drove step by step, each after a new image. Its odometry "
+      "and its camera are noisy.");
   page.add_figures(
       {{std::to_string(homing.arrived) + " of " + std::to_string(runs),
-        "runs that ended within 10 cm of home, and knew it"},
+        "runs that ended within 10 cm of home and reported so"},
        {format_fixed(100.0 * median(homing.distances_m), 1) + " cm",
         "median distance from home at the end"},
        {format_fixed(static_cast<double>(steps) / runs, 0), "steps a run, on average"}});
   page.add_plots(
-      {{map_of_runs(office, homing.runs),
+      {{draw_runs(office, homing.runs),
         "All robots at once, step by step, from the green circles to the black squares. A "
         "run that ended elsewhere turns orange."}});
-  page.add_views(
-      views_of(seen_from(shown.goal), seen_from(shown.path.front()), shown.vectors.front()));
+  page.add_views(make_report_views(seen_from(shown.goal), seen_from(shown.path.front()),
+                                   shown.vectors.front()));
   return homing;
 }
 

@@ -17,7 +17,7 @@ struct DemoHoming {
 };
 
 /// Runs them and adds a part that plays them to the page. The same seed gives the same runs.
-DemoHoming show_homing(const simulation::Scene& office, int runs, std::uint64_t seed,
-                       Session& session, viewer::ReportPage& page);
+DemoHoming demonstrate_homing(const simulation::Scene& office, int runs, std::uint64_t seed,
+                              Session& session, viewer::ReportPage& page);
 
 }  // namespace panonav::command

@@ -25,15 +25,15 @@ namespace {
 constexpr double spacing_m = 0.1;
 constexpr int components = 15;
 
-viewer::MapPlot map_of_drive(const simulation::PlaceRecording& place,
-                             const simulation::MappingRecording& recording,
-                             const simulation::MappedRecording& mapped) {
+viewer::MapPlot draw_drive(const simulation::PlaceRecording& place,
+                           const simulation::MappingRecording& recording,
+                           const simulation::MappedRecording& mapped) {
   viewer::MapPlot plot{.title = "A drive through rooms",
                        .layers = viewer::scene_layers(place.scene)};
   plot.layers.push_back(
-      {.label = "true way", .colour = viewer::PlotColour::black, .lines = {mapped.truth}});
+      {.label = "true path", .colour = viewer::PlotColour::black, .lines = {mapped.truth}});
   plot.layers.push_back(
-      {.label = "wheels alone",
+      {.label = "odometry alone",
        .colour = viewer::PlotColour::vermilion,
        .lines = {simulation::align_to(positions_of(recording.wheels), mapped.truth)}});
   plot.layers.push_back({.label = "map from the views",
@@ -50,8 +50,8 @@ struct Growth {
 
 /// The views as dots, coloured by where they were taken, from west to east: whoever looks sees at
 /// once whether they are sorted.
-std::vector<viewer::MapLayer> coloured(const std::vector<Point2>& positions,
-                                       const std::vector<Point2>& truth) {
+std::vector<viewer::MapLayer> colour_by_position(const std::vector<Point2>& positions,
+                                                 const std::vector<Point2>& truth) {
   constexpr std::array colours{viewer::PlotColour::blue,   viewer::PlotColour::sky,
                                viewer::PlotColour::green,  viewer::PlotColour::yellow,
                                viewer::PlotColour::orange, viewer::PlotColour::vermilion};
@@ -68,10 +68,9 @@ std::vector<viewer::MapLayer> coloured(const std::vector<Point2>& positions,
   return layers;
 }
 
-/// How the views find together: groups at the places where their views end, single views at places
-/// at random.
-viewer::UnfoldingMap map_of_growth(const Lattice& arranged, const VisualMemory& office,
-                                   const std::vector<Growth>& growth, std::uint64_t seed) {
+/// Draws how the views join: groups at their final positions, single views at random positions.
+viewer::UnfoldingMap draw_growth(const Lattice& arranged, const VisualMemory& office,
+                                 const std::vector<Growth>& growth, std::uint64_t seed) {
   std::vector<Point2> truth;
   std::vector<Point2> ends;
   for (const Lattice::Node& node : arranged.nodes) {
@@ -85,7 +84,7 @@ viewer::UnfoldingMap map_of_growth(const Lattice& arranged, const VisualMemory& 
     std::swap(anywhere[i - 1], anywhere[static_cast<std::size_t>(random.index(i))]);
   }
   viewer::UnfoldingMap map{.title = "As the views arrange themselves"};
-  map.frames.push_back({.title = "in no order", .layers = coloured(anywhere, truth)});
+  map.frames.push_back({.title = "in no order", .layers = colour_by_position(anywhere, truth)});
   for (const Growth& at : growth) {
     std::map<std::size_t, std::vector<std::size_t>> groups;
     for (std::size_t i = 0; i < at.groups.size(); ++i) groups[at.groups[i]].push_back(i);
@@ -105,7 +104,7 @@ viewer::UnfoldingMap map_of_growth(const Lattice& arranged, const VisualMemory& 
     }
     map.frames.push_back({.title = std::to_string(found) + " of " + std::to_string(truth.size()) +
                                    " views in groups",
-                          .layers = coloured(positions, truth)});
+                          .layers = colour_by_position(positions, truth)});
   }
   viewer::MapLayer springs{.label = "springs", .colour = viewer::PlotColour::light_grey};
   for (const Lattice::Spring& spring : arranged.springs) {
@@ -113,20 +112,20 @@ viewer::UnfoldingMap map_of_growth(const Lattice& arranged, const VisualMemory& 
       springs.lines.push_back({ends[spring.a], ends[spring.b]});
   }
   map.frames.push_back({.title = "done", .layers = {springs}});
-  std::ranges::move(coloured(ends, truth), std::back_inserter(map.frames.back().layers));
+  std::ranges::move(colour_by_position(ends, truth), std::back_inserter(map.frames.back().layers));
   return map;
 }
 
-viewer::MapPlot map_of_truth(const VisualMemory& office) {
+viewer::MapPlot draw_truth(const VisualMemory& office) {
   std::vector<Point2> truth;
   for (const ViewId view : office.views()) {
     truth.push_back(office.info(view).pose->position());
   }
-  return {.title = "As they were taken", .layers = coloured(truth, truth)};
+  return {.title = "As they were taken", .layers = colour_by_position(truth, truth)};
 }
 
 /// The longer side of the floor on which the views were taken.
-double room_m(const VisualMemory& office) {
+double room_length_m(const VisualMemory& office) {
   std::vector<double> x_m;
   std::vector<double> y_m;
   for (const ViewId view : office.views()) {
@@ -138,33 +137,32 @@ double room_m(const VisualMemory& office) {
   return std::max(east - west, north - south);
 }
 
-std::string whole_centimetres(double metres) {
+std::string format_centimetres(double metres) {
   return format_fixed(100.0 * metres, 0) + " cm";
 }
 
-std::vector<std::pair<std::string, std::string>> figures_of(const DemoMaps& maps,
-                                                            const VisualMemory& office,
-                                                            std::size_t drive_views) {
+std::vector<std::pair<std::string, std::string>> make_figures(const DemoMaps& maps,
+                                                              const VisualMemory& office,
+                                                              std::size_t drive_views) {
   std::vector<std::pair<std::string, std::string>> figures;
   if (maps.lattice) {
-    figures.push_back({whole_centimetres(maps.lattice->rms_m),
-                       "from their true places lie the arranged views (root mean "
-                       "square), in a room " +
-                           format_fixed(room_m(office), 1) + " m long: " +
-                           format_fixed(100.0 * maps.lattice->rms_m / room_m(office), 1) +
+    figures.push_back({format_centimetres(maps.lattice->rms_m),
+                       "is the error of the arranged views (root mean square), in a room " +
+                           format_fixed(room_length_m(office), 1) + " m long: " +
+                           format_fixed(100.0 * maps.lattice->rms_m / room_length_m(office), 1) +
                            " % of it"});
   }
-  figures.push_back({whole_centimetres(maps.map_rms_m),
-                     "from the true way lies the map of a drive of " +
+  figures.push_back({format_centimetres(maps.map_rms_m),
+                     "is the error of the map of a drive of " +
                          format_fixed(spacing_m * static_cast<double>(drive_views), 0) + " m"});
-  figures.push_back({whole_centimetres(maps.wheels_rms_m), "from it lies what the wheels tell"});
+  figures.push_back({format_centimetres(maps.wheels_rms_m), "is the error of the odometry alone"});
   return figures;
 }
 
 }  // namespace
 
-DemoMaps show_maps(const VisualMemory& office, std::uint64_t seed, bool quick, Session& session,
-                   viewer::ReportPage& page) {
+DemoMaps demonstrate_maps(const VisualMemory& office, std::uint64_t seed, bool quick,
+                          Session& session, viewer::ReportPage& page) {
   constexpr std::size_t frames = 40;
   DemoMaps maps;
   std::vector<Growth> growth;
@@ -190,35 +188,31 @@ DemoMaps show_maps(const VisualMemory& office, std::uint64_t seed, bool quick, S
   maps.wheels_rms_m =
       align(positions_of(recording.wheels), mapped.truth, {.allow_scale = true}).rms_m;
 
-  const std::string arranged = maps.lattice ? whole_centimetres(maps.lattice->rms_m) : "none";
-  page.begin_part(
-      "How places lie",
-      {arranged, "is how far off a map is that views made by how alike they look alone"});
+  const std::string arranged = maps.lattice ? format_centimetres(maps.lattice->rms_m) : "none";
+  page.begin_part("Maps",
+                  {arranged, "is the error of a map made from the similarity of views alone"});
   page.add_text(
-      "Can pictures alone make a map? The remembered views of the office were shuffled and their "
-      "positions taken away. Views that look alike pull each other close, like balls on springs, "
-      "and so they find their places by themselves.");
+      "Can images alone make a map? The remembered views of the office were shuffled and their "
+      "positions removed. Similar views attract each other like balls on springs until all are in "
+      "place.");
   page.add_plots(
-      {{map_of_growth(maps.arranged, office, growth, seed),
-        "At first the views lie anywhere. Those that belong together join, and the groups "
-        "grow until all hang together; each group is drawn where it ends. The whole is "
-        "turned and scaled to fit the truth, because pictures know neither north nor "
-        "metres."},
-       {map_of_truth(office),
-        "Where the views were taken, which the robot was not told. Colours go from west to "
-        "east: were the arrangement perfect, the left picture would become this one."}});
+      {{draw_growth(maps.arranged, office, growth, seed),
+        "At first the positions are random. Similar views join into groups, and the groups grow "
+        "until all are connected; each group is drawn at its final position. The arrangement is "
+        "rotated and scaled to fit the truth, because images contain neither north nor metres."},
+       {draw_truth(office),
+        "The true positions, which were not used. Colours run from west to east: if the "
+        "arrangement were perfect, the left map would end like this one."}});
   page.add_text(
-      "Below, a robot drives through rooms that it has never seen and makes a map "
-      "of its way, from one picture after the other and without wheels; where it comes by again it "
-      "recognises the place and closes the loop.");
-  page.add_plots(
-      {{map_of_drive(place, recording, mapped),
-        "The drive: " + std::to_string(recording.truth.size()) + " views, one every " +
-            whole_centimetres(spacing_m) +
-            ". The blue map should lie on the black way; both it and the orange line are "
-            "laid over that in equal size. The orange one is what the wheels of a cheap "
-            "robot make of the same drive."}});
-  page.add_figures(figures_of(maps, office, recording.truth.size()));
+      "Below, a robot drives through rooms that it has never seen and makes a map of its path, "
+      "image by image and without odometry; where it passes a place again it recognises the place "
+      "and closes the loop.");
+  page.add_plots({{draw_drive(place, recording, mapped),
+                   "The drive: " + std::to_string(recording.truth.size()) + " views, one every " +
+                       format_centimetres(spacing_m) +
+                       ". The blue map should lie on the black path; it and the orange line, the "
+                       "odometry of a cheap robot, are scaled to the size of the true path."}});
+  page.add_figures(make_figures(maps, office, recording.truth.size()));
   return maps;
 }
 

@@ -10,7 +10,7 @@
 
 namespace panonav::command {
 
-/// What the memory's views tell about how they lie.
+/// Maps made from the memory's views.
 struct DemoMaps {
   Lattice arranged;                          ///< the office, its views in no order
   std::optional<LatticeComparison> lattice;  ///< beside the truth
@@ -23,7 +23,7 @@ struct DemoMaps {
 /// Arranges the views of `office` without their poses, makes a map of a drive through rooms of
 /// another place, and adds a part to the page that plays the first and
 /// draws the second.
-DemoMaps show_maps(const VisualMemory& office, std::uint64_t seed, bool quick, Session& session,
-                   viewer::ReportPage& page);
+DemoMaps demonstrate_maps(const VisualMemory& office, std::uint64_t seed, bool quick,
+                          Session& session, viewer::ReportPage& page);
 
 }  // namespace panonav::command

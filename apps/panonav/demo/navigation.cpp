@@ -35,8 +35,8 @@ constexpr std::uint64_t noise_stream = 4;
 
 using Pipeline = std::shared_ptr<const ViewEncoder>;
 
-simulation::RememberedPlace remembered_place(const VisualMemory& memory, const Lattice& arranged,
-                                             double spacing_m) {
+simulation::RememberedPlace remember_office(const VisualMemory& memory, const Lattice& arranged,
+                                            double spacing_m) {
   simulation::RememberedPlace remembered{memory, graph_from_lattice(arranged), {}, spacing_m};
   for (const ViewId view : remembered.graph.views()) {
     const ReferencePose& pose = *memory.info(view).pose;
@@ -46,8 +46,8 @@ simulation::RememberedPlace remembered_place(const VisualMemory& memory, const L
 }
 
 /// The robot sees through the camera as it is, and understands it as it was calibrated.
-void give_sight(simulation::MissionPlace& place, const DemoRecordings& recordings,
-                const Pipeline& pipeline) {
+void set_sight(simulation::MissionPlace& place, const DemoRecordings& recordings,
+               const Pipeline& pipeline) {
   const simulation::SimulatedWorldOptions& settled = recordings.office_world->options();
   place.sight = simulation::make_sight(place.renderer, recordings.true_camera, settled.frame,
                                        settled.sensor, pipeline, nullptr);
@@ -60,11 +60,10 @@ struct ScreenedMission {
 };
 
 /// The first of `missions` that such a screen makes longer but not impossible.
-std::optional<ScreenedMission> screened_mission(const simulation::MissionPlace& place,
-                                                const simulation::RememberedPlace& remembered,
-                                                const std::vector<simulation::Mission>& missions,
-                                                const DemoRecordings& recordings,
-                                                const Pipeline& pipeline, Executor& executor) {
+std::optional<ScreenedMission> find_screened_mission(
+    const simulation::MissionPlace& place, const simulation::RememberedPlace& remembered,
+    const std::vector<simulation::Mission>& missions, const DemoRecordings& recordings,
+    const Pipeline& pipeline, Executor& executor) {
   constexpr double width_m = 0.6;
   constexpr double height_m = 1.0;
   constexpr double min_detour_m = 0.1;
@@ -92,17 +91,17 @@ std::optional<ScreenedMission> screened_mission(const simulation::MissionPlace& 
       continue;
     screened.renderer = std::make_shared<const simulation::Renderer>(
         screened.scene, simulation::RendererOptions{}, executor);
-    give_sight(screened, recordings, pipeline);
+    set_sight(screened, recordings, pipeline);
     return ScreenedMission{mission, std::move(screened)};
   }
   return std::nullopt;
 }
 
 /// All robots at once, look by look.
-viewer::UnfoldingMap map_of_runs(const DemoNavigation& navigation,
-                                 const simulation::RememberedPlace& remembered,
-                                 const std::vector<simulation::Mission>& missions,
-                                 const simulation::Scene& office) {
+viewer::UnfoldingMap draw_runs(const DemoNavigation& navigation,
+                               const simulation::RememberedPlace& remembered,
+                               const std::vector<simulation::Mission>& missions,
+                               const simulation::Scene& office) {
   viewer::MapLayer views{.label = "remembered views", .colour = viewer::PlotColour::light_grey};
   for (const Pose2& pose : remembered.truth) views.circles.push_back(pose.position());
   viewer::MapLayer starts{.label = "start", .colour = viewer::PlotColour::green};
@@ -116,43 +115,43 @@ viewer::UnfoldingMap map_of_runs(const DemoNavigation& navigation,
   }
   viewer::UnfoldingMap map{.title = "All missions", .backdrop = viewer::scene_layers(office)};
   for (const viewer::MapLayer& layer : {views, starts, goals}) map.backdrop.push_back(layer);
-  for (std::size_t look = 0; look < longest; ++look) {
-    viewer::MapLayer good{.label = "way to the goal", .colour = viewer::PlotColour::blue};
+  for (std::size_t step = 0; step < longest; ++step) {
+    viewer::MapLayer good{.label = "path to the goal", .colour = viewer::PlotColour::blue};
     viewer::MapLayer bad{.label = "ended elsewhere", .colour = viewer::PlotColour::vermilion};
     for (const simulation::MissionRun& run : navigation.runs) {
       std::vector<Point2> line = positions_of(run.path);
-      const bool over = line.size() <= look + 1;
-      line.resize(std::min(line.size(), look + 1));
+      const bool over = line.size() <= step + 1;
+      line.resize(std::min(line.size(), step + 1));
       viewer::MapLayer& layer = over && !run.arrives(navigation.within_m) ? bad : good;
       layer.dots.push_back(line.back());
       if (line.size() > 1) layer.lines.push_back(std::move(line));
     }
-    map.frames.push_back({.title = "look " + std::to_string(look + 1), .layers = {good, bad}});
+    map.frames.push_back({.title = "image " + std::to_string(step + 1), .layers = {good, bad}});
   }
   return map;
 }
 
 /// One run, look by look, over what the memory tells of the way.
-viewer::UnfoldingMap map_of_run(const std::string& title, const simulation::MissionPlace& place,
-                                const simulation::RememberedPlace& remembered,
-                                const PlannerOptions& options, ViewId goal,
-                                const simulation::MissionRun& run) {
+viewer::UnfoldingMap draw_run(const std::string& title, const simulation::MissionPlace& place,
+                              const simulation::RememberedPlace& remembered,
+                              const PlannerOptions& options, ViewId goal,
+                              const simulation::MissionRun& run) {
   viewer::MapPlot backdrop = viewer::mission_plot(title, place, remembered, options, goal, run);
   std::erase_if(backdrop.layers,
-                [](const viewer::MapLayer& layer) { return layer.label == "way driven"; });
+                [](const viewer::MapLayer& layer) { return layer.label == "driven path"; });
   viewer::UnfoldingMap map{.title = title, .backdrop = std::move(backdrop.layers)};
-  for (std::size_t look = 0; look < run.path.size(); ++look) {
+  for (std::size_t step = 0; step < run.path.size(); ++step) {
     viewer::MapLayer driven{
-        .label = "way driven", .colour = viewer::PlotColour::vermilion, .lines = {{}}};
-    for (std::size_t i = 0; i <= look; ++i) {
+        .label = "driven path", .colour = viewer::PlotColour::vermilion, .lines = {{}}};
+    for (std::size_t i = 0; i <= step; ++i) {
       driven.lines.back().push_back(run.path[i].position());
       if (run.kidnapped_at == i) driven.lines.emplace_back();
     }
     std::erase_if(driven.lines, [](const auto& line) { return line.size() < 2; });
-    driven.dots = {run.path[look].position()};
-    map.frames.push_back({.title = look < run.decisions.size()
-                                       ? "look " + std::to_string(look + 1) + ": " +
-                                             std::string(name_of(run.decisions[look].state))
+    driven.dots = {run.path[step].position()};
+    map.frames.push_back({.title = step < run.decisions.size()
+                                       ? "image " + std::to_string(step + 1) + ": " +
+                                             std::string(name_of(run.decisions[step].state))
                                        : "the end",
                           .layers = {driven}});
   }
@@ -160,14 +159,14 @@ viewer::UnfoldingMap map_of_run(const std::string& title, const simulation::Miss
 }
 
 /// A mission with what the robot sees and decides at each look.
-viewer::RunPage played_run(const simulation::MissionPlace& place,
+viewer::RunPage replay_run(const simulation::MissionPlace& place,
                            const simulation::RememberedPlace& remembered,
                            const DemoRecordings& recordings, const MemoryFile& file,
                            const Pipeline& pipeline, const PlannerOptions& options, ViewId goal,
                            const simulation::MissionRun& run) {
   const simulation::SimulatedWorldOptions& settled = recordings.office_world->options();
   std::optional<Panorama> seen;
-  const auto look = simulation::make_sight(
+  const auto see = simulation::make_sight(
       place.renderer, recordings.true_camera, settled.frame, settled.sensor, pipeline, nullptr,
       [&](const Image& /*picture*/, const Panorama& panorama) { seen = panorama; });
   AreaPlanner planner(remembered.graph, options);
@@ -187,7 +186,7 @@ viewer::RunPage played_run(const simulation::MissionPlace& place,
       std::ranges::replace(name, '_', ' ');
       moment.values.emplace_back("event", std::move(name));
     }
-    const FourierSignature signature = look(pose, i);
+    const FourierSignature signature = see(pose, i);
     moment.panorama = std::exchange(seen, std::nullopt);
     if (decision.nearest) {
       moment.values.emplace_back("best_match", remembered.memory.info(*decision.nearest).name);
@@ -221,30 +220,30 @@ viewer::RunPage played_run(const simulation::MissionPlace& place,
   return page;
 }
 
-std::string end_text(const simulation::MissionRun& run, double within_m) {
+std::string describe_end(const simulation::MissionRun& run, double within_m) {
   const std::string name(name_of(run.end));
   if (run.end != NavigationState::arrived) return name;
   return run.arrives(within_m) ? "arrived" : "arrived, but too far off";
 }
 
 /// A heading with what came of a run, and a line for each step.
-std::string log_of(const std::string& title, const std::string& goal,
-                   const simulation::MissionRun& run, double within_m) {
-  std::string text = title + ", to " + goal + ": " + end_text(run, within_m) + ", " +
+std::string format_log(const std::string& title, const std::string& goal,
+                       const simulation::MissionRun& run, double within_m) {
+  std::string text = title + ", to " + goal + ": " + describe_end(run, within_m) + ", " +
                      format_fixed(100.0 * run.end_distance_m, 0) + " cm from it\n";
   for (const NavigationDecision& decision : run.decisions) text += describe(decision) + "\n";
   return text + "\n";
 }
 
-/// What one mission more came to, as a sentence.
-std::string sentence_on(const simulation::MissionRun& run, double within_m) {
-  return "It ended as: " + end_text(run, within_m) + ", " +
+/// Describes the result of a mission in a sentence.
+std::string describe_run(const simulation::MissionRun& run, double within_m) {
+  return "It ended as: " + describe_end(run, within_m) + ", " +
          format_fixed(100.0 * run.end_distance_m, 0) + " cm from the goal after " +
          std::to_string(run.decisions.size()) + " steps and " + format_fixed(run.travelled_m, 1) +
          " m.";
 }
 
-/// What the page shows of them.
+/// The plots of the page.
 struct Shown {
   viewer::RunPage first;
   viewer::UnfoldingMap all;
@@ -256,65 +255,67 @@ void add_part(const DemoNavigation& navigation, Shown shown, viewer::ReportPage&
   const std::string count = std::to_string(navigation.runs.size());
   const std::string arrived = std::to_string(navigation.arrived) + " of " + count;
   const std::string within = format_fixed(100.0 * navigation.within_m, 1) + " cm";
-  page.begin_part("It goes where it is told", {arrived, "missions arrived, by views alone"});
+  page.begin_part("Navigation", {arrived, "missions arrived, over views alone"});
   page.add_text(
-      "The goal is a remembered view. The robot knows how the views arranged themselves (part 5), "
-      "and what it sees now. It knows no positions, not where it starts, nor which way it faces, "
-      "and it has no map of walls: it feels what stands in the way of its next step. Each "
-      "remembered view has a direction towards the goal, read from the phases of the views on the "
-      "way. The robot looks, finds the view that it is at, takes its direction, drives a step and "
-      "looks again; the last stretch is the way home to the goal's view.");
+      "The goal is a remembered view. The robot uses the arrangement of the views (part 5) and its "
+      "current image. It knows no positions, neither its start nor its heading, and has no map of "
+      "walls: it only feels obstacles in front of it. Each remembered view has a direction towards "
+      "the goal, read from the phases of the views along the path. The robot takes an image, finds "
+      "the nearest remembered view, drives a step in its direction and repeats; near the goal it "
+      "homes to the goal's view.");
   page.add_text(
-      "It was sent from " + count + " random places to " + count +
-      " random views. One more robot was kidnapped half way, and another one found a "
-      "screen across its way that had not been there before. A mission counts when the robot "
-      "says that it arrived and is within half the spacing of the views, " +
+      "The robots started at " + count + " random places and were sent to " + count +
+      " random views. One more robot was kidnapped on its path, and another one met a screen "
+      "across its path that had not been there before. A mission counts if the robot reports "
+      "its arrival and is within half the spacing of the views, " +
       within + ".");
   page.add_figures(
-      {{arrived, "missions arrived within " + within + ", and knew it"},
+      {{arrived, "missions arrived within " + within + " and reported so"},
        {navigation.detours.empty() ? "none" : format_fixed(median(navigation.detours), 2),
-        "times the shortest way, driven by those that arrived (median)"},
+        "times the shortest path, driven by those that arrived (median)"},
        {format_fixed(median(navigation.steps), 0), "steps a mission (median)"},
-       {end_text(navigation.kidnapped, navigation.within_m), "the robot that was kidnapped"},
-       {navigation.screened ? end_text(*navigation.screened, navigation.within_m) : "none",
-        navigation.screened ? "the robot with a screen in its way"
-                            : "no screen leaves a way round here"}});
+       {describe_end(navigation.kidnapped, navigation.within_m), "the robot that was kidnapped"},
+       {navigation.screened ? describe_end(*navigation.screened, navigation.within_m) : "none",
+        navigation.screened ? "the robot with a screen across its path"
+                            : "no screen leaves a path around it here"}});
   page.add_text(
-      "The first mission, look by look. Short strokes: which way each remembered view sends the "
-      "robot; the thick line: the way planned. Below what the robot sees stands the view that it "
-      "takes for the place where it is, turned alike.");
+      "The first mission, image by image. Short strokes: the direction in which each remembered "
+      "view sends the robot; thick line: the planned path. Below the robot's image is the "
+      "remembered view at which it localises itself, rotated to the same heading.");
   page.add_run(shown.first);
   std::vector<viewer::ReportPlot> maps{
-      {std::move(shown.all), "All missions at once. A way that did not end at its goal is orange."},
+      {std::move(shown.all),
+       "All missions at once. A path that did not end at its goal is orange."},
       {std::move(shown.kidnapped),
-       "Half way, somebody kidnapped this robot: it was put down at the purple square. " +
-           sentence_on(navigation.kidnapped, navigation.within_m)}};
+       "This robot was kidnapped half way along its path and put down at the purple square. " +
+           describe_run(navigation.kidnapped, navigation.within_m)}};
   if (shown.screened) {
     maps.push_back({std::move(*shown.screened),
-                    "A screen, the short dark line, stands across the middle of the planned way; "
-                    "the memory does not know it. There is a way round. " +
-                        sentence_on(*navigation.screened, navigation.within_m)});
+                    "A screen, the short dark line, stands across the middle of the planned path "
+                    "and is not in the memory. There is a path around it. " +
+                        describe_run(*navigation.screened, navigation.within_m)});
   }
   page.add_plots(maps);
-  page.add_link("mission.log", "Read each decision of all missions");
+  page.add_link("mission.log", "Log of all decisions");
 }
 
 }  // namespace
 
-DemoNavigation show_navigation(const DemoOptions& options, const DemoRecordings& recordings,
-                               const MemoryFile& file, const VisualMemory& memory,
-                               const Lattice& arranged, std::shared_ptr<const ViewEncoder> pipeline,
-                               Session& session, viewer::ReportPage& page) {
+DemoNavigation demonstrate_navigation(const DemoOptions& options, const DemoRecordings& recordings,
+                                      const MemoryFile& file, const VisualMemory& memory,
+                                      const Lattice& arranged,
+                                      std::shared_ptr<const ViewEncoder> pipeline, Session& session,
+                                      viewer::ReportPage& page) {
   Executor& executor = session.executor();
   const simulation::RememberedPlace remembered =
-      remembered_place(memory, arranged, options.spacing_m());
+      remember_office(memory, arranged, options.spacing_m());
   simulation::MissionPlace place = simulation::make_mission_place(*recordings.office_world);
-  give_sight(place, recordings, pipeline);
+  set_sight(place, recordings, pipeline);
   const auto random = [&](std::uint64_t stream, int count, bool kidnapped) {
     return simulation::draw_missions(place, remembered, {.count = count, .kidnapped = kidnapped},
                                      Random(options.seed, stream).next());
   };
-  auto missions = random(mission_stream, options.missions(), false);
+  auto missions = random(mission_stream, options.mission_count(), false);
   missions.push_back(random(kidnapped_stream, 1, true).front());
   const simulation::MissionOptions settings;
   const std::uint64_t noise = Random(options.seed, noise_stream).next();
@@ -331,38 +332,38 @@ DemoNavigation show_navigation(const DemoOptions& options, const DemoRecordings&
   }
   const auto map_of = [&](const std::string& title, const simulation::MissionPlace& where,
                           const simulation::Mission& mission, const simulation::MissionRun& run) {
-    return map_of_run(title, where, remembered, settings.planner, mission.goal, run);
+    return draw_run(title, where, remembered, settings.planner, mission.goal, run);
   };
   const simulation::Mission& first = missions.front();
   Shown shown{
-      .first = played_run(place, remembered, recordings, file, pipeline, settings.planner,
+      .first = replay_run(place, remembered, recordings, file, pipeline, settings.planner,
                           first.goal, navigation.runs.front()),
-      .all = map_of_runs(navigation, remembered, missions, recordings.office_scene),
-      .kidnapped = map_of("Kidnapped half way", place, missions.back(), navigation.kidnapped)};
+      .all = draw_runs(navigation, remembered, missions, recordings.office_scene),
+      .kidnapped = map_of("Kidnapped on its path", place, missions.back(), navigation.kidnapped)};
   navigation.all = shown.all;
   std::string log;
   const auto add_log = [&](const std::string& title, const simulation::Mission& mission,
                            const simulation::MissionRun& run) {
-    log += log_of(title, memory.info(mission.goal).name, run, navigation.within_m);
+    log += format_log(title, memory.info(mission.goal).name, run, navigation.within_m);
   };
   for (std::size_t i = 0; i < navigation.runs.size(); ++i) {
     add_log("Mission " + std::to_string(i + 1), missions[i], navigation.runs[i]);
   }
-  add_log("Kidnapped half way", missions.back(), navigation.kidnapped);
+  add_log("Kidnapped on its path", missions.back(), navigation.kidnapped);
   navigation.first_mission = {"--goal", memory.info(first.goal).name, "--start",
                               format_fixed(first.start.x_m, 3) + "," +
                                   format_fixed(first.start.y_m, 3) + "," +
                                   format_fixed(degrees(first.start.heading_rad), 1)};
   constexpr int candidates = 30;
   if (const auto screened =
-          screened_mission(place, remembered, random(screen_stream, candidates, false), recordings,
-                           pipeline, executor)) {
+          find_screened_mission(place, remembered, random(screen_stream, candidates, false),
+                                recordings, pipeline, executor)) {
     navigation.screened = simulation::run_missions(screened->place, remembered, {screened->mission},
                                                    settings, noise, executor)
                               .front();
-    shown.screened =
-        map_of("A screen in the way", screened->place, screened->mission, *navigation.screened);
-    add_log("A screen in the way", screened->mission, *navigation.screened);
+    shown.screened = map_of("A screen across the path", screened->place, screened->mission,
+                            *navigation.screened);
+    add_log("A screen across the path", screened->mission, *navigation.screened);
   }
   write_file(options.out / "mission.log", std::string_view(log));
   add_part(navigation, std::move(shown), page);

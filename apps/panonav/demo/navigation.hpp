@@ -33,9 +33,10 @@ struct DemoNavigation {
 
 /// Sends them over the views of `memory`, which is what `file` holds, and adds a part that plays
 /// them to the page, with a log. The same seed gives the same runs.
-DemoNavigation show_navigation(const DemoOptions& options, const DemoRecordings& recordings,
-                               const MemoryFile& file, const VisualMemory& memory,
-                               const Lattice& arranged, std::shared_ptr<const ViewEncoder> pipeline,
-                               Session& session, viewer::ReportPage& page);
+DemoNavigation demonstrate_navigation(const DemoOptions& options, const DemoRecordings& recordings,
+                                      const MemoryFile& file, const VisualMemory& memory,
+                                      const Lattice& arranged,
+                                      std::shared_ptr<const ViewEncoder> pipeline, Session& session,
+                                      viewer::ReportPage& page);
 
 }  // namespace panonav::command

@@ -13,7 +13,7 @@ namespace panonav::command {
 
 namespace {
 
-viewer::MapLayer references(const VisualMemory& memory, viewer::PlotColour colour) {
+viewer::MapLayer draw_references(const VisualMemory& memory, viewer::PlotColour colour) {
   viewer::MapLayer layer{.label = "remembered views", .colour = colour};
   for (const ViewId view : memory.views()) {
     layer.circles.push_back(memory.info(view).pose->position());
@@ -23,34 +23,34 @@ viewer::MapLayer references(const VisualMemory& memory, viewer::PlotColour colou
 
 }  // namespace
 
-viewer::MapPlot map_of_answers(const VisualMemory& memory,
-                               const std::vector<viewer::MapLayer>& scene,
-                               const std::vector<AskedView>& asked) {
+viewer::MapPlot draw_answers(const VisualMemory& memory, const std::vector<viewer::MapLayer>& scene,
+                             const std::vector<LocalisedView>& queries) {
   viewer::MapLayer truth{.label = "true place", .colour = viewer::PlotColour::green};
   viewer::MapLayer error{.label = "from there to the answer",
                          .colour = viewer::PlotColour::vermilion};
-  for (const auto& view : asked) {
+  for (const auto& view : queries) {
     truth.crosses.push_back(view.truth.position());
     if (view.found.position) {
       error.lines.push_back({view.truth.position(), view.found.position->position()});
     }
   }
   viewer::MapPlot map{.title = "The office from above", .layers = scene};
-  for (const viewer::MapLayer& layer : {references(memory, viewer::PlotColour::blue), error, truth})
+  for (const viewer::MapLayer& layer :
+       {draw_references(memory, viewer::PlotColour::blue), error, truth})
     map.layers.push_back(layer);
   return map;
 }
 
-AreasShown map_of_areas(const VisualMemory& memory, const std::vector<viewer::MapLayer>& scene,
-                        const AskedView& asked) {
+AreasShown draw_areas(const VisualMemory& memory, const std::vector<viewer::MapLayer>& scene,
+                      const LocalisedView& query) {
   // Views within a quarter of the best dissimilarity stay candidates, as in `reproduce m04`: with
   // none the first component alone would drop the true place for noise.
   constexpr double tolerance = 0.25;
   const ReferenceAreas areas(memory);
   const auto levels =
-      localise_hierarchically(memory, areas, asked.signature, {.tolerance = tolerance});
+      localise_hierarchically(memory, areas, query.signature, {.tolerance = tolerance});
   AreasShown shown{.map = {.title = "Where the robot may be", .backdrop = scene}};
-  shown.map.backdrop.push_back(references(memory, viewer::PlotColour::light_grey));
+  shown.map.backdrop.push_back(draw_references(memory, viewer::PlotColour::light_grey));
   for (const auto& level : levels) {
     viewer::MapLayer area{.label = "where the robot may be", .colour = viewer::PlotColour::orange};
     for (const auto& candidate : level.candidates) {
@@ -58,7 +58,7 @@ AreasShown map_of_areas(const VisualMemory& memory, const std::vector<viewer::Ma
     }
     const viewer::MapLayer robot{.label = "the robot",
                                  .colour = viewer::PlotColour::vermilion,
-                                 .crosses = {asked.truth.position()}};
+                                 .crosses = {query.truth.position()}};
     shown.areas_m2.push_back(level.area_m2.value_or(std::numeric_limits<double>::quiet_NaN()));
     shown.map.frames.push_back(
         {.title = std::to_string(level.components) +
@@ -69,14 +69,14 @@ AreasShown map_of_areas(const VisualMemory& memory, const std::vector<viewer::Ma
   return shown;
 }
 
-viewer::HeatMap map_of_similarity(const VisualMemory& memory, double spacing_m,
-                                  const AskedView& asked) {
+viewer::HeatMap draw_similarity(const VisualMemory& memory, double spacing_m,
+                                const LocalisedView& query) {
   std::vector<double> dissimilarities;
   constexpr double infinity = std::numeric_limits<double>::infinity();
   Point2 low{infinity, infinity};
   Point2 high{-infinity, -infinity};
   for (const ViewId view : memory.views()) {
-    dissimilarities.push_back(dissimilarity_packed(asked.signature, memory.packed(view)));
+    dissimilarities.push_back(dissimilarity_packed(query.signature, memory.packed(view)));
     const Point2 at = memory.info(view).pose->position();
     low = {std::min(low.x_m, at.x_m), std::min(low.y_m, at.y_m)};
     high = {std::max(high.x_m, at.x_m), std::max(high.y_m, at.y_m)};
@@ -93,7 +93,7 @@ viewer::HeatMap map_of_similarity(const VisualMemory& memory, double spacing_m,
                       .rows = row_of(high.y_m) + 1,
                       .first_cell = low,
                       .spacing_m = spacing_m,
-                      .crosses = {asked.truth.position()}};
+                      .crosses = {query.truth.position()}};
   map.values.assign(static_cast<std::size_t>(map.columns) * static_cast<std::size_t>(map.rows),
                     std::numeric_limits<double>::quiet_NaN());
   const auto similarity = similarities(dissimilarities);
@@ -108,7 +108,7 @@ viewer::HeatMap map_of_similarity(const VisualMemory& memory, double spacing_m,
   return map;
 }
 
-viewer::ReportPicture picture_in_page(ImageView image, std::string caption) {
+viewer::ReportPicture embed_image(ImageView image, std::string caption) {
   return {viewer::data_url("image/jpeg", encode_jpeg(image)), std::move(caption)};
 }
 

@@ -12,31 +12,31 @@
 namespace panonav::command {
 
 /// A view that was asked for, and what the memory said.
-struct AskedView {
+struct LocalisedView {
   Pose2 truth;
   PackedSignature signature;
   Place found;
 };
 
 /// True places, and a line from each to where the memory says it is, over the layers of the scene.
-[[nodiscard]] viewer::MapPlot map_of_answers(const VisualMemory& memory,
-                                             const std::vector<viewer::MapLayer>& scene,
-                                             const std::vector<AskedView>& asked);
+[[nodiscard]] viewer::MapPlot draw_answers(const VisualMemory& memory,
+                                           const std::vector<viewer::MapLayer>& scene,
+                                           const std::vector<LocalisedView>& queries);
 
-/// Where the robot may be after each number of components [M04 figure 9].
+/// The area where the robot may be after each number of components [M04 figure 9].
 struct AreasShown {
   viewer::UnfoldingMap map;
   std::vector<double> areas_m2;  ///< of the frames
 };
-[[nodiscard]] AreasShown map_of_areas(const VisualMemory& memory,
-                                      const std::vector<viewer::MapLayer>& scene,
-                                      const AskedView& asked);
+[[nodiscard]] AreasShown draw_areas(const VisualMemory& memory,
+                                    const std::vector<viewer::MapLayer>& scene,
+                                    const LocalisedView& query);
 
-/// How similar every remembered view is to the one asked for [M04 figure 8].
-[[nodiscard]] viewer::HeatMap map_of_similarity(const VisualMemory& memory, double spacing_m,
-                                                const AskedView& asked);
+/// Draws the similarity of every remembered view to the query [M04 figure 8].
+[[nodiscard]] viewer::HeatMap draw_similarity(const VisualMemory& memory, double spacing_m,
+                                              const LocalisedView& query);
 
 /// A picture that stands in the page itself.
-[[nodiscard]] viewer::ReportPicture picture_in_page(ImageView image, std::string caption);
+[[nodiscard]] viewer::ReportPicture embed_image(ImageView image, std::string caption);
 
 }  // namespace panonav::command

@@ -68,14 +68,14 @@ PlannedRun plan(simulation::SimulatedWorld world) {
   return {std::move(world), std::move(poses), with_path};
 }
 
-simulation::SimulatedWorld world_of(const std::string& scene,
-                                    const simulation::SimulatedWorldOptions& wanted,
-                                    Executor& executor) {
-  return {scene, wanted, [](const auto&, const auto&) { return std::nullopt; }, executor};
+simulation::SimulatedWorld make_world(const std::string& scene,
+                                      const simulation::SimulatedWorldOptions& world_options,
+                                      Executor& executor) {
+  return {scene, world_options, [](const auto&, const auto&) { return std::nullopt; }, executor};
 }
 
 /// Sees the same with half as many pixels each way.
-Camera half_as_large(Camera camera) {
+Camera halve_resolution(Camera camera) {
   std::get<HyperboloidalModel>(camera.model).focal_length_px *= 0.5;
   camera.image_size = {camera.image_size.width / 2, camera.image_size.height / 2};
   camera.centre = {0.5 * camera.centre.u_px, 0.5 * camera.centre.v_px};
@@ -84,7 +84,7 @@ Camera half_as_large(Camera camera) {
   return camera;
 }
 
-std::optional<MirrorCircle> find_mirror_in(const Dataset& recording, int count) {
+std::optional<MirrorCircle> find_mirror_in_recording(const Dataset& recording, int count) {
   std::vector<Image> images;
   // Spread over the run: what stays the same in all of them is the mirror.
   for (int i = 0; i < count; ++i) {
@@ -102,8 +102,9 @@ std::optional<MirrorCircle> find_mirror_in(const Dataset& recording, int count) 
 
 /// Drives as one recording. Between them somebody carries the robot away; its odometry knows
 /// nothing of that.
-std::vector<simulation::RecordedPose> joined(std::vector<simulation::RecordedPose> walk,
-                                             const std::vector<simulation::RecordedPose>& after) {
+std::vector<simulation::RecordedPose> join_drives(
+    std::vector<simulation::RecordedPose> walk,
+    const std::vector<simulation::RecordedPose>& after) {
   const simulation::RecordedPose last = walk.back();
   for (simulation::RecordedPose next : after) {
     next.stamp_s += last.stamp_s + 1.0;
@@ -114,8 +115,8 @@ std::vector<simulation::RecordedPose> joined(std::vector<simulation::RecordedPos
 }
 
 /// Along straight lines, facing forward.
-PlannedRun drive_through(const simulation::SimulatedWorld& world, double spacing_m, int seed,
-                         const std::vector<Point2>& way_points) {
+PlannedRun plan_drive(const simulation::SimulatedWorld& world, double spacing_m, int seed,
+                      const std::vector<Point2>& way_points) {
   simulation::SimulatedWorld there = world.with({.path = simulation::RecordingPath::tour,
                                                  .heading = simulation::RecordingHeading::path,
                                                  .spacing_m = spacing_m},
@@ -129,35 +130,35 @@ PlannedRun drive_through(const simulation::SimulatedWorld& world, double spacing
 // the same turned by half and each of them the same as its neighbour.
 PlannedRun plan_remembered_ring(const simulation::SimulatedWorld& corridor, int seed) {
   constexpr double remembered_every_m = 0.35;
-  PlannedRun ring = drive_through(corridor, remembered_every_m, seed,
-                                  {{0.0, 0.0}, {12.0, 0.0}, {12.0, 8.0}, {0.0, 8.0}, {0.0, 0.4}});
+  PlannedRun ring = plan_drive(corridor, remembered_every_m, seed,
+                               {{0.0, 0.0}, {12.0, 0.0}, {12.0, 8.0}, {0.0, 8.0}, {0.0, 0.4}});
   for (const double x : {4.0, 8.0}) {
-    const auto across = drive_through(corridor, remembered_every_m, seed, {{x, 0.4}, {x, 7.6}});
-    ring.poses = joined(std::move(ring.poses), across.poses);
+    const auto across = plan_drive(corridor, remembered_every_m, seed, {{x, 0.4}, {x, 7.6}});
+    ring.poses = join_drives(std::move(ring.poses), across.poses);
   }
   return ring;
 }
 
-// A walk a hand's breadth beside the remembered line, in two parts of at most so many images: the
-// robot is carried from the end of the first to the start of the second. Also returns the last
+// Plans a walk 10 cm from the remembered line, in two parts of at most `images` images: the robot
+// is carried from the end of the first to the start of the second. Also returns the last
 // image of the first.
 std::pair<PlannedRun, std::size_t> plan_kidnapped_walk(const simulation::SimulatedWorld& corridor,
                                                        std::size_t images, int walk_seed,
                                                        int after_seed) {
   constexpr double driven_every_m = 0.25;
   PlannedRun walk =
-      drive_through(corridor, driven_every_m, walk_seed, {{4.1, 6.0}, {4.1, 7.9}, {12.0, 7.9}});
+      plan_drive(corridor, driven_every_m, walk_seed, {{4.1, 6.0}, {4.1, 7.9}, {12.0, 7.9}});
   auto after =
-      drive_through(corridor, driven_every_m, after_seed, {{7.9, 2.0}, {7.9, 0.1}, {12.0, 0.1}});
+      plan_drive(corridor, driven_every_m, after_seed, {{7.9, 2.0}, {7.9, 0.1}, {12.0, 0.1}});
   walk.poses.resize(std::min(walk.poses.size(), images));
   after.poses.resize(std::min(after.poses.size(), images));
   const std::size_t kidnapped_after = walk.poses.size() - 1;
-  walk.poses = joined(std::move(walk.poses), after.poses);
+  walk.poses = join_drives(std::move(walk.poses), after.poses);
   return {std::move(walk), kidnapped_after};
 }
 
 // Gives all runs the camera of the mirror that was found in their pictures.
-void set_found_camera(DemoRecordings& recordings, const MirrorCircle& mirror) {
+void set_calibrated_camera(DemoRecordings& recordings, const MirrorCircle& mirror) {
   // No picture shows a mirror's shape and how it is mounted; these are known of the robot.
   const Camera camera =
       camera_from_mirror(mirror, {.model = recordings.true_camera.model,
@@ -188,16 +189,17 @@ std::function<Image(const DatasetEntry&, Executor&)> make_colour_camera(
 
 }  // namespace
 
-simulation::SimulatedWorldOptions simulation_of(const DemoOptions& options, int stream) {
-  simulation::SimulatedWorldOptions wanted;
-  wanted.simulation.scene.seed = static_cast<int>(3 * (options.seed % 100000000) + stream);
-  wanted.simulation.scene.scene_seed = static_cast<int>(options.seed % 1000000000);
+simulation::SimulatedWorldOptions demo_world_options(const DemoOptions& options, int stream) {
+  simulation::SimulatedWorldOptions world_options;
+  world_options.simulation.scene.seed = static_cast<int>(3 * (options.seed % 100000000) + stream);
+  world_options.simulation.scene.scene_seed = static_cast<int>(options.seed % 1000000000);
   // One ray a pixel: unwrapping averages over pixels, and it takes a third of the time.
-  wanted.frame.rays_per_axis = 1;
-  // What automatic exposure would choose in these rooms.
-  wanted.sensor.exposure = 2.0;
-  if (options.quick) wanted.mirror = half_as_large(simulation::make_simulated_mirror_camera());
-  return wanted;
+  world_options.frame.rays_per_axis = 1;
+  // The value of automatic exposure in these rooms.
+  world_options.sensor.exposure = 2.0;
+  if (options.quick)
+    world_options.mirror = halve_resolution(simulation::make_simulated_mirror_camera());
+  return world_options;
 }
 
 void prepare_demo_folder(const fs::path& out) {
@@ -214,7 +216,7 @@ void prepare_demo_folder(const fs::path& out) {
   fs::create_directories(out, error);
   if (error) throw FileError(out.string(), "cannot be made: " + error.message());
   write_file(out / mark, std::string_view("This folder was made by panonav demo. Running it again "
-                                          "with this folder writes its files anew.\n"));
+                                          "with this folder writes its files again.\n"));
   for (const auto name : made) {
     fs::remove_all(out / name, error);
     if (error) throw FileError((out / name).string(), "cannot be removed: " + error.message());
@@ -223,27 +225,27 @@ void prepare_demo_folder(const fs::path& out) {
 
 std::optional<DemoRecordings> record_demo(const DemoOptions& options, Session& session) {
   Executor& executor = session.executor();
-  simulation::SimulatedWorldOptions grid = simulation_of(options, 0);
+  simulation::SimulatedWorldOptions grid = demo_world_options(options, 0);
   grid.recording.path = simulation::RecordingPath::grid;
   grid.recording.spacing_m = options.spacing_m();
   const simulation::RecordingOptions anywhere{.path = simulation::RecordingPath::random,
                                               .heading = simulation::RecordingHeading::random,
-                                              .poses = options.questions()};
+                                              .poses = options.query_count()};
   const auto seed_of = [&](int stream) {
-    return simulation_of(options, stream).simulation.scene.seed;
+    return demo_world_options(options, stream).simulation.scene.seed;
   };
-  const PlannedRun office = plan(world_of("office", grid, executor));
-  const PlannedRun asked = plan(office.world.with(anywhere, seed_of(1)));
+  const PlannedRun office = plan(make_world("office", grid, executor));
+  const PlannedRun queries = plan(office.world.with(anywhere, seed_of(1)));
   const PlannedRun elsewhere =
-      plan(world_of("lab", simulation_of(options, 2), executor).with(anywhere, seed_of(2)));
+      plan(make_world("lab", demo_world_options(options, 2), executor).with(anywhere, seed_of(2)));
   const simulation::SimulatedWorld corridor =
-      world_of("corridor", simulation_of(options, 5), executor);
+      make_world("corridor", demo_world_options(options, 5), executor);
   const PlannedRun ring = plan_remembered_ring(corridor, seed_of(5));
   const auto [walk, kidnapped_after] = plan_kidnapped_walk(
-      corridor, static_cast<std::size_t>(options.walk_images() / 2), seed_of(3), seed_of(4));
+      corridor, static_cast<std::size_t>(options.walk_image_count() / 2), seed_of(3), seed_of(4));
 
   Progress progress(session, "rendering",
-                    office.poses.size() + asked.poses.size() + elsewhere.poses.size() +
+                    office.poses.size() + queries.poses.size() + elsewhere.poses.size() +
                         ring.poses.size() + walk.poses.size());
   const auto record_run = [&](const PlannedRun& run, const char* name) {
     return simulation::record_dataset(
@@ -252,7 +254,7 @@ std::optional<DemoRecordings> record_demo(const DemoOptions& options, Session& s
   };
   DemoRecordings recordings;
   recordings.memory_run = record_run(office, "memory_run");
-  recordings.query_run = record_run(asked, "query_run");
+  recordings.query_run = record_run(queries, "query_run");
   recordings.elsewhere_run = record_run(elsewhere, "elsewhere_run");
   recordings.corridor_run = record_run(ring, "corridor_run");
   recordings.walk_run = record_run(walk, "walk_run");
@@ -262,10 +264,10 @@ std::optional<DemoRecordings> record_demo(const DemoOptions& options, Session& s
   recordings.true_camera = std::get<Camera>(office.world.camera());
   recordings.calibrated_on =
       static_cast<int>(std::min<std::size_t>(6, recordings.memory_run.entries.size()));
-  const auto mirror = find_mirror_in(recordings.memory_run, recordings.calibrated_on);
+  const auto mirror = find_mirror_in_recording(recordings.memory_run, recordings.calibrated_on);
   if (!mirror) return std::nullopt;
   recordings.mirror = *mirror;
-  set_found_camera(recordings, *mirror);
+  set_calibrated_camera(recordings, *mirror);
 
   recordings.office_scene = office.world.scene();
   recordings.corridor_scene = corridor.scene();

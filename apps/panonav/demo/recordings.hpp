@@ -21,16 +21,16 @@ struct DemoOptions {
   bool quick = false;
 
   [[nodiscard]] double spacing_m() const noexcept { return quick ? 0.5 : 0.25; }
-  [[nodiscard]] int questions() const noexcept { return quick ? 8 : 40; }
-  [[nodiscard]] int runs_home() const noexcept { return quick ? 3 : 12; }
+  [[nodiscard]] int query_count() const noexcept { return quick ? 8 : 40; }
+  [[nodiscard]] int homing_run_count() const noexcept { return quick ? 3 : 12; }
   /// Images of the robot that is tracked, half of them before it is kidnapped.
-  [[nodiscard]] int walk_images() const noexcept { return 60; }
-  [[nodiscard]] int missions() const noexcept { return quick ? 3 : 12; }
+  [[nodiscard]] int walk_image_count() const noexcept { return 60; }
+  [[nodiscard]] int mission_count() const noexcept { return quick ? 3 : 12; }
   [[nodiscard]] double route_m() const noexcept { return quick ? 3.0 : 10.0; }
 };
 
-/// What the demonstration works on: pictures of a simulated mirror camera with its sensor's noise,
-/// on the disk as any recording, and the camera as calibration found it in them.
+/// The data of the demonstration: images of a simulated mirror camera with sensor noise, stored as
+/// recordings, and the calibrated camera.
 struct DemoRecordings {
   Dataset memory_run;               ///< the office on a grid
   Dataset query_run;                ///< the same office at random places
@@ -45,14 +45,14 @@ struct DemoRecordings {
   std::shared_ptr<const simulation::SimulatedWorld>
       office_world;  ///< in grey, as the robot sees it
   simulation::Scene corridor_scene;
-  /// What the camera sees at an entry of the office, in colour, for people.
+  /// Renders the camera's image at an entry of the office in colour.
   std::function<Image(const DatasetEntry&, Executor&)> colour_picture;
 };
 
-/// How the demonstration's camera sees its office. `stream` tells the noise of different robots
-/// apart.
-[[nodiscard]] simulation::SimulatedWorldOptions simulation_of(const DemoOptions& options,
-                                                              int stream);
+/// Returns the options of the demonstration's camera and office. Each `stream` has noise of its
+/// own.
+[[nodiscard]] simulation::SimulatedWorldOptions demo_world_options(const DemoOptions& options,
+                                                                   int stream);
 
 /// Makes the folder, or clears away what an earlier demo made in it and nothing else. Throws
 /// FileError when it holds anything and was not made by a demo, or cannot be written.

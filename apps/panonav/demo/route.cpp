@@ -19,11 +19,11 @@ namespace {
 
 constexpr double seconds_a_look = 0.3;
 
-viewer::PicturePlot picture_of(const RoutePanorama& route) {
+viewer::PicturePlot draw_route_image(const RoutePanorama& route) {
   const auto columns = static_cast<std::size_t>(route.columns());
   viewer::PicturePlot plot{.title = "What the robot remembers of the route",
                            .x_label = "azimuth from straight ahead [degrees], left positive",
-                           .y_label = "way along the route [m]",
+                           .y_label = "distance along the route [m]",
                            .x_range = {180.0, -180.0},
                            .y_range = {0.0, route.length_m()},
                            .columns = route.columns(),
@@ -40,7 +40,7 @@ viewer::PicturePlot picture_of(const RoutePanorama& route) {
 }
 
 /// The first run, line by line.
-viewer::RunPage played_run(const lab::RouteScene& place, const RoutePanorama& panorama,
+viewer::RunPage replay_run(const lab::RouteScene& place, const RoutePanorama& panorama,
                            const lab::RouteRun& run, std::uint64_t seed, Executor& executor) {
   viewer::RunPage page("A route is repeated", run.truth.size());
   std::vector<viewer::RouteMark> marks;
@@ -51,8 +51,7 @@ viewer::RunPage played_run(const lab::RouteScene& place, const RoutePanorama& pa
     moment.truth = ReferencePose{truth.x_m, truth.y_m, truth.heading_rad};
     moment.sure = seen.has_value();
     moment.state = seen ? "on the route" : "off the route";
-    moment.values.emplace_back("beside the route",
-                               format_fixed(100.0 * run.lateral_m[i], 1) + " cm");
+    moment.values.emplace_back("lateral offset", format_fixed(100.0 * run.lateral_m[i], 1) + " cm");
     if (seen) moment.pose = seen->pose;
     moment.panorama = simulation::take_panorama(
         *place.renderer, truth, {.rows = 40, .columns = 256, .rays_per_axis = 1},
@@ -64,7 +63,7 @@ viewer::RunPage played_run(const lab::RouteScene& place, const RoutePanorama& pa
     page.add(moment);
     marks.push_back({.along_m = seen ? std::optional(seen->along_m) : std::nullopt});
   }
-  page.route(picture_of(panorama), marks);
+  page.route(draw_route_image(panorama), marks);
   return page;
 }
 
@@ -83,10 +82,10 @@ DemoRoute repeat_and_measure(const lab::RouteScene& place, const RoutePanorama& 
   });
   for (const lab::RouteRun& run : route.runs) {
     route.completed += run.has_completed() ? 1 : 0;
-    double way_m = 0.0;
+    double travelled_m = 0.0;
     for (std::size_t i = 0; i < run.truth.size(); ++i) {
-      if (i > 0) way_m += distance(run.truth[i - 1].position(), run.truth[i].position());
-      if (way_m >= 1.0) route.lateral_m.push_back(run.lateral_m[i]);
+      if (i > 0) travelled_m += distance(run.truth[i - 1].position(), run.truth[i].position());
+      if (travelled_m >= 1.0) route.lateral_m.push_back(run.lateral_m[i]);
     }
     route.position_m.insert(route.position_m.end(), run.position_m.begin(), run.position_m.end());
   }
@@ -95,12 +94,12 @@ DemoRoute repeat_and_measure(const lab::RouteScene& place, const RoutePanorama& 
 
 }  // namespace
 
-DemoRoute show_route(const simulation::Scene& office, double length_m, std::uint64_t seed,
-                     Session& session, viewer::ReportPage& page) {
+DemoRoute demonstrate_route(const simulation::Scene& office, double length_m, std::uint64_t seed,
+                            Session& session, viewer::ReportPage& page) {
   constexpr double spacing_m = 0.1;
   Executor& executor = session.executor();
   lab::RouteScene place = lab::make_route_scene(office, "office", executor);
-  // What automatic exposure would choose in these rooms.
+  // The value of automatic exposure in these rooms.
   place.camera.sensor.exposure = 2.0;
   const auto way = lab::plan_curved_route(place, length_m, spacing_m, seed);
   const RoutePanorama panorama = lab::record_route(place, way, seed, executor);
@@ -112,34 +111,33 @@ DemoRoute show_route(const simulation::Scene& office, double length_m, std::uint
   const auto median_cm = [](const std::vector<double>& values) {
     return values.empty() ? std::string("none") : format_fixed(100.0 * median(values), 1) + " cm";
   };
-  page.begin_part("A route, again and again",
+  page.begin_part("Routes",
                   {median_cm(route.lateral_m),
-                   "is how far a robot strays from a route it was shown once (median)"});
+                   "is the median distance of a robot from a route that it was shown once"});
   page.add_text(
-      "Of a route the robot remembers one line of pixels every 10 cm: its horizon, a byte a "
-      "degree. Light in the plane of the camera goes straight from place to place, so that these "
-      "lines also tell what is seen from beside the route. The robot was shown a route of " +
+      "Of a route the robot stores one line of pixels every 10 cm: its horizon, a byte a degree. "
+      "Light in the plane of the camera travels straight from place to place, so these lines also "
+      "predict what is seen to the sides of the route. The robot was shown a route of " +
       format_fixed(route.length_m, 0) +
-      " m once, then put down 0.3 m off its start and told that it stands on it, with wheels that "
-      "are wrong by 5 %; it drove the route to its end, and another robot drove it back.");
+      " m once, then put down 0.3 m away from its start as if it stood on it, with an odometry "
+      "that is wrong by 5 %; it drove the route to its end, and another robot drove it back.");
   page.add_figures({{std::to_string(route.completed) + " of " + std::to_string(route.runs.size()),
-                     "runs that reached the end of the route, and knew it"},
+                     "runs that reached the end of the route and reported so"},
                     {median_cm(route.lateral_m), "median distance from the route, from 1 m on"},
                     {median_cm(route.position_m), "median error of the position"},
                     {format_fixed(1e-3 * static_cast<double>(route.bytes), 0) + " kB",
-                     "what the route takes, before packing"}});
+                     "is the size of the route before compression"}});
   page.add_text(
-      "Below is the first of them. The striped picture is all that the robot keeps of the route: "
-      "each row is what it saw at one place, all around, straight ahead in the middle; the start "
-      "is the lowest row, the end the highest. A thing that the robot passes is a curve that "
-      "begins in the middle and runs out to a side. The mark says which row it is at by what it "
-      "sees.");
-  page.add_run(played_run(place, panorama, route.runs.front(), seed, executor));
+      "Below is the first run. The striped image is all that the robot stores of the route: each "
+      "row shows what it saw at one place, all around, straight ahead in the middle; the start is "
+      "the lowest row, the end the highest. An object that the robot passes is a curve from the "
+      "middle to one side. The mark shows the row at which the robot localises itself.");
+  page.add_run(replay_run(place, panorama, route.runs.front(), seed, executor));
   page.add_plots(
       {{map,
-        "The remembered route in black, under both drives: one there, one back. Each was "
-        "put down at a circle, 0.3 m beside the route, and comes to it by itself; where "
-        "only one colour is seen the drives lie on the route."}});
+        "The recorded route in black, below both drives: one forward, one back. Each robot "
+        "was put down at a circle, 0.3 m to the side of the route, and returns to it; where "
+        "only one colour is visible the drives coincide with the route."}});
   return route;
 }
 

@@ -20,7 +20,7 @@ struct DemoRoute {
 
 /// Records and repeats it and adds a part that plays it to the page. The same seed gives the same
 /// runs.
-DemoRoute show_route(const simulation::Scene& office, double length_m, std::uint64_t seed,
-                     Session& session, viewer::ReportPage& page);
+DemoRoute demonstrate_route(const simulation::Scene& office, double length_m, std::uint64_t seed,
+                            Session& session, viewer::ReportPage& page);
 
 }  // namespace panonav::command

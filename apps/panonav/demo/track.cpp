@@ -15,59 +15,60 @@ namespace panonav::command {
 
 namespace {
 
-bool is_right(const TrackedImage& image, double within_m) {
+bool is_correct(const TrackedImage& image, double within_m) {
   const auto error_m = position_error_m(image);
   return is_localised(image) && error_m && *error_m <= within_m;
 }
 
 /// Images of [begin, end) until the first that is right, that one included.
-std::optional<std::size_t> images_until_right(const std::vector<TrackedImage>& images,
-                                              std::size_t begin, std::size_t end, double within_m) {
+std::optional<std::size_t> count_images_until_right(const std::vector<TrackedImage>& images,
+                                                    std::size_t begin, std::size_t end,
+                                                    double within_m) {
   for (std::size_t i = begin; i < end; ++i) {
-    if (is_right(images[i], within_m)) return i - begin + 1;
+    if (is_correct(images[i], within_m)) return i - begin + 1;
   }
   return std::nullopt;
 }
 
-DemoTrack outcome_of(const std::vector<TrackedImage>& images, std::size_t kidnapped_after,
-                     double spacing_m) {
+DemoTrack summarise_outcome(const std::vector<TrackedImage>& images, std::size_t kidnapped_after,
+                            double spacing_m) {
   DemoTrack track{.images = images.size()};
-  track.until_localised = images_until_right(images, 0, kidnapped_after + 1, spacing_m);
+  track.until_localised = count_images_until_right(images, 0, kidnapped_after + 1, spacing_m);
   track.until_found_again =
-      images_until_right(images, kidnapped_after + 1, images.size(), spacing_m);
+      count_images_until_right(images, kidnapped_after + 1, images.size(), spacing_m);
   for (const TrackedImage& image : images) {
     if (!is_localised(image)) continue;
     ++track.localised;
-    track.wrong += is_right(image, spacing_m) ? 0 : 1;
+    track.wrong += is_correct(image, spacing_m) ? 0 : 1;
     track.errors_m.push_back(*position_error_m(image));
   }
   return track;
 }
 
-/// What happened at an image, for people.
+/// Describes the state at an image.
 std::string frame_title(const TrackedImage& image, std::size_t kidnapped_after, double within_m) {
-  const std::string number = "picture " + std::to_string(image.index + 1) + ": ";
+  const std::string number = "image " + std::to_string(image.index + 1) + ": ";
   if (image.index == kidnapped_after + 1) return number + "carried away";
   switch (image.estimate.state) {
     case LocalisationState::localised:
-      return number + (is_right(image, within_m) ? "it knows where it is" : "it has not noticed");
+      return number + (is_correct(image, within_m) ? "localised" : "it has not noticed");
     case LocalisationState::ambiguous:
-      return number + "it may be in several places";
+      return number + "several places are possible";
     case LocalisationState::lost:
       break;
   }
-  return number + "it does not know where it is";
+  return number + "lost";
 }
 
 /// The particles gather: few of them, so that they fit into a small picture.
-viewer::UnfoldingMap gathering_of(const std::vector<TrackedImage>& images,
-                                  const std::vector<Point2>& at_first,
-                                  std::vector<viewer::MapLayer> scene, std::size_t kidnapped_after,
-                                  double within_m) {
+viewer::UnfoldingMap draw_gathering(const std::vector<TrackedImage>& images,
+                                    const std::vector<Point2>& at_first,
+                                    std::vector<viewer::MapLayer> scene,
+                                    std::size_t kidnapped_after, double within_m) {
   viewer::UnfoldingMap map{.title = "", .backdrop = std::move(scene)};
   const viewer::MapLayer everywhere{
       .label = "where it may be", .colour = viewer::PlotColour::vermilion, .dots = at_first};
-  map.frames.push_back({.title = "before the first picture", .layers = {everywhere}});
+  map.frames.push_back({.title = "before the first image", .layers = {everywhere}});
   for (const TrackedImage& image : images) {
     viewer::MapLayer particles = everywhere;
     particles.dots = positions_of(image.particles);
@@ -85,52 +86,52 @@ void add_part(const DemoTrack& track, double spacing_m, std::size_t kidnapped_af
               viewer::ReportPage& page) {
   const std::string median_text =
       track.errors_m.empty() ? "none" : format_fixed(100.0 * median(track.errors_m), 1) + " cm";
-  page.begin_part("It tracks itself",
-                  {pictures_text(track.until_localised),
-                   "until a robot knew which of " + std::to_string(track.places_at_first) +
-                       " places it was at, several of them alike"});
+  page.begin_part("Tracking",
+                  {format_image_count(track.until_localised),
+                   "until a robot was localised in one of " +
+                       std::to_string(track.places_at_first) + " places, several of them similar"});
   page.add_text(
-      "A corridor with identical doors and eight identical junctions. The robot does not know "
-      "where it is, nor which way it faces, and it starts in one of two narrow crossings: its plan "
-      "is the same when turned by half, so that at first several places explain what it sees. "
-      "Each dot is a particle, a place where the robot may be. Its odometry, which drifts, moves "
-      "them, and each picture keeps those that explain it: they gather in a few places, and in one "
-      "once small differences have added up.");
+      "A corridor with identical doors and eight identical junctions. The robot knows neither its "
+      "position nor its heading, and it starts in one of two narrow crossings: the plan is "
+      "symmetric, so that at first several places explain what it sees. Each dot is a particle, a "
+      "possible pose of the robot. Its odometry, which drifts, moves the particles, and each image "
+      "keeps those that explain it: they gather in a few places, and in one once small differences "
+      "have added up.");
   page.add_text(
       "After " + std::to_string(kidnapped_after + 1) +
-      " pictures somebody carries the robot to the other crossing and tells it nothing. It "
-      "counts as localised when it says so and is right to " +
+      " images somebody carries the robot to the other crossing. It counts as localised when "
+      "it reports so and its error is at most " +
       format_fixed(100.0 * spacing_m, 0) + " cm.");
   page.add_figures(
-      {{std::to_string(track.places_at_first), "places possible after the first picture"},
-       {pictures_text(track.until_localised), "until it was localised"},
-       {pictures_text(track.until_found_again), "until it was found again, once kidnapped"},
-       {median_text, "median error where it says that it is localised"},
+      {{std::to_string(track.places_at_first), "places possible after the first image"},
+       {format_image_count(track.until_localised), "until it was localised"},
+       {format_image_count(track.until_found_again),
+        "until it was localised again after the kidnapping"},
+       {median_text, "median error while it reports to be localised"},
        {std::to_string(track.wrong) + " of " + std::to_string(track.localised),
-        "of these answers wrong; a kidnapped robot needs some pictures to notice"}});
+        "of these answers are wrong; a kidnapped robot needs some images to notice"}});
   page.add_run(played);
   page.add_plots(
       {{whole,
-        "The whole run. The true way in black begins anew where the robot was put down; the "
-        "estimated one in blue lies on it, but for the pictures after it was kidnapped."}});
+        "The whole run. The true path in black starts again where the robot was put down; the "
+        "estimated path in blue lies on it, except for the images after the kidnapping."}});
 }
 
 }  // namespace
 
-std::string pictures_text(const std::optional<std::size_t>& pictures) {
-  return pictures ? std::to_string(*pictures) + (*pictures == 1 ? " picture" : " pictures")
-                  : "never";
+std::string format_image_count(const std::optional<std::size_t>& pictures) {
+  return pictures ? std::to_string(*pictures) + (*pictures == 1 ? " image" : " images") : "never";
 }
 
-DemoTrack show_track(const DemoOptions& options, const DemoRecordings& recordings,
-                     const MemoryFile& file, Session& session, viewer::ReportPage& page) {
+DemoTrack demonstrate_tracking(const DemoOptions& options, const DemoRecordings& recordings,
+                               const MemoryFile& file, Session& session, viewer::ReportPage& page) {
   const Dataset& run = recordings.walk_run;
-  const OdometryNoise odometry = simulation_of(options, 0).odometry;
+  const OdometryNoise odometry = demo_world_options(options, 0).odometry;
   Tracker tracker(file, {.filter = {.seed = static_cast<int>(options.seed % 1000000000)},
                          .odometry = odometry,
                          .source = run.source});
   const VisualMemory& memory = tracker.memory();
-  const std::size_t particles_kept = particles_shown(run.entries.size());
+  const std::size_t particles_kept = count_shown_particles(run.entries.size());
   const std::vector<Point2> at_first = positions_of(
       recordings::resample_systematically(tracker.localiser().particles(), particles_kept));
   std::vector<TrackedImage> images;
@@ -144,13 +145,13 @@ DemoTrack show_track(const DemoOptions& options, const DemoRecordings& recording
           image.moment.reset();
           images.push_back(std::move(image));
         });
-  DemoTrack result = outcome_of(images, recordings.kidnapped_after, options.spacing_m());
+  DemoTrack result = summarise_outcome(images, recordings.kidnapped_after, options.spacing_m());
   result.places_at_first = images.front().estimate.modes.size();
   const std::vector<viewer::MapLayer> scene = viewer::scene_layers(recordings.corridor_scene);
   result.gathering =
-      gathering_of(images, at_first, scene, recordings.kidnapped_after, options.spacing_m());
+      draw_gathering(images, at_first, scene, recordings.kidnapped_after, options.spacing_m());
   add_part(result, options.spacing_m(), recordings.kidnapped_after, played,
-           track_map(memory, images, {scene, recordings.kidnapped_after}), page);
+           draw_track(memory, images, {scene, recordings.kidnapped_after}), page);
   return result;
 }
 

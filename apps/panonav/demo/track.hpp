@@ -28,12 +28,12 @@ struct DemoTrack {
   viewer::UnfoldingMap gathering;  ///< the particles, picture by picture
 };
 
-/// "9 pictures", or "never".
-[[nodiscard]] std::string pictures_text(const std::optional<std::size_t>& pictures);
+/// "9 images", or "never".
+[[nodiscard]] std::string format_image_count(const std::optional<std::size_t>& pictures);
 
 /// Tracks it by Monte-Carlo localisation and adds a part that plays the run to the page. The same
 /// seed gives the same run.
-DemoTrack show_track(const DemoOptions& options, const DemoRecordings& recordings,
-                     const MemoryFile& file, Session& session, viewer::ReportPage& page);
+DemoTrack demonstrate_tracking(const DemoOptions& options, const DemoRecordings& recordings,
+                               const MemoryFile& file, Session& session, viewer::ReportPage& page);
 
 }  // namespace panonav::command

@@ -17,7 +17,7 @@ namespace {
 using Springs = std::vector<std::pair<std::size_t, std::size_t>>;
 
 /// Those that hold, at most two of each view where there are many.
-Springs shown_springs(const Lattice& lattice) {
+Springs choose_springs(const Lattice& lattice) {
   constexpr std::size_t many = 1500;
   std::vector<const Lattice::Spring*> all;
   for (const Lattice::Spring& spring : lattice.springs) {
@@ -38,9 +38,9 @@ Springs shown_springs(const Lattice& lattice) {
 
 /// Each group moved, turned and scaled to where its views end; empty for those of one or two, which
 /// have no shape.
-std::vector<std::optional<Point2>> laid_over(const std::vector<Pose2>& poses,
-                                             const std::vector<std::size_t>& components,
-                                             const std::vector<std::optional<Point2>>& end) {
+std::vector<std::optional<Point2>> align_to_end(const std::vector<Pose2>& poses,
+                                                const std::vector<std::size_t>& components,
+                                                const std::vector<std::optional<Point2>>& end) {
   std::map<std::size_t, std::vector<std::size_t>> groups;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     if (end[i]) groups[components[i]].push_back(i);
@@ -65,13 +65,13 @@ std::vector<std::optional<Point2>> laid_over(const std::vector<Pose2>& poses,
 }  // namespace
 
 LatticeWatch LatticeSteps::watch() {
-  constexpr std::size_t most = 200;
+  constexpr std::size_t max_steps = 200;
   return [this](std::span<const Pose2> poses, std::span<const std::size_t> components) {
     const std::size_t number = count_++;
     if (number % every_ != 0) return;
     steps_.push_back(
         {number, {poses.begin(), poses.end()}, {components.begin(), components.end()}});
-    if (steps_.size() < most) return;
+    if (steps_.size() < max_steps) return;
     every_ *= 2;
     std::erase_if(steps_, [this](const Step& step) { return step.number % every_ != 0; });
   };
@@ -79,12 +79,12 @@ LatticeWatch LatticeSteps::watch() {
 
 viewer::UnfoldingMap LatticeSteps::unfold(const Lattice& lattice,
                                           const VisualMemory& memory) const {
-  const auto end = places_of(lattice, memory);
-  const Springs springs = shown_springs(lattice);
+  const auto end = aligned_positions(lattice, memory);
+  const Springs springs = choose_springs(lattice);
   constexpr std::size_t numbers = 600'000;
   const std::size_t each = 1 + 2 * lattice.nodes.size() + 4 * springs.size();
   const std::size_t frames = std::clamp<std::size_t>(numbers / each, 10, 100);
-  viewer::UnfoldingMap map{.title = "The arrangement as it unfolds"};
+  viewer::UnfoldingMap map{.title = "The arrangement, step by step"};
   const std::string of = " of " + std::to_string(count_);
   const auto add = [&](const std::string& title, const std::vector<std::optional<Point2>>& places,
                        const std::vector<std::size_t>& components) {
@@ -114,7 +114,7 @@ viewer::UnfoldingMap LatticeSteps::unfold(const Lattice& lattice,
   const std::size_t step = steps_.size() / frames + 1;
   for (std::size_t i = 0; i < steps_.size(); i += step) {
     add("step " + std::to_string(steps_[i].number + 1) + of,
-        laid_over(steps_[i].poses, steps_[i].components, end), steps_[i].components);
+        align_to_end(steps_[i].poses, steps_[i].components, end), steps_[i].components);
   }
   std::vector<std::size_t> components;
   for (const Lattice::Node& node : lattice.nodes) components.push_back(node.component);
@@ -126,14 +126,14 @@ void write_arrange_report(const std::filesystem::path& folder, const std::string
                           const Lattice& lattice, const VisualMemory& memory,
                           const LatticeSteps& steps) {
   viewer::ReportPage page(
-      "How do the places lie?",
+      "Arrangement of the views",
       "The " + std::to_string(lattice.nodes.size()) + " views of " + name +
-          " in no order. From their similarity alone follows which lie near each "
-          "other and in which direction, and from that how all of them lie.");
+          " in no order. Their similarity shows which views are near each other and in which "
+          "direction, and these relations give the positions of all.");
   const auto& components = lattice.components;
   std::vector<std::pair<std::string, std::string>> figures{
       {std::to_string(components.front().views) + " of " + std::to_string(lattice.nodes.size()),
-       "views in the largest group that holds together"}};
+       "views in the largest connected group"}};
   const auto comparison = compare_with_ground_truth(lattice, memory);
   if (comparison) {
     figures.emplace_back(format_fixed(comparison->rms_m, 2) + " m",
@@ -148,31 +148,29 @@ void write_arrange_report(const std::filesystem::path& folder, const std::string
   page.add_figures(figures);
   page.begin_section("Step by step");
   page.add_text(
-      "Groups grow where views are certain to belong together, and join where both agree how they "
-      "lie. Each group is drawn over where it ends, in the shape that it has at that step.");
-  page.add_plots(
-      {{steps.unfold(lattice, memory),
-        "Grey lines are springs: pairs of views that tell how far and in which direction "
-        "the other one is"}});
+      "Groups grow by views that certainly belong together, and join where both agree on their "
+      "relative position. Each group is drawn at its final position, in its shape at that step.");
+  page.add_plots({{steps.unfold(lattice, memory),
+                   "Grey lines are springs: pairs of views with known distance and direction"}});
   if (comparison) {
-    page.begin_section("Beside the true places");
+    page.begin_section("Comparison with the true positions");
     page.add_text(
-        "True places were not used; they only turn, move and scale the arrangement so that both "
-        "can be compared.");
+        "The true positions were used only to rotate, move and scale the arrangement for this "
+        "comparison.");
     std::vector<viewer::ReportPlot> plots;
-    for (viewer::MapPlot& plot : lattice_plots(lattice, memory))
+    for (viewer::MapPlot& plot : draw_lattice(lattice, memory))
       plots.push_back({std::move(plot), ""});
     plots.front().caption = "Where the views were taken";
-    plots.back().caption = "Where their similarity puts them";
+    plots.back().caption = "Positions by similarity";
     page.add_plots(plots);
   }
   page.begin_section("Groups");
   std::vector<std::vector<std::string>> rows;
   for (std::size_t i = 0; i < std::min<std::size_t>(20, components.size()); ++i) {
     rows.push_back({std::to_string(i + 1), std::to_string(components[i].views),
-                    components[i].handedness_known ? "yes" : "no: may be the mirror image"});
+                    components[i].handedness_known ? "yes" : "no: may be a mirror image"});
   }
-  page.add_table({"group", "views", "left and right told apart"}, rows);
+  page.add_table({"group", "views", "left and right distinguished"}, rows);
   if (rows.size() < components.size()) {
     page.add_text("The largest 20 of " + std::to_string(components.size()) + " groups.");
   }

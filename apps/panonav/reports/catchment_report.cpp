@@ -15,8 +15,8 @@ namespace panonav::command {
 namespace {
 
 /// Places as cells of a raster of their spacing. Places that share a cell show the last one.
-viewer::HeatMap raster(const std::vector<Pose2>& places, double spacing_m,
-                       const std::function<double(std::size_t)>& value) {
+viewer::HeatMap rasterise(const std::vector<Pose2>& places, double spacing_m,
+                          const std::function<double(std::size_t)>& value) {
   Point2 low = places.front().position();
   Point2 high = low;
   for (const Pose2& place : places) {
@@ -44,7 +44,7 @@ viewer::HeatMap raster(const std::vector<Pose2>& places, double spacing_m,
   return map;
 }
 
-std::vector<viewer::ReportPlot> curves(const CatchmentResult& result) {
+std::vector<viewer::ReportPlot> draw_curves(const CatchmentResult& result) {
   viewer::Series homeward{.label = "", .style = viewer::SeriesStyle::lines_and_points};
   viewer::Series orientation{.label = "", .style = viewer::SeriesStyle::lines_and_points};
   for (const CatchmentResult::Bin& bin : result.bins) {
@@ -78,8 +78,8 @@ std::vector<viewer::ReportPlot> curves(const CatchmentResult& result) {
            "home [S06 figure 11]"}};
 }
 
-viewer::MapPlot field(const RecordedViews& places, const std::vector<HomeVector>& vectors,
-                      const CatchmentResult& result, std::size_t goal) {
+viewer::MapPlot draw_field(const RecordedViews& places, const std::vector<HomeVector>& vectors,
+                           const CatchmentResult& result, std::size_t goal) {
   const double side_m = 0.5 * result.spacing_m;
   const double arrow_m = 0.8 * result.spacing_m;
   viewer::MapLayer inside{.label = "catchment area", .colour = viewer::PlotColour::green};
@@ -113,7 +113,7 @@ void write_catchment_report(const std::filesystem::path& folder, const RecordedV
                             const FourierHomingOptions& homing, std::size_t goal) {
   const double accepted_m = result.spacing_m;
   const auto count = static_cast<double>(result.survey.places.size());
-  auto sizes = raster(result.survey.goals, result.spacing_m, [&](std::size_t g) {
+  auto sizes = rasterise(result.survey.goals, result.spacing_m, [&](std::size_t g) {
     return 100.0 * static_cast<double>(count_catchment(result, g, accepted_m)) / count;
   });
   sizes.title = "Catchment area of the view at each place";
@@ -125,12 +125,12 @@ void write_catchment_report(const std::filesystem::path& folder, const RecordedV
     vectors.push_back(home_vector(goals.views[goal], view, homing));
     differences.push_back(image_difference(goals.views[goal], view, homing.highest));
   }
-  auto difference =
-      raster(result.survey.places, result.spacing_m, [&](std::size_t p) { return differences[p]; });
+  auto difference = rasterise(result.survey.places, result.spacing_m,
+                              [&](std::size_t p) { return differences[p]; });
   difference.title = "Difference from the view at home (cross)";
   difference.value_label = "image difference, 0 to 1";
   difference.crosses = {result.survey.goals[goal].position()};
-  auto ends = raster(result.survey.places, result.spacing_m, [&](std::size_t p) {
+  auto ends = rasterise(result.survey.places, result.spacing_m, [&](std::size_t p) {
     return static_cast<double>(result.final_m[goal * places.views.size() + p]);
   });
   ends.title = "Where runs home end, by where they start (home: cross)";
@@ -150,12 +150,12 @@ void write_catchment_report(const std::filesystem::path& folder, const RecordedV
        {format_fixed(result.areas[1], 1) + " of " + std::to_string(result.survey.places.size()),
         "places from which runs end within " + format_fixed(result.spacing_m, 2) + " m"}});
   page.begin_section("Against the distance");
-  page.add_plots(curves(result));
+  page.add_plots(draw_curves(result));
   page.begin_section("Place by place");
   page.add_plots({{sizes, "Share of all places from which runs end within " +
                               format_fixed(result.spacing_m, 2) + " m of home, home by home"}});
   page.begin_section("One home: " + goals.files[goal]);
-  page.add_plots({{field(places, vectors, result, goal),
+  page.add_plots({{draw_field(places, vectors, result, goal),
                    "Home vectors, and the catchment area [S06 figure 9]"},
                   {difference, "How far views differ from home's [S06 figure 9]"},
                   {ends, "How far from home runs end [S06 figure 14]"}});

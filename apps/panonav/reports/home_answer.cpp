@@ -16,15 +16,16 @@ std::string in_words(double direction_rad) {
          " to the " + (direction_rad > 0.0 ? "left" : "right");
 }
 
-std::string turn_in_words(double heading_rad) {
+std::string describe_rotation(double heading_rad) {
   // heading_rad is home's heading seen from here, so the robot has turned the other way.
   const double turned = wrap_angle(-heading_rad);
   if (std::abs(degrees(turned)) < 0.5) return "the robot faces as at home";
-  if (std::abs(degrees(turned)) >= 179.5) return "the robot faces the other way than at home";
+  if (std::abs(degrees(turned)) >= 179.5)
+    return "the robot faces the opposite direction than at home";
   return "the robot has turned by " + in_words(turned);
 }
 
-std::string why_none(const HomingResult& way) {
+std::string explain_no_direction(const HomingResult& way) {
   if (!way.known) return "the views match no better than chance";
   // Above it more than half of the energy of either view is found in the other.
   constexpr double alike = std::numbers::sqrt2 / 2.0;

@@ -27,9 +27,9 @@ struct HomeAnswer {
 
 /// "34 degrees to the left", "straight ahead".
 [[nodiscard]] std::string in_words(double direction_rad);
-/// How the robot faces compared with the home view.
-[[nodiscard]] std::string turn_in_words(double heading_rad);
+/// Describes the robot's rotation relative to the home view.
+[[nodiscard]] std::string describe_rotation(double heading_rad);
 /// Why there is no direction.
-[[nodiscard]] std::string why_none(const HomingResult& way);
+[[nodiscard]] std::string explain_no_direction(const HomingResult& way);
 
 }  // namespace panonav::command

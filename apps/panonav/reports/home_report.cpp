@@ -16,20 +16,20 @@ namespace panonav::command {
 namespace {
 
 /// First, last and evenly between.
-std::set<std::size_t> shown_of(std::size_t count) {
-  constexpr std::size_t most = 4;
+std::set<std::size_t> choose_shown(std::size_t count) {
+  constexpr std::size_t max_shown = 4;
   std::set<std::size_t> shown;
-  for (std::size_t i = 0; i < std::min(most, count); ++i) {
-    shown.insert(i * (count - 1) / std::max<std::size_t>(1, std::min(most, count) - 1));
+  for (std::size_t i = 0; i < std::min(max_shown, count); ++i) {
+    shown.insert(i * (count - 1) / std::max<std::size_t>(1, std::min(max_shown, count) - 1));
   }
   return shown;
 }
 
-std::string caption_of(const HomeAnswer& answer) {
+std::string make_caption(const HomeAnswer& answer) {
   const HomingResult& way = answer.way;
-  if (!way.direction_rad) return answer.file + ": no direction home, " + why_none(way);
+  if (!way.direction_rad) return answer.file + ": no direction home, " + explain_no_direction(way);
   return answer.file + ": home is " + in_words(*way.direction_rad) + ", about " +
-         format_fixed(way.distance_r, 2) + " R away; " + turn_in_words(way.vector.heading_rad);
+         format_fixed(way.distance_r, 2) + " R away; " + describe_rotation(way.vector.heading_rad);
 }
 
 /// Arrows as long as the nearest views are apart.
@@ -42,8 +42,9 @@ double arrow_length_m(const std::vector<HomeAnswer>& answers) {
 }
 
 /// Empty where nothing is known of positions.
-std::optional<viewer::MapPlot> field(const Goal& goal, const std::vector<HomeAnswer>& answers) {
-  viewer::MapLayer arrows{.label = "way home", .colour = viewer::PlotColour::blue};
+std::optional<viewer::MapPlot> draw_field(const Goal& goal,
+                                          const std::vector<HomeAnswer>& answers) {
+  viewer::MapLayer arrows{.label = "path home", .colour = viewer::PlotColour::blue};
   viewer::MapLayer silent{.label = "no direction", .colour = viewer::PlotColour::vermilion};
   const double length_m = arrow_length_m(answers);
   for (const auto& answer : answers) {
@@ -64,8 +65,9 @@ std::optional<viewer::MapPlot> field(const Goal& goal, const std::vector<HomeAns
 
 /// The view at home, turned as if the robot there faced the same way as here, above the current
 /// one.
-std::vector<viewer::ReportView> views_of(const std::optional<Panorama>& home,
-                                         const Panorama& current, const HomeAnswer& answer) {
+std::vector<viewer::ReportView> make_report_views(const std::optional<Panorama>& home,
+                                                  const Panorama& current,
+                                                  const HomeAnswer& answer) {
   const HomeVector& found = answer.way.vector;
   std::vector<viewer::ViewMark> marks{{.azimuth_rad = 0.0, .colour = viewer::PlotColour::grey}};
   if (answer.way.direction_rad) {
@@ -80,9 +82,9 @@ std::vector<viewer::ReportView> views_of(const std::optional<Panorama>& home,
   if (home) {  // the robot at home turns to the current heading
     const double columns = -found.heading_rad / (2.0 * std::numbers::pi) * home->columns();
     views.push_back({rotate_columns(*home, static_cast<int>(std::lround(columns))), marks,
-                     "At home, turned alike"});
+                     "At home, rotated to the same heading"});
   }
-  views.push_back({current, marks, caption_of(answer)});
+  views.push_back({current, marks, make_caption(answer)});
   return views;
 }
 
@@ -91,14 +93,13 @@ std::vector<viewer::ReportView> views_of(const std::optional<Panorama>& home,
 void write_home_report(const std::filesystem::path& folder, const Goal& goal,
                        const std::vector<HomeAnswer>& answers,
                        const std::function<Panorama(std::size_t)>& current) {
-  viewer::ReportPage page(
-      "The way home",
-      "From one view of a place, " + goal.name +
-          ", and what the robot sees now: which way to go, without a map and without "
-          "knowing the heading.");
+  viewer::ReportPage page("The path home",
+                          "From one view of a place, " + goal.name +
+                              ", and the robot's current view: the direction back, without a map "
+                              "and without knowing the heading.");
   const HomingResult& first = answers.front().way;
   if (answers.size() == 1 && !first.known) {
-    page.add_figures({{"no answer", why_none(first)}});
+    page.add_figures({{"no answer", explain_no_direction(first)}});
   } else if (answers.size() == 1) {
     page.add_figures(
         {{first.direction_rad ? in_words(*first.direction_rad) : "none", "direction home"},
@@ -110,19 +111,19 @@ void write_home_report(const std::filesystem::path& folder, const Goal& goal,
   }
   page.begin_section(goal.panorama ? "Both views" : "What the robot sees");
   page.add_text(
-      std::string(goal.panorama
-                      ? "Above, the view at home, turned as if the robot there faced the same way "
-                        "as here; below, what it sees now. "
-                      : "") +
-      "Forward is in the middle (grey mark). Orange: the direction home, where things spread out "
-      "on the way; blue: the opposite one, where they close up.");
-  for (const std::size_t i : shown_of(answers.size())) {
-    page.add_views(views_of(goal.panorama, current(i), answers[i]));
+      std::string(
+          goal.panorama
+              ? "Above, the view at home, rotated to the current heading; below, the current view. "
+              : "") +
+      "Forward is in the middle (grey mark). Orange: the direction home, from which the image "
+      "expands on the way; blue: the opposite direction, towards which it contracts.");
+  for (const std::size_t i : choose_shown(answers.size())) {
+    page.add_views(make_report_views(goal.panorama, current(i), answers[i]));
   }
-  if (const auto vectors = field(goal, answers)) {
+  if (const auto vectors = draw_field(goal, answers)) {
     page.begin_section("From above");
     page.add_plots(
-        {{*vectors, "The direction home at each place whose position and heading are known"}});
+        {{*vectors, "The direction home at each place with known position and heading"}});
   }
   page.begin_section("Numbers");
   std::vector<std::vector<std::string>> rows;

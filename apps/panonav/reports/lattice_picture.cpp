@@ -19,7 +19,7 @@ struct Known {
   std::vector<Point2> truth;
 };
 
-Known known_of(const Lattice& lattice, const VisualMemory& memory) {
+Known collect_known(const Lattice& lattice, const VisualMemory& memory) {
   Known known;
   for (const Lattice::Node& node : lattice.nodes) {
     const auto& pose = memory.info(node.view).pose;
@@ -31,8 +31,8 @@ Known known_of(const Lattice& lattice, const VisualMemory& memory) {
 }
 
 /// Springs that were not rejected, as lines between `positions`.
-viewer::MapLayer springs_between(const Lattice& lattice,
-                                 const std::vector<std::optional<Point2>>& positions) {
+viewer::MapLayer draw_springs(const Lattice& lattice,
+                              const std::vector<std::optional<Point2>>& positions) {
   viewer::MapLayer layer{.label = "springs", .colour = viewer::PlotColour::light_grey};
   for (const Lattice::Spring& spring : lattice.springs) {
     const auto& a = positions[spring.a];
@@ -42,20 +42,20 @@ viewer::MapLayer springs_between(const Lattice& lattice,
   return layer;
 }
 
-viewer::MapPlot plot_of(std::string title, const Lattice& lattice,
-                        const std::vector<std::optional<Point2>>& positions) {
+viewer::MapPlot draw_plot(std::string title, const Lattice& lattice,
+                          const std::vector<std::optional<Point2>>& positions) {
   viewer::MapLayer views{.label = "views"};
   for (const auto& position : positions) {
     if (position) views.circles.push_back(*position);
   }
-  return {.title = std::move(title), .layers = {springs_between(lattice, positions), views}};
+  return {.title = std::move(title), .layers = {draw_springs(lattice, positions), views}};
 }
 
 }  // namespace
 
 std::optional<LatticeComparison> compare_with_ground_truth(const Lattice& lattice,
                                                            const VisualMemory& memory) {
-  const Known known = known_of(lattice, memory);
+  const Known known = collect_known(lattice, memory);
   if (!is_comparable(known.arranged, known.truth)) return std::nullopt;
   const auto difference = shape_difference(known.arranged, known.truth);
   const auto alignment = align(known.arranged, known.truth, {.allow_scale = true});
@@ -73,12 +73,13 @@ std::optional<LatticeComparison> compare_with_ground_truth(const Lattice& lattic
 }
 
 bool is_known(const Lattice& lattice, const VisualMemory& memory) {
-  const Known known = known_of(lattice, memory);
+  const Known known = collect_known(lattice, memory);
   return is_comparable(known.arranged, known.truth);
 }
 
-std::vector<std::optional<Point2>> places_of(const Lattice& lattice, const VisualMemory& memory) {
-  const Known known = known_of(lattice, memory);
+std::vector<std::optional<Point2>> aligned_positions(const Lattice& lattice,
+                                                     const VisualMemory& memory) {
+  const Known known = collect_known(lattice, memory);
   Alignment truth_from_lattice;
   if (is_comparable(known.arranged, known.truth)) {
     truth_from_lattice =
@@ -92,9 +93,9 @@ std::vector<std::optional<Point2>> places_of(const Lattice& lattice, const Visua
   return places;
 }
 
-std::vector<viewer::MapPlot> lattice_plots(const Lattice& lattice, const VisualMemory& memory) {
+std::vector<viewer::MapPlot> draw_lattice(const Lattice& lattice, const VisualMemory& memory) {
   viewer::MapPlot map =
-      plot_of("as the views arrange themselves", lattice, places_of(lattice, memory));
+      draw_plot("as the views arrange themselves", lattice, aligned_positions(lattice, memory));
   if (!is_known(lattice, memory)) {
     if (!lattice.metric) map.unit = "median distance to the nearest view";
     return {map};
@@ -105,12 +106,12 @@ std::vector<viewer::MapPlot> lattice_plots(const Lattice& lattice, const VisualM
     const auto& pose = memory.info(node.view).pose;
     if (node.component == 0 && pose) truth.back() = pose->position();
   }
-  return {plot_of("as they were taken", lattice, truth), map};
+  return {draw_plot("as they were taken", lattice, truth), map};
 }
 
 void write_lattice_picture(const std::filesystem::path& path, const Lattice& lattice,
                            const VisualMemory& memory) {
-  const auto plots = lattice_plots(lattice, memory);
+  const auto plots = draw_lattice(lattice, memory);
   viewer::write_plot(path, plots, static_cast<int>(plots.size()));
 }
 

@@ -11,7 +11,7 @@
 
 namespace panonav::command {
 
-/// How the largest component of an arrangement compares with the positions that the memory knows.
+/// Comparison of the largest component of an arrangement with the positions that the memory knows.
 struct LatticeComparison {
   std::size_t compared = 0;               ///< views of that component with a true position
   double shape_difference = 1.0;          ///< mu [F11], 0 .. 1
@@ -25,17 +25,17 @@ struct LatticeComparison {
 [[nodiscard]] std::optional<LatticeComparison> compare_with_ground_truth(
     const Lattice& lattice, const VisualMemory& memory);
 
-/// Whether the memory knows enough positions of the largest component to compare with.
+/// True if the memory knows enough positions of the largest component for a comparison.
 [[nodiscard]] bool is_known(const Lattice& lattice, const VisualMemory& memory);
 
 /// Places of the largest component's views, laid over the positions that the memory knows; empty
 /// for other views.
-[[nodiscard]] std::vector<std::optional<Point2>> places_of(const Lattice& lattice,
-                                                           const VisualMemory& memory);
+[[nodiscard]] std::vector<std::optional<Point2>> aligned_positions(const Lattice& lattice,
+                                                                   const VisualMemory& memory);
 
 /// The largest component with its springs; where the memory knows positions, these stand before it.
-[[nodiscard]] std::vector<viewer::MapPlot> lattice_plots(const Lattice& lattice,
-                                                         const VisualMemory& memory);
+[[nodiscard]] std::vector<viewer::MapPlot> draw_lattice(const Lattice& lattice,
+                                                        const VisualMemory& memory);
 
 /// Draws the largest component with its springs; where the memory knows positions, the map is laid
 /// over them and they stand beside it. Throws what `write_plot` throws.

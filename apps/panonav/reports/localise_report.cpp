@@ -19,11 +19,11 @@ namespace {
 constexpr std::size_t max_shown = 200;
 constexpr std::size_t max_rows = 500;
 
-std::string position_text(const PositionEstimate& position) {
+std::string format_position(const PositionEstimate& position) {
   return "x " + format_fixed(position.x_m, 2) + " m, y " + format_fixed(position.y_m, 2) + " m";
 }
 
-std::string degrees_text(double angle_rad) {
+std::string format_degrees(double angle_rad) {
   return format_fixed(degrees(angle_rad), 1) + "\u00b0";
 }
 
@@ -33,29 +33,29 @@ std::optional<double> error_m(const LocalisedQuery& query) {
   return std::hypot(found.x_m - query.pose->x_m, found.y_m - query.pose->y_m);
 }
 
-std::string answer_text(const LocalisedQuery& query) {
+std::string describe_answer(const LocalisedQuery& query) {
   if (!query.error.empty()) return "cannot be read";
   const Place& place = query.place;
   if (!place.known || place.matches.empty()) return "unknown place";
   return "near " + place.matches.front().name;
 }
 
-/// What the run shows of a picture. The first one brings the references.
+/// Makes the moment of an image for the page.
 recordings::RunMoment make_moment(const LocalisedQuery& query, std::size_t number, Panorama&& seen,
                                   const MemoryFile& file) {
   recordings::RunMoment moment{.stamp_s = static_cast<double>(number), .panorama = std::move(seen)};
   moment.truth = query.pose;
   const auto& matches = query.place.matches;
   describe(moment, query.place);
-  moment.values = {{"picture", query.file}, {"answer", answer_text(query)}};
+  moment.values = {{"image", query.file}, {"answer", describe_answer(query)}};
   if (const auto& position = query.place.position) {
-    moment.values.emplace_back("position", position_text(*position));
+    moment.values.emplace_back("position", format_position(*position));
     if (position->radius_m) {
       moment.values.emplace_back("95 % within", format_fixed(*position->radius_m, 2) + " m");
     }
   }
   if (const auto& heading = query.place.heading_rad) {
-    moment.values.emplace_back("heading", degrees_text(*heading));
+    moment.values.emplace_back("heading", format_degrees(*heading));
   }
   if (matches.empty()) return moment;
   moment.values.emplace_back("probability that the place is known",
@@ -89,20 +89,20 @@ void add_table(viewer::ReportPage& page, const std::vector<LocalisedQuery>& quer
     const auto dissimilarity = [&](std::size_t match) {
       return match < matches.size() ? std::to_string(matches[match].dissimilarity) : "";
     };
-    rows.push_back({query.file, answer_text(query),
+    rows.push_back({query.file, describe_answer(query),
                     query.error.empty() ? format_fixed(query.place.known_probability, 2) : "",
-                    position ? position_text(*position) : "", heading ? degrees_text(*heading) : "",
-                    error ? format_fixed(*error, 2) : "", difference(0), difference(1),
-                    dissimilarity(0), dissimilarity(1)});
+                    position ? format_position(*position) : "",
+                    heading ? format_degrees(*heading) : "", error ? format_fixed(*error, 2) : "",
+                    difference(0), difference(1), dissimilarity(0), dissimilarity(1)});
   }
   page.add_text(
       "Difference and dissimilarity (of the signatures) are to the best match and to the next.");
-  page.add_table({"picture", "answer", "probability", "position", "heading", "error [m]",
+  page.add_table({"image", "answer", "probability", "position", "heading", "error [m]",
                   "difference", "to the next", "dissimilarity", "to the next"},
                  rows);
 }
 
-/// How many places are known and how far off the answers are, where the truth is known.
+/// Counts known places and summarises the errors of answers with a known truth.
 std::vector<std::pair<std::string, std::string>> summarise(
     const std::vector<LocalisedQuery>& queries, std::size_t readable) {
   std::vector<double> errors;
@@ -112,7 +112,7 @@ std::vector<std::pair<std::string, std::string>> summarise(
     if (const auto error = error_m(query)) errors.push_back(*error);
   }
   std::vector<std::pair<std::string, std::string>> summary{
-      {std::to_string(known) + " of " + std::to_string(readable), "pictures show a known place"}};
+      {std::to_string(known) + " of " + std::to_string(readable), "images show a known place"}};
   if (!errors.empty()) {
     summary.emplace_back(format_fixed(median(errors), 2) + " m", "median error of the position");
   }
@@ -132,27 +132,27 @@ void write_localise_report(const std::filesystem::path& folder, const MemoryFile
   for (std::size_t i = 0; i < queries.size(); ++i) {
     if (queries[i].error.empty()) readable.push_back(i);
   }
-  viewer::ReportPage page(
-      "Where was this?",
-      "What the robot saw, and the view of " + memory_name(file.path()) +
-          " that resembles it most, turned as the robot faced. Where both show the "
-          "same things in the same directions, the answer is right.");
+  viewer::ReportPage page("Localised images",
+                          "Each image, and the view of " + memory_name(file.path()) +
+                              " that is most similar, rotated to the same heading. If both show "
+                              "the same objects in the same directions, the answer is right.");
   page.add_figures(summarise(queries, readable.size()));
   page.add_text(
-      "The difference compares the picture with a view column by column, both turned alike: 0 "
-      "where they are the same. The probability that the place is known follows from how much less "
-      "the better half of the columns differs at the best match than at the tenth best and at "
-      "mirrored views, which show places that do not exist. Below one half the place is unknown.");
+      "The difference compares the image with a view column by column, at the same heading: 0 if "
+      "they are equal. The probability that the place is known is computed from how much smaller "
+      "the difference of the better half of the columns is at the best match than at the tenth "
+      "best and at mirrored views, which show places that do not exist. Below one half the place "
+      "is unknown.");
   const std::size_t shown = std::min(max_shown, readable.size());
-  page.begin_section("Picture by picture");
+  page.begin_section("Image by image");
   page.add_text(
-      "The upper view is the picture, forward in its middle. Below it stands the most similar view "
-      "of the memory, turned as the robot faced. Grey dots on the map are all views of the memory; "
-      "the large dot with its circle is the answer and where it is in 95 % of cases; the ring is "
-      "the data set's own position.");
+      "The upper view is the image, forward in its middle. Below it is the most similar view of "
+      "the memory, rotated to the same heading. Grey dots on the map are the views of the memory; "
+      "the large dot is the answer, its circle contains the true position in 95 % of cases; the "
+      "ring is the position of the data set.");
   if (shown < readable.size()) {
     page.add_text("Shown are " + std::to_string(shown) + " of " + std::to_string(readable.size()) +
-                  " pictures, evenly spread.");
+                  " images, evenly spread.");
   }
   viewer::RunPage run("", shown);
   run.unordered();
@@ -164,8 +164,7 @@ void write_localise_report(const std::filesystem::path& folder, const MemoryFile
     if (n == 0) moment.references = recordings::reference_positions(recogniser.memory());
     run.add(moment);
   }
-  if (!thumbnails)
-    page.add_text("The memory holds no thumbnail of the best match of some pictures.");
+  if (!thumbnails) page.add_text("The memory holds no thumbnail of the best match of some images.");
   if (recordings::reference_positions(recogniser.memory()).empty()) {
     page.add_text("The memory knows no positions, so there is no map.");
   }

@@ -26,7 +26,7 @@ struct Nodes {
   std::unordered_map<ViewId, std::size_t> number;
 };
 
-Nodes nodes_of(const Dataset& recording, const Mapper::Result& run) {
+Nodes collect_nodes(const Dataset& recording, const Mapper::Result& run) {
   Nodes nodes;
   const std::size_t component = find_largest_component(run.map);
   for (std::size_t i = 0; i < run.map.nodes.size(); ++i) {
@@ -43,7 +43,7 @@ Nodes nodes_of(const Dataset& recording, const Mapper::Result& run) {
   return nodes;
 }
 
-std::vector<Point2> moved(const std::vector<Point2>& points, const Alignment& alignment) {
+std::vector<Point2> apply_alignment(const std::vector<Point2>& points, const Alignment& alignment) {
   std::vector<Point2> result;
   for (const Point2& p : points) result.push_back(alignment.apply(p));
   return result;
@@ -53,7 +53,7 @@ std::vector<Point2> moved(const std::vector<Point2>& points, const Alignment& al
 
 std::optional<MapComparison> compare_with_ground_truth(const Dataset& recording,
                                                        const Mapper::Result& run) {
-  const Nodes nodes = nodes_of(recording, run);
+  const Nodes nodes = collect_nodes(recording, run);
   if (!is_comparable(nodes.map, nodes.truth)) return std::nullopt;
   MapComparison comparison;
   comparison.compared = nodes.map.size();
@@ -83,19 +83,20 @@ std::optional<MapComparison> compare_with_ground_truth(const Dataset& recording,
   return comparison;
 }
 
-viewer::MapPlot map_plot(const Dataset& recording, const Mapper::Result& run) {
-  const Nodes nodes = nodes_of(recording, run);
+viewer::MapPlot draw_map(const Dataset& recording, const Mapper::Result& run) {
+  const Nodes nodes = collect_nodes(recording, run);
   viewer::MapPlot plot{.title = "map", .layers = {}};
   std::vector<Point2> map = nodes.map;
   if (is_comparable(nodes.map, nodes.truth)) {
-    map = moved(nodes.map, align(nodes.map, nodes.truth, {.allow_scale = !run.wheels}));
-    plot.title = "map beside the ground truth";
+    map = apply_alignment(nodes.map, align(nodes.map, nodes.truth, {.allow_scale = !run.wheels}));
+    plot.title = "map and ground truth";
     plot.layers.push_back(
         {.label = "ground truth", .colour = viewer::PlotColour::black, .lines = {nodes.truth}});
     if (is_comparable(nodes.odometry, nodes.truth)) {
-      plot.layers.push_back({.label = "wheels",
-                             .colour = viewer::PlotColour::vermilion,
-                             .lines = {moved(nodes.odometry, align(nodes.odometry, nodes.truth))}});
+      plot.layers.push_back(
+          {.label = "wheels",
+           .colour = viewer::PlotColour::vermilion,
+           .lines = {apply_alignment(nodes.odometry, align(nodes.odometry, nodes.truth))}});
     }
   }
   viewer::MapLayer closures{.label = "closures", .colour = viewer::PlotColour::green};
@@ -115,7 +116,7 @@ viewer::MapPlot map_plot(const Dataset& recording, const Mapper::Result& run) {
 
 void write_map_picture(const std::filesystem::path& path, const Dataset& recording,
                        const Mapper::Result& run) {
-  viewer::write_plot(path, map_plot(recording, run));
+  viewer::write_plot(path, draw_map(recording, run));
 }
 
 void write_map_report(const std::filesystem::path& folder, const std::string& name,
@@ -124,8 +125,8 @@ void write_map_report(const std::filesystem::path& folder, const std::string& na
   viewer::ReportPage page(
       "The map of " + name,
       "A robot took " + std::to_string(recording.entries.size()) +
-          " pictures on its way. Each is placed by what it shows of the step from the "
-          "one before; where the robot passed a place again, the loop is closed.");
+          " images on its path. Each is placed by the step since the one before, which is read "
+          "from the images; where the robot passed a place again, the loop is closed.");
   const auto closures = std::ranges::count(run.map.edges, LinkKind::closure, &MapEdge::kind);
   std::vector<std::pair<std::string, std::string>> figures{
       {std::to_string(run.map.nodes.size()), "places"},
@@ -138,27 +139,27 @@ void write_map_report(const std::filesystem::path& folder, const std::string& na
   const auto comparison = compare_with_ground_truth(recording, run);
   if (comparison) {
     figures.emplace_back(format_fixed(comparison->rms_m, 2) + " m",
-                         "from the true way, root mean square, after the best alignment" +
+                         "from the true path, root mean square, after the best alignment" +
                              std::string(run.wheels ? "" : " with a free scale"));
     figures.emplace_back(format_fixed(comparison->shape_difference, 4),
                          "Procrustes disparity (shape difference): 0 the same shape, 1 none");
     if (comparison->odometry_shape_difference) {
       figures.emplace_back(format_fixed(*comparison->odometry_shape_difference, 4),
-                           "the same of the wheels alone");
+                           "the same of the odometry alone");
     }
   }
   page.add_figures(figures);
-  page.begin_section("The drive, picture by picture");
+  page.begin_section("The drive, image by image");
   page.add_text(
-      "Grey dots are the places of the map, lines its edges. The large dot is where the map puts "
-      "the picture; pictures between places are not in the map.");
+      "Grey dots are the places of the map, lines its edges. The large dot is the image's position "
+      "in the map; images between places are not in the map.");
   page.add_run(played);
   page.begin_section("The whole map");
   page.add_plots(
-      {{map_plot(recording, run),
-        comparison ? "The map, turned and moved over the true way: only for the comparison, "
-                     "true positions were not used"
-                   : "The places in the order of the pictures, and the closures"}});
+      {{draw_map(recording, run),
+        comparison ? "The map, rotated and moved onto the true path; true positions were "
+                     "used for this only"
+                   : "The places in the order of the images, and the closures"}});
   page.write(folder, "index.html", "panonav map");
 }
 

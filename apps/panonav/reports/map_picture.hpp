@@ -13,12 +13,12 @@ namespace panonav::command {
 
 /// The largest component of the map with its closures; where the recording knows positions, the map
 /// is laid over them, and so is the odometry of its wheels.
-[[nodiscard]] viewer::MapPlot map_plot(const Dataset& recording, const Mapper::Result& run);
+[[nodiscard]] viewer::MapPlot draw_map(const Dataset& recording, const Mapper::Result& run);
 /// The same as a PNG or SVG file. Throws what `write_plot` throws.
 void write_map_picture(const std::filesystem::path& path, const Dataset& recording,
                        const Mapper::Result& run);
 
-/// How the map compares with the positions that the recording knows.
+/// Comparison of a map with the positions that the recording knows.
 struct MapComparison {
   std::size_t compared = 0;       ///< nodes of the largest component with a true position
   double shape_difference = 0.0;  ///< mu [F11], 0 .. 1
@@ -28,7 +28,7 @@ struct MapComparison {
   std::optional<double> continuity;
   std::size_t right_closures = 0;  ///< views at most 1 m apart
   std::size_t wrong_closures = 0;
-  /// Of the wheels alone, over the same nodes; empty where the recording has no odometry.
+  /// The same for odometry alone, over the same nodes; nullopt if the recording has none.
   std::optional<double> odometry_shape_difference;
 };
 /// Empty where fewer than three nodes have a position, or all are at one place.

@@ -9,7 +9,7 @@
 
 namespace panonav::command {
 
-/// What the page of a mission tells beside its run.
+/// The content of a mission's page besides its run.
 struct MissionReport {
   std::string goal;    ///< name of its view
   std::string reason;  ///< why it ended, in words

@@ -48,9 +48,9 @@ std::vector<Point2> arrow(const Pose2& from, double length_m) {
           at(tip, from.heading_rad - barb_rad, 0.3 * length_m)};
 }
 
-void tell_report(const std::filesystem::path& folder, Session& session) {
+void print_report_path(const std::filesystem::path& folder, Session& session) {
   if (session.json()) return;
-  session.print("Open " + session.strong((folder / "index.html").string()) + " in a browser.");
+  session.print("Open " + session.bold((folder / "index.html").string()) + " in a browser.");
 }
 
 }  // namespace panonav::command

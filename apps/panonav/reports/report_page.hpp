@@ -20,6 +20,6 @@ void prepare_report_folder(const std::filesystem::path& folder, std::string_view
 [[nodiscard]] std::vector<Point2> arrow(const Pose2& from, double length_m);
 
 /// Tells people to open the report in `folder`; says nothing to machines.
-void tell_report(const std::filesystem::path& folder, Session& session);
+void print_report_path(const std::filesystem::path& folder, Session& session);
 
 }  // namespace panonav::command

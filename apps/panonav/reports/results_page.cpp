@@ -53,7 +53,7 @@ void write_paper_page(const std::filesystem::path& folder, const ReproducedPaper
       {.version = {}, .command = {}, .papers = {{std::string(paper.name), {}, reproduction.rows}}});
   page.begin_section("Published and measured");
   add_tables(page, reproduction.rows);
-  page.begin_section("Pictures");
+  page.begin_section("Images");
   std::vector<viewer::ReportPicture> pictures;
   for (const auto& picture : reproduction.pictures) {
     pictures.push_back({picture.file.string(), picture.caption});
@@ -72,7 +72,7 @@ void write_results_page(const std::filesystem::path& folder, const lab::ResultsD
   add_misses(page, document);
   for (const lab::PaperResults& paper : document.papers) {
     page.begin_section(paper.title);
-    page.add_link(paper.paper + "/index.html", "Its own page, with pictures");
+    page.add_link(paper.paper + "/index.html", "Its own page, with images");
     add_tables(page, paper.rows);
   }
   page.write(folder);

@@ -19,72 +19,72 @@ namespace {
 
 /// Columns of a line as a person sees them: clockwise, forward in the middle. `to` is the first of
 /// `columns` values.
-void put_line(std::span<const float> line, float* to) {
+void copy_line_clockwise(std::span<const float> line, float* to) {
   const std::size_t columns = line.size();
   for (std::size_t i = 0; i < columns; ++i) {
     to[i] = line[(2 * columns + columns / 2 - i) % columns];
   }
 }
 
-viewer::MapLayer path_layer(std::span<const Pose2> path) {
-  viewer::MapLayer layer{.label = "remembered route", .colour = viewer::PlotColour::grey};
+viewer::MapLayer draw_path_layer(std::span<const Pose2> path) {
+  viewer::MapLayer layer{.label = "recorded route", .colour = viewer::PlotColour::grey};
   layer.lines.push_back(positions_of(path));
   return layer;
 }
 
 /// Lines at equal steps of way from the bottom to the top.
-viewer::PicturePlot plot_of_panorama(const RoutePanorama& route) {
+viewer::PicturePlot draw_panorama(const RoutePanorama& route) {
   constexpr int max_rows = 400;
   const double length_m = route.length_m();
   const int rows = std::clamp(static_cast<int>(route.size()), 1, max_rows);
   const auto columns = static_cast<std::size_t>(route.columns());
-  viewer::PicturePlot plot{
-      .title = "What the route looks like: each row is the horizon at one place",
-      .x_label = "azimuth from straight ahead [degrees], left positive",
-      .y_label = "way along the route [m]",
-      .x_range = {180.0, -180.0},
-      .y_range = {0.0, std::max(length_m, 1e-3)},
-      .columns = route.columns(),
-      .rows = rows,
-      .x_tick = 45.0};
+  viewer::PicturePlot plot{.title = "The route panorama: each row is the horizon at one place",
+                           .x_label = "azimuth from straight ahead [degrees], left positive",
+                           .y_label = "distance along the route [m]",
+                           .x_range = {180.0, -180.0},
+                           .y_range = {0.0, std::max(length_m, 1e-3)},
+                           .columns = route.columns(),
+                           .rows = rows,
+                           .x_tick = 45.0};
   plot.values.resize(columns * static_cast<std::size_t>(rows));
-  double way_m = 0.0;
+  double travelled_m = 0.0;
   std::size_t line = 0;
   std::vector<float> grey(columns);
   for (int row = 0; row < rows; ++row) {
-    const double wanted_m = length_m * (row + 0.5) / rows;
+    const double middle_m = length_m * (row + 0.5) / rows;
     // The line nearest to the middle of the row.
     while (line + 1 < route.size()) {
       const double step_m =
           distance(route.poses()[line].position(), route.poses()[line + 1].position());
-      if (way_m + 0.5 * step_m > wanted_m) break;
-      way_m += step_m;
+      if (travelled_m + 0.5 * step_m > middle_m) break;
+      travelled_m += step_m;
       ++line;
     }
     const auto bytes = route.line(line);
     for (std::size_t c = 0; c < columns; ++c) grey[c] = static_cast<float>(bytes[c]) / 255.0F;
-    put_line(grey, plot.values.data() + static_cast<std::size_t>(row) * columns);
+    copy_line_clockwise(grey, plot.values.data() + static_cast<std::size_t>(row) * columns);
   }
   return plot;
 }
 
 /// Pictures spread evenly over those on the route.
-std::vector<std::size_t> spread(const std::vector<FollowedImage>& images, std::size_t most) {
+std::vector<std::size_t> choose_evenly(const std::vector<FollowedImage>& images,
+                                       std::size_t max_count) {
   std::vector<std::size_t> on_route;
   for (std::size_t i = 0; i < images.size(); ++i) {
     if (images[i].fix) on_route.push_back(i);
   }
-  if (on_route.size() <= most) return on_route;
+  if (on_route.size() <= max_count) return on_route;
   std::vector<std::size_t> chosen;
-  for (std::size_t k = 0; k < most; ++k) {
-    chosen.push_back(on_route[k * (on_route.size() - 1) / (most - 1)]);
+  for (std::size_t k = 0; k < max_count; ++k) {
+    chosen.push_back(on_route[k * (on_route.size() - 1) / (max_count - 1)]);
   }
   return chosen;
 }
 
 /// For each chosen picture two bands: seen above, shown by the route below.
-viewer::PicturePlot plot_of_lines(const RouteLines& route, const std::vector<FollowedImage>& images,
-                                  const std::vector<std::size_t>& chosen) {
+viewer::PicturePlot draw_lines(const RouteLines& route, const std::vector<FollowedImage>& images,
+                               const std::vector<std::size_t>& chosen) {
   constexpr int band = 3;
   constexpr int gap = 1;
   constexpr int rows_of_pair = 2 * band + gap;
@@ -93,7 +93,7 @@ viewer::PicturePlot plot_of_lines(const RouteLines& route, const std::vector<Fol
   viewer::PicturePlot plot{
       .title = "Seen (upper band) and shown by the route from there (lower band)",
       .x_label = "azimuth from straight ahead [degrees], left positive",
-      .y_label = "picture, the last one on top",
+      .y_label = "image, the last one on top",
       .x_range = {180.0, -180.0},
       .y_range = {0.0, static_cast<double>(chosen.size())},
       .columns = route.columns(),
@@ -107,14 +107,14 @@ viewer::PicturePlot plot_of_lines(const RouteLines& route, const std::vector<Fol
     const auto shown = route.synthesise(image.fix->pose);
     for (int row = 0; row < 2 * band; ++row) {
       const auto& line = row < band ? shown : image.line;
-      put_line(line,
-               plot.values.data() + (k * rows_of_pair + static_cast<std::size_t>(row)) * columns);
+      copy_line_clockwise(
+          line, plot.values.data() + (k * rows_of_pair + static_cast<std::size_t>(row)) * columns);
     }
   }
   return plot;
 }
 
-viewer::MapPlot plot_of_path(const RouteLines& route, const std::vector<FollowedImage>& images) {
+viewer::MapPlot draw_path(const RouteLines& route, const std::vector<FollowedImage>& images) {
   viewer::MapLayer truth{.label = "ground truth", .colour = viewer::PlotColour::black};
   viewer::MapLayer fixes{.label = "fixes", .colour = viewer::PlotColour::blue};
   viewer::MapLayer changed{.label = "something changed in view",
@@ -131,10 +131,11 @@ viewer::MapPlot plot_of_path(const RouteLines& route, const std::vector<Followed
     if (!image.fix && image.truth) off.crosses.push_back(image.truth->position());
   }
   if (true_path.size() > 1) truth.lines.push_back(std::move(true_path));
-  return {.title = "From above", .layers = {path_layer(route.poses()), truth, changed, fixes, off}};
+  return {.title = "From above",
+          .layers = {draw_path_layer(route.poses()), truth, changed, fixes, off}};
 }
 
-viewer::LinePlot plot_of_errors(const std::vector<FollowedImage>& images) {
+viewer::LinePlot draw_errors(const std::vector<FollowedImage>& images) {
   viewer::Series position{.label = "position [cm]", .style = viewer::SeriesStyle::points};
   viewer::Series along{.label = "along the route [cm]", .style = viewer::SeriesStyle::points};
   viewer::Series lost{.label = "not on this route", .style = viewer::SeriesStyle::points};
@@ -149,25 +150,25 @@ viewer::LinePlot plot_of_errors(const std::vector<FollowedImage>& images) {
     }
   }
   return {.title = "How far off",
-          .x_label = "picture",
+          .x_label = "image",
           .y_label = "error [cm]",
           .series = {position, along, lost}};
 }
 
-viewer::LinePlot plot_of_correlations(const std::vector<FollowedImage>& images) {
+viewer::LinePlot draw_correlations(const std::vector<FollowedImage>& images) {
   viewer::Series correlation{.label = "of seen and shown line",
                              .style = viewer::SeriesStyle::lines_and_points};
   for (std::size_t i = 0; i < images.size(); ++i) {
     if (!images[i].fix) continue;
     correlation.add(static_cast<double>(i + 1), images[i].fix->correlation);
   }
-  return {.title = "How well the route explains the pictures",
-          .x_label = "picture",
+  return {.title = "How well the route explains the images",
+          .x_label = "image",
           .y_label = "correlation",
           .series = {correlation}};
 }
 
-std::vector<viewer::RouteMark> marks_of(const std::vector<FollowedImage>& images) {
+std::vector<viewer::RouteMark> make_marks(const std::vector<FollowedImage>& images) {
   std::vector<viewer::RouteMark> marks;
   for (const FollowedImage& image : images) {
     viewer::RouteMark& mark = marks.emplace_back();
@@ -191,13 +192,13 @@ void add_figure(std::vector<std::pair<std::string, std::string>>& figures,
 
 void write_record_report(const std::filesystem::path& folder, const std::string& name,
                          const RoutePanorama& route, double bytes_per_km) {
-  viewer::MapLayer path = path_layer(route.poses());
+  viewer::MapLayer path = draw_path_layer(route.poses());
   viewer::MapLayer start{.label = "start", .colour = viewer::PlotColour::green};
   start.squares.push_back(route.poses().front().position());
   viewer::ReportPage page(
       "Route '" + name + "'",
-      "A robot drove this way once. From each place it keeps one line of pixels, what its camera "
-      "sees at its own height, and that is all it needs to follow the way again.");
+      "A robot drove this route once. For each place it stores one line of pixels, what its camera "
+      "sees at its own height; this is all it needs to follow the route again.");
   page.add_figures(
       {{format_fixed(route.length_m(), 1) + " m", "long"},
        {std::to_string(route.size()), "lines of " + std::to_string(route.columns()) + " pixels"},
@@ -205,10 +206,10 @@ void write_record_report(const std::filesystem::path& folder, const std::string&
   page.begin_section("The route panorama");
   page.add_text(
       "Each row is one place, the start at the bottom, the end on top; from left to right all "
-      "around the robot, straight ahead in the middle. Things beside the way go from the middle "
-      "outwards as the robot passes them, the slower the farther they are.");
-  page.add_plots({{plot_of_panorama(route), "Omnidirectional route panorama"}});
-  page.begin_section("The way");
+      "around the robot, straight ahead in the middle. Objects move from the middle outwards as "
+      "the robot passes them, the slower the farther they are.");
+  page.add_plots({{draw_panorama(route), "Omnidirectional route panorama"}});
+  page.begin_section("Route");
   page.add_plots({{viewer::MapPlot{.title = "From above", .layers = {path, start}},
                    "Where the lines were taken"}});
   page.write(folder, "index.html", "panonav route record");
@@ -217,49 +218,49 @@ void write_record_report(const std::filesystem::path& folder, const std::string&
 void write_follow_report(const std::filesystem::path& folder, const FollowedRoute& route,
                          const std::vector<FollowedImage>& images, const FollowSummary& summary,
                          viewer::RunPage played) {
-  const auto chosen = spread(images, 8);
+  const auto chosen = choose_evenly(images, 8);
   std::vector<std::pair<std::string, std::string>> figures{
       {std::to_string(summary.on_route) + " of " + std::to_string(summary.images),
-       "pictures on the route"}};
+       "images on the route"}};
   add_figure(figures, summary.position_m, 100.0, 1, " cm", "median error of position");
   add_figure(figures, summary.along_m, 100.0, 1, " cm", "median error along the route");
   add_figure(figures, summary.heading_rad, degrees(1.0), 2, " degrees", "median error of heading");
   viewer::ReportPage page(
       "Following route '" + route.name + "'",
-      "A robot that drives the way again, or beside it, looks for the pose from which "
-      "the remembered lines show what it sees.");
+      "A robot that drives the route again, or at some distance from it, searches for the pose at "
+      "which the recorded lines predict what it sees.");
   page.add_figures(figures);
-  played.route(plot_of_panorama(route.panorama), marks_of(images));
-  page.begin_section("The run, picture by picture");
+  played.route(draw_panorama(route.panorama), make_marks(images));
+  page.begin_section("The run, image by image");
   page.add_text(
-      "On the map, the remembered route and where the robot is beside it. Below, the route "
-      "panorama: each row is the horizon at one place of the route, the start at the bottom, "
-      "straight ahead in the middle. The line across it is the row that the robot is at; orange "
-      "marks are directions in which something is not as remembered.");
+      "On the map, the recorded route and the robot's position. Below, the route panorama: each "
+      "row is the horizon at one place of the route, the start at the bottom, straight ahead in "
+      "the middle. The line across it is the robot's row; orange marks are directions in which the "
+      "scene has changed.");
   page.add_run(played);
-  page.begin_section("The way");
-  page.add_plots({{plot_of_path(route.lines, images),
-                   "Remembered route, fixes, and the true path where it is known"}});
+  page.begin_section("Route");
+  page.add_plots({{draw_path(route.lines, images),
+                   "Recorded route, fixes, and the true path where it is known"}});
   if (!chosen.empty()) {
     page.begin_section("Seen and shown");
     page.add_text(
-        "For some pictures, spread over the run, what the robot saw (upper band of each pair) and "
-        "what the route shows from where it believes to be (lower band), put together from the "
-        "lines of many places. Light blue: in this direction the route shows nothing.");
+        "For some images of the run, what the robot saw (upper band of each pair) and what the "
+        "route predicts at its estimated pose (lower band), composed of the lines of many places. "
+        "Light blue: the route has no data in this direction.");
     page.add_plots(
-        {{plot_of_lines(route.lines, images, chosen), "Lines seen, and lines made from the route"},
-         {plot_of_correlations(images), "Correlation of the two, picture by picture"}});
+        {{draw_lines(route.lines, images, chosen), "Lines seen, and lines made from the route"},
+         {draw_correlations(images), "Correlation of the two, image by image"}});
   }
   if (!summary.position_m.empty()) {
     page.begin_section("Errors");
-    page.add_plots({{plot_of_errors(images), "Distance of each fix from the data set's own pose"}});
+    page.add_plots({{draw_errors(images), "Distance of each fix from the data set's own pose"}});
   }
   const auto stretches = changed_stretches(images);
   if (!stretches.empty()) {
     page.begin_section("Changed here");
     page.add_text(
-        "Along these stretches some directions stay unexplained picture after picture: the "
-        "scene is not as it was.");
+        "Along these stretches the route does not explain some directions in consecutive images: "
+        "the scene has changed.");
     std::vector<std::vector<std::string>> rows;
     for (const auto& [from_m, to_m] : stretches) {
       rows.push_back({format_fixed(from_m, 2) + " m", format_fixed(to_m, 2) + " m"});

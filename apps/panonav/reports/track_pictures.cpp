@@ -9,7 +9,7 @@ namespace {
 
 using Lines = std::vector<std::vector<Point2>>;
 
-viewer::MapLayer references(const VisualMemory& memory) {
+viewer::MapLayer draw_references(const VisualMemory& memory) {
   viewer::MapLayer layer{.label = "remembered views", .colour = viewer::PlotColour::grey};
   for (const ViewId view : memory.views()) {
     if (const auto& pose = memory.info(view).pose) layer.circles.push_back(pose->position());
@@ -18,45 +18,45 @@ viewer::MapLayer references(const VisualMemory& memory) {
 }
 
 /// One line for each stretch of images that hold a position and follow each other.
-Lines lines_of(const std::vector<std::optional<Point2>>& positions,
-               const std::optional<std::size_t>& kidnapped_after) {
+Lines split_lines(const std::vector<std::optional<Point2>>& positions,
+                  const std::optional<std::size_t>& kidnapped_after) {
   Lines lines;
-  bool going_on = false;
+  bool is_continued = false;
   for (std::size_t i = 0; i < positions.size(); ++i) {
-    if (positions[i] && !going_on) lines.emplace_back();
+    if (positions[i] && !is_continued) lines.emplace_back();
     if (positions[i]) lines.back().push_back(*positions[i]);
-    going_on = positions[i] && kidnapped_after != i;
+    is_continued = positions[i] && kidnapped_after != i;
   }
   std::erase_if(lines, [](const auto& line) { return line.size() < 2; });
   return lines;
 }
 
-viewer::MapLayer true_path(const std::vector<TrackedImage>& images,
-                           const TrackBackground& background) {
+viewer::MapLayer draw_true_path(const std::vector<TrackedImage>& images,
+                                const TrackBackground& background) {
   std::vector<std::optional<Point2>> positions(images.size());
   for (std::size_t i = 0; i < images.size(); ++i) {
     if (images[i].truth) positions[i] = images[i].truth->position();
   }
   return {.label = "ground truth",
           .colour = viewer::PlotColour::black,
-          .lines = lines_of(positions, background.kidnapped_after)};
+          .lines = split_lines(positions, background.kidnapped_after)};
 }
 
-viewer::MapLayer estimated_path(const std::vector<TrackedImage>& images,
-                                const TrackBackground& background) {
+viewer::MapLayer draw_estimated_path(const std::vector<TrackedImage>& images,
+                                     const TrackBackground& background) {
   std::vector<std::optional<Point2>> positions(images.size());
   for (std::size_t i = 0; i < images.size(); ++i) {
     if (is_localised(images[i])) positions[i] = images[i].estimate.pose->position();
   }
   return {.label = "estimated path",
           .colour = viewer::PlotColour::blue,
-          .lines = lines_of(positions, background.kidnapped_after)};
+          .lines = split_lines(positions, background.kidnapped_after)};
 }
 
 }  // namespace
 
-viewer::MapPlot track_map(const VisualMemory& memory, const std::vector<TrackedImage>& images,
-                          const TrackBackground& background) {
+viewer::MapPlot draw_track(const VisualMemory& memory, const std::vector<TrackedImage>& images,
+                           const TrackBackground& background) {
   viewer::MapLayer localised{.label = "localised here", .colour = viewer::PlotColour::blue};
   viewer::MapLayer guessed{.label = "ambiguous: likeliest place",
                            .colour = viewer::PlotColour::orange};
@@ -78,9 +78,9 @@ viewer::MapPlot track_map(const VisualMemory& memory, const std::vector<TrackedI
     }
   }
   viewer::MapPlot plot{.title = "The whole run from above", .layers = background.surroundings};
-  for (viewer::MapLayer& layer : std::vector{references(memory), true_path(images, background),
-                                             estimated_path(images, background), localised, guessed,
-                                             lost, start, kidnapped}) {
+  for (viewer::MapLayer& layer : std::vector{
+           draw_references(memory), draw_true_path(images, background),
+           draw_estimated_path(images, background), localised, guessed, lost, start, kidnapped}) {
     plot.layers.push_back(std::move(layer));
   }
   return plot;

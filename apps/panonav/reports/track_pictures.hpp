@@ -10,7 +10,7 @@
 
 namespace panonav::command {
 
-/// What is drawn below a tracked run.
+/// The background of a drawing of a tracked run.
 struct TrackBackground {
   std::vector<viewer::MapLayer> surroundings;
   /// The last image before the robot was kidnapped; empty: it was not.
@@ -18,8 +18,8 @@ struct TrackBackground {
 };
 
 /// True and estimated path of a run from above, and what the filter said of each image.
-[[nodiscard]] viewer::MapPlot track_map(const VisualMemory& memory,
-                                        const std::vector<TrackedImage>& images,
-                                        const TrackBackground& background);
+[[nodiscard]] viewer::MapPlot draw_track(const VisualMemory& memory,
+                                         const std::vector<TrackedImage>& images,
+                                         const TrackBackground& background);
 
 }  // namespace panonav::command

@@ -17,7 +17,7 @@ namespace panonav::command {
 
 namespace {
 
-viewer::LinePlot plot_of_errors(const std::vector<TrackedImage>& images, double spacing_m) {
+viewer::LinePlot draw_errors(const std::vector<TrackedImage>& images, double spacing_m) {
   viewer::Series localised{.label = "error, localised", .style = viewer::SeriesStyle::points};
   viewer::Series guessed{.label = "error, ambiguous", .style = viewer::SeriesStyle::points};
   viewer::Series spread{.label = "spread of particles", .style = viewer::SeriesStyle::lines};
@@ -43,9 +43,9 @@ viewer::LinePlot plot_of_errors(const std::vector<TrackedImage>& images, double 
                           .log_y = true};
 }
 
-viewer::LinePlot plot_of_particles(const std::vector<TrackedImage>& images) {
+viewer::LinePlot draw_particles(const std::vector<TrackedImage>& images) {
   viewer::Series all{.label = "particles", .style = viewer::SeriesStyle::lines};
-  viewer::Series injected{.label = "drawn anew", .style = viewer::SeriesStyle::points};
+  viewer::Series injected{.label = "drawn again", .style = viewer::SeriesStyle::points};
   viewer::Series effective{.label = "effective number", .style = viewer::SeriesStyle::lines};
   for (std::size_t i = 0; i < images.size(); ++i) {
     const MonteCarloEstimate& estimate = images[i].estimate;
@@ -83,7 +83,7 @@ std::vector<std::vector<std::string>> stretches(const std::vector<TrackedImage>&
   return rows;
 }
 
-std::string share_text(std::size_t count, std::size_t total) {
+std::string format_share(std::size_t count, std::size_t total) {
   return format_fixed(100.0 * static_cast<double>(count) / static_cast<double>(total), 0) + " %";
 }
 
@@ -95,7 +95,7 @@ std::string length_text(double length_m) {
 std::vector<std::pair<std::string, std::string>> main_figures(const TrackSummary& summary,
                                                               std::size_t total) {
   std::vector<std::pair<std::string, std::string>> figures{
-      {share_text(summary.localised, total), "of the images localised"},
+      {format_share(summary.localised, total), "of the images localised"},
       {summary.first_localised ? std::to_string(*summary.first_localised) : "never",
        summary.first_localised ? "images until it was first localised" : "localised"}};
   if (!summary.errors_m.empty()) {
@@ -112,11 +112,11 @@ std::vector<std::pair<std::string, std::string>> main_figures(const TrackSummary
 
 }  // namespace
 
-std::size_t particles_shown(std::size_t images) {
-  constexpr std::size_t most = 300;
-  constexpr std::size_t least = 30;
+std::size_t count_shown_particles(std::size_t images) {
+  constexpr std::size_t max_particles = 300;
+  constexpr std::size_t min_particles = 30;
   constexpr std::size_t altogether = 300000;
-  return std::clamp(altogether / std::max<std::size_t>(1, images), least, most);
+  return std::clamp(altogether / std::max<std::size_t>(1, images), min_particles, max_particles);
 }
 
 void write_track_report(const std::filesystem::path& folder, const VisualMemory& memory,
@@ -128,10 +128,10 @@ void write_track_report(const std::filesystem::path& folder, const VisualMemory&
       "Where was the robot?",
       "A robot moved, with odometry that drifts and a memory of " + std::to_string(memory.size()) +
           " views, and took " + std::to_string(images.size()) +
-          " pictures. After each one, particles say where it may be: far apart while it does not "
+          " images. After each one, particles say where it may be: far apart while it does not "
           "know, close together once it does.");
   page.add_figures(main_figures(summary, images.size()));
-  page.begin_section("The run, picture by picture");
+  page.begin_section("The run, image by image");
   page.add_text(
       "Each small dot is a particle, a place where the robot may be. Grey dots are the remembered "
       "views, " +
@@ -142,10 +142,10 @@ void write_track_report(const std::filesystem::path& folder, const VisualMemory&
   page.add_run(played);
   page.begin_section("The whole run");
   page.add_plots(
-      {{track_map(memory, images, {}),
+      {{draw_track(memory, images, {}),
         truth_known ? "True and estimated path; crosses: true places where the robot was lost"
                     : "The estimated path; it breaks off where the robot was not localised"},
-       {plot_of_errors(images, spacing_m),
+       {draw_errors(images, spacing_m),
         truth_known ? "Error of each estimate, and how far the particles spread around their "
                       "mean, on a logarithmic scale"
                     : "How far the particles spread around their mean, on a logarithmic scale"}});
@@ -154,9 +154,9 @@ void write_track_report(const std::filesystem::path& folder, const VisualMemory&
   page.begin_section("Particles");
   page.add_text(
       "More are used while much is possible, fewer once they lie close together. By those drawn "
-      "anew a robot that was kidnapped is found again.");
-  page.add_plots({{plot_of_particles(images),
-                   "Number of particles after each image, on a logarithmic scale"}});
+      "again, a kidnapped robot is found.");
+  page.add_plots(
+      {{draw_particles(images), "Number of particles after each image, on a logarithmic scale"}});
   page.write(folder, "index.html", "panonav track");
 }
 

@@ -12,7 +12,7 @@ namespace panonav::command {
 
 /// Particles of each image that a report on this many images shows; fewer for long runs, so that
 /// the page stays a few megabytes.
-[[nodiscard]] std::size_t particles_shown(std::size_t images);
+[[nodiscard]] std::size_t count_shown_particles(std::size_t images);
 
 /// A page that plays the run, with the particles as in [M03] figures 7 to 9, and figures of the
 /// whole of it. `images`: at least one. Throws FileError.

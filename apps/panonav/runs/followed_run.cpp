@@ -33,13 +33,13 @@ void describe(recordings::RunMoment& moment, const FollowedImage& image) {
 }  // namespace
 
 void follow(RouteFollower& follower, const Dataset& run, const std::vector<Pose2>& truth,
-            int thin_recording, const PanoramaReader* recorded, Executor& executor,
+            int every_nth, const PanoramaReader* recorded, Executor& executor,
             const std::function<void(FollowedImage&&)>& report) {
   struct Seen {
     std::vector<float> line;
     std::optional<recordings::RunMoment> moment;
   };
-  const auto every = static_cast<std::size_t>(thin_recording);
+  const auto every = static_cast<std::size_t>(every_nth);
   make_in_order((run.entries.size() + every - 1) / every, executor,
                 [&](std::size_t i) {
                   StageClock clock;
@@ -52,7 +52,7 @@ void follow(RouteFollower& follower, const Dataset& run, const std::vector<Pose2
                   seen.moment->panorama = recorded->convert(seen.moment->picture->view(),
                                                             observation.tilt.value_or(Tilt{}));
                   clock.stage("for viewers");
-                  clock.put(*seen.moment);
+                  clock.add_to(*seen.moment);
                   return seen;
                 },
                 [&](std::size_t i, Seen&& seen) {
@@ -61,7 +61,7 @@ void follow(RouteFollower& follower, const Dataset& run, const std::vector<Pose2
                   StageClock clock;
                   RouteFollower::Step step = follower.step(std::move(seen.line), entry.odometry);
                   clock.stage("matching");
-                  if (seen.moment) clock.put(*seen.moment);
+                  if (seen.moment) clock.add_to(*seen.moment);
                   FollowedImage image{index,
                                       entry.file,
                                       entry.stamp_s,
@@ -116,16 +116,16 @@ FollowSummary summarise_follow(const std::vector<FollowedImage>& images, bool he
 
 std::vector<std::pair<double, double>> changed_stretches(const std::vector<FollowedImage>& images) {
   std::vector<std::pair<double, double>> stretches;
-  bool going_on = false;
+  bool is_continued = false;
   for (const FollowedImage& image : images) {
     const bool changed = image.fix && !image.changed.empty();
     if (changed) {
       const double along_m = image.fix->along_m;
-      if (!going_on) stretches.emplace_back(along_m, along_m);
+      if (!is_continued) stretches.emplace_back(along_m, along_m);
       stretches.back().first = std::min(stretches.back().first, along_m);
       stretches.back().second = std::max(stretches.back().second, along_m);
     }
-    going_on = changed;
+    is_continued = changed;
   }
   return stretches;
 }

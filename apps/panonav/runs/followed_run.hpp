@@ -29,7 +29,7 @@ struct FollowedImage {
   std::optional<Pose2> truth;                       ///< in the route's frame, where it is known
   std::optional<RoutePosition> true_place;
   std::optional<recordings::RunMoment>
-      moment;  ///< what was seen and said, where a record is wanted
+      moment;  ///< what a record holds of it; nullopt: nothing is recorded
 };
 
 /// Follows a run along a route, every N-th picture of it. Lines are read on all threads, the
@@ -37,7 +37,7 @@ struct FollowedImage {
 /// empty. `recorded`: makes panoramas of the pictures for moments; null: there are none. `report`
 /// is called after each picture, in order. Throws FileError on a picture that cannot be read.
 void follow(RouteFollower& follower, const Dataset& run, const std::vector<Pose2>& truth,
-            int thin_recording, const PanoramaReader* recorded, Executor& executor,
+            int every_nth, const PanoramaReader* recorded, Executor& executor,
             const std::function<void(FollowedImage&&)>& report);
 
 struct FollowSummary {

@@ -12,44 +12,44 @@ const std::vector<std::string> rise{"--vertical-motion", "--tilt"};
 
 }  // namespace
 
-void declare_homing(Arguments& arguments, HomingArguments& wanted) {
-  arguments.flag("--horizon", wanted.views.horizon,
+void declare_homing(Arguments& arguments, HomingArguments& values) {
+  arguments.flag("--horizon", values.views.horizon,
                  "Compare one row only, the mean of the rows within 5 degrees of the horizon (all "
                  "rows where elevations are not known), as [S06] does");
-  arguments.option("--published K", wanted.published, 1,
+  arguments.option("--published K", values.published, 1,
                    "Use the rule as published [S06] with K frequencies; goes with --iterations");
-  arguments.options("signature", wanted.views.signature);
-  arguments.options("preprocessing", wanted.views.preprocessing);
-  arguments.options("homing", wanted.homing);
+  arguments.options("signature", values.views.signature);
+  arguments.options("preprocessing", values.views.preprocessing);
+  arguments.options("homing", values.homing);
   arguments.uncommon({"--horizon"});
-  arguments.used_only(
-      {"--rising"}, [&wanted] { return wanted.homing.iterations > 0; }, "without --iterations");
-  arguments.used_only(
+  arguments.refuse_unless(
+      {"--rising"}, [&values] { return values.homing.iterations > 0; }, "without --iterations");
+  arguments.refuse_unless(
       {"--starting-estimates"},
-      [&wanted] { return wanted.homing.turn == FourierHomingOptions::TurnEstimate::global; },
+      [&values] { return values.homing.turn == FourierHomingOptions::TurnEstimate::global; },
       "with --turn sequential");
-  arguments.used_only(
-      rise, [&wanted] { return !wanted.views.horizon; }, "with --horizon");
+  arguments.refuse_unless(
+      rise, [&values] { return !values.views.horizon; }, "with --horizon");
 }
 
-FourierHomingOptions homing_options(const Arguments& arguments, const HomingArguments& wanted,
-                                    int components) {
-  FourierHomingOptions options = wanted.homing;
-  if (wanted.published) {
+FourierHomingOptions make_homing_options(const Arguments& declared,
+                                         const HomingArguments& arguments, int components) {
+  FourierHomingOptions options = arguments.homing;
+  if (arguments.published) {
     for (const auto* name :
          {"highest", "rising", "turn", "gradient", "weights", "starting_estimates",
           "displacement_search", "vertical_motion", "tilt"}) {
-      if (!arguments.given("homing", name)) continue;
+      if (!declared.is_set("homing", name)) continue;
       throw UsageError("--published sets '" + std::string(name) +
                        "' itself; leave one of them out");
     }
-    options = published_homing_options(*wanted.published, wanted.homing.iterations);
+    options = published_homing_options(*arguments.published, arguments.homing.iterations);
   }
-  const int most = components - 2;
-  if (most < 1) throw ContractError("components", components, ">= 3, for homing");
-  if (options.highest > most) {
-    throw ContractError(wanted.published ? "published" : "highest", options.highest,
-                        "1 to " + std::to_string(most) + ", components less two");
+  const int max_frequency = components - 2;
+  if (max_frequency < 1) throw ContractError("components", components, ">= 3, for homing");
+  if (options.highest > max_frequency) {
+    throw ContractError(arguments.published ? "published" : "highest", options.highest,
+                        "1 to " + std::to_string(max_frequency) + ", components less two");
   }
   return options;
 }

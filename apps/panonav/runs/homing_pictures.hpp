@@ -7,7 +7,7 @@
 
 namespace panonav::command {
 
-/// What a user says of how home vectors are to be computed.
+/// The arguments of verbs that compute home vectors.
 struct HomingArguments {
   HomingViewOptions views;
   std::optional<int> published;  ///< K of S06's own rule
@@ -15,13 +15,14 @@ struct HomingArguments {
 };
 
 /// Adds --horizon, --published and the options of signature, preprocessing and homing.
-void declare_homing(Arguments& arguments, HomingArguments& wanted);
+void declare_homing(Arguments& arguments, HomingArguments& values);
 
 /// The options of the rule that the user wants. Throws UsageError when --published stands beside
-/// options of our own rule, ContractError when frequencies are wanted that `components` do not
+/// options of our own rule, ContractError when frequencies are arguments that `components` do not
 /// hold.
-[[nodiscard]] FourierHomingOptions homing_options(const Arguments& arguments,
-                                                  const HomingArguments& wanted, int components);
+[[nodiscard]] FourierHomingOptions make_homing_options(const Arguments& declared,
+                                                       const HomingArguments& arguments,
+                                                       int components);
 
 /// Throws UsageError when --vertical-motion or --tilt was typed and this view, of the file `name`,
 /// cannot tell rows that move up and down: elevations are unknown, or there are fewer than three

@@ -9,7 +9,7 @@
 
 namespace panonav::command {
 
-ListeningPlace listening_place(std::string_view flag, const std::string& text) {
+ListeningPlace parse_listening_address(std::string_view flag, const std::string& text) {
   ListeningPlace place;
   const std::size_t colon = text.rfind(':');
   if (colon != std::string::npos) place.address = text.substr(0, colon);

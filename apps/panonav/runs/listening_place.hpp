@@ -5,13 +5,14 @@
 
 namespace panonav::command {
 
-/// Where a server of this program listens.
+/// Address and port of a server of this program.
 struct ListeningPlace {
   std::string address = "127.0.0.1";
   int port = 0;
 };
 
-/// Of "8080" or "192.168.1.5:8080". Throws UsageError, which names the flag.
-[[nodiscard]] ListeningPlace listening_place(std::string_view flag, const std::string& text);
+/// Parses "8080" or "192.168.1.5:8080". Throws UsageError, which names the flag.
+[[nodiscard]] ListeningPlace parse_listening_address(std::string_view flag,
+                                                     const std::string& text);
 
 }  // namespace panonav::command

@@ -22,7 +22,7 @@ namespace {
 class LinePrinter {
  public:
   LinePrinter(Session& session, bool wait)
-      : session_(session), wait_(wait), thread_([this] { work(); }) {}
+      : session_(session), wait_(wait), thread_([this] { print_lines(); }) {}
   ~LinePrinter() { finish(); }
   LinePrinter(const LinePrinter&) = delete;
   LinePrinter& operator=(const LinePrinter&) = delete;
@@ -49,7 +49,7 @@ class LinePrinter {
   [[nodiscard]] std::size_t left_out() const noexcept { return left_out_; }
 
  private:
-  void work() {
+  void print_lines() {
     std::unique_lock lock(mutex_);
     while (true) {
       came_.wait(lock, [this] { return over_ || !lines_.empty(); });
@@ -81,57 +81,56 @@ class SkipNotes {
  public:
   explicit SkipNotes(Session& session) : session_(session) {}
   void add(const std::string& why) {
-    ++unsaid_;
+    ++unreported_;
     const auto now = std::chrono::steady_clock::now();
     if (now < next_) return;
     next_ = now + std::chrono::seconds(1);
     session_.note(
-        "skipped: " + (unsaid_ > 1 ? std::to_string(unsaid_) + " pictures, the last: " : "") +
+        "skipped: " + (unreported_ > 1 ? std::to_string(unreported_) + " images, the last: " : "") +
         to_readable_line(why));
-    unsaid_ = 0;
+    unreported_ = 0;
   }
 
  private:
   Session& session_;
-  std::size_t unsaid_ = 0;
+  std::size_t unreported_ = 0;
   std::chrono::steady_clock::time_point next_;
 };
 
 /// Chooses pictures as `select_pictures` does, but one by one.
 class LiveSelection {
  public:
-  explicit LiveSelection(const Dataset::Selection& wanted) : wanted_(wanted) {}
-  [[nodiscard]] bool takes(double stamp_s) {
+  explicit LiveSelection(const Dataset::Selection& selection) : selection_(selection) {}
+  [[nodiscard]] bool should_take(double stamp_s) {
     if (!first_s_) first_s_ = stamp_s;
-    if (wanted_.from_s && stamp_s - *first_s_ < *wanted_.from_s) return false;
-    if (number_++ % static_cast<std::size_t>(wanted_.every) != 0) return false;
-    const bool near = taken_s_ && stamp_s >= *taken_s_ && wanted_.every_s &&
-                      stamp_s - *taken_s_ < *wanted_.every_s;
-    if (!near) taken_s_ = stamp_s;
+    if (selection_.from_s && stamp_s - *first_s_ < *selection_.from_s) return false;
+    if (number_++ % static_cast<std::size_t>(selection_.every) != 0) return false;
+    const bool near = last_kept_s_ && stamp_s >= *last_kept_s_ && selection_.every_s &&
+                      stamp_s - *last_kept_s_ < *selection_.every_s;
+    if (!near) last_kept_s_ = stamp_s;
     return !near;
   }
-  [[nodiscard]] bool ends(double stamp_s) const {
-    return wanted_.to_s && first_s_ && stamp_s - *first_s_ > *wanted_.to_s;
+  [[nodiscard]] bool is_past_end(double stamp_s) const {
+    return selection_.to_s && first_s_ && stamp_s - *first_s_ > *selection_.to_s;
   }
 
  private:
-  Dataset::Selection wanted_;
+  Dataset::Selection selection_;
   std::optional<double> first_s_;
-  std::optional<double> taken_s_;
+  std::optional<double> last_kept_s_;
   std::size_t number_ = 0;
 };
 
-double milliseconds(std::chrono::steady_clock::duration duration) {
+double to_milliseconds(std::chrono::steady_clock::duration duration) {
   return std::chrono::duration<double, std::milli>(duration).count();
 }
 
 }  // namespace
 
 void declare_live(Arguments& arguments, LiveArguments& live) {
-  arguments.option("--count N", live.count, 1, "End after this many pictures");
-  arguments.option("--camera-width", live.camera_width, 1, "Wanted width of a camera's pictures");
-  arguments.option("--camera-height", live.camera_height, 1,
-                   "Wanted height of a camera's pictures");
+  arguments.option("--count N", live.count, 1, "End after this many images");
+  arguments.option("--camera-width", live.camera_width, 1, "Wanted width of a camera's images");
+  arguments.option("--camera-height", live.camera_height, 1, "Wanted height of a camera's images");
   arguments.uncommon({"--count", "--camera-width", "--camera-height"});
 }
 
@@ -146,7 +145,7 @@ std::unique_ptr<recordings::LiveObservations> open_live(
   }
   const auto stated = picture_source(pictures);
   if (!stated && !remembered) {
-    throw UsageError("say what the pictures of " + input + " show with --kind");
+    throw UsageError("say what the images of " + input + " show with --kind");
   }
   recordings::LiveOptions options;
   if (live.camera_width) options.size = ImageSize{*live.camera_width, *live.camera_height};
@@ -160,7 +159,7 @@ void refuse_live(const Arguments& arguments, const std::string& input, bool coun
   if (count) arguments.refuse_unused({"--count"}, why);
 }
 
-std::string events_text(const LiveCounts& counts, std::size_t moments_left_out) {
+std::string describe_events(const LiveCounts& counts, std::size_t moments_left_out) {
   std::string text;
   const auto add = [&text](std::uint64_t count, const std::string& what) {
     if (count > 0) text += ", " + std::to_string(count) + " " + what;
@@ -179,12 +178,12 @@ std::string events_text(const LiveCounts& counts, std::size_t moments_left_out) 
 }
 
 struct LiveRun::Implementation {
-  Implementation(ObservationSource& from, const PartArguments& part, const LiveArguments& wanted,
+  Implementation(ObservationSource& from, const PartArguments& part, const LiveArguments& arguments,
                  Session& its_session)
       : source(from),
         live(dynamic_cast<recordings::LiveObservations*>(&from)),
-        selection(selection_of(part)),
-        count(wanted.count),
+        selection(to_selection(part)),
+        count(arguments.count),
         session(its_session),
         printer(session, live == nullptr) {}
 
@@ -196,8 +195,8 @@ struct LiveRun::Implementation {
     }
     const std::size_t at = delays++ % max_kept;
     const recordings::LiveObservations::Timing timing = live->timing();
-    counts.delays_ms[at] = milliseconds(std::chrono::steady_clock::now() - timing.arrived);
-    counts.decoding_ms[at] = milliseconds(timing.decoding);
+    counts.delays_ms[at] = to_milliseconds(std::chrono::steady_clock::now() - timing.arrived);
+    counts.decoding_ms[at] = to_milliseconds(timing.decoding);
   }
 
   ObservationSource& source;
@@ -215,8 +214,8 @@ LiveRun::LiveRun(ObservationSource& source, const PartArguments& part, const Liv
     : implementation_(std::make_unique<Implementation>(source, part, live, session)) {}
 LiveRun::~LiveRun() = default;
 
-void LiveRun::take(const std::function<std::string(const Observation&)>& look,
-                   const std::function<void(Observation&&)>& keep) {
+void LiveRun::run(const std::function<std::string(const Observation&)>& answer,
+                  const std::function<void(Observation&&)>& keep) {
   auto& self = *implementation_;
   LiveCounts& counts = self.counts;
   std::atomic<bool> stopped = false;
@@ -226,17 +225,17 @@ void LiveRun::take(const std::function<std::string(const Observation&)>& look,
   });
   SkipNotes notes(self.session);
   while (!stopped && (!self.count || counts.pictures < static_cast<std::size_t>(*self.count))) {
-    std::optional<Observation> seen;
+    std::optional<Observation> observation;
     std::string line;
     try {
-      seen = self.source.next();
-      if (!seen) break;
+      observation = self.source.next();
+      if (!observation) break;
       if (self.live != nullptr) {
-        if (self.selection.ends(*seen->stamp_s)) break;
-        if (!self.selection.takes(*seen->stamp_s)) continue;
+        if (self.selection.is_past_end(*observation->stamp_s)) break;
+        if (!self.selection.should_take(*observation->stamp_s)) continue;
       }
       ++counts.pictures;
-      line = look(*seen);
+      line = answer(*observation);
     } catch (const Error& error) {
       ++counts.skipped;
       notes.add(error.what());
@@ -244,14 +243,14 @@ void LiveRun::take(const std::function<std::string(const Observation&)>& look,
     }
     if (self.live != nullptr) self.add_delay();
     if (!line.empty()) self.printer.print(std::move(line));
-    keep(std::move(*seen));
+    keep(std::move(*observation));
   }
   if (self.live != nullptr) self.live->live().stop();  // what comes from now on is not dropped
 }
 
 std::optional<double> LiveRun::decoding_ms() const {
   if (implementation_->live == nullptr) return std::nullopt;
-  return milliseconds(implementation_->live->timing().decoding);
+  return to_milliseconds(implementation_->live->timing().decoding);
 }
 
 const LiveCounts& LiveRun::finish() {

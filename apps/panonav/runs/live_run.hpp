@@ -14,7 +14,7 @@
 
 namespace panonav::command {
 
-/// What a user says of a live source.
+/// The arguments for live sources.
 struct LiveArguments {
   std::optional<int> camera_width;
   std::optional<int> camera_height;
@@ -32,7 +32,7 @@ void declare_live(Arguments& arguments, LiveArguments& live);
 /// Refuses what goes with live sources only; --count, too, where a verb ends with its input.
 void refuse_live(const Arguments& arguments, const std::string& input, bool count);
 
-/// What happened while observations were taken.
+/// Counts of a run over a source.
 struct LiveCounts {
   std::size_t pictures = 0;
   std::size_t skipped = 0;         ///< pictures that could not be read, or not be used
@@ -46,7 +46,7 @@ struct LiveCounts {
 
 /// ", 3 could not be read, 2 came too fast and were dropped": what was out of the ordinary.
 /// `moments_left_out`: of a record.
-[[nodiscard]] std::string events_text(const LiveCounts& counts, std::size_t moments_left_out);
+[[nodiscard]] std::string describe_events(const LiveCounts& counts, std::size_t moments_left_out);
 
 /// Takes observations one by one until their source ends, the user or the system asks the program
 /// to end (SIGINT, SIGTERM), or as many were taken as the user wants. What is printed of them never
@@ -61,13 +61,13 @@ class LiveRun {
   LiveRun(const LiveRun&) = delete;
   LiveRun& operator=(const LiveRun&) = delete;
 
-  /// Prints what `look` says of each observation, unless that is empty, then calls `keep`. An Error
-  /// of `look` skips the picture, one of `keep` ends the run.
-  void take(const std::function<std::string(const Observation&)>& look,
-            const std::function<void(Observation&&)>& keep);
+  /// Prints what `answer` says of each observation, unless that is empty, then calls `keep`. An
+  /// Error of `answer` skips the picture, one of `keep` ends the run.
+  void run(const std::function<std::string(const Observation&)>& answer,
+           const std::function<void(Observation&&)>& keep);
   /// Waits until all lines are printed: what is to be stored comes before.
   const LiveCounts& finish();
-  /// How long the observation of now took to become pixels; empty where it is not a live one.
+  /// Time to decode the current observation; nullopt if the source is not live.
   [[nodiscard]] std::optional<double> decoding_ms() const;
 
  private:

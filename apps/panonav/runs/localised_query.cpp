@@ -59,13 +59,13 @@ std::string csv_row(const LocalisedQuery& answer) {
 std::string as_text(const LocalisedQuery& answer, Session& session) {
   const Place& found = answer.place;
   std::string line = answer.file + "  ";
-  if (found.matches.empty()) return line + session.bad("nothing to compare with");
+  if (found.matches.empty()) return line + session.red("nothing to compare with");
   const PlaceMatch& nearest = found.matches.front();
   if (!found.known) {
-    return line + session.bad("unknown place") + "  (probability " +
+    return line + session.red("unknown place") + "  (probability " +
            format_fixed(found.known_probability, 2) + "; most similar: " + nearest.name + ")";
   }
-  line += session.good("near " + nearest.name) + "  probability " +
+  line += session.green("near " + nearest.name) + "  probability " +
           format_fixed(found.known_probability, 2);
   if (found.position) {
     line += "  x " + format_fixed(found.position->x_m, 2) + " m  y " +

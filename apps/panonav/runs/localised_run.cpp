@@ -29,7 +29,7 @@ namespace panonav::command {
 
 namespace {
 
-/// Where the poses of a route's lines come from.
+/// Source of the poses of a route's lines.
 enum class RoutePoses { known, odometry, images };
 
 /// Records a route beside the views that are added, once there is a memory.
@@ -97,9 +97,9 @@ ordered_json as_json(const RouteFollower::Step& step) {
 }
 
 std::string as_text(const RouteFollower::Step& step, Session& session) {
-  if (!step.fix) return session.bad("not on the route");
-  return session.good("on the route") + ", along " + format_fixed(step.fix->along_m, 2) +
-         " m  beside " + format_fixed(step.fix->lateral_m, 2) + " m";
+  if (!step.fix) return session.red("not on the route");
+  return session.green("on the route") + ", along " + format_fixed(step.fix->along_m, 2) +
+         " m  lateral " + format_fixed(step.fix->lateral_m, 2) + " m";
 }
 
 /// Makes the moments of a run for its record.
@@ -111,9 +111,9 @@ class RunMoments {
   recordings::RunMoment make(const Observation& observation, const LiveMemory::Answer& answer,
                              const RunRecord& record, StageClock& stages) {
     recordings::RunMoment moment = record.make_moment(observation, number_++);
-    stages.put(moment);
+    stages.add_to(moment);
     const PlaceRecogniser* const recogniser = memory_.recogniser();
-    if (record.wants_pictures()) moment.panorama = memory_.panorama();
+    if (record.needs_images()) moment.panorama = memory_.panorama();
     if (!answer.place) {
       moment.state = "no memory yet";
       return moment;
@@ -121,18 +121,18 @@ class RunMoments {
     describe(moment, *answer.place);
     StageClock clock;
     if (!file_) file_ = MemoryFile::open(path_, Access::read_only);
-    if (record.wants_pictures()) moment.best_match = best_match_of(*answer.place, *file_);
+    if (record.needs_images()) moment.best_match = load_best_match(*answer.place, *file_);
     // Rarely: the cloud is that of all views. A memory that was read again has other ids.
-    if (memory_.views() > references_ + references_ / 8 || recogniser != shown_of_) {
+    if (memory_.views() > references_ + references_ / 8 || recogniser != shown_recogniser_) {
       references_ = memory_.views();
-      shown_of_ = recogniser;
+      shown_recogniser_ = recogniser;
       shown_.emplace(recogniser->memory());
-      shown_->put(moment);
+      shown_->add_to(moment);
     }
     if (moment.panorama) {
       shown_->compare(moment, recogniser->memory(), recogniser->encoder().packed(*moment.panorama));
       clock.stage("for viewers");
-      clock.put(moment);
+      clock.add_to(moment);
     }
     return moment;
   }
@@ -144,11 +144,11 @@ class RunMoments {
   std::size_t number_ = 0;
   std::size_t references_ = 0;  // that are in the record
   std::optional<ShownReferences> shown_;
-  const PlaceRecogniser* shown_of_ = nullptr;
+  const PlaceRecogniser* shown_recogniser_ = nullptr;
 };
 
-/// How the memory's images lie, where there is a memory. Throws FileError where there is none and
-/// nothing is added; UsageError on options that it was not made with.
+/// Returns the layout of the memory's images; nullopt without a memory. Throws FileError when there
+/// is none and nothing is added; UsageError on options that it was not made with.
 std::optional<PictureSource> remembered_source(const Arguments& declared,
                                                const LocaliseArguments& arguments) {
   if (!memory_exists(arguments.memory)) {
@@ -198,28 +198,28 @@ class LocalisedRun {
     read.push_back(arguments_.memory);
     RunRecord record(arguments_.record, read, live_, session_, {.memory = arguments_.memory});
     RunMoments moments(*memory_, arguments_.memory);
-    LiveRun taking(*source_, arguments_.pictures.part, arguments_.live, session_);
+    LiveRun loop(*source_, arguments_.pictures.part, arguments_.live, session_);
     StageClock stages;
-    taking.take(
+    loop.run(
         [&](const Observation& observation) {
           stages = StageClock();
-          if (const auto ms = taking.decoding_ms()) stages.add("reading", *ms);
-          return answer(observation, stages);
+          if (const auto ms = loop.decoding_ms()) stages.add("reading", *ms);
+          return answer_observation(observation, stages);
         },
         [&](Observation&& observation) {
           if (arguments_.out) table_ += csv_row(query_);
           if (arguments_.report) queries_.push_back(query_);
           if (route_) route_->add(observation, *memory_);
-          if (record.wanted()) record.add(moments.make(observation, answer_, record, stages));
+          if (record.is_active()) record.add(moments.make(observation, answer_, record, stages));
           if (answer_.is_new) memory_->add(std::move(observation));
         });
     const std::string changes = finish();
     record.close();
-    const LiveCounts& counts = taking.finish();
+    const LiveCounts& counts = loop.finish();
     if (arguments_.report) write_report();
     session_.note(std::to_string(counts.pictures) + " images, " + std::to_string(known_) +
                   " of places of " + arguments_.memory + changes +
-                  events_text(counts, record.left_out()) +
+                  describe_events(counts, record.left_out()) +
                   (live_ ? ", unwrapping " +
                                format_fixed(unwrapping_.count() /
                                                 std::max(1.0, static_cast<double>(counts.pictures)),
@@ -269,7 +269,7 @@ class LocalisedRun {
   }
 
   /// Returns the line that is printed.
-  std::string answer(const Observation& observation, StageClock& stages) {
+  std::string answer_observation(const Observation& observation, StageClock& stages) {
     answer_ = memory_->answer(observation);
     stages.part("unwarping", answer_.unwrapping);
     stages.stage("signature, search, ranking");
@@ -315,7 +315,7 @@ class LocalisedRun {
       const auto entry = std::ranges::find(entries, queries_[i].file, &DatasetEntry::file);
       return recogniser.encoder().panorama(read_observation(*entry));
     });
-    tell_report(*arguments_.report, session_);
+    print_report_path(*arguments_.report, session_);
   }
 
   const LocaliseArguments& arguments_;
@@ -343,7 +343,7 @@ class LocalisedRun {
 void require_components(const Arguments& declared, const LocaliseArguments& arguments,
                         const MemoryHeader& header) {
   const int components = arguments.localiser.components;
-  const bool zero = components == 0 && declared.given("localiser", "components");
+  const bool zero = components == 0 && declared.is_set("localiser", "components");
   if (zero || components > header.shape.components) {
     throw ContractError("components", components,
                         "1 to " + std::to_string(header.shape.components) + ", the memory's");

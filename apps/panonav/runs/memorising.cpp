@@ -2,22 +2,24 @@
 
 namespace panonav::command {
 
-void require_kept_options(const Arguments& arguments, const SignatureOptions& signature,
+void require_kept_options(const Arguments& declared, const SignatureOptions& signature,
                           const PreprocessingOptions& preprocessing, const MemoryFile& memory) {
   const MemoryHeader& header = memory.header();
   const std::string as =
       ", as " + memory.path().string() + " was made with; leave it out or start a new memory";
   // 0 stands for the usual size, or for the pictures' own.
-  const PanoramaShape usual = choose_panorama_shape(header.source, {});
-  const PanoramaShape own =
+  const PanoramaShape default_shape = choose_panorama_shape(header.source, {});
+  const PanoramaShape image_shape =
       header.picture_shape.value_or(PanoramaShape{header.shape.rows, header.panorama_columns});
-  SignatureOptions wanted = signature;
-  if (wanted.rows == 0) wanted.rows = usual.rows > 0 ? usual.rows : own.rows;
-  if (wanted.columns == 0) wanted.columns = usual.columns > 0 ? usual.columns : own.columns;
-  arguments.require_kept(
-      "signature", wanted,
+  SignatureOptions arguments = signature;
+  if (arguments.rows == 0)
+    arguments.rows = default_shape.rows > 0 ? default_shape.rows : image_shape.rows;
+  if (arguments.columns == 0)
+    arguments.columns = default_shape.columns > 0 ? default_shape.columns : image_shape.columns;
+  declared.require_same(
+      "signature", arguments,
       SignatureOptions{header.shape.rows, header.panorama_columns, header.shape.components}, as);
-  arguments.require_kept("preprocessing", preprocessing, header.preprocessing, as);
+  declared.require_same("preprocessing", preprocessing, header.preprocessing, as);
 }
 
 }  // namespace panonav::command

@@ -22,7 +22,7 @@ bool is_known(const Pose2& pose) {
 }  // namespace
 
 void MissionMoments::set_image(const Image& image, const Panorama& panorama) {
-  clock_.stage("driving, picture");
+  clock_.stage("driving, image");
   image_ = image;
   panorama_ = panorama;
 }
@@ -55,7 +55,7 @@ recordings::RunMoment MissionMoments::make(const NavigationDecision& decision, c
     shown_goal_ = robot_.goal();
   }
   clock_.stage("for viewers");
-  clock_.put(moment);
+  clock_.add_to(moment);
   return moment;
 }
 
@@ -99,7 +99,7 @@ void MissionMoments::add_field(recordings::RunMoment& moment) const {
     moment.directions.push_back(
         {pose.x_m, pose.y_m, wrap_angle(pose.heading_rad + *guides[i].direction_rad)});
   }
-  moment.regions = regions_of(moment.references, areas);
+  moment.regions = voronoi_regions(moment.references, areas);
   Pose2 goal = remembered_.truth[*remembered_.graph.node_of(robot_.goal())];
   if (!is_known(goal)) return;
   if (!std::isfinite(goal.heading_rad)) goal.heading_rad = 0.0;
@@ -109,7 +109,7 @@ void MissionMoments::add_field(recordings::RunMoment& moment) const {
 std::optional<ViewId> set_goal_of_viewer(RobotNavigator& robot,
                                          const simulation::RememberedPlace& remembered,
                                          RunRecord& record, Session& session) {
-  const auto wish = record.consume_wish();
+  const auto wish = record.take_viewer_input();
   if (!wish) return std::nullopt;
   std::optional<std::size_t> nearest;
   double min_m = std::numeric_limits<double>::infinity();

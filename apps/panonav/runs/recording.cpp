@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Replaces the names of options that have flags of other names; `name_flags` knows the rest.
-std::string name_picture_flags(std::string text) {
+std::string replace_option_names(std::string text) {
   constexpr std::array<std::pair<std::string_view, std::string_view>, 4> flags{{
       {"'source' (a PictureSource)", "--kind"},
       {"'source'", "--kind and its companions"},
@@ -36,7 +36,7 @@ std::string name_picture_flags(std::string text) {
   return text;
 }
 
-std::optional<ElevationBand> elevation_band(const PictureArguments& pictures) {
+std::optional<ElevationBand> parse_elevation_band(const PictureArguments& pictures) {
   constexpr double min_band_deg = 5.0;  // pictures are higher; radians are mostly less
   if (!pictures.elevation_deg) return std::nullopt;
   const auto [low, high] = *pictures.elevation_deg;
@@ -52,7 +52,7 @@ PictureSource mirror_source(const PictureArguments& pictures,
                             const std::optional<ElevationBand>& band) {
   if (!pictures.camera) {
     throw UsageError(
-        "--camera is missing: pictures of a mirror need the file that panonav calibrate writes");
+        "--camera is missing: images of a mirror need the file that panonav calibrate writes");
   }
   if (pictures.columns || pictures.forward_column) {
     throw UsageError(
@@ -71,26 +71,26 @@ PictureSource mirror_source(const PictureArguments& pictures,
 
 void declare_layout(Arguments& arguments, PictureArguments& pictures) {
   arguments.choice("--kind", pictures.kind, {"panorama", "equirectangular", "mirror"},
-                   "What the pictures show, where no dataset.toml says it");
+                   "Kind of the images, unless a dataset.toml states it");
   arguments.option("--camera FILE", pictures.camera,
                    "Calibration of a mirror camera (panonav calibrate)");
   arguments.choice("--columns-run", pictures.columns, {"clockwise", "counter-clockwise"},
-                   "How columns run, seen from above; default clockwise");
+                   "Direction of columns, seen from above; default clockwise");
   arguments.option("--forward-column", pictures.forward_column,
                    "Fraction of the width that looks along the heading; default 0.5");
   arguments.option("--elevation-deg", pictures.elevation_deg,
-                   "Lower and upper edge of a panorama, or the band to keep of other pictures");
+                   "Lower and upper edge of a panorama, or the band to keep of other images");
   arguments.uncommon({"--columns-run", "--forward-column"});
 }
 
 void declare_topics(Arguments& arguments, InputOptions::Topics& topics) {
-  arguments.option(
-      "--image-topic NAME", topics.image,
-      "Pictures of a recording (MCAP, rosbag2, ROS 1 bag) with several topics of them");
+  arguments.option("--image-topic NAME", topics.image,
+                   "Images of a recording (MCAP, rosbag2, ROS 1 bag) with several topics of them");
   arguments.option("--odometry-topic NAME", topics.odometry,
                    "Its odometry (nav_msgs/Odometry) where there are several");
-  arguments.option("--odometry-frames", "ODOM BASE", topics.odometry_frames,
-                   "Odometry from its transforms (TF) instead; without a topic odom base_link");
+  arguments.option(
+      "--odometry-frames", "ODOM BASE", topics.odometry_frames,
+      "Odometry from its transforms (TF) instead; without an odometry topic: odom base_link");
   arguments.option("--imu-topic NAME", topics.imu,
                    "Its inertial sensor (roll and pitch) where there are several");
   arguments.uncommon({"--image-topic", "--odometry-topic", "--odometry-frames", "--imu-topic"});
@@ -98,11 +98,11 @@ void declare_topics(Arguments& arguments, InputOptions::Topics& topics) {
 
 void declare_part(Arguments& arguments, PartArguments& part, bool every) {
   arguments.option("--from SECONDS", part.from_s,
-                   "Begin this long after the first picture of a recording with stamps");
-  arguments.option("--to SECONDS", part.to_s, "End this long after its first picture");
+                   "Begin this long after the first image of a recording with stamps");
+  arguments.option("--to SECONDS", part.to_s, "End this long after its first image");
   if (every) {
     arguments.option("--every N|TIME", part.every,
-                     "Take every N-th picture only, or one in this time, such as 0.5s");
+                     "Take every N-th image only, or one in this time, such as 0.5s");
   }
   arguments.uncommon({"--from", "--to"});
   if (every) arguments.uncommon({"--every"});
@@ -114,7 +114,7 @@ void declare_pictures(Arguments& arguments, PictureArguments& pictures) {
   declare_part(arguments, pictures.part, true);
 }
 
-std::vector<std::string> recording_options() {
+std::vector<std::string> recording_flags() {
   return {"--image-topic", "--odometry-topic", "--odometry-frames", "--imu-topic", "--from",
           "--to",          "--every"};
 }
@@ -125,7 +125,7 @@ bool is_one_picture(const std::string& input) {
          !recordings::is_live(input);
 }
 
-Dataset::Selection selection_of(const PartArguments& part) {
+Dataset::Selection to_selection(const PartArguments& part) {
   Dataset::Selection selection{.from_s = part.from_s, .to_s = part.to_s};
   for (const auto& [flag, value] : {std::pair{"--from", part.from_s}, {"--to", part.to_s}}) {
     if (value && *value < 0.0) {
@@ -143,8 +143,8 @@ Dataset::Selection selection_of(const PartArguments& part) {
   double value = 0.0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   const bool number = error == std::errc() && end == text.data() + text.size();
-  constexpr double most = 1e9;
-  const bool fits = number && value > 0.0 && value <= most &&
+  constexpr double max_value = 1e9;
+  const bool fits = number && value > 0.0 && value <= max_value &&
                     (is_time || (value >= 1.0 && value == std::floor(value)));
   if (!fits) {
     throw UsageError("--every is " + to_readable_line(*part.every) +
@@ -165,7 +165,7 @@ std::optional<PictureSource> picture_source(const PictureArguments& pictures) {
   const std::string kind = pictures.kind.value_or(pictures.camera ? "mirror" : "");
   if (kind.empty()) throw UsageError("--kind is missing: panorama, equirectangular or mirror");
 
-  const std::optional<ElevationBand> band = elevation_band(pictures);
+  const std::optional<ElevationBand> band = parse_elevation_band(pictures);
   if (kind == "mirror") return mirror_source(pictures, band);
   if (pictures.camera) throw UsageError("--camera goes only with --kind mirror");
   PictureSource source;
@@ -194,21 +194,21 @@ Dataset open_recording(const std::string& input, const PictureArguments& picture
   const InputOptions options{.source = picture_source(pictures),
                              .default_source = remembered,
                              .topics = pictures.topics,
-                             .selection = selection_of(pictures.part),
+                             .selection = to_selection(pictures.part),
                              .recursive = pictures.recursive};
   if (recordings::is_live(input) && input != "-") {
     throw UsageError(input + " is a live source; allowed with localise, memorise and track");
   }
   try {
     Dataset opened = open_input(input, options);
-    for (const std::string& warning : opened.warnings) session.note(name_picture_flags(warning));
+    for (const std::string& warning : opened.warnings) session.note(replace_option_names(warning));
     return opened;
   } catch (const OptionError& error) {
-    throw UsageError(name_picture_flags(error.what()));
+    throw UsageError(replace_option_names(error.what()));
   } catch (const FileError& error) {
     const std::string_view text = error.what();
-    if (text.find("'source'") != text.npos) throw UsageError(name_picture_flags(error.what()));
-    throw Error(name_picture_flags(error.what()));
+    if (text.find("'source'") != text.npos) throw UsageError(replace_option_names(error.what()));
+    throw Error(replace_option_names(error.what()));
   }
 }
 
@@ -262,20 +262,19 @@ std::vector<double> trajectory_stamps(const Dataset& run, const std::string& ver
   }
   if (!run.entries.front().stamp_s) {
     session.note("panonav " + verb + ": " + dataset + " has no column 'stamp_s'; the seconds in " +
-                 tum + " count pictures from 0");
+                 tum + " count images from 0");
   }
   return seconds;
 }
 
-std::string how_to_add(const std::string& folder, const std::string& columns,
-                       const std::string& values) {
+std::string explain_columns(const std::string& folder, const std::string& columns,
+                            const std::string& values) {
   if (recordings::is_recording(folder)) {
     return "; of a recording odometry is nav_msgs/Odometry or TF, poses are those of /ground_truth";
   }
   const bool described = has_dataset_file(folder);
   const Dataset recording = described ? read_dataset(folder) : read_picture_folder(folder, {});
-  const std::string table = "the columns file," + columns +
-                            " and a line for each picture, such as " +
+  const std::string table = "the columns file," + columns + " and a line for each image, such as " +
                             to_readable_line(recording.entries.front().file) + "," + values;
   if (described) return "; its table needs " + table;
   return "; write " + (fs::path(folder) / "dataset.toml").string() +
@@ -290,8 +289,8 @@ Dataset read_described(const std::string& folder, const PictureArguments& pictur
   std::error_code ignored;
   if (fs::is_directory(folder, ignored) && !has_dataset_file(folder) &&
       !recordings::is_recording(folder) && !picture_source(pictures)) {
-    throw FileError(folder, "has no dataset.toml, so nothing tells where its pictures were taken" +
-                                how_to_add(folder, columns, values));
+    throw FileError(folder, "has no dataset.toml, so nothing tells where its images were taken" +
+                                explain_columns(folder, columns, values));
   }
   return open_recording(folder, pictures, remembered, session);
 }

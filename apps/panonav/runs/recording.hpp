@@ -22,7 +22,7 @@ struct PartArguments {
   std::optional<std::string> every;  ///< "5": each fifth picture; "0.5s": one in half a second
 };
 
-/// What a user says of pictures that come without a dataset.toml.
+/// The arguments for images without a dataset.toml.
 struct PictureArguments {
   std::optional<std::string> kind;
   std::optional<std::string> camera;
@@ -44,7 +44,7 @@ void declare_part(Arguments& arguments, PartArguments& part, bool every);
 void declare_pictures(Arguments& arguments, PictureArguments& pictures);
 
 /// The flags of the last two, for verbs that also take single pictures.
-[[nodiscard]] std::vector<std::string> recording_options();
+[[nodiscard]] std::vector<std::string> recording_flags();
 /// Neither a folder nor a recording, a video or a live source.
 [[nodiscard]] bool is_one_picture(const std::string& input);
 
@@ -52,8 +52,8 @@ void declare_pictures(Arguments& arguments, PictureArguments& pictures);
 /// on the camera file.
 [[nodiscard]] std::optional<PictureSource> picture_source(const PictureArguments& pictures);
 
-/// The part that is wanted. Throws UsageError on values out of range.
-[[nodiscard]] Dataset::Selection selection_of(const PartArguments& part);
+/// Checks and converts the part. Throws UsageError on values out of range.
+[[nodiscard]] Dataset::Selection to_selection(const PartArguments& part);
 
 /// Opens what `open_input` does, as the flags say, and notes its warnings. `remembered` is how the
 /// pictures lie that a memory was made from: so lie those that come without a description of their
@@ -81,10 +81,10 @@ void require_kept_band(const PictureArguments& pictures, const MemoryFile& memor
                                                     const std::string& dataset,
                                                     const std::string& tum, Session& session);
 
-/// How to make a recording tell more, for the end of an error's line: the table of a data set gets
-/// these columns, a folder of pictures alone a dataset.toml first. `values`: of an example.
-[[nodiscard]] std::string how_to_add(const std::string& folder, const std::string& columns,
-                                     const std::string& values);
+/// Explains how to add columns to a recording, for the end of an error message: the table of a data
+/// set gets them, a folder of images needs a dataset.toml first. `values`: an example of a line.
+[[nodiscard]] std::string explain_columns(const std::string& folder, const std::string& columns,
+                                          const std::string& values);
 /// A data set, or what the user says of other pictures, as `open_recording` does. A folder of
 /// pictures alone throws a FileError that says how to make it a data set with these columns.
 [[nodiscard]] Dataset read_described(const std::string& folder, const PictureArguments& pictures,

@@ -23,22 +23,22 @@ constexpr const char* run_file = "run.json";
 // More than any run writes.
 constexpr std::size_t max_file_bytes = 64 << 20;
 
-std::string text_of(const fs::path& path) {
+std::string read_text(const fs::path& path) {
   const auto bytes = read_file(path, max_file_bytes);
   return {bytes.begin(), bytes.end()};
 }
 
-// What results depend on.
-ordered_json run_record(const ReproduceArguments& wanted) {
-  const fs::path data = data_folder(wanted);
+// Everything that the results depend on.
+ordered_json make_run_record(const ReproduceArguments& arguments) {
+  const fs::path data = data_folder(arguments);
   ordered_json record;
   record["version"] = PANONAV_VERSION;
-  record["quick"] = wanted.quick;
-  record["seed"] = or_null(wanted.seed);
-  record["scenes"] = or_null(wanted.scenes);
-  record["queries"] = or_null(wanted.queries);
-  record["runs"] = or_null(wanted.runs);
-  record["rows"] = or_null(wanted.rows);
+  record["quick"] = arguments.quick;
+  record["seed"] = or_null(arguments.seed);
+  record["scenes"] = or_null(arguments.scenes);
+  record["queries"] = or_null(arguments.queries);
+  record["runs"] = or_null(arguments.runs);
+  record["rows"] = or_null(arguments.rows);
   record["data"] =
       data.empty() ? ordered_json(nullptr) : ordered_json(fs::weakly_canonical(data).string());
   return record;
@@ -49,7 +49,7 @@ void require_same_run(const fs::path& out, const ordered_json& record) {
   if (!fs::exists(out / run_file)) {
     throw FileError(file, "is not there: no run to continue; leave --continue out");
   }
-  const auto earlier = ordered_json::parse(text_of(out / run_file), nullptr, false);
+  const auto earlier = ordered_json::parse(read_text(out / run_file), nullptr, false);
   if (!earlier.is_object()) throw FileError(file, "is no JSON object, or not all of it");
   for (const auto& [field, value] : record.items()) {
     if (!earlier.contains(field)) throw FileError(file, field + " is missing");
@@ -61,29 +61,29 @@ void require_same_run(const fs::path& out, const ordered_json& record) {
   }
 }
 
-// As typed by a person elsewhere: no paths of this machine.
-std::string command_line(const ReproduceArguments& wanted) {
+// Returns the command line without paths of this machine.
+std::string command_line(const ReproduceArguments& arguments) {
   std::string line = "panonav reproduce all";
-  if (wanted.quick) line += " --quick";
+  if (arguments.quick) line += " --quick";
   const auto add = [&](const std::string& flag, const auto& value) {
     if (value) line += " " + flag + " " + std::to_string(*value);
   };
-  add("--seed", wanted.seed);
-  add("--scenes", wanted.scenes);
-  add("--queries", wanted.queries);
-  add("--runs", wanted.runs);
-  add("--rows", wanted.rows);
-  if (!data_folder(wanted).empty()) line += " --data DATA";
+  add("--seed", arguments.seed);
+  add("--scenes", arguments.scenes);
+  add("--queries", arguments.queries);
+  add("--runs", arguments.runs);
+  add("--rows", arguments.rows);
+  if (!data_folder(arguments).empty()) line += " --data DATA";
   return line;
 }
 
-// What means nothing to the paper is left to those to which it does.
-ReproduceArguments wanted_of(const ReproducedPaper& paper, ReproduceArguments wanted) {
-  wanted.paper = paper.name;
-  if (!paper.queries) wanted.queries = std::nullopt;
-  if (!paper.runs) wanted.runs = std::nullopt;
-  if (!paper.rows) wanted.rows = std::nullopt;
-  return wanted;
+// Removes the options that have no meaning for the paper.
+ReproduceArguments arguments_for(const ReproducedPaper& paper, ReproduceArguments arguments) {
+  arguments.paper = paper.name;
+  if (!paper.queries) arguments.queries = std::nullopt;
+  if (!paper.runs) arguments.runs = std::nullopt;
+  if (!paper.rows) arguments.rows = std::nullopt;
+  return arguments;
 }
 
 void remove_file(const fs::path& path) {
@@ -94,7 +94,7 @@ void remove_file(const fs::path& path) {
 
 }  // namespace
 
-lab::Reproduction reproduce_paper(const ReproducedPaper& paper, const ReproduceArguments& wanted,
+lab::Reproduction reproduce_paper(const ReproducedPaper& paper, const ReproduceArguments& arguments,
                                   const fs::path& out, Session& session) {
   Progress progress(session, "reproduce " + std::string(paper.name), 100);
   std::size_t shown_percent = 0;
@@ -104,7 +104,7 @@ lab::Reproduction reproduce_paper(const ReproducedPaper& paper, const ReproduceA
     shown_percent = std::max(shown_percent, percent);
   };
   remove_file(out / results_file);
-  const lab::ReproductionOptions options = reproduction_options(paper, wanted, out);
+  const lab::ReproductionOptions options = reproduction_options(paper, arguments, out);
   lab::Reproduction result = lab::reproduce(paper.name, options, session.executor(), report);
   progress.clear();
   const std::string name(paper.name);
@@ -117,13 +117,13 @@ lab::Reproduction reproduce_paper(const ReproducedPaper& paper, const ReproduceA
   return result;
 }
 
-ExitCode reproduce_all(const ReproduceArguments& wanted, Session& session) {
-  if (wanted.only) throw OptionError("--only has no meaning for all");
-  check_scenes(wanted);  // before anything of an earlier run is removed
-  const fs::path out(wanted.out.value_or("reproduction"));
-  const ordered_json record = run_record(wanted);
+ExitCode reproduce_all(const ReproduceArguments& arguments, Session& session) {
+  if (arguments.only) throw OptionError("--only has no meaning for all");
+  check_scenes(arguments);  // before anything of an earlier run is removed
+  const fs::path out(arguments.out.value_or("reproduction"));
+  const ordered_json record = make_run_record(arguments);
   const auto papers = reproduced_papers();
-  if (wanted.continues) {
+  if (arguments.continues) {
     require_same_run(out, record);
   } else {
     std::error_code error;
@@ -139,20 +139,20 @@ ExitCode reproduce_all(const ReproduceArguments& wanted, Session& session) {
                           std::string_view how) {
     if (session.json()) return;
     const lab::TargetCount count = lab::count_targets(rows);
-    session.print("  " + session.strong(paper.name) + ": " + std::to_string(count.held) + " of " +
+    session.print("  " + session.bold(paper.name) + ": " + std::to_string(count.held) + " of " +
                   std::to_string(count.judged) + " targets hold" + std::string(how));
   };
   lab::ResultsDocument document{
-      .version = PANONAV_VERSION, .command = command_line(wanted), .papers = {}};
+      .version = PANONAV_VERSION, .command = command_line(arguments), .papers = {}};
   for (const ReproducedPaper& paper : papers) {
     const fs::path file = out / paper.name / results_file;
     const bool is_done = fs::exists(file);
     if (!is_done) {
       static_cast<void>(
-          reproduce_paper(paper, wanted_of(paper, wanted), out / paper.name, session));
+          reproduce_paper(paper, arguments_for(paper, arguments), out / paper.name, session));
     }
     lab::PaperResults results{std::string(paper.name), std::string(paper.title),
-                              lab::from_json(text_of(file), file.string())};
+                              lab::from_json(read_text(file), file.string())};
     report(paper, results.rows, is_done ? " (finished by an earlier run)" : "");
     document.papers.push_back(std::move(results));
   }
@@ -165,10 +165,10 @@ ExitCode reproduce_all(const ReproduceArguments& wanted, Session& session) {
     return ExitCode::done;
   }
   for (const std::string& line : lab::list_misses(document)) {
-    session.print(session.bad("DOES NOT HOLD") + "  " + line);
+    session.print(session.red("DOES NOT HOLD") + "  " + line);
   }
   const lab::TargetCount count = lab::count_targets(document);
-  session.print(session.strong(std::to_string(count.held) + " of " + std::to_string(count.judged)) +
+  session.print(session.bold(std::to_string(count.held) + " of " + std::to_string(count.judged)) +
                 " targets hold; the table: " + (out / "index.html").string());
   return ExitCode::done;
 }

@@ -10,12 +10,12 @@ class Session;
 /// Runs the experiments of a paper and writes its tables, pictures and page into `out`;
 /// results.json is written last, so that it is there only when all is. Tells how far it is.
 [[nodiscard]] lab::Reproduction reproduce_paper(const ReproducedPaper& paper,
-                                                const ReproduceArguments& wanted,
+                                                const ReproduceArguments& arguments,
                                                 const std::filesystem::path& out, Session& session);
 
 /// Runs paper after paper, each in a folder of its own, and writes the table of all. With
 /// `continues` the papers that an earlier run of the same options and version has finished are
 /// read. Throws OptionError when the earlier run had others.
-ExitCode reproduce_all(const ReproduceArguments& wanted, Session& session);
+ExitCode reproduce_all(const ReproduceArguments& arguments, Session& session);
 
 }  // namespace panonav::command

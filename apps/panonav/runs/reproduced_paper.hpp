@@ -11,7 +11,7 @@
 
 namespace panonav::command {
 
-/// What the caller of `reproduce` wants; what is not given is as the paper has it.
+/// The arguments of `reproduce`; unset ones have the paper's defaults.
 struct ReproduceArguments {
   std::string paper;
   std::optional<std::string> out;  ///< empty: reproduction/PAPER, `reproduction` for all
@@ -52,12 +52,12 @@ struct ReproducedPaper {
 
 /// The folder with recordings and worlds: as asked for, else where the environment says; empty:
 /// none. Throws FileError when there is no such folder.
-[[nodiscard]] std::filesystem::path data_folder(const ReproduceArguments& wanted);
+[[nodiscard]] std::filesystem::path data_folder(const ReproduceArguments& arguments);
 
-/// Throws OptionError when there are too few variants for `wanted.paper`: intervals need two.
-void check_scenes(const ReproduceArguments& wanted);
+/// Throws OptionError when there are too few variants for `arguments.paper`: intervals need two.
+void check_scenes(const ReproduceArguments& arguments);
 
 /// Throws OptionError when an option is given that means nothing to the paper.
-void refuse_meaningless(const ReproducedPaper& paper, const ReproduceArguments& wanted);
+void refuse_meaningless(const ReproducedPaper& paper, const ReproduceArguments& arguments);
 
 }  // namespace panonav::command

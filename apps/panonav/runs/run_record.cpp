@@ -14,7 +14,8 @@ namespace panonav::command {
 namespace {
 
 /// The thumbnails of a memory that may not be there yet, for one thread.
-std::function<std::vector<std::uint8_t>(const std::string&)> thumbnails_of(std::string memory) {
+std::function<std::vector<std::uint8_t>(const std::string&)> make_thumbnail_reader(
+    std::string memory) {
   return [memory = std::move(memory), file = std::shared_ptr<MemoryFile>()](
              const std::string& name) mutable -> std::vector<std::uint8_t> {
     try {
@@ -34,7 +35,7 @@ std::function<std::vector<std::uint8_t>(const std::string&)> thumbnails_of(std::
 
 void declare_record(Arguments& arguments, RunRecordArguments& record) {
   arguments.option("--record FILE", record.file,
-                   "Write what is seen and answered as MCAP, for Rerun, Foxglove and Lichtblick");
+                   "Record images and answers as MCAP, for Rerun, Foxglove and Lichtblick");
 }
 
 void declare_view(Arguments& arguments, RunRecordArguments& record) {
@@ -43,44 +44,45 @@ void declare_view(Arguments& arguments, RunRecordArguments& record) {
                    "ADDRESS:PORT shows it to the network of that address, too");
 }
 
-RunRecord::RunRecord(const RunRecordArguments& wanted, std::span<const std::string> read, bool live,
-                     Session& session, const Offers& offers)
+RunRecord::RunRecord(const RunRecordArguments& arguments, std::span<const std::string> read,
+                     bool live, Session& session, const Offers& offers)
     : session_(session), live_(live) {
-  if (wanted.file) {
+  if (arguments.file) {
     for (const std::string& other : read) {
       std::error_code ignored;
-      if (std::filesystem::equivalent(*wanted.file, other, ignored)) {
-        throw UsageError("--record is " + *wanted.file +
+      if (std::filesystem::equivalent(*arguments.file, other, ignored)) {
+        throw UsageError("--record is " + *arguments.file +
                          ", which the run reads; allowed: another file");
       }
     }
-    recorder_.emplace(*wanted.file, recordings::RunRecorderOptions{.wait = !live});
+    recorder_.emplace(*arguments.file, recordings::RunRecorderOptions{.wait = !live});
   }
-  if (wanted.view) {
-    const ListeningPlace place = listening_place("--view", *wanted.view);
+  if (arguments.view) {
+    const ListeningPlace place = parse_listening_address("--view", *arguments.view);
     viewer::ViewServerOptions options;
     options.address = place.address;
     options.port = place.port;
     options.title = "panonav: " + (read.empty() ? std::string() : read.front());
     options.replay = !live;
     options.takes = offers.takes;
-    if (!offers.memory.empty()) options.thumbnail = thumbnails_of(offers.memory);
+    if (!offers.memory.empty()) options.thumbnail = make_thumbnail_reader(offers.memory);
     viewer_.emplace(options);
-    session_.ask("Open " + viewer_->url() + " in a browser" +
-                 (live ? "" : "; the run waits for it"));
+    session_.prompt("Open " + viewer_->url() + " in a browser" +
+                    (live ? "" : "; the run waits for it"));
   }
 }
 
-bool RunRecord::wants_pictures() const {
+bool RunRecord::needs_images() const {
   return recorder_ || page_ != nullptr || (viewer_ && (!live_ || viewer_->viewers() > 0));
 }
 
-recordings::RunMoment RunRecord::make_moment(const Observation& seen, std::size_t number) const {
-  if (wants_pictures()) return recordings::make_moment(seen, number);
-  return {.stamp_s = seen.stamp_s.value_or(static_cast<double>(number)),
-          .odometry = seen.odometry,
-          .tilt = seen.tilt,
-          .truth = seen.pose};
+recordings::RunMoment RunRecord::make_moment(const Observation& observation,
+                                             std::size_t number) const {
+  if (needs_images()) return recordings::make_moment(observation, number);
+  return {.stamp_s = observation.stamp_s.value_or(static_cast<double>(number)),
+          .odometry = observation.odometry,
+          .tilt = observation.tilt,
+          .truth = observation.pose};
 }
 
 void RunRecord::add(recordings::RunMoment moment) {
@@ -109,7 +111,7 @@ void RunRecord::close() {
   }
 }
 
-std::vector<std::uint8_t> best_match_of(const Place& place, const MemoryFile& file) {
+std::vector<std::uint8_t> load_best_match(const Place& place, const MemoryFile& file) {
   if (place.matches.empty()) return {};
   const auto view = file.find(place.matches.front().name);
   const auto picture = view ? file.thumbnail(*view) : std::nullopt;

@@ -15,7 +15,7 @@
 
 namespace panonav::command {
 
-/// Where a run is kept and shown.
+/// File and address for recording and viewing a run.
 struct RunRecordArguments {
   std::optional<std::string> file;
   std::optional<std::string> view;  ///< [ADDRESS:]PORT
@@ -26,35 +26,35 @@ void declare_record(Arguments& arguments, RunRecordArguments& record);
 /// Adds --view.
 void declare_view(Arguments& arguments, RunRecordArguments& record);
 
-/// What --record writes of a run, and --view shows. A record that cannot be written any more ends
-/// with a note, and the run goes on: its answers are worth more.
+/// Writes the record of a run (--record) and shows it (--view). If the record can no longer be
+/// written, it ends with a note, and the run continues.
 class RunRecord {
  public:
-  /// What viewers may ask of a run, and tell it.
+  /// What viewers of a run can see and send.
   struct Offers {
     std::string memory;  ///< whose thumbnails they see; empty: none
     viewer::ViewWish takes = viewer::ViewWish::none;
   };
 
-  /// Does nothing where nothing is wanted. Of a live run moments are left out that the disk or a
+  /// Does nothing where nothing is arguments. Of a live run moments are left out that the disk or a
   /// viewer does not keep up with; any other run waits for both. Throws UsageError where the file
   /// is one of those that the run reads or there is no such address, FileError where the file
   /// cannot be made.
-  RunRecord(const RunRecordArguments& wanted, std::span<const std::string> read, bool live,
+  RunRecord(const RunRecordArguments& arguments, std::span<const std::string> read, bool live,
             Session& session, const Offers& offers);
 
   /// Moments are added to the page, too, which must outlive the run.
-  void also_into(viewer::RunPage& page) noexcept { page_ = &page; }
-  /// Whether `add` does anything.
-  [[nodiscard]] bool wanted() const noexcept { return recorder_ || viewer_ || page_ != nullptr; }
-  /// Whether somebody looks at pictures: a file, or a viewer who is there or waited for.
-  [[nodiscard]] bool wants_pictures() const;
-  /// What is known of an observation, with its picture where it is wanted.
-  [[nodiscard]] recordings::RunMoment make_moment(const Observation& seen,
+  void copy_to(viewer::RunPage& page) noexcept { page_ = &page; }
+  /// True if `add` has an effect.
+  [[nodiscard]] bool is_active() const noexcept { return recorder_ || viewer_ || page_ != nullptr; }
+  /// True if a file or a viewer, present or waited for, takes images.
+  [[nodiscard]] bool needs_images() const;
+  /// Makes the moment of an observation, with its image if `needs_images`.
+  [[nodiscard]] recordings::RunMoment make_moment(const Observation& observation,
                                                   std::size_t number) const;
   void add(recordings::RunMoment moment);
-  /// What a viewer wished since the last time.
-  [[nodiscard]] std::optional<ReferencePose> consume_wish() {
+  /// Returns the latest input of a viewer since the last call.
+  [[nodiscard]] std::optional<ReferencePose> take_viewer_input() {
     return viewer_ ? viewer_->consume_wish() : std::nullopt;
   }
   /// All that waits is written, and viewers know that the run has ended.
@@ -72,6 +72,6 @@ class RunRecord {
 
 /// The thumbnail of the most similar view, by its name: views that were just added have other ids
 /// in the file. Empty without one.
-[[nodiscard]] std::vector<std::uint8_t> best_match_of(const Place& place, const MemoryFile& file);
+[[nodiscard]] std::vector<std::uint8_t> load_best_match(const Place& place, const MemoryFile& file);
 
 }  // namespace panonav::command

@@ -6,7 +6,7 @@
 
 namespace panonav::command {
 
-void put_component(recordings::RunMoment& moment, const TopologicalMap& map, std::size_t component,
+void add_component(recordings::RunMoment& moment, const TopologicalMap& map, std::size_t component,
                    const std::vector<std::string>& names) {
   for (std::size_t i = 0; i < map.nodes.size(); ++i) {
     const MapNode& node = map.nodes[i];
@@ -24,8 +24,8 @@ void put_component(recordings::RunMoment& moment, const TopologicalMap& map, std
   }
 }
 
-void GrowingMap::put(recordings::RunMoment& moment, const TopologicalMap& map, bool is_node,
-                     const std::string& name) {
+void GrowingMap::add_to(recordings::RunMoment& moment, const TopologicalMap& map, bool is_node,
+                        const std::string& name) {
   truth_ = moment.truth;
   last_is_node_ = is_node;
   if (is_node) {
@@ -39,13 +39,13 @@ void GrowingMap::put(recordings::RunMoment& moment, const TopologicalMap& map, b
   moment.values = {{"places", std::to_string(map.nodes.size())},
                    {"closures", std::to_string(closures)}};
   if (map.nodes.empty()) return;
-  if (closures > told_closures_) moment.values.emplace_back("event", "a loop is closed");
+  if (closures > shown_closures_) moment.values.emplace_back("event", "a loop is closed");
   const std::size_t component = map.nodes.back().component;
   place(moment, map, component);
-  if (closures == told_closures_ && map.nodes.size() <= told_nodes_ + told_nodes_ / 20) return;
-  told_closures_ = closures;
-  told_nodes_ = map.nodes.size();
-  put_component(moment, map, component, names_);
+  if (closures == shown_closures_ && map.nodes.size() <= shown_nodes_ + shown_nodes_ / 20) return;
+  shown_closures_ = closures;
+  shown_nodes_ = map.nodes.size();
+  add_component(moment, map, component, names_);
 }
 
 void GrowingMap::finish(recordings::RunMoment& moment, const TopologicalMap& map) const {
@@ -54,7 +54,7 @@ void GrowingMap::finish(recordings::RunMoment& moment, const TopologicalMap& map
   moment.truth = truth_;
   place(moment, map, component);
   moment.values.emplace_back("event", "the map is finished");
-  put_component(moment, map, component, names_);
+  add_component(moment, map, component, names_);
 }
 
 void GrowingMap::place(recordings::RunMoment& moment, const TopologicalMap& map,

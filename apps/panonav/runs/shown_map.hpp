@@ -13,18 +13,18 @@ namespace panonav::command {
 
 /// The nodes and edges of one connected component, as components have no common frame. `names`: of
 /// the nodes.
-void put_component(recordings::RunMoment& moment, const TopologicalMap& map, std::size_t component,
+void add_component(recordings::RunMoment& moment, const TopologicalMap& map, std::size_t component,
                    const std::vector<std::string>& names);
 
-/// What people see of a map while it grows: the connected component of the newest node.
+/// Shows a map while it grows: the connected component of the newest node.
 class GrowingMap {
  public:
   /// The map as it is after the observation of this moment; `is_node`: which became a node. Nodes
   /// and edges are told when a closure came or a twentieth of the nodes is new. The truth is moved
   /// into the frame of the map, by the first node of the component; without a heading of it there
   /// is none.
-  void put(recordings::RunMoment& moment, const TopologicalMap& map, bool is_node,
-           const std::string& name);
+  void add_to(recordings::RunMoment& moment, const TopologicalMap& map, bool is_node,
+              const std::string& name);
   /// The finished map: its largest component.
   void finish(recordings::RunMoment& moment, const TopologicalMap& map) const;
 
@@ -35,8 +35,8 @@ class GrowingMap {
   std::vector<std::optional<ReferencePose>> truths_;  // of the nodes
   std::optional<ReferencePose> truth_;                // of the last observation
   bool last_is_node_ = false;
-  std::size_t told_nodes_ = 0;
-  std::size_t told_closures_ = 0;
+  std::size_t shown_nodes_ = 0;
+  std::size_t shown_closures_ = 0;
 };
 
 }  // namespace panonav::command

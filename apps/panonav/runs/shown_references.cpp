@@ -17,10 +17,10 @@ ShownReferences::ShownReferences(const VisualMemory& memory) {
   }
 }
 
-void ShownReferences::put(recordings::RunMoment& moment) const {
+void ShownReferences::add_to(recordings::RunMoment& moment) const {
   moment.references = positions_;
   moment.reference_views = views_;
-  moment.regions = regions_of(positions_);
+  moment.regions = voronoi_regions(positions_);
 }
 
 void ShownReferences::compare(recordings::RunMoment& moment, const VisualMemory& memory,
@@ -35,8 +35,8 @@ void ShownReferences::compare(recordings::RunMoment& moment, const VisualMemory&
   }
 }
 
-std::vector<recordings::RunRegion> regions_of(const std::vector<Point2>& positions,
-                                              const std::vector<std::size_t>& areas) {
+std::vector<recordings::RunRegion> voronoi_regions(const std::vector<Point2>& positions,
+                                                   const std::vector<std::size_t>& areas) {
   constexpr std::size_t max_cells = 5000;
   if (positions.size() > max_cells) return {};
   const VoronoiCells cells(positions);

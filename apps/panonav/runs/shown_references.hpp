@@ -18,8 +18,8 @@ class ShownReferences {
   explicit ShownReferences(const VisualMemory& memory);
 
   /// Positions, names and Voronoi cells: of the first moment, and when there are others.
-  void put(recordings::RunMoment& moment) const;
-  /// How alike the view is to the references, to the 1000 most similar of more. Cost: a search that
+  void add_to(recordings::RunMoment& moment) const;
+  /// Adds the similarities of the view to its 1000 most similar references. Cost: a search that
   /// sorts them.
   void compare(recordings::RunMoment& moment, const VisualMemory& memory,
                const PackedSignature& view) const;
@@ -32,7 +32,7 @@ class ShownReferences {
 
 /// The cells of positions, all of one area or of those given by position. Empty where there are
 /// more than anybody sees apart, 5000, or fewer than two.
-[[nodiscard]] std::vector<recordings::RunRegion> regions_of(
+[[nodiscard]] std::vector<recordings::RunRegion> voronoi_regions(
     const std::vector<Point2>& positions, const std::vector<std::size_t>& areas = {});
 
 /// Notes how long the stages of a moment take.
@@ -40,17 +40,17 @@ class StageClock {
  public:
   /// The stage since the one before ends here.
   void stage(const char* name) { part(name, std::chrono::steady_clock::now() - since_); }
-  /// So much of the stage that goes on was another one.
+  /// Counts this part of the current stage as another stage.
   void part(const char* name, std::chrono::steady_clock::duration duration) {
     add(name, std::chrono::duration<double, std::milli>(duration).count());
     since_ += duration;
   }
   /// Measured elsewhere, before.
   void add(const char* name, double ms) { stages_.emplace_back(name, ms); }
-  /// What comes now is not of a stage that was begun.
+  /// Discards the time since the last stage.
   void restart() { since_ = std::chrono::steady_clock::now(); }
   /// Appends them to the moment's.
-  void put(recordings::RunMoment& moment) {
+  void add_to(recordings::RunMoment& moment) {
     for (auto& one : stages_) moment.stages_ms.push_back(std::move(one));
     stages_.clear();
   }

@@ -4,45 +4,45 @@
 
 namespace panonav::command {
 
-void declare_simulation(Arguments& arguments, simulation::SimulatedWorldOptions& wanted) {
-  arguments.options("recording", wanted.recording);
-  arguments.options("simulation", wanted.simulation);
-  arguments.options("frame", wanted.frame);
-  arguments.options("sensor", wanted.sensor);
-  arguments.options("free_space", wanted.free_space);
-  arguments.options("odometry", wanted.odometry, "odometry");
-  require_effects(arguments, wanted);
-  const auto& simulation = wanted.simulation;
-  arguments.used_only(
+void declare_simulation(Arguments& arguments, simulation::SimulatedWorldOptions& values) {
+  arguments.options("recording", values.recording);
+  arguments.options("simulation", values.simulation);
+  arguments.options("frame", values.frame);
+  arguments.options("sensor", values.sensor);
+  arguments.options("free_space", values.free_space);
+  arguments.options("odometry", values.odometry, "odometry");
+  require_effects(arguments, values);
+  const auto& simulation = values.simulation;
+  arguments.refuse_unless(
       {"--rows", "--columns", "--elevation-low-deg", "--elevation-high-deg"},
       [&simulation] { return simulation.kind == 1; }, "without --kind panorama");
-  arguments.used_only(
+  arguments.refuse_unless(
       {"--vignetting"}, [&simulation] { return simulation.kind != 1; }, "with --kind panorama");
-  arguments.used_only(
+  arguments.refuse_unless(
       {"--lens-seed", "--lens-distance-m"}, [&simulation] { return simulation.kind == 2; },
       "without --kind dual-fisheye");
 }
 
-void require_effects(Arguments& arguments, const simulation::SimulatedWorldOptions& wanted) {
-  const auto& sensor = wanted.sensor;
-  arguments.used_only(
-      {"--moved-seed"}, [&wanted] { return wanted.simulation.scene.moved_objects > 0.0; },
+void require_effects(Arguments& arguments, const simulation::SimulatedWorldOptions& values) {
+  const auto& sensor = values.sensor;
+  arguments.refuse_unless(
+      {"--moved-seed"}, [&values] { return values.simulation.scene.moved_objects > 0.0; },
       "without --moved-objects");
-  arguments.used_only(
+  arguments.refuse_unless(
       {"--light-azimuth-rad"}, [&sensor] { return sensor.directional_light > 0.0; },
       "without --directional-light");
-  arguments.used_only(
+  arguments.refuse_unless(
       {"--occluders"}, [&sensor] { return sensor.occluded_fraction > 0.0; },
       "without --occluded-fraction");
-  arguments.used_only(
+  arguments.refuse_unless(
       {"--eight-bit"}, [&sensor] { return sensor.eight_bit; },
-      "on pictures, whose values always have eight bits");
+      "on images, whose values always have eight bits");
 }
 
-simulation::FindSetOption typed_options(const Arguments& arguments) {
+simulation::FindSetOption make_option_lookup(const Arguments& arguments) {
   return [&arguments](const std::string& section,
                       const std::string& name) -> std::optional<std::string> {
-    if (!arguments.given(section, name)) return std::nullopt;
+    if (!arguments.is_set(section, name)) return std::nullopt;
     std::string flag = "--" + name;
     std::ranges::replace(flag, '_', '-');
     return flag;

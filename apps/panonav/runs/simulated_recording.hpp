@@ -5,11 +5,11 @@
 
 namespace panonav::command {
 
-void declare_simulation(Arguments& arguments, simulation::SimulatedWorldOptions& wanted);
-/// What the options of scene and sensor need of each other, for verbs that declare both.
-void require_effects(Arguments& arguments, const simulation::SimulatedWorldOptions& wanted);
+void declare_simulation(Arguments& declared, simulation::SimulatedWorldOptions& arguments);
+/// Declares which options of scene and sensor depend on each other, for verbs that have both.
+void require_effects(Arguments& declared, const simulation::SimulatedWorldOptions& arguments);
 
 /// The options that the user typed.
-[[nodiscard]] simulation::FindSetOption typed_options(const Arguments& arguments);
+[[nodiscard]] simulation::FindSetOption make_option_lookup(const Arguments& declared);
 
 }  // namespace panonav::command

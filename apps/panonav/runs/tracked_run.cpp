@@ -73,13 +73,13 @@ TrackedImage track_image(Tracker& tracker, const PackedSignature& view,
       }
     }
     clock.stage("for viewers");
-    clock.put(*moment);
+    clock.add_to(*moment);
     image.moment = std::move(moment);
   }
   return image;
 }
 
-void tell_wish(recordings::RunMoment& moment) {
+void note_viewer_pose(recordings::RunMoment& moment) {
   moment.values.emplace_back("event", "a viewer tells where the robot is");
 }
 
@@ -88,7 +88,7 @@ void add(viewer::RunPage& page, const TrackedImage& image) {
   moment.particles = image.particles;
   constexpr std::size_t max_compared = 50;  // else they would be most of a page of many pictures
   if (moment.comparisons.size() > max_compared) moment.comparisons.resize(max_compared);
-  moment.values.insert(moment.values.begin(), {"picture", image.file});
+  moment.values.insert(moment.values.begin(), {"image", image.file});
   page.add(moment);
 }
 
@@ -96,39 +96,40 @@ void track(Tracker& tracker, const Dataset& run, const TrackSettings& settings, 
            const std::function<void(TrackedImage&&)>& report) {
   const auto& entries = run.entries;
   const auto every = static_cast<std::size_t>(settings.every);
-  const std::size_t looked_at = (entries.size() + every - 1) / every;
+  const std::size_t image_count = (entries.size() + every - 1) / every;
   constexpr std::size_t batch = 32;
-  for (std::size_t begin = 0; begin < looked_at; begin += batch) {
-    const std::size_t count = std::min(batch, looked_at - begin);
+  for (std::size_t begin = 0; begin < image_count; begin += batch) {
+    const std::size_t count = std::min(batch, image_count - begin);
     std::vector<std::optional<PackedSignature>> signatures(count);
     std::vector<std::optional<recordings::RunMoment>> moments(count);
     for_each_entry(executor, count, [&](std::size_t i) {
       const std::size_t index = (begin + i) * every;
       StageClock clock;
-      Observation seen = read_observation(entries[index]);
+      Observation observation = read_observation(entries[index]);
       clock.stage("reading");
       if (settings.recorded == nullptr) {
-        signatures[i] = tracker.encoder().packed(seen);
+        signatures[i] = tracker.encoder().packed(observation);
         return;
       }
-      recordings::RunMoment& moment = moments[i].emplace(recordings::make_moment(seen, index));
+      recordings::RunMoment& moment =
+          moments[i].emplace(recordings::make_moment(observation, index));
       clock.restart();
-      moment.panorama = tracker.encoder().panorama(seen);
+      moment.panorama = tracker.encoder().panorama(observation);
       clock.stage("unwarping");
       signatures[i] = tracker.encoder().packed(*moment.panorama);
       clock.stage("signature");
-      clock.put(moment);
-      if (index == 0 && settings.shown != nullptr) settings.shown->put(moment);
+      clock.add_to(moment);
+      if (index == 0 && settings.shown != nullptr) settings.shown->add_to(moment);
     });
     for (std::size_t i = 0; i < count; ++i) {
       const std::size_t index = (begin + i) * every;
-      const bool wished = settings.wished && settings.wished();
+      const bool has_viewer_input = settings.has_viewer_input && settings.has_viewer_input();
       for (std::size_t e = index - std::min(index, every - 1); e <= index; ++e) {
         tracker.move_to(*entries[e].odometry);
       }
       const DatasetEntry& entry = entries[index];
       TrackedImage image = track_image(tracker, *signatures[i], settings, std::move(moments[i]));
-      if (image.moment && wished) tell_wish(*image.moment);
+      if (image.moment && has_viewer_input) note_viewer_pose(*image.moment);
       image.index = index;
       image.file = entry.file;
       image.stamp_s = entry.stamp_s;

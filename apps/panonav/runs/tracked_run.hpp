@@ -28,12 +28,13 @@ struct TrackedImage {
   std::optional<ReferencePose> truth;
   MonteCarloEstimate estimate;
   std::vector<Pose2> particles;  ///< an even sample of them, as many as were asked for
-  std::optional<recordings::RunMoment> moment;  ///< what was seen, where a record is wanted
+  std::optional<recordings::RunMoment>
+      moment;  ///< what a record holds of it; nullopt: nothing is recorded
 };
 
-/// What is true of all runs: whether and how far off the answer was.
+/// True if the robot was localised at the image.
 [[nodiscard]] bool is_localised(const TrackedImage& image);
-/// Of the pose beside the true one; empty where one of them is not known.
+/// Error of the estimated pose; nullopt if it or the true pose is not known.
 [[nodiscard]] std::optional<double> position_error_m(const TrackedImage& image);
 [[nodiscard]] std::optional<double> heading_error_rad(const TrackedImage& image);
 
@@ -58,16 +59,16 @@ struct TrackSettings {
   const ShownReferences* shown = nullptr;
   /// Asked before each image: whether somebody has told the tracker where the robot is. Empty:
   /// nobody can.
-  std::function<bool()> wished;
+  std::function<bool()> has_viewer_input;
 };
 
-/// What the filter says of the image and, where a moment is given, what is recorded of it.
+/// Updates the filter with a view; completes the moment, if there is one.
 [[nodiscard]] TrackedImage track_image(Tracker& tracker, const PackedSignature& view,
                                        const TrackSettings& settings,
                                        std::optional<recordings::RunMoment> moment);
 
 /// That a viewer has told where the robot is.
-void tell_wish(recordings::RunMoment& moment);
+void note_viewer_pose(recordings::RunMoment& moment);
 
 /// Adds the image to the page that plays the run. Its moment must be there.
 void add(viewer::RunPage& page, const TrackedImage& image);

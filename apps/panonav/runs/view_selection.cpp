@@ -14,7 +14,7 @@ namespace panonav::command {
 namespace {
 
 /// x, y and the distance from there.
-std::array<double, 3> circle_of(const std::string& text) {
+std::array<double, 3> parse_circle(const std::string& text) {
   std::array<double, 3> circle{};
   std::size_t begin = 0;
   for (std::size_t i = 0; i < circle.size(); ++i) {
@@ -22,7 +22,7 @@ std::array<double, 3> circle_of(const std::string& text) {
     if (end == std::string::npos || end < begin) {
       throw UsageError("--near is '" + text + "'; allowed: X,Y,METRES");
     }
-    circle[i] = number_from_text("--near", std::string_view(text).substr(begin, end - begin));
+    circle[i] = parse_number("--near", std::string_view(text).substr(begin, end - begin));
     begin = end + 1;
   }
   if (!(circle[2] >= 0.0)) throw UsageError("--near is '" + text + "'; allowed: METRES >= 0");
@@ -36,7 +36,7 @@ void declare_selection(Arguments& arguments, ViewSelection& selection) {
       "--name PATTERN", selection.name,
       "Only views whose name fits a pattern: * stands for any text, ? for a character");
   arguments.option("--near X,Y,METRES", selection.near,
-                   "Only views at most so far from this place");
+                   "Only views within this distance of a position");
 }
 
 std::vector<ViewRecord> selected(std::vector<ViewRecord> views, const ViewSelection& selection) {
@@ -46,7 +46,7 @@ std::vector<ViewRecord> selected(std::vector<ViewRecord> views, const ViewSelect
     });
   }
   if (selection.near) {
-    const auto [x_m, y_m, radius_m] = circle_of(*selection.near);
+    const auto [x_m, y_m, radius_m] = parse_circle(*selection.near);
     std::erase_if(views, [&, x_m = x_m, y_m = y_m, radius_m = radius_m](const ViewRecord& view) {
       const auto& pose = view.info.pose;
       return !pose || std::hypot(pose->x_m - x_m, pose->y_m - y_m) > radius_m;

@@ -31,23 +31,24 @@ struct ArrangeArguments {
 };
 
 /// Motion between consecutive pictures of the data set that the memory knows by name.
-std::vector<CoarseMotion> motions_of(const ArrangeArguments& wanted, const PictureSource& source,
-                                     const VisualMemory& memory, Session& session) {
-  if (!wanted.odometry) return {};
+std::vector<CoarseMotion> read_motions(const ArrangeArguments& arguments,
+                                       const PictureSource& source, const VisualMemory& memory,
+                                       Session& session) {
+  if (!arguments.odometry) return {};
   const Dataset recording =
-      read_described(*wanted.odometry, wanted.pictures, source,
+      read_described(*arguments.odometry, arguments.pictures, source,
                      "odom_x_m,odom_y_m,odom_heading_deg", "1.5,0.25,90", session);
-  auto motions = make_coarse_motions(recording, memory, wanted.motion);
+  auto motions = make_coarse_motions(recording, memory, arguments.motion);
   if (motions.empty()) {
-    throw FileError(*wanted.odometry,
-                    "has no odometry between pictures that the memory knows by name");
+    throw FileError(*arguments.odometry,
+                    "has no odometry between images that the memory knows by name");
   }
   return motions;
 }
 
 /// Poses of the largest component in the order of the views; the stamp is the view's, or its
 /// number.
-std::vector<StampedPose> trajectory_of(const Lattice& lattice, const VisualMemory& memory) {
+std::vector<StampedPose> make_trajectory(const Lattice& lattice, const VisualMemory& memory) {
   const auto has_stamp = [&](const Lattice::Node& node) {
     return memory.info(node.view).stamp_s.has_value();
   };
@@ -68,7 +69,7 @@ std::vector<StampedPose> trajectory_of(const Lattice& lattice, const VisualMemor
   return trajectory;
 }
 
-std::size_t number_rejected(const Lattice& lattice) {
+std::size_t count_rejected(const Lattice& lattice) {
   return static_cast<std::size_t>(std::ranges::count_if(
       lattice.springs, [](const auto& spring) { return spring.weight < min_spring_weight; }));
 }
@@ -83,7 +84,7 @@ ordered_json as_json(const LatticeComparison& comparison) {
           {"continuity", or_null(comparison.continuity)}};
 }
 
-ordered_json as_json(const ArrangeArguments& wanted, const Lattice& lattice,
+ordered_json as_json(const ArrangeArguments& arguments, const Lattice& lattice,
                      const VisualMemory& memory) {
   auto components = ordered_json::array();
   for (const Lattice::Component& component : lattice.components) {
@@ -97,16 +98,16 @@ ordered_json as_json(const ArrangeArguments& wanted, const Lattice& lattice,
                      {"connected_component", node.component},
                      {"x", node.pose.x_m},
                      {"y", node.pose.y_m},
-                     {"heading_rad", wanted.lattice.phases || lattice.metric
+                     {"heading_rad", arguments.lattice.phases || lattice.metric
                                          ? ordered_json(node.pose.heading_rad)
                                          : ordered_json()}});
   }
-  ordered_json json{{"memory", wanted.memory},
+  ordered_json json{{"memory", arguments.memory},
                     {"views", lattice.nodes.size()},
                     {"connected_components", std::move(components)},
                     {"candidates", lattice.candidates},
                     {"springs", lattice.springs.size()},
-                    {"springs_rejected", number_rejected(lattice)},
+                    {"springs_rejected", count_rejected(lattice)},
                     {"metric", lattice.metric},
                     {"iterations", lattice.iterations},
                     {"energy", lattice.energy},
@@ -119,33 +120,34 @@ ordered_json as_json(const ArrangeArguments& wanted, const Lattice& lattice,
 }
 
 void print_result(const Lattice& lattice, const VisualMemory& memory, Session& session) {
-  session.print(session.strong(std::to_string(lattice.nodes.size())) + " views arranged by " +
+  session.print(session.bold(std::to_string(lattice.nodes.size())) + " views arranged by " +
                 std::to_string(lattice.springs.size()) + " springs of " +
                 std::to_string(lattice.candidates) + " candidates, " +
-                std::to_string(number_rejected(lattice)) + " of them rejected; unit: " +
+                std::to_string(count_rejected(lattice)) + " of them rejected; unit: " +
                 (lattice.metric ? "metres" : "the distance to the nearest view (median)"));
   if (lattice.components.size() > 1) {
     std::string others;
-    std::size_t alone = 0;
+    std::size_t single_views = 0;
     for (const auto& component : std::span(lattice.components).subspan(1)) {
-      alone += component.views == 1 ? 1 : 0;
+      single_views += component.views == 1 ? 1 : 0;
       if (component.views == 1) continue;
       others += (others.empty() ? "; the others hold " : ", ") + std::to_string(component.views);
     }
-    if (alone > 0) others += "; " + std::to_string(alone) + " views are joined to none";
+    if (single_views > 0)
+      others += "; " + std::to_string(single_views) + " views are joined to none";
     session.print("The largest of " +
-                  session.bad(std::to_string(lattice.components.size()) + " connected components") +
+                  session.red(std::to_string(lattice.components.size()) + " connected components") +
                   " holds " + std::to_string(lattice.components.front().views) + " of the " +
                   std::to_string(lattice.nodes.size()) + " views" + others +
-                  ". How components lie to each other is unknown, and no way leads from one to "
-                  "another.");
+                  ". Their positions relative to each other are unknown, and no path leads from "
+                  "one to another.");
   }
   if (!lattice.components.front().handedness_known) {
-    session.print("It may as well be the mirror image: nothing tells left from right.");
+    session.print("It may be the mirror image: left and right cannot be told apart.");
   }
   if (const auto comparison = compare_with_ground_truth(lattice, memory)) {
-    session.print("beside the ground truth: Procrustes disparity (shape difference) " +
-                  session.strong(format_fixed(comparison->shape_difference, 4)) + " over " +
+    session.print("compared with the ground truth: Procrustes disparity (shape difference) " +
+                  session.bold(format_fixed(comparison->shape_difference, 4)) + " over " +
                   std::to_string(comparison->compared) + " views, " +
                   format_fixed(comparison->rms_m, 2) + " m rms with a free scale of " +
                   format_fixed(comparison->scale, 3));
@@ -157,82 +159,82 @@ void print_result(const Lattice& lattice, const VisualMemory& memory, Session& s
   }
 }
 
-ExitCode arrange_views(const ArrangeArguments& wanted, Session& session) {
-  auto file =
-      MemoryFile::open(wanted.memory, wanted.no_save ? Access::read_only : Access::read_write);
+ExitCode arrange_views(const ArrangeArguments& arguments, Session& session) {
+  auto file = MemoryFile::open(arguments.memory,
+                               arguments.no_save ? Access::read_only : Access::read_write);
   const VisualMemory memory = file.load();
   if (memory.empty()) {
-    return session.no_answer("panonav arrange: " + wanted.memory + " holds no views");
+    return session.no_answer("panonav arrange: " + arguments.memory + " holds no views");
   }
   session.detail(std::to_string(memory.size()) + " views loaded");
-  if (wanted.report) prepare_report_folder(*wanted.report, "arrange");
+  if (arguments.report) prepare_report_folder(*arguments.report, "arrange");
   LatticeSteps steps;
-  const LatticeWatch watch = wanted.report ? steps.watch() : LatticeWatch();
-  const Lattice lattice =
-      arrange(memory, wanted.lattice, motions_of(wanted, file.header().source, memory, session),
-              session.executor(), watch);
+  const LatticeWatch watch = arguments.report ? steps.watch() : LatticeWatch();
+  const Lattice lattice = arrange(memory, arguments.lattice,
+                                  read_motions(arguments, file.header().source, memory, session),
+                                  session.executor(), watch);
   session.detail("views arranged");
-  if (!wanted.no_save) store_lattice(lattice, memory, file);
-  if (wanted.tum) write_trajectory(*wanted.tum, trajectory_of(lattice, memory));
-  if (wanted.graph) {
-    write_graph(*wanted.graph, to_topological_map(lattice),
+  if (!arguments.no_save) store_lattice(lattice, memory, file);
+  if (arguments.tum) write_trajectory(*arguments.tum, make_trajectory(lattice, memory));
+  if (arguments.graph) {
+    write_graph(*arguments.graph, to_topological_map(lattice),
                 [&](ViewId view) { return memory.info(view).name; });
   }
-  if (wanted.picture) write_lattice_picture(*wanted.picture, lattice, memory);
-  if (wanted.report) {
-    write_arrange_report(*wanted.report, memory_name(file.path()), lattice, memory, steps);
+  if (arguments.picture) write_lattice_picture(*arguments.picture, lattice, memory);
+  if (arguments.report) {
+    write_arrange_report(*arguments.report, memory_name(file.path()), lattice, memory, steps);
   }
   if (session.json()) {
-    session.print(json_line(as_json(wanted, lattice, memory)));
+    session.print(json_line(as_json(arguments, lattice, memory)));
   } else {
     print_result(lattice, memory, session);
-    if (wanted.picture && lattice.components.size() > 1) {
-      session.print(*wanted.picture + " shows the largest connected component of the map, " +
+    if (arguments.picture && lattice.components.size() > 1) {
+      session.print(*arguments.picture + " shows the largest connected component of the map, " +
                     std::to_string(lattice.components.front().views) + " of " +
                     std::to_string(lattice.nodes.size()) + " views.");
     }
-    if (wanted.report) tell_report(*wanted.report, session);
+    if (arguments.report) print_report_path(*arguments.report, session);
   }
   return ExitCode::done;
 }
 
 Run declare_arrange(Arguments& arguments) {
-  auto wanted = std::make_shared<ArrangeArguments>();
-  arguments.positional("MEMORY", wanted->memory, "Memory file; its views may be in any order");
+  auto values = std::make_shared<ArrangeArguments>();
+  arguments.positional("MEMORY", values->memory, "Memory file; its views may be in any order");
   arguments.option(
-      "--odometry DATASET", wanted->odometry,
+      "--odometry DATASET", values->odometry,
       "Take the robot's motion between views from this data set or recording, by name");
-  declare_topics(arguments, wanted->pictures.topics);
+  declare_topics(arguments, values->pictures.topics);
   arguments.option(
-      "--tum FILE", wanted->tum,
+      "--tum FILE", values->tum,
       "Write the poses of the largest component to this file: TUM text, or CSV for a name "
       "that ends in .csv");
-  arguments.option("--graphml FILE", wanted->graph, "Write the map as a graph to this file");
-  arguments.option("--picture FILE", wanted->picture,
-                   "Draw the map, beside the truth where it is known, into this PNG or SVG file");
-  arguments.option("--report FOLDER", wanted->report,
-                   "Write a page that shows the arrangement as it unfolds into this folder: a new "
+  arguments.option("--graphml FILE", values->graph, "Write the map as a graph to this file");
+  arguments.option(
+      "--picture FILE", values->picture,
+      "Draw the map, next to the true positions where they are known, into this PNG or SVG file");
+  arguments.option("--report FOLDER", values->report,
+                   "Write a page that shows the arrangement step by step into this folder: a new "
                    "one, or that of an earlier report");
-  arguments.flag("--no-save", wanted->no_save, "Leave the memory file as it is");
-  arguments.options("lattice", wanted->lattice);
-  arguments.options("coarse_motion", wanted->motion, "motion");
+  arguments.flag("--no-save", values->no_save, "Leave the memory file as it is");
+  arguments.options("lattice", values->lattice);
+  arguments.options("coarse_motion", values->motion, "motion");
   arguments.common({"--neighbours"});
-  arguments.used_only(
-      {"[coarse_motion]"}, [wanted] { return wanted->odometry.has_value(); }, "without --odometry");
-  return [wanted](Session& session) { return arrange_views(*wanted, session); };
+  arguments.refuse_unless(
+      {"[coarse_motion]"}, [values] { return values->odometry.has_value(); }, "without --odometry");
+  return [values](Session& session) { return arrange_views(*values, session); };
 }
 
 }  // namespace
 
 Verb arrange_verb() {
-  return {
-      "arrange", "Arrange the views of a memory as they lie in space, by their similarity alone",
-      "Views may have been taken in any order; poses in the memory are only compared with. What "
-      "nothing connects is kept as separate components. The map is stored in the memory under the "
-      "name lattice.",
-      "  panonav arrange office.panonav --report arranged\n"
-      "  panonav arrange hall.panonav --odometry run --graphml hall.graphml --json",
-      declare_arrange};
+  return {"arrange", "Arrange the views of a memory in space, by their similarity alone",
+          "Views may be in any order; poses in the memory are only used for comparison. Parts that "
+          "are not connected are kept as separate components. The map is stored in the memory "
+          "under the name lattice.",
+          "  panonav arrange office.panonav --report arranged\n"
+          "  panonav arrange hall.panonav --odometry run --graphml hall.graphml --json",
+          declare_arrange};
 }
 
 }  // namespace panonav::command

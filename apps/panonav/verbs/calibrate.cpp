@@ -14,7 +14,7 @@ namespace panonav::command {
 
 namespace {
 
-/// What no picture shows of a mirror: its profile, and where the robot's forward direction lies.
+/// Properties of a mirror that images do not show: its profile and the robot's forward direction.
 struct MirrorOptions {
   int profile = 0;
   double inner_elevation_deg = -60.0;
@@ -29,7 +29,7 @@ struct MirrorOptions {
 void visit_options(MirrorOptions& options, OptionVisitor& visitor) {
   using T = MirrorOptions;
   constexpr OptionTable table{
-      choice<&T::profile>("Shape of the mirror, or two fisheye lenses side by side in one picture",
+      choice<&T::profile>("Shape of the mirror, or two fisheye lenses side by side in one image",
                           "equiangular", "hyperboloidal", "unified", "dual-fisheye"),
       option<&T::inner_elevation_deg>("Elevation seen at the inner radius (equiangular)", -90, 90),
       option<&T::rim_elevation_deg>("Elevation seen at the mirror's rim", -90, 90),
@@ -37,19 +37,19 @@ void visit_options(MirrorOptions& options, OptionVisitor& visitor) {
       option<&T::mirror_b_mm>("b of the hyperboloid [Y03 eq. 1]", above(0)),
       option<&T::xi>("Mirror parameter of the unified model", 0, 10),
       choice<&T::direction>(
-          "How a turn to the left runs in the picture: clockwise where the camera looks up into "
-          "the mirror, counter-clockwise where it looks down; dual-fisheye: counter-clockwise "
-          "where the picture is mirrored",
+          "Direction in which the image moves when the robot rotates to the left: clockwise where "
+          "the camera looks up into the mirror, counter-clockwise where it looks down; "
+          "dual-fisheye: counter-clockwise where the image is mirrored",
           "clockwise", "counter-clockwise"),
       option<&T::forward_angle_deg>(
-          "Where the robot's forward direction lies in the picture: 0 right, 90 up", -360, 360),
+          "Where the robot's forward direction lies in the image: 0 right, 90 up", -360, 360),
   };
   table.visit(options, visitor);
 }
 
 constexpr int dual_fisheye_profile = 3;
 
-/// What is known of a camera of two fisheye lenses.
+/// Known properties of a camera with two fisheye lenses.
 struct LensesOptions {
   double left_roll_deg = 0.0;
   double right_roll_deg = 0.0;
@@ -61,17 +61,16 @@ struct LensesOptions {
 void visit_options(LensesOptions& options, OptionVisitor& visitor) {
   using T = LensesOptions;
   constexpr OptionTable table{
-      option<&T::left_roll_deg>(
-          "How what is above lies in the left circle: 0 at the top, 90 at its left, -90 right",
-          -360, 360),
-      option<&T::right_roll_deg>("The same of the right circle", -360, 360),
+      option<&T::left_roll_deg>("Position of the zenith side in the left circle: 0 at its top, 90 "
+                                "at its left, -90 at its right",
+                                -360, 360),
+      option<&T::right_roll_deg>("The same for the right circle", -360, 360),
       option<&T::left_azimuth_deg>(
-          "Where the left lens looks, counter-clockwise from the robot's forward direction", -360,
+          "Azimuth of the left lens, counter-clockwise from the robot's forward direction", -360,
           360),
-      option<&T::field_of_view_deg>("Field of view of each lens; 0: found, 185 to 220", 0, 300),
+      option<&T::field_of_view_deg>("Field of view of each lens; 0: estimated, 185 to 220", 0, 300),
       option<&T::turn_deg>(
-          "How far the camera was turned to the left from each picture to the next; 0: found", -360,
-          360),
+          "Rotation of the camera to the left between consecutive images; 0: estimated", -360, 360),
   };
   table.visit(options, visitor);
 }
@@ -89,8 +88,8 @@ struct CalibrateArguments {
 
 /// The pictures of one input; how they lie is what is asked for. Of a long recording some, evenly
 /// spread: as many as tell the mirror's circle well.
-std::vector<DatasetEntry> entries_of(const std::string& input, const CalibrateArguments& wanted,
-                                     Session& session) {
+std::vector<DatasetEntry> choose_entries(const std::string& input,
+                                         const CalibrateArguments& arguments, Session& session) {
   if (is_one_picture(input)) {
     DatasetEntry entry;
     entry.file = input;
@@ -103,9 +102,9 @@ std::vector<DatasetEntry> entries_of(const std::string& input, const CalibrateAr
   if (!std::filesystem::exists(std::filesystem::path(input) / "dataset.toml", ignored)) {
     any.emplace();
   }
-  std::vector<DatasetEntry> all = open_recording(input, wanted.pictures, any, session).entries;
+  std::vector<DatasetEntry> all = open_recording(input, arguments.pictures, any, session).entries;
   if (all.size() <= max_pictures) return all;
-  session.note("of the " + std::to_string(all.size()) + " pictures of " + to_readable_line(input) +
+  session.note("of the " + std::to_string(all.size()) + " images of " + to_readable_line(input) +
                " " + std::to_string(max_pictures) + " are taken, evenly spread");
   std::vector<DatasetEntry> some;
   for (std::size_t i = 0; i < max_pictures; ++i) {
@@ -115,11 +114,11 @@ std::vector<DatasetEntry> entries_of(const std::string& input, const CalibrateAr
 }
 
 /// Sets `names`, too.
-std::vector<Image> read_images(const CalibrateArguments& wanted, std::vector<std::string>& names,
+std::vector<Image> read_images(const CalibrateArguments& arguments, std::vector<std::string>& names,
                                Session& session) {
   std::vector<DatasetEntry> entries;
-  for (const std::string& input : wanted.inputs) {
-    for (DatasetEntry& entry : entries_of(input, wanted, session)) {
+  for (const std::string& input : arguments.inputs) {
+    for (DatasetEntry& entry : choose_entries(input, arguments, session)) {
       entries.push_back(std::move(entry));
     }
   }
@@ -141,7 +140,7 @@ std::vector<Image> read_images(const CalibrateArguments& wanted, std::vector<std
   return images;
 }
 
-CameraModel model_of(const MirrorOptions& options, double rim_radius_px) {
+CameraModel make_mirror_model(const MirrorOptions& options, double rim_radius_px) {
   const double rim_rad = radians(options.rim_elevation_deg);
   switch (options.profile) {
     case 1:
@@ -155,7 +154,7 @@ CameraModel model_of(const MirrorOptions& options, double rim_radius_px) {
   }
 }
 
-ordered_json as_json(const CalibrateArguments& wanted, std::size_t images,
+ordered_json as_json(const CalibrateArguments& arguments, std::size_t images,
                      const MirrorCircle& mirror, const Camera& camera) {
   ordered_json json{{"images", images},
                     {"width_px", mirror.image_size.width},
@@ -168,7 +167,7 @@ ordered_json as_json(const CalibrateArguments& wanted, std::size_t images,
                     {"quality", mirror.quality},
                     {"residual_px", mirror.residual_px},
                     {"deviation_over_images", nullptr},
-                    {"camera", wanted.out}};
+                    {"camera", arguments.out}};
   if (const auto spread = agreement(mirror)) {
     json["deviation_over_images"] = {{"images", spread->images},
                                      {"centre_u_px", spread->centre_u_px},
@@ -178,13 +177,13 @@ ordered_json as_json(const CalibrateArguments& wanted, std::size_t images,
   return json;
 }
 
-void print_text(const Arguments& arguments, const CalibrateArguments& wanted, bool several,
+void print_text(const Arguments& declared, const CalibrateArguments& arguments, bool several,
                 const MirrorCircle& mirror, const Camera& camera, Session& session) {
-  session.print(session.strong("mirror found") + ": centre " + format_fixed(mirror.centre.u_px, 1) +
+  session.print(session.bold("mirror found") + ": centre " + format_fixed(mirror.centre.u_px, 1) +
                 ", " + format_fixed(mirror.centre.v_px, 1) + " px, rim radius " +
                 format_fixed(mirror.rim_radius_px, 1) + " px, inner radius " +
                 format_fixed(camera.inner_radius_px, 1) + " px" +
-                (mirror.inner_radius_px || wanted.inner_radius_px
+                (mirror.inner_radius_px || arguments.inner_radius_px
                      ? ""
                      : " (none found; give --inner-radius-px)"));
   session.print("quality " + format_fixed(mirror.quality, 2) + " of 1, edges within " +
@@ -196,16 +195,17 @@ void print_text(const Arguments& arguments, const CalibrateArguments& wanted, bo
                   format_fixed(spread->centre_v_px, 2) + " px and the radius by " +
                   format_fixed(spread->rim_radius_px, 2) + " px (standard deviations)");
   }
-  if (!arguments.given("mirror")) {
+  if (!declared.is_set("mirror")) {
     session.print(
-        "A picture does not show the mirror's profile: elevations are taken to run evenly from " +
-        format_number(wanted.mirror.inner_elevation_deg) + " degrees at the inner radius to " +
-        format_number(wanted.mirror.rim_elevation_deg) +
-        " at the rim. Say what you know with --profile, --rim-elevation-deg and their companions.");
+        "An image does not show the mirror's profile: elevations are taken to run evenly from " +
+        format_number(arguments.mirror.inner_elevation_deg) + " degrees at the inner radius to " +
+        format_number(arguments.mirror.rim_elevation_deg) +
+        " at the rim. If you know the mirror, set --profile, --rim-elevation-deg and related "
+        "options.");
   }
-  session.suggest({"panonav", "unwrap", wanted.inputs.front(), "--camera", wanted.out, "-o",
+  session.suggest({"panonav", "unwrap", arguments.inputs.front(), "--camera", arguments.out, "-o",
                    several ? "panoramas" : "panorama.png"},
-                  wanted.overlay ? "Next: look at " + *wanted.overlay + ", then" : "Next:");
+                  arguments.overlay ? "Next: look at " + *arguments.overlay + ", then" : "Next:");
 }
 
 /// The two circles, as draw_mirror draws one.
@@ -242,42 +242,43 @@ ordered_json as_json(const DualFisheyeCalibration& found, std::size_t images,
   return json;
 }
 
-ExitCode calibrate_lenses(const CalibrateArguments& wanted, const std::vector<std::string>& names,
-                          const std::vector<ImageView>& all, Session& session) {
-  // Of a turn in a video some, evenly spread: more cost time and memory, and tell little.
+ExitCode calibrate_lenses(const CalibrateArguments& arguments,
+                          const std::vector<std::string>& names, const std::vector<ImageView>& all,
+                          Session& session) {
+  // Uses evenly spread images of a long video: more cost time and memory and add little.
   constexpr std::size_t max_pictures = 12;
   const std::size_t count = std::min(all.size(), max_pictures);
   std::vector<ImageView> views;
   for (std::size_t i = 0; i < count; ++i) views.push_back(all[i * all.size() / count]);
-  if (wanted.lenses.turn_deg != 0 && all.size() > count) {
-    throw UsageError("--turn-deg is the same between up to 12 pictures; there are " +
+  if (arguments.lenses.turn_deg != 0 && all.size() > count) {
+    throw UsageError("--turn-deg is the same between up to 12 images; there are " +
                      std::to_string(all.size()));
   }
-  const LensesOptions& options = wanted.lenses;
+  const LensesOptions& options = arguments.lenses;
   DualFisheyeCalibration::Knowledge known;
   known.left_roll_rad = radians(options.left_roll_deg);
   known.right_roll_rad = radians(options.right_roll_deg);
   known.left_azimuth_rad = radians(options.left_azimuth_deg);
   if (options.field_of_view_deg > 0) known.field_of_view_rad = radians(options.field_of_view_deg);
   if (options.turn_deg != 0) known.turn_rad = radians(options.turn_deg);
-  if (wanted.mirror.direction != 0) known.direction = ColumnDirection::counter_clockwise;
+  if (arguments.mirror.direction != 0) known.direction = ColumnDirection::counter_clockwise;
   const auto answer = calibrate_dual_fisheye(views, known, session.executor());
   if (const auto* refusal = std::get_if<std::string>(&answer)) {
     return session.no_answer("panonav calibrate: " + names.front() +
                              (views.size() > 1 ? " and the others: " : ": ") + *refusal);
   }
   const auto& found = std::get<DualFisheyeCalibration>(answer);
-  if (wanted.overlay) {
+  if (arguments.overlay) {
     const Image overlay = draw_lenses(views.front(), found.camera);
-    write_png(*wanted.overlay, overlay.view());
+    write_png(*arguments.overlay, overlay.view());
   }
-  write_camera(wanted.out, {found.camera, std::nullopt});
+  write_camera(arguments.out, {found.camera, std::nullopt});
   if (session.json()) {
-    session.print(json_line(as_json(found, views.size(), wanted.out)));
+    session.print(json_line(as_json(found, views.size(), arguments.out)));
     return ExitCode::done;
   }
   const auto& lenses = std::get<DualFisheyeModel>(found.camera.model).lenses;
-  session.print(session.strong("two lenses found") + ": " +
+  session.print(session.bold("two lenses found") + ": " +
                 format_fixed(degrees(2 * lenses[0].max_angle_rad), 1) + " and " +
                 format_fixed(degrees(2 * lenses[1].max_angle_rad), 1) +
                 " degrees, brightness 1 to " + format_fixed(lenses[1].gain / lenses[0].gain, 2));
@@ -287,94 +288,96 @@ ExitCode calibrate_lenses(const CalibrateArguments& wanted, const std::vector<st
   session.print("azimuths are uncertain by " +
                 format_fixed(degrees(found.azimuth_deviation_rad), 3) +
                 " degrees (standard deviation, far things)");
-  session.suggest({"panonav", "unwrap", wanted.inputs.front(), "--camera", wanted.out,
+  session.suggest({"panonav", "unwrap", arguments.inputs.front(), "--camera", arguments.out,
                    "--elevation-deg", "-40", "40", "-o", "panorama.png"});
   return ExitCode::done;
 }
 
-ExitCode calibrate(const Arguments& arguments, const CalibrateArguments& wanted, Session& session) {
-  if (std::ranges::all_of(wanted.inputs, is_one_picture)) {
-    arguments.refuse_unused(recording_options(), "as all inputs are single pictures");
+ExitCode calibrate(const Arguments& declared, const CalibrateArguments& arguments,
+                   Session& session) {
+  if (std::ranges::all_of(arguments.inputs, is_one_picture)) {
+    declared.refuse_unused(recording_flags(), "as all inputs are single images");
   }
   std::vector<std::string> names;
-  const auto images = read_images(wanted, names, session);
+  const auto images = read_images(arguments, names, session);
   std::vector<ImageView> views;
   for (const auto& image : images) views.push_back(image.view());
-  if (wanted.mirror.profile == dual_fisheye_profile) {
-    return calibrate_lenses(wanted, names, views, session);
+  if (arguments.mirror.profile == dual_fisheye_profile) {
+    return calibrate_lenses(arguments, names, views, session);
   }
-  const auto mirror = find_mirror(views, wanted.search);
+  const auto mirror = find_mirror(views, arguments.search);
   if (!mirror) {
     return session.no_answer("panonav calibrate: no mirror found in " + names.front() +
                              (images.size() > 1 ? " and the others" : "") +
                              "; give more images, or allow a fainter rim with --min-quality");
   }
-  const double forward_rad = radians(wanted.mirror.forward_angle_deg);
+  const double forward_rad = radians(arguments.mirror.forward_angle_deg);
   const Camera camera = camera_from_mirror(
-      *mirror, {.model = model_of(wanted.mirror, mirror->rim_radius_px),
-                .inner_radius_px = wanted.inner_radius_px,
-                .direction = wanted.mirror.direction == 0 ? ColumnDirection::clockwise
-                                                          : ColumnDirection::counter_clockwise,
+      *mirror, {.model = make_mirror_model(arguments.mirror, mirror->rim_radius_px),
+                .inner_radius_px = arguments.inner_radius_px,
+                .direction = arguments.mirror.direction == 0 ? ColumnDirection::clockwise
+                                                             : ColumnDirection::counter_clockwise,
                 .forward_angle_rad = forward_rad});
-  if (wanted.overlay) {
+  if (arguments.overlay) {
     const Image overlay = draw_mirror(views.front(), *mirror, forward_rad);
-    write_png(*wanted.overlay, overlay.view());
+    write_png(*arguments.overlay, overlay.view());
   }
-  write_camera(wanted.out, {camera, std::nullopt});
+  write_camera(arguments.out, {camera, std::nullopt});
   if (session.json()) {
-    session.print(json_line(as_json(wanted, images.size(), *mirror, camera)));
+    session.print(json_line(as_json(arguments, images.size(), *mirror, camera)));
   } else {
-    print_text(arguments, wanted, images.size() > wanted.inputs.size(), *mirror, camera, session);
+    print_text(declared, arguments, images.size() > arguments.inputs.size(), *mirror, camera,
+               session);
   }
   return ExitCode::done;
 }
 
 Run declare_calibrate(Arguments& arguments) {
-  auto wanted = std::make_shared<CalibrateArguments>();
-  arguments.positionals("INPUT", wanted->inputs,
+  auto values = std::make_shared<CalibrateArguments>();
+  arguments.positionals("INPUT", values->inputs,
                         "Raw images of one mirror camera, more are better; or of a camera of two "
                         "fisheye lenses turned round at one place. Or folders, videos or "
-                        "recordings of them, or - for JPEG pictures on standard input");
-  declare_topics(arguments, wanted->pictures.topics);
-  declare_part(arguments, wanted->pictures.part, true);
-  arguments.required_option("-o,--out", wanted->out, "Camera file to write (camera.toml)");
-  arguments.option("--overlay FILE", wanted->overlay,
-                   "PNG picture to write: what was found, drawn over the first image");
-  arguments.option("--inner-radius-px", wanted->inner_radius_px,
+                        "recordings of them, or - for JPEG images on standard input");
+  declare_topics(arguments, values->pictures.topics);
+  declare_part(arguments, values->pictures.part, true);
+  arguments.required_option("-o,--out", values->out, "Camera file to write (camera.toml)");
+  arguments.option("--overlay FILE", values->overlay,
+                   "PNG image to write: what was found, drawn over the first image");
+  arguments.option("--inner-radius-px", values->inner_radius_px,
                    "Radius that the camera's own reflection covers, instead of the one found");
-  arguments.options("mirror", wanted->mirror);
-  arguments.options("lenses", wanted->lenses);
-  arguments.options("mirror_search", wanted->search);
+  arguments.options("mirror", values->mirror);
+  arguments.options("lenses", values->lenses);
+  arguments.options("mirror_search", values->search);
   arguments.common({"--profile", "--inner-elevation-deg", "--rim-elevation-deg", "--direction",
                     "--forward-angle-deg"});
-  const auto shaped = [wanted](int profile) {
-    return [wanted, profile] { return wanted->mirror.profile == profile; };
+  const auto shaped = [values](int profile) {
+    return [values, profile] { return values->mirror.profile == profile; };
   };
-  arguments.used_only({"--inner-elevation-deg"}, shaped(0), "without --profile equiangular");
-  arguments.used_only({"--mirror-a-mm", "--mirror-b-mm"}, shaped(1),
-                      "without --profile hyperboloidal");
-  arguments.used_only({"--xi"}, shaped(2), "without --profile unified");
-  arguments.used_only({"[lenses]"}, shaped(dual_fisheye_profile), "without --profile dual-fisheye");
-  arguments.used_only(
+  arguments.refuse_unless({"--inner-elevation-deg"}, shaped(0), "without --profile equiangular");
+  arguments.refuse_unless({"--mirror-a-mm", "--mirror-b-mm"}, shaped(1),
+                          "without --profile hyperboloidal");
+  arguments.refuse_unless({"--xi"}, shaped(2), "without --profile unified");
+  arguments.refuse_unless({"[lenses]"}, shaped(dual_fisheye_profile),
+                          "without --profile dual-fisheye");
+  arguments.refuse_unless(
       {"--rim-elevation-deg", "--forward-angle-deg", "--inner-radius-px", "[mirror_search]"},
       [shaped] { return !shaped(dual_fisheye_profile)(); }, "with --profile dual-fisheye");
-  return [wanted, &arguments](Session& session) { return calibrate(arguments, *wanted, session); };
+  return [values, &arguments](Session& session) { return calibrate(arguments, *values, session); };
 }
 
 }  // namespace
 
 Verb calibrate_verb() {
-  return {
-      "calibrate", "Find a mirror, or the two lenses of a 360 degree camera, in raw images",
-      "The exit code is 1 when no image shows a mirror's rim, or the images do not determine two "
-      "lenses. Those are calibrated from one place with much around: three or four pictures, the "
-      "camera turned on its stand by about 90 degrees from each to the next. Look at the overlay "
-      "before you trust the file.",
-      "  panonav calibrate mirror1.jpg mirror2.jpg -o camera.toml --overlay overlay.png\n"
-      "  panonav calibrate turned?.jpg --profile dual-fisheye -o camera.toml\n"
-      "  panonav calibrate theta?.jpg --profile dual-fisheye --left-roll-deg 90 "
-      "--right-roll-deg -90 -o camera.toml",
-      declare_calibrate};
+  return {"calibrate", "Find a mirror, or the two lenses of a 360 degree camera, in raw images",
+          "The exit code is 1 when no image shows a mirror's rim, or the images do not determine "
+          "two lenses. For two lenses, take three or four images at one place with many objects "
+          "around, and rotate the camera on its stand by about 90 degrees between them. Check the "
+          "overlay before you use the file.",
+          "  panonav calibrate mirror1.jpg mirror2.jpg -o camera.toml --overlay overlay.png\n"
+          "  panonav calibrate turned?.jpg --profile dual-fisheye -o camera.toml\n"
+          "  panonav calibrate theta?.jpg --profile dual-fisheye --left-roll-deg 90 "
+          "--right-roll-deg -90 -o camera.toml",
+          declare_calibrate};
 }
 
 }  // namespace panonav::command

@@ -34,7 +34,7 @@ struct CatchmentArguments {
 };
 
 /// Shows each work that it hears of.
-WorkProgress bars(Session& session) {
+WorkProgress show_progress(Session& session) {
   return [&session, bar = std::shared_ptr<Progress>(), shown = std::string()](
              const std::string& work, std::size_t steps, std::size_t total) mutable {
     if (work != shown) {
@@ -45,17 +45,17 @@ WorkProgress bars(Session& session) {
   };
 }
 
-ordered_json as_json(const CatchmentArguments& wanted, const RecordedViews& goals,
+ordered_json as_json(const CatchmentArguments& arguments, const RecordedViews& goals,
                      const CatchmentResult& result) {
-  ordered_json json{{"dataset", wanted.dataset},
-                    {"current", or_null(wanted.current)},
+  ordered_json json{{"dataset", arguments.dataset},
+                    {"current", or_null(arguments.current)},
                     {"goals", result.survey.goals.size()},
                     {"places", result.survey.places.size()},
                     {"spacing_m", result.spacing_m},
                     {"typical_distance_m", result.typical_distance_m},
-                    {"up_to_m", or_null(wanted.settings.up_to_m)},
+                    {"up_to_m", or_null(arguments.settings.up_to_m)},
                     {"pairs", result.pairs},
-                    {"stages", or_null(wanted.stages)},
+                    {"stages", or_null(arguments.stages)},
                     {"homeward_component", or_null(result.component)},
                     {"orientation_error_rad", or_null(result.orientation_error_rad)}};
   auto bins = ordered_json::array();
@@ -83,11 +83,13 @@ ordered_json as_json(const CatchmentArguments& wanted, const RecordedViews& goal
   return json;
 }
 
-void print_text(const CatchmentArguments& wanted, const CatchmentResult& result, Session& session) {
-  const std::string range =
-      wanted.settings.up_to_m ? " up to " + format_number(*wanted.settings.up_to_m) + " m" : "";
+void print_text(const CatchmentArguments& arguments, const CatchmentResult& result,
+                Session& session) {
+  const std::string range = arguments.settings.up_to_m
+                                ? " up to " + format_number(*arguments.settings.up_to_m) + " m"
+                                : "";
   session.print("Average homeward component over " + std::to_string(result.pairs) + " pairs" +
-                range + ": " + session.strong(format_fixed(result.component, 3)) +
+                range + ": " + session.bold(format_fixed(result.component, 3)) +
                 " (1: straight home, 0: chance)");
   session.print("  heading off by " + format_fixed(degrees(result.orientation_error_rad), 1) +
                 " degrees (circular standard deviation); a home vector of length 1 is worth " +
@@ -95,7 +97,7 @@ void print_text(const CatchmentArguments& wanted, const CatchmentResult& result,
   session.print("  distance [m]  pairs     homeward  heading error [degrees]");
   for (const CatchmentResult::Bin& bin : result.bins) {
     // Rounding of a distance must not take its bin away.
-    if (wanted.settings.up_to_m && bin.homeward.distance_m > 1.001 * *wanted.settings.up_to_m)
+    if (arguments.settings.up_to_m && bin.homeward.distance_m > 1.001 * *arguments.settings.up_to_m)
       break;
     const auto padded = [](std::string text, std::size_t width) {
       text.resize(std::max(width, text.size()), ' ');
@@ -116,28 +118,28 @@ void print_text(const CatchmentArguments& wanted, const CatchmentResult& result,
   }
 }
 
-/// Each view homes to the one so many pictures later.
-ExitCode look_ahead(const CatchmentArguments& wanted, const RecordedViews& views,
-                    const FourierHomingOptions& options, Session& session) {
-  const auto ahead = static_cast<std::size_t>(*wanted.ahead);
+/// Homes from each view to the one `ahead` images later.
+ExitCode compare_ahead(const CatchmentArguments& arguments, const RecordedViews& views,
+                       const FourierHomingOptions& options, Session& session) {
+  const auto ahead = static_cast<std::size_t>(*arguments.ahead);
   if (views.files.size() <= ahead) {
-    throw FileError(wanted.dataset, "has " + std::to_string(views.files.size()) +
-                                        " pictures; --ahead allows 1 to " +
-                                        std::to_string(views.files.size() - 1));
+    throw FileError(arguments.dataset, "has " + std::to_string(views.files.size()) +
+                                           " images; --ahead allows 1 to " +
+                                           std::to_string(views.files.size() - 1));
   }
   std::vector<double> directions;
   std::size_t sideways = 0;
   for (std::size_t i = 0; i + ahead < views.files.size(); ++i) {
     const HomeVector found = home_vector(views.views[i + ahead], views.views[i], options);
     if (!(found.length() > 0.0)) continue;
-    // As if the robot had not been turned.
+    // Undoes the robot's random rotation.
     directions.push_back(wrap_angle(found.direction_rad() + views.rotation_rad[i]));
     sideways += std::abs(directions.back()) > radians(90.0) ? 1 : 0;
   }
   const auto mean = circular_mean(directions);
   if (session.json()) {
     session.print(json_line(
-        ordered_json{{"dataset", wanted.dataset},
+        ordered_json{{"dataset", arguments.dataset},
                      {"ahead", ahead},
                      {"pairs", directions.size()},
                      {"direction_rad", mean ? ordered_json(mean->direction_rad) : ordered_json()},
@@ -147,15 +149,15 @@ ExitCode look_ahead(const CatchmentArguments& wanted, const RecordedViews& views
     const double degrees_left = degrees(mean->direction_rad);
     session.print("From each of " + std::to_string(directions.size()) + " views to the one " +
                   std::to_string(ahead) + " later: on average " +
-                  session.strong(format_fixed(std::abs(degrees_left), 1) + " degrees to the " +
-                                 (degrees_left > 0.0 ? "left" : "right")) +
+                  session.bold(format_fixed(std::abs(degrees_left), 1) + " degrees to the " +
+                               (degrees_left > 0.0 ? "left" : "right")) +
                   " of straight ahead");
     session.print("  resultant length " + format_fixed(mean->resultant_length, 3) +
                   " (1: all the same), spread " +
                   format_fixed(degrees(circular_standard_deviation(*mean)), 1) + " degrees, " +
                   std::to_string(sideways) + " point backwards");
   } else {
-    session.print(session.bad("no common direction"));
+    session.print(session.red("no common direction"));
   }
   return mean ? ExitCode::done : ExitCode::no_answer;
 }
@@ -163,19 +165,20 @@ ExitCode look_ahead(const CatchmentArguments& wanted, const RecordedViews& views
 void check_posed(const RecordedViews& views, const std::string& name) {
   for (std::size_t i = 0; i < views.files.size(); ++i) {
     if (views.poses[i] && views.poses[i]->heading_rad) continue;
-    throw FileError(name, "picture " + views.files[i] + " has no " +
+    throw FileError(name, "image " + views.files[i] + " has no " +
                               (views.poses[i] ? "heading" : "position") +
                               ", and directions are judged by both; --ahead N needs neither" +
-                              how_to_add(name, pose_columns, pose_values));
+                              explain_columns(name, pose_columns, pose_values));
   }
 }
 
 /// The view asked for, or the one nearest to the middle of all.
-std::size_t shown_goal(const CatchmentArguments& wanted, const RecordedViews& goals) {
-  if (wanted.goal) {
-    const auto found = std::ranges::find(goals.files, *wanted.goal);
+std::size_t choose_goal(const CatchmentArguments& arguments, const RecordedViews& goals) {
+  if (arguments.goal) {
+    const auto found = std::ranges::find(goals.files, *arguments.goal);
     if (found == goals.files.end()) {
-      throw FileError(wanted.dataset, "has no picture '" + *wanted.goal + "', asked for by --goal");
+      throw FileError(arguments.dataset,
+                      "has no image '" + *arguments.goal + "', asked for by --goal");
     }
     return static_cast<std::size_t>(found - goals.files.begin());
   }
@@ -195,15 +198,16 @@ std::size_t shown_goal(const CatchmentArguments& wanted, const RecordedViews& go
 }
 
 /// Numbers between commas.
-std::vector<int> read_stages(const std::string& text, int most) {
+std::vector<int> read_stages(const std::string& text, int max_frequency) {
   std::vector<int> stages;
   for (std::size_t begin = 0; begin <= text.size();) {
     const std::size_t end = std::min(text.find(',', begin), text.size());
     int value = 0;
     const auto [last, error] = std::from_chars(text.data() + begin, text.data() + end, value);
-    if (error != std::errc() || last != text.data() + end || value < 1 || value > most) {
+    if (error != std::errc() || last != text.data() + end || value < 1 || value > max_frequency) {
       throw UsageError("--stages is '" + text + "'; allowed: numbers from 1 to " +
-                       std::to_string(most) + ", components less two, with commas between them");
+                       std::to_string(max_frequency) +
+                       ", components less two, with commas between them");
     }
     stages.push_back(value);
     begin = end + 1;
@@ -211,110 +215,112 @@ std::vector<int> read_stages(const std::string& text, int most) {
   return stages;
 }
 
-ExitCode catchment(const Arguments& arguments, const CatchmentArguments& wanted, Session& session) {
-  if (wanted.settings.up_to_m && !(*wanted.settings.up_to_m > 0.0)) {
-    throw UsageError("--up-to-m is " + format_number(*wanted.settings.up_to_m) + "; allowed: > 0");
+ExitCode catchment(const Arguments& declared, const CatchmentArguments& arguments,
+                   Session& session) {
+  if (arguments.settings.up_to_m && !(*arguments.settings.up_to_m > 0.0)) {
+    throw UsageError("--up-to-m is " + format_number(*arguments.settings.up_to_m) +
+                     "; allowed: > 0");
   }
-  if (wanted.settings.bin_m && !(*wanted.settings.bin_m > 0.0)) {
-    throw UsageError("--bin-m is " + format_number(*wanted.settings.bin_m) + "; allowed: > 0");
+  if (arguments.settings.bin_m && !(*arguments.settings.bin_m > 0.0)) {
+    throw UsageError("--bin-m is " + format_number(*arguments.settings.bin_m) + "; allowed: > 0");
   }
-  CatchmentSettings settings = wanted.settings;
+  CatchmentSettings settings = arguments.settings;
   settings.homing =
-      homing_options(arguments, wanted.homing, wanted.homing.views.signature.components);
-  if (wanted.stages) {
-    settings.stages =
-        read_stages(*wanted.stages, std::min(62, wanted.homing.views.signature.components - 2));
+      make_homing_options(declared, arguments.homing, arguments.homing.views.signature.components);
+  if (arguments.stages) {
+    settings.stages = read_stages(*arguments.stages,
+                                  std::min(62, arguments.homing.views.signature.components - 2));
   }
-  settings.has_typical_distance = arguments.given("run", "typical_distance_m");
-  settings.has_longest_step = arguments.given("run", "max_step_m");
-  settings.has_obstacle = arguments.given("run", "obstacle_m");
+  settings.has_typical_distance = declared.is_set("run", "typical_distance_m");
+  settings.has_longest_step = declared.is_set("run", "max_step_m");
+  settings.has_obstacle = declared.is_set("run", "obstacle_m");
   const auto recording =
-      wanted.ahead ? open_recording(wanted.dataset, wanted.pictures, std::nullopt, session)
-                   : read_described(wanted.dataset, wanted.pictures, std::nullopt, pose_columns,
-                                    pose_values, session);
+      arguments.ahead ? open_recording(arguments.dataset, arguments.pictures, std::nullopt, session)
+                      : read_described(arguments.dataset, arguments.pictures, std::nullopt,
+                                       pose_columns, pose_values, session);
   std::optional<Dataset> second;
-  if (wanted.current)
-    second = open_recording(*wanted.current, wanted.pictures, recording.source, session);
-  if (wanted.report) prepare_report_folder(*wanted.report, "catchment");
+  if (arguments.current)
+    second = open_recording(*arguments.current, arguments.pictures, recording.source, session);
+  if (arguments.report) prepare_report_folder(*arguments.report, "catchment");
 
-  if (wanted.ahead) {
-    const auto views = read_views(recording, wanted.homing.views, wanted.turn_seed,
-                                  session.executor(), bars(session));
-    refuse_unused_rise(arguments, views.views.front(), wanted.dataset);
-    return look_ahead(wanted, views, settings.homing, session);
+  if (arguments.ahead) {
+    const auto views = read_views(recording, arguments.homing.views, arguments.turn_seed,
+                                  session.executor(), show_progress(session));
+    refuse_unused_rise(declared, views.views.front(), arguments.dataset);
+    return compare_ahead(arguments, views, settings.homing, session);
   }
-  const auto goals =
-      read_views(recording, wanted.homing.views, std::nullopt, session.executor(), bars(session));
-  check_posed(goals, wanted.dataset);
-  refuse_unused_rise(arguments, goals.views.front(), wanted.dataset);
-  const std::size_t goal = shown_goal(wanted, goals);
-  const auto places = read_views(second ? *second : recording, wanted.homing.views,
-                                 wanted.turn_seed, session.executor(), bars(session));
-  const std::string& places_name = wanted.current ? *wanted.current : wanted.dataset;
+  const auto goals = read_views(recording, arguments.homing.views, std::nullopt, session.executor(),
+                                show_progress(session));
+  check_posed(goals, arguments.dataset);
+  refuse_unused_rise(declared, goals.views.front(), arguments.dataset);
+  const std::size_t goal = choose_goal(arguments, goals);
+  const auto places = read_views(second ? *second : recording, arguments.homing.views,
+                                 arguments.turn_seed, session.executor(), show_progress(session));
+  const std::string& places_name = arguments.current ? *arguments.current : arguments.dataset;
   check_posed(places, places_name);
   if (goals.views.front().rows() != places.views.front().rows()) {
     throw FileError(places_name, "rows is " + std::to_string(places.views.front().rows()) +
                                      "; allowed: " + std::to_string(goals.views.front().rows()) +
-                                     ", as in " + wanted.dataset);
+                                     ", as in " + arguments.dataset);
   }
-  const auto result =
-      survey_catchment(goals, places, settings, places_name, session.executor(), bars(session));
+  const auto result = survey_catchment(goals, places, settings, places_name, session.executor(),
+                                       show_progress(session));
   if (session.json()) {
-    session.print(json_line(as_json(wanted, goals, result)));
+    session.print(json_line(as_json(arguments, goals, result)));
   } else {
-    print_text(wanted, result, session);
+    print_text(arguments, result, session);
   }
-  if (wanted.report) {
-    write_catchment_report(*wanted.report, goals, places, result, settings.homing, goal);
-    tell_report(*wanted.report, session);
+  if (arguments.report) {
+    write_catchment_report(*arguments.report, goals, places, result, settings.homing, goal);
+    print_report_path(*arguments.report, session);
   }
   return std::isfinite(result.component) ? ExitCode::done : ExitCode::no_answer;
 }
 
 Run declare_catchment(Arguments& arguments) {
-  auto wanted = std::make_shared<CatchmentArguments>();
-  arguments.positional("DATASET", wanted->dataset,
+  auto values = std::make_shared<CatchmentArguments>();
+  arguments.positional("DATASET", values->dataset,
                        "Data set with positions and headings; each view is a home");
-  arguments.option("--current DATASET", wanted->current,
+  arguments.option("--current DATASET", values->current,
                    "Data set of the views to go home from; default: the same recording");
-  declare_pictures(arguments, wanted->pictures);
-  arguments.option("--up-to-m", wanted->settings.up_to_m,
+  declare_pictures(arguments, values->pictures);
+  arguments.option("--up-to-m", values->settings.up_to_m,
                    "Leave out pairs that are farther apart from the averages");
-  arguments.option("--bin-m", wanted->settings.bin_m,
+  arguments.option("--bin-m", values->settings.bin_m,
                    "Width of a bin of distances; default: the spacing of the places");
-  arguments.option("--turn-randomly SEED", wanted->turn_seed,
+  arguments.option("--turn-randomly SEED", values->turn_seed,
                    "Turn the robot before each current view by a random number of whole columns");
   arguments.option(
-      "--stages K,K,...", wanted->stages,
+      "--stages K,K,...", values->stages,
       "Runs go from coarse to fine: the highest frequency of each stage, as in 2,4,10");
-  arguments.option("--ahead N", wanted->ahead, 1,
-                   "Only compare each view with the one N pictures later: the direction of travel "
+  arguments.option("--ahead N", values->ahead, 1,
+                   "Only compare each view with the one N images later: the direction of travel "
                    "where the camera looks along it. Needs no positions");
-  arguments.option("--goal PICTURE", wanted->goal,
-                   "Picture whose home vectors the report shows; default: the one in the middle");
-  arguments.option("--report FOLDER", wanted->report,
+  arguments.option("--goal IMAGE", values->goal,
+                   "Image whose home vectors the report shows; default: the one in the middle");
+  arguments.option("--report FOLDER", values->report,
                    "Write curves and maps into this folder: a new one, or that of an earlier "
                    "report");
-  declare_homing(arguments, wanted->homing);
-  arguments.options("run", wanted->settings.run);
+  declare_homing(arguments, values->homing);
+  arguments.options("run", values->settings.run);
   arguments.uncommon({"--bin-m", "--goal"});
-  arguments.used_only(
+  arguments.refuse_unless(
       {"--current", "--report", "--up-to-m", "--bin-m", "--stages", "[run]"},
-      [wanted] { return !wanted->ahead; },
-      "with --ahead, which compares the pictures of one recording in their order");
-  arguments.used_only(
-      {"--goal"}, [wanted] { return wanted->report.has_value(); }, "without --report");
-  return [wanted, &arguments](Session& session) { return catchment(arguments, *wanted, session); };
+      [values] { return !values->ahead; },
+      "with --ahead, which compares the images of one recording in their order");
+  arguments.refuse_unless(
+      {"--goal"}, [values] { return values->report.has_value(); }, "without --report");
+  return [values, &arguments](Session& session) { return catchment(arguments, *values, session); };
 }
 
 }  // namespace
 
 Verb catchment_verb() {
-  return {"catchment", "Measure from how far the views of a recording lead home",
+  return {"catchment", "Measure from how far away the views of a recording lead home",
           "The verb computes home vectors between all pairs of views, and runs from place to place "
-          "[S06 section 4]. Where they are not given, the longest step is twice the spacing of the "
-          "places, a step must end within 0.8 of it, and the typical distance of things is learnt "
-          "from near pairs.",
+          "[S06 section 4]. By default the longest step is twice the spacing of the places, a step "
+          "must end within 0.8 of it, and the typical distance of objects is estimated from near "
+          "pairs.",
           "  panonav catchment grid_run --up-to-m 0.3 --turn-randomly 1 --report catchment\n"
           "  panonav catchment monday_run --current tuesday_run --published 5 --json\n"
           "  panonav catchment grid_run --published 10 --stages 2,4,10\n"

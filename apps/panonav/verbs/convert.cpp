@@ -17,8 +17,8 @@ struct ConvertArguments {
   PictureArguments pictures;
 };
 
-/// What some pictures lack, and so none has in a data set.
-std::string parts(const Dataset::Fields& done) {
+/// Lists the fields that the data set has for all images.
+std::string describe_fields(const Dataset::Fields& done) {
   std::string text;
   for (const auto& [has, what] : {std::pair{done.odometry, "odometry"},
                                   {done.positions, "positions"},
@@ -29,31 +29,31 @@ std::string parts(const Dataset::Fields& done) {
   return text;
 }
 
-ExitCode convert(const ConvertArguments& wanted, Session& session) {
+ExitCode convert(const ConvertArguments& arguments, Session& session) {
   std::error_code ignored;
-  const bool records = fs::path(wanted.output).extension() == ".mcap";
-  if (!records &&
-      (fs::exists(fs::path(wanted.input) / "dataset.toml", ignored) ||
-       (fs::is_directory(wanted.input, ignored) && !recordings::is_recording(wanted.input)))) {
-    throw UsageError(wanted.output +
-                     " does not end in .mcap; pictures of a folder become a "
+  const bool records = fs::path(arguments.output).extension() == ".mcap";
+  if (!records && (fs::exists(fs::path(arguments.input) / "dataset.toml", ignored) ||
+                   (fs::is_directory(arguments.input, ignored) &&
+                    !recordings::is_recording(arguments.input)))) {
+    throw UsageError(arguments.output +
+                     " does not end in .mcap; images of a folder become a "
                      "recording, and a recording becomes a folder");
   }
   // A recording does not say how its pictures lie.
   PictureSource any{.kind = PictureKind::equirectangular};
   any.layout.elevations = ElevationBand{-1.0, 1.0};
-  const Dataset dataset = open_recording(wanted.input, wanted.pictures,
+  const Dataset dataset = open_recording(arguments.input, arguments.pictures,
                                          records ? std::optional(any) : std::nullopt, session);
   Progress progress(session, "converting", dataset.entries.size());
   const auto advance = [&] { progress.advance(); };
   const Dataset::Fields done =
-      records ? recordings::convert_to_recording(dataset, wanted.output, advance)
-              : recordings::convert_to_dataset(dataset, wanted.output, advance);
+      records ? recordings::convert_to_recording(dataset, arguments.output, advance)
+              : recordings::convert_to_dataset(dataset, arguments.output, advance);
   progress.clear();
   if (session.json()) {
-    session.print(json_line(ordered_json{{"input", wanted.input},
-                                         {"output", wanted.output},
-                                         {"pictures", dataset.entries.size()},
+    session.print(json_line(ordered_json{{"input", arguments.input},
+                                         {"output", arguments.output},
+                                         {"images", dataset.entries.size()},
                                          {"stamps", done.stamps},
                                          {"odometry", done.odometry},
                                          {"positions", done.positions},
@@ -61,30 +61,31 @@ ExitCode convert(const ConvertArguments& wanted, Session& session) {
                                          {"tilts", done.tilts}}));
     return ExitCode::done;
   }
-  session.print(session.strong(std::to_string(dataset.entries.size())) + " pictures of " +
-                wanted.input + " in " + wanted.output + parts(done));
+  session.print(session.bold(std::to_string(dataset.entries.size())) + " images of " +
+                arguments.input + " in " + arguments.output + describe_fields(done));
   if (records && !done.stamps) {
-    session.print("Not all pictures have a stamp; they are one second apart.");
+    session.print("Not all images have a stamp; they are one second apart.");
   }
   return ExitCode::done;
 }
 
 Run declare_convert(Arguments& arguments) {
-  auto wanted = std::make_shared<ConvertArguments>();
-  arguments.positional("INPUT", wanted->input,
-                       "Data set, folder of pictures, or recording (MCAP, rosbag2, ROS 1 bag)");
-  arguments.positional("OUTPUT", wanted->output,
+  auto values = std::make_shared<ConvertArguments>();
+  arguments.positional("INPUT", values->input,
+                       "Data set, folder of images, or recording (MCAP, rosbag2, ROS 1 bag)");
+  arguments.positional("OUTPUT", values->output,
                        "Recording to write, FILE.mcap, or a new folder for a data set");
-  declare_pictures(arguments, wanted->pictures);
-  return [wanted](Session& session) { return convert(*wanted, session); };
+  declare_pictures(arguments, values->pictures);
+  return [values](Session& session) { return convert(*values, session); };
 }
 
 }  // namespace
 
 Verb convert_verb() {
-  return {"convert", "Turn a data set into a recording of ROS 2 messages, or one into a data set",
-          "Pictures keep their bytes, and stamps, odometry, poses, roll and pitch come along. A "
-          "data set needs --kind, as a recording does not say how its pictures lie.",
+  return {"convert",
+          "Convert a data set to a recording of ROS 2 messages, or a recording to a data set",
+          "Images are copied unchanged, with stamps, odometry, poses, roll and pitch. A data set "
+          "needs --kind, as a recording does not say how its images lie.",
           "  panonav convert walk walk.mcap\n"
           "  panonav convert drive.bag drive --kind equirectangular --image-topic /camera/image",
           declare_convert};

@@ -35,14 +35,14 @@ constexpr int neighbours = 8;
 /// Comparing everyone's neighbours takes time with the square of the poses; more are thinned out.
 constexpr std::size_t max_points = 2000;
 
-/// What is compared with the truth: poses over time, and closures where a map was given.
+/// The estimate: poses over time, and the closures of a map.
 struct Estimate {
   Trajectory trajectory;
   TopologicalMap map;                // empty where a trajectory was given
   std::map<ViewId, double> stamp_s;  // of the map's views
 };
 
-/// How the estimate compares as a map; what is not defined for so few poses is empty.
+/// Comparison of the estimate with the truth as maps; nullopt where there are too few poses.
 struct MapFigures {
   std::optional<ShapeDifference> shape;
   std::optional<NeighbourPreservation> neighbours;
@@ -91,8 +91,8 @@ ordered_json as_json(const TrajectoryError& error) {
   return json;
 }
 
-std::string line_of(const std::string& label, const TrajectoryError::Summary& errors, double unit,
-                    int digits) {
+std::string format_line(const std::string& label, const TrajectoryError::Summary& errors,
+                        double unit, int digits) {
   return label + "  RMSE " + format_fixed(errors.rms * unit, digits) + "  median " +
          format_fixed(errors.median * unit, digits) + "  95 % within " +
          format_fixed(errors.p95 * unit, digits) + "  maximum " +
@@ -132,7 +132,7 @@ Estimate read_estimate(const std::string& path) {
   return {.trajectory = read(path)};
 }
 
-MapFigures compare_as_map(const Estimate& estimate, const Trajectory& truth, double max_gap_s) {
+MapFigures compare_as_maps(const Estimate& estimate, const Trajectory& truth, double max_gap_s) {
   std::vector<Point2> map;
   std::vector<Point2> known;
   for (const StampedPose& pose : estimate.trajectory.poses()) {
@@ -144,14 +144,14 @@ MapFigures compare_as_map(const Estimate& estimate, const Trajectory& truth, dou
   MapFigures figures;
   if (is_comparable(map, known)) figures.shape = shape_difference(map, known);
   const std::size_t every = (map.size() + max_points - 1) / max_points;
-  std::vector<Point2> few;
-  std::vector<Point2> few_known;
+  std::vector<Point2> thinned_map;
+  std::vector<Point2> thinned_truth;
   for (std::size_t i = 0; every > 0 && i < map.size(); i += every) {
-    few.push_back(map[i]);
-    few_known.push_back(known[i]);
+    thinned_map.push_back(map[i]);
+    thinned_truth.push_back(known[i]);
   }
-  if (3 * neighbours + 1 < 2 * static_cast<int>(few.size())) {
-    figures.neighbours = neighbour_preservation(few, few_known, neighbours);
+  if (3 * neighbours + 1 < 2 * static_cast<int>(thinned_map.size())) {
+    figures.neighbours = neighbour_preservation(thinned_map, thinned_truth, neighbours);
   }
   if (!estimate.map.nodes.empty()) {
     figures.closures = count_closures(
@@ -181,16 +181,16 @@ void print_figures(const MapFigures& figures, Session& session) {
   }
 }
 
-ExitCode evaluate(const EvaluateArguments& wanted, Session& session) {
-  const Estimate estimate = read_estimate(wanted.estimate);
-  const Trajectory truth = read(wanted.truth);
-  const auto error = trajectory_error(estimate.trajectory, truth, wanted.options);
+ExitCode evaluate(const EvaluateArguments& arguments, Session& session) {
+  const Estimate estimate = read_estimate(arguments.estimate);
+  const Trajectory truth = read(arguments.truth);
+  const auto error = trajectory_error(estimate.trajectory, truth, arguments.options);
   if (!error) {
-    return session.no_answer("panonav evaluate: fewer than two poses of " + wanted.estimate +
-                             " have a stamp within " + wanted.truth +
+    return session.no_answer("panonav evaluate: fewer than two poses of " + arguments.estimate +
+                             " have a stamp within " + arguments.truth +
                              "; do both count the same seconds?");
   }
-  const MapFigures figures = compare_as_map(estimate, truth, wanted.options.max_gap_s);
+  const MapFigures figures = compare_as_maps(estimate, truth, arguments.options.max_gap_s);
   if (session.json()) {
     ordered_json json = as_json(*error);
     json.update(as_json(figures));
@@ -199,28 +199,28 @@ ExitCode evaluate(const EvaluateArguments& wanted, Session& session) {
   }
   session.print(std::to_string(error->pairs) + " poses compared, " +
                 std::to_string(error->left_out) + " without ground truth");
-  session.print(line_of("ATE [m]            ", error->position_m, 1.0, 3));
-  session.print(line_of("heading [degrees]  ", error->heading_rad, degrees(1.0), 2));
+  session.print(format_line("ATE [m]            ", error->position_m, 1.0, 3));
+  session.print(format_line("heading [degrees]  ", error->heading_rad, degrees(1.0), 2));
   if (error->relative_pairs > 0) {
-    session.print("over " + to_text(wanted.options.relative_distance_m) + " m of path:");
-    session.print(line_of("RPE [m]            ", error->relative_position_m, 1.0, 3));
-    session.print(line_of("RPE [degrees]      ", error->relative_heading_rad, degrees(1.0), 2));
+    session.print("over " + to_text(arguments.options.relative_distance_m) + " m of path:");
+    session.print(format_line("RPE [m]            ", error->relative_position_m, 1.0, 3));
+    session.print(format_line("RPE [degrees]      ", error->relative_heading_rad, degrees(1.0), 2));
   }
   print_figures(figures, session);
   return ExitCode::done;
 }
 
 Run declare_evaluate(Arguments& arguments) {
-  auto wanted = std::make_shared<EvaluateArguments>();
-  arguments.positional("ESTIMATE", wanted->estimate,
+  auto values = std::make_shared<EvaluateArguments>();
+  arguments.positional("ESTIMATE", values->estimate,
                        "Trajectory as TUM text or CSV, or a memory file (NAME.panonav) with a map");
-  arguments.positional("GROUND_TRUTH", wanted->truth, "Trajectory as TUM text or CSV");
-  arguments.options("evaluation", wanted->options);
+  arguments.positional("GROUND_TRUTH", values->truth, "Trajectory as TUM text or CSV");
+  arguments.options("evaluation", values->options);
   arguments.common({"--align", "--align-scale"});
-  arguments.used_only(
-      {"--align-scale", "--align-reflection"}, [wanted] { return wanted->options.align; },
+  arguments.refuse_unless(
+      {"--align-scale", "--align-reflection"}, [values] { return values->options.align; },
       "with --align false");
-  return [wanted](Session& session) { return evaluate(*wanted, session); };
+  return [values](Session& session) { return evaluate(*values, session); };
 }
 
 }  // namespace
@@ -228,7 +228,7 @@ Run declare_evaluate(Arguments& arguments) {
 Verb evaluate_verb() {
   return {"evaluate", "Compare an estimated trajectory or map with the ground truth",
           "Poses are associated by stamp and aligned by least squares unless --align false. The "
-          "exit code is 1 when the two have no time in common.",
+          "exit code is 1 when no stamps match.",
           "  panonav evaluate estimate.tum truth.tum\n"
           "  panonav evaluate estimate.csv truth.csv --align-scale true --json\n"
           "  panonav evaluate office.panonav run/poses.csv",

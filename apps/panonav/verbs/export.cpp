@@ -20,22 +20,22 @@ std::string lost_columns(const MemoryExport& done) {
   return lost;
 }
 
-void tell(const MemoryExport& done, const MemoryFile& memory, const std::string& out,
-          Session& session) {
+void print_export(const MemoryExport& done, const MemoryFile& memory, const std::string& out,
+                  Session& session) {
   const auto info = memory.info();
-  session.print(session.strong(std::to_string(done.views)) + " views of " + memory.path().string() +
+  session.print(session.bold(std::to_string(done.views)) + " views of " + memory.path().string() +
                 " in " + out +
                 ": names, poses and stamps in views.csv, signatures in signatures.npy");
   if (done.pictures == 0) {
     session.print(
         info.thumbnails == 0
-            ? "No pictures: the memory holds no thumbnails. memorise cannot take this back."
-            : "No pictures: the thumbnails are too small for the memory's " +
+            ? "No images: the memory holds no thumbnails. memorise cannot read this folder."
+            : "No images: the thumbnails are too small for the memory's " +
                   std::to_string(memory.header().shape.components) +
-                  " components, or are not panonav's. memorise cannot take this back.");
+                  " components, or are not panonav's. memorise cannot read this folder.");
     return;
   }
-  session.print("A data set of " + std::to_string(done.pictures) + " pictures, the thumbnails" +
+  session.print("A data set of " + std::to_string(done.pictures) + " images, the thumbnails" +
                 (done.enlarged ? ", enlarged to the size of the memory's panoramas: fine detail is "
                                  "lost, and signatures differ a little from the memory's"
                                : "") +
@@ -46,7 +46,7 @@ void tell(const MemoryExport& done, const MemoryFile& memory, const std::string&
   }
   if (done.renamed > 0) {
     session.print(std::to_string(done.renamed) +
-                  " pictures are not named as their views, whose names cannot be those of files; "
+                  " images are not named as their views, whose names cannot be those of files; "
                   "views.csv has both.");
   }
   const std::string lost = lost_columns(done);
@@ -60,19 +60,19 @@ void tell(const MemoryExport& done, const MemoryFile& memory, const std::string&
                   "Back again:");
 }
 
-ExitCode export_all(const ExportArguments& wanted, Session& session) {
-  const auto memory = MemoryFile::open(wanted.memory, Access::read_only);
+ExitCode export_all(const ExportArguments& arguments, Session& session) {
+  const auto memory = MemoryFile::open(arguments.memory, Access::read_only);
   Progress progress(session, "exporting", static_cast<std::size_t>(memory.info().views));
-  const MemoryExport done = export_memory(memory, wanted.out, [&] { progress.advance(); });
+  const MemoryExport done = export_memory(memory, arguments.out, [&] { progress.advance(); });
   progress.clear();
   if (!session.json()) {
-    tell(done, memory, wanted.out, session);
+    print_export(done, memory, arguments.out, session);
     return ExitCode::done;
   }
-  session.print(json_line(ordered_json{{"memory", wanted.memory},
-                                       {"folder", wanted.out},
+  session.print(json_line(ordered_json{{"memory", arguments.memory},
+                                       {"folder", arguments.out},
                                        {"views", done.views},
-                                       {"pictures", done.pictures},
+                                       {"images", done.pictures},
                                        {"renamed", done.renamed},
                                        {"enlarged", done.enlarged},
                                        {"positions", done.positions},
@@ -82,11 +82,11 @@ ExitCode export_all(const ExportArguments& wanted, Session& session) {
 }
 
 Run declare_export(Arguments& arguments) {
-  auto wanted = std::make_shared<ExportArguments>();
-  arguments.positional("MEMORY", wanted->memory, "Memory file");
-  arguments.required_option("-o,--out FOLDER", wanted->out,
+  auto values = std::make_shared<ExportArguments>();
+  arguments.positional("MEMORY", values->memory, "Memory file");
+  arguments.required_option("-o,--out FOLDER", values->out,
                             "Folder to write: a new or an empty one");
-  return [wanted](Session& session) { return export_all(*wanted, session); };
+  return [values](Session& session) { return export_all(*values, session); };
 }
 
 }  // namespace
@@ -94,7 +94,7 @@ Run declare_export(Arguments& arguments) {
 Verb export_verb() {
   return {
       "export", "Write views, poses, thumbnails and signatures of a memory as a data set",
-      "Thumbnails are all that a memory keeps of its pictures; they become panoramas of the "
+      "Thumbnails are all that a memory keeps of its images; they become panoramas of the "
       "memory's size, which memorise takes back. views.csv and signatures.npy hold all views as "
       "they are. Links, maps and routes are not exported. The folder appears whole or not at all.",
       "  panonav export office.panonav -o office_views\n"

@@ -30,18 +30,19 @@ struct GalleryArguments {
 /// Views that are shown under one title.
 using Groups = std::vector<std::pair<std::string, std::vector<ViewRecord>>>;
 
-std::string span_text(double index, double side_m) {
+std::string format_span(double index, double side_m) {
   return format_number(index * side_m) + " to " + format_number((index + 1.0) * side_m) + " m";
 }
 
-/// Squares of the plane with eight views each or more in the mean, row by row from the upper left
-/// as on a map.
-Groups squares_of(const std::vector<ViewRecord>& views, const std::string& prefix) {
+/// Groups views by squares of the plane with eight views or more on average, row by row from the
+/// upper left.
+Groups group_by_squares(const std::vector<ViewRecord>& views, const std::string& prefix) {
   std::map<std::pair<double, double>, std::vector<ViewRecord>> squares;
   double side_m = 0.0;
-  for (const double wanted_m : {0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0, 1e6, 1e300}) {
+  for (const double candidate_m :
+       {0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0, 1e6, 1e300}) {
     squares.clear();
-    side_m = wanted_m;
+    side_m = candidate_m;
     for (const ViewRecord& view : views) {
       const auto& pose = *view.info.pose;
       squares[{-std::floor(pose.y_m / side_m), std::floor(pose.x_m / side_m)}].push_back(view);
@@ -50,15 +51,15 @@ Groups squares_of(const std::vector<ViewRecord>& views, const std::string& prefi
   }
   Groups groups;
   for (auto& [place, members] : squares) {
-    groups.emplace_back(
-        prefix + "x " + span_text(place.second, side_m) + ", y " + span_text(-place.first, side_m),
-        std::move(members));
+    groups.emplace_back(prefix + "x " + format_span(place.second, side_m) + ", y " +
+                            format_span(-place.first, side_m),
+                        std::move(members));
   }
   return groups;
 }
 
 /// By the folder in their names, by the component of the map, then by place.
-Groups grouped(const std::vector<ViewRecord>& views) {
+Groups group_views(const std::vector<ViewRecord>& views) {
   std::map<std::string, std::pair<std::vector<ViewRecord>, std::vector<ViewRecord>>> areas;
   const bool parts = std::ranges::any_of(views, [](const auto& v) { return v.component > 0U; });
   for (const ViewRecord& view : views) {
@@ -71,7 +72,8 @@ Groups grouped(const std::vector<ViewRecord>& views) {
   Groups groups;
   for (auto& [title, members] : areas) {
     auto& [placed, others] = members;
-    if (!placed.empty()) std::ranges::move(squares_of(placed, title), std::back_inserter(groups));
+    if (!placed.empty())
+      std::ranges::move(group_by_squares(placed, title), std::back_inserter(groups));
     if (!others.empty())
       groups.emplace_back((title.empty() ? "Position" : title + "position") + " not known",
                           std::move(others));
@@ -79,9 +81,9 @@ Groups grouped(const std::vector<ViewRecord>& views) {
   return groups;
 }
 
-/// Empty without a picture. It is decoded and written anew: a browser gets nothing else of the
-/// file.
-std::string picture_of(const MemoryFile& memory, const ViewRecord& view) {
+/// Returns the thumbnail as a data URL, decoded and encoded again, so that a browser gets nothing
+/// else of the file; empty without a thumbnail.
+std::string thumbnail_url(const MemoryFile& memory, const ViewRecord& view) {
   const auto bytes = view.thumbnail ? memory.thumbnail(view.view) : std::nullopt;
   if (!bytes) return "";
   try {
@@ -92,7 +94,7 @@ std::string picture_of(const MemoryFile& memory, const ViewRecord& view) {
   }
 }
 
-std::string caption_of(const ViewRecord& view, bool pictured) {
+std::string make_caption(const ViewRecord& view, bool pictured) {
   std::string text = std::to_string(view.view.value) + ": " + view.info.name;
   if (const auto& pose = view.info.pose) {
     text += ", x " + format_fixed(pose->x_m, 2) + " y " + format_fixed(pose->y_m, 2) + " m";
@@ -101,25 +103,25 @@ std::string caption_of(const ViewRecord& view, bool pictured) {
   return pictured ? text : text + "; no thumbnail";
 }
 
-ExitCode gallery(const GalleryArguments& wanted, Session& session) {
-  const auto memory = MemoryFile::open(wanted.memory, Access::read_only);
-  auto views = selected(list_views(memory), wanted.selection);
-  if (views.empty()) throw FileError(wanted.memory, "holds no such view");
+ExitCode gallery(const GalleryArguments& arguments, Session& session) {
+  const auto memory = MemoryFile::open(arguments.memory, Access::read_only);
+  auto views = selected(list_views(memory), arguments.selection);
+  if (views.empty()) throw FileError(arguments.memory, "holds no such view");
   const std::size_t found = views.size();
   const auto pictured =
       static_cast<std::size_t>(std::ranges::count_if(views, &ViewRecord::thumbnail));
   if (pictured == 0) {
-    throw FileError(wanted.memory,
+    throw FileError(arguments.memory,
                     "holds no thumbnails of these " + std::to_string(found) +
                         " views; to get them, memorise the recording into a new memory without "
                         "--no-thumbnails");
   }
-  prepare_report_folder(wanted.out, "gallery", page_name);
+  prepare_report_folder(arguments.out, "gallery", page_name);
   views.resize(std::min(found, max_views));
 
   viewer::ReportPage page(
-      "What " + memory_name(wanted.memory) + " remembers",
-      "The reference views of the memory, each as the small picture that is stored with it: all "
+      "What " + memory_name(arguments.memory) + " remembers",
+      "The reference views of the memory, each as the small image that is stored with it: all "
       "around the robot, straight ahead in the middle, left and right as the robot sees them, the "
       "edges behind it. Below each: the view's id and name, where it was taken and the heading.");
   const auto placed = std::ranges::count_if(
@@ -132,42 +134,42 @@ ExitCode gallery(const GalleryArguments& wanted, Session& session) {
                   " views; --name and --near of panonav gallery choose others.");
   }
   Progress progress(session, "drawing", views.size());
-  for (const auto& [title, members] : grouped(views)) {
+  for (const auto& [title, members] : group_views(views)) {
     page.begin_section(title + " (" + std::to_string(members.size()) +
                        (members.size() == 1 ? " view)" : " views)"));
     std::vector<viewer::ReportPicture> pictures;
     for (const ViewRecord& view : members) {
-      std::string picture = picture_of(memory, view);
-      std::string caption = caption_of(view, !picture.empty());
+      std::string picture = thumbnail_url(memory, view);
+      std::string caption = make_caption(view, !picture.empty());
       pictures.push_back({std::move(picture), std::move(caption)});
       progress.advance();
     }
     page.add_thumbnails(pictures);
   }
-  page.write(wanted.out, page_name, "panonav gallery");
+  page.write(arguments.out, page_name, "panonav gallery");
   progress.clear();
-  const std::string path = (fs::path(wanted.out) / page_name).string();
+  const std::string path = (fs::path(arguments.out) / page_name).string();
   if (session.json()) {
-    session.print(json_line(ordered_json{{"memory", wanted.memory},
+    session.print(json_line(ordered_json{{"memory", arguments.memory},
                                          {"page", path},
                                          {"views", found},
                                          {"shown", views.size()},
                                          {"thumbnails", pictured}}));
     return ExitCode::done;
   }
-  session.print(session.strong(std::to_string(views.size())) + " of " + std::to_string(found) +
+  session.print(session.bold(std::to_string(views.size())) + " of " + std::to_string(found) +
                 " views, " + std::to_string(pictured) + " with a thumbnail");
-  session.print("Open " + session.strong(path) + " in a browser.");
+  session.print("Open " + session.bold(path) + " in a browser.");
   return ExitCode::done;
 }
 
 Run declare_gallery(Arguments& arguments) {
-  auto wanted = std::make_shared<GalleryArguments>();
-  arguments.positional("MEMORY", wanted->memory, "Memory file");
-  arguments.required_option("-o,--out FOLDER", wanted->out,
+  auto values = std::make_shared<GalleryArguments>();
+  arguments.positional("MEMORY", values->memory, "Memory file");
+  arguments.required_option("-o,--out FOLDER", values->out,
                             "Folder to write: a new one, or that of an earlier gallery");
-  declare_selection(arguments, wanted->selection);
-  return [wanted](Session& session) { return gallery(*wanted, session); };
+  declare_selection(arguments, values->selection);
+  return [values](Session& session) { return gallery(*values, session); };
 }
 
 }  // namespace

@@ -11,9 +11,9 @@ Run declare_help(Arguments& arguments) {
                                  "Verb to explain; none: all verbs with a line each", verb_names());
   return [words](Session& session) {
     const auto verbs = all_verbs();
-    return print_text(
-        words->empty() ? overview(verbs) : help_text(describe(named_verb(verbs, *words)), false),
-        session);
+    return print_text(words->empty() ? overview(verbs)
+                                     : help_text(describe(find_named_verb(verbs, *words)), false),
+                      session);
   };
 }
 

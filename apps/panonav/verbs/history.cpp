@@ -52,8 +52,8 @@ Run declare_history(Arguments& arguments) {
 Verb history_verb() {
   return {"history", "List the changes that a memory keeps, the newest first",
           "Each forget, prune and rename, and each localise --update that changed something. "
-          "panonav undo takes back the newest, then the one before it. Of changes "
-          "beyond the newest 100, or 64 MiB, the line alone is left, of 1000 at most.",
+          "panonav undo takes back the newest, then the one before it. Only the newest 100 "
+          "changes, at most 64 MiB, can be taken back; up to 1000 are listed.",
           "  panonav history office.panonav\n"
           "  panonav history office.panonav --json",
           declare_history};

@@ -51,18 +51,20 @@ ordered_json as_json(const std::string& goal, const HomeAnswer& answer) {
 
 std::string as_text(const HomeAnswer& answer, Session& session) {
   const HomingResult& way = answer.way;
-  if (!way.known) return answer.file + "  " + session.bad("no answer") + ": " + why_none(way);
+  if (!way.known)
+    return answer.file + "  " + session.red("no answer") + ": " + explain_no_direction(way);
   const std::string sure = "; probability " + format_fixed(way.probability, 2);
   if (way.direction_rad) {
-    return answer.file + "  home is " + session.good(in_words(*way.direction_rad)) + ", about " +
-           format_fixed(way.distance_r, 2) + " R away; " + turn_in_words(way.vector.heading_rad) +
-           sure;
+    return answer.file + "  home is " + session.green(in_words(*way.direction_rad)) + ", about " +
+           format_fixed(way.distance_r, 2) + " R away; " +
+           describe_rotation(way.vector.heading_rad) + sure;
   }
-  return answer.file + "  " + session.bad("no direction home") + ": " + why_none(way) + sure;
+  return answer.file + "  " + session.red("no direction home") + ": " + explain_no_direction(way) +
+         sure;
 }
 
 /// A picture beside a dataset.toml lies as that says.
-std::optional<PictureSource> source_beside(const std::string& picture) {
+std::optional<PictureSource> source_of_folder(const std::string& picture) {
   const fs::path folder = fs::path(picture).parent_path();
   std::error_code ignored;
   if (!fs::is_regular_file(picture, ignored) || !fs::exists(folder / "dataset.toml", ignored)) {
@@ -71,7 +73,7 @@ std::optional<PictureSource> source_beside(const std::string& picture) {
   return read_dataset(folder.empty() ? fs::path(".") : folder).source;
 }
 
-ExitCode answer_all(const HomeArguments& wanted, const HomingGuide& guide, const Goal& goal,
+ExitCode answer_all(const HomeArguments& arguments, const HomingGuide& guide, const Goal& goal,
                     const Dataset& recording, Session& session) {
   const std::size_t total = recording.entries.size();
   std::vector<HomeAnswer> answers;
@@ -93,89 +95,89 @@ ExitCode answer_all(const HomeArguments& wanted, const HomingGuide& guide, const
       });
   progress.clear();
   if (!session.json() && total > 1) {
-    session.print(session.strong(std::to_string(pointing) + " of " + std::to_string(total)) +
-                  " views tell the way to " + goal.name);
+    session.print(session.bold(std::to_string(pointing) + " of " + std::to_string(total)) +
+                  " views tell the direction to " + goal.name);
   }
-  if (wanted.report) {
-    write_home_report(*wanted.report, goal, answers, [&](std::size_t i) {
+  if (arguments.report) {
+    write_home_report(*arguments.report, goal, answers, [&](std::size_t i) {
       return guide.encoder().panorama(read_observation(recording.entries[i]));
     });
-    tell_report(*wanted.report, session);
+    print_report_path(*arguments.report, session);
   }
   return pointing > 0 ? ExitCode::done : ExitCode::no_answer;
 }
 
-ExitCode home_from_memory(const Arguments& arguments, const HomeArguments& wanted,
+ExitCode home_from_memory(const Arguments& declared, const HomeArguments& arguments,
                           Session& session) {
-  const auto file = MemoryFile::open(*wanted.memory, Access::read_only);
+  const auto file = MemoryFile::open(*arguments.memory, Access::read_only);
   const auto& header = file.header();
-  SignatureOptions kept = wanted.homing.views.signature;
+  SignatureOptions kept = arguments.homing.views.signature;
   kept.components = header.shape.components;  // fewer of them may be compared
-  require_kept_options(arguments, kept, wanted.homing.views.preprocessing, file);
+  require_kept_options(declared, kept, arguments.homing.views.preprocessing, file);
   int components = header.shape.components;
-  if (arguments.given("signature", "components")) {
-    components = wanted.homing.views.signature.components;
+  if (declared.is_set("signature", "components")) {
+    components = arguments.homing.views.signature.components;
   }
-  const ViewId view = find_view_by_name_or_id(file, wanted.goal);
-  const auto recording = open_recording(wanted.current, wanted.pictures, file, session);
-  const HomingGuide guide(file, wanted.goal, recording.source,
-                          homing_options(arguments, wanted.homing, components), components,
-                          wanted.homing.views.horizon);
-  refuse_unused_rise(arguments, guide.goal(), *wanted.memory);
+  const ViewId view = find_view_by_name_or_id(file, arguments.goal);
+  const auto recording = open_recording(arguments.current, arguments.pictures, file, session);
+  const HomingGuide guide(file, arguments.goal, recording.source,
+                          make_homing_options(declared, arguments.homing, components), components,
+                          arguments.homing.views.horizon);
+  refuse_unused_rise(declared, guide.goal(), *arguments.memory);
   const Goal goal{guide.goal_name(), file.load({&view, 1}).info(view).pose, guide.goal(),
-                  wanted.report ? thumbnail_panorama(file, view) : std::nullopt};
-  return answer_all(wanted, guide, goal, recording, session);
+                  arguments.report ? thumbnail_panorama(file, view) : std::nullopt};
+  return answer_all(arguments, guide, goal, recording, session);
 }
 
-ExitCode home(const Arguments& arguments, const HomeArguments& wanted, Session& session) {
-  if (wanted.report) prepare_report_folder(*wanted.report, "home");
-  if (wanted.memory) return home_from_memory(arguments, wanted, session);
-  const auto& views = wanted.homing.views;
-  const auto options = homing_options(arguments, wanted.homing, views.signature.components);
+ExitCode home(const Arguments& declared, const HomeArguments& arguments, Session& session) {
+  if (arguments.report) prepare_report_folder(*arguments.report, "home");
+  if (arguments.memory) return home_from_memory(declared, arguments, session);
+  const auto& views = arguments.homing.views;
+  const auto options = make_homing_options(declared, arguments.homing, views.signature.components);
   std::error_code ignored;
-  if (fs::is_directory(wanted.goal, ignored)) {
-    throw FileError(wanted.goal, "is a folder; the goal is one picture, or a view of --memory");
+  if (fs::is_directory(arguments.goal, ignored)) {
+    throw FileError(arguments.goal, "is a folder; the goal is one image, or a view of --memory");
   }
   // Either picture may be the one whose folder says how both lie.
-  std::optional<PictureSource> known = source_beside(wanted.current);
-  if (!known) known = source_beside(wanted.goal);
-  const auto recording = open_recording(wanted.current, wanted.pictures, known, session);
-  std::optional<PictureSource> goal_source = source_beside(wanted.goal);
+  std::optional<PictureSource> known = source_of_folder(arguments.current);
+  if (!known) known = source_of_folder(arguments.goal);
+  const auto recording = open_recording(arguments.current, arguments.pictures, known, session);
+  std::optional<PictureSource> goal_source = source_of_folder(arguments.goal);
   if (!goal_source) goal_source = recording.source;
-  PictureArguments of_goal = wanted.pictures;
+  PictureArguments of_goal = arguments.pictures;
   of_goal.part = {};
-  const auto goals = open_recording(wanted.goal, of_goal, goal_source, session);
+  const auto goals = open_recording(arguments.goal, of_goal, goal_source, session);
   const HomingEncoder encoder(goals.source, views);
   const Panorama picture = encoder.panorama(read_observation(goals.entries.front()));
-  const Goal goal{wanted.goal, std::nullopt, encoder.view(picture), picture};
-  refuse_unused_rise(arguments, goal.view, goal.name);
+  const Goal goal{arguments.goal, std::nullopt, encoder.view(picture), picture};
+  refuse_unused_rise(declared, goal.view, goal.name);
   const HomingGuide guide(HomingEncoder(recording.source, views), goal.name, goal.view, options);
-  return answer_all(wanted, guide, goal, recording, session);
+  return answer_all(arguments, guide, goal, recording, session);
 }
 
 Run declare_home(Arguments& arguments) {
-  auto wanted = std::make_shared<HomeArguments>();
-  arguments.positional("GOAL", wanted->goal,
-                       "Picture of the place to return to; with --memory the name or id of a view");
-  arguments.positional("CURRENT", wanted->current,
-                       "What the robot sees now: a picture, or a data set (an answer for each)");
-  arguments.option("--memory FILE", wanted->memory, "Take GOAL from this memory file");
-  declare_pictures(arguments, wanted->pictures);
-  arguments.option("--report FOLDER", wanted->report,
-                   "Write pictures of both views and the way home into this folder: a new one, or "
-                   "that of an earlier report");
-  declare_homing(arguments, wanted->homing);
-  return [wanted, &arguments](Session& session) { return home(arguments, *wanted, session); };
+  auto values = std::make_shared<HomeArguments>();
+  arguments.positional("GOAL", values->goal,
+                       "Image of the place to return to; with --memory the name or id of a view");
+  arguments.positional("CURRENT", values->current,
+                       "What the robot sees now: an image, or a data set (an answer for each)");
+  arguments.option("--memory FILE", values->memory, "Take GOAL from this memory file");
+  declare_pictures(arguments, values->pictures);
+  arguments.option("--report FOLDER", values->report,
+                   "Write a page with both views and the direction home into this folder: a new "
+                   "one, or that of an earlier report");
+  declare_homing(arguments, values->homing);
+  return [values, &arguments](Session& session) { return home(arguments, *values, session); };
 }
 
 }  // namespace
 
 Verb home_verb() {
-  return {"home", "Tell the direction back to a place from one view of it",
-          "Directions are seen from the robot as it stands now; the heading need not be known. The "
-          "distance is in units of R, the typical distance of the things around. A picture in the "
+  return {"home", "Compute the direction back to a place from one view of it",
+          "Directions are relative to the robot's current heading, which need not be known. The "
+          "distance is in units of R, the typical distance of the things around. An image in the "
           "folder of a data set lies as its dataset.toml says. The exit code is 1 when no view "
-          "tells the way: at home itself, or where the views match no better than chance.",
+          "tells a direction: at home itself, or where the views match no better than chance.",
           "  panonav home door.png now.png --kind panorama --elevation-deg -30 40\n"
           "  panonav home view_00012.png now.png --memory office.panonav --report way_home\n"
           "  panonav home office_run/view_00012.png office_run --json",

@@ -31,7 +31,7 @@ struct NamedRoute {
   std::uint64_t bytes = 0;
 };
 
-std::vector<NamedRoute> routes_of(const MemoryFile& memory) {
+std::vector<NamedRoute> list_routes(const MemoryFile& memory) {
   std::vector<NamedRoute> routes;
   for (auto& name : memory.route_names()) {
     const auto route = memory.route(name);
@@ -69,7 +69,7 @@ ordered_json as_json(const MemoryFile& memory, const MemoryFile::Info& info) {
                       {"remove_mean", steps.remove_mean},
                       {"normalise_gain", steps.normalise_gain}}}};
   auto routes = ordered_json::array();
-  for (const auto& [name, lines, length_m, bytes] : routes_of(memory)) {
+  for (const auto& [name, lines, length_m, bytes] : list_routes(memory)) {
     routes.push_back({{"name", name}, {"lines", lines}, {"length_m", length_m}, {"bytes", bytes}});
   }
   json["routes"] = std::move(routes);
@@ -79,7 +79,7 @@ ordered_json as_json(const MemoryFile& memory, const MemoryFile::Info& info) {
   return json;
 }
 
-ExitCode show(const std::string& path, Session& session) {
+ExitCode print_memory(const std::string& path, Session& session) {
   const auto memory = MemoryFile::open(path, Access::read_only);
   const auto info = memory.info();
   if (session.json()) {
@@ -87,7 +87,7 @@ ExitCode show(const std::string& path, Session& session) {
     return ExitCode::done;
   }
   const auto& header = memory.header();
-  session.print(session.strong(path) + ": " + std::to_string(info.views) + " views, " +
+  session.print(session.bold(path) + ": " + std::to_string(info.views) + " views, " +
                 std::to_string(info.views_with_position) + " with a position, " +
                 std::to_string(info.views_with_heading) + " with a heading, " +
                 std::to_string(info.links) + " links");
@@ -99,7 +99,7 @@ ExitCode show(const std::string& path, Session& session) {
                   " views with local features, " +
                   std::to_string(info.feature_bytes / info.views_with_features) + " bytes a view");
   }
-  session.print("  pictures    " + std::string(kind_name(header.source.kind)) + ", " +
+  session.print("  images      " + std::string(kind_name(header.source.kind)) + ", " +
                 std::to_string(header.panorama_columns) + " columns, elevations " +
                 (header.elevations
                      ? format_number(degrees(header.elevations->bottom_rad)) + " to " +
@@ -108,7 +108,7 @@ ExitCode show(const std::string& path, Session& session) {
   session.print("  file        " + std::to_string(info.file_bytes) + " bytes, format " +
                 std::to_string(info.format_version) + ", " + std::to_string(info.thumbnails) +
                 " thumbnails");
-  for (const auto& [name, lines, length_m, bytes] : routes_of(memory)) {
+  for (const auto& [name, lines, length_m, bytes] : list_routes(memory)) {
     session.print("  route       " + name + ": " + std::to_string(lines) + " lines over " +
                   format_fixed(length_m, 1) + " m, " +
                   (length_m > 0.0 ? format_fixed(1e-3 * static_cast<double>(bytes) / length_m, 2) +
@@ -118,7 +118,7 @@ ExitCode show(const std::string& path, Session& session) {
   return ExitCode::done;
 }
 
-ExitCode show_recording(const std::string& path, Session& session) {
+ExitCode print_recording(const std::string& path, Session& session) {
   const recordings::RecordingSummary summary = recordings::describe_recording(path);
   const auto seconds = [](std::int64_t ns) { return 1e-9 * static_cast<double>(ns); };
   if (session.json()) {
@@ -131,13 +131,12 @@ ExitCode show_recording(const std::string& path, Session& session) {
     add_span(json, summary.time);
     auto topics = ordered_json::array();
     for (const auto& [topic, time, rate_hz, shows] : summary.topics) {
-      ordered_json each{{"name", topic.name},         {"type", topic.type},
-                        {"messages", topic.messages}, {"begin_s", nullptr},
-                        {"end_s", nullptr},           {"rate_hz", nullptr},
-                        {"first_picture", nullptr}};
+      ordered_json each{{"name", topic.name},    {"type", topic.type}, {"messages", topic.messages},
+                        {"begin_s", nullptr},    {"end_s", nullptr},   {"rate_hz", nullptr},
+                        {"first_image", nullptr}};
       add_span(each, time);
       if (rate_hz) each["rate_hz"] = *rate_hz;
-      if (shows) each["first_picture"] = *shows;
+      if (shows) each["first_image"] = *shows;
       topics.push_back(std::move(each));
     }
     json["topics"] = std::move(topics);
@@ -153,7 +152,7 @@ ExitCode show_recording(const std::string& path, Session& session) {
     name_width = std::max(name_width, each.topic.name.size());
     type_width = std::max(type_width, each.topic.type.size());
   }
-  session.print(session.strong(path) + ": " + std::to_string(messages) + " messages of " +
+  session.print(session.bold(path) + ": " + std::to_string(messages) + " messages of " +
                 std::to_string(summary.topics.size()) + " topics" +
                 (summary.time
                      ? " in " +
@@ -174,7 +173,7 @@ ExitCode show_recording(const std::string& path, Session& session) {
   return ExitCode::done;
 }
 
-ExitCode show_camera(const std::string& path, Session& session) {
+ExitCode print_camera(const std::string& path, Session& session) {
   const auto formats = recordings::camera_formats(path);
   auto listed = ordered_json::array();
   for (const recordings::CameraFormat& format : formats) {
@@ -191,21 +190,21 @@ ExitCode show_camera(const std::string& path, Session& session) {
   return ExitCode::done;
 }
 
-ExitCode show_video(const std::string& path, Session& session) {
+ExitCode print_video(const std::string& path, Session& session) {
   const Dataset video = recordings::read_video(path, {});
   const ImageSize size = read_picture(video.entries.front()).size();
   const double begin_s = *video.entries.front().stamp_s;
   const double end_s = *video.entries.back().stamp_s;
   if (session.json()) {
     session.print(json_line({{"video", path},
-                             {"pictures", video.entries.size()},
+                             {"images", video.entries.size()},
                              {"begin_s", begin_s},
                              {"end_s", end_s},
                              {"width", size.width},
                              {"height", size.height}}));
     return ExitCode::done;
   }
-  session.print(session.strong(std::to_string(video.entries.size()) + " pictures") + " of " +
+  session.print(session.bold(std::to_string(video.entries.size()) + " images") + " of " +
                 std::to_string(size.width) + " x " + std::to_string(size.height) + " px, from " +
                 format_number(begin_s) + " s to " + format_number(end_s) + " s");
   return ExitCode::done;
@@ -217,9 +216,10 @@ Run declare_info(Arguments& arguments) {
       "FILE", *path,
       "Memory file, recording (MCAP, rosbag2, ROS 1 bag), video, or camera (/dev/video0)");
   return [path](Session& session) {
-    if (path->starts_with("/dev/video")) return show_camera(*path, session);
-    if (recordings::is_video(*path)) return show_video(*path, session);
-    return recordings::is_recording(*path) ? show_recording(*path, session) : show(*path, session);
+    if (path->starts_with("/dev/video")) return print_camera(*path, session);
+    if (recordings::is_video(*path)) return print_video(*path, session);
+    return recordings::is_recording(*path) ? print_recording(*path, session)
+                                           : print_memory(*path, session);
   };
 }
 

@@ -36,13 +36,13 @@ struct Column {
   bool text = false;  // stands at the left
 };
 
-std::size_t width_of(const std::string& text) {
+std::size_t display_width(const std::string& text) {
   return static_cast<std::size_t>(std::ranges::count_if(
       text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
 }
 
 /// Columns in which no view has anything are left out.
-std::vector<std::string> table_of(const std::vector<ViewRecord>& views) {
+std::vector<std::string> format_table(const std::vector<ViewRecord>& views) {
   const std::vector<Column> columns{
       {"id", [](const ViewRecord& v) { return std::to_string(v.view.value); }},
       {"name",
@@ -67,13 +67,13 @@ std::vector<std::string> table_of(const std::vector<ViewRecord>& views) {
     std::vector<std::string> cells;
     std::size_t width = 0;
     for (const ViewRecord& view : views) {
-      width = std::max(width, width_of(cells.emplace_back(column.cell(view))));
+      width = std::max(width, display_width(cells.emplace_back(column.cell(view))));
     }
     if (width == 0) continue;
     cells.insert(cells.begin(), column.title);
     width = std::max(width, column.title.size());
     for (std::size_t i = 0; i < cells.size(); ++i) {
-      const std::string blanks(width - width_of(cells[i]), ' ');
+      const std::string blanks(width - display_width(cells[i]), ' ');
       lines[i] +=
           (lines[i].empty() ? "" : "  ") + (column.text ? cells[i] + blanks : blanks + cells[i]);
     }
@@ -82,19 +82,19 @@ std::vector<std::string> table_of(const std::vector<ViewRecord>& views) {
   return lines;
 }
 
-std::string named(const std::string& what, const std::vector<std::string>& names) {
+std::string list_names(const std::string& what, const std::vector<std::string>& names) {
   std::string text;
   for (const std::string& name : names) text += (text.empty() ? "" : ", ") + to_readable_line(name);
   return names.empty() ? "" : "; " + what + ": " + text;
 }
 
-ExitCode list(const ListArguments& wanted, Session& session) {
-  if (wanted.csv && session.json()) throw UsageError("--csv and --json exclude each other");
-  const auto memory = MemoryFile::open(wanted.memory, Access::read_only);
+ExitCode list(const ListArguments& arguments, Session& session) {
+  if (arguments.csv && session.json()) throw UsageError("--csv and --json exclude each other");
+  const auto memory = MemoryFile::open(arguments.memory, Access::read_only);
   const auto all = list_views(memory);
-  const auto views = selected(all, wanted.selection);
+  const auto views = selected(all, arguments.selection);
   const ExitCode code = views.empty() ? ExitCode::no_answer : ExitCode::done;
-  if (wanted.csv) {
+  if (arguments.csv) {
     std::string table = view_table(views);
     table.pop_back();
     session.print(table);
@@ -105,29 +105,29 @@ ExitCode list(const ListArguments& wanted, Session& session) {
   if (session.json()) {
     auto list = ordered_json::array();
     for (const ViewRecord& view : views) list.push_back(as_json(view));
-    session.print(json_line(ordered_json{{"memory", wanted.memory},
+    session.print(json_line(ordered_json{{"memory", arguments.memory},
                                          {"views", std::move(list)},
                                          {"routes", routes},
                                          {"maps", maps}}));
     return code;
   }
   if (!views.empty()) {
-    const auto lines = table_of(views);
-    session.print(session.strong(lines.front()));
+    const auto lines = format_table(views);
+    session.print(session.bold(lines.front()));
     for (std::size_t i = 1; i < lines.size(); ++i) session.print(lines[i]);
   }
   session.print(std::to_string(views.size()) +
                 (views.size() < all.size() ? " of " + std::to_string(all.size()) : "") + " views" +
-                named("routes", routes) + named("maps", maps));
+                list_names("routes", routes) + list_names("maps", maps));
   return code;
 }
 
 Run declare_list(Arguments& arguments) {
-  auto wanted = std::make_shared<ListArguments>();
-  arguments.positional("MEMORY", wanted->memory, "Memory file");
-  declare_selection(arguments, wanted->selection);
-  arguments.flag("--csv", wanted->csv, "Print a table for other programs");
-  return [wanted](Session& session) { return list(*wanted, session); };
+  auto values = std::make_shared<ListArguments>();
+  arguments.positional("MEMORY", values->memory, "Memory file");
+  declare_selection(arguments, values->selection);
+  arguments.flag("--csv", values->csv, "Print a table for other programs");
+  return [values](Session& session) { return list(*values, session); };
 }
 
 }  // namespace

@@ -22,8 +22,8 @@ namespace panonav::command {
 namespace {
 
 /// Turns the robot as --turn-randomly says, and returns by how much.
-double turn(Observation& observation, const PlaceRecogniser& recogniser,
-            const LocaliseArguments& arguments, std::size_t index) {
+double turn_randomly(Observation& observation, const PlaceRecogniser& recogniser,
+                     const LocaliseArguments& arguments, std::size_t index) {
   if (!arguments.turn_seed) return 0.0;
   const Panorama panorama = recogniser.encoder().panorama(observation);
   Random random(*arguments.turn_seed, index);
@@ -66,7 +66,7 @@ std::vector<LocalisedQuery> answer_all(const PlaceRecogniser& recogniser,
         } catch (const FileError& error) {
           return {{entry.file, 0.0, {}, entry.pose, error.what()}, std::current_exception()};
         }
-        const double turned_rad = turn(*observation, recogniser, arguments, i);
+        const double turned_rad = turn_randomly(*observation, recogniser, arguments, i);
         // Several images are called as they were typed.
         const std::string name =
             arguments.inputs.size() > 1 ? entry.path.filename().string() : entry.file;
@@ -89,8 +89,8 @@ std::vector<LocalisedQuery> answer_all(const PlaceRecogniser& recogniser,
 }
 
 /// Writes the CSV table and prints how many places are known; returns that number.
-std::size_t conclude(const LocaliseArguments& arguments, const std::vector<LocalisedQuery>& answers,
-                     Session& session) {
+std::size_t write_table_and_count(const LocaliseArguments& arguments,
+                                  const std::vector<LocalisedQuery>& answers, Session& session) {
   std::string table(csv_header);
   std::size_t known = 0;
   std::size_t unread = 0;
@@ -102,7 +102,7 @@ std::size_t conclude(const LocaliseArguments& arguments, const std::vector<Local
   if (arguments.out) write_file(*arguments.out, std::string_view(table));
   if (!session.json() && answers.size() > 1) {
     session.print(
-        session.strong(std::to_string(known) + " of " + std::to_string(answers.size() - unread)) +
+        session.bold(std::to_string(known) + " of " + std::to_string(answers.size() - unread)) +
         " views show a place of " + arguments.memory +
         (unread > 0 ? "; " + std::to_string(unread) + " could not be read" : ""));
   }
@@ -127,14 +127,14 @@ ExitCode localise(const Arguments& declared, const LocaliseArguments& arguments,
   if (arguments.report) options.max_held_views = std::numeric_limits<std::size_t>::max();
   const PlaceRecogniser recogniser(arguments.memory, options);
   const auto answers = answer_all(recogniser, arguments, recording, session);
-  const std::size_t known = conclude(arguments, answers, session);
+  const std::size_t known = write_table_and_count(arguments, answers, session);
   if (arguments.report) {
     write_localise_report(*arguments.report, file, recogniser, answers, [&](std::size_t i) {
       Observation observation = read_observation(recording.entries[i]);
-      (void)turn(observation, recogniser, arguments, i);
+      (void)turn_randomly(observation, recogniser, arguments, i);
       return recogniser.encoder().panorama(observation);
     });
-    tell_report(*arguments.report, session);
+    print_report_path(*arguments.report, session);
   }
   return known > 0 ? ExitCode::done : ExitCode::no_answer;
 }
@@ -145,17 +145,17 @@ void declare_changes(Arguments& arguments, const std::shared_ptr<LocaliseArgumen
   arguments.option("--add-interval-s", values->add_interval_s,
                    "Time between two views that are added, at least; default 0.5");
   arguments.flag("--update", values->update,
-                 "Keep views of known places true: other appearances are added, up to "
-                 "--appearances, and what keeps failing is replaced");
+                 "Keep views of known places up to date: other appearances are added, up to "
+                 "--appearances, and views that keep failing are replaced");
   arguments.option("--route NAME", values->route,
                    "Follow this route of the memory; with --add record it, a line each 0.1 m");
   arguments.options("update", values->update_options);
   arguments.options("signature", values->signature, "new");
   arguments.options("preprocessing", values->preprocessing);
-  arguments.used_only(
+  arguments.refuse_unless(
       {"--add-interval-s", "[signature]", "[preprocessing]"}, [values] { return values->add; },
       "without --add");
-  arguments.used_only(
+  arguments.refuse_unless(
       {"[update]"}, [values] { return values->update; }, "without --update");
 }
 
@@ -164,18 +164,18 @@ Run declare_localise(Arguments& arguments) {
   arguments.positional("MEMORY", values->memory, "Memory file");
   arguments.positionals(
       "INPUT", values->inputs,
-      "Data set, folder of pictures, video, recording of topics, one or more pictures, or a live "
-      "source: - for JPEG pictures on standard input, a camera (/dev/video0), an address "
+      "Data set, folder of images, video, recording of topics, one or more images, or a live "
+      "source: - for JPEG images on standard input, a camera (/dev/video0), an address "
       "(rtsp://, http://, tcp://)");
   declare_pictures(arguments, values->pictures);
   declare_live(arguments, values->live);
   declare_record(arguments, values->record);
   declare_view(arguments, values->record);
   arguments.uncommon({"--record"});
-  arguments.option("-o,--out FILE", values->out, "Write a CSV table, one line for each picture");
+  arguments.option("-o,--out FILE", values->out, "Write a CSV table, one line for each image");
   arguments.option("--report FOLDER", values->report,
-                   "Write a page with each picture above its best match, turned alike, into this "
-                   "folder: a new one, or that of an earlier report");
+                   "Write a page with each image above its best match, rotated to the same "
+                   "heading, into this folder: a new one, or that of an earlier report");
   arguments.flag("--exclude-same-file", values->exclude_same_file,
                  "Leave out the reference view of the same file name (leave-one-out)");
   arguments.option("--turn-randomly SEED", values->turn_seed,
@@ -188,7 +188,7 @@ Run declare_localise(Arguments& arguments) {
   arguments.options("accuracy", values->accuracy, "area");
   arguments.common({"--top"});
   declare_changes(arguments, values);
-  arguments.used_only(
+  arguments.refuse_unless(
       {"[accuracy]"}, [values] { return values->areas; }, "without --areas");
   return [values, &arguments](Session& session) { return localise(arguments, *values, session); };
 }
@@ -198,15 +198,14 @@ Run declare_localise(Arguments& arguments) {
 Verb localise_verb() {
   return {
       "localise",
-      "Tell where pictures were taken and which way the robot faced",
-      "Pictures without a dataset.toml are read as those that the memory was made from. Pictures "
-      "that cannot be read are named and skipped. Of a live source the newest picture is answered "
-      "as it comes, until Ctrl-C. --add makes the memory grow with the places that the robot comes "
-      "to, --update keeps known places true by odometry, or by motion that is read from the "
-      "pictures; everything is stored when the input ends, and panonav undo takes an update back. "
-      "--route tells where the robot is beside a recorded route; with --add it records one, with "
-      "the poses of the recording, its odometry, or motion read from the pictures. The exit code "
-      "is 1 when no picture shows a place of the memory.",
+      "Find where images were taken and the robot's heading",
+      "Images without a dataset.toml are read like those that the memory was made from. Images "
+      "that cannot be read are reported and skipped. A live source is answered until Ctrl-C, the "
+      "newest image first. --add adds views of places that the memory does not know. --update "
+      "keeps the views of known places up to date, by odometry or by motion that is read from the "
+      "images; panonav undo takes an update back. --route locates the robot relative to a recorded "
+      "route; with --add it records one, with the poses of the recording, its odometry, or motion "
+      "read from the images. The exit code is 1 when no image shows a place of the memory.",
       "  panonav localise office.panonav query_run --report answers\n"
       "  panonav localise office.panonav /dev/video0\n"
       "  panonav localise office.panonav one.png two.png -o answers.csv\n"

@@ -16,17 +16,17 @@ struct ManArguments {
   std::optional<std::string> out;
 };
 
-ExitCode man(const ManArguments& wanted, Session& session) {
+ExitCode man(const ManArguments& arguments, Session& session) {
   const auto verbs = all_verbs();
-  if (wanted.out && !wanted.words.empty()) {
-    throw UsageError("--out writes the pages of all verbs; leave out '" + wanted.words[0] + "'");
+  if (arguments.out && !arguments.words.empty()) {
+    throw UsageError("--out writes the pages of all verbs; leave out '" + arguments.words[0] + "'");
   }
-  if (!wanted.words.empty()) {
-    return print_text(manual_page(describe(named_verb(verbs, wanted.words))), session);
+  if (!arguments.words.empty()) {
+    return print_text(manual_page(describe(find_named_verb(verbs, arguments.words))), session);
   }
   const auto descriptions = describe(verbs);
-  if (!wanted.out) return print_text(manual_overview(descriptions), session);
-  const fs::path folder(*wanted.out);
+  if (!arguments.out) return print_text(manual_overview(descriptions), session);
+  const fs::path folder(*arguments.out);
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) throw FileError(folder.string(), "cannot be made: " + error.message());
@@ -35,20 +35,20 @@ ExitCode man(const ManArguments& wanted, Session& session) {
     write_file(folder / (manual_name(description.verb) + ".1"), manual_page(description) + "\n");
   }
   if (session.json()) {
-    session.print(json_line(ordered_json{{"folder", *wanted.out}, {"pages", verbs.size() + 1}}));
+    session.print(json_line(ordered_json{{"folder", *arguments.out}, {"pages", verbs.size() + 1}}));
   } else {
-    session.print(std::to_string(verbs.size() + 1) + " manual pages in " + *wanted.out);
+    session.print(std::to_string(verbs.size() + 1) + " manual pages in " + *arguments.out);
   }
   return ExitCode::done;
 }
 
 Run declare_man(Arguments& arguments) {
-  auto wanted = std::make_shared<ManArguments>();
-  arguments.optional_positionals("VERB", wanted->words, "Verb of the page; none: the overview",
+  auto values = std::make_shared<ManArguments>();
+  arguments.optional_positionals("VERB", values->words, "Verb of the page; none: the overview",
                                  verb_names());
-  arguments.option("-o,--out FOLDER", wanted->out,
+  arguments.option("-o,--out FOLDER", values->out,
                    "Write the pages of all verbs as files into this folder instead");
-  return [wanted](Session& session) { return man(*wanted, session); };
+  return [values](Session& session) { return man(*values, session); };
 }
 
 }  // namespace

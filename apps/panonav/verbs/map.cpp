@@ -41,8 +41,8 @@ struct MapArguments {
 
 /// Poses of the largest component over time. The stamp is the number of the picture where the
 /// recording has none.
-std::vector<StampedPose> trajectory_of(const Dataset& recording, const Mapper::Result& run,
-                                       const std::string& dataset) {
+std::vector<StampedPose> make_trajectory(const Dataset& recording, const Mapper::Result& run,
+                                         const std::string& dataset) {
   std::vector<StampedPose> trajectory;
   const std::size_t component = find_largest_component(run.map);
   for (std::size_t i = 0; i < run.map.nodes.size(); ++i) {
@@ -65,7 +65,7 @@ std::vector<std::size_t> component_sizes(const TopologicalMap& map) {
   return sizes;
 }
 
-std::size_t number_of_closures(const TopologicalMap& map) {
+std::size_t count_closures(const TopologicalMap& map) {
   return static_cast<std::size_t>(std::ranges::count(map.edges, LinkKind::closure, &MapEdge::kind));
 }
 
@@ -87,12 +87,12 @@ ordered_json as_json(const MapComparison& comparison) {
 
 void print_comparison(const MapComparison& comparison, const Mapper::Result& run,
                       Session& session) {
-  session.print("beside the ground truth: Procrustes disparity (shape difference) " +
-                session.strong(format_fixed(comparison.shape_difference, 4)) + ", " +
+  session.print("compared with the ground truth: Procrustes disparity (shape difference) " +
+                session.bold(format_fixed(comparison.shape_difference, 4)) + ", " +
                 format_fixed(comparison.rms_m, 2) + " m rms" +
                 (run.wheels ? "" : " with a free scale of " + format_fixed(comparison.scale, 2)));
   if (comparison.odometry_shape_difference) {
-    session.print("the wheels alone: Procrustes disparity " +
+    session.print("the odometry alone: Procrustes disparity " +
                   format_fixed(*comparison.odometry_shape_difference, 4));
   }
   if (comparison.trustworthiness) {
@@ -104,20 +104,20 @@ void print_comparison(const MapComparison& comparison, const Mapper::Result& run
                 std::to_string(comparison.wrong_closures));
 }
 
-void print_result(const MapArguments& wanted, const Dataset& recording, const Mapper::Result& run,
-                  Session& session) {
+void print_result(const MapArguments& arguments, const Dataset& recording,
+                  const Mapper::Result& run, Session& session) {
   const std::size_t nodes = run.map.nodes.size();
   const double step_ms =
       1e3 * run.mapping_s / static_cast<double>(std::max<std::size_t>(1, recording.entries.size()));
   const auto sizes = component_sizes(run.map);
   const auto comparison = compare_with_ground_truth(recording, run);
   if (session.json()) {
-    ordered_json json{{"memory", wanted.memory},
-                      {"pictures", recording.entries.size()},
+    ordered_json json{{"memory", arguments.memory},
+                      {"images", recording.entries.size()},
                       {"nodes", nodes},
                       {"skipped", run.skipped},
                       {"connected_components", sizes},
-                      {"closures", number_of_closures(run.map)},
+                      {"closures", count_closures(run.map)},
                       {"scale_m", run.scale_m},
                       {"wheels", run.wheels},
                       {"step_ms", step_ms},
@@ -126,21 +126,21 @@ void print_result(const MapArguments& wanted, const Dataset& recording, const Ma
     session.print(json_line(json));
     return;
   }
-  session.print(session.strong(std::to_string(nodes)) + " places from " +
-                std::to_string(recording.entries.size()) + " pictures, " +
-                std::to_string(number_of_closures(run.map)) + " closures; " +
-                format_fixed(step_ms, 2) + " ms a picture");
+  session.print(session.bold(std::to_string(nodes)) + " places from " +
+                std::to_string(recording.entries.size()) + " images, " +
+                std::to_string(count_closures(run.map)) + " closures; " + format_fixed(step_ms, 2) +
+                " ms an image");
   if (sizes.size() > 1) {
     std::string text;
     for (const std::size_t size : sizes) text += (text.empty() ? "" : ", ") + std::to_string(size);
     session.print(
-        session.bad("The map has " + std::to_string(sizes.size()) + " connected components") +
+        session.red("The map has " + std::to_string(sizes.size()) + " connected components") +
         ", with these numbers of places: " + text + ".");
     session.print(
-        "Pictures taken closer together, odometry in the recording, or another drive through the "
-        "same places connect them.");
+        "To connect them, take images closer together, record odometry, or drive through the same "
+        "places again.");
   }
-  const double height_m = wanted.mapper.odometry.camera_height_m;
+  const double height_m = arguments.mapper.odometry.camera_height_m;
   if (!run.wheels && height_m > 0.0) {
     session.print("Lengths are read from the ground, " + format_number(height_m) +
                   " m below the camera.");
@@ -149,19 +149,19 @@ void print_result(const MapArguments& wanted, const Dataset& recording, const Ma
                   format_number(run.scale_m) + " m (--scale-m, --camera-height-m).");
   }
   if (comparison) print_comparison(*comparison, run, session);
-  if (wanted.picture) {
-    session.print(*wanted.picture + " shows " +
+  if (arguments.picture) {
+    session.print(*arguments.picture + " shows " +
                   (sizes.size() > 1 ? "the largest connected component of the map, " +
                                           std::to_string(std::ranges::max(sizes)) + " of " +
                                           std::to_string(nodes) + " places"
                                     : "the map"));
   }
-  session.print(wanted.memory + " holds the map and the views of its places.");
-  if (wanted.tum) {
-    session.print(*wanted.tum + " holds the poses" +
+  session.print(arguments.memory + " holds the map and the views of its places.");
+  if (arguments.tum) {
+    session.print(*arguments.tum + " holds the poses" +
                   (sizes.size() > 1 ? " of the largest connected component." : "."));
   }
-  if (wanted.graph) session.print(*wanted.graph + " holds the map as a graph.");
+  if (arguments.graph) session.print(*arguments.graph + " holds the map as a graph.");
 }
 
 Mapper::Result map_recording(const Dataset& recording, Mapper& mapper, Session& session) {
@@ -170,11 +170,11 @@ Mapper::Result map_recording(const Dataset& recording, Mapper& mapper, Session& 
 }
 
 /// As `map_recording`, and viewers see how it grows.
-Mapper::Result map_in_view(const MapArguments& wanted, const Dataset& recording, Mapper& mapper,
+Mapper::Result map_in_view(const MapArguments& arguments, const Dataset& recording, Mapper& mapper,
                            Session& session) {
-  RunRecord record({.file = std::nullopt, .view = wanted.record.view},
-                   std::array{wanted.dataset, wanted.memory}, false, session,
-                   {.memory = wanted.memory});
+  RunRecord record({.file = std::nullopt, .view = arguments.record.view},
+                   std::array{arguments.dataset, arguments.memory}, false, session,
+                   {.memory = arguments.memory});
   struct Seen {
     Mapper::EncodedView view;
     recordings::RunMoment moment;
@@ -194,7 +194,7 @@ Mapper::Result map_in_view(const MapArguments& wanted, const Dataset& recording,
         clock.stage("unwarping, signature");
         seen.moment.panorama = mapper.encoder().panorama(observation);
         clock.stage("for viewers");
-        clock.put(seen.moment);
+        clock.add_to(seen.moment);
         return seen;
       },
       [&](std::size_t, Seen&& seen) {
@@ -202,8 +202,8 @@ Mapper::Result map_in_view(const MapArguments& wanted, const Dataset& recording,
         StageClock clock;
         const bool is_node = mapper.add(std::move(seen.view));
         clock.stage("mapping");
-        clock.put(seen.moment);
-        shown.put(seen.moment, mapper.map_so_far(), is_node, seen.name);
+        clock.add_to(seen.moment);
+        shown.add_to(seen.moment, mapper.map_so_far(), is_node, seen.name);
         last = std::move(seen.moment);
         progress.advance();
       });
@@ -218,10 +218,10 @@ Mapper::Result map_in_view(const MapArguments& wanted, const Dataset& recording,
 
 /// Writes the finished map, then each picture with the pose that it got: of the largest connected
 /// component, as components have no common frame.
-void record_map(const MapArguments& wanted, const Dataset& recording, const Mapper::Result& run,
+void record_map(const MapArguments& arguments, const Dataset& recording, const Mapper::Result& run,
                 const ViewEncoder& encoder, viewer::RunPage& played, Session& session) {
-  RunRecord record({.file = wanted.record.file, .view = std::nullopt},
-                   std::array{wanted.dataset, wanted.memory}, false, session, {});
+  RunRecord record({.file = arguments.record.file, .view = std::nullopt},
+                   std::array{arguments.dataset, arguments.memory}, false, session, {});
   const std::size_t component = find_largest_component(run.map);
   std::map<std::size_t, std::size_t> nodes;  // by observation
   std::vector<std::string> names;
@@ -233,9 +233,9 @@ void record_map(const MapArguments& wanted, const Dataset& recording, const Mapp
   make_in_order(
       recording.entries.size(), session.executor(),
       [&](std::size_t i) {
-        const Observation seen = read_observation(recording.entries[i]);
-        recordings::RunMoment moment = recordings::make_moment(seen, i);
-        moment.panorama = encoder.panorama(seen);
+        const Observation observation = read_observation(recording.entries[i]);
+        recordings::RunMoment moment = recordings::make_moment(observation, i);
+        moment.panorama = encoder.panorama(observation);
         return moment;
       },
       [&](std::size_t i, recordings::RunMoment&& moment) {
@@ -245,8 +245,8 @@ void record_map(const MapArguments& wanted, const Dataset& recording, const Mapp
         if (moment.sure && run.map.nodes[node->second].component == component) {
           moment.pose = run.map.nodes[node->second].pose;
         }
-        if (i == 0) put_component(moment, run.map, component, names);
-        if (wanted.report) {
+        if (i == 0) add_component(moment, run.map, component, names);
+        if (arguments.report) {
           recordings::RunMoment shown = moment;
           shown.truth.reset();  // in another frame than the map's
           played.add(shown);
@@ -259,131 +259,133 @@ void record_map(const MapArguments& wanted, const Dataset& recording, const Mapp
 
 /// Refuses what is typed and does nothing with this recording, and a height of the camera, also of
 /// a file, where lengths cannot be read from the ground.
-void refuse_without_effect(const Arguments& arguments, const MapArguments& wanted,
+void refuse_without_effect(const Arguments& declared, const MapArguments& arguments,
                            const Dataset& recording, const MemoryHeader& header) {
   const auto has_odometry = [](const DatasetEntry& entry) { return entry.odometry.has_value(); };
   const bool all = std::ranges::all_of(recording.entries, has_odometry);
-  const bool wheels = wanted.mapper.mapping.wheels && all;
-  if (arguments.given("visual_odometry", "camera_height_m") && !header.elevations) {
-    throw FileError(wanted.dataset,
-                    "does not tell the elevations of its pictures' rows, without which the ground "
+  const bool wheels = arguments.mapper.mapping.wheels && all;
+  if (declared.is_set("visual_odometry", "camera_height_m") && !header.elevations) {
+    throw FileError(arguments.dataset,
+                    "does not tell the elevations of its images' rows, without which the ground "
                     "is not found; allowed with --camera-height-m: panoramas with elevation_deg, "
-                    "equirectangular pictures, and mirror pictures with a camera");
+                    "equirectangular images, and mirror images with a camera");
   }
-  if (arguments.given("visual_odometry", "camera_height_m") && wheels) {
-    throw FileError(wanted.dataset,
+  if (declared.is_set("visual_odometry", "camera_height_m") && wheels) {
+    throw FileError(arguments.dataset,
                     "has odometry, which tells the lengths of all steps; allowed with "
                     "--camera-height-m: recordings without it, or --wheels false");
   }
   if (wheels) {
-    arguments.refuse_unused({"--scale-m", "--step-deviation"},
-                            "where odometry tells the lengths of all steps");
+    declared.refuse_unused({"--scale-m", "--step-deviation"},
+                           "where odometry tells the lengths of all steps");
   }
-  if (all) arguments.refuse_unused({"--bridge-m"}, "where odometry tells of all steps");
+  if (all) declared.refuse_unused({"--bridge-m"}, "where odometry tells of all steps");
   if (std::ranges::none_of(recording.entries, has_odometry)) {
-    if (wanted.mapper.mapping.wheels) {
-      arguments.refuse_unused({"--wheels"}, "as " + wanted.dataset + " has no odometry");
+    if (arguments.mapper.mapping.wheels) {
+      declared.refuse_unused({"--wheels"}, "as " + arguments.dataset + " has no odometry");
     }
   }
 }
 
-ExitCode map(const Arguments& arguments, const MapArguments& wanted, Session& session) {
-  if (wanted.report) prepare_report_folder(*wanted.report, "map");
-  const bool there = memory_exists(wanted.memory);
+ExitCode map(const Arguments& declared, const MapArguments& arguments, Session& session) {
+  if (arguments.report) prepare_report_folder(*arguments.report, "map");
+  const bool there = memory_exists(arguments.memory);
   std::optional<MemoryFile> memory;
-  if (there) memory = MemoryFile::open(wanted.memory, Access::read_write);
+  if (there) memory = MemoryFile::open(arguments.memory, Access::read_write);
   const Dataset recording =
-      memory ? open_recording(wanted.dataset, wanted.pictures, *memory, session)
-             : open_recording(wanted.dataset, wanted.pictures, std::nullopt, session);
+      memory ? open_recording(arguments.dataset, arguments.pictures, *memory, session)
+             : open_recording(arguments.dataset, arguments.pictures, std::nullopt, session);
   if (memory) {
-    require_kept_options(arguments, wanted.signature, memory->header().preprocessing, *memory);
-    refuse_without_effect(arguments, wanted, recording, memory->header());
+    require_kept_options(declared, arguments.signature, memory->header().preprocessing, *memory);
+    refuse_without_effect(declared, arguments, recording, memory->header());
   } else {
     const MemoryHeader header =
-        make_header_of_recording(recording, wanted.signature, {}, session.executor());
-    refuse_without_effect(arguments, wanted, recording, header);
-    memory = MemoryFile::create(wanted.memory, header);
+        make_header_of_recording(recording, arguments.signature, {}, session.executor());
+    refuse_without_effect(declared, arguments, recording, header);
+    memory = MemoryFile::create(arguments.memory, header);
   }
-  MapperOptions options = wanted.mapper;
-  options.thumbnails = !wanted.no_thumbnails;
+  MapperOptions options = arguments.mapper;
+  options.thumbnails = !arguments.no_thumbnails;
   Mapper mapper(std::move(*memory), recording.source, options);
   if (there) check_known_views(recording, mapper.memory(), mapper.encoder(), session.executor());
-  const Mapper::Result run = wanted.record.view ? map_in_view(wanted, recording, mapper, session)
-                                                : map_recording(recording, mapper, session);
-  if (wanted.tum) write_trajectory(*wanted.tum, trajectory_of(recording, run, wanted.dataset));
-  if (wanted.graph) {
-    write_graph(*wanted.graph, run.map, [&](ViewId view) {
+  const Mapper::Result run = arguments.record.view
+                                 ? map_in_view(arguments, recording, mapper, session)
+                                 : map_recording(recording, mapper, session);
+  if (arguments.tum)
+    write_trajectory(*arguments.tum, make_trajectory(recording, run, arguments.dataset));
+  if (arguments.graph) {
+    write_graph(*arguments.graph, run.map, [&](ViewId view) {
       const auto found = std::ranges::lower_bound(run.map.nodes, view, {}, &MapNode::view);
       const auto number = static_cast<std::size_t>(found - run.map.nodes.begin());
       return recording.entries[run.observations[number]].file;
     });
   }
   viewer::RunPage played("", recording.entries.size());
-  if (wanted.record.file || wanted.report) {
-    record_map(wanted, recording, run, mapper.encoder(), played, session);
+  if (arguments.record.file || arguments.report) {
+    record_map(arguments, recording, run, mapper.encoder(), played, session);
   }
-  if (wanted.picture) write_map_picture(*wanted.picture, recording, run);
-  if (wanted.report) {
-    write_map_report(*wanted.report, fs::path(wanted.memory).filename().string(), recording, run,
-                     played);
+  if (arguments.picture) write_map_picture(*arguments.picture, recording, run);
+  if (arguments.report) {
+    write_map_report(*arguments.report, fs::path(arguments.memory).filename().string(), recording,
+                     run, played);
   }
-  print_result(wanted, recording, run, session);
-  if (wanted.report) tell_report(*wanted.report, session);
+  print_result(arguments, recording, run, session);
+  if (arguments.report) print_report_path(*arguments.report, session);
   return ExitCode::done;
 }
 
 Run declare_map(Arguments& arguments) {
-  auto wanted = std::make_shared<MapArguments>();
+  auto values = std::make_shared<MapArguments>();
   arguments.positional(
-      "DATASET", wanted->dataset,
-      "Data set, folder of pictures, video or recording, in the order in which they were taken");
-  arguments.positional("MEMORY", wanted->memory,
+      "DATASET", values->dataset,
+      "Data set, folder of images, video or recording, in the order in which they were taken");
+  arguments.positional("MEMORY", values->memory,
                        "Memory file (NAME.panonav); views that it does not know are appended");
-  declare_pictures(arguments, wanted->pictures);
+  declare_pictures(arguments, values->pictures);
   arguments.option(
-      "--tum FILE", wanted->tum,
+      "--tum FILE", values->tum,
       "Write the poses of the largest component to this file: TUM text, or CSV for a name "
       "that ends in .csv");
-  arguments.option("--graphml FILE", wanted->graph, "Write the map as a graph to this file");
-  declare_record(arguments, wanted->record);
-  declare_view(arguments, wanted->record);
+  arguments.option("--graphml FILE", values->graph, "Write the map as a graph to this file");
+  declare_record(arguments, values->record);
+  declare_view(arguments, values->record);
   arguments.uncommon({"--record"});
-  arguments.option("--picture FILE", wanted->picture,
-                   "Draw the map, beside the truth where it is known, into this PNG or SVG file");
-  arguments.option("--report FOLDER", wanted->report,
-                   "Write a page that plays the drive on its map into this folder: a new one, or "
+  arguments.option(
+      "--picture FILE", values->picture,
+      "Draw the map, next to the true positions where they are known, into this PNG or SVG file");
+  arguments.option("--report FOLDER", values->report,
+                   "Write a page that replays the drive on its map into this folder: a new one, or "
                    "that of an earlier report");
   arguments.uncommon({"--picture"});
-  arguments.flag("--no-thumbnails", wanted->no_thumbnails,
-                 "Do not keep small pictures of the views");
-  arguments.options("signature", wanted->signature);
-  arguments.options("mapping", wanted->mapper.mapping);
-  arguments.options("visual_odometry", wanted->mapper.odometry);
-  arguments.options("loop_closure", wanted->mapper.closure, "closure");
-  arguments.options("pose_graph", wanted->mapper.graph, "graph");
+  arguments.flag("--no-thumbnails", values->no_thumbnails, "Do not store thumbnails of the views");
+  arguments.options("signature", values->signature);
+  arguments.options("mapping", values->mapper.mapping);
+  arguments.options("visual_odometry", values->mapper.odometry);
+  arguments.options("loop_closure", values->mapper.closure, "closure");
+  arguments.options("pose_graph", values->mapper.graph, "graph");
   arguments.common({"--camera-height-m", "--capture-difference"});
-  arguments.used_only(
-      {"[loop_closure]", "[pose_graph]"}, [wanted] { return wanted->mapper.mapping.close_loops; },
+  arguments.refuse_unless(
+      {"[loop_closure]", "[pose_graph]"}, [values] { return values->mapper.mapping.close_loops; },
       "with --close-loops false");
-  arguments.used_only(
+  arguments.refuse_unless(
       {"--distance-components", "--turn-components"},
-      [wanted] { return wanted->mapper.odometry.rule == VisualOdometryOptions::Rule::published; },
+      [values] { return values->mapper.odometry.rule == VisualOdometryOptions::Rule::published; },
       "without --rule published");
-  arguments.used_only(
+  arguments.refuse_unless(
       {"--iterations", "--nearer-side"},
-      [wanted] { return wanted->mapper.odometry.rule == VisualOdometryOptions::Rule::home_vector; },
+      [values] { return values->mapper.odometry.rule == VisualOdometryOptions::Rule::home_vector; },
       "with --rule published");
-  return [wanted, &arguments](Session& session) { return map(arguments, *wanted, session); };
+  return [values, &arguments](Session& session) { return map(arguments, *values, session); };
 }
 
 }  // namespace
 
 Verb map_verb() {
-  return {"map", "Make a map from pictures in the order in which they were taken",
-          "Each picture is placed by what its view shows of the step from the one before; places "
-          "that are passed again close the loop. Where the data set has odometry, steps are its, "
-          "with turns that the views steady. Without it, --camera-height-m makes metres of "
-          "lengths. What nothing connects is kept as separate components.",
+  return {"map", "Make a map from images in the order in which they were taken",
+          "Each image is placed by the step since the one before, which is read from the views; "
+          "places that are passed again close loops. If the data set has odometry, it gives the "
+          "steps, and the views correct their rotations. Without odometry, --camera-height-m gives "
+          "lengths in metres. Parts that are not connected are kept as separate components.",
           "  panonav map office_run office.panonav\n"
           "  panonav map office_run office.panonav --report mapped --graphml map.graphml\n"
           "  panonav map walk walk.panonav --camera-height-m 0.6\n"

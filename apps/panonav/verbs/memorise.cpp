@@ -34,16 +34,16 @@ struct Skipped {
   std::string why;
 };
 
-void skip(const std::string& file, const Error& error, std::vector<Skipped>& skipped,
-          Session& session) {
+void note_skipped(const std::string& file, const Error& error, std::vector<Skipped>& skipped,
+                  Session& session) {
   session.note("skipped: " + to_readable_line(error.what()));
   skipped.push_back({file, error.what()});
 }
 
 /// Appends what is missing; notes which recording it is of as soon as there is a file. Adds the
 /// pictures that cannot be read to `skipped`; with `strict` the first of them ends it.
-void add_all(const Dataset& missing, const Dataset& recording, bool strict, Memoriser& memoriser,
-             std::vector<Skipped>& skipped, Session& session) {
+void memorise_missing(const Dataset& missing, const Dataset& recording, bool strict,
+                      Memoriser& memoriser, std::vector<Skipped>& skipped, Session& session) {
   bool noted = false;
   const auto note = [&] {
     if (!noted && memoriser.file() != nullptr) remember_recording(recording, *memoriser.file());
@@ -67,7 +67,7 @@ void add_all(const Dataset& missing, const Dataset& recording, bool strict, Memo
           break;
         }
         progress.clear();
-        skip(entry.file, error, skipped, session);
+        note_skipped(entry.file, error, skipped, session);
       }
     }
     progress.advance(batch.size());
@@ -76,35 +76,36 @@ void add_all(const Dataset& missing, const Dataset& recording, bool strict, Memo
   }
   if (failure) std::rethrow_exception(failure);
   if (memoriser.file() == nullptr && skipped.size() == missing.entries.size()) {
-    throw FileError(recording.folder.string(), "holds no picture that can be read");
+    throw FileError(recording.folder.string(), "holds no image that can be read");
   }
 }
 
-MemoriserOptions options_of(const MemoriseArguments& wanted, const PictureSource& source,
-                            std::vector<Skipped>& skipped, Session& session) {
+MemoriserOptions make_options(const MemoriseArguments& arguments, const PictureSource& source,
+                              std::vector<Skipped>& skipped, Session& session) {
   MemoriserOptions options{.source = source,
-                           .signature = wanted.signature,
-                           .preprocessing = wanted.preprocessing,
-                           .thumbnails = !wanted.no_thumbnails,
-                           .features = !wanted.no_features,
+                           .signature = arguments.signature,
+                           .preprocessing = arguments.preprocessing,
+                           .thumbnails = !arguments.no_thumbnails,
+                           .features = !arguments.no_features,
                            .left_out = {}};
-  if (!wanted.strict) {
-    options.left_out = [&](const Observation& seen, const Error& error) {
-      skip(seen.name, error, skipped, session);
+  if (!arguments.strict) {
+    options.left_out = [&](const Observation& observation, const Error& error) {
+      note_skipped(observation.name, error, skipped, session);
     };
   }
   return options;
 }
 
-void tell(const MemoriseArguments& wanted, const MemoryFile& memory, std::size_t appended,
-          std::size_t known_before, const std::vector<Skipped>& skipped, Session& session) {
+void print_result(const MemoriseArguments& arguments, const MemoryFile& memory,
+                  std::size_t appended, std::size_t known_before,
+                  const std::vector<Skipped>& skipped, Session& session) {
   const auto info = memory.info();
   if (session.json()) {
     auto skipped_json = ordered_json::array();
     for (const Skipped& one : skipped) {
       skipped_json.push_back({{"file", one.file}, {"why", one.why}});
     }
-    session.print(json_line(ordered_json{{"memory", wanted.memory},
+    session.print(json_line(ordered_json{{"memory", arguments.memory},
                                          {"appended", appended},
                                          {"known_before", known_before},
                                          {"skipped", std::move(skipped_json)},
@@ -113,51 +114,55 @@ void tell(const MemoriseArguments& wanted, const MemoryFile& memory, std::size_t
     return;
   }
   session.print(
-      session.strong(std::to_string(appended)) + " views memorised" +
+      session.bold(std::to_string(appended)) + " views memorised" +
       (known_before > 0 ? ", " + std::to_string(known_before) + " were known before" : "") +
       (skipped.empty() ? "" : ", " + std::to_string(skipped.size()) + " could not be read") + "; " +
-      wanted.memory + " holds " + std::to_string(info.views));
+      arguments.memory + " holds " + std::to_string(info.views));
   if (!memory.header().elevations) {
-    session.print(
-        "The pictures' elevations are not known: every row is treated as on the horizon.");
+    session.print("The images' elevations are not known: every row is treated as on the horizon.");
   }
-  session.suggest({"panonav", "localise", wanted.memory, "INPUT"});
+  session.suggest({"panonav", "localise", arguments.memory, "INPUT"});
 }
 
 /// Memorises pictures as they come until the source ends or the user interrupts.
-ExitCode memorise_live(const Arguments& arguments, const MemoriseArguments& wanted,
+ExitCode memorise_live(const Arguments& declared, const MemoriseArguments& arguments,
                        const std::optional<PictureSource>& remembered, Session& session) {
-  const auto source = open_live(arguments, wanted.input, wanted.pictures, remembered, wanted.live);
+  const auto source =
+      open_live(declared, arguments.input, arguments.pictures, remembered, arguments.live);
   std::vector<Skipped> skipped;
-  Memoriser memoriser(wanted.memory, options_of(wanted, source->pictures(), skipped, session));
-  LiveRun taking(*source, wanted.pictures.part, wanted.live, session);
-  taking.take([](const Observation&) { return ""; },
-              [&](Observation&& seen) { memoriser.add(std::move(seen)); });
-  const LiveCounts& counts = taking.finish();
-  if (counts.pictures == 0) throw FileError(wanted.input, "gave no picture");
+  Memoriser memoriser(arguments.memory,
+                      make_options(arguments, source->pictures(), skipped, session));
+  LiveRun loop(*source, arguments.pictures.part, arguments.live, session);
+  loop.run([](const Observation&) { return ""; },
+           [&](Observation&& observation) { memoriser.add(std::move(observation)); });
+  const LiveCounts& counts = loop.finish();
+  if (counts.pictures == 0) throw FileError(arguments.input, "gave no image");
   const auto stored = memoriser.finish(session.executor());
-  tell(wanted, *memoriser.file(), stored.appended, stored.known_before, skipped, session);
-  if (const std::string events = events_text(counts, 0); !events.empty()) {
-    session.note(std::to_string(counts.pictures) + " pictures" + events);
+  print_result(arguments, *memoriser.file(), stored.appended, stored.known_before, skipped,
+               session);
+  if (const std::string events = describe_events(counts, 0); !events.empty()) {
+    session.note(std::to_string(counts.pictures) + " images" + events);
   }
   return ExitCode::done;
 }
 
-ExitCode memorise(const Arguments& arguments, const MemoriseArguments& wanted, Session& session) {
-  const bool resumes = memory_exists(wanted.memory);
-  const bool live = recordings::is_live(wanted.input);
-  if (!live) refuse_live(arguments, wanted.input, true);
+ExitCode memorise(const Arguments& declared, const MemoriseArguments& arguments, Session& session) {
+  const bool resumes = memory_exists(arguments.memory);
+  const bool live = recordings::is_live(arguments.input);
+  if (!live) refuse_live(declared, arguments.input, true);
   std::optional<PictureSource> remembered;
   if (resumes) {
-    const auto memory = MemoryFile::open(wanted.memory, Access::read_write);
-    require_kept_options(arguments, wanted.signature, wanted.preprocessing, memory);
-    require_kept_band(wanted.pictures, memory);
+    const auto memory = MemoryFile::open(arguments.memory, Access::read_write);
+    require_kept_options(declared, arguments.signature, arguments.preprocessing, memory);
+    require_kept_band(arguments.pictures, memory);
     remembered = memory.header().source;
   }
-  if (live) return memorise_live(arguments, wanted, remembered, session);
-  const Dataset recording = open_recording(wanted.input, wanted.pictures, remembered, session);
+  if (live) return memorise_live(declared, arguments, remembered, session);
+  const Dataset recording =
+      open_recording(arguments.input, arguments.pictures, remembered, session);
   std::vector<Skipped> skipped;
-  Memoriser memoriser(wanted.memory, options_of(wanted, recording.source, skipped, session));
+  Memoriser memoriser(arguments.memory,
+                      make_options(arguments, recording.source, skipped, session));
   Dataset missing = recording;
   if (resumes) {
     Progress comparing(session, "comparing", recording.entries.size());
@@ -168,55 +173,53 @@ ExitCode memorise(const Arguments& arguments, const MemoriseArguments& wanted, S
     });
   }
   const std::size_t known_before = recording.entries.size() - missing.entries.size();
-  add_all(missing, recording, wanted.strict, memoriser, skipped, session);
+  memorise_missing(missing, recording, arguments.strict, memoriser, skipped, session);
   const auto counts = memoriser.finish(session.executor());
-  tell(wanted, *memoriser.file(), counts.appended, known_before, skipped, session);
+  print_result(arguments, *memoriser.file(), counts.appended, known_before, skipped, session);
   return ExitCode::done;
 }
 
 Run declare_memorise(Arguments& arguments) {
-  auto wanted = std::make_shared<MemoriseArguments>();
+  auto values = std::make_shared<MemoriseArguments>();
   arguments.positional(
-      "INPUT", wanted->input,
-      "Data set, folder of pictures, one picture, video, recording of topics (MCAP, "
-      "rosbag2, ROS 1 bag), or a live source: - for JPEG pictures on standard input, a camera "
+      "INPUT", values->input,
+      "Data set, folder of images, one image, video, recording of topics (MCAP, "
+      "rosbag2, ROS 1 bag), or a live source: - for JPEG images on standard input, a camera "
       "(/dev/video0), an address (rtsp://, http://, tcp://)");
-  arguments.positional("MEMORY", wanted->memory,
-                       "Memory file (NAME.panonav); grows if it is there");
-  declare_pictures(arguments, wanted->pictures);
-  declare_live(arguments, wanted->live);
-  arguments.flag("--no-thumbnails", wanted->no_thumbnails,
-                 "Do not keep small pictures of the views");
-  arguments.flag("--no-features", wanted->no_features,
-                 "Do not keep local features, with which views 1 to 2 m apart are told apart: 4 kB "
-                 "a view");
+  arguments.positional("MEMORY", values->memory,
+                       "Memory file (NAME.panonav); an existing one is continued");
+  declare_pictures(arguments, values->pictures);
+  declare_live(arguments, values->live);
+  arguments.flag("--no-thumbnails", values->no_thumbnails, "Do not store thumbnails of the views");
   arguments.flag(
-      "--strict", wanted->strict,
-      "End at the first picture that cannot be read or is of another size; otherwise it is "
+      "--no-features", values->no_features,
+      "Do not store local features (4 kB a view), which tell views 1 to 2 m apart from each other");
+  arguments.flag(
+      "--strict", values->strict,
+      "End at the first image that cannot be read or is of another size; otherwise it is "
       "named and skipped");
-  arguments.flag("--recursive", wanted->pictures.recursive,
-                 "A folder of pictures: take those of the folders within, too");
-  arguments.options("signature", wanted->signature);
-  arguments.options("preprocessing", wanted->preprocessing);
+  arguments.flag("--recursive", values->pictures.recursive,
+                 "Also take the images of the folders within a folder");
+  arguments.options("signature", values->signature);
+  arguments.options("preprocessing", values->preprocessing);
   arguments.common({"--components"});
-  return [wanted, &arguments](Session& session) { return memorise(arguments, *wanted, session); };
+  return [values, &arguments](Session& session) { return memorise(arguments, *values, session); };
 }
 
 }  // namespace
 
 Verb memorise_verb() {
-  return {
-      "memorise",
-      "Remember what the places of a recording look like",
-      "Views reach the disk in batches of 16, a new memory's first 32 together, each batch whole "
-      "or not at all; after an interruption the same command goes on where it stopped. Views that "
-      "the memory knows by name must be the same views: another pose, stamp or picture under a "
-      "known name is refused. A live source is memorised until Ctrl-C.",
-      "  panonav memorise office_run office.panonav\n"
-      "  panonav memorise photos walk.panonav --kind equirectangular --elevation-deg -30 40\n"
-      "  panonav memorise /dev/video0 walk.panonav --kind equirectangular --every 0.5s",
-      declare_memorise,
-      "memorize"};
+  return {"memorise",
+          "Add the views of a recording to a memory",
+          "Views are stored in batches of 16 (the first 32 of a new memory together), each batch "
+          "completely or not at all; after an interruption the same command continues where it "
+          "stopped. A view with a known name must be the same view: another pose, stamp or image "
+          "under that name is refused. A live source is memorised until Ctrl-C.",
+          "  panonav memorise office_run office.panonav\n"
+          "  panonav memorise photos walk.panonav --kind equirectangular --elevation-deg -30 40\n"
+          "  panonav memorise /dev/video0 walk.panonav --kind equirectangular --every 0.5s",
+          declare_memorise,
+          "memorize"};
 }
 
 }  // namespace panonav::command

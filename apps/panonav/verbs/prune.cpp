@@ -24,7 +24,7 @@ ordered_json as_json(const std::optional<SparseLoss::Positions>& positions) {
           {"p95_after_m", positions->p95_after_m}};
 }
 
-/// What was selected must still be what is there.
+/// Throws FileError when another program has changed the file since the selection.
 void require_unchanged(const MemoryFile& file, const VisualMemory& memory) {
   const auto views = memory.views();
   if (!std::ranges::equal(file.views(), views) || file.links().size() != memory.links().size()) {
@@ -46,14 +46,14 @@ void refuse_without_effect(const Arguments& arguments, const std::string& file,
 }
 
 /// Prints for people what was kept, and what it costs.
-void print_loss(const PruneArguments& wanted, const SparseLoss& loss, std::size_t before,
+void print_loss(const PruneArguments& arguments, const SparseLoss& loss, std::size_t before,
                 std::size_t kept, double factor, std::size_t outdated,
                 const std::vector<std::string>& names, Session& session) {
-  session.print(std::string(wanted.dry_run ? "would keep " : "kept ") +
-                session.strong(std::to_string(kept)) + " of " + std::to_string(before) +
+  session.print(std::string(arguments.dry_run ? "would keep " : "kept ") +
+                session.bold(std::to_string(kept)) + " of " + std::to_string(before) +
                 " views: " + format_fixed(factor, 1) + " times fewer" +
                 (outdated > 0 ? "; " + std::to_string(outdated) + " were outdated" : ""));
-  if (wanted.dry_run) {
+  if (arguments.dry_run) {
     for (const std::string& name : names) session.print("  would drop  " + name);
   }
   if (loss.positions) {
@@ -63,18 +63,18 @@ void print_loss(const PruneArguments& wanted, const SparseLoss& loss, std::size_
                   format_fixed(loss.positions->p95_after_m, 3) + " m (before " +
                   format_fixed(loss.positions->p95_before_m, 3) + ")");
   } else if (loss.queries > 0) {
-    session.print("dropped views differ from those that stand for them by " +
+    session.print("dropped views differ from their representatives by " +
                   format_fixed(loss.median_difference, 3) + " (median)");
   }
 }
 
-ExitCode prune(const Arguments& arguments, const PruneArguments& wanted, Session& session) {
-  auto file =
-      MemoryFile::open(wanted.memory, wanted.dry_run ? Access::read_only : Access::read_write);
+ExitCode prune(const Arguments& declared, const PruneArguments& arguments, Session& session) {
+  auto file = MemoryFile::open(arguments.memory,
+                               arguments.dry_run ? Access::read_only : Access::read_write);
   const VisualMemory memory = file.load();
   session.detail(std::to_string(memory.size()) + " views loaded");
-  refuse_without_effect(arguments, wanted.memory, memory);
-  const SparseSelection selection = select_references(memory, wanted.options);
+  refuse_without_effect(declared, arguments.memory, memory);
+  const SparseSelection selection = select_references(memory, arguments.options);
   session.detail("redundant views: " + std::to_string(selection.redundant.size()));
   const SparseLoss loss = measure_loss(memory, selection);
   std::vector<ViewId> dropped;
@@ -85,7 +85,7 @@ ExitCode prune(const Arguments& arguments, const PruneArguments& wanted, Session
     names.push_back(memory.info(redundant.view).name);
     outdated += redundant.outdated ? 1 : 0;
   }
-  if (!wanted.dry_run && !dropped.empty()) {
+  if (!arguments.dry_run && !dropped.empty()) {
     file.change(
         [&] {
           require_unchanged(file, memory);
@@ -105,42 +105,42 @@ ExitCode prune(const Arguments& arguments, const PruneArguments& wanted, Session
                                                : static_cast<double>(memory.size()) /
                                                      static_cast<double>(selection.kept.size());
   if (session.json()) {
-    session.print(json_line(ordered_json{{"memory", wanted.memory},
-                                         {"dry_run", wanted.dry_run},
+    session.print(json_line(ordered_json{{"memory", arguments.memory},
+                                         {"dry_run", arguments.dry_run},
                                          {"views_before", memory.size()},
                                          {"views", selection.kept.size()},
                                          {"dropped", names},
                                          {"outdated", outdated},
                                          {"factor", factor},
                                          {"median_difference", loss.median_difference},
-                                         {"asked", loss.queries},
+                                         {"queries", loss.queries},
                                          {"position_error", as_json(loss.positions)}}));
     return ExitCode::done;
   }
-  print_loss(wanted, loss, memory.size(), selection.kept.size(), factor, outdated, names, session);
-  if (!wanted.dry_run && !dropped.empty()) {
-    session.suggest({"panonav", "undo", wanted.memory}, "To bring them back:");
+  print_loss(arguments, loss, memory.size(), selection.kept.size(), factor, outdated, names,
+             session);
+  if (!arguments.dry_run && !dropped.empty()) {
+    session.suggest({"panonav", "undo", arguments.memory}, "To bring them back:");
   }
   return ExitCode::done;
 }
 
 Run declare_prune(Arguments& arguments) {
-  auto wanted = std::make_shared<PruneArguments>();
-  arguments.positional("MEMORY", wanted->memory, "Memory file");
-  arguments.flag("--dry-run", wanted->dry_run, "Say what would be dropped, and drop nothing");
-  arguments.options("prune", wanted->options);
+  auto values = std::make_shared<PruneArguments>();
+  arguments.positional("MEMORY", values->memory, "Memory file");
+  arguments.flag("--dry-run", values->dry_run, "List what would be dropped, and change nothing");
+  arguments.options("prune", values->options);
   arguments.common({"--max-difference", "--reach-m", "--outdated-within-m"});
-  return [wanted, &arguments](Session& session) { return prune(arguments, *wanted, session); };
+  return [values, &arguments](Session& session) { return prune(arguments, *values, session); };
 }
 
 }  // namespace
 
 Verb prune_verb() {
-  return {"prune", "Keep one view of places where views hardly change",
-          "A view is dropped when a newer one that is kept differs from it by no more than "
-          "--max-difference and was taken near it. The verb says by how much the memory shrinks "
-          "and how far the reference that is found for a dropped view is from it, before and "
-          "after. panonav undo brings dropped views back.",
+  return {"prune", "Drop redundant views of a memory",
+          "A view is dropped when a newer view near it differs by at most --max-difference. The "
+          "verb reports how much smaller the memory becomes, and how far the nearest reference of "
+          "a dropped view is before and after. panonav undo brings dropped views back.",
           "  panonav prune office.panonav --dry-run\n"
           "  panonav prune office.panonav --max-difference 0.02\n"
           "  panonav prune office.panonav --outdated-within-m 0.3",

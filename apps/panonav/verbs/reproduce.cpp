@@ -12,30 +12,30 @@ namespace {
 // "-0.056 (..)  holds", a line each.
 void print_rows(const lab::Reproduction& reproduction, Session& session) {
   for (const lab::ResultRow& row : reproduction.rows) {
-    std::string line = "  " + row.what + ": " + session.strong(lab::format_figure(row));
+    std::string line = "  " + row.what + ": " + session.bold(lab::format_figure(row));
     if (row.target) {
       line += "  " + (row.holds()
-                          ? session.good("holds")
-                          : session.bad("DOES NOT HOLD") + ", missed " + lab::explain_miss(row));
+                          ? session.green("holds")
+                          : session.red("DOES NOT HOLD") + ", missed " + lab::explain_miss(row));
     }
     session.print(line);
   }
 }
 
-ExitCode reproduce(const ReproduceArguments& wanted, Session& session) {
-  if (wanted.paper == "all") return reproduce_all(wanted, session);
+ExitCode reproduce(const ReproduceArguments& arguments, Session& session) {
+  if (arguments.paper == "all") return reproduce_all(arguments, session);
   const auto papers = reproduced_papers();
-  const auto paper = std::ranges::find(papers, wanted.paper, &ReproducedPaper::name);
+  const auto paper = std::ranges::find(papers, arguments.paper, &ReproducedPaper::name);
   if (paper == papers.end()) {
     std::string allowed;
     for (const ReproducedPaper& one : papers) {
       allowed.append(one.name).append(" (").append(one.subject).append("), ");
     }
-    throw OptionError("PAPER is '" + wanted.paper + "'; allowed: " + allowed + "all");
+    throw OptionError("PAPER is '" + arguments.paper + "'; allowed: " + allowed + "all");
   }
-  refuse_meaningless(*paper, wanted);
-  const std::string out = wanted.out.value_or("reproduction/" + wanted.paper);
-  const lab::Reproduction result = reproduce_paper(*paper, wanted, out, session);
+  refuse_meaningless(*paper, arguments);
+  const std::string out = arguments.out.value_or("reproduction/" + arguments.paper);
+  const lab::Reproduction result = reproduce_paper(*paper, arguments, out, session);
   if (session.json()) {
     const std::string json = to_json(result.rows);
     session.print(json.substr(0, json.size() - 1));
@@ -45,7 +45,7 @@ ExitCode reproduce(const ReproduceArguments& wanted, Session& session) {
   const lab::TargetCount count = lab::count_targets(result.rows);
   session.print(std::to_string(result.rows.size()) + " rows, " +
                 std::to_string(count.judged - count.held) +
-                " of them miss their target; pictures and tables: " +
+                " of them miss their target; images and tables: " +
                 (std::filesystem::path(out) / "index.html").string());
   return ExitCode::done;
 }
@@ -72,7 +72,7 @@ std::string meanings(int lab::ReproductionOptions::*option,
 }
 
 Run declare_reproduce(Arguments& arguments) {
-  auto wanted = std::make_shared<ReproduceArguments>();
+  auto values = std::make_shared<ReproduceArguments>();
   std::vector<std::string> papers;
   std::string names;
   for (const auto& paper : reproduced_papers()) {
@@ -80,46 +80,46 @@ Run declare_reproduce(Arguments& arguments) {
     names.append(paper.name).append(", ");
   }
   papers.emplace_back("all");
-  arguments.positional("PAPER", wanted->paper, names + "or all", std::move(papers));
-  arguments.option("-o,--out FOLDER", wanted->out,
+  arguments.positional("PAPER", values->paper, names + "or all", std::move(papers));
+  arguments.option("-o,--out FOLDER", values->out,
                    "Folder for the report (default: reproduction/PAPER; all: reproduction)");
-  arguments.flag("--quick", wanted->quick, "A smoke run: few scenes, few questions or runs");
-  arguments.flag("--continue", wanted->continues,
+  arguments.flag("--quick", values->quick, "A smoke run: few scenes, few questions or runs");
+  arguments.flag("--continue", values->continues,
                  "all: continue a run of the same options that was stopped; papers that are "
                  "finished are not run again");
   using Options = lab::ReproductionOptions;
-  arguments.option("--seed", wanted->seed, "First of the scene seeds" + defaults(&Options::seed));
-  arguments.option("--scenes", wanted->scenes, 1,
+  arguments.option("--seed", values->seed, "First of the scene seeds" + defaults(&Options::seed));
+  arguments.option("--scenes", values->scenes, 1,
                    "Variants of the scene" + defaults(&Options::scenes));
   arguments.option(
-      "--queries", wanted->queries, 1,
+      "--queries", values->queries, 1,
       meanings(&Options::queries, {{"m04", "questions in each"}, {"elsewhere", "the same"}}));
   arguments.option(
-      "--runs", wanted->runs, 2,
+      "--runs", values->runs, 2,
       meanings(&Options::runs, {{"elsewhere", "homing runs and missions in each place"},
                                 {"m04", "missions of figure 18 in each kind of place"},
                                 {"m03", "runs in each variant of an office"},
                                 {"f11", "paths in each Gazebo world"},
                                 {"navigation", "missions in each kind of place"},
                                 {"y03", "runs along routes of 60 m in each place"}}));
-  arguments.option("--rows", wanted->rows, 1,
+  arguments.option("--rows", values->rows, 1,
                    meanings(&Options::rows, {{"elsewhere, m03, m04", "rows of the views"}}));
-  arguments.option("--data FOLDER", wanted->data,
+  arguments.option("--data FOLDER", values->data,
                    "elsewhere, f11, m03, navigation, s06, y03: folder with the recordings and "
                    "Gazebo worlds (default: the environment's PANONAV_DATA; without it they are "
                    "left out)");
   const auto parts = lab::tracking_reproduction_parts();
-  arguments.choice("--only", wanted->only, {parts.begin(), parts.end()},
+  arguments.choice("--only", values->only, {parts.begin(), parts.end()},
                    "m03: this part of the experiments (default: all)");
   arguments.uncommon({"--queries", "--rows", "--only"});
-  return [wanted](Session& session) { return reproduce(*wanted, session); };
+  return [values](Session& session) { return reproduce(*values, session); };
 }
 
 }  // namespace
 
 Verb reproduce_verb() {
-  return {"reproduce", "Run the experiments of a paper: published figures beside ours",
-          "The verb writes pictures, results.json, results.md and index.html into the folder. The "
+  return {"reproduce", "Run the experiments of a paper: published and measured figures",
+          "The verb writes images, results.json, results.md and index.html into the folder. The "
           "full run "
           "of a paper takes minutes. `all` runs every paper in a folder of its own and writes one "
           "table of all; targets that are missed are results and do not change the exit code.",

@@ -29,8 +29,8 @@ std::string parameter_name(const ArgumentInfo& info) {
 }
 
 /// The word behind a flag, or the flag's initial value.
-std::string typed_or_initial(std::span<const std::string> words,
-                             std::span<const ArgumentInfo> infos, const std::string& flag) {
+std::string find_value_or_initial(std::span<const std::string> words,
+                                  std::span<const ArgumentInfo> infos, const std::string& flag) {
   for (std::size_t i = 0; i < words.size(); ++i) {
     if (words[i] == flag && i + 1 < words.size()) return words[i + 1];
     if (words[i].starts_with(flag + "=")) return words[i].substr(flag.size() + 1);
@@ -38,11 +38,12 @@ std::string typed_or_initial(std::span<const std::string> words,
   return std::ranges::find(infos, flag, &ArgumentInfo::name)->initial;
 }
 
-/// As `ros2 run` and launch files call a node: parameters are options.
-std::vector<std::string> without_ros_arguments(std::span<const std::string> typed,
-                                               std::span<const ArgumentInfo> infos) {
-  const auto read = ros2::read_ros_arguments(typed, typed_or_initial(typed, infos, "--node-name"),
-                                             typed_or_initial(typed, infos, "--namespace"));
+/// Converts the arguments of `ros2 run` and launch files: parameters become options.
+std::vector<std::string> translate_ros_arguments(std::span<const std::string> typed,
+                                                 std::span<const ArgumentInfo> infos) {
+  const auto read =
+      ros2::read_ros_arguments(typed, find_value_or_initial(typed, infos, "--node-name"),
+                               find_value_or_initial(typed, infos, "--namespace"));
   std::vector<std::string> words = read.words;
   const auto is_typed = [&](const std::string& flag) {
     return std::ranges::any_of(read.words, [&](const std::string& word) {
@@ -60,9 +61,9 @@ std::vector<std::string> without_ros_arguments(std::span<const std::string> type
     }
     const auto& info = infos[static_cast<std::size_t>(found - names.begin())];
     if (info.name == "MEMORY") {
-      const bool given = std::ranges::any_of(
+      const bool has_memory = std::ranges::any_of(
           read.words, [](const std::string& word) { return word.ends_with(".panonav"); });
-      if (!given) words.insert(words.begin(), values.begin(), values.end());
+      if (!has_memory) words.insert(words.begin(), values.begin(), values.end());
     } else if (info.positional()) {
       words.insert(words.end(), values.begin(), values.end());
     } else if (is_typed(info.name)) {
@@ -89,19 +90,19 @@ std::vector<std::string> without_ros_arguments(std::span<const std::string> type
   return words;
 }
 
-ExitCode run_node(Ros2Arguments& wanted, Session& session) {
-  wanted.setup.memory = wanted.memory;
-  wanted.setup.participant.domain = wanted.domain;
-  for (const std::string& text : wanted.remappings) {
+ExitCode run_node(Ros2Arguments& arguments, Session& session) {
+  arguments.setup.memory = arguments.memory;
+  arguments.setup.participant.domain = arguments.domain;
+  for (const std::string& text : arguments.remappings) {
     const auto [from, to] = ros2::parse_remapping(text);
-    wanted.setup.participant.remappings.insert_or_assign(from, to);
+    arguments.setup.participant.remappings.insert_or_assign(from, to);
   }
-  if (wanted.teach) {
-    const auto pictures = picture_source(wanted.pictures);
-    if (!pictures) throw UsageError("say what the pictures show with --kind");
-    wanted.setup.teacher = wanted.teacher;
-    wanted.setup.teacher->pictures = *pictures;
-    wanted.setup.teacher->route = wanted.route;
+  if (arguments.teach) {
+    const auto pictures = picture_source(arguments.pictures);
+    if (!pictures) throw UsageError("say what the images show with --kind");
+    arguments.setup.teacher = arguments.teacher;
+    arguments.setup.teacher->pictures = *pictures;
+    arguments.setup.teacher->route = arguments.route;
   }
   std::atomic<bool> stopped = false;
   std::atomic<ros2::LocalisationNode*> running = nullptr;
@@ -109,54 +110,55 @@ ExitCode run_node(Ros2Arguments& wanted, Session& session) {
     stopped = true;
     if (auto* const node = running.load()) node->stop();
   });
-  ros2::LocalisationNode node(wanted.setup, [&](const std::string& line) { session.note(line); });
+  ros2::LocalisationNode node(arguments.setup,
+                              [&](const std::string& line) { session.note(line); });
   running = &node;
   if (stopped) return ExitCode::done;
-  session.note("panonav ros2: " + wanted.memory + (wanted.teach ? " is taught" : " is loaded") +
-               "; the node listens");
+  session.note("panonav ros2: " + arguments.memory +
+               (arguments.teach ? " is taught" : " is loaded") + "; the node listens");
   node.run();
   running = nullptr;
   const auto counts = node.counts();
-  session.note(std::to_string(counts.pictures) + " pictures, localised at " +
+  session.note(std::to_string(counts.pictures) + " images, localised at " +
                std::to_string(counts.localised) + ", " +
-               (wanted.teach ? std::to_string(counts.taught) + " views taught, " : "") +
+               (arguments.teach ? std::to_string(counts.taught) + " views taught, " : "") +
                std::to_string(counts.dropped) + " came too fast and were dropped, " +
                std::to_string(counts.notes) + " warnings");
   return ExitCode::done;
 }
 
 Run declare_ros2(Arguments& arguments) {
-  auto wanted = std::make_shared<Ros2Arguments>();
-  auto& setup = wanted->setup;
-  arguments.positional("MEMORY", wanted->memory, "Memory file");
-  arguments.optional_positionals("REMAPPING", wanted->remappings,
+  auto values = std::make_shared<Ros2Arguments>();
+  auto& setup = values->setup;
+  arguments.positional("MEMORY", values->memory, "Memory file");
+  arguments.optional_positionals("REMAPPING", values->remappings,
                                  "Names of topics, FROM:=TO: image:=/camera/image_raw");
-  arguments.flag("--teach", wanted->teach,
-                 "Make MEMORY, a new file, of the first drive, until ~/command says finish");
-  arguments.option("--route NAME", wanted->route, "With --teach: record the drive as this route");
+  arguments.flag("--teach", values->teach,
+                 "Make MEMORY, a new file, from a first drive, until finish is sent to ~/command");
+  arguments.option("--route NAME", values->route, "With --teach: record the drive as this route");
   arguments.option("--node-name NAME", setup.participant.node, "Name of the node");
   arguments.option("--namespace NAME", setup.participant.name_space, "Namespace of the node");
-  arguments.option("--domain-id", wanted->domain, 0,
+  arguments.option("--domain-id", values->domain, 0,
                    "DDS domain; default: ROS_DOMAIN_ID of the environment, or 0");
   arguments.option("--map-frame NAME", setup.frames.map, "Frame of the memory's positions");
   arguments.option("--odom-frame NAME", setup.frames.odom, "Frame of the odometry");
   arguments.option("--base-frame NAME", setup.frames.base, "Frame of the robot");
   arguments.in_files("ros2",
                      {"--node-name", "--namespace", "--map-frame", "--odom-frame", "--base-frame"});
-  declare_layout(arguments, wanted->pictures);
-  arguments.options("signature", wanted->teacher.signature);
-  arguments.options("preprocessing", wanted->teacher.preprocessing);
+  declare_layout(arguments, values->pictures);
+  arguments.options("signature", values->teacher.signature);
+  arguments.options("preprocessing", values->teacher.preprocessing);
   arguments.options("ros2", setup.node);
   arguments.options("monte_carlo", setup.tracker.filter);
   arguments.options("odometry", setup.tracker.odometry, "odometry");
   arguments.options("base", setup.navigator.base);
-  arguments.used_only(
+  arguments.refuse_unless(
       {"--route", "--kind", "--camera", "--columns-run", "--forward-column", "--elevation-deg",
        "[signature]", "[preprocessing]"},
-      [wanted] { return wanted->teach; }, "without --teach");
+      [values] { return values->teach; }, "without --teach");
   arguments.common({"--motion", "--pictures", "--use-sim-time"});
   arguments.uncommon({"--node-name", "--domain-id", "--map-frame", "--odom-frame", "--base-frame"});
-  return [wanted](Session& session) { return run_node(*wanted, session); };
+  return [values](Session& session) { return run_node(*values, session); };
 }
 
 }  // namespace
@@ -165,15 +167,15 @@ Verb ros2_verb() {
   return {"ros2",
           "Localise a robot as a ROS 2 node, without an installed ROS",
           "Listens to image, odom, initialpose and goal_pose; sends map -> odom on /tf, and pose, "
-          "particles, references, best match and diagnostics, on the way to a goal cmd_vel. Any "
-          "ROS 2 distribution on the network sees the node (docs/ros2.md). Ends on Ctrl-C.",
+          "particles, references, best match and diagnostics, and on its path to a goal cmd_vel. "
+          "Any ROS 2 distribution on the network sees the node (docs/ros2.md). Ends on Ctrl-C.",
           "  panonav ros2 office.panonav image:=/camera/image_raw\n"
           "  panonav ros2 new.panonav --teach --kind mirror --camera mirror.toml --elevation-deg "
           "-25 35\n"
           "  panonav ros2 office.panonav --pictures compressed --use-sim-time true",
           declare_ros2,
           {},
-          without_ros_arguments};
+          translate_ros_arguments};
 }
 
 }  // namespace panonav::command

@@ -72,12 +72,12 @@ ordered_json as_json(const FollowedImage& image, bool headings_known) {
 }
 
 std::string as_text(const FollowedImage& image, Session& session) {
-  if (!image.fix) return image.file + "  " + session.bad("not on this route");
+  if (!image.fix) return image.file + "  " + session.red("not on this route");
   const RouteFix& fix = *image.fix;
-  std::string line = image.file + "  " + session.good(name_of(image.fix->origin)) + "  x " +
+  std::string line = image.file + "  " + session.green(name_of(image.fix->origin)) + "  x " +
                      format_fixed(fix.pose.x_m, 3) + " m  y " + format_fixed(fix.pose.y_m, 3) +
                      " m  heading " + format_fixed(degrees(fix.pose.heading_rad), 1) +
-                     " degrees  along " + format_fixed(image.fix->along_m, 3) + " m  beside " +
+                     " degrees  along " + format_fixed(image.fix->along_m, 3) + " m  lateral " +
                      format_fixed(image.fix->lateral_m, 3) + " m  correlation " +
                      format_fixed(fix.correlation, 3);
   for (const RouteChanges::AzimuthRange& range : image.changed) {
@@ -98,13 +98,13 @@ void print_summary(const FollowSummary& summary, const std::vector<FollowedImage
                    Session& session) {
   session.print(
       "on the route at " +
-      session.strong(std::to_string(summary.on_route) + " of " + std::to_string(summary.images)) +
+      session.bold(std::to_string(summary.on_route) + " of " + std::to_string(summary.images)) +
       " images: " + std::to_string(summary.predicted) + " as predicted, " +
       std::to_string(summary.recovered) + " recovered, " + std::to_string(summary.searched) +
       " found by search");
   print_error("error of position      ", summary.position_m, 1.0, 4, " m", session);
   print_error("error along the route  ", summary.along_m, 1.0, 4, " m", session);
-  print_error("error beside the route ", summary.lateral_m, 1.0, 4, " m", session);
+  print_error("lateral error          ", summary.lateral_m, 1.0, 4, " m", session);
   print_error("error of heading       ", summary.heading_rad, degrees(1.0), 2, " degrees", session);
   for (const auto& [from_m, to_m] : changed_stretches(images)) {
     session.print("changed here: something seen from " + format_fixed(from_m, 2) + " to " +
@@ -112,39 +112,42 @@ void print_summary(const FollowSummary& summary, const std::vector<FollowedImage
   }
 }
 
-ExitCode follow_run(const Arguments& arguments, const FollowArguments& wanted, Session& session) {
-  const auto memory = MemoryFile::open(wanted.memory, Access::read_only);
-  const Dataset run = read_run(wanted.dataset, wanted.topics, wanted.part, memory, session);
+ExitCode follow_run(const Arguments& declared, const FollowArguments& arguments, Session& session) {
+  const auto memory = MemoryFile::open(arguments.memory, Access::read_only);
+  const Dataset run =
+      read_run(arguments.dataset, arguments.topics, arguments.part, memory, session);
   if (odometry_poses(run).empty()) {
-    arguments.refuse_unused({"--recovery-m", "--surprise-m"},
-                            "as " + wanted.dataset + " has no odometry");
+    declared.refuse_unused({"--recovery-m", "--surprise-m"},
+                           "as " + arguments.dataset + " has no odometry");
   }
   RouteFollower follower(memory, run.source,
-                         {.name = wanted.name,
-                          .tracker = wanted.tracker,
-                          .fit = wanted.fit,
-                          .use_odometry = !wanted.no_odometry && !odometry_poses(run).empty()});
+                         {.name = arguments.name,
+                          .tracker = arguments.tracker,
+                          .fit = arguments.fit,
+                          .use_odometry = !arguments.no_odometry && !odometry_poses(run).empty()});
   // A route in its odometry's frame has nothing that a data set's poses could be compared with.
   const auto truth = follower.source().from_odometry ? std::vector<Pose2>{} : dataset_poses(run);
   const bool headings_known = !truth.empty() && run.entries.front().pose->heading_rad.has_value();
   std::vector<double> seconds;
-  if (wanted.tum)
-    seconds = trajectory_stamps(run, "route follow", wanted.dataset, *wanted.tum, session);
-  if (wanted.report) prepare_report_folder(*wanted.report, "route follow");
+  if (arguments.tum)
+    seconds = trajectory_stamps(run, "route follow", arguments.dataset, *arguments.tum, session);
+  if (arguments.report) prepare_report_folder(*arguments.report, "route follow");
   std::vector<FollowedImage> images;
-  Progress progress(session, "following", (run.entries.size() - 1) / wanted.every + 1);
-  RunRecord record(wanted.record, std::array{wanted.dataset, wanted.memory}, false, session, {});
+  Progress progress(session, "following", (run.entries.size() - 1) / arguments.every + 1);
+  RunRecord record(arguments.record, std::array{arguments.dataset, arguments.memory}, false,
+                   session, {});
   std::optional<PanoramaReader> recorded;
-  if (record.wanted() || wanted.report) recorded.emplace(run.source, PanoramaShape{});
-  viewer::RunPage played("", (run.entries.size() - 1) / static_cast<std::size_t>(wanted.every) + 1);
-  follow(follower, run, truth, wanted.every, recorded ? &*recorded : nullptr, session.executor(),
+  if (record.is_active() || arguments.report) recorded.emplace(run.source, PanoramaShape{});
+  viewer::RunPage played("",
+                         (run.entries.size() - 1) / static_cast<std::size_t>(arguments.every) + 1);
+  follow(follower, run, truth, arguments.every, recorded ? &*recorded : nullptr, session.executor(),
          [&](FollowedImage&& image) {
            progress.clear();
            session.print(session.json() ? json_line(as_json(image, headings_known))
                                         : as_text(image, session));
-           if (wanted.report) {
+           if (arguments.report) {
              recordings::RunMoment moment = *image.moment;
-             moment.values.insert(moment.values.begin(), {"picture", image.file});
+             moment.values.insert(moment.values.begin(), {"image", image.file});
              played.add(moment);
            }
            if (image.moment) record.add(std::move(*image.moment));
@@ -155,65 +158,65 @@ ExitCode follow_run(const Arguments& arguments, const FollowArguments& wanted, S
   progress.clear();
   record.close();
 
-  if (wanted.tum) {
+  if (arguments.tum) {
     std::vector<StampedPose> trajectory;
     for (const FollowedImage& image : images) {
       if (image.fix) trajectory.push_back({seconds[image.index], image.fix->pose});
     }
-    write_trajectory(*wanted.tum, trajectory);
+    write_trajectory(*arguments.tum, trajectory);
   }
   const FollowSummary summary = summarise_follow(images, headings_known);
   if (!session.json()) print_summary(summary, images, session);
-  if (wanted.report) {
+  if (arguments.report) {
     const auto panorama = memory.route(follower.name());
-    write_follow_report(*wanted.report, {follower.name(), *panorama, follower.tracker().lines()},
+    write_follow_report(*arguments.report, {follower.name(), *panorama, follower.tracker().lines()},
                         images, summary, std::move(played));
-    tell_report(*wanted.report, session);
+    print_report_path(*arguments.report, session);
   }
   return summary.on_route > 0 ? ExitCode::done : ExitCode::no_answer;
 }
 
 Run declare_route_follow(Arguments& arguments) {
-  auto wanted = std::make_shared<FollowArguments>();
-  arguments.positional("MEMORY", wanted->memory, "Memory file with a route");
-  arguments.positional("DATASET", wanted->dataset,
-                       "Data set, folder of pictures, video or recording of a later drive, in its "
+  auto values = std::make_shared<FollowArguments>();
+  arguments.positional("MEMORY", values->memory, "Memory file with a route");
+  arguments.positional("DATASET", values->dataset,
+                       "Data set, folder of images, video or recording of a later drive, in its "
                        "order");
-  declare_topics(arguments, wanted->topics);
-  declare_part(arguments, wanted->part, false);
-  arguments.option("--name NAME", wanted->name,
-                   "Name of the route; the only one where none is given");
-  arguments.option("--every N", wanted->every, 1,
-                   "Look at every N-th picture only and go by odometry between");
-  arguments.flag("--no-odometry", wanted->no_odometry,
-                 "Search the whole route for each picture alone");
-  arguments.option("--tum FILE", wanted->tum,
+  declare_topics(arguments, values->topics);
+  declare_part(arguments, values->part, false);
+  arguments.option("--name NAME", values->name,
+                   "Name of the route; may be left out if there is only one");
+  arguments.option("--every N", values->every, 1,
+                   "Use every N-th image only, and odometry between them");
+  arguments.flag("--no-odometry", values->no_odometry,
+                 "Search the whole route for each image alone");
+  arguments.option("--tum FILE", values->tum,
                    "Write the poses on the route to this file: TUM text, or CSV for a name that "
                    "ends in .csv");
-  declare_record(arguments, wanted->record);
-  declare_view(arguments, wanted->record);
-  arguments.option("--report FOLDER", wanted->report,
-                   "Write pictures of the route, the fixes, and what was seen beside what the "
-                   "route shows into this folder: a new one, or that of an earlier report");
-  arguments.options("route_tracker", wanted->tracker);
-  arguments.options("route_fit", wanted->fit);
-  arguments.used_only(
-      {"--recovery-m", "--surprise-m"}, [wanted] { return !wanted->no_odometry; },
+  declare_record(arguments, values->record);
+  declare_view(arguments, values->record);
+  arguments.option("--report FOLDER", values->report,
+                   "Write a page with the route, the fixes, and what was seen compared with what "
+                   "the route shows into this folder: a new one, or that of an earlier report");
+  arguments.options("route_tracker", values->tracker);
+  arguments.options("route_fit", values->fit);
+  arguments.refuse_unless(
+      {"--recovery-m", "--surprise-m"}, [values] { return !values->no_odometry; },
       "with --no-odometry");
-  arguments.used_only(
-      {"--coarse-deg"}, [wanted] { return wanted->fit.levels > 1; }, "with --levels 1");
-  return [wanted, &arguments](Session& session) { return follow_run(arguments, *wanted, session); };
+  arguments.refuse_unless(
+      {"--coarse-deg"}, [values] { return values->fit.levels > 1; }, "with --levels 1");
+  return [values, &arguments](Session& session) { return follow_run(arguments, *values, session); };
 }
 
 }  // namespace
 
 Verb route_follow_verb() {
-  return {"route follow", "Say where a robot is beside a remembered route, to the centimetre",
+  return {"route follow", "Locate a robot relative to a recorded route, to the centimetre",
           "Position and heading come from what the route shows at the robot's place, also between "
-          "and beside the remembered lines. Odometry predicts where the data set has it; where the "
-          "prediction does not hold the robot is looked for around it, then on the whole route. "
-          "Parts of the scene that are not as remembered are left out and named. The exit code is "
-          "1 when no picture is on the route.",
+          "the recorded lines and to their sides. Odometry predicts where the data set has it; "
+          "where the prediction does not hold the robot is searched for around it, then on the "
+          "whole route. Parts of the scene that differ from the recording are left out and "
+          "reported. The exit code is 1 when no image is on the route.",
           "  panonav route follow office.panonav repeat_run\n"
           "  panonav route follow office.panonav repeat_run --report followed\n"
           "  panonav route follow office.panonav repeat_run --no-odometry --json",

@@ -36,7 +36,7 @@ struct RecordArguments {
 };
 
 /// "17-20".
-std::pair<int, int> rows_from_text(const std::string& text) {
+std::pair<int, int> parse_rows(const std::string& text) {
   const auto dash = text.find('-');
   const auto number = [&](const std::string& part) {
     int value = -1;
@@ -53,82 +53,83 @@ std::pair<int, int> rows_from_text(const std::string& text) {
 }
 
 /// The poses to remember and the frame that they are in.
-std::vector<Pose2> recorded_poses(const RecordArguments& wanted, const Dataset& dataset,
-                                  bool& from_odometry, Session& session) {
+std::vector<Pose2> choose_poses(const RecordArguments& arguments, const Dataset& dataset,
+                                bool& from_odometry, Session& session) {
   from_odometry = false;
-  if (!wanted.odometry) {
+  if (!arguments.odometry) {
     auto poses = dataset_poses(dataset);
     if (!poses.empty()) {
       if (!dataset.entries.front().pose->heading_rad) {
-        session.note("panonav route record: " + wanted.dataset +
-                     " has no headings; they are taken along the way");
+        session.note("panonav route record: " + arguments.dataset +
+                     " has no headings; the direction of travel is used");
       }
       return poses;
     }
   }
   auto poses = odometry_poses(dataset);
   if (poses.empty()) {
-    throw FileError(wanted.dataset,
-                    wanted.odometry
-                        ? "has no odometry; allowed for --odometry: a table with the columns "
-                          "'odom_x_m', 'odom_y_m' and 'odom_heading_deg'"
-                        : "has neither positions nor odometry" +
-                              how_to_add(wanted.dataset, position_columns, position_values) +
-                              (recordings::is_recording(wanted.dataset)
-                                   ? ""
-                                   : "; or odom_x_m,odom_y_m,odom_heading_deg instead"));
+    throw FileError(
+        arguments.dataset,
+        arguments.odometry
+            ? "has no odometry; allowed for --odometry: a table with the columns "
+              "'odom_x_m', 'odom_y_m' and 'odom_heading_deg'"
+            : "has neither positions nor odometry" +
+                  explain_columns(arguments.dataset, position_columns, position_values) +
+                  (recordings::is_recording(arguments.dataset)
+                       ? ""
+                       : "; or odom_x_m,odom_y_m,odom_heading_deg instead"));
   }
   from_odometry = true;
   return poses;
 }
 
-std::string rows_text(const std::optional<std::pair<int, int>>& rows) {
+std::string format_rows(const std::optional<std::pair<int, int>>& rows) {
   return rows ? std::to_string(rows->first) + "-" + std::to_string(rows->second) : "none";
 }
 
-/// What of the route's lines the user said: lines that a route has already can only go on as they
-/// are.
-void choose_lines(const Arguments& arguments, const RecordArguments& wanted,
-                  const PictureSource& pictures, const std::optional<MemoryFile>& memory,
-                  RouteRecorderOptions& options) {
-  if (wanted.horizon_rows) options.horizon_rows = rows_from_text(*wanted.horizon_rows);
+/// Sets the options of the route's lines; an existing route keeps its own.
+void set_line_options(const Arguments& declared, const RecordArguments& arguments,
+                      const PictureSource& pictures, const std::optional<MemoryFile>& memory,
+                      RouteRecorderOptions& options) {
+  if (arguments.horizon_rows) options.horizon_rows = parse_rows(*arguments.horizon_rows);
   if (pictures.kind == PictureKind::panorama && !pictures.layout.elevations) {
-    arguments.refuse_unused({"--half-band-rad"},
-                            "as the elevations of the pictures are not known (--horizon-rows)");
+    declared.refuse_unused({"--half-band-rad"},
+                           "as the elevations of the images are not known (--horizon-rows)");
   }
-  const auto route = memory ? memory->route(wanted.name) : std::nullopt;
+  const auto route = memory ? memory->route(arguments.name) : std::nullopt;
   if (!route) {
-    options.line = wanted.line;
+    options.line = arguments.line;
     return;
   }
-  const RouteSource before = read_route_source(*memory, wanted.name, route->columns());
-  const std::string as = ", as the route '" + wanted.name + "' in " + wanted.memory +
+  const RouteSource before = read_route_source(*memory, arguments.name, route->columns());
+  const std::string as = ", as the route '" + arguments.name + "' in " + arguments.memory +
                          " was recorded; leave it out or take another --name";
-  arguments.require_kept("line", wanted.line, before.line, as);
+  declared.require_same("line", arguments.line, before.line, as);
   if (options.horizon_rows && options.horizon_rows != before.horizon_rows) {
-    throw ContractError("--horizon-rows", *wanted.horizon_rows,
-                        rows_text(before.horizon_rows) + as);
+    throw ContractError("--horizon-rows", *arguments.horizon_rows,
+                        format_rows(before.horizon_rows) + as);
   }
 }
 
-ExitCode record(const Arguments& arguments, const RecordArguments& wanted, Session& session) {
-  if (wanted.every_m && !(*wanted.every_m >= 0.0)) {
-    throw UsageError("--every-m is " + to_text(*wanted.every_m) + "; allowed: 0 or more");
+ExitCode record(const Arguments& declared, const RecordArguments& arguments, Session& session) {
+  if (arguments.every_m && !(*arguments.every_m >= 0.0)) {
+    throw UsageError("--every-m is " + to_text(*arguments.every_m) + "; allowed: 0 or more");
   }
-  RouteRecorderOptions options{.name = wanted.name, .every_m = wanted.every_m.value_or(0.1)};
+  RouteRecorderOptions options{.name = arguments.name, .every_m = arguments.every_m.value_or(0.1)};
   std::optional<MemoryFile> memory;
-  if (memory_exists(wanted.memory)) memory = MemoryFile::open(wanted.memory, Access::read_write);
+  if (memory_exists(arguments.memory))
+    memory = MemoryFile::open(arguments.memory, Access::read_write);
   const Dataset dataset =
-      read_described(wanted.dataset, wanted.pictures,
+      read_described(arguments.dataset, arguments.pictures,
                      memory ? std::optional(memory->header().source) : std::nullopt,
                      position_columns, position_values, session);
-  choose_lines(arguments, wanted, dataset.source, memory, options);
-  const auto poses = recorded_poses(wanted, dataset, options.odometry, session);
-  if (wanted.report) prepare_report_folder(*wanted.report, "route record");
+  set_line_options(declared, arguments, dataset.source, memory, options);
+  const auto poses = choose_poses(arguments, dataset, options.odometry, session);
+  if (arguments.report) prepare_report_folder(*arguments.report, "route record");
   // Views can be memorised into a new file later; what they need of the pictures is known now.
   RouteRecorder recorder(
       memory ? std::move(*memory)
-             : MemoryFile::create(wanted.memory,
+             : MemoryFile::create(arguments.memory,
                                   make_header_of_recording(dataset, {}, {}, session.executor())),
       dataset.source, options);
   std::optional<Progress> bar;
@@ -139,10 +140,11 @@ ExitCode record(const Arguments& arguments, const RecordArguments& wanted, Sessi
   bar.reset();
   const double length_m = recorded.route.length_m();
   const double bytes_per_km = recorded.bytes_per_km();
-  if (wanted.report) write_record_report(*wanted.report, wanted.name, recorded.route, bytes_per_km);
+  if (arguments.report)
+    write_record_report(*arguments.report, arguments.name, recorded.route, bytes_per_km);
   if (session.json()) {
-    session.print(json_line(ordered_json{{"memory", wanted.memory},
-                                         {"route", wanted.name},
+    session.print(json_line(ordered_json{{"memory", arguments.memory},
+                                         {"route", arguments.name},
                                          {"appended", recorded.appended},
                                          {"lines", recorded.route.size()},
                                          {"columns", recorded.route.columns()},
@@ -152,56 +154,55 @@ ExitCode record(const Arguments& arguments, const RecordArguments& wanted, Sessi
                                          {"file_bytes", recorder.memory().info().file_bytes}}));
     return ExitCode::done;
   }
-  session.print(session.strong(std::to_string(recorded.appended)) + " lines recorded; route '" +
-                wanted.name + "' in " + wanted.memory + " has " +
+  session.print(session.bold(std::to_string(recorded.appended)) + " lines recorded; route '" +
+                arguments.name + "' in " + arguments.memory + " has " +
                 std::to_string(recorded.route.size()) + " over " + format_fixed(length_m, 2) +
                 " m, " + format_fixed(1e-6 * bytes_per_km, 2) + " MB a kilometre");
   if (dataset.source.kind == PictureKind::panorama && !dataset.source.layout.elevations &&
       !recorder.source().horizon_rows) {
     session.print(
-        "The pictures' elevations are not known: all rows are averaged into a line. Say which show "
+        "The images' elevations are not known: all rows are averaged into a line. Say which show "
         "the horizon with --horizon-rows.");
   }
-  session.suggest({"panonav", "route", "follow", wanted.memory, "DATASET"});
+  session.suggest({"panonav", "route", "follow", arguments.memory, "DATASET"});
   return ExitCode::done;
 }
 
 Run declare_route_record(Arguments& arguments) {
-  auto wanted = std::make_shared<RecordArguments>();
+  auto values = std::make_shared<RecordArguments>();
   arguments.positional(
-      "DATASET", wanted->dataset,
+      "DATASET", values->dataset,
       "Data set or recording with positions or odometry, in the order of the drive");
-  arguments.positional("MEMORY", wanted->memory,
+  arguments.positional("MEMORY", values->memory,
                        "Memory file (NAME.panonav); made where there is none");
-  arguments.option("--name NAME", wanted->name, "Name of the route; it grows if it is there");
-  arguments.option("--every-m METRES", wanted->every_m,
-                   "Way between lines, in metres (default 0.1)");
-  arguments.option("--horizon-rows FIRST-LAST", wanted->horizon_rows,
+  arguments.option("--name NAME", values->name, "Name of the route; an existing one is continued");
+  arguments.option("--every-m METRES", values->every_m,
+                   "Distance between lines, in metres (default 0.1)");
+  arguments.option("--horizon-rows FIRST-LAST", values->horizon_rows,
                    "Rows that show the horizon, from 0 at the top, of panoramas whose "
                    "elevations are not known; all without it");
-  arguments.flag("--odometry", wanted->odometry,
-                 "Remember the odometry's poses, even where the data set knows positions");
-  arguments.option("--report FOLDER", wanted->report,
-                   "Write a picture of the route panorama into this folder: a new one, or that of "
+  arguments.flag("--odometry", values->odometry,
+                 "Record the poses of the odometry, even if the data set has positions");
+  arguments.option("--report FOLDER", values->report,
+                   "Write a page with the route panorama into this folder: a new one, or that of "
                    "an earlier report");
-  declare_pictures(arguments, wanted->pictures);
-  arguments.options("line", wanted->line);
-  return [wanted, &arguments](Session& session) { return record(arguments, *wanted, session); };
+  declare_pictures(arguments, values->pictures);
+  arguments.options("line", values->line);
+  return [values, &arguments](Session& session) { return record(arguments, *values, session); };
 }
 
 }  // namespace
 
 Verb route_record_verb() {
-  return {
-      "route record", "Remember a route as one line of pixels a step",
-      "The route holds what the camera sees at its own height, a byte a degree, from every place "
-      "of the way: a few megabytes a kilometre. Lines are on the disk batch by batch; after an "
-      "interruption the same command goes on where it stopped, and a drive that goes on where the "
-      "route ends makes it longer.",
-      "  panonav route record teach_run office.panonav\n"
-      "  panonav route record teach_run office.panonav --name corridor --odometry --report "
-      "corridor",
-      declare_route_record};
+  return {"route record", "Record a route as one line of pixels per step",
+          "The route holds what the camera sees at its own height, a byte a degree, from every "
+          "place of the route: a few megabytes a kilometre. Lines are stored in batches; after an "
+          "interruption the same command continues where it stopped, and a drive that continues "
+          "where the route ends makes it longer.",
+          "  panonav route record teach_run office.panonav\n"
+          "  panonav route record teach_run office.panonav --name corridor --odometry --report "
+          "corridor",
+          declare_route_record};
 }
 
 }  // namespace panonav::command

@@ -24,7 +24,7 @@ struct ServeArguments {
 };
 
 /// "office=/data/monday.panonav", or a file that gives its own name.
-server::ServedMemory served_memory(const std::string& text) {
+server::ServedMemory parse_served_memory(const std::string& text) {
   const std::size_t equals = text.find('=');
   const bool named = equals != std::string::npos && text.find('/') > equals;
   if (named) return {text.substr(0, equals), text.substr(equals + 1)};
@@ -50,82 +50,81 @@ std::string read_token(const std::string& path) {
   return token;
 }
 
-ExitCode serve(const Arguments& arguments, const ServeArguments& wanted, Session& session) {
+ExitCode serve(const Arguments& declared, const ServeArguments& arguments, Session& session) {
   std::mutex mutex;
-  std::condition_variable asked;
+  std::condition_variable stop_requested;
   bool stopped = false;
   const StopSignals signals([&] {
     const std::lock_guard lock(mutex);
     stopped = true;
-    asked.notify_all();
+    stop_requested.notify_all();
   });
-  const ListeningPlace place = listening_place("--listen", wanted.listen);
+  const ListeningPlace place = parse_listening_address("--listen", arguments.listen);
   server::LocalisationServerOptions options;
   options.address = place.address;
   options.port = place.port;
   options.threads = session.executor().threads();
-  options.max_waiting = static_cast<std::size_t>(wanted.max_waiting);
-  options.max_held_views = static_cast<std::size_t>(wanted.max_held_views);
-  if (wanted.token_file) options.token = read_token(*wanted.token_file);
-  options.localiser = wanted.localiser;
+  options.max_waiting = static_cast<std::size_t>(arguments.max_waiting);
+  options.max_held_views = static_cast<std::size_t>(arguments.max_held_views);
+  if (arguments.token_file) options.token = read_token(*arguments.token_file);
+  options.localiser = arguments.localiser;
   options.note = [&](const std::string& line) {
     const std::lock_guard lock(mutex);
     session.note(line);
   };
   std::vector<server::ServedMemory> memories;
-  for (const std::string& memory : wanted.memories) memories.push_back(served_memory(memory));
+  for (const std::string& memory : arguments.memories)
+    memories.push_back(parse_served_memory(memory));
   if (std::ranges::none_of(memories, is_server_address, &server::ServedMemory::path)) {
-    arguments.refuse_unused({"--max-held-views"}, "where all memories are files");
+    declared.refuse_unused({"--max-held-views"}, "where all memories are files");
   }
   const server::LocalisationServer server(memories, options);
   std::unique_lock lock(mutex);
   if (session.json()) {
     session.print(json_line({{"url", server.url()}}));
   } else {
-    session.print(session.strong("serving at " + server.url()) + "; Ctrl-C ends it");
+    session.print(session.bold("serving at " + server.url()) + "; Ctrl-C ends it");
     session.suggest({"curl", "--data-binary", "@view.jpg",
                      server.url() + "/v1/memories/" + memories.front().name + "/localise"},
                     "Try:");
   }
   session.flush();
-  asked.wait(lock, [&] { return stopped; });
+  stop_requested.wait(lock, [&] { return stopped; });
   return ExitCode::done;
 }
 
 Run declare_serve(Arguments& arguments) {
-  auto wanted = std::make_shared<ServeArguments>();
-  arguments.positionals("MEMORY", wanted->memories,
+  auto values = std::make_shared<ServeArguments>();
+  arguments.positionals("MEMORY", values->memories,
                         "Memory files, or addresses of memories on a server, known to clients by "
                         "their names without .panonav, or NAME=FILE");
-  arguments.option("--listen PORT", wanted->listen,
+  arguments.option("--listen PORT", values->listen,
                    "Port for programs of this machine (0: a free one); ADDRESS:PORT serves the "
                    "network of that address, too");
-  arguments.option("--token-file FILE", wanted->token_file,
+  arguments.option("--token-file FILE", values->token_file,
                    "Answer only clients that send the first line of this file as bearer token");
-  arguments.option("--max-waiting", wanted->max_waiting, 1,
-                   "Pictures that may wait for a thread; clients of further ones are told to try "
-                   "again");
-  arguments.option("--max-held-views", wanted->max_held_views, 0,
+  arguments.option("--max-waiting", values->max_waiting, 1,
+                   "Images that may wait for a thread; further clients are asked to try again");
+  arguments.option("--max-held-views", values->max_held_views, 0,
                    "Memories on a server with more views are not held: 350 bytes a view instead of "
-                   "2700, and a longer time for each picture (docs/scale.md)");
-  arguments.options("localiser", wanted->localiser);
+                   "2700, and a longer time for each image (docs/scale.md)");
+  arguments.options("localiser", values->localiser);
   arguments.common({"--top"});
-  return [wanted, &arguments](Session& session) { return serve(arguments, *wanted, session); };
+  return [values, &arguments](Session& session) { return serve(arguments, *values, session); };
 }
 
 }  // namespace
 
 Verb serve_verb() {
-  return {
-      "serve", "Answer over HTTP where pictures were taken",
-      "Clients POST a PNG or JPEG to /v1/memories/NAME/localise and get the JSON of localise. GET "
-      "/v1/memories lists the memories, /health tells whether the server is ready, /metrics is for "
-      "Prometheus. A memory whose file changes is read again. There is no encryption: put a proxy "
-      "that has it before a server that others than you can reach.",
-      "  panonav serve office.panonav\n"
-      "  panonav serve office.panonav hall=monday.panonav --listen 8090\n"
-      "  panonav serve office.panonav --listen 0.0.0.0:8080 --token-file token.txt",
-      declare_serve};
+  return {"serve", "Answer over HTTP where images were taken",
+          "Clients POST a PNG or JPEG to /v1/memories/NAME/localise and get the JSON of localise. "
+          "GET /v1/memories lists the memories, /health tells whether the server is ready, "
+          "/metrics is for Prometheus. A memory whose file changes is read again. There is no "
+          "encryption: put a proxy that encrypts in front of a server that others can reach.",
+          "  panonav serve office.panonav\n"
+          "  panonav serve office.panonav hall=monday.panonav --listen 8090\n"
+          "  panonav serve office.panonav --listen 0.0.0.0:8080 --token-file token.txt",
+          declare_serve};
 }
 
 }  // namespace panonav::command

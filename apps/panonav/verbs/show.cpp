@@ -20,7 +20,7 @@ struct ShowArguments {
 };
 
 /// Another view as seen from the one that is shown.
-ordered_json neighbour(const VisualMemory& memory, ViewId view, ViewId other) {
+ordered_json describe_neighbour(const VisualMemory& memory, ViewId view, ViewId other) {
   const auto& here = memory.info(view).pose;
   const auto& there = memory.info(other).pose;
   ordered_json json{
@@ -29,29 +29,29 @@ ordered_json neighbour(const VisualMemory& memory, ViewId view, ViewId other) {
   return json;
 }
 
-ordered_json links_of(const VisualMemory& memory, ViewId view) {
+ordered_json list_links(const VisualMemory& memory, ViewId view) {
   constexpr std::array<const char*, 3> kinds{"sequence", "neighbour", "closure"};
   auto links = ordered_json::array();
   for (const Link& link : memory.links()) {
     if (link.a != view && link.b != view) continue;
-    links.push_back(neighbour(memory, view, link.a == view ? link.b : link.a));
+    links.push_back(describe_neighbour(memory, view, link.a == view ? link.b : link.a));
     links.back()["kind"] = kinds[static_cast<std::size_t>(link.kind)];
   }
   return links;
 }
 
-ordered_json similar_to(const VisualMemory& memory, ViewId view) {
+ordered_json find_similar(const VisualMemory& memory, ViewId view) {
   auto similar = ordered_json::array();
   const auto found =
       memory.search(memory.packed(view), {.top = nearest}, {.excluded_views = {&view, 1}});
   for (const Match& match : found.matches) {
-    similar.push_back(neighbour(memory, view, match.view));
+    similar.push_back(describe_neighbour(memory, view, match.view));
     similar.back()["dissimilarity"] = match.dissimilarity;
   }
   return similar;
 }
 
-ordered_json near_to(const VisualMemory& memory, ViewId view) {
+ordered_json find_near(const VisualMemory& memory, ViewId view) {
   std::vector<std::pair<double, ViewId>> near;
   const auto& pose = memory.info(view).pose;
   for (const ViewId other : memory.views()) {
@@ -63,12 +63,12 @@ ordered_json near_to(const VisualMemory& memory, ViewId view) {
   std::ranges::sort(near);
   auto list = ordered_json::array();
   for (std::size_t i = 0; i < std::min<std::size_t>(near.size(), nearest); ++i) {
-    list.push_back(neighbour(memory, view, near[i].second));
+    list.push_back(describe_neighbour(memory, view, near[i].second));
   }
   return list;
 }
 
-ordered_json maps_with(const MemoryFile& file, ViewId view) {
+ordered_json find_maps(const MemoryFile& file, ViewId view) {
   auto maps = ordered_json::array();
   for (const std::string& name : file.map_names()) {
     const auto map = file.map(name);
@@ -84,14 +84,14 @@ ordered_json maps_with(const MemoryFile& file, ViewId view) {
   return maps;
 }
 
-void tell(const ordered_json& view, Session& session) {
+void print_view(const ordered_json& view, Session& session) {
   const auto number = [](const ordered_json& value, int digits) {
     return format_fixed(value.get<double>(), digits);
   };
   const auto name_in = [](const ordered_json& json, const char* key) {
     return to_readable_line(json[key].get<std::string>());
   };
-  session.print(session.strong(name_in(view, "name")) + ", view " + view["id"].dump());
+  session.print(session.bold(name_in(view, "name")) + ", view " + view["id"].dump());
   std::string place = "not known";
   if (const auto& pose = view["pose"]; !pose.is_null()) {
     place = "x " + number(pose["x_m"], 2) + " m, y " + number(pose["y_m"], 2) + " m";
@@ -131,39 +131,39 @@ void tell(const ordered_json& view, Session& session) {
   }
 }
 
-ExitCode show(const ShowArguments& wanted, Session& session) {
-  const auto file = MemoryFile::open(wanted.memory, Access::read_only);
-  const ViewId view = find_view_by_name_or_id(file, wanted.view);
+ExitCode show(const ShowArguments& arguments, Session& session) {
+  const auto file = MemoryFile::open(arguments.memory, Access::read_only);
+  const ViewId view = find_view_by_name_or_id(file, arguments.view);
   const VisualMemory memory = file.load();
   const ReferenceInfo& info = memory.info(view);
-  ordered_json shown{{"memory", wanted.memory},
+  ordered_json shown{{"memory", arguments.memory},
                      {"id", view.value},
                      {"name", info.name},
                      {"pose", nullptr},
                      {"stamp_s", or_null(info.stamp_s)},
                      {"signature_bytes", 2 * file.header().shape.size()},
                      {"thumbnail", nullptr},
-                     {"links", links_of(memory, view)},
-                     {"similar", similar_to(memory, view)},
-                     {"near", near_to(memory, view)},
-                     {"maps", maps_with(file, view)}};
+                     {"links", list_links(memory, view)},
+                     {"similar", find_similar(memory, view)},
+                     {"near", find_near(memory, view)},
+                     {"maps", find_maps(file, view)}};
   if (const auto& pose = info.pose) {
     shown["pose"] = {
         {"x_m", pose->x_m}, {"y_m", pose->y_m}, {"heading_rad", or_null(pose->heading_rad)}};
   }
   const auto bytes = file.thumbnail(view);
-  if (!bytes && wanted.thumbnail) {
-    throw FileError(wanted.memory, "holds no thumbnail of " + to_readable_line(wanted.view) +
-                                       "; memorise keeps them unless told --no-thumbnails");
+  if (!bytes && arguments.thumbnail) {
+    throw FileError(arguments.memory, "holds no thumbnail of " + to_readable_line(arguments.view) +
+                                          "; memorise keeps them unless told --no-thumbnails");
   }
   if (bytes) {
     std::optional<Image> picture;
     try {
       picture = decode_image(*bytes, "thumbnail of " + to_readable_line(info.name));
     } catch (const FileError&) {
-      if (wanted.thumbnail) throw;
+      if (arguments.thumbnail) throw;
     }
-    if (wanted.thumbnail) write_png(*wanted.thumbnail, picture->view());
+    if (arguments.thumbnail) write_png(*arguments.thumbnail, picture->view());
     shown["thumbnail"] = {{"bytes", bytes->size()},
                           {"width_px", picture ? picture->width() : 0},
                           {"height_px", picture ? picture->height() : 0}};
@@ -172,24 +172,24 @@ ExitCode show(const ShowArguments& wanted, Session& session) {
     session.print(json_line(shown));
     return ExitCode::done;
   }
-  tell(shown, session);
-  if (wanted.thumbnail) session.print("Thumbnail written to " + *wanted.thumbnail);
+  print_view(shown, session);
+  if (arguments.thumbnail) session.print("Thumbnail written to " + *arguments.thumbnail);
   return ExitCode::done;
 }
 
 Run declare_show(Arguments& arguments) {
-  auto wanted = std::make_shared<ShowArguments>();
-  arguments.positional("MEMORY", wanted->memory, "Memory file");
-  arguments.positional("VIEW", wanted->view, "Name or id of a view");
-  arguments.option("-o,--thumbnail FILE", wanted->thumbnail,
+  auto values = std::make_shared<ShowArguments>();
+  arguments.positional("MEMORY", values->memory, "Memory file");
+  arguments.positional("VIEW", values->view, "Name or id of a view");
+  arguments.option("-o,--thumbnail FILE", values->thumbnail,
                    "Write its thumbnail into this PNG file");
-  return [wanted](Session& session) { return show(*wanted, session); };
+  return [values](Session& session) { return show(*values, session); };
 }
 
 }  // namespace
 
 Verb show_verb() {
-  return {"show", "Show all that a memory knows of a view",
+  return {"show", "Show everything that a memory stores about a view",
           "The answer has the view's pose, links and place in maps, its size, and the five views "
           "that are most similar and nearest to it.",
           "  panonav show office.panonav view_00012.png\n"

@@ -29,47 +29,48 @@ struct SimulateArguments {
 
 /// --grid, --random and --trajectory each say all of the way; with the options of [recording] they
 /// would contradict.
-void apply_shorthands(const Arguments& arguments, SimulateArguments& wanted) {
-  const int ways = (wanted.grid_m ? 1 : 0) + (wanted.random ? 1 : 0) + (wanted.trajectory ? 1 : 0);
-  if (ways > 1 || (ways == 1 && arguments.given("recording", "path"))) {
+void apply_shorthands(const Arguments& declared, SimulateArguments& arguments) {
+  const int path_count =
+      (arguments.grid_m ? 1 : 0) + (arguments.random ? 1 : 0) + (arguments.trajectory ? 1 : 0);
+  if (path_count > 1 || (path_count == 1 && declared.is_set("recording", "path"))) {
     throw UsageError("--grid, --random, --trajectory and --path exclude each other; take one");
   }
-  auto& recording = wanted.simulation.recording;
-  if (wanted.grid_m) {
-    if (!(*wanted.grid_m > 0.0)) {
-      throw UsageError("--grid is " + to_text(*wanted.grid_m) + "; allowed: > 0 metres");
+  auto& recording = arguments.simulation.recording;
+  if (arguments.grid_m) {
+    if (!(*arguments.grid_m > 0.0)) {
+      throw UsageError("--grid is " + to_text(*arguments.grid_m) + "; allowed: > 0 metres");
     }
     recording.path = simulation::RecordingPath::grid;
-    recording.spacing_m = *wanted.grid_m;
+    recording.spacing_m = *arguments.grid_m;
   }
-  if (wanted.random) {
-    constexpr std::uint64_t most = 1000000;
-    if (*wanted.random == 0 || *wanted.random > most) {
-      throw UsageError("--random is " + std::to_string(*wanted.random) + "; allowed: 1 to " +
-                       std::to_string(most));
+  if (arguments.random) {
+    constexpr std::uint64_t max_poses = 1000000;
+    if (*arguments.random == 0 || *arguments.random > max_poses) {
+      throw UsageError("--random is " + std::to_string(*arguments.random) + "; allowed: 1 to " +
+                       std::to_string(max_poses));
     }
     recording.path = simulation::RecordingPath::random;
-    recording.poses = static_cast<int>(*wanted.random);
+    recording.poses = static_cast<int>(*arguments.random);
   }
-  if (arguments.given("recording", "heading")) return;
+  if (declared.is_set("recording", "heading")) return;
   recording.heading = simulation::default_heading(recording.path);
 }
 
-std::vector<simulation::RecordedPose> poses_of_file(const std::string& path,
-                                                    const simulation::SimulatedWorld& world) {
+std::vector<simulation::RecordedPose> read_poses(const std::string& path,
+                                                 const simulation::SimulatedWorld& world) {
   const auto trajectory = read_trajectory(path);
   if (trajectory.empty()) throw FileError(path, "holds no pose; allowed: one or more");
   return world.plan_along(trajectory);
 }
 
-void check_out(const std::string& out) {
+void require_new_folder(const std::string& out) {
   std::error_code ignored;
   if (fs::exists(out, ignored) && !fs::is_empty(out, ignored)) {
     throw FileError(out, "is there already and not empty; allowed: a new folder");
   }
 }
 
-/// What the robot saw, and where it truly was.
+/// Makes the moment of an image with the true pose.
 recordings::RunMoment make_moment(const DatasetEntry& entry, const Image& picture,
                                   const PanoramaReader& panoramas, std::size_t number) {
   recordings::RunMoment moment{
@@ -83,29 +84,29 @@ recordings::RunMoment make_moment(const DatasetEntry& entry, const Image& pictur
   return moment;
 }
 
-ExitCode simulate(const Arguments& arguments, SimulateArguments wanted, Session& session) {
-  if (wanted.ros2 ? !wanted.out.empty() : wanted.out.size() != 1) {
-    throw UsageError(wanted.ros2 ? "--ros2 makes no data set; leave OUT away"
-                                 : "OUT is missing or given twice: a folder for the data set");
+ExitCode simulate(const Arguments& declared, SimulateArguments arguments, Session& session) {
+  if (arguments.ros2 ? !arguments.out.empty() : arguments.out.size() != 1) {
+    throw UsageError(arguments.ros2 ? "--ros2 makes no data set; leave OUT away"
+                                    : "OUT is missing or given twice: a folder for the data set");
   }
-  const std::string out = wanted.ros2 ? "" : wanted.out.front();
-  apply_shorthands(arguments, wanted);
-  if (!wanted.ros2) check_out(out);
-  const simulation::SimulatedWorld world(wanted.scene, wanted.simulation, typed_options(arguments),
-                                         session.executor());
+  const std::string out = arguments.ros2 ? "" : arguments.out.front();
+  apply_shorthands(declared, arguments);
+  if (!arguments.ros2) require_new_folder(out);
+  const simulation::SimulatedWorld world(arguments.scene, arguments.simulation,
+                                         make_option_lookup(declared), session.executor());
   for (const auto& warning : world.scene().warnings) session.note("warning: " + warning);
-  if (wanted.ros2) return wanted.robot.run(world, session);
-  const auto poses = wanted.trajectory ? poses_of_file(*wanted.trajectory, world) : world.plan();
-  const bool with_path = wanted.trajectory.has_value() ||
+  if (arguments.ros2) return arguments.robot.run(world, session);
+  const auto poses = arguments.trajectory ? read_poses(*arguments.trajectory, world) : world.plan();
+  const bool with_path = arguments.trajectory.has_value() ||
                          world.options().recording.path != simulation::RecordingPath::random;
-  RunRecord record(wanted.record, {}, false, session, {});
+  RunRecord record(arguments.record, {}, false, session, {});
   const PanoramaReader panoramas(world.source(), {});
   std::size_t number = 0;
   Progress progress(session, "rendering", poses.size());
   const auto dataset =
       simulation::record_dataset(world, out, poses, with_path, session.executor(),
                                  [&](const DatasetEntry& entry, const Image& picture) {
-                                   if (record.wanted())
+                                   if (record.is_active())
                                      record.add(make_moment(entry, picture, panoramas, number));
                                    ++number;
                                    progress.advance();
@@ -119,7 +120,7 @@ ExitCode simulate(const Arguments& arguments, SimulateArguments wanted, Session&
                                          {"free_area_m2", world.free_space().area_m2()},
                                          {"warnings", world.scene().warnings}}));
   } else {
-    session.print(session.strong(std::to_string(dataset.entries.size())) + " views of " +
+    session.print(session.bold(std::to_string(dataset.entries.size())) + " views of " +
                   world.scene().name + " in " + out);
     session.suggest({"panonav", "memorise", out, "NAME.panonav"});
   }
@@ -127,66 +128,66 @@ ExitCode simulate(const Arguments& arguments, SimulateArguments wanted, Session&
 }
 
 Run declare_simulate_verb(Arguments& arguments) {
-  auto wanted = std::make_shared<SimulateArguments>();
+  auto values = std::make_shared<SimulateArguments>();
   const auto scenes = simulation::scene_names();
   std::string names;
   for (const auto name : scenes) names += (names.empty() ? "" : ", ") + std::string(name);
-  arguments.positional("SCENE", wanted->scene,
+  arguments.positional("SCENE", values->scene,
                        "Built-in scene (" + names + "), Gazebo world (.world, .sdf) or mesh file",
                        {scenes.begin(), scenes.end()});
-  arguments.optional_positionals("OUT", wanted->out, "Folder for the data set; new or empty");
-  arguments.flag("--ros2", wanted->ros2,
+  arguments.optional_positionals("OUT", values->out, "Folder for the data set; new or empty");
+  arguments.flag("--ros2", values->ros2,
                  "No data set: a robot in the scene that ROS 2 sees and drives");
-  arguments.option("--grid METRES", wanted->grid_m,
+  arguments.option("--grid METRES", values->grid_m,
                    "Short for --path grid --spacing-m: all free places of a grid");
-  arguments.option("--random N", wanted->random,
+  arguments.option("--random N", values->random,
                    "Short for --path random --poses: random places and headings");
-  arguments.option("--trajectory FILE", wanted->trajectory,
+  arguments.option("--trajectory FILE", values->trajectory,
                    "Poses of a trajectory file (TUM text or CSV)");
-  declare_record(arguments, wanted->record);
+  declare_record(arguments, values->record);
   arguments.uncommon({"--record"});
-  declare_simulation(arguments, wanted->simulation);
-  wanted->robot.declare(arguments, [wanted] { return wanted->ros2; });
+  declare_simulation(arguments, values->simulation);
+  values->robot.declare(arguments, [values] { return values->ros2; });
   arguments.common({"--path", "--spacing-m", "--poses", "--kind", "--seed", "--light"});
-  const auto path = [wanted] {
-    return wanted->random ? simulation::RecordingPath::random : wanted->simulation.recording.path;
+  const auto path = [values] {
+    return values->random ? simulation::RecordingPath::random : values->simulation.recording.path;
   };
-  arguments.used_only(
-      {"[recording]"}, [wanted] { return !wanted->trajectory; },
+  arguments.refuse_unless(
+      {"[recording]"}, [values] { return !values->trajectory; },
       "with --trajectory, which says places and times");
-  arguments.used_only(
-      {"--spacing-m"}, [wanted] { return !wanted->grid_m; }, "with --grid, which is the spacing");
-  arguments.used_only(
-      {"--poses"}, [wanted] { return !wanted->random; }, "with --random, which is their number");
-  arguments.used_only(
+  arguments.refuse_unless(
+      {"--spacing-m"}, [values] { return !values->grid_m; }, "with --grid, which is the spacing");
+  arguments.refuse_unless(
+      {"--poses"}, [values] { return !values->random; }, "with --random, which is their number");
+  arguments.refuse_unless(
       {"--poses"},
       [path] {
         return path() == simulation::RecordingPath::walk ||
                path() == simulation::RecordingPath::random;
       },
       "without --path walk or random");
-  arguments.used_only(
+  arguments.refuse_unless(
       {"--spacing-m", "--speed-m-s", "[odometry]"},
-      [wanted, path] { return wanted->trajectory || path() != simulation::RecordingPath::random; },
-      "on random places, which are no way");
-  arguments.used_only(
+      [values, path] { return values->trajectory || path() != simulation::RecordingPath::random; },
+      "with random places, which are no path");
+  arguments.refuse_unless(
       {"--heading-rad"},
-      [wanted, path, &arguments] {
-        return arguments.given("recording", "heading")
-                   ? wanted->simulation.recording.heading == simulation::RecordingHeading::fixed
+      [values, path, &arguments] {
+        return arguments.is_set("recording", "heading")
+                   ? values->simulation.recording.heading == simulation::RecordingHeading::fixed
                    : path() == simulation::RecordingPath::grid ||
                          path() == simulation::RecordingPath::zigzag;
       },
       "without --heading fixed");
-  return [wanted, &arguments](Session& session) { return simulate(arguments, *wanted, session); };
+  return [values, &arguments](Session& session) { return simulate(arguments, *values, session); };
 }
 
 }  // namespace
 
 Verb simulate_verb() {
   return {"simulate", "Render a data set of a simulated robot with a mirror camera",
-          "Every way but random places comes with stamps and noisy odometry. The same options and "
-          "seeds give the same pictures on one kind of processor.",
+          "All paths but random places have stamps and noisy odometry. The same options and seeds "
+          "give the same images on one kind of processor.",
           "  panonav simulate office memory_run --grid 0.25\n"
           "  panonav simulate office query_run --random 20 --seed 7\n"
           "  panonav simulate house.world house_run --grid 0.5 --kind panorama\n"

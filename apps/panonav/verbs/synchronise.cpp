@@ -18,19 +18,19 @@ struct SynchroniseArguments {
   std::optional<double> within_m;
 };
 
-fleet::SynchronisationOptions options_of(const SynchroniseArguments& wanted) {
+fleet::SynchronisationOptions make_options(const SynchroniseArguments& arguments) {
   fleet::SynchronisationOptions options;
-  if (wanted.around.has_value() != wanted.within_m.has_value()) {
-    throw UsageError(wanted.around ? "--around needs --within-m" : "--within-m needs --around");
+  if (arguments.around.has_value() != arguments.within_m.has_value()) {
+    throw UsageError(arguments.around ? "--around needs --within-m" : "--within-m needs --around");
   }
-  if (wanted.around) {
+  if (arguments.around) {
     options.areas =
-        fleet::areas_around(wanted.around->first, wanted.around->second, *wanted.within_m);
+        fleet::areas_around(arguments.around->first, arguments.around->second, *arguments.within_m);
   }
   return options;
 }
 
-std::string counted(const fleet::SynchronisationReport& report) {
+std::string describe_report(const fleet::SynchronisationReport& report) {
   const std::array<std::pair<std::size_t, const char*>, 12> counts{{
       {report.uploaded, "uploaded"},
       {report.downloaded, "downloaded"},
@@ -53,11 +53,11 @@ std::string counted(const fleet::SynchronisationReport& report) {
   return text.empty() ? "nothing was new" : text;
 }
 
-ExitCode synchronise(const SynchroniseArguments& wanted, Session& session) {
+ExitCode synchronise(const SynchroniseArguments& arguments, Session& session) {
   const fleet::SynchronisationReport report = [&] {
     std::optional<Progress> progress;
     std::size_t expected = 0;
-    return fleet::synchronise_memory(wanted.memory, wanted.server, options_of(wanted),
+    return fleet::synchronise_memory(arguments.memory, arguments.server, make_options(arguments),
                                      [&](std::size_t total) {
                                        if (!progress || std::exchange(expected, total) != total) {
                                          progress.emplace(session, "synchronising", total);
@@ -66,12 +66,12 @@ ExitCode synchronise(const SynchroniseArguments& wanted, Session& session) {
                                      });
   }();
   {
-    MemoryFile file = MemoryFile::open(wanted.memory, Access::read_write);
+    MemoryFile file = MemoryFile::open(arguments.memory, Access::read_write);
     keep_models(file);
   }
   if (session.json()) {
-    session.print(json_line(ordered_json{{"memory", wanted.memory},
-                                         {"server", wanted.server},
+    session.print(json_line(ordered_json{{"memory", arguments.memory},
+                                         {"server", arguments.server},
                                          {"views", report.views},
                                          {"uploaded", report.uploaded},
                                          {"downloaded", report.downloaded},
@@ -90,8 +90,8 @@ ExitCode synchronise(const SynchroniseArguments& wanted, Session& session) {
                                          {"seconds", report.seconds}}));
     return ExitCode::done;
   }
-  session.print(wanted.memory + " and " + wanted.server + ": " + counted(report) + ". " +
-                wanted.memory + " holds " + std::to_string(report.views) + " views.");
+  session.print(arguments.memory + " and " + arguments.server + ": " + describe_report(report) +
+                ". " + arguments.memory + " holds " + std::to_string(report.views) + " views.");
   if (report.conflicts > 0) {
     session.note("of " + std::to_string(report.conflicts) +
                  " views changes of this file were dropped, as others had changed or removed them "
@@ -106,28 +106,28 @@ ExitCode synchronise(const SynchroniseArguments& wanted, Session& session) {
 }
 
 Run declare_synchronise(Arguments& arguments) {
-  auto wanted = std::make_shared<SynchroniseArguments>();
-  arguments.positional("MEMORY", wanted->memory,
+  auto values = std::make_shared<SynchroniseArguments>();
+  arguments.positional("MEMORY", values->memory,
                        "The robot's memory file; where there is none it is made");
-  arguments.positional("ADDRESS", wanted->server,
+  arguments.positional("ADDRESS", values->server,
                        "Address of a memory on a server; where there is none it is made");
-  arguments.option("--around", "X_M Y_M", wanted->around,
+  arguments.option("--around", "X_M Y_M", values->around,
                    "Keep only the areas (squares of 10 m) around this position");
-  arguments.option("--within-m", wanted->within_m, "Distance from that position, metres");
-  return [wanted](Session& session) { return synchronise(*wanted, session); };
+  arguments.option("--within-m", values->within_m, "Distance from that position, metres");
+  return [values](Session& session) { return synchronise(*values, session); };
 }
 
 }  // namespace
 
 Verb synchronise_verb() {
   return {
-      "synchronise", "Bring a robot's memory file and a memory on a server to the same views",
-      "Uploads what the file has and the server lacks, each view once, and takes what others "
-      "did since: views with pictures and features, poses, names, removals and links. What the "
-      "server acknowledged first holds; a removal wins over a change; two replacements of one "
-      "view stand beside each other; a name that another view has becomes ROBOT/NAME. Maps, "
-      "routes and what was learnt stay with the file. When the link breaks nothing is lost or "
-      "doubled: the same command goes on (docs/scale.md).",
+      "synchronise", "Synchronise the views of a memory file and of a memory on a server",
+      "Uploads what only the file has, each view once, and downloads what others changed since: "
+      "views with images and features, poses, names, removals and links. The first change that the "
+      "server acknowledged holds; a removal wins over a change; two replacements of one view are "
+      "both kept; a name that another view has becomes ROBOT/NAME. Maps, routes and models stay "
+      "with the file. If the connection breaks, nothing is lost or doubled: the same command "
+      "continues (docs/scale.md).",
       "  panonav synchronise robot.panonav 'postgresql://robots.example/panonav?memory=office'\n"
       "  panonav synchronise robot.panonav ADDRESS --around 12.5 40 --within-m 60 --json",
       declare_synchronise};

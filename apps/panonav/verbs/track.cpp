@@ -19,7 +19,7 @@ namespace panonav::command {
 
 namespace {
 
-/// How sure a start pose is. The defaults are those of a robot put down by hand on a mark.
+/// Uncertainty of the start pose. The defaults are for a robot put down by hand on a mark.
 struct StartOptions {
   double deviation_m = 0.1;
   double heading_deviation_deg = 5.0;
@@ -34,7 +34,7 @@ void visit_options(StartOptions& options, OptionVisitor& visitor) {
   table.visit(options, visitor);
 }
 
-/// Of positions that are taken for metres; what lies farther is a mistake.
+/// Largest plausible coordinate, metres.
 constexpr double farthest_m = 1e9;
 
 struct TrackArguments {
@@ -55,28 +55,28 @@ struct TrackArguments {
   OdometryNoise odometry;
 };
 
-void check(const Arguments& arguments, const TrackArguments& wanted) {
-  const bool x = wanted.start_x_m.has_value();
-  const bool y = wanted.start_y_m.has_value();
-  if (x != y || (x && !wanted.start_heading_deg)) {
+void check_arguments(const Arguments& declared, const TrackArguments& arguments) {
+  const bool x = arguments.start_x_m.has_value();
+  const bool y = arguments.start_y_m.has_value();
+  if (x != y || (x && !arguments.start_heading_deg)) {
     throw UsageError(
         "--start-x-m, --start-y-m and --start-heading-deg go together; --start-heading-deg alone "
-        "is a robot that knows its heading only");
+        "sets the heading only");
   }
-  if (!x && arguments.given("start")) {
+  if (!x && declared.is_set("start")) {
     throw UsageError(
         "--start-deviation-m and --start-heading-deviation-deg go with --start-x-m, --start-y-m "
         "and --start-heading-deg");
   }
-  if (x && std::max(std::abs(*wanted.start_x_m), std::abs(*wanted.start_y_m)) > farthest_m) {
-    throw UsageError("--start-x-m and --start-y-m are " + to_text(*wanted.start_x_m) + " and " +
-                     to_text(*wanted.start_y_m) + "; allowed: " + to_text(-farthest_m) + " to " +
+  if (x && std::max(std::abs(*arguments.start_x_m), std::abs(*arguments.start_y_m)) > farthest_m) {
+    throw UsageError("--start-x-m and --start-y-m are " + to_text(*arguments.start_x_m) + " and " +
+                     to_text(*arguments.start_y_m) + "; allowed: " + to_text(-farthest_m) + " to " +
                      to_text(farthest_m));
   }
-  if (wanted.filter.min_particles > wanted.filter.max_particles) {
-    throw UsageError("--min-particles is " + std::to_string(wanted.filter.min_particles) +
+  if (arguments.filter.min_particles > arguments.filter.max_particles) {
+    throw UsageError("--min-particles is " + std::to_string(arguments.filter.min_particles) +
                      "; allowed: at most --max-particles, which is " +
-                     std::to_string(wanted.filter.max_particles));
+                     std::to_string(arguments.filter.max_particles));
   }
 }
 
@@ -90,12 +90,12 @@ void check_odometry(const Dataset& run, const std::string& folder) {
   }
 }
 
-void start(Tracker& tracker, const TrackArguments& wanted) {
-  if (!wanted.start_heading_deg) return;
-  const double heading_rad = wrap_angle(radians(*wanted.start_heading_deg));
-  if (wanted.start_x_m) {
-    tracker.start_at({*wanted.start_x_m, *wanted.start_y_m, heading_rad}, wanted.start.deviation_m,
-                     radians(wanted.start.heading_deviation_deg));
+void set_start(Tracker& tracker, const TrackArguments& arguments) {
+  if (!arguments.start_heading_deg) return;
+  const double heading_rad = wrap_angle(radians(*arguments.start_heading_deg));
+  if (arguments.start_x_m) {
+    tracker.start_at({*arguments.start_x_m, *arguments.start_y_m, heading_rad},
+                     arguments.start.deviation_m, radians(arguments.start.heading_deviation_deg));
   } else {
     tracker.start_globally(heading_rad);
   }
@@ -135,7 +135,7 @@ ordered_json as_json(const TrackedImage& image) {
           {"ground_truth", std::move(truth)}};
 }
 
-std::string place_text(const Pose2& pose) {
+std::string format_position(const Pose2& pose) {
   return "x " + format_fixed(pose.x_m, 2) + " m  y " + format_fixed(pose.y_m, 2) + " m";
 }
 
@@ -144,36 +144,36 @@ std::string as_text(const TrackedImage& image, Session& session) {
   std::string line = image.file + "  ";
   const std::string state(name_of(estimate.state));
   if (estimate.state == LocalisationState::lost || estimate.modes.empty()) {
-    return line + session.bad(state);
+    return line + session.red(state);
   }
   const PoseMode& best = estimate.modes.front();
   if (is_localised(image)) {
-    return line + session.good(state) + "  " + place_text(*estimate.pose) + "  heading " +
+    return line + session.green(state) + "  " + format_position(*estimate.pose) + "  heading " +
            format_fixed(degrees(estimate.pose->heading_rad), 1) + " degrees  spread " +
            format_fixed(best.spread_m, 2) + " m";
   }
-  line += session.strong(state) + "  ";
+  line += session.bold(state) + "  ";
   if (estimate.modes.size() == 1) {
-    return line + "an area around " + place_text(best.mean) + "  spread " +
+    return line + "an area around " + format_position(best.mean) + "  spread " +
            format_fixed(best.spread_m, 2) + " m";
   }
   constexpr std::size_t max_shown = 3;
   line += std::to_string(estimate.modes.size()) + " places:";
   for (std::size_t i = 0; i < std::min(max_shown, estimate.modes.size()); ++i) {
     const PoseMode& mode = estimate.modes[i];
-    line += (i > 0 ? ",  " : "  ") + place_text(mode.mean) + " (" +
+    line += (i > 0 ? ",  " : "  ") + format_position(mode.mean) + " (" +
             format_fixed(100.0 * mode.weight, 0) + " %)";
   }
   return estimate.modes.size() > max_shown ? line + ", .." : line;
 }
 
-std::string count_text(std::size_t count, std::size_t total) {
+std::string format_count(std::size_t count, std::size_t total) {
   return std::to_string(count) + " of " + std::to_string(total);
 }
 
 void print_summary(const TrackSummary& summary, Session& session) {
   const std::size_t total = summary.localised + summary.ambiguous + summary.lost;
-  session.print("localised at " + session.strong(count_text(summary.localised, total)) +
+  session.print("localised at " + session.bold(format_count(summary.localised, total)) +
                 " images, ambiguous at " + std::to_string(summary.ambiguous) + ", lost at " +
                 std::to_string(summary.lost) +
                 (summary.first_localised
@@ -193,17 +193,17 @@ void print_summary(const TrackSummary& summary, Session& session) {
   }
 }
 
-ExitCode exit_code_of(const TrackSummary& summary) {
+ExitCode to_exit_code(const TrackSummary& summary) {
   return summary.localised > 0 ? ExitCode::done : ExitCode::no_answer;
 }
 
 /// A viewer has told where the robot is; false where none did.
-bool start_as_wished(Tracker& tracker, RunRecord& record) {
+bool start_at_viewer_pose(Tracker& tracker, RunRecord& record) {
   // A finger on a map, and an arrow beside it.
   constexpr double deviation_m = 0.3;
   constexpr double heading_deviation_deg = 20.0;
   constexpr double any_heading_deg = 180.0;
-  const auto wish = record.consume_wish();
+  const auto wish = record.take_viewer_input();
   if (!wish) return false;
   const double heading_rad = wrap_angle(wish->heading_rad.value_or(0.0));
   tracker.start_at({wish->x_m, wish->y_m, heading_rad}, deviation_m,
@@ -220,52 +220,53 @@ class LiveTrack {
       : arguments_(arguments),
         session_(session),
         tracker_(file, {arguments.filter,
-                        declared.given("odometry") ? arguments.odometry : visual_odometry_noise(),
+                        declared.is_set("odometry") ? arguments.odometry : visual_odometry_noise(),
                         source}),
         odometry_(visual_odometry(tracker_.memory())),
         record_(arguments.record, std::span(&arguments.memory, 1), true, session,
                 {.memory = arguments.memory, .takes = viewer::ViewWish::pose}) {
-    session.note("panonav track: motion is read from the pictures; one unit of the views is " +
+    session.note("panonav track: motion is read from the images; one unit of the views is " +
                  format_number(odometry_.scale_m()) + " m, as in the memory");
-    start(tracker_, arguments);
-    if (record_.wanted()) shown_.emplace(tracker_.memory());
+    set_start(tracker_, arguments);
+    if (record_.is_active()) shown_.emplace(tracker_.memory());
     settings_ = {.recorded = &file, .shown = shown_ ? &*shown_ : nullptr};
   }
 
   /// Moves by what the image shows and looks at every N-th one; returns the line that is printed.
-  std::string observe(const Observation& seen, std::optional<double> decoding_ms) {
+  std::string observe(const Observation& observation, std::optional<double> decoding_ms) {
     const std::size_t number = count_++;
     const ViewEncoder& encoder = tracker_.encoder();
     StageClock clock;
     if (decoding_ms) clock.add("reading", *decoding_ms);
     std::optional<Panorama> unwarped;
-    if (record_.wants_pictures()) unwarped = encoder.panorama(seen);
+    if (record_.needs_images()) unwarped = encoder.panorama(observation);
     if (unwarped) clock.stage("unwarping");
-    const FourierSignature view = unwarped ? encoder.signature(*unwarped) : encoder.signature(seen);
+    const FourierSignature view =
+        unwarped ? encoder.signature(*unwarped) : encoder.signature(observation);
     clock.stage(unwarped ? "signature" : "unwarping and signature");
     odometry_.add(OdometryView(view));
     tracker_.move_to(odometry_.pose());
     clock.stage("visual odometry");
-    const bool moved_by_hand = start_as_wished(tracker_, record_);
+    const bool moved_by_hand = start_at_viewer_pose(tracker_, record_);
     if (number % static_cast<std::size_t>(arguments_.every) != 0) return "";
-    if (record_.wanted()) {
-      moment_ = record_.make_moment(seen, number);
+    if (record_.is_active()) {
+      moment_ = record_.make_moment(observation, number);
       moment_->panorama = std::move(unwarped);
       moment_->odometry = odometry_.pose();
-      if (number == 0) shown_->put(*moment_);
-      clock.put(*moment_);
+      if (number == 0) shown_->add_to(*moment_);
+      clock.add_to(*moment_);
     }
     TrackedImage image = track_image(tracker_, pack(view, encoder.header().full_scale), settings_,
                                      std::move(moment_));
     moment_ = std::move(image.moment);
-    if (moment_ && moved_by_hand) tell_wish(*moment_);
+    if (moment_ && moved_by_hand) note_viewer_pose(*moment_);
     image.index = number;
-    image.file = seen.name;
-    image.stamp_s = seen.stamp_s;
+    image.file = observation.name;
+    image.stamp_s = observation.stamp_s;
     add(summary_, image);
-    const bool later = trajectory_.empty() || trajectory_.back().stamp_s < *seen.stamp_s;
+    const bool later = trajectory_.empty() || trajectory_.back().stamp_s < *observation.stamp_s;
     if (arguments_.tum && is_localised(image) && later) {
-      trajectory_.push_back({*seen.stamp_s, *image.estimate.pose});
+      trajectory_.push_back({*observation.stamp_s, *image.estimate.pose});
     }
     return session_.json() ? json_line(as_json(image)) : as_text(image, session_);
   }
@@ -274,15 +275,15 @@ class LiveTrack {
     if (moment_) record_.add(std::move(*moment_));
     moment_.reset();
   }
-  ExitCode finish(LiveRun& taking) {
+  ExitCode finish(LiveRun& loop) {
     if (arguments_.tum) write_trajectory(*arguments_.tum, trajectory_);
     record_.close();
-    const LiveCounts& counts = taking.finish();
+    const LiveCounts& counts = loop.finish();
     if (!session_.json()) print_summary(summary_, session_);
-    session_.note(std::to_string(counts.pictures) + " pictures, " +
+    session_.note(std::to_string(counts.pictures) + " images, " +
                   std::to_string(odometry_.breaks()) + " steps unread" +
-                  events_text(counts, record_.left_out()));
-    return exit_code_of(summary_);
+                  describe_events(counts, record_.left_out()));
+    return to_exit_code(summary_);
   }
 
  private:
@@ -299,15 +300,19 @@ class LiveTrack {
   std::vector<StampedPose> trajectory_;
 };
 
-ExitCode track_live(const Arguments& arguments, const TrackArguments& wanted,
+ExitCode track_live(const Arguments& declared, const TrackArguments& arguments,
                     const MemoryFile& file, Session& session) {
-  arguments.refuse_unused({"--report"}, "where " + wanted.dataset + " is a live source");
-  const auto source = open_live(arguments, wanted.dataset, {}, file.header().source, wanted.live);
-  LiveTrack track(arguments, wanted, file, source->pictures(), session);
-  LiveRun taking(*source, wanted.part, wanted.live, session);
-  taking.take([&](const Observation& seen) { return track.observe(seen, taking.decoding_ms()); },
-              [&](Observation&&) { track.record(); });
-  return track.finish(taking);
+  declared.refuse_unused({"--report"}, "where " + arguments.dataset + " is a live source");
+  const auto source =
+      open_live(declared, arguments.dataset, {}, file.header().source, arguments.live);
+  LiveTrack track(declared, arguments, file, source->pictures(), session);
+  LiveRun loop(*source, arguments.part, arguments.live, session);
+  loop.run(
+      [&](const Observation& observation) {
+        return track.observe(observation, loop.decoding_ms());
+      },
+      [&](Observation&&) { track.record(); });
+  return track.finish(loop);
 }
 
 /// Writes the poses of the images at which the robot was localised; `seconds` are stamps of all.
@@ -324,49 +329,50 @@ void write_localised(const std::string& path, const std::vector<TrackedImage>& i
 void read_motion(Dataset& run, const std::string& name, const Tracker& tracker, Session& session) {
   session.note("panonav track: " + to_readable_line(name) +
                " has no odometry (columns odom_x_m,odom_y_m,odom_heading_deg); motion is read "
-               "from the pictures, " +
+               "from the images, " +
                add_visual_odometry(run, tracker.memory(), tracker.encoder(), session.executor()));
 }
 
-ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Session& session) {
-  check(arguments, wanted);
-  const auto file = MemoryFile::open(wanted.memory, Access::read_only);
-  if (recordings::is_live(wanted.dataset)) return track_live(arguments, wanted, file, session);
-  refuse_live(arguments, wanted.dataset, true);
-  Dataset run = read_run(wanted.dataset, wanted.topics, wanted.part, file, session);
+ExitCode track_run(const Arguments& declared, const TrackArguments& arguments, Session& session) {
+  check_arguments(declared, arguments);
+  const auto file = MemoryFile::open(arguments.memory, Access::read_only);
+  if (recordings::is_live(arguments.dataset)) return track_live(declared, arguments, file, session);
+  refuse_live(declared, arguments.dataset, true);
+  Dataset run = read_run(arguments.dataset, arguments.topics, arguments.part, file, session);
   const bool visual = odometry_poses(run).empty();
-  if (!visual) check_odometry(run, wanted.dataset);
+  if (!visual) check_odometry(run, arguments.dataset);
   std::vector<double> seconds;
-  if (wanted.tum) seconds = trajectory_stamps(run, "track", wanted.dataset, *wanted.tum, session);
+  if (arguments.tum)
+    seconds = trajectory_stamps(run, "track", arguments.dataset, *arguments.tum, session);
   Tracker tracker(
-      file, {wanted.filter,
-             visual && !arguments.given("odometry") ? visual_odometry_noise() : wanted.odometry,
+      file, {arguments.filter,
+             visual && !declared.is_set("odometry") ? visual_odometry_noise() : arguments.odometry,
              run.source});
-  if (visual) read_motion(run, wanted.dataset, tracker, session);
-  start(tracker, wanted);
-  TrackSettings settings{.every = wanted.every};
-  if (wanted.report) {
-    prepare_report_folder(*wanted.report, "track");
-    settings.particles_kept = particles_shown(run.entries.size());
+  if (visual) read_motion(run, arguments.dataset, tracker, session);
+  set_start(tracker, arguments);
+  TrackSettings settings{.every = arguments.every};
+  if (arguments.report) {
+    prepare_report_folder(*arguments.report, "track");
+    settings.particles_kept = count_shown_particles(run.entries.size());
   }
 
-  RunRecord record(wanted.record, std::array{wanted.dataset, wanted.memory}, false, session,
-                   {.memory = wanted.memory, .takes = viewer::ViewWish::pose});
-  const std::size_t looked_at = (run.entries.size() - 1) / settings.every + 1;
+  RunRecord record(arguments.record, std::array{arguments.dataset, arguments.memory}, false,
+                   session, {.memory = arguments.memory, .takes = viewer::ViewWish::pose});
+  const std::size_t image_count = (run.entries.size() - 1) / settings.every + 1;
   std::optional<ShownReferences> shown;
-  if (record.wanted() || wanted.report) {
+  if (record.is_active() || arguments.report) {
     settings.recorded = &file;
     settings.shown = &shown.emplace(tracker.memory());
-    settings.wished = [&] { return start_as_wished(tracker, record); };
+    settings.has_viewer_input = [&] { return start_at_viewer_pose(tracker, record); };
   }
-  viewer::RunPage played("panonav track: " + to_readable_line(wanted.dataset), looked_at);
+  viewer::RunPage played("panonav track: " + to_readable_line(arguments.dataset), image_count);
   std::vector<TrackedImage> images;
-  Progress progress(session, "tracking", looked_at);
+  Progress progress(session, "tracking", image_count);
   track(tracker, run, settings, session.executor(), [&](TrackedImage&& image) {
     progress.clear();
     session.print(session.json() ? json_line(as_json(image)) : as_text(image, session));
-    if (wanted.report) add(played, image);
-    if (record.wanted()) record.add(std::move(*image.moment));
+    if (arguments.report) add(played, image);
+    if (record.is_active()) record.add(std::move(*image.moment));
     image.moment.reset();
     images.push_back(std::move(image));
     progress.advance();
@@ -374,63 +380,61 @@ ExitCode track_run(const Arguments& arguments, const TrackArguments& wanted, Ses
   progress.clear();
   record.close();
 
-  if (wanted.tum) write_localised(*wanted.tum, images, seconds);
+  if (arguments.tum) write_localised(*arguments.tum, images, seconds);
   const TrackSummary summary = summarise_track(images);
   if (!session.json()) print_summary(summary, session);
-  if (wanted.report) {
-    write_track_report(*wanted.report, tracker.memory(), tracker.localiser().model().spacing_m,
+  if (arguments.report) {
+    write_track_report(*arguments.report, tracker.memory(), tracker.localiser().model().spacing_m,
                        images, summary, played);
-    tell_report(*wanted.report, session);
+    print_report_path(*arguments.report, session);
   }
-  return exit_code_of(summary);
+  return to_exit_code(summary);
 }
 
 Run declare_track(Arguments& arguments) {
-  auto wanted = std::make_shared<TrackArguments>();
-  arguments.positional("MEMORY", wanted->memory, "Memory file");
+  auto values = std::make_shared<TrackArguments>();
+  arguments.positional("MEMORY", values->memory, "Memory file");
   arguments.positional(
-      "DATASET", wanted->dataset,
-      "Data set, folder of pictures, video or recording, in the order of the run, or a live source "
-      "(-, /dev/video0, rtsp://); without odometry motion is read from the pictures");
-  declare_topics(arguments, wanted->topics);
-  declare_part(arguments, wanted->part, false);
-  arguments.option("--every N", wanted->every, 1,
-                   "Look at every N-th picture only and go by odometry between");
-  arguments.option("--start-x-m", wanted->start_x_m,
-                   "x of the place where the run starts; without it the run starts anywhere");
-  arguments.option("--start-y-m", wanted->start_y_m, "y of that place");
-  arguments.option("--start-heading-deg", wanted->start_heading_deg,
-                   "Heading at the start; it may be given without the place");
-  arguments.option("--tum FILE", wanted->tum,
+      "DATASET", values->dataset,
+      "Data set, folder of images, video or recording, in the order of the run, or a live source "
+      "(-, /dev/video0, rtsp://); without odometry motion is read from the images");
+  declare_topics(arguments, values->topics);
+  declare_part(arguments, values->part, false);
+  arguments.option("--every N", values->every, 1,
+                   "Use every N-th image only, and odometry between them");
+  arguments.option("--start-x-m", values->start_x_m,
+                   "x of the start position; without it the start is unknown");
+  arguments.option("--start-y-m", values->start_y_m, "y of the start position");
+  arguments.option("--start-heading-deg", values->start_heading_deg,
+                   "Heading at the start; may be given without a position");
+  arguments.option("--tum FILE", values->tum,
                    "Write the trajectory of localised images to this file: TUM text, or CSV for a "
                    "name that ends in .csv");
-  declare_record(arguments, wanted->record);
-  declare_view(arguments, wanted->record);
-  declare_live(arguments, wanted->live);
-  arguments.option("--report FOLDER", wanted->report,
-                   "Write pictures and a page that plays the run into this "
-                   "folder: a new one, or that of an earlier report");
-  arguments.options("start", wanted->start, "start");
-  arguments.options("monte_carlo", wanted->filter);
-  arguments.options("odometry", wanted->odometry, "odometry");
+  declare_record(arguments, values->record);
+  declare_view(arguments, values->record);
+  declare_live(arguments, values->live);
+  arguments.option("--report FOLDER", values->report,
+                   "Write a page that replays the run into this folder: a new one, or that of an "
+                   "earlier report");
+  arguments.options("start", values->start, "start");
+  arguments.options("monte_carlo", values->filter);
+  arguments.options("odometry", values->odometry, "odometry");
   arguments.common({"--seed"});
-  return [wanted, &arguments](Session& session) { return track_run(arguments, *wanted, session); };
+  return [values, &arguments](Session& session) { return track_run(arguments, *values, session); };
 }
 
 }  // namespace
 
 Verb track_verb() {
-  return {
-      "track", "Follow a moving robot through its pictures and odometry",
-      "Monte-Carlo localisation: the robot need not know where it starts, several places that look "
-      "alike are kept until a picture tells them apart, and a robot that was kidnapped is found "
-      "again. A live source is followed until Ctrl-C. The exit code is 1 when the robot was never "
-      "localised.",
-      "  panonav track office.panonav run\n"
-      "  panonav track office.panonav run --every 10 --report report\n"
-      "  panonav track office.panonav run --tum estimate.tum --json\n"
-      "  panonav evaluate estimate.tum run/poses.csv --align false",
-      declare_track};
+  return {"track", "Follow a moving robot through its images and odometry",
+          "Monte-Carlo localisation: the start may be unknown, several similar places are tracked "
+          "until an image tells them apart, and a kidnapped robot is found again. A live source is "
+          "followed until Ctrl-C. The exit code is 1 when the robot was never localised.",
+          "  panonav track office.panonav run\n"
+          "  panonav track office.panonav run --every 10 --report report\n"
+          "  panonav track office.panonav run --tum estimate.tum --json\n"
+          "  panonav evaluate estimate.tum run/poses.csv --align false",
+          declare_track};
 }
 
 }  // namespace panonav::command

@@ -10,44 +10,44 @@ struct UndoArguments {
   bool dry_run = false;
 };
 
-ExitCode undo(const UndoArguments& wanted, Session& session) {
-  auto memory =
-      MemoryFile::open(wanted.memory, wanted.dry_run ? Access::read_only : Access::read_write);
+ExitCode undo(const UndoArguments& arguments, Session& session) {
+  auto memory = MemoryFile::open(arguments.memory,
+                                 arguments.dry_run ? Access::read_only : Access::read_write);
   const auto what = memory.undoable();
   if (!what) {
     throw FileError(
-        wanted.memory,
+        arguments.memory,
         "has nothing to undo; allowed: after forget, prune, rename and localise --update");
   }
-  if (!wanted.dry_run) memory.undo();
+  if (!arguments.dry_run) memory.undo();
   const auto views = memory.info().views;
   if (session.json()) {
-    session.print(json_line(ordered_json{{"memory", wanted.memory},
-                                         {"dry_run", wanted.dry_run},
+    session.print(json_line(ordered_json{{"memory", arguments.memory},
+                                         {"dry_run", arguments.dry_run},
                                          {"undone", *what},
                                          {"views", views}}));
     return ExitCode::done;
   }
-  session.print((wanted.dry_run ? "would undo \"" : "undone \"") + *what + "\"; " + wanted.memory +
-                " holds " + std::to_string(views) + " views");
+  session.print((arguments.dry_run ? "would undo \"" : "undone \"") + *what + "\"; " +
+                arguments.memory + " holds " + std::to_string(views) + " views");
   return ExitCode::done;
 }
 
 Run declare_undo(Arguments& arguments) {
-  auto wanted = std::make_shared<UndoArguments>();
-  arguments.positional("MEMORY", wanted->memory, "Memory file");
-  arguments.flag("--dry-run", wanted->dry_run, "Say what would be undone, and change nothing");
-  return [wanted](Session& session) { return undo(*wanted, session); };
+  auto values = std::make_shared<UndoArguments>();
+  arguments.positional("MEMORY", values->memory, "Memory file");
+  arguments.flag("--dry-run", values->dry_run, "Report what would be undone, and change nothing");
+  return [values](Session& session) { return undo(*values, session); };
 }
 
 }  // namespace
 
 Verb undo_verb() {
   return {"undo", "Take back the last forget, prune, rename or --update",
-          "Again, it takes back the change before (panonav history lists them). Views come back "
-          "with their small pictures, their links, what they were in maps, and "
-          "their former names. Views that were added since stay. The verb is refused when one of "
-          "them has the name of a view that comes back, or when a map was made anew.",
+          "Repeat it to take back earlier changes (panonav history lists them). Views come back "
+          "with their thumbnails, links, places in maps and former names. Views that were added "
+          "since stay. The verb is refused if one of them has the name of a view that would come "
+          "back, or if a map was made again.",
           "  panonav undo office.panonav --dry-run\n"
           "  panonav undo office.panonav",
           declare_undo};

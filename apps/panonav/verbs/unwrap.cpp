@@ -55,95 +55,100 @@ std::string panorama_name(const std::string& file) {
   return name + ".png";
 }
 
-ExitCode unwrap_series(const UnwrapArguments& wanted, const Dataset& recording, Session& session) {
+ExitCode unwrap_series(const UnwrapArguments& arguments, const Dataset& recording,
+                       Session& session) {
   std::error_code error;
-  if (fs::exists(wanted.out) && (!fs::is_directory(wanted.out) || !fs::is_empty(wanted.out))) {
-    throw FileError(wanted.out, "is there already and not empty; allowed: a new folder");
+  if (fs::exists(arguments.out) &&
+      (!fs::is_directory(arguments.out) || !fs::is_empty(arguments.out))) {
+    throw FileError(arguments.out, "is there already and not empty; allowed: a new folder");
   }
-  fs::create_directories(wanted.out, error);
-  if (error) throw FileError(wanted.out, "cannot be made: " + error.message());
-  const PanoramaReader reader(recording.source, {wanted.unwarper.rows, wanted.unwarper.columns});
+  fs::create_directories(arguments.out, error);
+  if (error) throw FileError(arguments.out, "cannot be made: " + error.message());
+  const PanoramaReader reader(recording.source,
+                              {arguments.unwarper.rows, arguments.unwarper.columns});
   Progress progress(session, "unwrapping", recording.entries.size());
   std::optional<Panorama> last;
   make_in_order(
       recording.entries.size(), session.executor(),
       [&](std::size_t i) {
-        const Observation seen = read_observation(recording.entries[i]);
-        return rethrow_with_file_name(seen, [&] {
-          return reader.convert(std::get<Image>(seen.picture).view(), seen.tilt.value_or(Tilt{}));
+        const Observation observation = read_observation(recording.entries[i]);
+        return rethrow_with_file_name(observation, [&] {
+          return reader.convert(std::get<Image>(observation.picture).view(),
+                                observation.tilt.value_or(Tilt{}));
         });
       },
       [&](std::size_t i, Panorama&& panorama) {
         const Image picture = to_picture(panorama);
-        write_png(fs::path(wanted.out) / panorama_name(recording.entries[i].file), picture.view());
+        write_png(fs::path(arguments.out) / panorama_name(recording.entries[i].file),
+                  picture.view());
         last = std::move(panorama);
         progress.advance();
       });
   progress.clear();
   if (session.json()) {
     ordered_json json{
-        {"input", wanted.input}, {"out", wanted.out}, {"pictures", recording.entries.size()}};
+        {"input", arguments.input}, {"out", arguments.out}, {"images", recording.entries.size()}};
     json.update(as_json(*last));
     session.print(json_line(json));
   } else {
-    session.print(wanted.out + ": " + std::to_string(recording.entries.size()) + " panoramas of " +
-                  as_text(*last));
+    session.print(arguments.out + ": " + std::to_string(recording.entries.size()) +
+                  " panoramas of " + as_text(*last));
   }
   return ExitCode::done;
 }
 
-ExitCode unwrap(const Arguments& arguments, const UnwrapArguments& wanted, Session& session) {
-  const std::string& input = wanted.input;
+ExitCode unwrap(const Arguments& declared, const UnwrapArguments& arguments, Session& session) {
+  const std::string& input = arguments.input;
   if (!is_one_picture(input)) {
-    return unwrap_series(wanted, open_recording(input, wanted.pictures, std::nullopt, session),
-                         session);
+    return unwrap_series(arguments,
+                         open_recording(input, arguments.pictures, std::nullopt, session), session);
   }
   if (fs::exists(input)) {
-    arguments.refuse_unused(recording_options(), "as " + input + " is one picture");
+    declared.refuse_unused(recording_flags(), "as " + input + " is one image");
   }
-  auto source = picture_source(wanted.pictures);
+  auto source = picture_source(arguments.pictures);
   if (!source) {
     throw UsageError(
-        "say what the picture shows: --camera camera.toml for a mirror, or --kind equirectangular");
+        "say what the image shows: --camera camera.toml for a mirror, or --kind equirectangular");
   }
-  const PanoramaReader reader(std::move(*source), {wanted.unwarper.rows, wanted.unwarper.columns});
+  const PanoramaReader reader(std::move(*source),
+                              {arguments.unwarper.rows, arguments.unwarper.columns});
   const auto panorama = reader.read(input);
   const Image picture = to_picture(panorama);
-  write_png(wanted.out, picture.view());
+  write_png(arguments.out, picture.view());
   if (session.json()) {
-    ordered_json json{{"image", input}, {"out", wanted.out}};
+    ordered_json json{{"image", input}, {"out", arguments.out}};
     json.update(as_json(panorama));
     session.print(json_line(json));
   } else {
-    session.print(wanted.out + ": " + as_text(panorama));
+    session.print(arguments.out + ": " + as_text(panorama));
   }
   return ExitCode::done;
 }
 
 Run declare_unwrap(Arguments& arguments) {
-  auto wanted = std::make_shared<UnwrapArguments>();
-  arguments.positional("INPUT", wanted->input,
-                       "Raw mirror image, 360 degree picture or panorama; or a data set, folder, "
-                       "video or recording of them, or - for JPEG pictures on standard input");
-  arguments.required_option("-o,--out", wanted->out,
-                            "PNG picture to write; of several pictures a new folder for them");
-  declare_pictures(arguments, wanted->pictures);
-  arguments.options("unwarper", wanted->unwarper);
+  auto values = std::make_shared<UnwrapArguments>();
+  arguments.positional("INPUT", values->input,
+                       "Raw mirror image, 360 degree image or panorama; or a data set, folder, "
+                       "video or recording of them, or - for JPEG images on standard input");
+  arguments.required_option("-o,--out", values->out,
+                            "PNG image to write; of several images a new folder for them");
+  declare_pictures(arguments, values->pictures);
+  arguments.options("unwarper", values->unwarper);
   arguments.common({"--rows", "--columns"});
-  return [wanted, &arguments](Session& session) { return unwrap(arguments, *wanted, session); };
+  return [values, &arguments](Session& session) { return unwrap(arguments, *values, session); };
 }
 
 }  // namespace
 
 Verb unwrap_verb() {
-  return {
-      "unwrap", "Turn a picture into the panoramic cylinder that the robot works with",
-      "The picture written runs clockwise with forward in the middle, as a person would see it.",
-      "  panonav unwrap mirror.jpg --camera camera.toml -o panorama.png\n"
-      "  panonav unwrap photo360.jpg --kind equirectangular --elevation-deg -30 40 -o "
-      "panorama.png\n"
-      "  panonav unwrap drive.mcap --camera camera.toml --every 1s -o panoramas",
-      declare_unwrap};
+  return {"unwrap", "Unwrap an image to a panoramic cylinder",
+          "The columns of the result run clockwise, with the forward direction in the middle.",
+          "  panonav unwrap mirror.jpg --camera camera.toml -o panorama.png\n"
+          "  panonav unwrap photo360.jpg --kind equirectangular --elevation-deg -30 40 -o "
+          "panorama.png\n"
+          "  panonav unwrap drive.mcap --camera camera.toml --every 1s -o panoramas",
+          declare_unwrap};
 }
 
 }  // namespace panonav::command

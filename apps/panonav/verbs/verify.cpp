@@ -17,7 +17,7 @@ ExitCode verify(const std::string& path, Session& session) {
     session.print(
         json_line(ordered_json{{"memory", path}, {"intact", faults.empty()}, {"faults", listed}}));
   } else if (faults.empty()) {
-    session.print(path + ": " + session.good("intact") + ", " +
+    session.print(path + ": " + session.green("intact") + ", " +
                   std::to_string(memory.info().views) + " views");
   } else {
     for (const auto& fault : faults) {
@@ -40,7 +40,7 @@ Run declare_verify(Arguments& arguments) {
 }  // namespace
 
 Verb verify_verb() {
-  return {"verify", "Check every byte of a memory that can be checked",
+  return {"verify", "Check a memory for damage",
           "The exit code is 0 when the file is intact, and 2 when it is not.",
           "  panonav verify office.panonav", declare_verify};
 }
