@@ -46,7 +46,7 @@ def main() -> None:
         try:
             place = urllib.parse.urlsplit(json.loads(server.stdout.readline())["url"])
             for clients in (1, 2, 8, 32):
-                taken: list[float] = []
+                durations_s: list[float] = []
                 refused = [0]
                 end = time.perf_counter() + seconds
 
@@ -59,7 +59,7 @@ def main() -> None:
                         response.read()
                         number += 1
                         if response.status == 200:
-                            taken.append(time.perf_counter() - begin)
+                            durations_s.append(time.perf_counter() - begin)
                         else:
                             refused[0] += 1
 
@@ -69,8 +69,8 @@ def main() -> None:
                     thread.start()
                 for thread in threads:
                     thread.join()
-                rate = len(taken) / (time.perf_counter() - begin)
-                ms = [1e3 * one for one in sorted(taken)]
+                rate = len(durations_s) / (time.perf_counter() - begin)
+                ms = [1e3 * one for one in sorted(durations_s)]
                 print(f"{clients:2} clients: {rate:.0f} answers/s, median {statistics.median(ms):.1f} ms, "
                       f"95 % within {ms[int(0.95 * len(ms))]:.1f} ms, {refused[0]} refused")
         finally:

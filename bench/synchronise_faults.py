@@ -3,12 +3,11 @@
 
 Usage: synchronise_faults.py TEST_FLEET PANONAV PANONAV_POSTGRESQL [--robots 20] [--faults 200] [--seed 1] [--quick]
 
-Each robot is a process with a memory file of its own; all share one memory on one PostgreSQL server, each over a proxy
-of its own. Robots tell each change before and after they made it. Faults come at random moments: kill -9 of robots, of
-the server with all its processes, links cut, delayed and silent, clocks wrong by years, the server's disk and the
-robots' disk full. Disks are file systems in RAM in a mount namespace of their own, which needs root; wrong clocks need
-the package libfaketime. What is not there is said, and other faults take its place. Then all faults end, all robots
-synchronise, and the memories are compared with what the robots told. Exits with 1 when anything was lost, doubled,
+Each robot is a process with its own memory file; all share one memory on one PostgreSQL server, each over its own
+proxy. Robots report each change before and after it. Faults come at random: kill -9 of robots and of the server, links
+cut, delayed and silent, clocks wrong by years (libfaketime), full disks (file systems in RAM; needs root). Missing
+tools are named, and other faults take their place. Then all robots synchronise without faults, and the memories are
+compared with the reports. Exits with 1 when anything was lost, doubled,
 brought back or different, and with 77 where there is no PostgreSQL. --quick leaves out the measurement of 200 views.
 """
 import argparse
@@ -245,7 +244,7 @@ def fill(folder):
     return ballast
 
 
-def told(program, memory):
+def contents_of(program, memory):
     """Returns the contents of a memory: name, signature, position, stamp, what lies beside it and links of each view."""
     done = subprocess.run([program, "--gtest_filter=SynchronisedMemory.AMemoryIsTold"], capture_output=True, text=True,
                           env=os.environ | {"PANONAV_TEST_SERVER": "x", "PANONAV_TEST_TOLD": str(memory)})
@@ -253,13 +252,13 @@ def told(program, memory):
     return sorted(line for line in done.stdout.splitlines() if line.startswith("view\t"))
 
 
-def faults_of(wanted, kinds, rng):
-    """As many as wanted, each kind by its share."""
-    faults = [kind for kind, share in kinds.items() for _ in range(max(1, round(wanted * share)))]
+def draw_faults(count, kinds, rng):
+    """Draws `count` faults, each kind by its share."""
+    faults = [kind for kind, share in kinds.items() for _ in range(max(1, round(count * share)))]
     rng.shuffle(faults)
-    while len(faults) < wanted:
+    while len(faults) < count:
         faults.append("robot killed")
-    return faults[:wanted]
+    return faults[:count]
 
 
 def experiment(arguments, folder):
@@ -302,7 +301,7 @@ def experiment(arguments, folder):
                 print(f"robot {robot.number}, exit code {robot.process.poll()}, said", *robot.said)
         raise RuntimeError(f"no recovery after: {kind}")
 
-    for kind in faults_of(arguments.faults, kinds, rng):
+    for kind in draw_faults(arguments.faults, kinds, rng):
         time.sleep(rng.uniform(0.0, 0.8))
         done[kind] += 1
         robot = rng.choice(robots)
@@ -365,8 +364,8 @@ def experiment(arguments, folder):
         if new == 0 or rounds == 6:
             break
     converging_s = time.monotonic() - begin
-    expected = told(arguments.test_fleet, server.address())
-    different = [robot.number for robot in robots if told(arguments.test_fleet, robot.file) != expected]
+    expected = contents_of(arguments.test_fleet, server.address())
+    different = [robot.number for robot in robots if contents_of(arguments.test_fleet, robot.file) != expected]
 
     there = collections.Counter(line.split("\t")[2] for line in expected)
     positions = {line.split("\t")[2]: float(line.split("\t")[3]) for line in expected}

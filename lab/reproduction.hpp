@@ -83,13 +83,8 @@ using ReproductionProgress = std::function<void(double fraction)>;
 /// - s06: visual homing and chains of snapshots [S06]
 /// - f11: visual odometry and topological maps [F11]
 /// - y03: route panoramas [Y03]
-/// - navigation: what [M04] section 3.5 leaves to later work: drives mapped by visual odometry,
-/// other
-///   light and moved objects, a kidnapped robot, tours, people, a recorded route, blocked edges
-/// - elsewhere: scenes, worlds and recordings that were not used for development, with rivals:
-/// places
-///   known and unknown, stated radii, home vectors, tilted robots, arranged floors, changes over
-///   days
+/// - navigation: missions [M04 section 3.5] over mapped drives, under changed light and furniture
+/// - elsewhere: places, home vectors, tilts and days on data not used for development, with rivals
 [[nodiscard]] Reproduction reproduce(std::string_view paper, const ReproductionOptions& options,
                                      Executor& executor, const ReproductionProgress& progress = {});
 

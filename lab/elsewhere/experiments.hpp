@@ -26,7 +26,7 @@ struct ElsewhereExperiments : Experiments {
   [[nodiscard]] std::vector<std::string> list_ground_names() const;
   void record_ground(const std::string& name);
 
-  /// Measures recognised own places, places of other grounds taken for own, and the 95 % radius.
+  /// Measures recognised own places, foreign places recognised as own, and the 95 % radius.
   void reproduce_known_places();
   /// Measures the covariance of poses that tracking reports as localised.
   void reproduce_tracked_poses();

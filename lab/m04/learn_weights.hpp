@@ -19,19 +19,14 @@ struct ComponentWeights {
 
 /// Learns the weights from the positions of the views [M04 section 4 leaves open how].
 ///
-/// For each sampled view, views within 1.25 spacings of it are near and views beyond 1.75 spacings
-/// are far; of the far ones, the most similar are used. The margin of (view, near, far) is the
-/// weighted dissimilarity to the far one less that to the near one, in units of the unweighted
-/// dissimilarity to the near ones.
+/// For each sampled view, views within 1.25 spacings are near and the most similar ones beyond 1.75
+/// spacings are far. The margin of (view, near, far) is the difference of their weighted
+/// dissimilarities over the unweighted one to the near views. The weights, at least 0, minimise the
+/// mean square of (1 - margin), with a cross-validated penalty towards equal weights.
 ///
-/// The weights minimise the mean square of (1 - margin), not below
-/// 0: but for their scale this is the largest mean over standard deviation. They are drawn towards
-/// equal weights by a penalty; how strongly is chosen by leaving out a quarter of the views at a
-/// time, and equal weights are among the choices.
-///
-/// Of larger memories only `sampled_views`, drawn by `seed`, are used for learning. Empty when
-/// fewer than 16 posed views have both near and far views. Throws ContractError on fewer than 16
-/// `sampled_views`. Cost: `sampled_views` searches and 16 comparisons of signatures for each.
+/// Larger memories are represented by `sampled_views`, drawn by `seed`. nullopt when fewer than 16
+/// views have both near and far views. Throws ContractError on fewer than 16 `sampled_views`.
+/// Cost: a search and 16 comparisons for each sampled view.
 [[nodiscard]] std::optional<ComponentWeights> learn_component_weights(const VisualMemory& memory,
                                                                       int sampled_views = 300,
                                                                       std::uint64_t seed = 1);

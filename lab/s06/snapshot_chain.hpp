@@ -89,14 +89,13 @@ struct ChainDecision {
 };
 
 /// Repeats a route: homes to one snapshot after the other, in the order of recording or back. It
-/// begins with the snapshot that is most similar to the first view. It continues to the next
-/// snapshot where the present one is near (by the vector's length), or where the view has become
-/// more similar to the next one.
+/// begins with the snapshot that is most similar to the first view. It continues to the next one
+/// where the present one is near (by the vector's length) or less similar than the next one.
 ///
-/// Odometry since the last snapshot is the second opinion, because it drifts little over that
-/// distance: a vector that contradicts it is not followed, a snapshot is not near while odometry
-/// expects more than half of the distance still to go, and a snapshot that is not found within
-/// three times the expected steps is skipped. The last snapshot is reached by a `HomingPursuit`.
+/// Odometry since the last snapshot is the second opinion: a vector that contradicts it is not
+/// followed, a snapshot is not near while odometry expects more than half of the distance still to
+/// go, and a snapshot that is not found within three times the expected steps is skipped. The last
+/// snapshot is reached by a `HomingPursuit`.
 class ChainFollower {
  public:
   /// Throws OptionError, and ContractError on an empty chain.

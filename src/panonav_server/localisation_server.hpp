@@ -36,8 +36,8 @@ struct LocalisationServerOptions {
 };
 
 /// Localises pictures over HTTP (docs/formats.md, "HTTP"): PNG or JPEG in, JSON out, with the same
-/// bits as the answers of `PlaceRecogniser`. Pictures wait in a bounded queue; a picture has at most
-/// 16 MiB and 33,554,432 pixels, waiting ones 128 MiB together. A changed memory is read again
+/// bits as the answers of `PlaceRecogniser`. Pictures wait in a bounded queue; a picture has at
+/// most 16 MiB and 33,554,432 pixels, waiting ones 128 MiB together. A changed memory is read again
 /// while the old one answers.
 ///
 /// Without a token every program that reaches the port is answered, but no web page of another

@@ -26,10 +26,9 @@ struct GazeboOptions {
 /// Approximations: coloured lamps become white ones of the same brightness; point and spot lights
 /// shine to all sides; light that adds up beyond white on the floor is scaled down as a whole.
 /// Visuals that are more than half transparent and invisible parts (collisions, joints, plugins)
-/// are left out. Like Gazebo, it continues where something is missing, faulty or unknown (actors,
-/// height maps): each such thing is left out with one line in Scene::warnings. Names whose letters
-/// only differ in case are found, with a warning. `model://sun` and `model://ground_plane` need no
-/// folder. Throws FileError on a world that is missing, no XML or shows nothing.
+/// are left out. Whatever is missing, faulty or unknown (actors, height maps) is left out with one
+/// line in Scene::warnings. `model://sun` and `model://ground_plane` need no folder. Throws
+/// FileError on a world that is missing, no XML or shows nothing.
 [[nodiscard]] Scene load_gazebo(const std::filesystem::path& world,
                                 const GazeboOptions& options = {});
 

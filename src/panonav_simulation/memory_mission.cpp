@@ -79,7 +79,7 @@ std::function<FourierSignature(const Pose2& pose, std::uint64_t seed)> make_sigh
 }
 
 MissionPlace make_mission_place(const std::string& scene, SimulatedWorldOptions options,
-                                const RobotNavigator& robot, const FindSetOption& given,
+                                const RobotNavigator& robot, const FindSetOption& find_set_option,
                                 Executor& executor, ImageReport report) {
   const MemoryHeader& header = robot.memory().header();
   const bool mirror = header.source.kind == PictureKind::mirror;
@@ -97,7 +97,7 @@ MissionPlace make_mission_place(const std::string& scene, SimulatedWorldOptions 
     options.simulation.elevation_low_deg = degrees(header.elevations->bottom_rad);
     options.simulation.elevation_high_deg = degrees(header.elevations->top_rad);
   }
-  const SimulatedWorld world(scene, options, given, executor);
+  const SimulatedWorld world(scene, options, find_set_option, executor);
   const RecordingCamera camera = mirror ? RecordingCamera(*header.source.camera) : world.camera();
   const PictureSource source = mirror ? header.source : world.source();
   MissionPlace place = make_mission_place(world);

@@ -31,13 +31,13 @@ using ImageReport = std::function<void(const Image& image, const Panorama& panor
 
 /// Makes a place in which the robot sees as its memory's views were seen: by the camera, size and
 /// preprocessing of the memory's header. `options` change the scene, camera and size excepted.
-/// A robot with a route also takes lines from these images. `scene` and `given` as for
+/// A robot with a route also takes lines from these images. `scene` and `find_set_option` as for
 /// `SimulatedWorld`; `executor` must outlive the place. Throws FileError when the memory does not
 /// know which elevations its rows show; else as `SimulatedWorld`.
 [[nodiscard]] MissionPlace make_mission_place(const std::string& scene,
                                               SimulatedWorldOptions options,
                                               const RobotNavigator& robot,
-                                              const FindSetOption& given, Executor& executor,
-                                              ImageReport report = {});
+                                              const FindSetOption& find_set_option,
+                                              Executor& executor, ImageReport report = {});
 
 }  // namespace panonav::simulation

@@ -131,9 +131,9 @@ class Kill : public ::testing::Test {
     const auto begin = Clock::now();
     run_well(arguments);
     auto duration = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - begin);
-    const std::string wanted = content_of(memory);
+    const std::string expected = content_of(memory);
     const std::string unchanged = base.empty() ? "" : content_of(base);
-    ASSERT_NE(wanted, unchanged) << "the verb does nothing";
+    ASSERT_NE(expected, unchanged) << "the verb does nothing";
 
     const std::uint64_t seed = 17;
     Random random(seed);
@@ -148,7 +148,7 @@ class Kill : public ::testing::Test {
           std::chrono::microseconds(random.index(static_cast<std::size_t>(duration.count()))));
       std::set<std::string> acknowledged;
       if (whole && !base.empty()) {
-        // What was there is either still there or was dropped with all the rest.
+        // The earlier file is either still there or was dropped with all the rest.
       } else if (round % 2 == 0) {
         acknowledged = acknowledged_in(memory);
       }
@@ -173,7 +173,7 @@ class Kill : public ::testing::Test {
       EXPECT_TRUE(none_lost);
       lost += !none_lost;
       const std::string left = there ? content_of(memory) : "";
-      if (left == wanted) {
+      if (left == expected) {
         ++complete;
         continue;
       }
@@ -183,7 +183,7 @@ class Kill : public ::testing::Test {
       EXPECT_TRUE(nothing_done || !whole || base.empty()) << "half of the change is there";
       const auto again = run_panonav(arguments);
       EXPECT_EQ(again.exit_code, 0) << again.err;
-      const bool same = content_of(memory) == wanted;
+      const bool same = content_of(memory) == expected;
       EXPECT_TRUE(same) << "going on gives another memory";
       different += !same;
       EXPECT_FALSE(fs::exists(memory.string() + "-wal"));

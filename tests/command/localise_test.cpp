@@ -96,25 +96,25 @@ TEST_F(Localise, UpdatesWhatHasChangedAndUndoTakesItBack) {
 
 TEST_F(Localise, TheLibraryGivesTheCommandsAnswerToTheBit) {
   const PlaceRecogniser recogniser(memory());
-  const auto told = answers({memory(), asked()});
+  const auto reported = answers({memory(), asked()});
   int known = 0;
-  for (std::size_t i = 0; i < told.size(); ++i) {
+  for (std::size_t i = 0; i < reported.size(); ++i) {
     const auto file = std::filesystem::path(asked()) / view_name(i);
     const Place place = recogniser.localise(read_image(file));
-    EXPECT_EQ(place.known, told[i]["known"].get<bool>());
-    EXPECT_EQ(place.known_probability, told[i]["known_probability"].get<double>());
-    ASSERT_EQ(place.matches.size(), told[i]["matches"].size());
+    EXPECT_EQ(place.known, reported[i]["known"].get<bool>());
+    EXPECT_EQ(place.known_probability, reported[i]["known_probability"].get<double>());
+    ASSERT_EQ(place.matches.size(), reported[i]["matches"].size());
     for (std::size_t m = 0; m < place.matches.size(); ++m) {
-      EXPECT_EQ(place.matches[m].name, told[i]["matches"][m]["file"]);
+      EXPECT_EQ(place.matches[m].name, reported[i]["matches"][m]["file"]);
       EXPECT_EQ(place.matches[m].column_difference,
-                told[i]["matches"][m]["column_difference"].get<double>());
+                reported[i]["matches"][m]["column_difference"].get<double>());
     }
-    EXPECT_EQ(place.bytes_read, told[i]["bytes_read"].get<std::uint64_t>());
+    EXPECT_EQ(place.bytes_read, reported[i]["bytes_read"].get<std::uint64_t>());
     if (!place.known) continue;
     ++known;
-    EXPECT_EQ(place.position->x_m, told[i]["position"]["x_m"].get<double>());
-    EXPECT_EQ(place.position->y_m, told[i]["position"]["y_m"].get<double>());
-    EXPECT_EQ(place.heading_rad.value(), told[i]["heading_rad"].get<double>());
+    EXPECT_EQ(place.position->x_m, reported[i]["position"]["x_m"].get<double>());
+    EXPECT_EQ(place.position->y_m, reported[i]["position"]["y_m"].get<double>());
+    EXPECT_EQ(place.heading_rad.value(), reported[i]["heading_rad"].get<double>());
   }
   EXPECT_GT(known, 10);
 }
@@ -278,12 +278,12 @@ TEST_F(Localise, TheReportShowsEachPictureAboveItsBestMatch) {
   const auto panels = panels_of(page);
   ASSERT_EQ(panels.size(), 1U);
   const json& run = panels[0].data;
-  const auto told = answers({memory(), asked(), "--turn-randomly", "5"});
-  ASSERT_EQ(run["moments"].size(), told.size());
+  const auto reported = answers({memory(), asked(), "--turn-randomly", "5"});
+  ASSERT_EQ(run["moments"].size(), reported.size());
   std::size_t known = 0;
-  for (std::size_t i = 0; i < told.size(); ++i) {
-    const json& best = told[i]["matches"][0];
-    const bool is_known = told[i]["known"];
+  for (std::size_t i = 0; i < reported.size(); ++i) {
+    const json& best = reported[i]["matches"][0];
+    const bool is_known = reported[i]["known"];
     known += is_known ? 1 : 0;
     const std::string title =
         view_name(i) + ": " +

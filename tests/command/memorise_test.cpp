@@ -113,7 +113,7 @@ TEST_F(Memorise, AResumedMemoryTakesNoOtherPictureUnderAKnownName) {
   write_picture(data() / view_name(6), world_, {0.5, 1.0, 0.4});
   line = refusal({"memorise", data(), memory()});
   EXPECT_TRUE(contains(line, view_name(6)));
-  // The true picture written anew is the same view.
+  // The true image, written again, is the same view.
   write_picture(data() / view_name(6), world_, grid_poses(4)[6]);
   run_well({"memorise", data(), memory()});
   fs::remove(data() / view_name(6));
@@ -395,7 +395,7 @@ TEST_F(BadInput, KilledMemoriseResumes) {
   EXPECT_GE(killed, 3);
   run_well({"memorise", data(), killed_memory});
   EXPECT_EQ(views_in(killed_memory), 225);
-  // What was resumed answers as what was made in one go.
+  // A resumed memory answers like one that was made in one go.
   const auto a = run_panonav({"localise", whole, data(), "--json", "--turn-randomly", "1"});
   const auto b = run_panonav({"localise", killed_memory, data(), "--json", "--turn-randomly", "1"});
   EXPECT_EQ(a.exit_code, 0);
@@ -475,7 +475,7 @@ TEST_F(Memorise, AMemoryThatIsTakenAwayIsNoticed) {
   }
 }
 
-// What the system does not take is said in a line, and what is no UTF-8 is shown as far as it is.
+// A name that the system refuses gives one line; bytes that are not UTF-8 are escaped.
 TEST_F(Memorise, NamesThatAreTooLongOrNotUtf8) {
   const std::string long_name(300, 'n');
   for (const auto& arguments : std::vector<std::vector<std::string>>{

@@ -77,25 +77,25 @@ TEST_F(Navigate, ArrivesAndReportsEachStep) {
       there(with_route, {"--json", "--log", *folder / "run.log", "--picture", *folder / "run.png",
                          "--route", "rows", "--report", *folder / "report"}));
   ASSERT_EQ(result.exit_code, 0) << result.err << result.out;
-  const auto told = objects(result.out);
-  ASSERT_GT(told.size(), 5U);
+  const auto reported = objects(result.out);
+  ASSERT_GT(reported.size(), 5U);
   int on_route = 0;
   std::size_t sure = 0;
-  for (std::size_t i = 0; i + 1 < told.size(); ++i) {
-    EXPECT_EQ(told[i]["step"], i + 1);
-    EXPECT_EQ(told[i]["state"], i + 2 < told.size() ? "moving" : "arrived");
-    EXPECT_TRUE(told[i]["nearest"].is_string());
-    EXPECT_LE(told[i]["probability"], 1.0);
-    sure += told[i]["probability"] >= 0.9 ? 1U : 0U;
-    on_route += told[i]["on_route"].get<bool>() ? 1 : 0;
+  for (std::size_t i = 0; i + 1 < reported.size(); ++i) {
+    EXPECT_EQ(reported[i]["step"], i + 1);
+    EXPECT_EQ(reported[i]["state"], i + 2 < reported.size() ? "moving" : "arrived");
+    EXPECT_TRUE(reported[i]["nearest"].is_string());
+    EXPECT_LE(reported[i]["probability"], 1.0);
+    sure += reported[i]["probability"] >= 0.9 ? 1U : 0U;
+    on_route += reported[i]["on_route"].get<bool>() ? 1 : 0;
   }
   EXPECT_GT(on_route, 0);
-  EXPECT_GE(sure, told.size() * 3 / 4);
-  const json& summary = told.back();
+  EXPECT_GE(sure, reported.size() * 3 / 4);
+  const json& summary = reported.back();
   EXPECT_EQ(summary["end"], "arrived");
   EXPECT_EQ(summary["edges_from"], "lattice");
   EXPECT_EQ(summary["route"], "rows");
-  EXPECT_EQ(summary["steps"], told.size() - 1);
+  EXPECT_EQ(summary["steps"], reported.size() - 1);
   EXPECT_LT(summary["goal_distance_m"], 0.5 * spacing_m);
   EXPECT_GT(summary["shortest_m"], 4.0 * spacing_m);
   EXPECT_GT(summary["travelled_m"], summary["shortest_m"].get<double>() - 0.5 * spacing_m);
@@ -104,7 +104,7 @@ TEST_F(Navigate, ArrivesAndReportsEachStep) {
   std::ifstream log(*folder / "run.log");
   std::size_t logged = 0;
   for (std::string line; std::getline(log, line);) ++logged;
-  EXPECT_EQ(logged, told.size() - 1);
+  EXPECT_EQ(logged, reported.size() - 1);
   std::ifstream picture(*folder / "run.png", std::ios::binary);
   std::string start(8, '\0');
   picture.read(start.data(), 8);
@@ -112,7 +112,7 @@ TEST_F(Navigate, ArrivesAndReportsEachStep) {
   const std::string page = bytes_of(*folder / "report/index.html");
   (void)text_of_page(page);
   const json run = panels_of(page).front().data;
-  EXPECT_EQ(run["moments"].size(), told.size() - 1);
+  EXPECT_EQ(run["moments"].size(), reported.size() - 1);
   EXPECT_EQ(run["moments"].back()["state"], "arrived");
   EXPECT_TRUE(run["retained"].contains("goal"));
 }
@@ -122,10 +122,10 @@ TEST_F(Navigate, IsLostInAnotherBuilding) {
                                            "--scene",  "garden", "--seed", "2"};
   const auto result = run_panonav(with(elsewhere, {"--json"}));
   EXPECT_EQ(result.exit_code, 1) << result.err;
-  const auto told = objects(result.out);
-  EXPECT_EQ(told.back()["end"], "lost");
-  EXPECT_LE(told.size(), 25U);
-  for (std::size_t i = 0; i + 1 < told.size(); ++i) EXPECT_LT(told[i]["probability"], 0.5);
+  const auto reported = objects(result.out);
+  EXPECT_EQ(reported.back()["end"], "lost");
+  EXPECT_LE(reported.size(), 25U);
+  for (std::size_t i = 0; i + 1 < reported.size(); ++i) EXPECT_LT(reported[i]["probability"], 0.5);
   const auto text = run_panonav(elsewhere);
   EXPECT_NE(text.out.find("sure of its place, with a probability of 0.5 or more, in 0 of "),
             std::string::npos)
@@ -173,9 +173,9 @@ TEST_F(Navigate, SameSeedSameRunOnAnyNumberOfThreads) {
 TEST_F(Navigate, ArrangesViewsThatNothingConnects) {
   const auto result = run_panonav(there(bare, {"--json"}));
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  const auto told = objects(result.out);
-  EXPECT_EQ(told.back()["edges_from"], "arrangement");
-  EXPECT_LT(told.back()["goal_distance_m"], 0.5 * spacing_m);
+  const auto reported = objects(result.out);
+  EXPECT_EQ(reported.back()["edges_from"], "arrangement");
+  EXPECT_LT(reported.back()["goal_distance_m"], 0.5 * spacing_m);
 }
 
 TEST_F(Navigate, NoticesThatItIsCarriedAway) {
@@ -185,19 +185,19 @@ TEST_F(Navigate, NoticesThatItIsCarriedAway) {
       memory, {"--json", "--kidnap",
                std::to_string(first.pose->x_m) + "," + std::to_string(first.pose->y_m) + ",-100"}));
   ASSERT_EQ(result.exit_code, 0) << result.out << result.err;
-  const auto told = objects(result.out);
-  EXPECT_EQ(told.back()["end"], "arrived");
-  EXPECT_LT(told.back()["goal_distance_m"], 0.5 * spacing_m);
-  ASSERT_TRUE(told.back()["kidnapped_after_step"].is_number());
-  const auto carried = told.back()["kidnapped_after_step"].get<std::size_t>();
-  ASSERT_LT(carried, told.size() - 1);
-  const Point2 back{told[carried]["pose"]["x_m"], told[carried]["pose"]["y_m"]};
+  const auto reported = objects(result.out);
+  EXPECT_EQ(reported.back()["end"], "arrived");
+  EXPECT_LT(reported.back()["goal_distance_m"], 0.5 * spacing_m);
+  ASSERT_TRUE(reported.back()["kidnapped_after_step"].is_number());
+  const auto carried = reported.back()["kidnapped_after_step"].get<std::size_t>();
+  ASSERT_LT(carried, reported.size() - 1);
+  const Point2 back{reported[carried]["pose"]["x_m"], reported[carried]["pose"]["y_m"]};
   EXPECT_LT(distance(back, first.pose->position()), 1e-6);
   // Three steps must agree before another place is believed.
   std::optional<std::size_t> noticed;
-  for (std::size_t i = carried; i + 1 < told.size() && !noticed; ++i) {
-    const Point2 here{told[i]["pose"]["x_m"], told[i]["pose"]["y_m"]};
-    const auto believed = views.find(told[i]["nearest"].get<std::string>());
+  for (std::size_t i = carried; i + 1 < reported.size() && !noticed; ++i) {
+    const Point2 here{reported[i]["pose"]["x_m"], reported[i]["pose"]["y_m"]};
+    const auto believed = views.find(reported[i]["nearest"].get<std::string>());
     if (distance(views.info(*believed).pose->position(), here) < spacing_m) noticed = i;
   }
   ASSERT_TRUE(noticed.has_value());

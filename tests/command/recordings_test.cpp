@@ -101,12 +101,12 @@ void write_bag(const fs::path& from, const fs::path& to) {
   std::vector<std::uint32_t> topics;
   for (const auto& topic : recording->topics()) {
     const std::string connection = number(topics.size(), 4);
-    const std::string told = bag_record(
+    const std::string reported = bag_record(
         {{"topic", topic.name}, {"type", topic.type}, {"md5sum", "*"}, {"message_definition", "-"}},
         "");
     // The fields alone: a header without its own data.
     chunk += bag_record({{"op", "\x07"}, {"conn", connection}, {"topic", topic.name}},
-                        told.substr(4, told.size() - 8));
+                        reported.substr(4, reported.size() - 8));
     topics.push_back(static_cast<std::uint32_t>(topics.size()));
   }
   recording->for_each(

@@ -66,7 +66,7 @@ CommandResult run_from_page(const fs::path& folder, const std::string& verb) {
   return run_panonav(words);
 }
 
-/// What the robots that are tracked and sent around must come to, on a 50 cm grid.
+/// Checks the results of the tracked and the navigating robots, on a 50 cm grid.
 void expect_tracked_and_navigated(const json& said) {
   EXPECT_EQ(said["track_images"], 55);
   EXPECT_GE(said["track_places_at_first"].get<int>(), 4) << "the corridor's plan is symmetric";
@@ -123,7 +123,7 @@ TEST_F(Demo, TellsTheWholeStoryTwiceAndLeavesAMemoryThatAnswers) {
   EXPECT_TRUE(contains(played, "\"state\":\"on the route\""));
   EXPECT_TRUE(contains(played, "\"state\":\"arrived\""));
   EXPECT_TRUE(contains(played, "views in groups")) << "the arrangement unfolds";
-  // What a stranger understands: lengths, and the truth about how they were measured.
+  // The page states lengths and how they were measured.
   const std::string page = bytes_of(fs::path(out) / "index.html");
   EXPECT_TRUE(std::regex_search(page, std::regex("Maps</small><b>[0-9]+ cm</b>")));
   EXPECT_FALSE(contains(page, "shape difference"));
@@ -148,7 +148,7 @@ TEST_F(Demo, TellsTheWholeStoryTwiceAndLeavesAMemoryThatAnswers) {
   EXPECT_EQ(sent.exit_code, 0) << sent.out << sent.err;
   EXPECT_TRUE(contains(sent.out, "the memory's lattice"));
 
-  // Again: its own files are written anew, the user's stay.
+  // Again: its own files are written again, the user's stay.
   std::ofstream(fs::path(out) / "notes.txt") << "mine";
   const auto again = run_panonav({"demo", "-o", out, "--quick", "--json"});
   ASSERT_EQ(again.exit_code, 0) << again.err;
@@ -184,8 +184,8 @@ TEST_F(Reproduce, WritesTheTableThreeTimesAndAllPictures) {
     if (row["target"].is_null()) continue;
     ++judged;
     const double ours = row["ours"];
-    const double wanted = row["target"]["value"];
-    EXPECT_EQ(row["holds"], row["target"]["op"] == "<=" ? ours <= wanted : ours >= wanted) << row;
+    const double target = row["target"]["value"];
+    EXPECT_EQ(row["holds"], row["target"]["op"] == "<=" ? ours <= target : ours >= target) << row;
   }
   EXPECT_GE(judged, 5);
   EXPECT_EQ(json::parse(bytes_of(fs::path(out) / "results.json")), rows);

@@ -61,7 +61,7 @@ class ReproduceAll : public ::testing::Test {
     return command({"--seed", "7", "--continue"});
   }
 
-  // What an experiment cannot make its folder of.
+  // Puts a file where an experiment makes its folder.
   void cannot_be_run(const std::string& paper) const {
     fs::remove_all(out_ / paper);
     fs::create_symlink(folder_ / "nowhere/at all", out_ / paper);

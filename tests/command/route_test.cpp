@@ -105,7 +105,7 @@ class RouteVerbs : public ::testing::Test {
 TEST_F(RouteVerbs, TheSameDriveGoesOnWhereItsRecordingStopped) {
   const std::string whole = bytes_of(folder_ / "teach" / "poses.csv");
   const json at_once = record({"--every-m", "0.05", "--name", "at once"});
-  // What an interrupted recording leaves: the first lines.
+  // An interrupted recording leaves the first lines.
   std::string first;
   for (const auto& line : lines(whole)) {
     if (first.size() < whole.size() / 2) first += line + "\n";
@@ -314,9 +314,8 @@ TEST_F(RouteVerbs, ReportsShowTheRouteAndTheFixes) {
   using Titles = std::vector<std::string>;
   const std::string recorded = bytes_of(folder_ / "recorded/index.html");
   (void)text_of_page(recorded);
-  EXPECT_EQ(
-      plots_of(recorded),
-      (Titles{"The route panorama: each row is the horizon at one place", "From above"}));
+  EXPECT_EQ(plots_of(recorded),
+            (Titles{"The route panorama: each row is the horizon at one place", "From above"}));
   const std::string followed = bytes_of(folder_ / "followed/index.html");
   (void)text_of_page(followed);
   EXPECT_EQ(

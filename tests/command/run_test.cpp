@@ -30,7 +30,7 @@ using nlohmann::json;
 
 constexpr std::size_t count = 36;
 
-/// What a shell says on standard output; expects exit code 0.
+/// Returns the standard output of a shell command; expects exit code 0.
 std::string said_by_shell(const std::string& command, const fs::path& folder) {
   const fs::path out = folder / "shell_output";
   EXPECT_EQ(std::system((command + " > " + quote_for_shell(out.string())).c_str()), 0) << command;
@@ -516,9 +516,9 @@ TEST_F(Walk, AnInterruptedRunHasStoredWhatItAdded) {
 TEST_F(Walk, ARunOutlivesLostCamerasAStalledReaderAndAClockThatIsSetBack) {
   write_camera_pictures();
   run_well({"memorise", path("walk"), path("a.panonav")});
-  const char* const wanted = std::getenv("PANONAV_SOAK_S");
-  const int seconds = wanted != nullptr ? std::atoi(wanted) : 8;
-  const int losses = wanted != nullptr ? 10 : 2;
+  const char* const soak_s = std::getenv("PANONAV_SOAK_S");
+  const int seconds = soak_s != nullptr ? std::atoi(soak_s) : 8;
+  const int losses = soak_s != nullptr ? 10 : 2;
   constexpr int rate = 100;
   const std::string script =
       "mkfifo out\n"
@@ -560,14 +560,14 @@ TEST_F(Walk, ARunOutlivesLostCamerasAStalledReaderAndAClockThatIsSetBack) {
     return is_there ? std::stoull(found[1]) : 0ULL;
   };
   EXPECT_EQ(counted("interruptions of the source"), losses) << said;
-  std::uint64_t taken = 0;
-  std::ifstream(path("taken"), std::ios::binary).read(reinterpret_cast<char*>(&taken), 8);
+  std::uint64_t frames_consumed = 0;
+  std::ifstream(path("taken"), std::ios::binary).read(reinterpret_cast<char*>(&frames_consumed), 8);
   const std::uint64_t pictures = counted("images, ");
   const std::uint64_t accounted = pictures + counted("came too fast and were dropped");
   // The last picture of all may still wait, and so may one at each loss.
-  EXPECT_LE(accounted, taken) << said;
-  EXPECT_GE(accounted + 1 + static_cast<std::uint64_t>(losses), taken) << said;
-  EXPECT_GT(pictures, taken / 4) << said;
+  EXPECT_LE(accounted, frames_consumed) << said;
+  EXPECT_GE(accounted + 1 + static_cast<std::uint64_t>(losses), frames_consumed) << said;
+  EXPECT_GT(pictures, frames_consumed / 4) << said;
   EXPECT_EQ(objects(said_by_shell("cat " + quote_for_shell(path("lines")), folder.path())).size() +
                 counted("lines were not printed for a slow reader"),
             pictures)

@@ -20,7 +20,7 @@ namespace {
 
 using nlohmann::json;
 
-/// What the table of a run holds besides files and odometry.
+/// Columns that the table of a run holds besides files and odometry.
 struct RunColumns {
   bool stamps = true;
   bool truth = true;

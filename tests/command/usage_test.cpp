@@ -70,7 +70,7 @@ std::vector<std::string> flags_in(const std::string& help) {
   return flags;
 }
 
-/// What the shell prints, standard error behind standard output.
+/// Returns the standard output of a shell command, followed by its standard error.
 std::string shell(const std::string& script) {
   const std::string quoted = "exec 2>&1; " + script;
   FILE* pipe = popen(quoted.c_str(), "r");
@@ -227,8 +227,8 @@ TEST(Usage, TemplatesOfOptionFilesReadBackAsTheDefaults) {
     const auto command = with(words_of(verb), {"--config-template"});
     const auto printed = run_panonav(command);
     ASSERT_EQ(printed.exit_code, 0) << verb << printed.err;
-    // As printed it sets nothing. With each option set it sets the values that it shows, and they
-    // are shown again.
+    // The template as printed sets nothing. With each option set it sets the values that it shows,
+    // and they are shown again.
     const std::string path = folder.write("template.toml", printed.out);
     EXPECT_EQ(run_panonav(with(command, {"--config", path})).out, printed.out) << verb;
     std::string set;
@@ -563,7 +563,7 @@ TEST(Usage, AMemoryKeepsItsBandOfElevations) {
   }
 }
 
-// What is missing, in which file, under which names, and a line as it may look.
+// The message names what is missing, the file, the field names, and an example line.
 TEST(Usage, AFolderOfPicturesAloneIsToldHowToBecomeADataSet) {
   const TemporaryFolder folder;
   const std::string bare = folder / "bare";

@@ -116,9 +116,9 @@ TEST_F(Views, ShowTellsAllOfAView) {
   }
   // Ready-made panoramas of at most 256 columns are kept as they are.
   EXPECT_EQ(read_image(picture), read_image(folder / "grid" / view_name(5)));
-  const auto told = run_panonav({"show", memory, "6"});
-  EXPECT_TRUE(contains(told.out, "view_005.png, view 6\n"));
-  EXPECT_TRUE(contains(told.out, "0.50 m away"));
+  const auto result = run_panonav({"show", memory, "6"});
+  EXPECT_TRUE(contains(result.out, "view_005.png, view 6\n"));
+  EXPECT_TRUE(contains(result.out, "0.50 m away"));
 
   expect_refusal({"show", memory, "17"}, "has no view of the name or id '17'");
   expect_refusal({"show", bare(), "1", "-o", folder / "no.png"},
@@ -142,7 +142,7 @@ TEST_F(Views, GalleryIsOnePageWithAllThumbnails) {
   }
   EXPECT_EQ(pictures, 16U);
   for (std::size_t i = 0; i < 16; ++i) EXPECT_TRUE(contains(page, ": " + view_name(i) + ", x "));
-  // By place: squares from the upper left, each with its views.
+  // Squares are listed by place from the upper left, each with its views.
   EXPECT_LT(page.find("x 0 to 2 m, y 0 to 2 m (16 views)"), page.find(view_name(0)));
 
   run_well({"gallery", memory, "-o", out, "--near", "0,0,0.1"});
@@ -228,9 +228,9 @@ TEST_F(Views, ExportOfLargePanoramasFindsTheSameViews) {
 
 TEST_F(Views, ExportWithoutThumbnailsSaysThatNothingComesBack) {
   const fs::path out = folder / "out";
-  const auto told = run_panonav({"export", bare(), "-o", out});
-  EXPECT_EQ(told.exit_code, 0) << told.err;
-  EXPECT_TRUE(contains(told.out, "holds no thumbnails. memorise cannot read this folder."));
+  const auto result = run_panonav({"export", bare(), "-o", out});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_TRUE(contains(result.out, "holds no thumbnails. memorise cannot read this folder."));
   EXPECT_FALSE(fs::exists(out / "dataset.toml"));
   const std::string array = bytes_of(out / "signatures.npy");
   EXPECT_TRUE(contains(array, "'shape': (16, 2, 15, 12)"));

@@ -77,7 +77,7 @@ TEST(PredictedExtents, AgreeWithStepsThatAreReallyTaken) {
       .read_noise = 0.0, .full_well = 1e12, .eight_bit = false};
   constexpr int components = 3;
   std::vector<double> predicted;
-  std::vector<double> taken;
+  std::vector<double> measured;
   Random random(9);
   for (int i = 0; i < 10; ++i) {
     const Pose2 pose = place.free_space->random_pose(random);
@@ -93,13 +93,13 @@ TEST(PredictedExtents, AgreeWithStepsThatAreReallyTaken) {
                                  components);
       };
       // From one side to the other, so that what grows with the square of the step falls out.
-      taken.push_back(dissimilarity_l1(observe_after(step_m), observe_after(-step_m)));
+      measured.push_back(dissimilarity_l1(observe_after(step_m), observe_after(-step_m)));
       predicted.push_back(1.0 / extents[d]);
       // A step back changes as much, to first order.
       EXPECT_NEAR(extents[d], extents[d + 4], 1e-9 * extents[d]);
     }
   }
-  EXPECT_GT(rank_correlation(predicted, taken), 0.8);
+  EXPECT_GT(rank_correlation(predicted, measured), 0.8);
 }
 
 /// Objects and walls of a drawn scene.

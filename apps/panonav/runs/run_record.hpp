@@ -30,7 +30,7 @@ void declare_view(Arguments& arguments, RunRecordArguments& record);
 /// written, it ends with a note, and the run continues.
 class RunRecord {
  public:
-  /// What viewers of a run can see and send.
+  /// Lists the panels and commands that viewers of a run can use.
   struct Offers {
     std::string memory;  ///< whose thumbnails they see; empty: none
     viewer::ViewWish takes = viewer::ViewWish::none;

@@ -106,12 +106,12 @@ struct Lattice {
 using LatticeWatch =
     std::function<void(std::span<const Pose2> poses, std::span<const std::size_t> components)>;
 
-/// Arranges the views of a memory by their similarity alone [M04 section 3], without poses of it:
+/// Arranges the views of a memory by their similarity alone [M04 section 3]:
 /// 1. Each view gets springs to its `neighbours` most similar views.
 /// 2. With phases and no motion, components grow from the most certain springs.
 /// 3. Otherwise multidimensional scaling starts and the energy of the springs is minimised.
-/// 4. The curve from dissimilarity to distance is fitted, views near each other get springs, and 2
-///    or 3 are repeated, `rounds` times in all.
+/// 4. The curve from dissimilarity to distance is fitted, near views get springs, and step 2 or 3
+///    is repeated, `rounds` times in all.
 ///
 /// `motion` [M04 section 3.4]: motions of the robot between views. It makes the map metric;
 /// similarity then gives consistent springs only. Throws OptionError; ContractError on a motion
@@ -122,11 +122,11 @@ using LatticeWatch =
 
 /// Adds the views of the memory that the lattice does not have, one after the other. A view gets
 /// springs to the most similar views of the lattice and, of the poses to which they point, that of
-/// minimum energy; then a few nodes around it are adjusted. Other views stay where they are, so the
-/// cost of a view grows with the lattice only by the search and one pass over the springs. A view
-/// joins the connected component to which most of its springs lead; without springs it is a new
-/// one. Does not join components, as `arrange` does. The lattice must come from the same memory, to
-/// which views may have been added. Throws OptionError, ContractError.
+/// minimum energy; then a few nodes around it are adjusted. Other views stay where they are. Cost
+/// of a view: the search and one pass over the springs. A view joins the connected component to
+/// which the majority of its springs lead; without springs it is a new one. Does not join
+/// components. The lattice must come from the same memory, to which views may have been added.
+/// Throws OptionError, ContractError.
 void extend(Lattice& lattice, const VisualMemory& memory, const LatticeOptions& options = {});
 
 /// Converts the arrangement into a map that can be stored and exported: its views with their poses
