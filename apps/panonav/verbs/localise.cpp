@@ -144,6 +144,7 @@ void declare_changes(Arguments& arguments, const std::shared_ptr<LocaliseArgumen
                  "Add views of places that the memory does not know; a new memory begins with 32");
   arguments.option("--add-interval-s", values->add_interval_s,
                    "Time between two views that are added, at least; default 0.5");
+  arguments.uncommon({"--add-interval-s"});
   arguments.flag("--update", values->update,
                  "Keep views of known places up to date: other appearances are added, up to "
                  "--appearances, and views that keep failing are replaced");
@@ -181,12 +182,11 @@ Run declare_localise(Arguments& arguments) {
   arguments.option("--turn-randomly SEED", values->turn_seed,
                    "Turn the robot before each query by a random number of whole columns; "
                    "turned_rad is the turn, counter-clockwise positive");
-  arguments.uncommon({"--turn-randomly"});
+  arguments.uncommon({"--exclude-same-file", "--turn-randomly"});
   arguments.flag("--areas", values->areas,
                  "Also show the area where the robot may be, component by component");
   arguments.options("localiser", values->localiser);
   arguments.options("accuracy", values->accuracy, "area");
-  arguments.common({"--top"});
   declare_changes(arguments, values);
   arguments.refuse_unless(
       {"[accuracy]"}, [values] { return values->areas; }, "without --areas");
