@@ -184,7 +184,7 @@ TEST_F(CameraVerbs, RecordingsAreCalibratedAndUnwrappedAsTheirPicturesAre) {
   expect_refusal({"unwrap", run, "-o", out_ / "by_folder"}, "allowed: a new folder");
   expect_refusal({"unwrap", recording, "-o", out_ / "none"}, "--kind");
   for (const char* verb : {"unwrap", "calibrate"}) {
-    expect_refusal({verb, picture(1), "-o", out_ / "x", "--every", "2"}, "picture");
+    expect_refusal({verb, picture(1), "-o", out_ / "x", "--every", "2"}, "image");
   }
 }
 

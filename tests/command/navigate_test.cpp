@@ -127,7 +127,7 @@ TEST_F(Navigate, IsLostInAnotherBuilding) {
   EXPECT_LE(reported.size(), 25U);
   for (std::size_t i = 0; i + 1 < reported.size(); ++i) EXPECT_LT(reported[i]["probability"], 0.5);
   const auto text = run_panonav(elsewhere);
-  EXPECT_NE(text.out.find("sure of its place, with a probability of 0.5 or more, in 0 of "),
+  EXPECT_NE(text.out.find("certain of its place (probability 0.5 or more) in 0 of "),
             std::string::npos)
       << text.out;
 }

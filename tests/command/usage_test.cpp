@@ -108,7 +108,7 @@ TEST(Usage, WrongUseIsOneLineWithAHint) {
   (void)refusal({"--no-such-flag"});
   expect_refusal({"info"}, "FILE is required");
   expect_refusal({"info", "a", "b"}, "'b' is one argument too many");
-  expect_refusal({"info", "a", "--threads"}, "--threads wants a value: INT");
+  expect_refusal({"info", "a", "--threads"}, "--threads needs a value: INT");
   expect_refusal({"info", "a", "--json=yes"}, "--json takes no value");
   expect_refusal({"info", "a", "--threads=1", "--threads", "2"}, "given twice");
   expect_refusal({"info", "a", "--quiet", "--verbose"}, "exclude each other");
