@@ -18,7 +18,7 @@ import urllib.parse
 from browser import DESK, PROGRAM, Browser
 
 HERE = pathlib.Path(__file__).resolve().parent
-WEB = HERE.parent.parent / "viewer" / "web"
+WEB = HERE.parent.parent / "src" / "panonav_viewer" / "web"
 REFERENCES = HERE / "panels"
 CELL_PX = 8
 TOLERANCE = 8  # of 255
