@@ -150,7 +150,7 @@ def look(browser, url, shots):
     browser.key("Enter")
     assert browser.ask("document.activeElement.textContent") == "The robot is here"
     browser.ask("document.activeElement.click()")
-    browser.wait("document.querySelector('pn-card output').textContent === 'The robot knows.'")
+    browser.wait("document.querySelector('pn-card output').textContent === 'Sent to the run.'")
     browser.key("Escape")
     assert browser.ask("document.querySelector('pn-card').hidden && document.activeElement.localName === 'pn-map'")
     # A click on a reference names it.
