@@ -7,6 +7,21 @@
 
 namespace panonav::simulation {
 
+namespace {
+
+/// Adds a lamp as large as a window, 0.8 m inside of the middle of the window, which is at the
+/// share `middle` of the wall.
+void add_daylight(SceneBuilder& builder, Point2 from, Point2 to, double middle, double height_m) {
+  const double length = distance(from, to);
+  const double in_x = -(to.y_m - from.y_m) / length;
+  const double in_y = (to.x_m - from.x_m) / length;
+  builder.add_lamp({from.x_m + middle * (to.x_m - from.x_m) + 0.8 * in_x,
+                    from.y_m + middle * (to.y_m - from.y_m) + 0.8 * in_y, height_m},
+                   1.8F, 1.2F);
+}
+
+}  // namespace
+
 void furnish_room_shell(SceneBuilder& builder, const FloorArea& room, double height_m) {
   Random& random = builder.random();
   const std::array<Point2, 4> corners{room.low, Point2{room.high.x_m, room.low.y_m}, room.high,
@@ -18,7 +33,6 @@ void furnish_room_shell(SceneBuilder& builder, const FloorArea& room, double hei
                       room.high, height_m, 1.0);
   // Windows are in one wall: the room is bright on one side.
   const std::size_t outer_wall = random.index(4);
-  const double middle_z = 0.6 * height_m;
   for (std::size_t i = 0; i < 4; ++i) {
     const Point2 from = corners[i];
     const Point2 to = corners[(i + 1) % 4];
@@ -38,13 +52,7 @@ void furnish_room_shell(SceneBuilder& builder, const FloorArea& room, double hei
           wall + " picture at " + std::to_string(static_cast<int>(along * 100));
       if (i == outer_wall && kind < 0.7) {
         width = std::min(random.uniform(1.0, 1.6), length - along - 0.1);
-        // Daylight comes in as from a lamp as large as the window.
-        const double middle = (along + 0.5 * width) / length;
-        const double in_x = -(to.y_m - from.y_m) / length;
-        const double in_y = (to.x_m - from.x_m) / length;
-        builder.add_lamp({from.x_m + middle * (to.x_m - from.x_m) + 0.8 * in_x,
-                          from.y_m + middle * (to.y_m - from.y_m) + 0.8 * in_y, middle_z},
-                         1.8F, 1.2F);
+        add_daylight(builder, from, to, (along + 0.5 * width) / length, 0.6 * height_m);
         const double bottom = random.uniform(0.8, 1.0);
         const int window = builder.add_textured_material(window_texture(random, 128), 1.0F);
         builder.add_on_wall(name, window, from, to, along, width, bottom,

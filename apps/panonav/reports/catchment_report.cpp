@@ -106,6 +106,16 @@ viewer::MapPlot draw_field(const RecordedViews& places, const std::vector<HomeVe
   return {.title = "Home vectors from above", .layers = {inside, arrows, home}};
 }
 
+std::vector<std::vector<std::string>> format_bins(std::span<const CatchmentResult::Bin> bins) {
+  std::vector<std::vector<std::string>> rows;
+  for (const CatchmentResult::Bin& bin : bins) {
+    rows.push_back({format_fixed(bin.homeward.distance_m, 3), std::to_string(bin.homeward.pairs),
+                    format_fixed(bin.homeward.component, 3),
+                    format_fixed(degrees(bin.orientation_error_rad), 1)});
+  }
+  return rows;
+}
+
 }  // namespace
 
 void write_catchment_report(const std::filesystem::path& folder, const RecordedViews& goals,
@@ -160,13 +170,8 @@ void write_catchment_report(const std::filesystem::path& folder, const RecordedV
                   {difference, "How far views differ from home's [S06 figure 9]"},
                   {ends, "How far from home runs end [S06 figure 14]"}});
   page.begin_section("Numbers");
-  std::vector<std::vector<std::string>> rows;
-  for (const CatchmentResult::Bin& bin : result.bins) {
-    rows.push_back({format_fixed(bin.homeward.distance_m, 3), std::to_string(bin.homeward.pairs),
-                    format_fixed(bin.homeward.component, 3),
-                    format_fixed(degrees(bin.orientation_error_rad), 1)});
-  }
-  page.add_table({"distance [m]", "pairs", "homeward component", "heading error [degrees]"}, rows);
+  page.add_table({"distance [m]", "pairs", "homeward component", "heading error [degrees]"},
+                 format_bins(result.bins));
   page.write(folder, "index.html", "panonav catchment");
 }
 

@@ -215,8 +215,7 @@ std::vector<int> read_stages(const std::string& text, int max_frequency) {
   return stages;
 }
 
-ExitCode catchment(const Arguments& declared, const CatchmentArguments& arguments,
-                   Session& session) {
+CatchmentSettings check_settings(const Arguments& declared, const CatchmentArguments& arguments) {
   if (arguments.settings.up_to_m && !(*arguments.settings.up_to_m > 0.0)) {
     throw UsageError("--up-to-m is " + format_number(*arguments.settings.up_to_m) +
                      "; allowed: > 0");
@@ -224,16 +223,21 @@ ExitCode catchment(const Arguments& declared, const CatchmentArguments& argument
   if (arguments.settings.bin_m && !(*arguments.settings.bin_m > 0.0)) {
     throw UsageError("--bin-m is " + format_number(*arguments.settings.bin_m) + "; allowed: > 0");
   }
+  const int components = arguments.homing.views.signature.components;
   CatchmentSettings settings = arguments.settings;
-  settings.homing =
-      make_homing_options(declared, arguments.homing, arguments.homing.views.signature.components);
+  settings.homing = make_homing_options(declared, arguments.homing, components);
   if (arguments.stages) {
-    settings.stages = read_stages(*arguments.stages,
-                                  std::min(62, arguments.homing.views.signature.components - 2));
+    settings.stages = read_stages(*arguments.stages, std::min(62, components - 2));
   }
   settings.has_typical_distance = declared.is_set("run", "typical_distance_m");
   settings.has_longest_step = declared.is_set("run", "max_step_m");
   settings.has_obstacle = declared.is_set("run", "obstacle_m");
+  return settings;
+}
+
+ExitCode catchment(const Arguments& declared, const CatchmentArguments& arguments,
+                   Session& session) {
+  const CatchmentSettings settings = check_settings(declared, arguments);
   const auto recording =
       arguments.ahead ? open_recording(arguments.dataset, arguments.pictures, std::nullopt, session)
                       : read_described(arguments.dataset, arguments.pictures, std::nullopt,
