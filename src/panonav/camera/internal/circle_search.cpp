@@ -384,7 +384,8 @@ std::vector<FieldCircle> circle_candidates(const EdgeField& field, const CircleR
   }
   std::ranges::stable_sort(candidates, std::greater<>(), &Candidate::merit);
   std::vector<FieldCircle> result;
-  for (const Candidate& candidate : candidates | std::views::take(count)) {
+  for (const Candidate& candidate : candidates) {
+    if (std::ssize(result) == count) break;
     result.push_back(candidate.circle);
   }
   return result;
