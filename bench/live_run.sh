@@ -2,7 +2,7 @@
 # What a robot waits for: pictures of a camera, 1280 x 640 JPEG at 30 a second, into `localise --add --update` with 10,000
 # references on one core; three walks, of known places, of half unknown ones and of unknown ones. The camera is
 # tests/support/v4l2_shim.cpp. Prints what `localise` says of each. The references take some minutes and are kept in FOLDER.
-#   bench/live_run.sh BUILD FOLDER [WORDS OF run ...]
+#   bench/live_run.sh BUILD FOLDER [WORDS OF localise ...]
 set -euo pipefail
 build=$(realpath "$1") folder=$2
 shift 2

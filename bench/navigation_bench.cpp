@@ -132,10 +132,11 @@ void look(benchmark::State& state, bool border, bool from_file, bool all = false
       const auto begin = std::chrono::steady_clock::now();
       const NavigationDecision decision = navigator.observe(seen[next++]);
       const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - begin;
-      const auto had = [&](NavigationEvent event) {
+      const auto had = [&](NavigationDecision::Event event) {
         return std::ranges::find(decision.events, event) != decision.events.end();
       };
-      measured = !had(NavigationEvent::relocalised) && had(NavigationEvent::entered_area) == border;
+      measured = !had(NavigationDecision::Event::relocalised) &&
+                 had(NavigationDecision::Event::entered_area) == border;
       if (measured) {
         state.SetIterationTime(passed.count());
         bytes_read += static_cast<double>(decision.bytes_read);

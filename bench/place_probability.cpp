@@ -113,7 +113,7 @@ std::vector<Sample> ask(const std::vector<BuiltPlace>& places, const BuiltPlace&
     bool disturbed;
     bool for_features = false;
   };
-  std::vector<Query> asked;
+  std::vector<Query> place_queries;
   for (const BuiltPlace& other : places) {
     for (const bool disturbed : {false, true}) {
       const auto* const views = disturbed ? &other.disturbed : &other.recording.queries;
@@ -123,19 +123,22 @@ std::vector<Sample> ask(const std::vector<BuiltPlace>& places, const BuiltPlace&
           const bool is_near = std::ranges::any_of(kept, [&](Point2 position) {
             return distance(position, view.pose.position()) <= place.recording.spacing_m;
           });
-          if (is_near) asked.push_back({&view.panorama, Whose::own, disturbed});
+          if (is_near) place_queries.push_back({&view.panorama, Whose::own, disturbed});
         } else if (i < (other.kind == place.kind ? asked_of_variants : asked_of_others)) {
-          asked.push_back({&view.panorama, other.kind == place.kind ? Whose::variant : Whose::other,
-                           disturbed, i >= asked_of_others});
+          place_queries.push_back({&view.panorama,
+                                   other.kind == place.kind ? Whose::variant : Whose::other,
+                                   disturbed, i >= asked_of_others});
         }
       }
     }
   }
-  return simulation::make_each(executor, asked.size(), [&](std::size_t i) {
+  return simulation::make_each(executor, place_queries.size(), [&](std::size_t i) {
     const PackedSignature query =
-        truncated(lab::compute_packed_signature(*asked[i].view, all), shape);
-    return Sample{localiser.localise(query, {}, lab::make_query_features(*asked[i].view)).evidence,
-                  asked[i].whose, place.kind, asked[i].disturbed, asked[i].for_features};
+        truncated(lab::compute_packed_signature(*place_queries[i].view, all), shape);
+    return Sample{
+        localiser.localise(query, {}, lab::make_query_features(*place_queries[i].view)).evidence,
+        place_queries[i].whose, place.kind, place_queries[i].disturbed,
+        place_queries[i].for_features};
   });
 }
 
@@ -224,7 +227,7 @@ void report(const char* title, const std::vector<Sample>& samples, const Probabi
   const std::array<double, 3> counts = counts_of(samples);
   std::array<std::array<double, 3>, 10> tenths{};
   std::array<double, 3> known_rates{};
-  std::array<std::array<std::array<int, 2>, 4>, kinds.size()> scenes{};  // asked, known
+  std::array<std::array<std::array<int, 2>, 4>, kinds.size()> scenes{};  // all, known
   for (const Sample& sample : samples) {
     const double p = probability(sample.evidence);
     const auto w = static_cast<std::size_t>(sample.whose);
@@ -245,8 +248,8 @@ void report(const char* title, const std::vector<Sample>& samples, const Probabi
   }
   for (std::size_t k = 0; k < kinds.size(); ++k) {
     std::printf("    %-14s own, hidden, variants, others:", kinds[k].scene);
-    for (const auto& [asked, known] : scenes[k]) {
-      std::printf(" %.3f", static_cast<double>(known) / std::max(1, asked));
+    for (const auto& [total, known] : scenes[k]) {
+      std::printf(" %.3f", static_cast<double>(known) / std::max(1, total));
     }
     std::printf("\n");
   }

@@ -295,7 +295,7 @@ double rms_m(const std::vector<StampedPose>& estimate, const std::vector<Stamped
   return error ? error->position_m.rms : -1.0;
 }
 
-double beside_m(const std::vector<StampedPose>& truths, Point2 place) {
+double distance_to_nearest(const std::vector<StampedPose>& truths, Point2 place) {
   double nearest = 1e9;
   for (const auto& each : truths) {
     nearest = std::min(nearest, distance(each.pose.position(), place));
@@ -414,7 +414,7 @@ class Loop {
     const double start_s = judge_.now_s;
     double farthest_m = 0.0;
     judge_.until(limit_s, [&] {
-      farthest_m = std::max(farthest_m, beside_m(truths_, judge_.truth.position()));
+      farthest_m = std::max(farthest_m, distance_to_nearest(truths_, judge_.truth.position()));
       return !judge_.result.empty();
     });
     const double off_m = distance(judge_.truth.position(), end);

@@ -208,10 +208,10 @@ std::vector<std::vector<Match>> scan(std::span<const PackedSignature* const> que
   for (std::size_t number = 0; number < views; ++number) {
     const auto view = magnitudes_of(number);
     for (std::size_t q = 0; q < queries.size(); ++q) {
-      const auto& asked = queries[q]->magnitudes;
+      const auto& query_magnitudes = queries[q]->magnitudes;
       std::uint32_t sum = 0;
       for (std::size_t i = 0; i < view.size(); ++i) {
-        sum += static_cast<std::uint32_t>(std::abs(view[i] - asked[i]));
+        sum += static_cast<std::uint32_t>(std::abs(view[i] - query_magnitudes[i]));
       }
       auto& best = nearest[q];
       const Match match{{static_cast<std::uint32_t>(number + 1)}, sum};

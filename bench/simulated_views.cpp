@@ -112,7 +112,7 @@ ViewSet render(Places places, std::size_t views, std::size_t queries, std::uint6
   std::vector<float> query_magnitudes;
   Executor executor(0);
   std::size_t made = 0;
-  std::size_t asked = 0;
+  std::size_t queries_made = 0;
   std::size_t rooms = 0;
   for (std::uint64_t seed = first_room; made < views; ++seed) {
     Random random(seed, 77);
@@ -127,7 +127,7 @@ ViewSet render(Places places, std::size_t views, std::size_t queries, std::uint6
     made += at.size();
     ++rooms;
     // Queries in proportion to the views, anywhere between them.
-    for (; asked < queries * made / views; ++asked) {
+    for (; queries_made < queries * made / views; ++queries_made) {
       Point2 place;
       do {
         const Point2 beside = at[random.index(at.size())];

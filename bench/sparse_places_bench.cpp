@@ -54,11 +54,11 @@ class MutualOrb final : public lab::RivalRecogniser {
   [[nodiscard]] std::size_t nearest(const lab::RivalView& query,
                                     std::optional<std::size_t> left_out) const override {
     const cv::BFMatcher matcher(cv::NORM_HAMMING, true);
-    const cv::Mat asked = described(query);
+    const cv::Mat query_descriptors = described(query);
     return best_of(references_.size(), left_out, [&](std::size_t i) {
-      if (references_[i].empty() || asked.empty()) return 0.0;
+      if (references_[i].empty() || query_descriptors.empty()) return 0.0;
       std::vector<cv::DMatch> matches;
-      matcher.match(asked, references_[i], matches);
+      matcher.match(query_descriptors, references_[i], matches);
       return static_cast<double>(std::ranges::count_if(
           matches, [](const cv::DMatch& match) { return match.distance <= 64.0F; }));
     });
@@ -93,9 +93,9 @@ class OrbVlad final : public lab::RivalRecogniser {
   }
   [[nodiscard]] std::size_t nearest(const lab::RivalView& query,
                                     std::optional<std::size_t> left_out) const override {
-    const cv::Mat asked = vlad(bits_of(described(query)));
+    const cv::Mat query_descriptors = vlad(bits_of(described(query)));
     return best_of(references_.size(), left_out,
-                   [&](std::size_t i) { return asked.dot(references_[i]); });
+                   [&](std::size_t i) { return query_descriptors.dot(references_[i]); });
   }
   [[nodiscard]] double bytes_per_view() const override { return 4.0 * words * 256; }
 

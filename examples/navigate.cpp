@@ -22,7 +22,7 @@ int main(int argc, char** argv) try {
   for (Robot robot(argv[3]); robot.next < robot.recording.entries.size();) {
     const auto step = navigator.step(robot.capture());
     robot.command(step.velocity);
-    if (step.decision.state != panonav::NavigationState::moving) break;
+    if (step.decision.state != panonav::NavigationDecision::State::moving) break;
   }
 } catch (const std::exception& error) {
   std::cerr << error.what() << '\n';

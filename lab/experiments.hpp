@@ -59,7 +59,7 @@ struct MappingExperiments : Experiments {
   [[nodiscard]] simulation::PlaceRecording make_variant(const std::string& scene, int number) const;
 };
 
-/// Navigation over the memory. Each experiment appends rows and writes pictures into
+/// Missions over the memory: [M04] figure 18, maps of drives, tours, routes and blocked paths.
 struct NavigationExperiments : Experiments {
   /// [M04] figure 18: missions in a built-in scene whose references lie on a grid of `spacing_m`
   /// and are arranged by their similarity alone.

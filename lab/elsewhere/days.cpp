@@ -237,7 +237,7 @@ class LearningRobot {
  private:
   VisualMemory memory_;
   std::unique_ptr<RememberedPlace> remembered_;
-  MemoryUse use_;
+  MemoryUpdate::Use use_;
   std::vector<double> errors_m_;
   std::size_t dropped_ = 0;
 };
@@ -309,12 +309,12 @@ class Days {
     Reproduction& result = elsewhere_.result;
     add_rate(result, id + ".without",
              what + "single images localised within one spacing, without learning", without_.right,
-             asked());
+             query_count());
     add_rate(result, id + ".rerecorded", what + "the same with a memory recorded again on that day",
-             rerecorded_.right, asked());
+             rerecorded_.right, query_count());
     add_rate(result, id + ".wrong_without",
              what + "answers farther off than one spacing, without learning", without_.wrong,
-             asked());
+             query_count());
     if (!without_.errors_m.empty()) {
       add_median(result, id + ".error_without", what + "error of positions, without learning", "m",
                  without_.errors_m);
@@ -330,12 +330,15 @@ class Days {
 
  private:
   [[nodiscard]] simulation::Scene first_scene() const {
-    simulation::Scene scene = simulation::make_or_read_scene(options_.data, name_, options_.seed);
+    simulation::Scene scene =
+        simulation::make_or_read_scene(options_.data, name_, {.seed = options_.seed});
     scene.name = name_;
     return scene;
   }
   [[nodiscard]] Executor& executor() const { return elsewhere_.executor; }
-  [[nodiscard]] std::size_t asked() const { return static_cast<std::size_t>(3 * options_.queries); }
+  [[nodiscard]] std::size_t query_count() const {
+    return static_cast<std::size_t>(3 * options_.queries);
+  }
 
   [[nodiscard]] simulation::PlaceRecording place_today(double light) const {
     simulation::PlaceRecording today = place_;
@@ -347,15 +350,15 @@ class Days {
   void ask_all(const simulation::PlaceRecording& today, int day, std::uint64_t seed) {
     Random random(seed, 6);
     std::vector<Pose2> poses;
-    for (std::size_t q = 0; q < asked(); ++q)
+    for (std::size_t q = 0; q < query_count(); ++q)
       poses.push_back(today.free_space->random_pose(random));
     const auto queries =
         simulation::take_views(today, place_.rendering, poses, seed + 500, {}, executor());
     without_ = ask(unchanged_, queries, executor());
-    add_point(without_learning_, day, success_rate(without_.right, asked()));
+    add_point(without_learning_, day, success_rate(without_.right, query_count()));
     for (DailyRobot& robot : robots_) {
       robot.answers = ask(robot.learning.remembered(), queries, executor());
-      add_point(robot.series, day, success_rate(robot.answers.right, asked()));
+      add_point(robot.series, day, success_rate(robot.answers.right, query_count()));
     }
     if (day == options_.days) {
       rerecorded_ = ask(record_again(today, seed + 50'000, executor()), queries, executor());
@@ -365,10 +368,10 @@ class Days {
   void report(const DailyRobot& robot, const std::string& row, const std::string& which) const {
     Reproduction& result = elsewhere_.result;
     const LearningRobot& learning = robot.learning;
-    add_rate(result, row, which + "localised within one spacing", robot.answers.right, asked(),
-             at_least(0.98));
+    add_rate(result, row, which + "localised within one spacing", robot.answers.right,
+             query_count(), at_least(0.98));
     add_rate(result, row + ".wrong", which + "answers farther off than one spacing",
-             robot.answers.wrong, asked());
+             robot.answers.wrong, query_count());
     if (!robot.answers.errors_m.empty()) {
       add_median(result, row + ".error", which + "error of positions", "m", robot.answers.errors_m);
     }

@@ -27,7 +27,7 @@ struct FloorMissions {
   std::size_t wrongly = 0;         // say that they arrived, but are elsewhere
   std::size_t within = 0;          // from the largest component to a view in it
   std::size_t arrived_within = 0;  // of these
-  std::map<NavigationState, std::size_t> ends;
+  std::map<NavigationDecision::State, std::size_t> ends;
 };
 
 // True if the view nearest to the position lies in the largest component.
@@ -46,7 +46,7 @@ FloorMissions count_missions(const simulation::RememberedPlace& remembered,
   for (std::size_t i = 0; i < runs.size(); ++i) {
     const bool arrives = runs[i].arrives(0.5 * spacing_m);
     count.arrived += arrives ? 1 : 0;
-    count.wrongly += !arrives && runs[i].end == NavigationState::arrived ? 1 : 0;
+    count.wrongly += !arrives && runs[i].end == NavigationDecision::State::arrived ? 1 : 0;
     ++count.ends[runs[i].end];
     const Pose2& goal = remembered.truth[remembered.graph.node_of(missions[i].goal).value()];
     if (!is_in_largest_component(remembered, goal.position()) ||

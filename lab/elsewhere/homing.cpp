@@ -128,10 +128,10 @@ class HomeVectors {
         pairs_(static_cast<std::size_t>(elsewhere.options.queries)) {}
 
   void ask_within(const Range& range) {
-    const auto asked = draw_pairs(range);
+    const auto pairs = draw_pairs(range);
     const auto answers = simulation::make_each(
-        elsewhere_.executor, asked.size(),
-        [&](std::size_t i) { return find_home(*asked[i].goal, *asked[i].current); });
+        elsewhere_.executor, pairs.size(),
+        [&](std::size_t i) { return find_home(*pairs[i].goal, *pairs[i].current); });
     std::size_t off = 0;
     std::map<std::string, std::size_t> off_in;
     for (std::size_t i = 0; i < answers.size(); ++i) {
@@ -142,7 +142,7 @@ class HomeVectors {
       }
       if (!answers[i].answered || is_right) continue;
       ++off;
-      ++off_in[asked[i].ground->name];
+      ++off_in[pairs[i].ground->name];
     }
     const std::string id = "elsewhere.home." + range.id;
     const std::string what = "views " + format_centimetres(range.low_m) + " to " +
@@ -213,7 +213,7 @@ class HomeVectors {
   }
 
   std::vector<ViewPair> draw_pairs(const Range& range) {
-    std::vector<ViewPair> asked;
+    std::vector<ViewPair> pairs;
     for (const RecordedGround& ground : elsewhere_.grounds) {
       const auto& place = ground.variants.front();
       const auto views = collect_views(place);
@@ -227,11 +227,11 @@ class HomeVectors {
         if (!place.free_space->is_free_between(goal->pose.position(), current->pose.position())) {
           continue;
         }
-        asked.push_back({goal, current, &ground});
+        pairs.push_back({goal, current, &ground});
         ++found;
       }
     }
-    return asked;
+    return pairs;
   }
 
   ElsewhereExperiments& elsewhere_;
@@ -257,7 +257,7 @@ void ElsewhereExperiments::reproduce_home_vectors() {
 void ElsewhereExperiments::reproduce_tilted_homing() {
   for (const std::string& name : list_ground_names()) {
     HomingPlace place = make_homing_place(
-        simulation::make_or_read_scene(options.data, name, options.seed), {}, executor);
+        simulation::make_or_read_scene(options.data, name, {.seed = options.seed}), {}, executor);
     const auto tasks = draw_homing_tasks(place, options.runs, homing_radius_m, options.seed);
     struct Condition {
       int tilt_deg;

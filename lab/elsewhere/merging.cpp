@@ -27,7 +27,7 @@ namespace panonav::lab {
 namespace {
 
 constexpr double walk_spacing_m = 0.1;
-constexpr double beside_m = 0.5;        // views so near to each other show one place
+constexpr double same_place_m = 0.5;    // views so near to each other show one place
 constexpr double shared_much = 0.13;    // of a walk beside the other: they have places in common
 constexpr double shared_hardly = 0.02;  // they have as good as none
 constexpr double wrong_rms_m = 2.0;     // a map that is joined rightly is off by the drift of both
@@ -40,7 +40,7 @@ struct Session {
   [[nodiscard]] double share_near(const Session& other) const {
     const auto beside = std::ranges::count_if(truth, [&](const auto& view) {
       return std::ranges::any_of(other.truth, [&](const auto& one) {
-        return distance(one.second, view.second) <= beside_m;
+        return distance(one.second, view.second) <= same_place_m;
       });
     });
     return static_cast<double>(beside) / static_cast<double>(truth.size());
@@ -97,7 +97,7 @@ std::optional<Joined> join(const Session& first, const Session& second,
     const std::size_t largest = find_largest_component(map);
     std::vector<Point2> estimate;
     std::vector<Point2> truth;
-    for (const MapNode& node : map.nodes) {
+    for (const TopologicalMap::Node& node : map.nodes) {
       if (node.component != largest) continue;
       const std::string& name = memory.info(node.view).name;
       estimate.push_back(node.pose.position());
@@ -163,8 +163,8 @@ void ElsewhereExperiments::reproduce_merging() {
   for (const char* const name : {"loop", "small_warehouse", "small_house"}) {
     if (!simulation::has_scene(options.data, name)) continue;
     const simulation::PlaceRecording place = simulation::make_empty_place(
-        simulation::make_or_read_scene(options.data, name, options.seed), options.seed, 512,
-        executor);
+        simulation::make_or_read_scene(options.data, name, {.seed = options.seed}), options.seed,
+        512, executor);
     for (int i = 0; i < options.walks; ++i) {
       sessions[name].push_back(
           record_walk(place, std::string(name) + "_" + std::to_string(i), options.walk_pictures,

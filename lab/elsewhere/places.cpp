@@ -66,7 +66,7 @@ void add_own_places(const ElsewhereExperiments& elsewhere, const RecordedGround&
   const std::vector<PlaceCondition> conditions(all_conditions.begin(), all_conditions.begin() + 2);
   const std::array<std::string, 2> ids{"clean", "hard"};
   const std::array<double, 2> targets{0.97, 0.93};
-  const auto asked = static_cast<std::size_t>(elsewhere.options.queries);
+  const auto query_count = static_cast<std::size_t>(elsewhere.options.queries);
   std::array<Rates, 2> known;
   std::array<Rates, 2> near;
   Rates inside;
@@ -74,10 +74,10 @@ void add_own_places(const ElsewhereExperiments& elsewhere, const RecordedGround&
     const std::string name = ground.name + " " + std::to_string(place.seed);
     const auto measured = run_place_experiment(place, conditions, elsewhere.executor);
     for (std::size_t c = 0; c < conditions.size(); ++c) {
-      known[c].add(name, measured[c].known, asked);
-      near[c].add(name, measured[c].nearest_or_next, asked);
+      known[c].add(name, measured[c].known, query_count);
+      near[c].add(name, measured[c].nearest_or_next, query_count);
     }
-    inside.add(name, measured[0].inside, asked);
+    inside.add(name, measured[0].inside, query_count);
   }
   Reproduction& result = elsewhere.result;
   for (std::size_t c = 0; c < conditions.size(); ++c) {
@@ -110,7 +110,7 @@ void ElsewhereExperiments::record_ground(const std::string& name) {
       std::ranges::find(simulation::scene_names(), name) != simulation::scene_names().end();
   for (int i = 0; i < (is_built_in ? options.scenes : 1); ++i) {
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
-    simulation::Scene scene = simulation::make_or_read_scene(options.data, name, seed);
+    simulation::Scene scene = simulation::make_or_read_scene(options.data, name, {.seed = seed});
     scene.name = name;
     ground.variants.push_back(simulation::record_place(std::move(scene),
                                                        {.seed = seed,

@@ -31,16 +31,16 @@ struct Recorded {
   Panorama sharp;  ///< the same rows as fine as they were recorded; of a mirror the panorama
 };
 
-/// True if `found` is near `asked`: in metres, or in a recording without positions the image before
+/// True if `found` is near `query`: in metres, or in a recording without positions the image before
 /// or after it.
-bool is_near(const std::vector<Recorded>& views, std::size_t asked, std::size_t found) {
-  if (!views[asked].position) return found + 1 == asked || asked + 1 == found;
+bool is_near(const std::vector<Recorded>& views, std::size_t query, std::size_t found) {
+  if (!views[query].position) return found + 1 == query || query + 1 == found;
   double nearest_m = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < views.size(); ++i) {
-    if (i != asked)
-      nearest_m = std::min(nearest_m, distance(*views[i].position, *views[asked].position));
+    if (i != query)
+      nearest_m = std::min(nearest_m, distance(*views[i].position, *views[query].position));
   }
-  return distance(*views[found].position, *views[asked].position) <= near_factor * nearest_m;
+  return distance(*views[found].position, *views[query].position) <= near_factor * nearest_m;
 }
 
 /// Memorises all images with the defaults of the command.
@@ -111,8 +111,8 @@ class LeaveOneOut {
 
   /// Localises by a memory of all images; the answers are kept in `places`.
   std::vector<Found> ask(const PlaceRecogniser& ours, std::vector<Place>& places) const {
-    places.resize(asked());
-    return simulation::make_each(elsewhere_.executor, asked(), [&](std::size_t n) {
+    places.resize(query_count());
+    return simulation::make_each(elsewhere_.executor, query_count(), [&](std::size_t n) {
       const Observation seen(turned(n));
       const double start = simulation::thread_seconds();
       places[n] = ours.localise(seen, {&views_[n / turns].file, 1});
@@ -128,7 +128,7 @@ class LeaveOneOut {
       references.push_back({view.panorama, to_picture(view.sharp)});
     }
     rival.memorise(references);
-    return simulation::make_each(elsewhere_.executor, asked(), [&](std::size_t n) {
+    return simulation::make_each(elsewhere_.executor, query_count(), [&](std::size_t n) {
       const Panorama& sharp = views_[n / turns].sharp;
       const auto turn = static_cast<int>(
           std::lround(turn_of(n) * sharp.columns() / static_cast<double>(columns_)));
@@ -140,14 +140,14 @@ class LeaveOneOut {
   }
 
   void add_near(const std::vector<Found>& found, std::optional<Target> target) const {
-    add_rate(result(), id_ + ".near", what_ + near_, count_near(found), asked(), target);
+    add_rate(result(), id_ + ".near", what_ + near_, count_near(found), query_count(), target);
   }
 
   void add_known(const std::vector<Place>& places) const {
     std::size_t known = 0;
     std::size_t placed = 0;
     std::size_t inside = 0;
-    for (std::size_t n = 0; n < asked(); ++n) {
+    for (std::size_t n = 0; n < query_count(); ++n) {
       const Place& place = places[n];
       const auto& truth = views_[n / turns].position;
       known += place.known ? 1 : 0;
@@ -156,7 +156,7 @@ class LeaveOneOut {
       const double off_m = distance({place.position->x_m, place.position->y_m}, *truth);
       inside += off_m <= *place.position->radius_m ? 1 : 0;
     }
-    add_rate(result(), id_ + ".known", what_ + "places known", known, asked());
+    add_rate(result(), id_ + ".known", what_ + "places known", known, query_count());
     if (placed == 0) return;
     add_rate(result(), id_ + ".radius", what_ + "positions within the stated 95 % radius", inside,
              placed, at_least(0.9));
@@ -177,7 +177,7 @@ class LeaveOneOut {
     std::erase(key, ',');
     const std::string id = id_ + "." + key;
     const std::size_t near_count = count_near(found);
-    add_rate(result(), id + ".near", what_ + other + ": " + near_, near_count, asked());
+    add_rate(result(), id + ".near", what_ + other + ": " + near_, near_count, query_count());
     add_median(result(), id + ".time", what_ + other + ": processor time", "ms",
                milliseconds(found));
     add_row(result(), id + ".bytes", what_ + other + ": bytes a view", bytes, "B");
@@ -186,7 +186,7 @@ class LeaveOneOut {
 
  private:
   [[nodiscard]] Reproduction& result() const { return elsewhere_.result; }
-  [[nodiscard]] std::size_t asked() const { return views_.size() * turns; }
+  [[nodiscard]] std::size_t query_count() const { return views_.size() * turns; }
   [[nodiscard]] int turn_of(std::size_t n) const {
     Random random(elsewhere_.options.seed + n % turns, n / turns);
     return static_cast<int>(random.index(columns_));

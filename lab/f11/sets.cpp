@@ -207,19 +207,20 @@ struct FirstSetVariations {
   std::vector<double> headings_deg;
   std::vector<double> compass_deg;
 
-  void add(const simulation::MappingRecording& recording, double open, double closed) {
+  void add_variations(const simulation::MappingRecording& recording, double open_loop_error,
+                      double closed_loop_error) {
     const auto error_of = [](const simulation::MappingRecording& views,
                              const simulation::MappingRunOptions& run) {
       const auto mapped = simulation::map_recording(views, run);
       return simulation::shape_error(mapped.estimate, mapped.truth);
     };
-    by_components[default_components].push_back(open);
+    by_components[default_components].push_back(open_loop_error);
     for (const int components : other_components) {
       by_components[components].push_back(
           error_of(recording, {.mapping = {.close_loops = false}, .components = components}));
     }
-    by_spacing[1].push_back(open);
-    closed_by_spacing[1].push_back(closed);
+    by_spacing[1].push_back(open_loop_error);
+    closed_by_spacing[1].push_back(closed_loop_error);
     for (const int every : {2, 3, 5}) {
       const auto thinned = simulation::thin_recording(recording, static_cast<std::size_t>(every));
       by_spacing[every].push_back(error_of(thinned, {.mapping = {.close_loops = false}}));
@@ -284,7 +285,7 @@ void MappingExperiments::reproduce_first_set() const {
         max_components + 2, simulation::cheap_wheels(), 1000 * place.seed, executor);
     set.add(place, recording, {});
     add_published_errors(recording, set.grid);
-    variations.add(recording, set.open.back(), set.closed.back());
+    variations.add_variations(recording, set.open.back(), set.closed.back());
   }
   set.report({.open = at_most(0.02),
               .published = 0.04,

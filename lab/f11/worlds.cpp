@@ -126,10 +126,11 @@ viewer::PicturePlot draw_pairs(const std::string& title,
   return plot;
 }
 
-std::vector<MapEdge> filter_closures(const simulation::MappedRecording& mapped) {
-  std::vector<MapEdge> closures;
-  std::ranges::copy_if(mapped.map.edges, std::back_inserter(closures),
-                       [](const MapEdge& edge) { return edge.kind == LinkKind::closure; });
+std::vector<TopologicalMap::Edge> filter_closures(const simulation::MappedRecording& mapped) {
+  std::vector<TopologicalMap::Edge> closures;
+  std::ranges::copy_if(
+      mapped.map.edges, std::back_inserter(closures),
+      [](const TopologicalMap::Edge& edge) { return edge.kind == Link::Kind::closure; });
   return closures;
 }
 
@@ -138,7 +139,7 @@ viewer::MapPlot plot_indoor_walk(const simulation::MappedRecording& bridged) {
   const auto position_of = [&](ViewId view) {
     return bridged.estimate[view.value - bridged.map.nodes[0].view.value];
   };
-  for (const MapEdge& edge : filter_closures(bridged)) {
+  for (const TopologicalMap::Edge& edge : filter_closures(bridged)) {
     lines.lines.push_back({position_of(edge.a), position_of(edge.b)});
   }
   return {.title = "indoor_walk_360, no positions known",
@@ -156,8 +157,8 @@ void map_indoor_walk(const MappingExperiments& f11) {
   // The pictures stand metres apart.
   const auto parts = simulation::map_recording(walk, {});
   const auto bridged = simulation::map_recording(walk, {.mapping = {.bridge_m = 1.5}});
-  const auto linked =
-      static_cast<double>(std::ranges::count(parts.map.edges, LinkKind::sequence, &MapEdge::kind));
+  const auto linked = static_cast<double>(
+      std::ranges::count(parts.map.edges, Link::Kind::sequence, &TopologicalMap::Edge::kind));
   add_row(f11.result, "f11.indoor_walk.linked",
           "indoor_walk_360: consecutive pictures linked by a step read from them",
           linked / static_cast<double>(walk.views.size() - 1), "");
@@ -183,7 +184,8 @@ void map_indoor_walk(const MappingExperiments& f11) {
   constexpr std::size_t max_pairs = 12;
   if (refused.size() > max_pairs) refused.resize(max_pairs);
   std::vector<std::pair<Panorama, Panorama>> pairs;
-  for (const MapEdge& edge : refused) pairs.emplace_back(view_of(edge.a), view_of(edge.b));
+  for (const TopologicalMap::Edge& edge : refused)
+    pairs.emplace_back(view_of(edge.a), view_of(edge.b));
   add_plot(f11.result, "f11_indoor_walk_pairs.svg",
            "Pairs of pictures (one over the other) that pass every check of a loop closure but the "
            "sequence: corridors of one kind on several floors. None of them becomes a closure",
@@ -443,8 +445,8 @@ void MappingExperiments::measure_large_maps() const {
     const double bytes = static_cast<double>(
         mapped.map.nodes.size() *
             (static_cast<std::size_t>(2 * recording.views.front().rows() * components) +
-             sizeof(MapNode) + passed_node_bytes) +
-        mapped.map.edges.size() * (sizeof(MapEdge) + sizeof(PoseEdge)));
+             sizeof(TopologicalMap::Node) + passed_node_bytes) +
+        mapped.map.edges.size() * (sizeof(TopologicalMap::Edge) + sizeof(PoseEdge)));
     add_row(result, id + ".memory", what + ": packed signatures, nodes and edges", 1e-6 * bytes,
             "MB");
     add_row(result, id + ".shape", what + ": shape difference",

@@ -57,7 +57,8 @@ std::vector<Box> find_distinct_objects(const simulation::Scene& scene) {
 }
 
 /// True if one of the objects covers at least `distinct_degrees` of the view.
-bool is_distinct(const simulation::PlaceRecording& place, std::span<const Box> things, Point2 at) {
+bool has_dominant_object(const simulation::PlaceRecording& place, std::span<const Box> things,
+                         Point2 at) {
   const simulation::Vector3 eye{at.x_m, at.y_m, place.scene.camera_height_m};
   std::vector<int> covered(things.size());
   for (int azimuth = 0; azimuth < 360; ++azimuth) {
@@ -137,7 +138,7 @@ CorridorRuns record_corridors(const TrackingExperiments& m03) {
       Random random(seed * 1000003U + 70U, r);
       ways[r] = plan_ring_drive(place.scene, random);
       for (std::size_t i = 0; i < ways[r].size(); ++i) {
-        if (!is_distinct(place, things, ways[r][i].position())) continue;
+        if (!has_dominant_object(place, things, ways[r][i].position())) continue;
         first[r] = i;
         ways[r].resize(std::min(ways[r].size(), i + images_after));
         break;
@@ -220,7 +221,7 @@ void TrackingExperiments::reproduce_corridor() {
     add_mean(result, "m03.corridor.modes_before",
              "corridor: modes kept before the first distinct place", "modes", of.hypotheses);
   }
-  rows.add_wrong(at_most(0.0));
+  rows.add_rate_of_wrong_answers(at_most(0.0));
   if (of.reached > 0) {
     add_rate(result, "m03.corridor.right_after",
              "corridor: runs whose heaviest mode is within 0.5 m of the truth at the first "

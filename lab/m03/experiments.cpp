@@ -85,7 +85,7 @@ void RunRows::add_images_mean() const {
            capped_images_until_localised(runs, radius_m, first_step));
 }
 
-void RunRows::add_within(int images, std::optional<Target> target) const {
+void RunRows::add_rate_localised_within(int images, std::optional<Target> target) const {
   const std::string count = std::to_string(images);
   add_rate(result, id + ".within_" + count, what + ": runs localised within " + count + " images",
            count_localised_within(runs, radius_m, images, first_step), runs.size(),
@@ -98,7 +98,7 @@ void RunRows::add_error_after(std::size_t images, std::optional<Target> target) 
              errors_after(runs, images), judged ? target : std::nullopt);
 }
 
-void RunRows::add_wrong(std::optional<Target> target) const {
+void RunRows::add_rate_of_wrong_answers(std::optional<Target> target) const {
   std::size_t images = 0;
   std::size_t wrong = 0;
   for (const TrackedRun& run : runs) {

@@ -77,10 +77,10 @@ struct RunRows {
   void add_images(std::optional<Target> target = std::nullopt,
                   std::optional<std::pair<double, double>> published = std::nullopt) const;
   void add_images_mean() const;
-  void add_within(int images, std::optional<Target> target = std::nullopt) const;
+  void add_rate_localised_within(int images, std::optional<Target> target = std::nullopt) const;
   void add_error_after(std::size_t images, std::optional<Target> target = std::nullopt) const;
   /// Adds the rate at which the filter reports localised with an error above `m03_wrong_m`.
-  void add_wrong(std::optional<Target> target = std::nullopt) const;
+  void add_rate_of_wrong_answers(std::optional<Target> target = std::nullopt) const;
   /// Appends the rates of single images to `over` of the last row: "one image alone: right 74 % (by
   /// dissimilarity only 54 %), within 25 cm 96 %".
   void append_single_image_rates() const;

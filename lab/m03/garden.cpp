@@ -79,9 +79,9 @@ void TrackingExperiments::reproduce_garden() {
     const RunRows rows{result, "m03.garden." + id, "garden, 50 cm grid, " + light, sets,
                        runs,   garden_spacing_m};
     rows.add_images();
-    rows.add_within(10);
+    rows.add_rate_localised_within(10);
     rows.add_error_after(10);
-    rows.add_wrong();
+    rows.add_rate_of_wrong_answers();
     return runs;
   };
   viewer::Series right{.label = "one image alone: nearest place"};

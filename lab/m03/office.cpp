@@ -51,9 +51,9 @@ void add_paper_rows(const TrackingExperiments& m03) {
                        .judged = is_papers};
     rows.add_images(at_most(4.0), is_papers ? std::optional(std::pair{5.0, 6.0}) : std::nullopt);
     rows.add_images_mean();
-    rows.add_within(10, at_least(0.99));
+    rows.add_rate_localised_within(10, at_least(0.99));
     rows.add_error_after(10, at_most(m03_spacing_m));
-    rows.add_wrong();
+    rows.add_rate_of_wrong_answers();
   }
 }
 
@@ -68,7 +68,7 @@ void add_hard_rows(const TrackingExperiments& m03, std::span<const RunSet> sets,
                                rule.injection == InjectionMethod::explained};
   rows.add_images(at_most(4.0));
   rows.add_images_mean();
-  rows.add_within(10, at_least(0.99));
+  rows.add_rate_localised_within(10, at_least(0.99));
   rows.add_error_after(10, at_most(0.5 * m03_spacing_m));
   const auto errors = errors_after(runs, 10);
   add_rate(m03.result, rows.id + ".half_10",
@@ -82,7 +82,7 @@ void add_hard_rows(const TrackingExperiments& m03, std::span<const RunSet> sets,
                          return images_until_first_fix(run, m03_spacing_m).value_or(2) <= 1;
                        }),
            runs.size());
-  rows.add_wrong();
+  rows.add_rate_of_wrong_answers();
 }
 
 void add_ratio_row(const Rule& rule, const std::vector<double>& with,
@@ -144,7 +144,7 @@ void add_tracking_rows(const TrackingExperiments& m03, std::span<const RunSet> s
            count_localised_within(known, m03_spacing_m, 2, first_after_blind), known.size());
   add_median(m03.result, row + ".error_1", what + ": error at the first image after", "m",
              errors_after(known, 1, first_after_blind));
-  rows.add_wrong();
+  rows.add_rate_of_wrong_answers();
 }
 
 void add_kidnapping_rows(const TrackingExperiments& m03, std::span<const RunSet> sets,
@@ -161,8 +161,8 @@ void add_kidnapping_rows(const TrackingExperiments& m03, std::span<const RunSet>
                                     ? std::optional(std::pair{3.0, 4.0})
                                     : std::nullopt);
   rows.add_images_mean();
-  rows.add_within(8, at_least(0.99));
-  rows.add_wrong();
+  rows.add_rate_localised_within(8, at_least(0.99));
+  rows.add_rate_of_wrong_answers();
   if (rule.injection != InjectionMethod::explained) return;
   std::vector<double> difference =
       capped_images_until_localised(runs, m03_spacing_m, rows.first_step);
@@ -385,7 +385,7 @@ void TrackingExperiments::reproduce_sweeps() {
       const auto runs = track(kind.sets, setting, seed);
       const RunRows rows{result, "m03." + id + "." + kind.id + "." + format_number(x),
                          what + ", " + kind.name, kind.sets, runs};
-      rows.add_within(10);
+      rows.add_rate_localised_within(10);
       rows.add_images_mean();
       curve.add(x, runs);
     };

@@ -108,7 +108,7 @@ constexpr std::size_t bins = 16;
 /// States that the filter reports over the runs.
 struct Reports {
   // By distance to the nearest reference, from the sixth image on.
-  std::array<std::size_t, bins> asked{};
+  std::array<std::size_t, bins> queries{};
   std::array<std::size_t, bins> lost{};
   std::array<std::size_t, bins> localised{};
   std::size_t inside = 0;  ///< images before the robot leaves
@@ -133,7 +133,7 @@ void add_run(Reports& reports, const TrackedRun& run, std::span<const double> wa
     const bool is_localised = image.state == LocalisationState::localised;
     if (image.step >= images_before) {
       const auto bin = std::min(bins - 1, static_cast<std::size_t>(way / bin_m));
-      ++reports.asked[bin];
+      ++reports.queries[bin];
       reports.lost[bin] += is_lost ? 1 : 0;
       reports.localised[bin] += is_localised ? 1 : 0;
     }
@@ -202,15 +202,15 @@ void TrackingExperiments::reproduce_leaving(const std::string& name) {
                runs};
   add_rows(rows, reports);
   rows.what = name + ", leaving and returning";
-  rows.add_wrong();
+  rows.add_rate_of_wrong_answers();
   viewer::Series lost_series{.label = "called lost"};
   viewer::Series sure_series{.label = "called localised"};
   for (std::size_t b = 0; b < bins; ++b) {
-    if (reports.asked[b] == 0) continue;
+    if (reports.queries[b] == 0) continue;
     for (const auto& [series, counts] :
          {std::pair{&lost_series, &reports.lost}, {&sure_series, &reports.localised}}) {
       add_point(*series, (static_cast<double>(b) + 0.5) * bin_m,
-                success_rate((*counts)[b], reports.asked[b]));
+                success_rate((*counts)[b], reports.queries[b]));
     }
   }
   const std::string file = "leaving_" + name + ".svg";

@@ -59,9 +59,9 @@ std::vector<double> fit_tangents(const std::vector<RecordedView>& views, std::si
 void add_rows(const RunRows& rows) {
   rows.add_images();
   rows.add_images_mean();
-  rows.add_within(10);
+  rows.add_rate_localised_within(10);
   rows.add_error_after(10);
-  rows.add_wrong();
+  rows.add_rate_of_wrong_answers();
 }
 
 /// Plans a walk over neighbouring places that visits none twice, up to `images` long.
@@ -127,7 +127,7 @@ void TrackingExperiments::reproduce_gazebo_world(const std::string& name) {
     add_median(result, rows.id + ".images", images, "images", needed);
     add_mean(result, rows.id + ".images_mean", images, "images", needed);
     rows.add_error_after(15);
-    rows.add_wrong();
+    rows.add_rate_of_wrong_answers();
   }
 }
 

@@ -144,9 +144,9 @@ GridComparison compare_with_grid(const ViewGrid& grid, const Lattice& lattice) {
   const ShapeDifference difference = shape_difference(arranged, truth);
   result.shape_difference = difference.value;
   result.with_reflection = difference.with_reflection;
-  Alignment align_to = align(arranged, truth, {.allow_scale = true, .allow_reflection = true});
-  align_to = match_extent(truth, arranged, align_to);
-  for (const Point2 p : arranged) result.aligned.push_back(align_to.apply(p));
+  Alignment alignment = align(arranged, truth, {.allow_scale = true, .allow_reflection = true});
+  alignment = match_extent(truth, arranged, alignment);
+  for (const Point2 p : arranged) result.aligned.push_back(alignment.apply(p));
 
   const std::vector<std::size_t> together(truth.size(), 0);
   const auto near = nearest_points(arranged, together, 8);

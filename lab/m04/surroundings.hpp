@@ -23,12 +23,11 @@ struct Surroundings {
 [[nodiscard]] Surroundings measure_surroundings(const simulation::PlaceRecording& place,
                                                 Point2 position);
 
-/// Predicts the relative distance in each direction until the first components of the view have
-/// changed by a fixed amount, to first order, for a view taken at `pose` with the place's heights
-/// and elevations: every pixel's brightness gradient times its shift by parallax, the shift read
-/// from the distance of what the pixel shows, transformed, and projected on each magnitude. Only
-/// ratios have a meaning. Directions are those of the scene. Throws ContractError on a view without
-/// elevations.
+/// Predicts, to first order, how far the robot can move from `pose` in each direction before the
+/// magnitudes of the first `components` change by a fixed amount. The parallax shift of each pixel
+/// follows from the scene's distance; shift times brightness gradient is transformed and projected
+/// on each magnitude. Only ratios between directions are meaningful. Directions are those of the
+/// scene. Throws ContractError on a view without elevations.
 [[nodiscard]] Directional predict_extents(const simulation::PlaceRecording& place,
                                           const Pose2& pose, const Panorama& view, int components);
 

@@ -43,7 +43,7 @@ struct Measures {
   std::size_t runs = 0;
   std::size_t arrived = 0;
   std::size_t wrongly = 0;  // says that it arrived, but is elsewhere
-  std::map<NavigationState, std::size_t> ends;
+  std::map<NavigationDecision::State, std::size_t> ends;
   std::vector<double> lengths;  // of those that arrived, over the shortest
   std::vector<double> steps;
   double bytes_read = 0.0;  // by all steps
@@ -53,7 +53,8 @@ struct Measures {
       ++runs;
       const bool arrives = run.arrives(radius_m);
       arrived += static_cast<std::size_t>(arrives);
-      wrongly += static_cast<std::size_t>(!arrives && run.end == NavigationState::arrived);
+      wrongly +=
+          static_cast<std::size_t>(!arrives && run.end == NavigationDecision::State::arrived);
       ++ends[run.end];
       steps.push_back(static_cast<double>(run.decisions.size()));
       for (const NavigationDecision& step : run.decisions) {
@@ -80,7 +81,7 @@ void report(const std::string& id, const std::string& what, const Measures& meas
   add_rate(result, id + ".wrongly", what + ": report an arrival but are farther off",
            measured.wrongly, measured.runs);
   for (const auto& [end, count] : measured.ends) {
-    if (end == NavigationState::arrived) continue;
+    if (end == NavigationDecision::State::arrived) continue;
     add_rate(result, id + "." + std::string(name_of(end)),
              what + ": end as " + std::string(name_of(end)), count, measured.runs);
   }
@@ -100,15 +101,6 @@ void draw_mission(const std::string& name, const simulation::MissionPlace& place
       {file, "A mission in " + name +
                  ": every reference view says in which direction the goal lies; the robot takes "
                  "the direction of the one it is nearest to and looks again."});
-}
-
-simulation::Scene make_or_read_scene(const ReproductionOptions& options, const std::string& name,
-                                     const simulation::SceneVariation& variation) {
-  const auto names = simulation::scene_names();
-  if (std::ranges::find(names, name) != names.end()) return simulation::make_scene(name, variation);
-  simulation::Scene scene = simulation::read_world(options.data, name);
-  if (variation.light != 1.0) simulation::scale_light(scene, variation.light);
-  return scene;
 }
 
 // Plans a drive of `drive_m`: repeated round trips of the scene, or paths between random places
@@ -195,25 +187,26 @@ void NavigationExperiments::reproduce_drive_missions(const std::string& scene) c
   for (int i = 0; i < options.scenes; ++i) {
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
     simulation::SceneVariation variation{.seed = seed};
-    const simulation::MissionPlace place =
-        simulation::make_mission_place(make_or_read_scene(options, scene, variation), executor);
+    const simulation::MissionPlace place = simulation::make_mission_place(
+        simulation::make_or_read_scene(options.data, scene, variation), executor);
     const simulation::RememberedPlace remembered =
         simulation::memorise_drive(place, plan_exploring_drive(place, seed),
                                    simulation::cheap_wheels(), Random(seed, 1).next(), executor);
     variation.light = i % 2 == 0 ? 1.0 - light_change : 1.0 + light_change;
     variation.moved_objects = moved_objects_share;
     variation.moved_seed = Random(seed, 4).next();
-    const simulation::MissionPlace other =
-        simulation::make_mission_place(make_or_read_scene(options, scene, variation), executor);
+    const simulation::MissionPlace other = simulation::make_mission_place(
+        simulation::make_or_read_scene(options.data, scene, variation), executor);
     simulation::MissionOptions mission;
     mission.base.drive = i % 2 == 0 ? DriveKind::differential : DriveKind::holonomic;
     const double radius_m = 0.5 * remembered.spacing_m;
     const auto run = [&](const simulation::MissionPlace& where, bool is_kidnapped,
                          std::uint64_t stream, Measures& measures) {
-      const auto missions = simulation::draw_missions(
-          where, remembered,
-          {.count = count_runs(options, i), .beside_m = beside_drive_m, .kidnapped = is_kidnapped},
-          Random(seed, stream).next());
+      const auto missions = simulation::draw_missions(where, remembered,
+                                                      {.count = count_runs(options, i),
+                                                       .max_distance_m = beside_drive_m,
+                                                       .kidnapped = is_kidnapped},
+                                                      Random(seed, stream).next());
       const auto runs = simulation::run_missions(where, remembered, missions, mission,
                                                  Random(seed, stream + 1).next(), executor);
       measures.add(runs, radius_m);
@@ -273,7 +266,7 @@ void NavigationExperiments::reproduce_tours() const {
     const MemoryViewSource source(remembered.memory);
     const int tours = (count_runs(options, i) + goals_a_tour - 1) / goals_a_tour;
     const auto missions = simulation::draw_missions(
-        place, remembered, {.count = tours * goals_a_tour, .beside_m = beside_drive_m},
+        place, remembered, {.count = tours * goals_a_tour, .max_distance_m = beside_drive_m},
         Random(seed, 12).next());
     for (Kind& kind : kinds) {
       auto runs =
@@ -310,7 +303,7 @@ void NavigationExperiments::reproduce_route_missions() const {
   std::vector<Kind> kinds{{"route", "with the route recorded on it", {}, {}},
                           {"without_route", "the same missions without the route", {}, {}}};
   std::vector<double> on_route_m;
-  std::map<NavigationEvent, std::size_t> events;
+  std::map<NavigationDecision::Event, std::size_t> events;
   for (int i = 0; i < options.scenes; ++i) {
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
     simulation::MissionPlace place =
@@ -320,7 +313,7 @@ void NavigationExperiments::reproduce_route_missions() const {
     simulation::RememberedPlace remembered = simulation::memorise_drive(
         place, drive, simulation::cheap_wheels(), Random(seed, 1).next(), executor);
     const auto missions = simulation::draw_missions(
-        place, remembered, {.count = count_runs(options, i), .beside_m = beside_drive_m},
+        place, remembered, {.count = count_runs(options, i), .max_distance_m = beside_drive_m},
         Random(seed, 13).next());
     for (Kind& kind : kinds) {
       const auto runs = simulation::run_missions(place, remembered, missions, {},
@@ -332,7 +325,7 @@ void NavigationExperiments::reproduce_route_missions() const {
               std::abs(project_onto_route(drive, run.path[step].position()).lateral_m);
           kind.off_m.push_back(off_m);
           if (run.decisions[step].on_route) on_route_m.push_back(off_m);
-          for (const NavigationEvent event : run.decisions[step].events) ++events[event];
+          for (const NavigationDecision::Event event : run.decisions[step].events) ++events[event];
         }
       }
       remembered.routes.clear();
@@ -350,7 +343,7 @@ void NavigationExperiments::reproduce_route_missions() const {
            on_route_m.size(), kinds.front().off_m.size());
   if (on_route_m.empty()) return;
   add_rate(result, "navigation.route.left", what + ": legs that did not come to their end",
-           events[NavigationEvent::route_left], events[NavigationEvent::route]);
+           events[NavigationDecision::Event::route_left], events[NavigationDecision::Event::route]);
   add_median(result, "navigation.route.leg_off",
              what + ": distance from the recorded path, on a leg", "m", on_route_m);
 }
@@ -401,11 +394,11 @@ void NavigationExperiments::reproduce_blocked_missions() const {
   report("navigation.blocked", what + ", with a detour", around, at_least(0.9), std::nullopt,
          result);
   add_rate(result, "navigation.shut.unreachable", what + " on both sides: reported unreachable",
-           shut.ends[NavigationState::unreachable], shut.runs, at_least(0.9));
-  result.rows.back().reason =
-      simulation::explain_other_ends(shut.ends, shut.wrongly, NavigationState::unreachable);
+           shut.ends[NavigationDecision::State::unreachable], shut.runs, at_least(0.9));
+  result.rows.back().reason = simulation::explain_other_ends(
+      shut.ends, shut.wrongly, NavigationDecision::State::unreachable);
   add_rate(result, "navigation.shut.arrived", what + " on both sides: report an arrival",
-           shut.ends[NavigationState::arrived], shut.runs);
+           shut.ends[NavigationDecision::State::arrived], shut.runs);
   add_median(result, "navigation.shut.steps", what + " on both sides: steps until reported", "",
              shut.steps);
   add_row(result, "navigation.shut.max_steps", what + " on both sides: steps, most",

@@ -68,9 +68,9 @@ std::vector<PlaceResult> run_place_experiment(const simulation::PlaceRecording& 
   std::vector<PlaceResult> results;
   std::uint64_t seed = place.seed * 1000003U;
   for (const PlaceCondition& condition : conditions) {
-    const std::size_t asked = place.queries.size();
-    std::vector<Place> answers(asked);
-    executor.for_chunks(asked, 1, [&](std::size_t begin, std::size_t, std::size_t) {
+    const std::size_t query_count = place.queries.size();
+    std::vector<Place> answers(query_count);
+    executor.for_chunks(query_count, 1, [&](std::size_t begin, std::size_t, std::size_t) {
       Executor here(1);
       const simulation::FrameOptions frame{.camera_height_m = place.scene.camera_height_m,
                                            .tilt_rad = condition.tilt_rad};
@@ -80,14 +80,14 @@ std::vector<PlaceResult> run_place_experiment(const simulation::PlaceRecording& 
       const Tilt measured = condition.levelled ? draw_tilt(frame, seed + begin) : Tilt{};
       answers[begin] = remembered.localise(level_panorama(seen, measured));
     });
-    seed += asked;
+    seed += query_count;
     std::size_t nearest = 0;
     std::size_t next = 0;
     std::size_t known = 0;
     std::size_t inside = 0;
     std::vector<double> heading_errors;
     std::vector<double> position_errors;
-    for (std::size_t i = 0; i < asked; ++i) {
+    for (std::size_t i = 0; i < query_count; ++i) {
       const Pose2& truth = place.queries[i].pose;
       const Place& answer = answers[i];
       const PlaceMatch& best = answer.matches.at(0);
@@ -106,9 +106,10 @@ std::vector<PlaceResult> run_place_experiment(const simulation::PlaceRecording& 
       position_errors.push_back(distance(answer.position->position(), truth.position()));
       inside += position_errors.back() <= answer.position->radius_m.value_or(0.0) ? 1 : 0;
     }
-    results.push_back({condition.name, success_rate(nearest, asked), success_rate(next, asked),
-                       success_rate(known, asked), quantile(heading_errors, 0.5),
-                       quantile(heading_errors, 0.95), quantile(position_errors, 0.5),
+    results.push_back({condition.name, success_rate(nearest, query_count),
+                       success_rate(next, query_count), success_rate(known, query_count),
+                       quantile(heading_errors, 0.5), quantile(heading_errors, 0.95),
+                       quantile(position_errors, 0.5),
                        success_rate(inside, position_errors.size())});
   }
   return results;
@@ -123,14 +124,14 @@ std::vector<RecognitionRate> recognition_rates(
   std::vector<RecognitionRate> others;
   for (const simulation::PlaceRecording* const place : places) {
     const MemorisedPlace remembered(*place, executor);
-    for (const simulation::PlaceRecording* const asked : places) {
-      std::vector<std::uint8_t> known(asked->queries.size());
+    for (const simulation::PlaceRecording* const queried : places) {
+      std::vector<std::uint8_t> known(queried->queries.size());
       executor.for_chunks(known.size(), 1, [&](std::size_t i, std::size_t, std::size_t) {
-        known[i] = remembered.localise(asked->queries[i].panorama).known ? 1 : 0;
+        known[i] = remembered.localise(queried->queries[i].panorama).known ? 1 : 0;
       });
       const auto count = static_cast<std::size_t>(std::ranges::count(known, 1));
-      (place == asked ? own : others)
-          .push_back({name(*place), name(*asked), success_rate(count, known.size())});
+      (place == queried ? own : others)
+          .push_back({name(*place), name(*queried), success_rate(count, known.size())});
     }
   }
   own.insert(own.end(), others.begin(), others.end());

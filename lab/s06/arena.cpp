@@ -115,19 +115,19 @@ HomingSurveyOptions survey_options(const Arena& arena) {
 }
 
 HomingSurvey survey_arena(const Arena& arena, const HomingRule& rule, Executor& executor,
-                          std::size_t every) {
+                          std::size_t goal_stride) {
   std::vector<Pose2> goals;
-  for (std::size_t g = 0; g < arena.homes.views.size(); g += every) {
+  for (std::size_t g = 0; g < arena.homes.views.size(); g += goal_stride) {
     goals.push_back(arena.homes.views[g].pose);
   }
   return survey_homing(
       goals, collect_poses(arena.currents),
-      [&](std::size_t goal, std::size_t place) { return rule(goal * every, place); },
+      [&](std::size_t goal, std::size_t place) { return rule(goal * goal_stride, place); },
       survey_options(arena), executor);
 }
 
 HomingSurvey survey_arena(const Arena& arena, const FourierHomingOptions& homing,
-                          Executor& executor, std::size_t every) {
+                          Executor& executor, std::size_t goal_stride) {
   validate(homing);
   return survey_arena(
       arena,
@@ -135,17 +135,17 @@ HomingSurvey survey_arena(const Arena& arena, const FourierHomingOptions& homing
         return home_vector_unchecked(arena.homes.views[goal].view, arena.currents.views[place].view,
                                      homing);
       },
-      executor, every);
+      executor, goal_stride);
 }
 
 HomingSurvey survey_arena(const Arena& arena, const ExpectedImageHoming& homing, Executor& executor,
-                          std::size_t every) {
+                          std::size_t goal_stride) {
   return survey_arena(
       arena,
       [&](std::size_t goal, std::size_t place) {
         return homing.home_vector(arena.homes.rows[goal], arena.currents.rows[place]);
       },
-      executor, every);
+      executor, goal_stride);
 }
 
 }  // namespace panonav::lab

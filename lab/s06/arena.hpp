@@ -70,13 +70,13 @@ struct Arena : simulation::SimulatedPlace {
 /// Returns options of runs as in [S06 section 4.4], for the spacing of the arena.
 [[nodiscard]] HomingSurveyOptions survey_options(const Arena& arena);
 
-/// Surveys home views of every n-th place (`every`) of the first recording against all places of
-/// the second. `rule` receives the indices of the places.
+/// Surveys the home view of every `goal_stride`-th place of the first recording against all
+/// places of the second. `rule` receives the indices of the places.
 [[nodiscard]] HomingSurvey survey_arena(const Arena& arena, const HomingRule& rule,
-                                        Executor& executor, std::size_t every = 1);
+                                        Executor& executor, std::size_t goal_stride = 1);
 [[nodiscard]] HomingSurvey survey_arena(const Arena& arena, const FourierHomingOptions& homing,
-                                        Executor& executor, std::size_t every = 1);
+                                        Executor& executor, std::size_t goal_stride = 1);
 [[nodiscard]] HomingSurvey survey_arena(const Arena& arena, const ExpectedImageHoming& homing,
-                                        Executor& executor, std::size_t every = 1);
+                                        Executor& executor, std::size_t goal_stride = 1);
 
 }  // namespace panonav::lab

@@ -19,11 +19,11 @@ inline constexpr double homing_start_radius_m = 1.5;
 /// minimum and says so". Empty for a success.
 [[nodiscard]] std::string explain_failure(const HomingRun& run);
 
-/// Measures runs home in the Gazebo world `name` of `data`, from `starts` random starts around
-/// random goals: rows "s06.world.NAME.*" of the success from all starts and from those in sight of
-/// the goal, of wrong places noticed, and of the published rule; pictures in `out`: a map of all
-/// runs, and one of each failure with its reason. Same arguments: same rows and pictures on any
-/// number of threads. Throws FileError, ContractError.
+/// Measures runs home in the Gazebo world `name`, from `context.options.starts` random starts
+/// around random goals. Adds rows "s06.world.NAME.*": success from all starts and from those in
+/// sight of the goal, wrong arrivals that were noticed, and success of the published rule. Draws a
+/// map of all runs, and one of each failure with its reason. Same arguments: same rows and images
+/// on any number of threads. Throws FileError, ContractError.
 void reproduce_homing_in_world(const std::string& name, const Experiments& context);
 
 /// Measures the same over built-in scenes of several seeds: office, lab, hall, loop and garden, the

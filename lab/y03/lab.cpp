@@ -79,7 +79,7 @@ Pose2 perturb_pose(const Pose2& truth) {
 }
 
 template <typename Fit>
-DriveErrors follow(const LineDrive& drive, const Fit& fit) {
+DriveErrors track_drive(const LineDrive& drive, const Fit& fit) {
   DriveErrors errors;
   Pose2 pose = perturb_pose(drive.truth.front());
   for (std::size_t i = 0; i < drive.truth.size(); ++i) {
@@ -205,21 +205,22 @@ RoutePanorama scale_route(const RoutePanorama& route, double factor) {
 DriveErrors follow_by_fit(const RouteLines& lines, const LineDrive& drive) {
   RouteChanges changes;
   std::size_t changed = 0;
-  DriveErrors errors = follow(drive, [&](const std::vector<float>& line, const Pose2& predicted) {
-    const auto fix = lines.fit(line, predicted);
-    if (!fix) {
-      changes.reset();
-      return std::optional<Pose2>();
-    }
-    changed += changes.add(*fix).empty() ? 0 : 1;
-    return std::optional(fix->pose);
-  });
+  DriveErrors errors =
+      track_drive(drive, [&](const std::vector<float>& line, const Pose2& predicted) {
+        const auto fix = lines.fit(line, predicted);
+        if (!fix) {
+          changes.reset();
+          return std::optional<Pose2>();
+        }
+        changed += changes.add(*fix).empty() ? 0 : 1;
+        return std::optional(fix->pose);
+      });
   errors.changed = changed;
   return errors;
 }
 
 DriveErrors follow_by_contours(const RouteContours& contours, const LineDrive& drive) {
-  return follow(drive, [&](const std::vector<float>& line, const Pose2& predicted) {
+  return track_drive(drive, [&](const std::vector<float>& line, const Pose2& predicted) {
     const auto fix = contours.fit(line, predicted);
     return fix && fix->converged ? std::optional(fix->pose) : std::nullopt;
   });

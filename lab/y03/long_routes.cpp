@@ -220,7 +220,7 @@ void RouteExperiments::reproduce_real_route() const {
   });
   std::vector<double> along_cm;
   std::vector<double> beside_cm;
-  std::size_t asked = 0;
+  std::size_t queries = 0;
   viewer::MapLayer right{.label = "fixes", .colour = viewer::PlotColour::blue};
   viewer::MapLayer remembered{.label = "remembered lines", .colour = viewer::PlotColour::black};
   for (std::size_t i = 0; i < way.size(); ++i) {
@@ -228,7 +228,7 @@ void RouteExperiments::reproduce_real_route() const {
       remembered.circles.push_back(places[i]);
       continue;
     }
-    ++asked;
+    ++queries;
     if (!found[i]) continue;
     const RoutePosition truth = project_onto_route(route.poses(), places[i]);
     along_cm.push_back(100.0 * std::abs(found[i]->along_m - truth.along_m));
@@ -241,7 +241,7 @@ void RouteExperiments::reproduce_real_route() const {
              at_most(3.0));
   add_median(result, "y03.sussex.lateral", what + ": error beside the route, median", "cm",
              beside_cm);
-  add_rate(result, "y03.sussex.found", what + ": found on the route", along_cm.size(), asked);
+  add_rate(result, "y03.sussex.found", what + ": found on the route", along_cm.size(), queries);
   viewer::MapLayer driven{
       .label = "driven way", .colour = viewer::PlotColour::grey, .lines = {places}};
   add_plot(

@@ -50,19 +50,23 @@ Mapper::Result make_map(const Dataset& recording, const std::filesystem::path& p
 }
 
 void bind_maps(py::module_& m) {
-  Record<MapNode>(m, "MapNode", "A node of a map: a view and its pose.")
-      .field("view", &MapNode::view, "Its id in the memory.")
-      .field("pose", &MapNode::pose, "In the frame of its connected component.")
-      .field("component", &MapNode::component,
+  Record<TopologicalMap::Node>(m, "MapNode", "A node of a map: a view and its pose.")
+      .field("view", &TopologicalMap::Node::view, "Its id in the memory.")
+      .field("pose", &TopologicalMap::Node::pose, "In the frame of its connected component.")
+      .field("component", &TopologicalMap::Node::component,
              "Number of its connected component; components have no common frame.");
-  Record<MapEdge>(m, "MapEdge", "Two nodes and the motion between them.")
-      .field("a", &MapEdge::a, "One node, by its view.")
-      .field("b", &MapEdge::b, "The other.")
-      .field("a_from_b", &MapEdge::a_from_b, "Pose of b in the frame of a.")
+  Record<TopologicalMap::Edge>(m, "MapEdge", "Two nodes and the motion between them.")
+      .field("a", &TopologicalMap::Edge::a, "One node, by its view.")
+      .field("b", &TopologicalMap::Edge::b, "The other.")
+      .field("a_from_b", &TopologicalMap::Edge::a_from_b, "Pose of b in the frame of a.")
       .field(
-          "kind", [](const MapEdge& e) { return link_names[static_cast<std::size_t>(e.kind)]; },
+          "kind",
+          [](const TopologicalMap::Edge& e) {
+            return link_names[static_cast<std::size_t>(e.kind)];
+          },
           "'sequence', 'neighbour' or 'closure'.")
-      .field("weight", &MapEdge::weight, "Small where the rest of the map contradicts.");
+      .field("weight", &TopologicalMap::Edge::weight,
+             "Small where the rest of the map contradicts.");
   Record<TopologicalMap>(m, "TopologicalMap", "A map of places with closed loops.")
       .field("nodes", &TopologicalMap::nodes, "Ascending by view.")
       .field("edges", &TopologicalMap::edges, "Each joins two nodes of the map.")

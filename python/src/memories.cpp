@@ -12,9 +12,9 @@ namespace {
 
 constexpr std::array<const char*, 3> link_names{"sequence", "neighbour", "closure"};
 
-LinkKind link_kind(const std::string& name) {
+Link::Kind link_kind(const std::string& name) {
   for (std::size_t i = 0; i < link_names.size(); ++i) {
-    if (name == link_names[i]) return static_cast<LinkKind>(i);
+    if (name == link_names[i]) return static_cast<Link::Kind>(i);
   }
   throw ContractError("kind", "'" + name + "'", "'sequence', 'neighbour', 'closure'");
 }

@@ -54,7 +54,7 @@ void bind_navigation(py::module_& m) {
           "events",
           [](const NavigationDecision& d) {
             std::vector<std::string_view> names;
-            for (const NavigationEvent event : d.events) names.push_back(name_of(event));
+            for (const NavigationDecision::Event event : d.events) names.push_back(name_of(event));
             return names;
           },
           "Reasons for a decision other than to continue, such as 'kidnapped' or 'closed'.");

@@ -119,7 +119,7 @@ void bind_worlds(py::module_& m) {
       .def_property_readonly(
           "robot_radius_m",
           [](const simulation::SimulatedWorld& w) { return w.options().free_space.robot_radius_m; },
-          "Of the robot, which is parsed for a cylinder.")
+          "Of the robot, which is treated as a cylinder.")
       .def_property_readonly(
           "free_area_m2",
           [](const simulation::SimulatedWorld& w) { return w.free_space().area_m2(); },

@@ -56,10 +56,10 @@ def test_memory_may_grow_while_threads_ask(arrays):
         return memory.search(query, top=1).matches[0].view
 
     with concurrent.futures.ThreadPoolExecutor(8) as threads:
-        asked = [threads.submit(ask, i) for i in range(200)]
+        futures = [threads.submit(ask, i) for i in range(200)]
         for i in range(100, 300, 50):
             memory.extend(arrays[0][i:i + 50], arrays[1][i:i + 50])
-        assert {one.result() for one in asked} == {7}
+        assert {one.result() for one in futures} == {7}
     assert len(memory) == 300
 
 

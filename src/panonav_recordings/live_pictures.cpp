@@ -206,7 +206,7 @@ struct LivePictures::Implementation {
   std::shared_ptr<Input> input;
   std::optional<std::pair<RawPicture, std::shared_ptr<Input>>> newest;
   Counts counts;
-  bool asked = false;  // for the first picture
+  bool has_been_read = false;  // for the first picture
   std::atomic<bool> stopped = false;
   bool ended = false;
   std::thread thread;
@@ -258,7 +258,7 @@ std::optional<LivePicture> LivePictures::next() {
     std::optional<std::pair<RawPicture, std::shared_ptr<Input>>> newest;
     {
       std::unique_lock lock(self.mutex);
-      if (!std::exchange(self.asked, true)) self.counts.dropped = 0;
+      if (!std::exchange(self.has_been_read, true)) self.counts.dropped = 0;
       self.arrived.wait(lock, [&] { return self.newest || self.ended || self.stopped; });
       if (self.stopped || !self.newest) return std::nullopt;
       newest = std::exchange(self.newest, std::nullopt);

@@ -7,18 +7,19 @@
 
 namespace panonav::recordings {
 
-/// Writes a data set, also one of another recording or a video, as an MCAP file of ROS 2 messages
-/// (docs/formats.md, section "Recordings"), which appears whole or not at all. Pictures keep the
-/// bytes of their files; their layout is not in it. Headings are left out where not every position
-/// has one; where not every picture has a stamp they are one second apart. Returns what every
-/// picture has. `advance` is called after each picture. Throws FileError, and ContractError on
+/// Writes a data set, or a recording or video opened as one, as an MCAP file of ROS 2 messages
+/// (docs/formats.md, section "Recordings"); on failure no file is left. The bytes of JPEG and PNG
+/// files are copied; the camera layout is not stored. Headings are written only if every position
+/// has one; unless every image has a stamp, stamps are one second apart. Returns the fields that
+/// all images have. `advance` is called after each image. Throws FileError, and ContractError on
 /// stamps below 0 or beyond 2038.
 Dataset::Fields convert_to_recording(const Dataset& dataset, const std::filesystem::path& file,
                                      const std::function<void()>& advance = {});
 
-/// Writes a data set of a recording or a video as a new folder, which appears whole or not at all.
-/// JPEG and PNG keep their bytes, other pictures become PNG. Fields that only some pictures have
-/// are left out. Returns the fields of every picture. Throws FileError.
+/// Converts a recording or video to a data set in a new folder; on failure no folder is left. The
+/// bytes of JPEG and PNG files are copied, other images become PNG. Fields that only some images
+/// have are dropped. Returns the fields that all images have. `advance` is called after each image.
+/// Throws FileError.
 Dataset::Fields convert_to_dataset(const Dataset& recording, const std::filesystem::path& folder,
                                    const std::function<void()>& advance = {});
 

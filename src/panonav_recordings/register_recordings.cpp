@@ -11,14 +11,10 @@ namespace panonav::recordings {
 
 namespace {
 
-void select_if_needed(Dataset& dataset, const Dataset::Selection& selection) {
-  if (selection.by_time() || selection.every > 1) select_pictures(dataset, selection);
-}
-
 Dataset open_recording(const std::filesystem::path& path, const PictureSource& source,
                        const InputOptions& options) {
   Dataset opened = read_recording(path, source, options.topics);
-  select_if_needed(opened, options.selection);
+  select_pictures(opened, options.selection);
   return opened;
 }
 
@@ -40,7 +36,7 @@ bool is_standard_input(const std::filesystem::path& path) {
 Dataset open_standard_input(const std::filesystem::path& /*path*/, const PictureSource& source,
                             const InputOptions& options) {
   Dataset opened = read_jpeg_stream(STDIN_FILENO, "standard input", source);
-  select_if_needed(opened, options.selection);
+  select_pictures(opened, options.selection);
   return opened;
 }
 

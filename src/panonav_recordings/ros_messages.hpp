@@ -15,8 +15,8 @@
 
 /// The messages of ROS that panonav reads and writes, as plain values. Members are named and
 /// ordered as in the .msg files, `type` is the type's name; a stamp is one number, `seq` of ROS 1
-/// is left out. Bulk data (pictures, clouds) is not owned: of a message that was read, to its
-/// bytes.
+/// is left out. Bulk data (pictures, clouds) is not owned; that of a
+/// message that was read belongs to the bytes it was read from.
 namespace panonav::recordings::ros {
 
 /// The type std_msgs/Header: when, and in which frame.

@@ -78,8 +78,7 @@ void convert_yuv_row(Row row, const Encoding& from, int width, std::uint8_t* to)
 
 /// Each colour that a pixel lacks is the mean of its two or four neighbours of that colour; the
 /// picture is mirrored at its edges, which keeps the pattern.
-void convert_bayer_row(const Image& message, Row data, const Encoding& from,
-                       panonav::Image& picture) {
+void convert_bayer(const Image& message, Row data, const Encoding& from, panonav::Image& picture) {
   const int width = picture.width();
   const int height = picture.height();
   if (width < 2 || height < 2) {
@@ -152,7 +151,7 @@ panonav::Image picture_of(const Image& message, const ImageLimits& limits) {
   panonav::Image picture(static_cast<int>(width), static_cast<int>(height), grey ? 1 : 3);
   const Row data = message.data.data();
   if (found->kind == Encoding::Kind::bayer) {
-    convert_bayer_row(message, data, *found, picture);
+    convert_bayer(message, data, *found, picture);
     return picture;
   }
   for (int v = 0; v < picture.height(); ++v) {

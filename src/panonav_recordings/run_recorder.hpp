@@ -24,9 +24,9 @@ namespace panonav::recordings {
 
 /// An edge of a map between two places.
 struct RunEdge {
-  Point2 from;                         ///< one end
-  Point2 to;                           ///< the other
-  LinkKind kind = LinkKind::sequence;  ///< why they are joined
+  Point2 from;                             ///< one end
+  Point2 to;                               ///< the other
+  Link::Kind kind = Link::Kind::sequence;  ///< why they are joined
 };
 
 /// Data of a reference besides its position.

@@ -104,8 +104,8 @@ void GoalDriver::drive_to_goal(const Observation& observation, const std::option
   const RobotNavigator::Step step = navigator_->step(observation, report);
   const NavigationDecision& decision = step.decision;
   const std::string state(name_of(decision.state));
-  if (decision.state != NavigationState::moving) {
-    end(state, decision.state == NavigationState::arrived ? fine : error);
+  if (decision.state != NavigationDecision::State::moving) {
+    end(state, decision.state == NavigationDecision::State::arrived ? fine : error);
     return;
   }
   send(step.velocity);

@@ -26,7 +26,7 @@ Affine3 inverse(const Affine3& b_from_a) {
   return result;
 }
 
-// Normalises names: "Ground Plane" and ".../ground_plane" are one: Gazebo's database and its
+// Normalises a name: "Ground Plane" and ".../ground_plane" are one, as Gazebo's database and its
 // servers differ.
 std::string normalise_model_name(std::string_view uri) {
   std::string name(uri.substr(uri.find_last_of('/') + 1));
@@ -97,8 +97,8 @@ double light_on_floor(const Scene& scene, double x_m, double y_m, double floor_m
   return light;
 }
 
-// Scales the light of Gazebo's lamps, which add up beyond white: exposes for the brightest floor
-// that lies under a lamp: all light is scaled so that it is 1 there, if it is more.
+// Scales the light of Gazebo's lamps, which add up beyond white, so that it is 1 on the brightest
+// floor under a lamp, if it is more.
 void expose(Scene& scene) {
   const double floor_m = extent(scene)->first.z_m;
   double brightest = scene.ambient;

@@ -18,7 +18,6 @@ namespace panonav::simulation {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr double right_closure_m = 1.0;
 
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
@@ -139,13 +138,11 @@ MappedRecording map_recording(const MappingRecording& recording, const MappingRu
     result.estimate.push_back(result.map.nodes[i].pose.position());
     result.truth.push_back(recording.truth[result.number[i]].position());
   }
-  const auto closures = count_closures(
-      result.map,
-      [&](ViewId view) -> std::optional<Point2> {
-        const auto found = std::ranges::lower_bound(result.map.nodes, view, {}, &MapNode::view);
-        return result.truth[static_cast<std::size_t>(found - result.map.nodes.begin())];
-      },
-      right_closure_m);
+  const auto closures = count_closures(result.map, [&](ViewId view) -> std::optional<Point2> {
+    const auto found =
+        std::ranges::lower_bound(result.map.nodes, view, {}, &TopologicalMap::Node::view);
+    return result.truth[static_cast<std::size_t>(found - result.map.nodes.begin())];
+  });
   result.right_closures = closures.right;
   result.wrong_closures = closures.wrong;
   return result;

@@ -159,7 +159,7 @@ RememberedPlace memorise_drive(const MissionPlace& place, const std::vector<Pose
   }
   mapper.finish();
   const TopologicalMap map = mapper.map();
-  for (const MapNode& node : map.nodes) {
+  for (const TopologicalMap::Node& node : map.nodes) {
     if (node.component != 0) continue;
     memory.set_pose(node.view, ReferencePose{node.pose.x_m, node.pose.y_m, node.pose.heading_rad});
   }
@@ -168,7 +168,7 @@ RememberedPlace memorise_drive(const MissionPlace& place, const std::vector<Pose
   std::vector<KnownRoute> routes;
   if (place.line) {
     std::vector<KnownRoute::View> placed;
-    for (const MapNode& node : map.nodes) {
+    for (const TopologicalMap::Node& node : map.nodes) {
       if (node.component == 0) placed.push_back({node.view, node.pose});
     }
     const std::uint64_t seed_of_lines = Random(seed, 1).next();
@@ -330,7 +330,7 @@ class Voyage {
       const NavigationDecision decision = step(navigator);
       run.decisions.push_back(decision);
       if (report_step) report_step(decision, robot_.pose());
-      if (decision.state != NavigationState::moving) {
+      if (decision.state != NavigationDecision::State::moving) {
         run.end = decision.state;
         break;
       }
@@ -373,9 +373,10 @@ class Voyage {
       report.moved = moved;
     }
     const NavigationDecision decision = navigator.observe(view, report);
-    in_doubt_ = std::ranges::any_of(decision.events, [](NavigationEvent event) {
-      return event == NavigationEvent::unknown_place || event == NavigationEvent::relocalised ||
-             event == NavigationEvent::kidnapped;
+    in_doubt_ = std::ranges::any_of(decision.events, [](NavigationDecision::Event event) {
+      return event == NavigationDecision::Event::unknown_place ||
+             event == NavigationDecision::Event::relocalised ||
+             event == NavigationDecision::Event::kidnapped;
     });
     return decision;
   }
@@ -411,14 +412,15 @@ void require_goal(const RememberedPlace& remembered, ViewId goal) {
 
 }  // namespace
 
-std::string explain_other_ends(const std::map<NavigationState, std::size_t>& ends,
-                               std::size_t wrongly, NavigationState expected) {
+std::string explain_other_ends(const std::map<NavigationDecision::State, std::size_t>& ends,
+                               std::size_t wrongly, NavigationDecision::State expected) {
   std::string text;
   const auto add = [&](std::size_t count, const std::string& end) {
     if (count == 0) return;
     text += (text.empty() ? "of the other runs, " : ", ") + std::to_string(count) + " " + end;
   };
-  if (expected == NavigationState::arrived) add(wrongly, "report an arrival but are farther off");
+  if (expected == NavigationDecision::State::arrived)
+    add(wrongly, "report an arrival but are farther off");
   for (const auto& [end, count] : ends) {
     if (end != expected) add(count, "end as " + std::string(name_of(end)));
   }
@@ -446,7 +448,7 @@ std::vector<MissionRun> run_tour(const MissionPlace& place, const RememberedPlac
   for (const ViewId goal : goals) {
     runs.push_back(voyage.run(navigator, goal, std::nullopt, {}, {}));
     // A robot that ended lost must not begin from a place in which it did not believe itself.
-    if (runs.back().end == NavigationState::lost) navigator.forget_place();
+    if (runs.back().end == NavigationDecision::State::lost) navigator.forget_place();
   }
   return runs;
 }
@@ -467,14 +469,14 @@ std::vector<MissionRun> run_missions(const MissionPlace& place, const Remembered
 std::vector<Mission> draw_missions(const MissionPlace& place, const RememberedPlace& remembered,
                                    const RandomMissionOptions& options, std::uint64_t seed) {
   require(options.count >= 0, "missions", options.count, ">= 0");
-  require(options.beside_m > 0.0, "distance from a reference", options.beside_m, "> 0");
+  require(options.max_distance_m > 0.0, "distance from a reference", options.max_distance_m, "> 0");
   Random random(seed, 3);
   const FreeSpace& space = *place.free_space;
   const auto anywhere = [&] {
-    if (!std::isfinite(options.beside_m)) return space.random_pose(random);
+    if (!std::isfinite(options.max_distance_m)) return space.random_pose(random);
     for (;;) {
       const Pose2& reference = remembered.truth[random.index(remembered.truth.size())];
-      const double off_m = options.beside_m * std::sqrt(random.uniform());
+      const double off_m = options.max_distance_m * std::sqrt(random.uniform());
       const double direction_rad = random.uniform(-std::numbers::pi, std::numbers::pi);
       const Pose2 there{reference.x_m + off_m * std::cos(direction_rad),
                         reference.y_m + off_m * std::sin(direction_rad),

@@ -141,7 +141,7 @@ struct Mission {
 struct RandomMissionOptions {
   int count = 100;
   /// Largest distance of random starts and kidnapping targets from a reference; infinite: anywhere.
-  double beside_m = std::numeric_limits<double>::infinity();
+  double max_distance_m = std::numeric_limits<double>::infinity();
   bool kidnapped = false;  ///< somebody kidnaps the robot on its way
 };
 
@@ -153,7 +153,7 @@ struct RandomMissionOptions {
                                                  std::uint64_t seed);
 
 struct MissionRun {
-  NavigationState end = NavigationState::moving;
+  NavigationDecision::State end = NavigationDecision::State::moving;
   std::vector<Pose2> path;  ///< true poses at the steps, and the last one
   std::vector<NavigationDecision> decisions;
   std::optional<std::size_t> kidnapped_at;  ///< the step after which the robot was kidnapped
@@ -165,15 +165,15 @@ struct MissionRun {
 
   /// True if the robot reports an arrival within `radius_m` of the goal.
   [[nodiscard]] bool arrives(double radius_m) const noexcept {
-    return end == NavigationState::arrived && end_distance_m <= radius_m;
+    return end == NavigationDecision::State::arrived && end_distance_m <= radius_m;
   }
 };
 
 /// Describes the missions that do not end as `expected`. `ends` counts all missions, `wrongly`
 /// those that report an arrival but are farther off.
-[[nodiscard]] std::string explain_other_ends(const std::map<NavigationState, std::size_t>& ends,
-                                             std::size_t wrongly,
-                                             NavigationState expected = NavigationState::arrived);
+[[nodiscard]] std::string explain_other_ends(
+    const std::map<NavigationDecision::State, std::size_t>& ends, std::size_t wrongly,
+    NavigationDecision::State expected = NavigationDecision::State::arrived);
 
 /// Called after each step, with the true pose.
 using StepReport = std::function<void(const NavigationDecision& decision, const Pose2& pose)>;

@@ -71,11 +71,13 @@ PlaceRecording record_place(Scene scene, const PlaceRecordingOptions& options, E
   }
   require(!grid.empty(), "reference views", 0.0, ">= 1");
   Random random(options.seed, 77);
-  std::vector<Pose2> asked;
-  for (int q = 0; q < options.queries; ++q) asked.push_back(place.free_space->random_pose(random));
+  std::vector<Pose2> query_poses;
+  for (int q = 0; q < options.queries; ++q)
+    query_poses.push_back(place.free_space->random_pose(random));
   const std::uint64_t noise = options.seed * 100003U;
   place.references = take_views(place, place.rendering, grid, noise, {}, executor);
-  place.queries = take_views(place, place.rendering, asked, noise + grid.size(), {}, executor);
+  place.queries =
+      take_views(place, place.rendering, query_poses, noise + grid.size(), {}, executor);
   return place;
 }
 

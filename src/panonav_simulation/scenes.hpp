@@ -19,9 +19,9 @@ struct SceneVariation {
 };
 
 /// Returns the names of the built-in scenes:
-/// - office: 5 x 2 m of floor amid desks and shelves, as in [M04] and [M03]
+/// - office: 5 x 2 m of free floor amid desks and shelves, as in [M04] and [M03]
 /// - hall: 7 x 7 m of free floor in a hall with things along its walls
-/// - hall_periodic: the same with pillars and pictures that repeat every 2 m
+/// - hall_periodic: the same with pillars and pictures repeated every 2 m
 /// - arena: 1.4 x 1.2 m of table with toy houses, camera 8 cm above it, as in [S06]
 /// - lab: a 7 x 5 m room, for [Y03] and [S06] section 3
 /// - loop: a round trip of 20 m, as in [F11]

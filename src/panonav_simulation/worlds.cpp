@@ -60,8 +60,11 @@ bool has_scene(const std::filesystem::path& data, const std::string& name) {
 }
 
 Scene make_or_read_scene(const std::filesystem::path& data, const std::string& name,
-                         std::uint64_t seed) {
-  return is_built_in(name) ? make_scene(name, {.seed = seed}) : read_world(data, name);
+                         const SceneVariation& variation) {
+  if (is_built_in(name)) return make_scene(name, variation);
+  Scene scene = read_world(data, name);
+  if (variation.light != 1.0) scale_light(scene, variation.light);
+  return scene;
 }
 
 }  // namespace panonav::simulation

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "panonav_simulation/scene.hpp"
+#include "panonav_simulation/scenes.hpp"
 
 namespace panonav::simulation {
 
@@ -20,8 +21,9 @@ namespace panonav::simulation {
 
 /// True if the name is a built-in scene or an existing world.
 [[nodiscard]] bool has_scene(const std::filesystem::path& data, const std::string& name);
-/// Returns the built-in scene of this seed, or the world. Throws FileError.
+/// Returns the variation of a built-in scene; of a world, only its light is varied. Throws
+/// FileError.
 [[nodiscard]] Scene make_or_read_scene(const std::filesystem::path& data, const std::string& name,
-                                       std::uint64_t seed);
+                                       const SceneVariation& variation);
 
 }  // namespace panonav::simulation

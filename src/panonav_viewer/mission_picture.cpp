@@ -18,7 +18,7 @@ bool is_known(const Pose2& pose) {
   return std::isfinite(pose.x_m) && std::isfinite(pose.y_m);
 }
 
-Point2 ahead(Point2 from, double direction_rad, double distance_m) {
+Point2 offset_point(Point2 from, double direction_rad, double distance_m) {
   return {from.x_m + distance_m * std::cos(direction_rad),
           from.y_m + distance_m * std::sin(direction_rad)};
 }
@@ -26,9 +26,9 @@ Point2 ahead(Point2 from, double direction_rad, double distance_m) {
 /// An arrow with its tail at `from`.
 std::vector<Point2> make_arrow(Point2 from, double direction_rad, double length_m) {
   constexpr double barb_rad = std::numbers::pi - 0.5;
-  const Point2 tip = ahead(from, direction_rad, length_m);
-  return {from, tip, ahead(tip, direction_rad + barb_rad, 0.4 * length_m), tip,
-          ahead(tip, direction_rad - barb_rad, 0.4 * length_m)};
+  const Point2 tip = offset_point(from, direction_rad, length_m);
+  return {from, tip, offset_point(tip, direction_rad + barb_rad, 0.4 * length_m), tip,
+          offset_point(tip, direction_rad - barb_rad, 0.4 * length_m)};
 }
 
 /// Each reference, and where it sends the robot.

@@ -125,8 +125,8 @@ std::string event(const std::string& name, const std::string& data) {
 }  // namespace
 
 struct ViewServer::Implementation {
-  explicit Implementation(const ViewServerOptions& number)
-      : options(number),
+  explicit Implementation(const ViewServerOptions& server_options)
+      : options(server_options),
         token(make_random_token()),
         page(live_page(options.title, options.replay, name_of(options.takes))),
         server({.address = options.address, .port = options.port, .headers = answer_headers},
@@ -149,22 +149,22 @@ struct ViewServer::Implementation {
         !server::is_own_page(request)) {
       return only(404);
     }
-    const std::string_view asked = std::string_view(request.path).substr(1 + token.size());
-    if ((options.replay || options.takes != ViewWish::none) && asked == "/control") {
+    const std::string_view resource = std::string_view(request.path).substr(1 + token.size());
+    if ((options.replay || options.takes != ViewWish::none) && resource == "/control") {
       if (request.method != "POST") return only(405);
       return only(handle_control(request.body) ? 204 : 400);
     }
     if (request.method != "GET") return only(405);
-    if (asked == "/") return {.type = "text/html; charset=utf-8", .content = page};
-    if (asked == "/events") return events();
+    if (resource == "/") return {.type = "text/html; charset=utf-8", .content = page};
+    if (resource == "/events") return events();
     constexpr std::string_view views = "/view/";
-    if (asked.starts_with(views)) {
-      const auto number = number_in(asked.substr(views.size()));
+    if (resource.starts_with(views)) {
+      const auto number = number_in(resource.substr(views.size()));
       return number ? reference(*number) : only(404);
     }
     constexpr std::string_view pictures = "/picture/";
-    if (!asked.starts_with(pictures)) return only(404);
-    const std::string_view rest = asked.substr(pictures.size());
+    if (!resource.starts_with(pictures)) return only(404);
+    const std::string_view rest = resource.substr(pictures.size());
     const std::size_t slash = rest.find('/');
     const auto number = number_in(rest.substr(0, slash));
     if (slash == std::string_view::npos || !number) return only(404);
@@ -256,7 +256,7 @@ struct ViewServer::Implementation {
     Implementation& all_;
     bool greeted_ = false;
     bool sent_end_ = false;
-    std::size_t next_ = 0;      // number of the frame that is still to be told
+    std::size_t next_ = 0;      // number of the next frame to send
     std::size_t retained_ = 0;  // as of `RetainedParts::times`
     Clock::time_point said_ = Clock::now();
   };
@@ -310,12 +310,12 @@ struct ViewServer::Implementation {
     }
     const auto& known = retained.moment.references;
     if (known.empty()) return false;
-    constexpr double beside_m = 10.0;
-    const auto is_beside = [&](double value, double Point2::*axis) {
+    constexpr double margin_m = 10.0;
+    const auto is_near = [&](double value, double Point2::*axis) {
       const auto [low, high] = std::ranges::minmax(known, {}, axis);
-      return value >= low.*axis - beside_m && value <= high.*axis + beside_m;
+      return value >= low.*axis - margin_m && value <= high.*axis + margin_m;
     };
-    if (!is_beside(pose.x_m, &Point2::x_m) || !is_beside(pose.y_m, &Point2::y_m)) return false;
+    if (!is_near(pose.x_m, &Point2::x_m) || !is_near(pose.y_m, &Point2::y_m)) return false;
     wish = pose;
     return true;
   }

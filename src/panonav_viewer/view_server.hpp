@@ -23,7 +23,7 @@ struct ViewServerOptions {
   std::string address = "127.0.0.1";  ///< an IPv4 address of this machine, to listen at
   int port = 0;                       ///< 0 .. 65535; 0: a free one
   std::string title = "panonav";      ///< of the page
-  std::size_t max_viewers = 8;        ///< at a time; further ones are told to come later
+  std::size_t max_viewers = 8;        ///< at a time; further ones are refused
   /// The run is one of a recording: it waits for the first viewer, continues at the pace of its
   /// stamps, and viewers may hold it, take it step by step, and change its pace. Two seconds after
   /// the last viewer has left it continues without waiting.
@@ -58,8 +58,9 @@ class ViewServer {
   /// replay waits until it is the moment's turn.
   void add(recordings::RunMoment moment);
   [[nodiscard]] std::size_t viewers() const;
-  /// Returns the last wish of a viewer once: of the kind that the run accepts, finite, and at most
-  /// 10 m beside the references that it has told.
+  /// Returns the latest pose or goal that a viewer has set, and clears it. Those that the run does
+  /// not accept, that are not finite or lie more than 10 m outside the bounding box of the reported
+  /// references are dropped.
   [[nodiscard]] std::optional<ReferencePose> consume_wish();
 
  private:

@@ -154,19 +154,20 @@ TEST_P(EveryCamera, OutsideTheBandNothingIsSeen) {
         project(camera(), Direction3::from_angles(up_rad + std::numbers::pi / 4, beyond_rad)));
     return;
   }
-  int asked = 0;
+  int projected = 0;
   for (int i = 0; i < 360; ++i) {
     const double azimuth_rad = i * std::numbers::pi / 180;
     for (const double beyond_rad : {1e-4, 0.1, 0.5}) {
       for (const double elevation_rad : {band.bottom_rad - beyond_rad, band.top_rad + beyond_rad}) {
         if (std::abs(elevation_rad) > std::numbers::pi / 2) continue;
-        ++asked;
+        ++projected;
         EXPECT_FALSE(project(camera(), Direction3::from_angles(azimuth_rad, elevation_rad)));
       }
     }
   }
-  EXPECT_TRUE(asked > 300 || band == (ElevationBand{-std::numbers::pi / 2, std::numbers::pi / 2}))
-      << asked;
+  EXPECT_TRUE(projected > 300 ||
+              band == (ElevationBand{-std::numbers::pi / 2, std::numbers::pi / 2}))
+      << projected;
 }
 
 TEST_P(EveryCamera, NeverNotANumber) {

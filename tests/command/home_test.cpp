@@ -199,13 +199,13 @@ TEST_F(Home, SaysItInWords) {
 TEST_F(Home, ThePublishedRuleAndOneRowAreOtherRules) {
   const std::vector<std::string> ask{"home", folder / "home.png", folder / ("run/" + view_name(0)),
                                      "--json"};
-  const auto asked = [&](const std::vector<std::string>& more) {
+  const auto home_with = [&](const std::vector<std::string>& more) {
     return json::parse(run_panonav(with(ask, more)).out);  // one row alone may tell nothing
   };
-  const auto ours = asked({});
-  EXPECT_EQ(asked({"--published", "5"})["frequencies"], 5.0);
-  EXPECT_NE(asked({"--horizon"})["correlation"], ours["correlation"]);
-  EXPECT_NE(asked({"--components", "8"})["xi"], ours["xi"]);
+  const auto ours = home_with({});
+  EXPECT_EQ(home_with({"--published", "5"})["frequencies"], 5.0);
+  EXPECT_NE(home_with({"--horizon"})["correlation"], ours["correlation"]);
+  EXPECT_NE(home_with({"--components", "8"})["xi"], ours["xi"]);
 }
 
 TEST_F(Home, BadInputIsOneLine) {

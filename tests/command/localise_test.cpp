@@ -30,19 +30,19 @@ class Localise : public ::testing::Test {
     world_ = landmark_world(7);
     write_dataset(*folder_ / "grid", *world_, grid_poses(5));
     Random random(3);
-    std::vector<Pose2> asked;
+    std::vector<Pose2> query_poses;
     for (int i = 0; i < 20; ++i) {
-      asked.push_back({random.uniform(0.0, 2.0), random.uniform(0.0, 2.0),
-                       random.uniform(-std::numbers::pi, std::numbers::pi)});
+      query_poses.push_back({random.uniform(0.0, 2.0), random.uniform(0.0, 2.0),
+                             random.uniform(-std::numbers::pi, std::numbers::pi)});
     }
-    asked_ = asked;
-    write_dataset(*folder_ / "asked", *world_, asked);
+    query_poses_ = query_poses;
+    write_dataset(*folder_ / "queries", *world_, query_poses);
     run_well({"memorise", *folder_ / "grid", memory()});
   }
   static void TearDownTestSuite() { folder_.reset(); }
   static std::string memory() { return *folder_ / "grid.panonav"; }
   static std::string grid() { return *folder_ / "grid"; }
-  static std::string asked() { return *folder_ / "asked"; }
+  static std::string queries() { return *folder_ / "queries"; }
 
   static std::vector<json> answers(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), "localise");
@@ -52,7 +52,7 @@ class Localise : public ::testing::Test {
 
   inline static std::optional<TemporaryFolder> folder_;
   inline static std::optional<ToyWorld> world_;
-  inline static std::optional<std::vector<Pose2>> asked_;
+  inline static std::optional<std::vector<Pose2>> query_poses_;
 };
 
 TEST_F(Localise, UpdatesWhatHasChangedAndUndoTakesItBack) {
@@ -96,10 +96,10 @@ TEST_F(Localise, UpdatesWhatHasChangedAndUndoTakesItBack) {
 
 TEST_F(Localise, TheLibraryGivesTheCommandsAnswerToTheBit) {
   const PlaceRecogniser recogniser(memory());
-  const auto reported = answers({memory(), asked()});
+  const auto reported = answers({memory(), queries()});
   int known = 0;
   for (std::size_t i = 0; i < reported.size(); ++i) {
-    const auto file = std::filesystem::path(asked()) / view_name(i);
+    const auto file = std::filesystem::path(queries()) / view_name(i);
     const Place place = recogniser.localise(read_image(file));
     EXPECT_EQ(place.known, reported[i]["known"].get<bool>());
     EXPECT_EQ(place.known_probability, reported[i]["known_probability"].get<double>());
@@ -120,7 +120,7 @@ TEST_F(Localise, TheLibraryGivesTheCommandsAnswerToTheBit) {
 }
 
 TEST_F(Localise, JsonLinesHaveExactlyTheDocumentedFields) {
-  const auto all = answers({memory(), asked()});
+  const auto all = answers({memory(), queries()});
   ASSERT_EQ(all.size(), 20U);
   for (const auto& answer : all) {
     EXPECT_EQ(keys_of(answer),
@@ -146,17 +146,17 @@ TEST_F(Localise, JsonLinesHaveExactlyTheDocumentedFields) {
 }
 
 TEST_F(Localise, FindsPlaceAndHeadingOfPosesBetweenTheReferences) {
-  const auto all = answers({memory(), asked()});
-  ASSERT_EQ(all.size(), asked_->size());
+  const auto all = answers({memory(), queries()});
+  ASSERT_EQ(all.size(), query_poses_->size());
   int near = 0;
   int heading_right = 0;
   for (std::size_t i = 0; i < all.size(); ++i) {
     EXPECT_EQ(all[i]["file"], view_name(i));
     if (all[i]["position"].is_null()) continue;
     const Point2 found{all[i]["position"]["x_m"], all[i]["position"]["y_m"]};
-    near += distance(found, (*asked_)[i].position()) <= 0.5 ? 1 : 0;
+    near += distance(found, (*query_poses_)[i].position()) <= 0.5 ? 1 : 0;
     if (!all[i]["heading_rad"].is_null()) {
-      const double error = angle_difference(all[i]["heading_rad"], (*asked_)[i].heading_rad);
+      const double error = angle_difference(all[i]["heading_rad"], (*query_poses_)[i].heading_rad);
       heading_right += std::abs(error) <= radians(15.0) ? 1 : 0;
     }
   }
@@ -193,7 +193,7 @@ TEST_F(Localise, ExcludeSameFileLeavesOnlyThatViewOut) {
 }
 
 TEST_F(Localise, ComponentsAndTopAreObeyed) {
-  const auto all = answers({memory(), asked(), "--components", "3", "--top", "2"});
+  const auto all = answers({memory(), queries(), "--components", "3", "--top", "2"});
   for (const auto& answer : all) {
     EXPECT_EQ(answer["matches"].size(), 2U);
     EXPECT_EQ(answer["components"], 3);
@@ -201,8 +201,8 @@ TEST_F(Localise, ComponentsAndTopAreObeyed) {
 }
 
 TEST_F(Localise, AnswersDoNotDependOnTheNumberOfThreads) {
-  const auto one = run_panonav({"localise", memory(), asked(), "--json", "--threads", "1"});
-  const auto three = run_panonav({"localise", memory(), asked(), "--json", "--threads", "3"});
+  const auto one = run_panonav({"localise", memory(), queries(), "--json", "--threads", "1"});
+  const auto three = run_panonav({"localise", memory(), queries(), "--json", "--threads", "3"});
   EXPECT_EQ(one.exit_code, 0);
   EXPECT_FALSE(one.out.empty());
   EXPECT_EQ(one.out, three.out);
@@ -228,14 +228,14 @@ TEST_F(Localise, AnotherWorldIsUnknownAndExitCodeSaysSo) {
 }
 
 TEST_F(Localise, OneImageAsksToo) {
-  const auto all = answers({memory(), (std::filesystem::path(asked()) / view_name(3)).string()});
+  const auto all = answers({memory(), (std::filesystem::path(queries()) / view_name(3)).string()});
   ASSERT_EQ(all.size(), 1U);
   EXPECT_EQ(all[0]["file"], view_name(3));
-  EXPECT_EQ(all[0]["matches"], answers({memory(), asked()})[3]["matches"]);
+  EXPECT_EQ(all[0]["matches"], answers({memory(), queries()})[3]["matches"]);
 }
 
 TEST_F(Localise, SeveralPicturesAndATable) {
-  const std::filesystem::path folder = asked();
+  const std::filesystem::path folder = queries();
   const std::string gone = folder / "gone.png";
   const std::string broken = *folder_ / "a, \"broken\".png";
   std::ofstream(broken) << "no picture";
@@ -267,18 +267,49 @@ TEST_F(Localise, SeveralPicturesAndATable) {
   EXPECT_TRUE(contains(rows[3], "\"\"broken\"\".png\",unreadable"));
 
   expect_refusal({"localise", memory(), gone, broken}, gone);
-  expect_refusal({"localise", memory(), gone, asked()}, "is a folder");
+  expect_refusal({"localise", memory(), gone, queries()}, "is a folder");
+}
+
+TEST_F(Localise, RunsInOrderKeepImagesThatCannotBeRead) {
+  const std::filesystem::path data = *folder_ / "in_order";
+  write_dataset(data, *world_, grid_poses(2));
+  std::ofstream(data / view_name(1)) << "no picture";
+  const std::string table = *folder_ / "in_order.csv";
+  const std::vector<std::string> in_order{"localise", memory(), data, "--record",
+                                          *folder_ / "in_order.mcap"};
+  const auto result = run_panonav(with(in_order, {"--json", "-o", table}));
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  const auto said = lines(result.out);
+  ASSERT_EQ(said.size(), 4U);
+  EXPECT_EQ(keys_of(json::parse(said[1])), (std::set<std::string>{"error", "file"}));
+  EXPECT_EQ(json::parse(said[1])["file"], view_name(1));
+  EXPECT_EQ(lines(bytes_of(table))[2].find(view_name(1) + ",unreadable,"), 0U);
+  for (std::size_t i = 0; i < 4; ++i) std::ofstream(data / view_name(i)) << "no picture";
+  const auto none = run_panonav(with(in_order, {"--json"}));
+  EXPECT_EQ(none.exit_code, 2);
+  EXPECT_TRUE(contains(none.err, view_name(0)));
+}
+
+TEST_F(Localise, ANewMemoryHasNothingToReport) {
+  const std::filesystem::path data = *folder_ / "few";
+  const std::filesystem::path report = *folder_ / "few_report";
+  write_dataset(data, *world_, grid_poses(2));
+  const auto result =
+      run_panonav({"localise", *folder_ / "few.panonav", data, "--add", "--report", report});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_TRUE(contains(result.err, "no report"));
+  EXPECT_FALSE(std::filesystem::exists(report / "index.html"));
 }
 
 TEST_F(Localise, TheReportShowsEachPictureAboveItsBestMatch) {
   const std::filesystem::path report = *folder_ / "report";
-  run_well({"localise", memory(), asked(), "--report", report, "--turn-randomly", "5"});
+  run_well({"localise", memory(), queries(), "--report", report, "--turn-randomly", "5"});
   const std::string page = bytes_of(report / "index.html");
   (void)text_of_page(page);
   const auto panels = panels_of(page);
   ASSERT_EQ(panels.size(), 1U);
   const json& run = panels[0].data;
-  const auto reported = answers({memory(), asked(), "--turn-randomly", "5"});
+  const auto reported = answers({memory(), queries(), "--turn-randomly", "5"});
   ASSERT_EQ(run["moments"].size(), reported.size());
   std::size_t known = 0;
   for (std::size_t i = 0; i < reported.size(); ++i) {
@@ -331,17 +362,17 @@ TEST_F(Localise, TheReportShowsEachPictureAboveItsBestMatch) {
 }
 
 TEST_F(Localise, TextForPeopleNamesEachImage) {
-  const auto result = run_panonav({"localise", memory(), asked()});
+  const auto result = run_panonav({"localise", memory(), queries()});
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_TRUE(contains(result.out, view_name(0)));
   EXPECT_EQ(result.out.find('\033'), std::string::npos) << "colours in a pipe";
 }
 
 TEST_F(Localise, WrongArgumentsAreRefused) {
-  expect_refusal({"localise", memory(), asked(), "--components", "0"}, "components");
-  expect_refusal({"localise", memory(), asked(), "--components", "400"}, "components");
-  expect_refusal({"localise", memory(), asked(), "--top", "0"}, "top");
-  expect_refusal({"localise", *folder_ / "nothing.panonav", asked()}, "nothing.panonav");
+  expect_refusal({"localise", memory(), queries(), "--components", "0"}, "components");
+  expect_refusal({"localise", memory(), queries(), "--components", "400"}, "components");
+  expect_refusal({"localise", memory(), queries(), "--top", "0"}, "top");
+  expect_refusal({"localise", *folder_ / "nothing.panonav", queries()}, "nothing.panonav");
   expect_refusal({"localise", memory(), *folder_ / "nowhere"}, "nowhere");
   expect_refusal({"localise", memory()}, "INPUT");
 }
@@ -373,7 +404,7 @@ TEST_F(Localise, BadQueriesAreNamed) {
 }
 
 TEST_F(Localise, AreasShrinkAndAreListedComponentByComponent) {
-  for (const auto& answer : answers({memory(), asked(), "--areas"})) {
+  for (const auto& answer : answers({memory(), queries(), "--areas"})) {
     const auto& areas = answer.at("areas");
     ASSERT_EQ(areas.size(), 15U);
     for (std::size_t i = 0; i < areas.size(); ++i) {
@@ -389,7 +420,7 @@ TEST_F(Localise, AreasShrinkAndAreListedComponentByComponent) {
     }
   }
   // Stopping at an accuracy, and a memory without positions.
-  const auto coarse = answers({memory(), asked(), "--areas", "--area-components", "2"});
+  const auto coarse = answers({memory(), queries(), "--areas", "--area-components", "2"});
   EXPECT_EQ(coarse.front()["areas"].size(), 2U);
   const std::string plain = *folder_ / "plain.panonav";
   std::filesystem::create_directory(*folder_ / "plain");

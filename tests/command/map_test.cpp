@@ -88,7 +88,7 @@ TEST_F(Map, ARecordHoldsTheFinishedMap) {
         for (std::size_t i = 0; i < cloud.width; ++i) {
           float kind = 0.0F;
           std::memcpy(&kind, &cloud.data[16 * i + 12], sizeof(kind));
-          of_closures += kind == static_cast<float>(LinkKind::closure) ? 1 : 0;
+          of_closures += kind == static_cast<float>(Link::Kind::closure) ? 1 : 0;
         }
         EXPECT_GE(of_closures, 2 * said["closures"].get<std::size_t>());
       });

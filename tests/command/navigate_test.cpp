@@ -134,9 +134,9 @@ TEST_F(Navigate, IsLostInAnotherBuilding) {
 
 TEST_F(Navigate, ARecordHoldsTheGoalThePlanAndTheDirections) {
   const std::string record = *folder / "mission.mcap";
-  const auto asked = there(memory, {"--json"});
-  const auto with_record = run_panonav(with(asked, {"--record", record}));
-  EXPECT_EQ(with_record.out, run_panonav(asked).out);  // it changes nothing
+  const auto arguments = there(memory, {"--json"});
+  const auto with_record = run_panonav(with(arguments, {"--record", record}));
+  EXPECT_EQ(with_record.out, run_panonav(arguments).out);  // it changes nothing
   const std::size_t looks = lines(with_record.out).size() - 1;
   auto topics = topics_of(record);
   EXPECT_GE(topics.at("/plan").second, 1U);
@@ -282,23 +282,24 @@ TEST(NavigateByLibrary, APictureInAndAVelocityOutWithOneAreaAtHand) {
   const auto memory = folder / "hall.panonav";
   ASSERT_EQ(run_panonav({"memorise", folder / "run", memory}).exit_code, 0);
   const auto goal = view_name(poses.size() - 2);
-  EXPECT_THROW(RobotNavigator(memory, goal, {.edges = GraphOrigin::links}), FileError)
+  EXPECT_THROW(RobotNavigator(memory, goal, {.edges = RobotNavigatorOptions::GraphOrigin::links}),
+               FileError)
       << "no links";
   {
     std::vector<Link> links;
     MemoryFile file = MemoryFile::open(memory, Access::read_write);
     const auto views = file.views();
     for (std::size_t i = 0; i < views.size(); ++i) {
-      if (i % rows + 1 < rows) links.push_back({views[i], views[i + 1], LinkKind::neighbour});
+      if (i % rows + 1 < rows) links.push_back({views[i], views[i + 1], Link::Kind::neighbour});
       if (i + rows < views.size())
-        links.push_back({views[i], views[i + rows], LinkKind::neighbour});
+        links.push_back({views[i], views[i + rows], Link::Kind::neighbour});
     }
     file.link(links);
   }
   RobotNavigator navigator(
       memory, goal,
       {.navigator = {.views_ahead = 0}, .planner = {.areas = {.views_per_area = 12}}});
-  EXPECT_EQ(navigator.origin(), GraphOrigin::links);
+  EXPECT_EQ(navigator.origin(), RobotNavigatorOptions::GraphOrigin::links);
   EXPECT_GE(navigator.navigator().planner().areas().nodes.size(), 4U);
 
   Pose2 robot{-3.4, 1.4, 1.0};
@@ -313,8 +314,8 @@ TEST(NavigateByLibrary, APictureInAndAVelocityOutWithOneAreaAtHand) {
     decisions += step.decided ? 1 : 0;
     max_loaded = std::max(max_loaded, navigator.navigator().loaded_views());
     robot = robot * integrate_velocity(step.velocity, BaseOptions{}.period_s);
-  } while (step.decision.state == NavigationState::moving && ++periods < 5000);
-  EXPECT_EQ(step.decision.state, NavigationState::arrived);
+  } while (step.decision.state == NavigationDecision::State::moving && ++periods < 5000);
+  EXPECT_EQ(step.decision.state, NavigationDecision::State::arrived);
   EXPECT_EQ(step.velocity, Velocity{});
   EXPECT_LT(distance(robot.position(), poses[poses.size() - 2].position()), 0.25);
   EXPECT_GT(decisions, 30);

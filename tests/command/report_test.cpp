@@ -136,10 +136,10 @@ TEST_F(Demo, TellsTheWholeStoryTwiceAndLeavesAMemoryThatAnswers) {
   EXPECT_EQ(memory["views"], said["views"]);
   EXPECT_TRUE(memory["elevations_rad"].is_array());
   EXPECT_NE(memory["full_scale"], 1.0);
-  const auto asked =
+  const auto result =
       run_panonav({"localise", out + "/office.panonav", out + "/query_run", "--json"});
-  EXPECT_EQ(asked.exit_code, 0) << asked.err;
-  EXPECT_EQ(lines(asked.out).size(), 8U);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(lines(result.out).size(), 8U);
   run_well({"localise", out + "/office.panonav", out + "/memory_run"});
 
   const auto tracked = run_from_page(out, "track");

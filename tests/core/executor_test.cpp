@@ -138,10 +138,10 @@ TEST(Executor, ManyShortLoopsDoNotHangOrLoseWork) {
 
 TEST(Executor, WhatBetweenThrowsEndsALoopAndTheNextOneRuns) {
   for (const int threads : {1, 4}) {
-    int asked = 0;
+    int checks = 0;
     bool interrupted = true;
     Executor executor(threads, [&] {
-      if (++asked >= 3 && interrupted) throw std::runtime_error("the user");
+      if (++checks >= 3 && interrupted) throw std::runtime_error("the user");
     });
     std::atomic<int> calls = 0;
     const auto work = [&](std::size_t, std::size_t, std::size_t) {

@@ -7,7 +7,7 @@
 namespace panonav::testing {
 namespace {
 
-TEST(ReadableLine, KeepsUtf8AndReplacesTheRest) {
+TEST(ToReadableLine, KeepsUtf8AndReplacesTheRest) {
   const std::string fine = "a \"quote\" \xC3\xA4 \xE2\x82\xAC \xF0\x9F\xA4\x96 \xF4\x8F\xBF\xBF";
   EXPECT_EQ(to_readable_line(fine), fine);
   EXPECT_EQ(to_readable_line(""), "");
@@ -23,7 +23,7 @@ TEST(ReadableLine, KeepsUtf8AndReplacesTheRest) {
   EXPECT_EQ(to_readable_line("\xF4\x90\x80\x80"), replaced + replaced + replaced + replaced);
 }
 
-TEST(Shortened, LeavesOutTheMiddleAndCutsNoCharacter) {
+TEST(ShortenMiddle, LeavesOutTheMiddleAndCutsNoCharacter) {
   EXPECT_EQ(shorten_middle("12345678", 8), "12345678");
   EXPECT_EQ(shorten_middle("123456789", 8), "12...89");
   EXPECT_EQ(shorten_middle("\xC3\xA4\xC3\xA4xxxxxxxx\xE2\x82\xAC\xE2\x82\xAC", 8),
@@ -32,7 +32,7 @@ TEST(Shortened, LeavesOutTheMiddleAndCutsNoCharacter) {
             "\xC3\xA4\xC3\xA4\xC3\xA4\xC3\xA4\xC3\xA4\xC3\xA4\xC3\xA4\xC3\xA4");
 }
 
-TEST(DidYouMean, ProposesTheNearestNameAndNothingFar) {
+TEST(SuggestName, ProposesTheNearestNameAndNothingFar) {
   const std::vector<std::string_view> names{"--grid", "--random", "--random-turn"};
   EXPECT_EQ(suggest_name("--gird", names), " (did you mean '--grid'?)");
   EXPECT_EQ(suggest_name("--rnadom", names), " (did you mean '--random'?)");
@@ -42,19 +42,19 @@ TEST(DidYouMean, ProposesTheNearestNameAndNothingFar) {
   EXPECT_EQ(suggest_name(std::string(100000, 'a'), names), "");
 }
 
-TEST(ShellQuoted, LeavesPlainWordsAndQuotesTheRest) {
+TEST(QuoteForShell, LeavesPlainWordsAndQuotesTheRest) {
   EXPECT_EQ(quote_for_shell("runs/a-1.png"), "runs/a-1.png");
   EXPECT_EQ(quote_for_shell(""), "''");
   EXPECT_EQ(quote_for_shell("a b"), "'a b'");
   EXPECT_EQ(quote_for_shell("it's $HOME"), "'it'\\''s $HOME'");
 }
 
-TEST(LowerCase, ChangesLettersOfAsciiAlone) {
+TEST(ToLowerCase, ChangesLettersOfAsciiAlone) {
   EXPECT_EQ(to_lower_case("View_007.JPG @[`{"), "view_007.jpg @[`{");
   EXPECT_EQ(to_lower_case("\xC3\x84"), "\xC3\x84") << "a letter of UTF-8 is not cut";
 }
 
-TEST(ShortNumber, IsAsPeopleWriteIt) {
+TEST(FormatNumber, IsAsPeopleWriteIt) {
   EXPECT_EQ(format_number(29.999999999999996), "30");
   EXPECT_EQ(format_number(1.735e-18), "0");
   EXPECT_EQ(format_number(-1e-18), "0");

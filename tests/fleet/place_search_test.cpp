@@ -37,12 +37,12 @@ class PlaceSearchTest : public MemoryFileTest {
     ASSERT_EQ(search.size(), held.size());
     EXPECT_EQ(search.views(), file.views());
     for (int i = 0; i < 6; ++i) {
-      const PackedSignature asked = query();
+      const PackedSignature signature = query();
       const std::vector<ViewId> excluded{held.views()[held.size() / 3], ViewId{999999}};
       const SearchMask mask{i % 2 == 0 ? std::span<const ViewId>() : excluded, {}};
       const SearchOptions options{.top = i == 5 ? 5000 : 7, .components = i % 3};
-      EXPECT_EQ(search.search(asked, options, mask).matches,
-                held.search(asked, options, mask).matches);
+      EXPECT_EQ(search.search(signature, options, mask).matches,
+                held.search(signature, options, mask).matches);
     }
   }
   /// Changes are told a moment later.
@@ -99,15 +99,15 @@ TEST_F(PlaceSearchTest, ASearchSeesOneStateAndLeavesOutWhatIsGone) {
   MemoryFile file = MemoryFile::create(path, small_header());
   file.append(views(300));
   PlaceSearch search(path);
-  const PackedSignature asked = query();
-  const auto nearest = file.load().search(asked, {.top = 12}).matches;
+  const PackedSignature signature = query();
+  const auto nearest = file.load().search(signature, {.top = 12}).matches;
   PlaceSearch::Snapshot before = search.snapshot();
-  EXPECT_EQ(before.search(asked, {.top = 12}, {}).matches, nearest);
+  EXPECT_EQ(before.search(signature, {.top = 12}, {}).matches, nearest);
   file.remove(std::vector{nearest[0].view, nearest[4].view});
-  EXPECT_EQ(before.search(asked, {.top = 12}, {}).matches, nearest);
+  EXPECT_EQ(before.search(signature, {.top = 12}, {}).matches, nearest);
   // Sketched, and gone from the memory.
-  const auto left = search.search(asked, {.top = 10}).matches;
-  EXPECT_EQ(left, file.load().search(asked, {.top = 10}).matches);
+  const auto left = search.search(signature, {.top = 10}).matches;
+  EXPECT_EQ(left, file.load().search(signature, {.top = 10}).matches);
   PlaceSearch::Snapshot after = search.snapshot();
   EXPECT_EQ(after.size(), 300U);
   const VisualMemory loaded =

@@ -73,8 +73,8 @@ TEST_F(MemoryOnServer, CopiesAreTheSameThereAndBack) {
   MemoryFile file = MemoryFile::create(folder / "first.panonav", small_header());
   const std::vector<ViewId> ids = file.append(random_views(0, 1500));
   file.remove(std::vector{ids[3], ids[700]});
-  file.link(
-      std::vector<Link>{{ids[1], ids[2], LinkKind::sequence}, {ids[9], ids[4], LinkKind::closure}});
+  file.link(std::vector<Link>{{ids[1], ids[2], Link::Kind::sequence},
+                              {ids[9], ids[4], Link::Kind::closure}});
   file.set_parameter("a 'name'; DROP TABLE panonav.views; --", "1.5");
   RoutePanorama route(16);
   for (int i = 0; i < 600; ++i) {

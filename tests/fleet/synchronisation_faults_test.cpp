@@ -279,7 +279,7 @@ TEST_F(SynchronisedMemory, ARobotWorksUntilItIsKilled) {
       } else {
         const ViewId a = any();
         const ViewId b = any();
-        if (a != b) file.link(std::vector<Link>{{a, b, LinkKind(random.index(3))}});
+        if (a != b) file.link(std::vector<Link>{{a, b, Link::Kind(random.index(3))}});
       }
     } catch (const FileError& error) {
       say("refused", error.what());

@@ -19,8 +19,8 @@ TEST_F(SynchronisedMemory, TakesAllThereIsAndThenNothing) {
   {
     MemoryFile file = MemoryFile::create(folder / "a", small_header());
     const auto ids = file.append(numbered(0, 700));  // several messages
-    file.link(std::vector<Link>{{ids[0], ids[1], LinkKind::sequence},
-                                {ids[5], ids[600], LinkKind::closure}});
+    file.link(std::vector<Link>{{ids[0], ids[1], Link::Kind::sequence},
+                                {ids[5], ids[600], Link::Kind::closure}});
     file.set_parameter("recordings", "1234");
   }
   const SynchronisationReport first = sync("a");
@@ -55,7 +55,7 @@ TEST_F(SynchronisedMemory, WhatOneDoesOthersGet) {
     file.set_pose(ViewId{2}, ReferencePose{1.0, 2.0, 0.5});
     file.rename(ViewId{3}, "the door");
     file.remove(std::vector{ViewId{5}, ViewId{6}});
-    file.link(std::vector<Link>{{ViewId{1}, ViewId{21}, LinkKind::neighbour}});
+    file.link(std::vector<Link>{{ViewId{1}, ViewId{21}, Link::Kind::neighbour}});
   }
   const SynchronisationReport sent = sync("a");
   EXPECT_EQ(sent.uploaded, 3U);
@@ -261,7 +261,7 @@ TEST_F(SynchronisedMemory, EveryOrderConverges) {
       case 4: {
         const ViewId a = any();
         const ViewId b = any();
-        if (a != b) file.link(std::vector<Link>{{a, b, LinkKind(random.index(3))}});
+        if (a != b) file.link(std::vector<Link>{{a, b, Link::Kind(random.index(3))}});
         break;
       }
       default: {

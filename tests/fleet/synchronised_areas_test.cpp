@@ -54,9 +54,9 @@ TEST_F(SynchronisedMemory, AFileKeepsTheAreasAroundIt) {
     views.push_back(numbered(40));
     views.back().info.pose = std::nullopt;
     const auto ids = file.append(views);
-    file.link(std::vector<Link>{{ids[0], ids[1], LinkKind::sequence},
-                                {ids[0], ids[39], LinkKind::closure},
-                                {ids[1], ids[40], LinkKind::neighbour}});
+    file.link(std::vector<Link>{{ids[0], ids[1], Link::Kind::sequence},
+                                {ids[0], ids[39], Link::Kind::closure},
+                                {ids[1], ids[40], Link::Kind::neighbour}});
   }
   (void)sync("a");
   const auto all = content(folder / "a");
@@ -81,7 +81,7 @@ TEST_F(SynchronisedMemory, AFileKeepsTheAreasAroundIt) {
     NewView nowhere = numbered(201);
     nowhere.info.pose = std::nullopt;
     const auto ids = file.append(std::vector{outside, nowhere});
-    file.link(std::vector<Link>{{ids[1], file.find("view_39.png").value(), LinkKind::neighbour}});
+    file.link(std::vector<Link>{{ids[1], file.find("view_39.png").value(), Link::Kind::neighbour}});
   }
   const SynchronisationReport added = sync("b", far);
   EXPECT_EQ(added.uploaded, 2U);

@@ -82,7 +82,7 @@ TEST_F(DatasetFolder, WhatIsWrittenReadsBackTheSame) {
   EXPECT_NEAR(back.source.layout.elevations->top_rad, radians(40.0), 1e-12);
 }
 
-TEST(WrittenDegrees, AreRoundWhereThatReadsBackTheSame) {
+TEST(RoundTripDegrees, AreRoundWhereThatReadsBackTheSame) {
   EXPECT_EQ(round_trip_degrees(radians(-30.0)), -30.0);
   EXPECT_EQ(round_trip_degrees(radians(118.1)), 118.1);
   int unchanged = 0;

@@ -132,12 +132,12 @@ class NextOne final : public RivalRecogniser {
                                     std::optional<std::size_t> left_out) const override {
     // Panorama and picture are turned alike, and are those of the view that is left out.
     EXPECT_EQ(query.picture, to_picture(query.panorama));
-    std::vector<float> asked(query.panorama.values().begin(), query.panorama.values().end());
+    std::vector<float> query_values(query.panorama.values().begin(), query.panorama.values().end());
     const auto& own = references_.at(left_out.value()).panorama.values();
     std::vector<float> there(own.begin(), own.end());
-    std::ranges::sort(asked);
+    std::ranges::sort(query_values);
     std::ranges::sort(there);
-    EXPECT_EQ(asked, there);
+    EXPECT_EQ(query_values, there);
     return (*left_out + after_) % references_.size();
   }
   [[nodiscard]] double bytes_per_view() const override { return 7.0; }

@@ -53,7 +53,7 @@ TEST(ColumnRanking, FindsThePlaceWhereSomebodyStandsInView) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   int by_columns = 0;
   int by_dissimilarity = 0;
-  int asked = 0;
+  int queries = 0;
   double heading_error = 0.0;
   for (std::uint64_t seed = 70; seed < 74; ++seed) {
     const RememberedRoom place(seed, {6.0, 4.0, 4, 0.15}, 0.4);
@@ -75,14 +75,14 @@ TEST(ColumnRanking, FindsThePlaceWhereSomebodyStandsInView) {
       const PlaceMatch& best = found.matches[0];
       heading_error += std::abs(angle_difference(
           *place.memory.info(best.view).pose->heading_rad + *best.heading_rad, pose.heading_rad));
-      ++asked;
+      ++queries;
     }
   }
   RecordProperty("by_columns", by_columns);
   RecordProperty("by_dissimilarity", by_dissimilarity);
-  EXPECT_GE(by_columns, 0.95 * asked);
-  EXPECT_LE(by_dissimilarity, 0.9 * asked) << "the test asks nothing";
-  EXPECT_LE(heading_error / asked, radians(4.0));
+  EXPECT_GE(by_columns, 0.95 * queries);
+  EXPECT_LE(by_dissimilarity, 0.9 * queries) << "the test asks nothing";
+  EXPECT_LE(heading_error / queries, radians(4.0));
 }
 
 }  // namespace

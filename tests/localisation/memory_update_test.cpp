@@ -81,7 +81,7 @@ std::vector<Pose2> line() {
 /// A run along the line. In pictures 6 to 9 `changed` is seen, whose places are known from the
 /// second run on.
 MemoryUpdate::Changes run(const Room& room, const Room* changed, const VisualMemory& memory,
-                          const MemoryUse& use, const MemoryUpdateOptions& options = {},
+                          const MemoryUpdate::Use& use, const MemoryUpdateOptions& options = {},
                           double sure = 1.0) {
   const ColumnRanking ranking(memory);
   MemoryUpdate update(ranking, learn_observation_model(ranking), use, options);
@@ -102,8 +102,9 @@ MemoryUpdate::Changes run(const Room& room, const Room* changed, const VisualMem
 }
 
 /// Applies what a run changes, as a memory file would.
-MemoryUse apply(const Room& room, const MemoryUpdate::Changes& changes, VisualMemory& memory) {
-  MemoryUse use = changes.use;
+MemoryUpdate::Use apply(const Room& room, const MemoryUpdate::Changes& changes,
+                        VisualMemory& memory) {
+  MemoryUpdate::Use use = changes.use;
   for (const auto* views : {&changes.replaced, &changes.forgotten}) {
     for (const ViewId view : *views) memory.remove(view);
   }
@@ -146,7 +147,7 @@ TEST(MemoryUpdate, AnotherAppearanceStandsBesideTheFormerAndServesTheNextRun) {
               0.5 * spacing_m);
   }
   EXPECT_TRUE(first.replaced.empty());
-  MemoryUse use = apply(changed, first, memory);
+  MemoryUpdate::Use use = apply(changed, first, memory);
   const MemoryUpdate::Changes second = run(place.room, &changed, memory, use);
   EXPECT_LE(second.added.size(), 1U);
   const auto matched_learnt = std::ranges::count_if(
@@ -160,7 +161,7 @@ TEST(MemoryUpdate, AnotherAppearanceStandsBesideTheFormerAndServesTheNextRun) {
 TEST(MemoryUpdate, NothingIsLearntWhereNoPlaceIsKnown) {
   const RememberedRoom place(33, empty_room, spacing_m);
   const Room elsewhere(78, empty_room);
-  MemoryUse before;
+  MemoryUpdate::Use before;
   const MemoryUpdate::Changes changes = run(elsewhere, nullptr, place.memory, before, {}, 0.89);
   EXPECT_EQ(changes.certain, 0U);
   EXPECT_TRUE(changes.added.empty() && changes.matched.empty());
@@ -169,7 +170,7 @@ TEST(MemoryUpdate, NothingIsLearntWhereNoPlaceIsKnown) {
 TEST(MemoryUpdate, SizeIsBoundedAndWhatIsTrueStaysHoweverManyOddRunsCome) {
   const RememberedRoom place(34, empty_room, spacing_m);
   VisualMemory memory = place.memory;
-  MemoryUse use;
+  MemoryUpdate::Use use;
   const MemoryUpdateOptions options{.appearances = 2, .failures = 3};
   std::size_t replaced = 0;
   for (std::uint64_t r = 0; r < 12; ++r) {
@@ -199,7 +200,7 @@ TEST(MemoryUpdate, WhatKeepsFailingIsForgottenOnceAnotherViewOfThePlaceMatches) 
   const RememberedRoom place(35, empty_room, spacing_m);
   const Room changed(79, empty_room);
   VisualMemory memory = place.memory;
-  MemoryUse use;
+  MemoryUpdate::Use use;
   std::size_t forgotten = 0;
   for (int r = 0; r < 6; ++r) {
     const MemoryUpdate::Changes changes = run(place.room, &changed, memory, use, {.failures = 3});
@@ -223,7 +224,7 @@ TEST(MemoryUpdate, SameRunGivesTheSameChangesAndHoldsAFewPicturesOnly) {
     EXPECT_EQ(one.added[i].pose, two.added[i].pose);
   }
   const ColumnRanking ranking(place.memory);
-  MemoryUpdate update(ranking, learn_observation_model(ranking));
+  MemoryUpdate update(ranking, learn_observation_model(ranking), {});
   const PackedSignature view = seen(place.room, {1.0, 1.0, 0.0}, place.memory);
   for (int i = 0; i < 500; ++i) {
     update.add({Pose2{0.2 * i, 0.0, 0.0}, view, 0.0, std::nullopt, std::nullopt});

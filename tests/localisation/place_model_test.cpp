@@ -128,7 +128,7 @@ TEST(PlaceModel, AcceptsItsOwnPlacesAndRefusesOtherRooms) {
     noise.push_back(compute_signature(view));
   }
   struct Count {
-    int asked = 0, known = 0;
+    int total = 0, known = 0;
   };
   Count own, own_hidden, foreign, of_noise;
   int sure = 0;
@@ -142,7 +142,7 @@ TEST(PlaceModel, AcceptsItsOwnPlacesAndRefusesOtherRooms) {
         const Place found = localiser.localise(pack(view, memory.full_scale()));
         EXPECT_EQ(found.known, found.known_probability >= 0.5);
         EXPECT_EQ(found.known, found.position.has_value());
-        ++count.asked;
+        ++count.total;
         count.known += found.known ? 1 : 0;
         if (found.known_probability < 0.9) continue;
         ++sure;
@@ -153,9 +153,9 @@ TEST(PlaceModel, AcceptsItsOwnPlacesAndRefusesOtherRooms) {
     ask(hidden[i], own_hidden);
     ask(noise, of_noise);
   }
-  EXPECT_GE(own.known, 0.97 * own.asked);
-  EXPECT_GE(own_hidden.known, 0.93 * own_hidden.asked);
-  EXPECT_LE(foreign.known, 0.01 * foreign.asked);
+  EXPECT_GE(own.known, 0.97 * own.total);
+  EXPECT_GE(own_hidden.known, 0.93 * own_hidden.total);
+  EXPECT_LE(foreign.known, 0.01 * foreign.total);
   EXPECT_EQ(of_noise.known, 0);
   EXPECT_GE(sure, own.known / 2);
   EXPECT_GE(sure_and_own, 0.95 * sure);

@@ -115,7 +115,7 @@ TEST(InterpolatedPosition, PlacesThatLookAlikeWidenTheRadiusThereAndNowhereElse)
   std::vector<double> radii;
   std::vector<double> radii_in_the_corner;
   int inside = 0;
-  int asked = 0;
+  int queries = 0;
   for (int i = 0; i < 120; ++i) {
     const Pose2 pose = place.room.between(place.grid, place.step_m, random);
     const bool in_the_corner = pose.x_m < corner_m - 0.3 && pose.y_m < corner_m - 0.3;
@@ -128,13 +128,13 @@ TEST(InterpolatedPosition, PlacesThatLookAlikeWidenTheRadiusThereAndNowhereElse)
     ASSERT_TRUE(estimate && estimate->radius_m);
     (in_the_corner ? radii_in_the_corner : radii).push_back(*estimate->radius_m);
     inside += distance(estimate->position(), pose.position()) <= *estimate->radius_m ? 1 : 0;
-    ++asked;
+    ++queries;
   }
   ASSERT_GE(radii.size(), 40U);
   ASSERT_GE(radii_in_the_corner.size(), 3U);
   EXPECT_LT(quantile(radii, 0.5), 2.0 * place.step_m);
   EXPECT_GT(quantile(radii_in_the_corner, 0.5), 0.9 * away_m);
-  EXPECT_GE(inside, 0.9 * asked);
+  EXPECT_GE(inside, 0.9 * queries);
 }
 
 // Errors beyond the outermost references are several times those between them; one radius for both
@@ -142,7 +142,7 @@ TEST(InterpolatedPosition, PlacesThatLookAlikeWidenTheRadiusThereAndNowhereElse)
 TEST(InterpolatedPosition, TheRadiusIsWiderAtTheEdgeOfWhatIsRemembered) {
   PANONAV_SKIP_RATES_UNDER_SANITIZERS();
   struct Held {
-    int asked = 0;
+    int queries = 0;
     int inside = 0;
   };
   Held between;
@@ -173,13 +173,13 @@ TEST(InterpolatedPosition, TheRadiusIsWiderAtTheEdgeOfWhatIsRemembered) {
       const auto estimate = interpolate_position(ranking, model, found);
       ASSERT_TRUE(estimate && estimate->radius_m);
       Held& held = is_beyond ? beyond : between;
-      ++held.asked;
+      ++held.queries;
       held.inside += distance(estimate->position(), pose.position()) <= *estimate->radius_m;
     }
   }
-  ASSERT_GE(beyond.asked, 100);
-  EXPECT_GE(between.inside, 0.9 * between.asked);
-  EXPECT_GE(beyond.inside, 0.8 * beyond.asked);
+  ASSERT_GE(beyond.queries, 100);
+  EXPECT_GE(between.inside, 0.9 * between.queries);
+  EXPECT_GE(beyond.inside, 0.8 * beyond.queries);
 }
 
 // Where each place has a double that differs in an eighth of its columns, a query tells the two

@@ -63,13 +63,13 @@ struct PositionErrors {
   double inside = 0.0;  // share within the radius
 };
 
-PositionErrors position_errors(const Part& memorised, const Part& asked) {
+PositionErrors position_errors(const Part& memorised, const Part& queried) {
   const VisualMemory memory = make_memory(memorised.signatures, memorised.poses);
   const Localiser localiser(memory);
   PositionErrors errors;
-  for (std::size_t i = 0; i < asked.signatures.size(); ++i) {
-    const Place found = localiser.localise(pack(asked.signatures[i], memory.full_scale()));
-    const Point2 truth = asked.poses[i]->position();
+  for (std::size_t i = 0; i < queried.signatures.size(); ++i) {
+    const Place found = localiser.localise(pack(queried.signatures[i], memory.full_scale()));
+    const Point2 truth = queried.poses[i]->position();
     errors.nearest_m.push_back(
         distance(memory.info(found.matches[0].view).pose->position(), truth));
     if (!found.position) continue;
@@ -127,11 +127,11 @@ TEST(GantryPlants, AbsoluteHeadingBetweenReferences) {
   const auto gantry = gantry_plants();
   PANONAV_REQUIRE_DATA(gantry, "gantry_plants");
   const Part memorised = part_of(*gantry, [&](std::size_t i) { return even_column(*gantry, i); });
-  const Part asked = part_of(*gantry, [&](std::size_t i) { return !even_column(*gantry, i); });
+  const Part queried = part_of(*gantry, [&](std::size_t i) { return !even_column(*gantry, i); });
   const VisualMemory memory = make_memory(memorised.signatures, memorised.poses);
   const Localiser localiser(memory);
   std::vector<double> errors;
-  for (const auto& query : asked.signatures) {
+  for (const auto& query : queried.signatures) {
     const Place found = localiser.localise(pack(query, memory.full_scale()));
     if (found.heading_rad) errors.push_back(std::abs(angle_difference(*found.heading_rad, 0.0)));
   }
@@ -170,7 +170,7 @@ TEST(UnknownPlaces, OtherRecordingsAreRefusedAndOwnOnesKnown) {
   struct Case {
     const char* name;
     const Recording* recording;
-    std::function<bool(std::size_t)> memorised, asked;
+    std::function<bool(std::size_t)> memorised, queried;
   };
   const std::vector<Case> cases = {
       {"gantry_plants", &*gantry, [&](std::size_t i) { return even_column(*gantry, i); },
@@ -187,9 +187,9 @@ TEST(UnknownPlaces, OtherRecordingsAreRefusedAndOwnOnesKnown) {
     const Part memorised = part_of(*c.recording, c.memorised);
     const VisualMemory memory = make_memory(memorised.signatures, memorised.poses);
     const Localiser localiser(memory);
-    EXPECT_GE(known_share(localiser, memory, part_of(*c.recording, c.asked).signatures), 0.95)
+    EXPECT_GE(known_share(localiser, memory, part_of(*c.recording, c.queried).signatures), 0.95)
         << c.name;
-    EXPECT_GE(known_share(localiser, memory, disturbed(*c.recording, c.asked)), 0.95) << c.name;
+    EXPECT_GE(known_share(localiser, memory, disturbed(*c.recording, c.queried)), 0.95) << c.name;
     for (const Case& other : cases) {
       if (other.recording == c.recording) continue;
       EXPECT_LE(known_share(localiser, memory, part_of(*other.recording, all).signatures), 0.01)

@@ -86,8 +86,8 @@ TEST(ViewLikelihood, IsGreatestNearTheTruthAndInItsHeading) {
   ViewLikelihood likelihood(ranking, model, true);
   Random random(1);
   int near = 0;
-  constexpr int asked = 40;
-  for (int i = 0; i < asked; ++i) {
+  constexpr int queries = 40;
+  for (int i = 0; i < queries; ++i) {
     const Pose2 truth = place.room.between(place.grid, place.step_m, random);
     likelihood.set_view(seen(place, truth));
     for (std::uint32_t s = 0; s < likelihood.sites().size(); ++s) likelihood.compare(s);
@@ -110,7 +110,7 @@ TEST(ViewLikelihood, IsGreatestNearTheTruthAndInItsHeading) {
     }
     near += distance(found.position(), truth.position()) < place.step_m ? 1 : 0;
   }
-  EXPECT_GE(near, asked * 9 / 10);
+  EXPECT_GE(near, queries * 9 / 10);
 }
 
 TEST(ViewLikelihood, ManyParticlesGetWhatEachGetsAlone) {

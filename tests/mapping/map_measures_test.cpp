@@ -68,13 +68,40 @@ TEST(NeighbourPreservation, RefusesWhatHasNoMeaning) {
   EXPECT_THROW((void)neighbour_preservation(broken, points, 2), ContractError);
 }
 
-TEST(ClosureCount, ByTheDistanceOfTheViews) {
+TEST(ComparePositions, AgreesWithItsPartsAndThinsLargeMaps) {
+  const auto truth = random_points(40, 6);
+  std::vector<Point2> map;
+  for (const Point2& p : truth) map.push_back({-0.5 * p.y_m + 7.0, 0.5 * p.x_m});
+  const auto copy = compare_positions(map, truth);
+  ASSERT_TRUE(copy.has_value());
+  EXPECT_EQ(copy->compared, 40U);
+  EXPECT_NEAR(copy->shape.value, 0.0, 1e-12);
+  EXPECT_NEAR(copy->truth_from_map.scale, 2.0, 1e-9);
+  EXPECT_NEAR(copy->truth_from_map.rms_m, 0.0, 1e-9);
+  EXPECT_EQ(copy->neighbours.value().continuity, 1.0);
+  EXPECT_EQ(compare_positions(map, truth, false)->truth_from_map.scale, 1.0);
+  EXPECT_FALSE(compare_positions(std::span(map).first(2), std::span(truth).first(2)));
+  const auto few = compare_positions(std::span(map).first(12), std::span(truth).first(12));
+  EXPECT_FALSE(few.value().neighbours.has_value());
+  const auto many = random_points(5000, 7);
+  const auto others = random_points(5000, 8);
+  std::vector<Point2> every_third;
+  std::vector<Point2> every_third_of_others;
+  for (std::size_t i = 0; i < many.size(); i += 3) {
+    every_third.push_back(many[i]);
+    every_third_of_others.push_back(others[i]);
+  }
+  EXPECT_EQ(compare_positions(many, others)->neighbours.value().trustworthiness,
+            neighbour_preservation(every_third, every_third_of_others, 8).trustworthiness);
+}
+
+TEST(Closures, AreCountedByTheDistanceOfTheViews) {
   TopologicalMap map;
   for (unsigned i = 0; i < 4; ++i) map.nodes.push_back({ViewId{i}, {}, 0});
-  map.edges = {{ViewId{0}, ViewId{1}, {}, LinkKind::sequence},
-               {ViewId{0}, ViewId{2}, {}, LinkKind::closure},
-               {ViewId{1}, ViewId{2}, {}, LinkKind::closure},
-               {ViewId{0}, ViewId{3}, {}, LinkKind::closure}};
+  map.edges = {{ViewId{0}, ViewId{1}, {}, Link::Kind::sequence},
+               {ViewId{0}, ViewId{2}, {}, Link::Kind::closure},
+               {ViewId{1}, ViewId{2}, {}, Link::Kind::closure},
+               {ViewId{0}, ViewId{3}, {}, Link::Kind::closure}};
   const auto count = count_closures(
       map,
       [](ViewId view) -> std::optional<Point2> {

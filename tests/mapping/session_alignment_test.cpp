@@ -40,7 +40,7 @@ struct Sessions {
           memory.append(round_room_signature(world, pose), {.name = std::to_string(memory.size())});
       const Pose2 here = inverse(truth.front()) * pose;
       if (!map.nodes.empty()) {
-        const MapNode& before = map.nodes.back();
+        const TopologicalMap::Node& before = map.nodes.back();
         map.edges.push_back({before.view, view, inverse(before.pose) * here});
       }
       map.nodes.push_back({view, here, 0});
@@ -105,7 +105,7 @@ TEST(AlignSessions, ViewsOfBothSessionsArePlacesInCommon) {
   const TopologicalMap first = sessions.add(round_room(radius_m, 5), drive(0, 110, 1.6));
   TopologicalMap second = first;
   const Pose2 moved{3.0, -1.0, 2.0};
-  for (MapNode& node : second.nodes) node.pose = moved * node.pose;
+  for (TopologicalMap::Node& node : second.nodes) node.pose = moved * node.pose;
   const auto found = align_sessions(sessions.memory, first, second);
   ASSERT_TRUE(found);
   EXPECT_EQ(found->matches.size(), first.nodes.size());

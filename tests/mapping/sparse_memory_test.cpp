@@ -33,7 +33,7 @@ VisualMemory along_a_line(const ToyWorld& room, int views, Known known) {
     ReferenceInfo info{.name = std::to_string(i)};
     if (known == Known::positions) info.pose = ReferencePose{pose.x_m, pose.y_m, pose.heading_rad};
     const ViewId view = memory.append(round_room_signature(room, pose), info);
-    if (before && known == Known::links) memory.link({*before, view, LinkKind::sequence});
+    if (before && known == Known::links) memory.link({*before, view, Link::Kind::sequence});
     before = view;
   }
   return memory;
@@ -138,7 +138,7 @@ TEST(SparseMemory, WhatWasConnectedStaysConnected) {
                                     selection.kept.begin());
   };
   std::vector<PoseEdge> edges;
-  for (const MapEdge& edge : left.edges) {
+  for (const TopologicalMap::Edge& edge : left.edges) {
     edges.push_back({number(edge.a), number(edge.b), edge.a_from_b});
     const Pose2 a = left.nodes[number(edge.a)].pose;
     EXPECT_NEAR((a * edge.a_from_b).x_m, left.nodes[number(edge.b)].pose.x_m, 1e-9);
@@ -158,7 +158,7 @@ TEST(SparseMemory, DegenerateMemories) {
   EXPECT_EQ(select_references(memory).kept.size(), 1U);
   memory.append(view, {.name = "the same, unlinked"});
   EXPECT_EQ(select_references(memory).kept.size(), 2U);
-  memory.link({memory.views()[0], memory.views()[1], LinkKind::sequence});
+  memory.link({memory.views()[0], memory.views()[1], Link::Kind::sequence});
   const auto selection = select_references(memory);
   EXPECT_EQ(selection.kept.size(), 1U);
   EXPECT_FALSE(measure_loss(memory, selection).positions.has_value());

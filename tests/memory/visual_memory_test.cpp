@@ -131,11 +131,11 @@ TEST(VisualMemory, GivenIdsGrowAndMayLeaveGaps) {
 
 TEST(VisualMemory, LinksAreOnePerPair) {
   VisualMemory memory = filled_memory(6);
-  memory.link({ViewId{0}, ViewId{1}, LinkKind::sequence});
-  memory.link({ViewId{2}, ViewId{0}, LinkKind::closure});
-  memory.link({ViewId{1}, ViewId{0}, LinkKind::neighbour});
+  memory.link({ViewId{0}, ViewId{1}, Link::Kind::sequence});
+  memory.link({ViewId{2}, ViewId{0}, Link::Kind::closure});
+  memory.link({ViewId{1}, ViewId{0}, Link::Kind::neighbour});
   ASSERT_EQ(memory.links().size(), 2U);
-  EXPECT_EQ(memory.links()[0], (Link{ViewId{1}, ViewId{0}, LinkKind::neighbour}));
+  EXPECT_EQ(memory.links()[0], (Link{ViewId{1}, ViewId{0}, Link::Kind::neighbour}));
   EXPECT_EQ(memory.neighbours(ViewId{0}), (std::vector{ViewId{1}, ViewId{2}}));
   EXPECT_THROW(memory.link({ViewId{1}, ViewId{1}}), ContractError);
   EXPECT_THROW(memory.link({ViewId{1}, ViewId{9}}), ContractError);

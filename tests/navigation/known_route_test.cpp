@@ -150,7 +150,7 @@ TEST(KnownRoute, RefusesWhatMakesNoSense) {
       {id(1), {std::numeric_limits<double>::quiet_NaN(), 0, 0}}};
   EXPECT_THROW((void)make_known_route(route, nowhere, unlearnt), ContractError);
   EXPECT_THROW((void)make_known_route(blank_route({{0, 0, 0}}), {}, unlearnt), ContractError);
-  EXPECT_THROW((void)make_known_route(route, {}, {.beside_m = 0.0}), OptionError);
+  EXPECT_THROW((void)make_known_route(route, {}, {.max_lateral_m = 0.0}), OptionError);
   EXPECT_FALSE(find_section(make_known_route(route, {}, unlearnt), std::vector<double>{0.0},
                             std::vector<ViewId>{id(1)}));
 }

@@ -19,7 +19,7 @@ namespace panonav::testing {
 namespace {
 
 constexpr double spacing_m = 0.4;
-constexpr double beside_m = 0.4;
+constexpr double max_lateral_m = 0.4;
 
 // Two rooms, a grid of views in them, and a route from one into the other.
 struct World {
@@ -38,8 +38,8 @@ struct World {
     for (const ViewId view : remembered.memory.views()) {
       views.push_back({view, remembered.pose_of(view)});
     }
-    routes.push_back(make_known_route(route, views,
-                                      {.beside_m = beside_m, .tracker = {.min_correlation = 0.7}}));
+    routes.push_back(make_known_route(
+        route, views, {.max_lateral_m = max_lateral_m, .tracker = {.min_correlation = 0.7}}));
   }
   [[nodiscard]] Navigator navigator() const {
     Executor executor(1);
@@ -65,7 +65,7 @@ struct Drive {
   std::vector<NavigationDecision> decisions;
   std::vector<Pose2> path;  // true poses at the steps
 
-  [[nodiscard]] std::optional<std::size_t> look_of(NavigationEvent event) const {
+  [[nodiscard]] std::optional<std::size_t> look_of(NavigationDecision::Event event) const {
     for (std::size_t i = 0; i < decisions.size(); ++i) {
       const auto& events = decisions[i].events;
       if (std::ranges::find(events, event) != events.end()) return i;
@@ -100,7 +100,7 @@ Drive drive(Navigator& navigator, ViewId goal, const Pose2& start, std::uint64_t
     run.decisions.push_back(
         navigator.observe(two_rooms_signature(world().walls, robot.pose(), noise), report));
     const NavigationDecision& decision = run.decisions.back();
-    if (decision.state != NavigationState::moving) break;
+    if (decision.state != NavigationDecision::State::moving) break;
     obstacle = robot.go(decision.direction_rad, decision.advance_m);
     if (options.kidnapped_to && run.on_route() == 6) {
       robot.carry_to(*options.kidnapped_to);
@@ -120,11 +120,11 @@ TEST(NavigatorOnARoute, RepeatsItTowardsGoalsAtBothEndsAndArrives) {
     const ViewId goal = world().view_at(back ? low : high);
     const Pose2 start{back ? high.x_m : low.x_m, back ? high.y_m : low.y_m, 2.0};
     const Drive run = drive(navigator, goal, start, 3, {});
-    EXPECT_EQ(run.decisions.back().state, NavigationState::arrived);
+    EXPECT_EQ(run.decisions.back().state, NavigationDecision::State::arrived);
     EXPECT_LE(distance(run.path.back().position(), world().remembered.pose_of(goal).position()),
               0.5 * spacing_m);
-    EXPECT_TRUE(run.look_of(NavigationEvent::route).has_value());
-    EXPECT_FALSE(run.look_of(NavigationEvent::route_left).has_value());
+    EXPECT_TRUE(run.look_of(NavigationDecision::Event::route).has_value());
+    EXPECT_FALSE(run.look_of(NavigationDecision::Event::route_left).has_value());
     EXPECT_GT(2 * run.on_route(), run.decisions.size());
     int steps = 0;
     for (std::size_t i = 0; i < run.path.size(); ++i) {
@@ -136,7 +136,7 @@ TEST(NavigatorOnARoute, RepeatsItTowardsGoalsAtBothEndsAndArrives) {
       EXPECT_TRUE(contains(describe(decision), "along a route"));
       // After half a metre it is on the path that was driven.
       const double off_m = world().off_m(run.path[i].position());
-      EXPECT_LT(off_m, steps > 3 ? 0.1 : beside_m) << "step " << i + 1;
+      EXPECT_LT(off_m, steps > 3 ? 0.1 : max_lateral_m) << "step " << i + 1;
     }
   }
 }
@@ -163,15 +163,15 @@ TEST(NavigatorOnARoute, ARobotThatIsCarriedAwayLeavesItAndArrives) {
   navigator.set_routes(world().routes);
   const ViewId goal = world().view_at(world().path.back().position());
   const Pose2 carried{1.0, 3.4, 0.5};
-  ASSERT_GT(world().off_m(carried.position()), 2.0 * beside_m);
+  ASSERT_GT(world().off_m(carried.position()), 2.0 * max_lateral_m);
   const Drive run = drive(navigator, goal, world().path.front(), 5, {.kidnapped_to = carried});
-  const auto left = run.look_of(NavigationEvent::route_left);
+  const auto left = run.look_of(NavigationDecision::Event::route_left);
   ASSERT_TRUE(left.has_value());
   // Within the steps that must agree, and one for a place that surprises.
-  const auto sixth = *run.look_of(NavigationEvent::route) + 5;
+  const auto sixth = *run.look_of(NavigationDecision::Event::route) + 5;
   EXPECT_LE(*left, sixth + 4);
   EXPECT_FALSE(run.decisions[*left].on_route);
-  EXPECT_EQ(run.decisions.back().state, NavigationState::arrived);
+  EXPECT_EQ(run.decisions.back().state, NavigationDecision::State::arrived);
 }
 
 // The door is shut after route and views were made.
@@ -195,14 +195,14 @@ TEST(NavigatorOnARoute, AShutDoorEndsTheLegAndTheRouteIsNotTriedAgain) {
     const auto line = two_rooms_line(walls, robot.pose());
     report.line = line;
     decision = navigator.observe(two_rooms_signature(walls, robot.pose(), noise), report);
-    for (const NavigationEvent event : decision.events) {
-      begun_after += static_cast<int>(left > 0 && event == NavigationEvent::route);
-      left += static_cast<int>(event == NavigationEvent::route_left);
+    for (const NavigationDecision::Event event : decision.events) {
+      begun_after += static_cast<int>(left > 0 && event == NavigationDecision::Event::route);
+      left += static_cast<int>(event == NavigationDecision::Event::route_left);
     }
     since_left += left;
     ASSERT_LT(decision.step, 200);
-    ASSERT_NE(decision.state, NavigationState::arrived);
-    if (decision.state != NavigationState::moving) break;
+    ASSERT_NE(decision.state, NavigationDecision::State::arrived);
+    if (decision.state != NavigationDecision::State::moving) break;
     obstacle = robot.go(decision.direction_rad, decision.advance_m);
   }
   EXPECT_EQ(left, 1);

@@ -25,10 +25,10 @@ struct Drive {
   NavigationDecision end;
   bool has_arrived = false;  // within half a spacing of the goal
   double travelled_m = 0.0;
-  std::vector<NavigationEvent> events;
+  std::vector<NavigationDecision::Event> events;
   std::uint64_t bytes_read = 0;
 
-  [[nodiscard]] bool had(NavigationEvent event) const {
+  [[nodiscard]] bool had(NavigationDecision::Event event) const {
     return std::ranges::find(events, event) != events.end();
   }
 };
@@ -95,12 +95,12 @@ struct Scene {
       run.end = navigator.observe(two_rooms_signature(world, robot.pose(), noise, light), report);
       run.events.insert(run.events.end(), run.end.events.begin(), run.end.events.end());
       run.bytes_read += run.end.bytes_read;
-      if (run.end.state != NavigationState::moving) break;
+      if (run.end.state != NavigationDecision::State::moving) break;
       report.obstacle = robot.go(run.end.direction_rad, run.end.advance_m);
     }
     const double error_m = distance(robot.pose().position(), remembered.pose_of(goal).position());
-    run.has_arrived =
-        run.end.state == NavigationState::arrived && error_m <= 0.5 * remembered.spacing_m;
+    run.has_arrived = run.end.state == NavigationDecision::State::arrived &&
+                      error_m <= 0.5 * remembered.spacing_m;
     run.travelled_m = robot.travelled_m();
     return run;
   }
@@ -255,7 +255,7 @@ TEST(Navigator, AKidnappedRobotStillArrives) {
       const Drive run =
           scene.drive(goal, start, DriveKind::holonomic, random.next(), 1.0, 8, carried);
       outcome.add(run);
-      noticed += run.had(NavigationEvent::kidnapped);
+      noticed += run.had(NavigationDecision::Event::kidnapped);
     }
   }
   EXPECT_GE(outcome.arrived, outcome.runs * 9 / 10);
@@ -281,9 +281,9 @@ TEST(Navigator, AShutDoorIsGoneRoundOrMakesTheGoalUnreachable) {
                                       random.next());
         (second_door ? with_detour : without).add(run);
         if (!second_door) {
-          unreachable += run.end.state == NavigationState::unreachable;
+          unreachable += run.end.state == NavigationDecision::State::unreachable;
           steps += run.end.step;
-          EXPECT_TRUE(run.had(NavigationEvent::closed));
+          EXPECT_TRUE(run.had(NavigationDecision::Event::closed));
         }
       }
     }
@@ -303,8 +303,8 @@ TEST(Navigator, IsLostInAnotherPlace) {
     const ViewId goal = scene.any_view(random);
     const Drive run =
         scene.drive(goal, scene.free_pose(random), DriveKind::holonomic, random.next());
-    EXPECT_EQ(run.end.state, NavigationState::lost) << describe(run.end);
-    EXPECT_TRUE(run.had(NavigationEvent::relocalised));
+    EXPECT_EQ(run.end.state, NavigationDecision::State::lost) << describe(run.end);
+    EXPECT_TRUE(run.had(NavigationDecision::Event::relocalised));
   }
 }
 
@@ -335,8 +335,8 @@ TEST(Navigator, SaysHowProbableItsPlaceIsAndStopsWhereNoneIs) {
     do {
       decision = scene.navigator.observe(view());
       EXPECT_LT(decision.probability, 0.5) << describe(decision);
-    } while (decision.state == NavigationState::moving);
-    EXPECT_EQ(decision.state, NavigationState::lost) << describe(decision);
+    } while (decision.state == NavigationDecision::State::moving);
+    EXPECT_EQ(decision.state, NavigationDecision::State::lost) << describe(decision);
     EXPECT_LE(decision.step, 2 * options.lost_patience);
   };
   for (std::uint64_t seed = 2; seed <= 4; ++seed) {
@@ -369,16 +369,16 @@ TEST(Navigator, IsNotLostBehindAScreen) {
     const Pose2 pose{random.uniform(3.3, 3.35), random.uniform(2.7, 2.9), 0.0};
     decision = scene.navigator.observe(scene.view_at(pose, random), {.obstacle = true});
     improbable += decision.probability < 0.5;
-  } while (decision.state == NavigationState::moving);
+  } while (decision.state == NavigationDecision::State::moving);
   EXPECT_GT(improbable, options.lost_patience);
-  EXPECT_EQ(decision.state, NavigationState::unreachable) << describe(decision);
+  EXPECT_EQ(decision.state, NavigationDecision::State::unreachable) << describe(decision);
 }
 
 TEST(Navigator, GoesNowhereWithoutAWay) {
   const ViewId goal{0};
   Scene scene(two_rooms(1, false), 1, {}, {goal});
   const Drive run = scene.drive(goal, {6.8, 3.4, 0.0}, DriveKind::holonomic, 1);
-  EXPECT_EQ(run.end.state, NavigationState::unreachable);
+  EXPECT_EQ(run.end.state, NavigationDecision::State::unreachable);
   EXPECT_EQ(run.end.step, 1);
   EXPECT_EQ(run.end.advance_m, 0.0);
 }
@@ -450,7 +450,7 @@ TEST(Navigator, TakesThePlaceOfAnotherEstimate) {
   const auto decision = scene.navigator.observe(
       scene.view_at(scene.remembered.pose_of(here), noise), {.estimate = here});
   EXPECT_EQ(decision.nearest, here);
-  EXPECT_TRUE(std::ranges::find(decision.events, NavigationEvent::relocalised) ==
+  EXPECT_TRUE(std::ranges::find(decision.events, NavigationDecision::Event::relocalised) ==
               decision.events.end());
 }
 

@@ -48,7 +48,7 @@ struct Grid {
     for (std::size_t a = 0; a < poses.size(); ++a) {
       for (std::size_t b = a + 1; b < poses.size(); ++b) {
         if (distance(poses[a].position(), poses[b].position()) < 0.75) {
-          made.link({made.views()[a], made.views()[b], LinkKind::neighbour});
+          made.link({made.views()[a], made.views()[b], Link::Kind::neighbour});
         }
       }
     }
@@ -99,9 +99,9 @@ TEST(NavigationGraph, AMapTellsWhatItsPosesTell) {
                             {ViewId{4}, {2, 0, -1.0}, 0},
                             {ViewId{6}, {2, 1, 0.0}, 0},
                             {ViewId{9}, {0, 0, 0.0}, 1}},
-                           {{ViewId{1}, ViewId{4}, {}, LinkKind::sequence, 1.0},
-                            {ViewId{4}, ViewId{6}, {}, LinkKind::closure, 0.05},
-                            {ViewId{6}, ViewId{9}, {}, LinkKind::sequence, 1.0}}};
+                           {{ViewId{1}, ViewId{4}, {}, Link::Kind::sequence, 1.0},
+                            {ViewId{4}, ViewId{6}, {}, Link::Kind::closure, 0.05},
+                            {ViewId{6}, ViewId{9}, {}, Link::Kind::sequence, 1.0}}};
   const NavigationGraph graph = graph_from_map(map);
   ASSERT_EQ(graph.edges().size(), 1U);  // one contradicts the map, one leads to another frame
   EXPECT_NEAR(graph.edges()[0].length, 2.0, 1e-12);
@@ -301,7 +301,7 @@ TEST(AreaViews, HoldsAnAreaAndFindsWhatTheWholeMemoryFinds) {
   const SubAreas areas = divide_into_areas(graph, {.views_per_area = 6});
   ASSERT_GT(areas.nodes.size(), 3U);
   AreaViews views(source, 1);
-  EXPECT_THROW((void)views.coefficients(grid.memory.views()[0]), ContractError);
+  EXPECT_THROW((void)views.read_coefficients(grid.memory.views()[0]), ContractError);
   for (std::size_t area = 0; area < areas.nodes.size(); ++area) {
     views.enter(graph, areas, area);
     EXPECT_EQ(views.area(), area);
@@ -367,7 +367,8 @@ TEST(AreaViews, WhatIsLoadedAheadNeedNotBeLoadedAgain) {
   for (const std::size_t node : areas.nodes[1]) {
     const QueryView seen(grid.memory.signature(graph.view(node)), grid.memory.full_scale());
     EXPECT_EQ(views.find_nearest(graph, seen)->node, at_once.find_nearest(graph, seen)->node);
-    EXPECT_EQ(views.coefficients(graph.view(node)), at_once.coefficients(graph.view(node)));
+    EXPECT_EQ(views.read_coefficients(graph.view(node)),
+              at_once.read_coefficients(graph.view(node)));
   }
 }
 

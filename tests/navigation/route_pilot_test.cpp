@@ -108,7 +108,7 @@ TEST(RoutePilot, BeginsOnlyWhereLineAndViewAgreeAndTheWayIsLong) {
   EXPECT_FALSE(pilot.begin_leg(std::vector<ViewId>{ViewId{900}, ViewId{901}}, here, shortest_m));
   EXPECT_FALSE(pilot.begin_leg({}, here, shortest_m));
   EXPECT_FALSE(RoutePilot().begin_leg(way, here, shortest_m));
-  // A route that was rejected is not begun until it is forgiven; one that was stopped is.
+  // An abandoned route is not begun again until all routes are allowed; one whose leg was ended is.
   ASSERT_TRUE(pilot.begin_leg(way, here, shortest_m));
   pilot.abandon_leg();
   EXPECT_FALSE(pilot.is_on_leg());

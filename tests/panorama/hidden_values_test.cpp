@@ -148,7 +148,7 @@ TEST(FillHiddenValues, AMaskOnATurningRobotDisturbsLessThanBlackPaintOrTheRowsMe
   }
 }
 
-TEST(ValuesHiddenBy, AreThoseThatLookAtTheMask) {
+TEST(FindHiddenValues, AreThoseThatLookAtTheMask) {
   const Camera camera = mirror_camera();
   const Unwarper unwarper(camera, {.rows = 20, .columns = 120});
   // The robot is seen between azimuths 1.0 and 1.6.
@@ -186,7 +186,7 @@ TEST(ValuesHiddenBy, AreThoseThatLookAtTheMask) {
   for (const float value : view.values()) ASSERT_GT(value, 0.995F);
 }
 
-TEST(ValuesHiddenBy, RefusesMasksThatDoNotFitOrHideEverything) {
+TEST(FindHiddenValues, RefusesMasksThatDoNotFitOrHideEverything) {
   const Camera camera = mirror_camera();
   const Unwarper unwarper(camera, {.rows = 8, .columns = 32});
   for (const Image& mask : {Image(10, 10), Image(640, 480), Image(640, 480, 3)}) {

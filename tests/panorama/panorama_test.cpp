@@ -68,7 +68,7 @@ TEST(Panorama, RefusesBrokenInvariants) {
   EXPECT_NO_THROW(Panorama(2, 8, std::nullopt, std::vector<float>(16, 3e38F)));
 }
 
-TEST(TurnColumns, FollowsTheConvention) {
+TEST(RotateColumns, FollowsTheConvention) {
   const Panorama view = random_panorama(1, 3, 12);
   const Panorama turned = rotate_columns(view, 5);
   for (int y = 0; y < 3; ++y) {
@@ -80,7 +80,7 @@ TEST(TurnColumns, FollowsTheConvention) {
   EXPECT_EQ(rotate_columns(rotate_columns(view, 7), 9), rotate_columns(view, 4));
 }
 
-TEST(Mirrored, TheLeftOfTheRobotBecomesItsRight) {
+TEST(Mirror, TheLeftOfTheRobotBecomesItsRight) {
   const Panorama view = random_panorama(2, 3, 12);
   const Panorama image = mirror(view);
   for (int y = 0; y < 3; ++y) {

@@ -16,7 +16,7 @@ using GraphFile = InTemporaryFolder;
 TEST_F(GraphFile, NodesAndEdgesAreThere) {
   TopologicalMap map;
   map.nodes = {{ViewId{3}, {1.5, -2.0, 0.25}, 0}, {ViewId{7}, {0.0, 0.0, 0.0}, 0}};
-  map.edges = {{ViewId{3}, ViewId{7}, {0.5, 0.0, 0.125}, LinkKind::closure, 0.75}};
+  map.edges = {{ViewId{3}, ViewId{7}, {0.5, 0.0, 0.125}, Link::Kind::closure, 0.75}};
   const auto path = folder / "map.graphml";
   write_graph(path, map, [](ViewId view) { return view.value == 3 ? "a<b&\"c\".png" : "d.png"; });
   const auto bytes = read_file(path, 1U << 20U);

@@ -159,7 +159,7 @@ TEST_F(MemoryUpdating, WhatHasChangedIsLearntWhereTheRobotWasAndTakenBackAgain) 
   }
   const auto history = file().history();
   ASSERT_EQ(history.size(), 1U);
-  EXPECT_EQ(history[0].what, "a run: " + as_text(changes));
+  EXPECT_EQ(history[0].what, "a run: " + summarise(changes));
   // The next run finds what this one learnt.
   EXPECT_EQ(run(world, &changed).added, 0U);
   ASSERT_EQ(file().history().size(), 2U);
@@ -199,7 +199,7 @@ TEST_F(MemoryUpdating, RunByRunViewsAreReplacedAndForgottenAndEachRunCanBeTakenB
     EXPECT_LE(changes.views, 2 * before->size());
     const auto history = file().history();
     ASSERT_EQ(history.size(), after.size() - 1);
-    EXPECT_EQ(history[0].what, "a run: " + as_text(changes));
+    EXPECT_EQ(history[0].what, "a run: " + summarise(changes));
   }
   EXPECT_GE(all.replaced, 1U);
   EXPECT_GE(all.forgotten, 1U);

@@ -67,7 +67,8 @@ class RouteDriving : public ::testing::Test {
       read = wheels.advance(moved);
       robot = robot * moved;
       way_m += std::hypot(moved.x_m, moved.y_m);
-      beside_m = std::max(beside_m, std::abs(project_onto_route(path, robot.position()).lateral_m));
+      max_lateral_m =
+          std::max(max_lateral_m, std::abs(project_onto_route(path, robot.position()).lateral_m));
       if (carry) carry(i, robot);
     }
     return robot;
@@ -80,7 +81,7 @@ class RouteDriving : public ::testing::Test {
   std::vector<Pose2> path;
   Pose2 start, end;
   double way_m = 0.0;
-  double beside_m = 0.0;
+  double max_lateral_m = 0.0;
 };
 
 TEST_F(RouteDriving, RepeatsARoundFromItsBeginningToItsEnd) {
@@ -89,7 +90,7 @@ TEST_F(RouteDriving, RepeatsARoundFromItsBeginningToItsEnd) {
   EXPECT_EQ(state, RouteDriver::State::arrived);
   EXPECT_LT(distance(robot.position(), end.position()), 0.1);
   EXPECT_GT(way_m, 8.0);  // not at its end from the beginning
-  EXPECT_LT(beside_m, 0.15);
+  EXPECT_LT(max_lateral_m, 0.15);
 }
 
 TEST_F(RouteDriving, ARobotThatIsNowhereOnItStands) {

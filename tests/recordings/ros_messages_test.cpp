@@ -34,7 +34,7 @@ Blob bytes_from(const std::vector<int>& values) {
 
 Blob golden_message(const std::string& name) {
   const std::string file =
-      bytes_of(fs::path(__FILE__).parent_path().parent_path() / "fuzz/corpus/ros_messages" / name);
+      bytes_of(fs::path(PANONAV_TEST_DATA) / "../../fuzz/corpus/ros_messages" / name);
   const auto* begin = reinterpret_cast<const std::uint8_t*>(file.data());
   return {begin + 1, begin + file.size()};
 }

@@ -450,7 +450,7 @@ TEST(ChanceMatch, PicturesOfNothingMatchNoBetterThanNoise) {
 
 TEST(ChanceMatch, ViewsOfOnePlaceAreKnownWhicheverWayTheRobotFaces) {
   int known = 0;
-  int asked = 0;
+  int queries = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     const ToyWorld around = random_surroundings(seed, 2.0);
     const HomingView home = view_of(seen_from(around, 0, 0, 0, 24));
@@ -460,13 +460,13 @@ TEST(ChanceMatch, ViewsOfOnePlaceAreKnownWhicheverWayTheRobotFaces) {
           seen_from(around, far * std::cos(towards), far * std::sin(towards), 2.0 * towards, 24));
       const ChanceMatch match = compare_with_chance(home, here);
       known += match.is_beyond_chance() ? 1 : 0;
-      ++asked;
+      ++queries;
       const ChanceMatch turned = compare_with_chance(rotate(home, 1.0), rotate(here, -2.0));
       EXPECT_NEAR(turned.match, match.match, 2e-3);
       EXPECT_NEAR(turned.chance, match.chance, 2e-2);
     }
   }
-  EXPECT_GE(10 * known, 8 * asked);
+  EXPECT_GE(10 * known, 8 * queries);
 }
 
 }  // namespace

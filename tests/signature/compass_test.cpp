@@ -336,12 +336,12 @@ TEST(Compass, UsesTheComponentsAskedFor) {
         {full.rows(), components}, {full.magnitudes().begin(), full.magnitudes().begin() + count},
         {full.phases_rad().begin(), full.phases_rad().begin() + count}, std::nullopt);
   };
-  const auto asked = compass(query, reference, 5);
+  const auto limited = compass(query, reference, 5);
   const auto of_cut = compass(cut(query, 5), cut(reference, 5));
   const auto of_one_cut = compass(cut(query, 5), reference);
-  ASSERT_TRUE(asked && of_cut && of_one_cut);
-  EXPECT_EQ(asked->heading_rad, of_cut->heading_rad);
-  EXPECT_EQ(asked->heading_rad, of_one_cut->heading_rad);
+  ASSERT_TRUE(limited && of_cut && of_one_cut);
+  EXPECT_EQ(limited->heading_rad, of_cut->heading_rad);
+  EXPECT_EQ(limited->heading_rad, of_one_cut->heading_rad);
   EXPECT_THROW(static_cast<void>(compass(query, reference, 16)), ContractError);
   EXPECT_THROW(static_cast<void>(compass(query, reference, 1)), ContractError);
   EXPECT_THROW(static_cast<void>(compass(query, reference, -1)), ContractError);

@@ -63,7 +63,7 @@ class Gantry : public ::testing::Test {
     double worst_m = 0.0;
   };
 
-  /// Each view against all others: where the min_dissimilarity dissimilar one stands.
+  /// Finds for each view the least dissimilar one of all others.
   template <class Dissimilarity>
   [[nodiscard]] Nearest find_nearest(Dissimilarity dissimilarity) const {
     Nearest result;

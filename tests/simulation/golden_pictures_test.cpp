@@ -24,7 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const fs::path golden = fs::path(__FILE__).parent_path() / "data/golden";
+const fs::path golden = fs::path(PANONAV_TEST_DATA) / "golden";
 
 constexpr char instructions[] = "sse4.2";
 

@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const fs::path data = fs::path(__FILE__).parent_path() / "data";
+const fs::path data = PANONAV_TEST_DATA;
 
 GazeboOptions options() {
   GazeboOptions result;

@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const fs::path meshes = fs::path(__FILE__).parent_path() / "data/models/crate/meshes";
+const fs::path meshes = fs::path(PANONAV_TEST_DATA) / "models/crate/meshes";
 
 // Says which file it was asked for by the size of the picture.
 TextureOptions fake_textures() {

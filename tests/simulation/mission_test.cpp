@@ -79,7 +79,7 @@ TEST(Missions, ArriveOverAMemoryWithoutPositionsAndAreRepeatable) {
   for (const MissionRun& run : runs) {
     ASSERT_FALSE(run.path.empty());
     ASSERT_EQ(run.path.size(), run.decisions.size());
-    EXPECT_NE(run.end, NavigationState::moving);
+    EXPECT_NE(run.end, NavigationDecision::State::moving);
     EXPECT_GE(run.shortest_m, 0.0);
     arrived += static_cast<int>(run.arrives(0.2));
     // No robot ever stands in a thing.
@@ -196,7 +196,7 @@ TEST(Missions, RefuseWhatMakesNoSense) {
   const MissionPlace& place = office();
   const RememberedPlace remembered = memorise_grid(place, 1.0, 5, executor);
   EXPECT_THROW((void)draw_missions(place, remembered, {.count = -1}, 1), ContractError);
-  EXPECT_THROW((void)draw_missions(place, remembered, {.beside_m = 0.0}, 1), ContractError);
+  EXPECT_THROW((void)draw_missions(place, remembered, {.max_distance_m = 0.0}, 1), ContractError);
   const MemoryViewSource source(remembered.memory);
   Navigator navigator(source, AreaPlanner(remembered.graph));
   EXPECT_THROW((void)run_mission(place, remembered, navigator, {ViewId{9999}, {}, {}}, {}, 1),
@@ -204,15 +204,16 @@ TEST(Missions, RefuseWhatMakesNoSense) {
 }
 
 TEST(Mission, OtherEndsSayHowRunsEndThatDoNotArrive) {
-  EXPECT_EQ(explain_other_ends({{NavigationState::arrived, 5}}, 0), "");
-  EXPECT_EQ(explain_other_ends({{NavigationState::arrived, 5},
-                                {NavigationState::lost, 1},
-                                {NavigationState::unreachable, 3}},
+  EXPECT_EQ(explain_other_ends({{NavigationDecision::State::arrived, 5}}, 0), "");
+  EXPECT_EQ(explain_other_ends({{NavigationDecision::State::arrived, 5},
+                                {NavigationDecision::State::lost, 1},
+                                {NavigationDecision::State::unreachable, 3}},
                                2),
             "of the other runs, 2 report an arrival but are farther off, 1 end as lost, 3 end as "
             "unreachable");
-  EXPECT_EQ(explain_other_ends({{NavigationState::arrived, 1}, {NavigationState::unreachable, 3}},
-                               1, NavigationState::unreachable),
+  EXPECT_EQ(explain_other_ends({{NavigationDecision::State::arrived, 1},
+                                {NavigationDecision::State::unreachable, 3}},
+                               1, NavigationDecision::State::unreachable),
             "of the other runs, 1 end as arrived");
 }
 

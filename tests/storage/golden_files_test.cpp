@@ -44,7 +44,7 @@ void expect_views(const MemoryFile& file) {
   }
   ASSERT_EQ(memory.links().size(), 2U);
   EXPECT_EQ(memory.links()[1].b, ViewId{4});
-  EXPECT_EQ(memory.links()[1].kind, LinkKind::closure);
+  EXPECT_EQ(memory.links()[1].kind, Link::Kind::closure);
 }
 
 // data/version_1.panonav is as the library wrote it, and stays as it is: five views with numbers

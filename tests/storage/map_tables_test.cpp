@@ -29,10 +29,10 @@ TopologicalMap random_map(const std::vector<ViewId>& views, std::uint64_t seed) 
   TopologicalMap map;
   for (std::size_t i = 0; i < views.size(); ++i) {
     map.nodes.push_back({views[i], pose(), i < 5 ? 0U : 1U});
-    if (i > 0) map.edges.push_back({views[i - 1], views[i], pose(), LinkKind::sequence, 1.0});
+    if (i > 0) map.edges.push_back({views[i - 1], views[i], pose(), Link::Kind::sequence, 1.0});
   }
   if (views.size() > 3) {
-    map.edges.push_back({views[0], views[3], pose(), LinkKind::closure, 0.625});
+    map.edges.push_back({views[0], views[3], pose(), Link::Kind::closure, 0.625});
   }
   return map;
 }

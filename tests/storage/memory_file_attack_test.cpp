@@ -85,7 +85,7 @@ class MemoryFileAttack : public MemoryFileTest {
     for (int number = 0; number < 6; ++number) {
       ids.push_back(file.append(random_view(random, mirror_header().shape, number)));
     }
-    file.link(std::vector<Link>{{ids[0], ids[1], LinkKind::sequence}});
+    file.link(std::vector<Link>{{ids[0], ids[1], Link::Kind::sequence}});
     file.save_map("map", {{{ids[0], {}}, {ids[1], {}}}, {}});
     RoutePanorama route(16);
     for (int i = 0; i < 20; ++i) {

@@ -278,14 +278,14 @@ TEST_F(MemoryFileCrash, ChangesInOneAreAllOrNothing) {
     MemoryFile file = MemoryFile::create(path, small_header());
     for (int number = 0; number < 4; ++number)
       ids.push_back(file.append(numbered_view(shape, number)));
-    file.link(std::vector<Link>{{ids[0], ids[1], LinkKind::sequence},
-                                {ids[1], ids[2], LinkKind::sequence}});
+    file.link(std::vector<Link>{{ids[0], ids[1], Link::Kind::sequence},
+                                {ids[1], ids[2], Link::Kind::sequence}});
   }
   const auto prune = [&](MemoryFile& file, const std::function<void()>& between) {
     file.change([&] {
       file.remove(std::vector<ViewId>{ids[1]});
       between();
-      file.link(std::vector<Link>{{ids[0], ids[2], LinkKind::sequence}});
+      file.link(std::vector<Link>{{ids[0], ids[2], Link::Kind::sequence}});
     });
   };
   const VisualMemory before = MemoryFile::open(path, Access::read_only).load();
@@ -309,7 +309,7 @@ TEST_F(MemoryFileCrash, ChangesInOneAreAllOrNothing) {
   EXPECT_EQ(file.parameter("note"), "kept");
   prune(file, [] {});
   EXPECT_EQ(file.load().size(), 3U);
-  EXPECT_EQ(file.links(), (std::vector<Link>{{ids[0], ids[2], LinkKind::sequence}}));
+  EXPECT_EQ(file.links(), (std::vector<Link>{{ids[0], ids[2], Link::Kind::sequence}}));
   EXPECT_TRUE(file.verify().empty());
 }
 

@@ -20,7 +20,7 @@ struct Sample {
     const std::vector<ViewId> ids = file.append(added);
     std::vector<Link> links;
     for (std::size_t i = 1; i < ids.size(); ++i) {
-      links.push_back({ids[i - 1], ids[i], LinkKind::sequence});
+      links.push_back({ids[i - 1], ids[i], Link::Kind::sequence});
     }
     file.link(links);
     file.set_parameter("unknown place", "0.25");

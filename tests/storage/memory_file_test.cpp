@@ -65,9 +65,9 @@ TEST_F(MemoryFileContent, ContentComesBack) {
       expected.append_with_id(id, view.signature, view.info);
     }
     const auto views = expected.views();
-    const std::vector<Link> links{{views[0], views[1], LinkKind::sequence},
-                                  {views[1], views[7], LinkKind::closure},
-                                  {views[2], views[3], LinkKind::neighbour}};
+    const std::vector<Link> links{{views[0], views[1], Link::Kind::sequence},
+                                  {views[1], views[7], Link::Kind::closure},
+                                  {views[2], views[3], Link::Kind::neighbour}};
     file.link(links);
     for (const Link& link : links) expected.link(link);
     EXPECT_TRUE(same_content(file.load(), expected));
@@ -172,8 +172,8 @@ TEST_F(MemoryFileContent, ABadViewChangesNothing) {
   const ViewId unknown{77};
   EXPECT_THROW(file.remove(std::vector{id, unknown}), ContractError);
   EXPECT_THROW(file.set_pose(unknown, std::nullopt), ContractError);
-  EXPECT_THROW(file.link(std::vector{Link{id, unknown, LinkKind::closure}}), ContractError);
-  EXPECT_THROW(file.link(std::vector{Link{id, id, LinkKind::closure}}), ContractError);
+  EXPECT_THROW(file.link(std::vector{Link{id, unknown, Link::Kind::closure}}), ContractError);
+  EXPECT_THROW(file.link(std::vector{Link{id, id, Link::Kind::closure}}), ContractError);
   EXPECT_THROW((void)file.thumbnail(unknown), ContractError);
   EXPECT_TRUE(same_content(file.load(), before));
 }

@@ -19,7 +19,7 @@ class MemoryFileUndo : public MemoryFileTest {
       ids.push_back(file->append(random_view(random, small_header().shape, number)));
     }
     for (std::size_t i = 1; i < ids.size(); ++i) {
-      file->link(std::vector<Link>{{ids[i - 1], ids[i], LinkKind::sequence}});
+      file->link(std::vector<Link>{{ids[i - 1], ids[i], Link::Kind::sequence}});
       map.nodes.push_back({ids[i], {static_cast<double>(i), 0.0, 0.0}});
     }
     file->save_map("map", map);

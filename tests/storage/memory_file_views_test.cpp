@@ -26,7 +26,7 @@ VisualMemory write_sample(const std::filesystem::path& path) {
   std::erase_if(ids, [&](ViewId id) { return std::ranges::binary_search(removed, id); });
   std::vector<Link> links;
   for (std::size_t i = 3; i < ids.size(); ++i) {
-    links.push_back({ids[i - 3], ids[i], i % 2 == 0 ? LinkKind::neighbour : LinkKind::closure});
+    links.push_back({ids[i - 3], ids[i], i % 2 == 0 ? Link::Kind::neighbour : Link::Kind::closure});
   }
   file.link(links);
   return file.load();

@@ -52,6 +52,8 @@ void expect_refusal(const std::vector<std::string>& arguments, std::string_view 
 void run_well(const std::vector<std::string>& arguments);
 
 [[nodiscard]] std::vector<std::string> lines(const std::string& text);
+/// Returns the parts of the text between blanks, such as the words of a verb of two.
+[[nodiscard]] std::vector<std::string> words_of(const std::string& text);
 [[nodiscard]] std::set<std::string> keys_of(const nlohmann::json& object);
 /// The arguments and more.
 [[nodiscard]] std::vector<std::string> with(std::vector<std::string> arguments,

@@ -135,7 +135,7 @@ struct RememberedWorld {
       for (std::size_t b = a + 1; b < poses.size(); ++b) {
         if (distance(poses[a].position(), poses[b].position()) < 1.5 * spacing_m &&
             is_passable(world, poses[a].position(), poses[b].position())) {
-          made.link({made.views()[a], made.views()[b], LinkKind::neighbour});
+          made.link({made.views()[a], made.views()[b], Link::Kind::neighbour});
         }
       }
     }

@@ -154,9 +154,9 @@ int answer(unsigned long request, void* argument) {
       return 0;
     }
     case VIDIOC_REQBUFS: {
-      auto& request = *static_cast<v4l2_requestbuffers*>(argument);
-      if (request.count > max_buffers) request.count = max_buffers;
-      self.buffers = request.count;
+      auto& buffers = *static_cast<v4l2_requestbuffers*>(argument);
+      if (buffers.count > max_buffers) buffers.count = max_buffers;
+      self.buffers = buffers.count;
       return 0;
     }
     case VIDIOC_QUERYBUF: {

@@ -62,7 +62,7 @@ class Browser:
             close_fds=False, preexec_fn=place, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         os.close(to_browser)
         os.close(from_browser)
-        self.number, self.left, self.session, self.errors, self.asked = 0, b"", None, [], []
+        self.number, self.left, self.session, self.errors, self.requests = 0, b"", None, [], []
         target = next(t for t in self.call("Target.getTargets")["targetInfos"] if t["type"] == "page")
         attached = self.call("Target.attachToTarget", targetId=target["targetId"], flatten=True)
         self.session = attached["sessionId"]
@@ -85,7 +85,7 @@ class Browser:
         elif what == "Runtime.consoleAPICalled" and params["type"] in ("error", "warning"):
             self.errors.append(str(params["args"]))
         elif what == "Network.requestWillBeSent":
-            self.asked.append(params["request"]["url"])
+            self.requests.append(params["request"]["url"])
         return message
 
     def call(self, method, **parameters):

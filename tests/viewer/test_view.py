@@ -39,7 +39,7 @@ def look_at_report(browser, file, shots):
     """The page of a run that is over, from its file: it plays without a click and stops on one."""
     browser.call("Page.navigate", url="about:blank")
     browser.settle()
-    browser.asked.clear()
+    browser.requests.clear()
     browser.errors.clear()
     browser.show(DESK)
     browser.call("Page.navigate", url=file.as_uri())
@@ -53,7 +53,7 @@ def look_at_report(browser, file, shots):
     browser.wait("document.querySelector('#clock').textContent.endsWith('picture 60 of 60')")
     browser.picture(shots / "report.png")
     assert not browser.errors, browser.errors
-    elsewhere = [one for one in browser.asked if not one.startswith((file.as_uri(), "data:"))]
+    elsewhere = [one for one in browser.requests if not one.startswith((file.as_uri(), "data:"))]
     assert not elsewhere, elsewhere
 
 
@@ -93,7 +93,7 @@ def look_at_demo(browser, file, shots):
     wide = browser.ask("document.documentElement.scrollWidth")
     assert wide <= PHONE["width"], wide
     assert not browser.errors, browser.errors
-    elsewhere = [one for one in browser.asked if not one.startswith((file.as_uri(), "data:", "about:"))]
+    elsewhere = [one for one in browser.requests if not one.startswith((file.as_uri(), "data:", "about:"))]
     assert not elsewhere, elsewhere
 
 
@@ -185,12 +185,12 @@ def look(browser, url, shots):
     # On a slow machine the run is over before its last pictures are asked for.
     errors = [one for one in browser.errors if "/picture/" not in one]
     assert not errors, errors
-    elsewhere = [one for one in browser.asked if not one.startswith((url, "data:", "about:", "blob:"))]
+    elsewhere = [one for one in browser.requests if not one.startswith((url, "data:", "about:", "blob:"))]
     assert not elsewhere, elsewhere
 
 
-def watch(arguments, asked=()):
-    """The events of a run that a viewer follows to its end. `asked`: requests after the first moment, each a method, what
+def watch(arguments, requests=()):
+    """The events of a run that a viewer follows to its end. `requests`: requests after the first moment, each a method, what
     is below the page's address, a text and the status that is expected.
     """
     run = subprocess.Popen([PANONAV, *map(str, arguments), "--view", "0"], stdout=subprocess.DEVNULL,
@@ -202,9 +202,9 @@ def watch(arguments, asked=()):
         follower.request("GET", url[2] + "events")
         answer = follower.getresponse()
         text = ""
-        while asked and "event: moment\n" not in text:
+        while requests and "event: moment\n" not in text:
             text += answer.readline().decode()
-        for method, below, body, status in [*asked, ("POST", "control", json.dumps({"speed": 100}), 204)]:
+        for method, below, body, status in [*requests, ("POST", "control", json.dumps({"speed": 100}), 204)]:
             other = connect()
             other.request(method, url[2] + below, body)
             assert (got := other.getresponse().status) == status, (arguments, below, body, got)

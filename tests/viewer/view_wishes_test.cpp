@@ -18,9 +18,9 @@ std::string below_pictures(const std::string& url, int reference) {
 
 TEST(ViewServer, GivesPicturesOfReferences) {
   const Image picture(64, 48, 3);
-  std::vector<std::string> asked;
+  std::vector<std::string> requests;
   ViewServer server({.thumbnail = [&](const std::string& name) {
-    asked.push_back(name);
+    requests.push_back(name);
     return name == "a" ? encode_png(picture.view()) : std::vector<std::uint8_t>{};
   }});
   EXPECT_EQ(status_of(below_pictures(server.url(), 0)), 404);  // none is told yet
@@ -37,7 +37,7 @@ TEST(ViewServer, GivesPicturesOfReferences) {
                                   "view/99999999999999999999", "view/../../etc/passwd"}) {
     EXPECT_EQ(status_of(ask(server.url(), below)), 404) << below;
   }
-  EXPECT_EQ(asked, (std::vector<std::string>{"a", "../b"}));
+  EXPECT_EQ(requests, (std::vector<std::string>{"a", "../b"}));
   ViewServer without;
   without.add(moment_at(0.0));
   EXPECT_EQ(status_of(below_pictures(without.url(), 0)), 404);

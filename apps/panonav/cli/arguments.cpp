@@ -27,7 +27,7 @@ struct Arguments::Implementation {
     OptionEntries entries;
     std::string prefix;  ///< of the flags
   };
-  struct UsedOnly {
+  struct Refusal {
     std::vector<std::string> options;
     std::function<bool()> used;
     std::string why;
@@ -35,7 +35,7 @@ struct Arguments::Implementation {
   std::vector<ArgumentInfo> infos = {};
   std::vector<Take> takes = {};       ///< one for each of the infos
   std::deque<Section> sections = {};  ///< a deque: takes keep references into it
-  std::vector<UsedOnly> used_only = {};
+  std::vector<Refusal> refusals = {};
   std::set<std::string, std::less<>> typed = {};  ///< flags
   /// Flags outside options structs that stand in option files, and what a file or the command line
   /// says.
@@ -178,7 +178,7 @@ void Arguments::choice(const std::string& flag, std::optional<std::string>& valu
   auto& info = add(flag, "NAME", help, [&value, name = long_flag(flag), choices](auto words) {
     const std::string& text = words.front();
     if (std::ranges::find(choices, text) == choices.end()) {
-      throw UsageError(name + " is '" + text + "'; allowed: " + listed(choices));
+      throw UsageError(name + " is '" + text + "'; allowed: " + join_texts(choices));
     }
     value = text;
   });
@@ -359,14 +359,14 @@ void Arguments::resolve(const std::optional<std::string>& config,
     section.visit(applier);
     section.check();
   }
-  for (const auto& [options, used, why] : implementation_->used_only) {
+  for (const auto& [options, used, why] : implementation_->refusals) {
     if (!used()) refuse_unused(options, why);
   }
 }
 
 void Arguments::refuse_unless(std::vector<std::string> options, std::function<bool()> used,
                               std::string why) {
-  implementation_->used_only.push_back({std::move(options), std::move(used), std::move(why)});
+  implementation_->refusals.push_back({std::move(options), std::move(used), std::move(why)});
 }
 
 void Arguments::refuse_unused(std::span<const std::string> options, const std::string& why) const {
@@ -430,7 +430,7 @@ std::string Arguments::config_template(std::string_view verb) const {
     text += "\n[" + section.name + "]\n";
     OptionLister lister([&](const ListedOption& option) {
       const std::string name(option.info.name);
-      const std::string range = option.choices.empty() ? option.range : listed(option.choices);
+      const std::string range = option.choices.empty() ? option.range : join_texts(option.choices);
       const bool is_name = option.type == "NAME";
       text += "# " + std::string(option.info.help) + (range.empty() ? "" : " (" + range + ")") +
               "\n" + (is_set(section.name, name) ? "" : "# ") + name + " = " +

@@ -50,10 +50,10 @@ struct ArgumentInfo {
 };
 
 /// The command line of one verb. Values are bound by reference and must live until the verb has
-/// run. A declared flag is written "--out FILE" or "-o,--out FILE": the word behind it stands for
-/// its value in texts, and FILE, FOLDER and names of data are completed as files. `--help` shows
-/// the flags that are declared one by one, `--help-all` those of options structs, too; `common` and
-/// `uncommon` tell otherwise.
+/// run. A declared flag is written "--out FILE" or "-o,--out FILE": the word after the flag names
+/// its value in help and messages; FILE, FOLDER and names of data are completed as files. `--help`
+/// shows the flags that are declared one by one, `--help-all` those of options structs, too, unless
+/// `show_in_help` and `hide_from_help` decide otherwise.
 class Arguments {
  public:
   Arguments();
@@ -85,7 +85,7 @@ class Arguments {
   /// Exactly two names; `words` stands for them in texts, "ODOM BASE".
   void option(const std::string& flag, const std::string& words,
               std::optional<std::pair<std::string, std::string>>& value, const std::string& help);
-  /// Whole number from `low` on.
+  /// Declares an option that takes an integer of at least `low`.
   void option(const std::string& flag, int& value, int low, const std::string& help);
   void option(const std::string& flag, std::optional<int>& value, int low, const std::string& help);
   /// One of `choices`.
@@ -109,8 +109,8 @@ class Arguments {
 
   /// Flags declared before that `--help` shows, or leaves to `--help-all`. Throws logic_error when
   /// there is no such flag.
-  void common(std::initializer_list<std::string_view> flags) { set_common(flags, true); }
-  void uncommon(std::initializer_list<std::string_view> flags) { set_common(flags, false); }
+  void show_in_help(std::initializer_list<std::string_view> flags) { set_common(flags, true); }
+  void hide_from_help(std::initializer_list<std::string_view> flags) { set_common(flags, false); }
 
   /// True if the user set this member by flag or file; with an empty name, any member of the
   /// section. Valid once the verb runs.

@@ -283,9 +283,8 @@ std::vector<std::string> completion_shells() {
 std::string completion_script(std::span<const Description> verbs, std::string_view name) {
   const auto* const shell = std::ranges::find(shells, name, &Shell::name);
   if (shell == shells.end()) {
-    std::string all;
-    for (const auto& known : shells) all += (all.empty() ? "" : ", ") + std::string(known.name);
-    throw UsageError("SHELL is '" + std::string(name) + "'; allowed: " + all);
+    throw UsageError("SHELL is '" + std::string(name) +
+                     "'; allowed: " + join_texts(completion_shells()));
   }
   return shell->script(verbs);
 }

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 
+#include "cli/option_values.hpp"
 #include "cli/texts.hpp"
 
 namespace panonav::command {
@@ -77,8 +78,7 @@ std::string help_line(const ArgumentInfo& argument) {
   if (argument.required && !argument.positional()) note("required");
   if (!argument.initial.empty()) note("default " + argument.initial);
   note(argument.range);
-  std::string choices;
-  for (const auto& choice : argument.choices) choices += (choices.empty() ? "" : ", ") + choice;
+  const std::string choices = join_texts(argument.choices);
   if (!argument.positional() && !choices.empty()) note("one of " + choices);
   return argument.help + (notes.empty() ? "" : " (" + notes + ")");
 }

@@ -83,7 +83,7 @@ void TextApplier::visit(const OptionInfo& info, std::span<const std::string_view
   const std::string* typed = text(info);
   if (typed == nullptr) return;
   const auto found = std::ranges::find(choices, *typed);
-  if (found == choices.end()) refuse(info.name, *typed, listed(choices));
+  if (found == choices.end()) refuse(info.name, *typed, join_texts(choices));
   value = static_cast<int>(found - choices.begin());
 }
 

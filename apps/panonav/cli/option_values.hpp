@@ -27,8 +27,8 @@ using OptionEntries = std::map<std::string, OptionEntry>;
 /// image_topic" becomes "--image-topic".
 [[nodiscard]] std::string name_flags(std::string_view message);
 
-/// The texts with commas between them.
-[[nodiscard]] std::string listed(const auto& texts) {
+/// Returns the texts with commas between them.
+[[nodiscard]] std::string join_texts(const auto& texts) {
   std::string all;
   for (const auto& text : texts) {
     if (!all.empty()) all += ", ";

@@ -48,7 +48,7 @@ const Verb& find_required_verb(std::span<const Verb> verbs, std::span<const std:
   if (words.empty()) throw UsageError("a verb is missing");
   const auto longer = find_verbs_beginning_with(verbs, words[0]);
   if (!longer.empty() && words.size() == 1) {
-    throw UsageError("'" + words[0] + "' needs a second word: " + listed(longer));
+    throw UsageError("'" + words[0] + "' needs a second word: " + join_texts(longer));
   }
   const std::string typed = longer.empty() ? words[0] : words[0] + " " + words[1];
   if (looks_like_flag(typed)) throw UsageError("no such option: " + typed + "; a verb is missing");
@@ -63,8 +63,9 @@ const Verb& find_required_verb(std::span<const Verb> verbs, std::span<const std:
       throw UsageError("'" + both + "' is no verb" + meant);
     }
   }
-  throw UsageError("'" + typed + "' is no verb" +
-                   (longer.empty() ? suggest_name(typed, names) : "; allowed: " + listed(longer)));
+  throw UsageError(
+      "'" + typed + "' is no verb" +
+      (longer.empty() ? suggest_name(typed, names) : "; allowed: " + join_texts(longer)));
 }
 
 std::vector<std::string> verb_names() {
@@ -122,7 +123,7 @@ std::shared_ptr<Declared> declare(const Verb& verb) {
                  "Print such a file with all options, their defaults and ranges, and stop");
   arguments.flag("-h,--help", declared->ignored, "Print a short help and stop");
   arguments.flag("--help-all", declared->ignored, "Print the help with all options and stop");
-  arguments.uncommon({"--threads", "--config", "--config-template"});
+  arguments.hide_from_help({"--threads", "--config", "--config-template"});
   return declared;
 }
 
@@ -146,7 +147,7 @@ ParsedCommand parse(std::span<const Verb> verbs, std::span<const std::string> wo
   if (!words.empty() && is_help_flag(words[0])) return printing({}, overview(verbs));
   if (words.size() > 1 && is_help_flag(words[1])) {
     const auto longer = find_verbs_beginning_with(verbs, words[0]);
-    if (!longer.empty()) return printing({}, "Verbs of two words: " + listed(longer));
+    if (!longer.empty()) return printing({}, "Verbs of two words: " + join_texts(longer));
   }
   const Verb& verb = find_required_verb(verbs, words);
   const auto declared = declare(verb);

@@ -31,8 +31,8 @@ void on_signal(int number) {
   const std::int64_t now_ns = steady_ns();
   std::int64_t first_ns = 0;
   if (asked_at_ns.compare_exchange_strong(first_ns, now_ns)) {
-    const char asked = 's';
-    (void)!write(signal_pipe, &asked, 1);
+    const char signal_byte = 's';
+    (void)!write(signal_pipe, &signal_byte, 1);
   } else if (now_ns - first_ns >= one_request_ns) {
     signal(number, SIG_DFL);
     raise(number);
@@ -51,10 +51,10 @@ StopSignals::StopSignals(std::function<void()> stop) : stop_(std::move(stop)) {
   sigaction(SIGINT, &action, &interrupt_);
   sigaction(SIGTERM, &action, &terminate_);
   waiting_ = std::thread([this] {
-    char asked = 0;
-    while (read(pipe_[0], &asked, 1) < 0) {
+    char signal_byte = 0;
+    while (read(pipe_[0], &signal_byte, 1) < 0) {
     }
-    if (asked == 's') stop_();
+    if (signal_byte == 's') stop_();
   });
 }
 

@@ -273,7 +273,7 @@ ordered_json as_json(const DemoResults& done, const fs::path& out) {
           {"track_wrong", done.track.wrong},
           {"track_error_m", median_or_null(done.track.errors_m)},
           {"arranged_procrustes_disparity",
-           done.maps.lattice ? ordered_json(done.maps.lattice->shape_difference) : ordered_json()},
+           done.maps.lattice ? ordered_json(done.maps.lattice->shape.value) : ordered_json()},
           {"drive_procrustes_disparity", done.maps.map_error},
           {"wheels_procrustes_disparity", done.maps.wheels_error},
           {"runs_home", done.homing.runs.size()},
@@ -292,8 +292,7 @@ ordered_json as_json(const DemoResults& done, const fs::path& out) {
 }
 
 std::string format_delay(const std::optional<std::size_t>& images) {
-  return images ? "after " + std::to_string(*images) + (*images == 1 ? " image" : " images")
-                : "never";
+  return (images ? "after " : "") + format_image_count(images);
 }
 
 std::string of(std::size_t part, std::size_t all) {
@@ -316,7 +315,7 @@ void print(const DemoResults& done, Session& session) {
                 of(done.track.wrong, done.track.localised) + " answers wrong");
   const auto centimetres = [](double metres) { return format_fixed(100.0 * metres, 0) + " cm"; };
   session.print("  arranged by similarity alone: " +
-                (done.maps.lattice ? centimetres(done.maps.lattice->rms_m) : "none") +
+                (done.maps.lattice ? centimetres(done.maps.lattice->truth_from_map.rms_m) : "none") +
                 " from the true places; map of a drive: " + centimetres(done.maps.map_rms_m) +
                 " from the true path, its odometry alone " + centimetres(done.maps.wheels_rms_m));
   session.print("  home from one metre away: " + of(done.homing.arrived, done.homing.runs.size()) +

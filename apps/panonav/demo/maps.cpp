@@ -146,11 +146,12 @@ std::vector<std::pair<std::string, std::string>> make_figures(const DemoMaps& ma
                                                               std::size_t drive_views) {
   std::vector<std::pair<std::string, std::string>> figures;
   if (maps.lattice) {
-    figures.push_back({format_centimetres(maps.lattice->rms_m),
-                       "is the error of the arranged views (root mean square), in a room " +
-                           format_fixed(room_length_m(office), 1) + " m long: " +
-                           format_fixed(100.0 * maps.lattice->rms_m / room_length_m(office), 1) +
-                           " % of it"});
+    figures.push_back(
+        {format_centimetres(maps.lattice->truth_from_map.rms_m),
+         "is the error of the arranged views (root mean square), in a room " +
+             format_fixed(room_length_m(office), 1) + " m long: " +
+             format_fixed(100.0 * maps.lattice->truth_from_map.rms_m / room_length_m(office), 1) +
+             " % of it"});
   }
   figures.push_back({format_centimetres(maps.map_rms_m),
                      "is the error of the map of a drive of " +
@@ -188,7 +189,8 @@ DemoMaps demonstrate_maps(const VisualMemory& office, std::uint64_t seed, bool q
   maps.wheels_rms_m =
       align(positions_of(recording.wheels), mapped.truth, {.allow_scale = true}).rms_m;
 
-  const std::string arranged = maps.lattice ? format_centimetres(maps.lattice->rms_m) : "none";
+  const std::string arranged =
+      maps.lattice ? format_centimetres(maps.lattice->truth_from_map.rms_m) : "none";
   page.begin_part("Maps",
                   {arranged, "is the error of a map made from the similarity of views alone"});
   page.add_text(

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "cli/session.hpp"
+#include "panonav/mapping/map_measures.hpp"
 #include "panonav_simulation/mapping_run.hpp"
 #include "reports/lattice_picture.hpp"
 #include "reports/report_page.hpp"
@@ -12,11 +13,11 @@ namespace panonav::command {
 
 /// Maps made from the memory's views.
 struct DemoMaps {
-  Lattice arranged;                          ///< the office, its views in no order
-  std::optional<LatticeComparison> lattice;  ///< beside the truth
-  double map_error = 1.0;                    ///< shape difference of a map from a drive
-  double wheels_error = 1.0;                 ///< of the wheels on the same drive
-  double map_rms_m = 0.0;                    ///< of the map laid over the true way, in equal size
+  Lattice arranged;                      ///< the office, its views in no order
+  std::optional<MapComparison> lattice;  ///< beside the truth
+  double map_error = 1.0;                ///< shape difference of a map from a drive
+  double wheels_error = 1.0;             ///< of the wheels on the same drive
+  double map_rms_m = 0.0;                ///< of the map laid over the true way, in equal size
   double wheels_rms_m = 0.0;
 };
 

@@ -181,7 +181,7 @@ viewer::RunPage replay_run(const simulation::MissionPlace& place,
     moment.sure = decision.probability >= 0.5;
     moment.state = name_of(decision.state);
     moment.probability = decision.probability;
-    for (const NavigationEvent event : decision.events) {
+    for (const NavigationDecision::Event event : decision.events) {
       std::string name(name_of(event));
       std::ranges::replace(name, '_', ' ');
       moment.values.emplace_back("event", std::move(name));
@@ -222,7 +222,7 @@ viewer::RunPage replay_run(const simulation::MissionPlace& place,
 
 std::string describe_end(const simulation::MissionRun& run, double within_m) {
   const std::string name(name_of(run.end));
-  if (run.end != NavigationState::arrived) return name;
+  if (run.end != NavigationDecision::State::arrived) return name;
   return run.arrives(within_m) ? "arrived" : "arrived, but too far off";
 }
 

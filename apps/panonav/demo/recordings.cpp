@@ -216,7 +216,7 @@ void prepare_demo_folder(const fs::path& out) {
   fs::create_directories(out, error);
   if (error) throw FileError(out.string(), "cannot be made: " + error.message());
   write_file(out / mark, std::string_view("This folder was made by panonav demo. Running it again "
-                                          "with this folder writes its files again.\n"));
+                                          "with this folder replaces its files.\n"));
   for (const auto name : made) {
     fs::remove_all(out / name, error);
     if (error) throw FileError((out / name).string(), "cannot be removed: " + error.message());

@@ -119,8 +119,8 @@ void add_part(const DemoTrack& track, double spacing_m, std::size_t kidnapped_af
 
 }  // namespace
 
-std::string format_image_count(const std::optional<std::size_t>& pictures) {
-  return pictures ? std::to_string(*pictures) + (*pictures == 1 ? " image" : " images") : "never";
+std::string format_image_count(const std::optional<std::size_t>& images) {
+  return images ? std::to_string(*images) + (*images == 1 ? " image" : " images") : "never";
 }
 
 DemoTrack demonstrate_tracking(const DemoOptions& options, const DemoRecordings& recordings,

@@ -29,7 +29,7 @@ struct DemoTrack {
 };
 
 /// "9 images", or "never".
-[[nodiscard]] std::string format_image_count(const std::optional<std::size_t>& pictures);
+[[nodiscard]] std::string format_image_count(const std::optional<std::size_t>& images);
 
 /// Tracks it by Monte-Carlo localisation and adds a part that plays the run to the page. The same
 /// seed gives the same run.

@@ -8,6 +8,7 @@
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/mapping/map_measures.hpp"
+#include "panonav/pipeline/arrangement.hpp"
 #include "reports/lattice_picture.hpp"
 
 namespace panonav::command {
@@ -21,7 +22,7 @@ Springs choose_springs(const Lattice& lattice) {
   constexpr std::size_t many = 1500;
   std::vector<const Lattice::Spring*> all;
   for (const Lattice::Spring& spring : lattice.springs) {
-    if (spring.weight >= 0.25) all.push_back(&spring);
+    if (spring.weight >= min_spring_weight) all.push_back(&spring);
   }
   const bool thin = all.size() > many;
   if (thin) std::ranges::stable_sort(all, {}, [](const auto* spring) { return spring->length; });
@@ -107,7 +108,7 @@ viewer::UnfoldingMap LatticeSteps::unfold(const Lattice& lattice,
       (components[i] == largest->first ? views : others).circles.push_back(*places[i]);
     }
     map.frames.push_back({.title = title, .layers = {held, others, views}});
-    if (!lattice.metric && !is_known(lattice, memory)) {
+    if (!lattice.metric && !has_true_positions(lattice, memory)) {
       map.frames.back().unit = "median distance to the nearest view";
     }
   };
@@ -136,12 +137,12 @@ void write_arrange_report(const std::filesystem::path& folder, const std::string
        "views in the largest connected group"}};
   const auto comparison = compare_with_ground_truth(lattice, memory);
   if (comparison) {
-    figures.emplace_back(format_fixed(comparison->rms_m, 2) + " m",
+    figures.emplace_back(format_fixed(comparison->truth_from_map.rms_m, 2) + " m",
                          "from the true places, root mean square, after the best alignment");
-    figures.emplace_back(format_fixed(comparison->shape_difference, 4),
+    figures.emplace_back(format_fixed(comparison->shape.value, 4),
                          "Procrustes disparity (shape difference): 0 the same shape, 1 none");
-    if (comparison->trustworthiness) {
-      figures.emplace_back(format_fixed(100.0 * *comparison->trustworthiness, 0) + " %",
+    if (comparison->neighbours) {
+      figures.emplace_back(format_fixed(100.0 * comparison->neighbours->trustworthiness, 0) + " %",
                            "trustworthiness: neighbours on the map that truly are");
     }
   }

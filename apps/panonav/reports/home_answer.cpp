@@ -20,8 +20,7 @@ std::string describe_rotation(double heading_rad) {
   // heading_rad is home's heading seen from here, so the robot has turned the other way.
   const double turned = wrap_angle(-heading_rad);
   if (std::abs(degrees(turned)) < 0.5) return "the robot faces as at home";
-  if (std::abs(degrees(turned)) >= 179.5)
-    return "the robot faces the opposite direction than at home";
+  if (std::abs(degrees(turned)) >= 179.5) return "the robot faces opposite to its heading at home";
   return "the robot has turned by " + in_words(turned);
 }
 

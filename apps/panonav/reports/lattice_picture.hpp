@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <vector>
@@ -11,22 +10,8 @@
 
 namespace panonav::command {
 
-/// Comparison of the largest component of an arrangement with the positions that the memory knows.
-struct LatticeComparison {
-  std::size_t compared = 0;               ///< views of that component with a true position
-  double shape_difference = 1.0;          ///< mu [F11], 0 .. 1
-  double with_reflection = 1.0;           ///< the same when a mirror image is allowed
-  double rms_m = 0.0;                     ///< after the best alignment with a free scale
-  double scale = 1.0;                     ///< metres for each unit of the lattice
-  std::optional<double> trustworthiness;  ///< of 8 neighbours; empty where views are too few
-  std::optional<double> continuity;
-};
-/// Empty where fewer than three views have a position, or all are at one place.
-[[nodiscard]] std::optional<LatticeComparison> compare_with_ground_truth(
-    const Lattice& lattice, const VisualMemory& memory);
-
 /// True if the memory knows enough positions of the largest component for a comparison.
-[[nodiscard]] bool is_known(const Lattice& lattice, const VisualMemory& memory);
+[[nodiscard]] bool has_true_positions(const Lattice& lattice, const VisualMemory& memory);
 
 /// Places of the largest component's views, laid over the positions that the memory knows; empty
 /// for other views.

@@ -11,6 +11,7 @@
 #include "panonav/storage/memory_address.hpp"
 #include "panonav_recordings/run_recorder.hpp"
 #include "panonav_viewer/report_page.hpp"
+#include "runs/run_record.hpp"
 
 namespace panonav::command {
 
@@ -66,7 +67,7 @@ recordings::RunMoment make_moment(const LocalisedQuery& query, std::size_t numbe
         std::string("difference to the ") + names.at(i),
         format_fixed(matches[i].column_difference, 3) + ", " + matches[i].name);
   }
-  if (const auto thumbnail = file.thumbnail(matches.front().view)) moment.best_match = *thumbnail;
+  moment.best_match = load_best_match(query.place, file);
   return moment;
 }
 

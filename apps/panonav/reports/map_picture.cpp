@@ -15,9 +15,6 @@ namespace panonav::command {
 
 namespace {
 
-constexpr double right_closure_m = 1.0;
-constexpr std::size_t compared_neighbours = 8;
-
 /// The nodes of the largest component beside what is known of them.
 struct Nodes {
   std::vector<Point2> map;
@@ -30,7 +27,7 @@ Nodes collect_nodes(const Dataset& recording, const Mapper::Result& run) {
   Nodes nodes;
   const std::size_t component = find_largest_component(run.map);
   for (std::size_t i = 0; i < run.map.nodes.size(); ++i) {
-    const MapNode& node = run.map.nodes[i];
+    const TopologicalMap::Node& node = run.map.nodes[i];
     if (node.component != component) continue;
     const DatasetEntry& entry = recording.entries[run.observations[i]];
     nodes.number.emplace(node.view, nodes.map.size());
@@ -51,32 +48,17 @@ std::vector<Point2> apply_alignment(const std::vector<Point2>& points, const Ali
 
 }  // namespace
 
-std::optional<MapComparison> compare_with_ground_truth(const Dataset& recording,
-                                                       const Mapper::Result& run) {
+std::optional<RecordedMapComparison> compare_with_ground_truth(const Dataset& recording,
+                                                               const Mapper::Result& run) {
   const Nodes nodes = collect_nodes(recording, run);
-  if (!is_comparable(nodes.map, nodes.truth)) return std::nullopt;
-  MapComparison comparison;
-  comparison.compared = nodes.map.size();
-  comparison.shape_difference = shape_difference(nodes.map, nodes.truth).value;
-  const Alignment alignment = align(nodes.map, nodes.truth, {.allow_scale = !run.wheels});
-  comparison.rms_m = alignment.rms_m;
-  comparison.scale = alignment.scale;
-  if (3 * compared_neighbours + 1 < 2 * nodes.map.size()) {
-    const auto kept =
-        neighbour_preservation(nodes.map, nodes.truth, static_cast<int>(compared_neighbours));
-    comparison.trustworthiness = kept.trustworthiness;
-    comparison.continuity = kept.continuity;
-  }
-  const auto closures = count_closures(
-      run.map,
-      [&](ViewId view) -> std::optional<Point2> {
-        const auto found = nodes.number.find(view);
-        if (found == nodes.number.end()) return std::nullopt;
-        return nodes.truth[found->second];
-      },
-      right_closure_m);
-  comparison.right_closures = closures.right;
-  comparison.wrong_closures = closures.wrong;
+  const auto positions = compare_positions(nodes.map, nodes.truth, !run.wheels);
+  if (!positions) return std::nullopt;
+  RecordedMapComparison comparison{.positions = *positions, .closures = {}};
+  comparison.closures = count_closures(run.map, [&](ViewId view) -> std::optional<Point2> {
+    const auto found = nodes.number.find(view);
+    if (found == nodes.number.end()) return std::nullopt;
+    return nodes.truth[found->second];
+  });
   if (is_comparable(nodes.odometry, nodes.truth)) {
     comparison.odometry_shape_difference = shape_difference(nodes.odometry, nodes.truth).value;
   }
@@ -100,10 +82,10 @@ viewer::MapPlot draw_map(const Dataset& recording, const Mapper::Result& run) {
     }
   }
   viewer::MapLayer closures{.label = "closures", .colour = viewer::PlotColour::green};
-  for (const MapEdge& edge : run.map.edges) {
+  for (const TopologicalMap::Edge& edge : run.map.edges) {
     const auto a = nodes.number.find(edge.a);
     const auto b = nodes.number.find(edge.b);
-    if (edge.kind != LinkKind::closure || a == nodes.number.end() || b == nodes.number.end()) {
+    if (edge.kind != Link::Kind::closure || a == nodes.number.end() || b == nodes.number.end()) {
       continue;
     }
     closures.lines.push_back({map[a->second], map[b->second]});
@@ -127,7 +109,8 @@ void write_map_report(const std::filesystem::path& folder, const std::string& na
       "A robot took " + std::to_string(recording.entries.size()) +
           " images on its path. Each is placed by the step since the one before, which is read "
           "from the images; where the robot passed a place again, the loop is closed.");
-  const auto closures = std::ranges::count(run.map.edges, LinkKind::closure, &MapEdge::kind);
+  const auto closures =
+      std::ranges::count(run.map.edges, Link::Kind::closure, &TopologicalMap::Edge::kind);
   std::vector<std::pair<std::string, std::string>> figures{
       {std::to_string(run.map.nodes.size()), "places"},
       {std::to_string(closures), "closures: places that were passed again"}};
@@ -138,10 +121,10 @@ void write_map_report(const std::filesystem::path& folder, const std::string& na
   }
   const auto comparison = compare_with_ground_truth(recording, run);
   if (comparison) {
-    figures.emplace_back(format_fixed(comparison->rms_m, 2) + " m",
+    figures.emplace_back(format_fixed(comparison->positions.truth_from_map.rms_m, 2) + " m",
                          "from the true path, root mean square, after the best alignment" +
                              std::string(run.wheels ? "" : " with a free scale"));
-    figures.emplace_back(format_fixed(comparison->shape_difference, 4),
+    figures.emplace_back(format_fixed(comparison->positions.shape.value, 4),
                          "Procrustes disparity (shape difference): 0 the same shape, 1 none");
     if (comparison->odometry_shape_difference) {
       figures.emplace_back(format_fixed(*comparison->odometry_shape_difference, 4),

@@ -45,7 +45,7 @@ viewer::LinePlot draw_errors(const std::vector<TrackedImage>& images, double spa
 
 viewer::LinePlot draw_particles(const std::vector<TrackedImage>& images) {
   viewer::Series all{.label = "particles", .style = viewer::SeriesStyle::lines};
-  viewer::Series injected{.label = "drawn again", .style = viewer::SeriesStyle::points};
+  viewer::Series injected{.label = "injected", .style = viewer::SeriesStyle::points};
   viewer::Series effective{.label = "effective number", .style = viewer::SeriesStyle::lines};
   for (std::size_t i = 0; i < images.size(); ++i) {
     const MonteCarloEstimate& estimate = images[i].estimate;

@@ -21,7 +21,7 @@ void declare_homing(Arguments& arguments, HomingArguments& values) {
   arguments.options("signature", values.views.signature);
   arguments.options("preprocessing", values.views.preprocessing);
   arguments.options("homing", values.homing);
-  arguments.uncommon({"--horizon"});
+  arguments.hide_from_help({"--horizon"});
   arguments.refuse_unless(
       {"--rising"}, [&values] { return values.homing.iterations > 0; }, "without --iterations");
   arguments.refuse_unless(

@@ -17,9 +17,9 @@ struct HomingArguments {
 /// Adds --horizon, --published and the options of signature, preprocessing and homing.
 void declare_homing(Arguments& arguments, HomingArguments& values);
 
-/// The options of the rule that the user wants. Throws UsageError when --published stands beside
-/// options of our own rule, ContractError when frequencies are arguments that `components` do not
-/// hold.
+/// Returns the options of the chosen rule. Throws UsageError when --published is combined with
+/// options of our own rule, ContractError when `components` hold too few
+/// frequencies.
 [[nodiscard]] FourierHomingOptions make_homing_options(const Arguments& declared,
                                                        const HomingArguments& arguments,
                                                        int components);

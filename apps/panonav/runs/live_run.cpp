@@ -23,7 +23,7 @@ class LinePrinter {
  public:
   LinePrinter(Session& session, bool wait)
       : session_(session), wait_(wait), thread_([this] { print_lines(); }) {}
-  ~LinePrinter() { finish(); }
+  ~LinePrinter() { drain_and_join(); }
   LinePrinter(const LinePrinter&) = delete;
   LinePrinter& operator=(const LinePrinter&) = delete;
 
@@ -37,7 +37,7 @@ class LinePrinter {
     lines_.push_back(std::move(line));
     came_.notify_one();
   }
-  void finish() {
+  void drain_and_join() {
     if (!thread_.joinable()) return;
     {
       const std::lock_guard lock(mutex_);
@@ -131,7 +131,7 @@ void declare_live(Arguments& arguments, LiveArguments& live) {
   arguments.option("--count N", live.count, 1, "End after this many images");
   arguments.option("--camera-width", live.camera_width, 1, "Wanted width of a camera's images");
   arguments.option("--camera-height", live.camera_height, 1, "Wanted height of a camera's images");
-  arguments.uncommon({"--count", "--camera-width", "--camera-height"});
+  arguments.hide_from_help({"--count", "--camera-width", "--camera-height"});
 }
 
 std::unique_ptr<recordings::LiveObservations> open_live(
@@ -215,7 +215,7 @@ LiveRun::LiveRun(ObservationSource& source, const PartArguments& part, const Liv
 LiveRun::~LiveRun() = default;
 
 void LiveRun::run(const std::function<std::string(const Observation&)>& answer,
-                  const std::function<void(Observation&&)>& keep) {
+                  const std::function<void(Observation&&)>& keep, const Skip& skip) {
   auto& self = *implementation_;
   LiveCounts& counts = self.counts;
   std::atomic<bool> stopped = false;
@@ -239,6 +239,8 @@ void LiveRun::run(const std::function<std::string(const Observation&)>& answer,
     } catch (const Error& error) {
       ++counts.skipped;
       notes.add(error.what());
+      if (skip) line = skip(observation ? &*observation : nullptr, error);
+      if (!line.empty()) self.printer.print(std::move(line));
       continue;
     }
     if (self.live != nullptr) self.add_delay();
@@ -255,7 +257,7 @@ std::optional<double> LiveRun::decoding_ms() const {
 
 const LiveCounts& LiveRun::finish() {
   auto& self = *implementation_;
-  self.printer.finish();
+  self.printer.drain_and_join();
   self.counts.lines_left_out = self.printer.left_out();
   if (self.live != nullptr) self.counts.source = self.live->live().counts();
   return self.counts;

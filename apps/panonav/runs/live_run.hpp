@@ -61,10 +61,12 @@ class LiveRun {
   LiveRun(const LiveRun&) = delete;
   LiveRun& operator=(const LiveRun&) = delete;
 
+  /// Returns the line to print of an image that cannot be read (null) or answered; empty: none.
+  using Skip = std::function<std::string(const Observation*, const Error&)>;
   /// Prints what `answer` says of each observation, unless that is empty, then calls `keep`. An
-  /// Error of `answer` skips the picture, one of `keep` ends the run.
+  /// Error of the source or of `answer` skips the image, one of `keep` ends the run.
   void run(const std::function<std::string(const Observation&)>& answer,
-           const std::function<void(Observation&&)>& keep);
+           const std::function<void(Observation&&)>& keep, const Skip& skip = {});
   /// Waits until all lines are printed: what is to be stored comes before.
   const LiveCounts& finish();
   /// Time to decode the current observation; nullopt if the source is not live.

@@ -56,7 +56,7 @@ std::string csv_row(const LocalisedQuery& answer) {
   return row + '\n';
 }
 
-std::string as_text(const LocalisedQuery& answer, Session& session) {
+std::string format_line(const LocalisedQuery& answer, Session& session) {
   const Place& found = answer.place;
   std::string line = answer.file + "  ";
   if (found.matches.empty()) return line + session.red("nothing to compare with");

@@ -18,6 +18,6 @@ inline constexpr std::string_view csv_header =
 /// Returns its row; unknown values are empty.
 [[nodiscard]] std::string csv_row(const LocalisedQuery& answer);
 /// A line for people, and one for each area that was asked for.
-[[nodiscard]] std::string as_text(const LocalisedQuery& answer, Session& session);
+[[nodiscard]] std::string format_line(const LocalisedQuery& answer, Session& session);
 
 }  // namespace panonav::command

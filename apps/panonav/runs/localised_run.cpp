@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <exception>
 #include <filesystem>
 #include <memory>
 #include <utility>
@@ -96,7 +97,7 @@ ordered_json as_json(const RouteFollower::Step& step) {
           {"correlation", step.fix->correlation}};
 }
 
-std::string as_text(const RouteFollower::Step& step, Session& session) {
+std::string format_line(const RouteFollower::Step& step, Session& session) {
   if (!step.fix) return session.red("not on the route");
   return session.green("on the route") + ", along " + format_fixed(step.fix->along_m, 2) +
          " m  lateral " + format_fixed(step.fix->lateral_m, 2) + " m";
@@ -188,7 +189,8 @@ class LocalisedRun {
     if (recording_) read_missing_motion();
     if (arguments.route) open_route();
     if (recording_) {
-      if (!arguments.report) recording_copy_.reset();
+      if (arguments.report) recording_copy_ = recording_;
+      for (const DatasetEntry& entry : recording_->entries) files_.push_back(entry.file);
       source_ = std::make_unique<DatasetObservations>(std::move(*recording_), session.executor());
     }
   }
@@ -212,11 +214,19 @@ class LocalisedRun {
           if (route_) route_->add(observation, *memory_);
           if (record.is_active()) record.add(moments.make(observation, answer_, record, stages));
           if (answer_.is_new) memory_->add(std::move(observation));
+        },
+        [&](const Observation* observation, const Error& error) {
+          return live_ ? "" : skip_image(observation, error);
         });
+    if (next_ > 0 && skipped_ == next_) std::rethrow_exception(first_failure_);
+    // An update may drop views that the page shows; added views have thumbnails once they are
+    // stored.
+    if (arguments_.report && !arguments_.add) write_report();
     const std::string changes = finish();
     record.close();
     const LiveCounts& counts = loop.finish();
-    if (arguments_.report) write_report();
+    if (arguments_.report && arguments_.add) write_report();
+    if (has_report_) print_report_path(*arguments_.report, session_);
     session_.note(std::to_string(counts.pictures) + " images, " + std::to_string(known_) +
                   " of places of " + arguments_.memory + changes +
                   describe_events(counts, record.left_out()) +
@@ -242,7 +252,6 @@ class LocalisedRun {
       return;
     }
     recording_ = open_queries(arguments_, remembered, session_);
-    recording_copy_ = recording_;
     pictures_ = recording_->source;
     poses_ = route_poses(*recording_);
   }
@@ -268,8 +277,21 @@ class LocalisedRun {
     }
   }
 
+  /// Keeps an image of a recording that cannot be read or answered as a row; returns the line that
+  /// is printed.
+  std::string skip_image(const Observation* observation, const Error& error) {
+    if (!first_failure_) first_failure_ = std::current_exception();
+    ++skipped_;
+    const std::string file = observation != nullptr ? observation->name : files_.at(next_++);
+    const LocalisedQuery unreadable{file, 0.0, {}, {}, error.what()};
+    if (arguments_.out) table_ += csv_row(unreadable);
+    if (arguments_.report) queries_.push_back(unreadable);
+    return session_.json() ? json_line(command::as_json(unreadable, arguments_.areas)) : "";
+  }
+
   /// Returns the line that is printed.
   std::string answer_observation(const Observation& observation, StageClock& stages) {
+    ++next_;
     answer_ = memory_->answer(observation);
     stages.part("unwarping", answer_.unwrapping);
     stages.stage("signature, search, ranking");
@@ -282,8 +304,8 @@ class LocalisedRun {
       stages.stage("route");
     }
     if (!session_.json()) {
-      return (answer_.place ? as_text(query_, session_) : query_.file + "  no memory yet") +
-             (answer_.is_new ? "  added" : "") + (step ? "  " + as_text(*step, session_) : "");
+      return (answer_.place ? format_line(query_, session_) : query_.file + "  no memory yet") +
+             (answer_.is_new ? "  added" : "") + (step ? "  " + format_line(*step, session_) : "");
     }
     auto json = command::as_json(query_, arguments_.areas);
     json["stamp_s"] = or_null(observation.stamp_s);
@@ -299,7 +321,7 @@ class LocalisedRun {
     if (arguments_.add) text += ", " + std::to_string(memory_->added()) + " views added";
     if (changes) {
       has_changed_ = changes->certain > 0;
-      text += "; " + as_text(*changes) + "; " + std::to_string(changes->certain) + " of " +
+      text += "; " + summarise(*changes) + "; " + std::to_string(changes->certain) + " of " +
               std::to_string(changes->observations) + " places certain";
     }
     if (route_) text += ", " + std::to_string(route_->finish()) + " lines of the route";
@@ -308,14 +330,18 @@ class LocalisedRun {
   }
 
   void write_report() {
+    const PlaceRecogniser* const recogniser = memory_->recogniser();
+    if (recogniser == nullptr) {
+      session_.note("no report: there was no memory yet to compare the images with");
+      return;
+    }
     const auto& entries = recording_copy_->entries;
     const auto file = MemoryFile::open(arguments_.memory, Access::read_only);
-    const PlaceRecogniser& recogniser = *memory_->recogniser();
-    write_localise_report(*arguments_.report, file, recogniser, queries_, [&](std::size_t i) {
+    write_localise_report(*arguments_.report, file, *recogniser, queries_, [&](std::size_t i) {
       const auto entry = std::ranges::find(entries, queries_[i].file, &DatasetEntry::file);
-      return recogniser.encoder().panorama(read_observation(*entry));
+      return recogniser->encoder().panorama(read_observation(*entry));
     });
-    print_report_path(*arguments_.report, session_);
+    has_report_ = true;
   }
 
   const LocaliseArguments& arguments_;
@@ -325,6 +351,7 @@ class LocalisedRun {
   RoutePoses poses_ = RoutePoses::images;
   std::optional<Dataset> recording_;       // until it becomes the source
   std::optional<Dataset> recording_copy_;  // for a report
+  std::vector<std::string> files_;         // of its images
   std::unique_ptr<ObservationSource> source_;
   std::optional<LiveMemory> memory_;
   std::optional<RouteFollower> follower_;
@@ -334,6 +361,10 @@ class LocalisedRun {
   std::vector<LocalisedQuery> queries_;
   std::string table_{csv_header};
   std::size_t known_ = 0;
+  std::size_t next_ = 0;     // image of the recording
+  std::size_t skipped_ = 0;  // images of the recording
+  std::exception_ptr first_failure_;
+  bool has_report_ = false;
   bool has_changed_ = false;
   std::chrono::duration<double, std::milli> unwrapping_{};
 };
@@ -391,6 +422,9 @@ ExitCode localise_in_order(const Arguments& declared, const LocaliseArguments& a
     declared.refuse_unused({"--report"}, "where " + input + " is a live source");
   } else {
     refuse_live(declared, input, false);
+  }
+  if (arguments.inputs.size() > 1 && live) {
+    throw UsageError(input + " is a live source; allowed: one of these, or several images");
   }
   if (arguments.inputs.size() > 1 && (arguments.add || arguments.update || arguments.route)) {
     throw UsageError(

@@ -39,7 +39,7 @@ recordings::RunMoment MissionMoments::make(const NavigationDecision& decision, c
   moment.state = name_of(decision.state);
   moment.probability = decision.probability;
   moment.values.emplace_back("probability", format_fixed(decision.probability, 4));
-  for (const NavigationEvent event : decision.events) {
+  for (const NavigationDecision::Event event : decision.events) {
     moment.values.emplace_back("event", name_of(event));
   }
   if (decision.nearest) {

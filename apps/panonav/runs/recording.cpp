@@ -80,7 +80,7 @@ void declare_layout(Arguments& arguments, PictureArguments& pictures) {
                    "Fraction of the width that looks along the heading; default 0.5");
   arguments.option("--elevation-deg", pictures.elevation_deg,
                    "Lower and upper edge of a panorama, or the band to keep of other images");
-  arguments.uncommon({"--columns-run", "--forward-column"});
+  arguments.hide_from_help({"--columns-run", "--forward-column"});
 }
 
 void declare_topics(Arguments& arguments, InputOptions::Topics& topics) {
@@ -93,7 +93,8 @@ void declare_topics(Arguments& arguments, InputOptions::Topics& topics) {
       "Odometry from its transforms (TF) instead; without an odometry topic: odom base_link");
   arguments.option("--imu-topic NAME", topics.imu,
                    "Its inertial sensor (roll and pitch) where there are several");
-  arguments.uncommon({"--image-topic", "--odometry-topic", "--odometry-frames", "--imu-topic"});
+  arguments.hide_from_help(
+      {"--image-topic", "--odometry-topic", "--odometry-frames", "--imu-topic"});
 }
 
 void declare_part(Arguments& arguments, PartArguments& part, bool every) {
@@ -104,8 +105,8 @@ void declare_part(Arguments& arguments, PartArguments& part, bool every) {
     arguments.option("--every N|TIME", part.every,
                      "Take every N-th image only, or one in this time, such as 0.5s");
   }
-  arguments.uncommon({"--from", "--to"});
-  if (every) arguments.uncommon({"--every"});
+  arguments.hide_from_help({"--from", "--to"});
+  if (every) arguments.hide_from_help({"--every"});
 }
 
 void declare_pictures(Arguments& arguments, PictureArguments& pictures) {
@@ -248,17 +249,21 @@ Dataset read_run(const std::string& input, const InputOptions::Topics& topics,
   return open_recording(input, pictures, memory, session);
 }
 
+void require_later_stamp(const std::string& dataset, const std::string& file, double stamp_s,
+                         double previous_s) {
+  if (stamp_s > previous_s) return;
+  throw FileError(dataset, "stamp_s of " + file + " is " + to_text(stamp_s) +
+                               "; allowed for --tum: > " + to_text(previous_s) +
+                               ", the stamp before it");
+}
+
 std::vector<double> trajectory_stamps(const Dataset& run, const std::string& verb,
                                       const std::string& dataset, const std::string& tum,
                                       Session& session) {
   std::vector<double> seconds;
   for (std::size_t i = 0; i < run.entries.size(); ++i) {
     seconds.push_back(run.entries[i].stamp_s.value_or(static_cast<double>(i)));
-    if (i > 0 && !(seconds[i] > seconds[i - 1])) {
-      throw FileError(dataset, "stamp_s of " + run.entries[i].file + " is " + to_text(seconds[i]) +
-                                   "; allowed for --tum: > " + to_text(seconds[i - 1]) +
-                                   ", the stamp before it");
-    }
+    if (i > 0) require_later_stamp(dataset, run.entries[i].file, seconds[i], seconds[i - 1]);
   }
   if (!run.entries.front().stamp_s) {
     session.note("panonav " + verb + ": " + dataset + " has no column 'stamp_s'; the seconds in " +

@@ -43,13 +43,13 @@ void declare_part(Arguments& arguments, PartArguments& part, bool every);
 /// All three.
 void declare_pictures(Arguments& arguments, PictureArguments& pictures);
 
-/// The flags of the last two, for verbs that also take single pictures.
+/// Returns the flags of the last two, for verbs that also take single images.
 [[nodiscard]] std::vector<std::string> recording_flags();
-/// Neither a folder nor a recording, a video or a live source.
+/// True if the input is neither a folder nor a recording, a video or a live source.
 [[nodiscard]] bool is_one_picture(const std::string& input);
 
-/// Empty when the user said nothing. Throws UsageError on flags that do not fit together, FileError
-/// on the camera file.
+/// Returns the source of images that the flags describe; nullopt if none of them was given. Throws
+/// UsageError on flags that do not fit together, FileError on the camera file.
 [[nodiscard]] std::optional<PictureSource> picture_source(const PictureArguments& pictures);
 
 /// Checks and converts the part. Throws UsageError on values out of range.
@@ -74,6 +74,11 @@ void require_kept_band(const PictureArguments& pictures, const MemoryFile& memor
 [[nodiscard]] Dataset read_run(const std::string& input, const InputOptions::Topics& topics,
                                const PartArguments& part, const MemoryFile& memory,
                                Session& session);
+
+/// Throws FileError unless the image's stamp is later than that of the image before it, as a
+/// trajectory in the TUM format needs.
+void require_later_stamp(const std::string& dataset, const std::string& file, double stamp_s,
+                         double previous_s);
 
 /// Returns the stamp of each entry for the trajectory file of a verb; the entries' numbers where
 /// there are no stamps, which is noted. Throws FileError on stamps that do not grow.

@@ -36,7 +36,7 @@ class RunRecord {
     viewer::ViewWish takes = viewer::ViewWish::none;
   };
 
-  /// Does nothing where nothing is arguments. Of a live run moments are left out that the disk or a
+  /// Does nothing without a file or viewer. Of a live run moments are left out that the disk or a
   /// viewer does not keep up with; any other run waits for both. Throws UsageError where the file
   /// is one of those that the run reads or there is no such address, FileError where the file
   /// cannot be made.

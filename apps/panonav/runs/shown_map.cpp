@@ -9,16 +9,16 @@ namespace panonav::command {
 void add_component(recordings::RunMoment& moment, const TopologicalMap& map, std::size_t component,
                    const std::vector<std::string>& names) {
   for (std::size_t i = 0; i < map.nodes.size(); ++i) {
-    const MapNode& node = map.nodes[i];
+    const TopologicalMap::Node& node = map.nodes[i];
     if (node.component != component) continue;
     moment.references.push_back(node.pose.position());
     moment.reference_views.push_back({names[i], node.pose.heading_rad});
   }
-  const auto node_of = [&](ViewId view) -> const MapNode& {
-    return *std::ranges::lower_bound(map.nodes, view, {}, &MapNode::view);
+  const auto node_of = [&](ViewId view) -> const TopologicalMap::Node& {
+    return *std::ranges::lower_bound(map.nodes, view, {}, &TopologicalMap::Node::view);
   };
-  for (const MapEdge& edge : map.edges) {
-    const MapNode& a = node_of(edge.a);
+  for (const TopologicalMap::Edge& edge : map.edges) {
+    const TopologicalMap::Node& a = node_of(edge.a);
     if (a.component != component) continue;
     moment.edges.push_back({a.pose.position(), node_of(edge.b).pose.position(), edge.kind});
   }
@@ -34,14 +34,14 @@ void GrowingMap::add_to(recordings::RunMoment& moment, const TopologicalMap& map
   }
   moment.sure = is_node;
   moment.state = is_node ? "place of the map" : "between places";
-  const auto closures =
-      static_cast<std::size_t>(std::ranges::count(map.edges, LinkKind::closure, &MapEdge::kind));
+  const auto closures = static_cast<std::size_t>(
+      std::ranges::count(map.edges, Link::Kind::closure, &TopologicalMap::Edge::kind));
   moment.values = {{"places", std::to_string(map.nodes.size())},
                    {"closures", std::to_string(closures)}};
   if (map.nodes.empty()) return;
   if (closures > shown_closures_) moment.values.emplace_back("event", "a loop is closed");
   const std::size_t component = map.nodes.back().component;
-  place(moment, map, component);
+  transform_to_component(moment, map, component);
   if (closures == shown_closures_ && map.nodes.size() <= shown_nodes_ + shown_nodes_ / 20) return;
   shown_closures_ = closures;
   shown_nodes_ = map.nodes.size();
@@ -52,18 +52,18 @@ void GrowingMap::finish(recordings::RunMoment& moment, const TopologicalMap& map
   if (map.nodes.empty()) return;
   const std::size_t component = find_largest_component(map);
   moment.truth = truth_;
-  place(moment, map, component);
+  transform_to_component(moment, map, component);
   moment.values.emplace_back("event", "the map is finished");
   add_component(moment, map, component, names_);
 }
 
-void GrowingMap::place(recordings::RunMoment& moment, const TopologicalMap& map,
-                       std::size_t component) const {
+void GrowingMap::transform_to_component(recordings::RunMoment& moment, const TopologicalMap& map,
+                                        std::size_t component) const {
   moment.pose.reset();
   if (last_is_node_ && map.nodes.back().component == component) {
     moment.pose = map.nodes.back().pose;
   }
-  const auto first = std::ranges::find(map.nodes, component, &MapNode::component);
+  const auto first = std::ranges::find(map.nodes, component, &TopologicalMap::Node::component);
   const auto& anchor = truths_[static_cast<std::size_t>(first - map.nodes.begin())];
   if (!moment.truth || !moment.truth->heading_rad || !anchor || !anchor->heading_rad) {
     moment.truth.reset();

@@ -29,7 +29,8 @@ class GrowingMap {
   void finish(recordings::RunMoment& moment, const TopologicalMap& map) const;
 
  private:
-  void place(recordings::RunMoment& moment, const TopologicalMap& map, std::size_t component) const;
+  void transform_to_component(recordings::RunMoment& moment, const TopologicalMap& map,
+                              std::size_t component) const;
 
   std::vector<std::string> names_;                    // of the nodes
   std::vector<std::optional<ReferencePose>> truths_;  // of the nodes

@@ -1,6 +1,6 @@
 #include "runs/simulated_recording.hpp"
 
-#include <algorithm>
+#include "cli/option_values.hpp"
 
 namespace panonav::command {
 
@@ -43,9 +43,7 @@ simulation::FindSetOption make_option_lookup(const Arguments& arguments) {
   return [&arguments](const std::string& section,
                       const std::string& name) -> std::optional<std::string> {
     if (!arguments.is_set(section, name)) return std::nullopt;
-    std::string flag = "--" + name;
-    std::ranges::replace(flag, '_', '-');
-    return flag;
+    return to_flag(name);
   };
 }
 

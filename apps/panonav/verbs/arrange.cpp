@@ -10,6 +10,7 @@
 #include "panonav/storage/memory_file.hpp"
 #include "reports/arrange_report.hpp"
 #include "reports/lattice_picture.hpp"
+#include "reports/map_measures.hpp"
 #include "reports/report_page.hpp"
 #include "runs/recording.hpp"
 
@@ -46,42 +47,14 @@ std::vector<CoarseMotion> read_motions(const ArrangeArguments& arguments,
   return motions;
 }
 
-/// Poses of the largest component in the order of the views; the stamp is the view's, or its
-/// number.
-std::vector<StampedPose> make_trajectory(const Lattice& lattice, const VisualMemory& memory) {
-  const auto has_stamp = [&](const Lattice::Node& node) {
-    return memory.info(node.view).stamp_s.has_value();
-  };
-  const bool stamped = std::ranges::all_of(lattice.nodes, has_stamp);
-  std::vector<StampedPose> trajectory;
-  for (const Lattice::Node& node : lattice.nodes) {
-    if (node.component != 0) continue;
-    trajectory.push_back(
-        {stamped ? *memory.info(node.view).stamp_s : static_cast<double>(node.view.value),
-         node.pose});
-  }
-  std::ranges::stable_sort(trajectory, {}, &StampedPose::stamp_s);
-  for (std::size_t i = 1; i < trajectory.size(); ++i) {
-    if (trajectory[i].stamp_s > trajectory[i - 1].stamp_s) continue;
-    throw ContractError("stamp_s of a view", to_text(trajectory[i].stamp_s),
-                        "for --tum: different for each view");
-  }
-  return trajectory;
-}
-
-std::size_t count_rejected(const Lattice& lattice) {
-  return static_cast<std::size_t>(std::ranges::count_if(
-      lattice.springs, [](const auto& spring) { return spring.weight < min_spring_weight; }));
-}
-
-ordered_json as_json(const LatticeComparison& comparison) {
-  return {{"views", comparison.compared},
-          {"procrustes_disparity", comparison.shape_difference},
-          {"procrustes_disparity_with_reflection", comparison.with_reflection},
-          {"rms_m", comparison.rms_m},
-          {"scale", comparison.scale},
-          {"trustworthiness", or_null(comparison.trustworthiness)},
-          {"continuity", or_null(comparison.continuity)}};
+ordered_json as_json(const MapComparison& comparison) {
+  ordered_json json{{"views", comparison.compared},
+                    {"procrustes_disparity", comparison.shape.value},
+                    {"procrustes_disparity_with_reflection", comparison.shape.with_reflection},
+                    {"rms_m", comparison.truth_from_map.rms_m},
+                    {"scale", comparison.truth_from_map.scale}};
+  json.update(neighbours_json(comparison));
+  return json;
 }
 
 ordered_json as_json(const ArrangeArguments& arguments, const Lattice& lattice,
@@ -107,7 +80,7 @@ ordered_json as_json(const ArrangeArguments& arguments, const Lattice& lattice,
                     {"connected_components", std::move(components)},
                     {"candidates", lattice.candidates},
                     {"springs", lattice.springs.size()},
-                    {"springs_rejected", count_rejected(lattice)},
+                    {"springs_rejected", count_rejected_springs(lattice)},
                     {"metric", lattice.metric},
                     {"iterations", lattice.iterations},
                     {"energy", lattice.energy},
@@ -123,7 +96,7 @@ void print_result(const Lattice& lattice, const VisualMemory& memory, Session& s
   session.print(session.bold(std::to_string(lattice.nodes.size())) + " views arranged by " +
                 std::to_string(lattice.springs.size()) + " springs of " +
                 std::to_string(lattice.candidates) + " candidates, " +
-                std::to_string(count_rejected(lattice)) + " of them rejected; unit: " +
+                std::to_string(count_rejected_springs(lattice)) + " of them rejected; unit: " +
                 (lattice.metric ? "metres" : "the distance to the nearest view (median)"));
   if (lattice.components.size() > 1) {
     std::string others;
@@ -147,15 +120,11 @@ void print_result(const Lattice& lattice, const VisualMemory& memory, Session& s
   }
   if (const auto comparison = compare_with_ground_truth(lattice, memory)) {
     session.print("compared with the ground truth: Procrustes disparity (shape difference) " +
-                  session.bold(format_fixed(comparison->shape_difference, 4)) + " over " +
+                  session.bold(format_fixed(comparison->shape.value, 4)) + " over " +
                   std::to_string(comparison->compared) + " views, " +
-                  format_fixed(comparison->rms_m, 2) + " m rms with a free scale of " +
-                  format_fixed(comparison->scale, 3));
-    if (comparison->trustworthiness) {
-      session.print("neighbours kept: trustworthiness " +
-                    format_fixed(*comparison->trustworthiness, 3) + ", continuity " +
-                    format_fixed(*comparison->continuity, 3));
-    }
+                  format_fixed(comparison->truth_from_map.rms_m, 2) + " m rms with a free scale of " +
+                  format_fixed(comparison->truth_from_map.scale, 3));
+    print_neighbours(*comparison, session);
   }
 }
 
@@ -219,7 +188,7 @@ Run declare_arrange(Arguments& arguments) {
   arguments.flag("--no-save", values->no_save, "Leave the memory file as it is");
   arguments.options("lattice", values->lattice);
   arguments.options("coarse_motion", values->motion, "motion");
-  arguments.common({"--neighbours"});
+  arguments.show_in_help({"--neighbours"});
   arguments.refuse_unless(
       {"[coarse_motion]"}, [values] { return values->odometry.has_value(); }, "without --odometry");
   return [values](Session& session) { return arrange_views(*values, session); };

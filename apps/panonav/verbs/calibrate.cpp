@@ -348,8 +348,8 @@ Run declare_calibrate(Arguments& arguments) {
   arguments.options("mirror", values->mirror);
   arguments.options("lenses", values->lenses);
   arguments.options("mirror_search", values->search);
-  arguments.common({"--profile", "--inner-elevation-deg", "--rim-elevation-deg", "--direction",
-                    "--forward-angle-deg"});
+  arguments.show_in_help({"--profile", "--inner-elevation-deg", "--rim-elevation-deg",
+                          "--direction", "--forward-angle-deg"});
   const auto shaped = [values](int profile) {
     return [values, profile] { return values->mirror.profile == profile; };
   };

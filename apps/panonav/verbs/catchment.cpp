@@ -307,7 +307,7 @@ Run declare_catchment(Arguments& arguments) {
                    "report");
   declare_homing(arguments, values->homing);
   arguments.options("run", values->settings.run);
-  arguments.uncommon({"--bin-m", "--goal"});
+  arguments.hide_from_help({"--bin-m", "--goal"});
   arguments.refuse_unless(
       {"--current", "--report", "--up-to-m", "--bin-m", "--stages", "[run]"},
       [values] { return !values->ahead; },

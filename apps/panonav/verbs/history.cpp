@@ -9,7 +9,7 @@ namespace panonav::command {
 
 namespace {
 
-std::string as_text(const MemoryFile::KeptChange& change) {
+std::string format_line(const MemoryFile::KeptChange& change) {
   std::string when = "at an unknown time";
   if (change.stamp_s) {
     const auto whole_s = static_cast<std::time_t>(std::floor(*change.stamp_s));
@@ -36,7 +36,7 @@ ExitCode history(const std::string& path, Session& session) {
     session.print(json_line(ordered_json{{"memory", path}, {"changes", std::move(list)}}));
     return ExitCode::done;
   }
-  for (const MemoryFile::KeptChange& change : changes) session.print(as_text(change));
+  for (const MemoryFile::KeptChange& change : changes) session.print(format_line(change));
   if (changes.empty()) session.note(path + " keeps no change");
   return ExitCode::done;
 }

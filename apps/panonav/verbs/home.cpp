@@ -49,7 +49,7 @@ ordered_json as_json(const std::string& goal, const HomeAnswer& answer) {
           {"frequencies", found.frequencies}};
 }
 
-std::string as_text(const HomeAnswer& answer, Session& session) {
+std::string format_line(const HomeAnswer& answer, Session& session) {
   const HomingResult& way = answer.way;
   if (!way.known)
     return answer.file + "  " + session.red("no answer") + ": " + explain_no_direction(way);
@@ -89,7 +89,7 @@ ExitCode answer_all(const HomeArguments& arguments, const HomingGuide& guide, co
         progress.clear();
         pointing += answer.way.direction_rad ? 1 : 0;
         session.print(session.json() ? json_line(as_json(goal.name, answer))
-                                     : as_text(answer, session));
+                                     : format_line(answer, session));
         answers.push_back(std::move(answer));
         progress.advance();
       });

@@ -39,7 +39,7 @@ void print_answer(const LocalisedQuery& query, const LocaliseArguments& argument
   if (session.json()) {
     session.print(json_line(as_json(query, arguments.areas)));
   } else if (query.error.empty()) {
-    session.print(as_text(query, session));
+    session.print(format_line(query, session));
   }
 }
 
@@ -144,7 +144,7 @@ void declare_changes(Arguments& arguments, const std::shared_ptr<LocaliseArgumen
                  "Add views of places that the memory does not know; a new memory begins with 32");
   arguments.option("--add-interval-s", values->add_interval_s,
                    "Time between two views that are added, at least; default 0.5");
-  arguments.uncommon({"--add-interval-s"});
+  arguments.hide_from_help({"--add-interval-s"});
   arguments.flag("--update", values->update,
                  "Keep views of known places up to date: other appearances are added, up to "
                  "--appearances, and views that keep failing are replaced");
@@ -172,7 +172,7 @@ Run declare_localise(Arguments& arguments) {
   declare_live(arguments, values->live);
   declare_record(arguments, values->record);
   declare_view(arguments, values->record);
-  arguments.uncommon({"--record"});
+  arguments.hide_from_help({"--record"});
   arguments.option("-o,--out FILE", values->out, "Write a CSV table, one line for each image");
   arguments.option("--report FOLDER", values->report,
                    "Write a page with each image above its best match, rotated to the same "
@@ -182,7 +182,7 @@ Run declare_localise(Arguments& arguments) {
   arguments.option("--turn-randomly SEED", values->turn_seed,
                    "Turn the robot before each query by a random number of whole columns; "
                    "turned_rad is the turn, counter-clockwise positive");
-  arguments.uncommon({"--exclude-same-file", "--turn-randomly"});
+  arguments.hide_from_help({"--exclude-same-file", "--turn-randomly"});
   arguments.flag("--areas", values->areas,
                  "Also show the area where the robot may be, component by component");
   arguments.options("localiser", values->localiser);

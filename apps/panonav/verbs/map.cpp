@@ -11,6 +11,7 @@
 #include "panonav/pipeline/mapper.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/storage/memory_address.hpp"
+#include "reports/map_measures.hpp"
 #include "reports/map_picture.hpp"
 #include "reports/report_page.hpp"
 #include "runs/memorising.hpp"
@@ -49,10 +50,8 @@ std::vector<StampedPose> make_trajectory(const Dataset& recording, const Mapper:
     if (run.map.nodes[i].component != component) continue;
     const DatasetEntry& entry = recording.entries[run.observations[i]];
     const double stamp_s = entry.stamp_s.value_or(static_cast<double>(run.observations[i]));
-    if (!trajectory.empty() && !(stamp_s > trajectory.back().stamp_s)) {
-      throw FileError(dataset, "stamp_s of " + entry.file + " is " + to_text(stamp_s) +
-                                   "; allowed for --tum: > " + to_text(trajectory.back().stamp_s) +
-                                   ", the stamp before it");
+    if (!trajectory.empty()) {
+      require_later_stamp(dataset, entry.file, stamp_s, trajectory.back().stamp_s);
     }
     trajectory.push_back({stamp_s, run.map.nodes[i].pose});
   }
@@ -61,47 +60,42 @@ std::vector<StampedPose> make_trajectory(const Dataset& recording, const Mapper:
 
 std::vector<std::size_t> component_sizes(const TopologicalMap& map) {
   std::vector<std::size_t> sizes(count_components(map), 0);
-  for (const MapNode& node : map.nodes) ++sizes[node.component];
+  for (const TopologicalMap::Node& node : map.nodes) ++sizes[node.component];
   return sizes;
 }
 
 std::size_t count_closures(const TopologicalMap& map) {
-  return static_cast<std::size_t>(std::ranges::count(map.edges, LinkKind::closure, &MapEdge::kind));
+  return static_cast<std::size_t>(
+      std::ranges::count(map.edges, Link::Kind::closure, &TopologicalMap::Edge::kind));
 }
 
-ordered_json as_json(const MapComparison& comparison) {
-  ordered_json json{{"nodes", comparison.compared},
-                    {"procrustes_disparity", comparison.shape_difference},
-                    {"rms_m", comparison.rms_m},
-                    {"scale", comparison.scale},
-                    {"trustworthiness", or_null(comparison.trustworthiness)},
-                    {"continuity", or_null(comparison.continuity)},
-                    {"right_closures", comparison.right_closures},
-                    {"wrong_closures", comparison.wrong_closures},
-                    {"odometry_procrustes_disparity", nullptr}};
-  if (comparison.odometry_shape_difference) {
-    json["odometry_procrustes_disparity"] = *comparison.odometry_shape_difference;
-  }
+ordered_json as_json(const RecordedMapComparison& comparison) {
+  const MapComparison& positions = comparison.positions;
+  ordered_json json{{"nodes", positions.compared},
+                    {"procrustes_disparity", positions.shape.value},
+                    {"rms_m", positions.truth_from_map.rms_m},
+                    {"scale", positions.truth_from_map.scale}};
+  json.update(neighbours_json(positions));
+  json.update(closures_json(comparison.closures));
+  json["odometry_procrustes_disparity"] = or_null(comparison.odometry_shape_difference);
   return json;
 }
 
-void print_comparison(const MapComparison& comparison, const Mapper::Result& run,
+void print_comparison(const RecordedMapComparison& comparison, const Mapper::Result& run,
                       Session& session) {
+  const MapComparison& positions = comparison.positions;
   session.print("compared with the ground truth: Procrustes disparity (shape difference) " +
-                session.bold(format_fixed(comparison.shape_difference, 4)) + ", " +
-                format_fixed(comparison.rms_m, 2) + " m rms" +
-                (run.wheels ? "" : " with a free scale of " + format_fixed(comparison.scale, 2)));
+                session.bold(format_fixed(positions.shape.value, 4)) + ", " +
+                format_fixed(positions.truth_from_map.rms_m, 2) + " m rms" +
+                (run.wheels ? ""
+                            : " with a free scale of " +
+                                  format_fixed(positions.truth_from_map.scale, 2)));
   if (comparison.odometry_shape_difference) {
     session.print("the odometry alone: Procrustes disparity " +
                   format_fixed(*comparison.odometry_shape_difference, 4));
   }
-  if (comparison.trustworthiness) {
-    session.print("neighbours kept: trustworthiness " +
-                  format_fixed(*comparison.trustworthiness, 3) + ", continuity " +
-                  format_fixed(*comparison.continuity, 3));
-  }
-  session.print("closures: right " + std::to_string(comparison.right_closures) + ", wrong " +
-                std::to_string(comparison.wrong_closures));
+  print_neighbours(positions, session);
+  print_closures(comparison.closures, session);
 }
 
 void print_result(const MapArguments& arguments, const Dataset& recording,
@@ -315,7 +309,8 @@ ExitCode map(const Arguments& declared, const MapArguments& arguments, Session& 
     write_trajectory(*arguments.tum, make_trajectory(recording, run, arguments.dataset));
   if (arguments.graph) {
     write_graph(*arguments.graph, run.map, [&](ViewId view) {
-      const auto found = std::ranges::lower_bound(run.map.nodes, view, {}, &MapNode::view);
+      const auto found =
+          std::ranges::lower_bound(run.map.nodes, view, {}, &TopologicalMap::Node::view);
       const auto number = static_cast<std::size_t>(found - run.map.nodes.begin());
       return recording.entries[run.observations[number]].file;
     });
@@ -349,21 +344,21 @@ Run declare_map(Arguments& arguments) {
   arguments.option("--graphml FILE", values->graph, "Write the map as a graph to this file");
   declare_record(arguments, values->record);
   declare_view(arguments, values->record);
-  arguments.uncommon({"--record"});
+  arguments.hide_from_help({"--record"});
   arguments.option(
       "--picture FILE", values->picture,
       "Draw the map, next to the true positions where they are known, into this PNG or SVG file");
   arguments.option("--report FOLDER", values->report,
                    "Write a page that replays the drive on its map into this folder: a new one, or "
                    "that of an earlier report");
-  arguments.uncommon({"--picture"});
+  arguments.hide_from_help({"--picture"});
   arguments.flag("--no-thumbnails", values->no_thumbnails, "Do not store thumbnails of the views");
   arguments.options("signature", values->signature);
   arguments.options("mapping", values->mapper.mapping);
   arguments.options("visual_odometry", values->mapper.odometry);
   arguments.options("loop_closure", values->mapper.closure, "closure");
   arguments.options("pose_graph", values->mapper.graph, "graph");
-  arguments.common({"--camera-height-m", "--capture-difference"});
+  arguments.show_in_help({"--camera-height-m", "--capture-difference"});
   arguments.refuse_unless(
       {"[loop_closure]", "[pose_graph]"}, [values] { return values->mapper.mapping.close_loops; },
       "with --close-loops false");

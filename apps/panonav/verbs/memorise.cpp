@@ -202,7 +202,7 @@ Run declare_memorise(Arguments& arguments) {
                  "Also take the images of the folders within a folder");
   arguments.options("signature", values->signature);
   arguments.options("preprocessing", values->preprocessing);
-  arguments.common({"--components"});
+  arguments.show_in_help({"--components"});
   return [values, &arguments](Session& session) { return memorise(arguments, *values, session); };
 }
 

@@ -82,7 +82,7 @@ Run declare_merge(Arguments& arguments) {
   arguments.positional("SECOND", values->second, "Memory file that is added to it");
   arguments.required_option("-o,--out MEMORY", values->memory, "New memory file");
   arguments.options("merge", values->alignment);
-  arguments.common({"--min-places"});
+  arguments.show_in_help({"--min-places"});
   return [values](Session& session) { return merge(*values, session); };
 }
 

@@ -70,7 +70,7 @@ ordered_json view_name_or_null(const std::optional<ViewId>& view, const RobotNav
 ordered_json as_json(const NavigationDecision& decision, const Pose2& pose,
                      const RobotNavigator& robot) {
   auto events = ordered_json::array();
-  for (const NavigationEvent event : decision.events) events.push_back(name_of(event));
+  for (const NavigationDecision::Event event : decision.events) events.push_back(name_of(event));
   return {{"step", decision.step},
           {"state", name_of(decision.state)},
           {"direction_rad", decision.direction_rad},
@@ -89,35 +89,35 @@ ordered_json as_json(const NavigationDecision& decision, const Pose2& pose,
           {"pose", pose_json(pose)}};
 }
 
-std::string describe_event(NavigationEvent event) {
+std::string describe_event(NavigationDecision::Event event) {
   switch (event) {
-    case NavigationEvent::relocalised:
+    case NavigationDecision::Event::relocalised:
       return "searches for its place in the whole memory";
-    case NavigationEvent::kidnapped:
+    case NavigationDecision::Event::kidnapped:
       return "is at another place than expected";
-    case NavigationEvent::entered_area:
+    case NavigationDecision::Event::entered_area:
       return "enters an area";
-    case NavigationEvent::unknown_place:
+    case NavigationDecision::Event::unknown_place:
       return "does not recognise the place";
-    case NavigationEvent::obstructed:
+    case NavigationDecision::Event::obstructed:
       return "was stopped by an obstacle";
-    case NavigationEvent::closed:
+    case NavigationDecision::Event::closed:
       return "marks an edge as blocked and plans again";
-    case NavigationEvent::reopened:
+    case NavigationDecision::Event::reopened:
       return "tries blocked edges again";
-    case NavigationEvent::homing:
+    case NavigationDecision::Event::homing:
       return "homes to the goal's view";
-    case NavigationEvent::homing_failed:
+    case NavigationDecision::Event::homing_failed:
       return "homed to another place";
-    case NavigationEvent::route:
+    case NavigationDecision::Event::route:
       return "follows the recorded route";
-    case NavigationEvent::route_left:
+    case NavigationDecision::Event::route_left:
       return "leaves the recorded route before the end of its leg";
   }
   return std::string(name_of(event));
 }
 
-std::string as_text(const NavigationDecision& decision, const RobotNavigator& robot) {
+std::string format_line(const NavigationDecision& decision, const RobotNavigator& robot) {
   std::string line = "step " + std::to_string(decision.step) + "  ";
   if (decision.nearest) {
     line += "at " + robot.info(*decision.nearest).name + " (probability " +
@@ -125,24 +125,24 @@ std::string as_text(const NavigationDecision& decision, const RobotNavigator& ro
   }
   for (std::size_t i = 0; i < decision.events.size(); ++i) {
     line += (i > 0 ? ", " : "") + describe_event(decision.events[i]);
-    if (decision.events[i] == NavigationEvent::entered_area) {
+    if (decision.events[i] == NavigationDecision::Event::entered_area) {
       line += " (" + std::to_string(decision.area) + ")";
     }
   }
   return line;
 }
 
-std::string_view explain_end(NavigationState state) {
+std::string_view explain_end(NavigationDecision::State state) {
   switch (state) {
-    case NavigationState::arrived:
+    case NavigationDecision::State::arrived:
       return "the image matches the goal's view";
-    case NavigationState::blocked:
+    case NavigationDecision::State::blocked:
       return "the robot is stuck, though the memory has a path";
-    case NavigationState::lost:
+    case NavigationDecision::State::lost:
       return "the image matches no view of the memory, or one elsewhere";
-    case NavigationState::unreachable:
+    case NavigationDecision::State::unreachable:
       return "no path in the memory leads to the goal, or all of them are blocked";
-    case NavigationState::moving:
+    case NavigationDecision::State::moving:
       break;
   }
   return "";
@@ -176,9 +176,10 @@ ordered_json summary_json(const NavigateArguments& arguments, RobotNavigator& ro
 
 void print_summary(const simulation::MissionRun& run, Session& session) {
   const std::string name(name_of(run.end));
-  session.print((run.end == NavigationState::arrived ? session.green(name) : session.red(name)) +
-                " after " + std::to_string(run.decisions.size()) +
-                " steps: " + std::string(explain_end(run.end)));
+  session.print(
+      (run.end == NavigationDecision::State::arrived ? session.green(name) : session.red(name)) +
+      " after " + std::to_string(run.decisions.size()) +
+      " steps: " + std::string(explain_end(run.end)));
   if (std::isfinite(run.end_distance_m)) {
     session.print("distance from the goal's view: " +
                   session.bold(format_fixed(run.end_distance_m, 3) + " m"));
@@ -240,7 +241,7 @@ void write_results(const NavigateArguments& arguments, const simulation::Mission
 void print_graph(const RobotNavigator& robot, Session& session) {
   session.print(std::to_string(robot.graph().size()) + " views, " +
                 std::to_string(robot.graph().edges().size()) + " edges from " +
-                (robot.origin() == GraphOrigin::arrangement
+                (robot.origin() == RobotNavigatorOptions::GraphOrigin::arrangement
                      ? "an arrangement made now (panonav arrange would keep one)"
                      : "the memory's " + std::string(name_of(robot.origin()))));
 }
@@ -303,7 +304,7 @@ ExitCode navigate(const Arguments& declared, const NavigateArguments& arguments,
         if (session.json()) {
           session.print(json_line(as_json(decision, pose, robot)));
         } else if (!decision.events.empty()) {
-          session.print(as_text(decision, robot));
+          session.print(format_line(decision, robot));
         }
       },
       [&] { return set_goal_of_viewer(robot, remembered, record, session); });
@@ -316,7 +317,7 @@ ExitCode navigate(const Arguments& declared, const NavigateArguments& arguments,
     print_summary(run, session);
     if (arguments.report) print_report_path(*arguments.report, session);
   }
-  return run.end == NavigationState::arrived ? ExitCode::done : ExitCode::no_answer;
+  return run.end == NavigationDecision::State::arrived ? ExitCode::done : ExitCode::no_answer;
 }
 
 Run declare_navigate(Arguments& arguments) {
@@ -345,7 +346,7 @@ Run declare_navigate(Arguments& arguments) {
                    "new one, or that of an earlier report");
   declare_record(arguments, values->record);
   declare_view(arguments, values->record);
-  arguments.uncommon({"--record", "--view", "--picture"});
+  arguments.hide_from_help({"--record", "--view", "--picture"});
   arguments.options("simulation", values->simulation.simulation.scene);
   arguments.options("navigator", values->mission.navigator);
   arguments.options("planner", values->mission.planner);
@@ -355,7 +356,7 @@ Run declare_navigate(Arguments& arguments) {
   arguments.options("frame", values->simulation.frame);
   arguments.options("sensor", values->simulation.sensor);
   arguments.options("free_space", values->simulation.free_space);
-  arguments.common({"--seed", "--light"});
+  arguments.show_in_help({"--seed", "--light"});
   require_effects(arguments, values->simulation);
   arguments.refuse_unless(
       {"[known_route]"}, [values] { return values->route.has_value(); }, "without --route");

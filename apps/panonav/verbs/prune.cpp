@@ -16,7 +16,7 @@ struct PruneArguments {
   bool dry_run = false;
 };
 
-ordered_json as_json(const std::optional<SparseLoss::Positions>& positions) {
+ordered_json as_json(const std::optional<SparseSelection::Loss::Positions>& positions) {
   if (!positions) return nullptr;
   return {{"median_before_m", positions->median_before_m},
           {"p95_before_m", positions->p95_before_m},
@@ -46,8 +46,8 @@ void refuse_without_effect(const Arguments& arguments, const std::string& file,
 }
 
 /// Prints for people what was kept, and what it costs.
-void print_loss(const PruneArguments& arguments, const SparseLoss& loss, std::size_t before,
-                std::size_t kept, double factor, std::size_t outdated,
+void print_loss(const PruneArguments& arguments, const SparseSelection::Loss& loss,
+                std::size_t before, std::size_t kept, double factor, std::size_t outdated,
                 const std::vector<std::string>& names, Session& session) {
   session.print(std::string(arguments.dry_run ? "would keep " : "kept ") +
                 session.bold(std::to_string(kept)) + " of " + std::to_string(before) +
@@ -76,7 +76,7 @@ ExitCode prune(const Arguments& declared, const PruneArguments& arguments, Sessi
   refuse_without_effect(declared, arguments.memory, memory);
   const SparseSelection selection = select_references(memory, arguments.options);
   session.detail("redundant views: " + std::to_string(selection.redundant.size()));
-  const SparseLoss loss = measure_loss(memory, selection);
+  const SparseSelection::Loss loss = measure_loss(memory, selection);
   std::vector<ViewId> dropped;
   std::vector<std::string> names;
   std::size_t outdated = 0;
@@ -130,7 +130,7 @@ Run declare_prune(Arguments& arguments) {
   arguments.positional("MEMORY", values->memory, "Memory file");
   arguments.flag("--dry-run", values->dry_run, "List what would be dropped, and change nothing");
   arguments.options("prune", values->options);
-  arguments.common({"--max-difference", "--reach-m", "--outdated-within-m"});
+  arguments.show_in_help({"--max-difference", "--reach-m", "--outdated-within-m"});
   return [values, &arguments](Session& session) { return prune(arguments, *values, session); };
 }
 

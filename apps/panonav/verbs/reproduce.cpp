@@ -56,7 +56,7 @@ std::string defaults(const auto& option) {
   for (const char* paper : {"elsewhere", "f11", "m03", "m04", "navigation", "s06", "y03"}) {
     values.push_back(std::to_string(lab::default_options(paper).*option) + " for " + paper);
   }
-  return " (default: " + listed(values) + ")";
+  return " (default: " + join_texts(values) + ")";
 }
 
 /// Returns what an option means for the papers that have it, each with its default.
@@ -111,7 +111,7 @@ Run declare_reproduce(Arguments& arguments) {
   const auto parts = lab::tracking_reproduction_parts();
   arguments.choice("--only", values->only, {parts.begin(), parts.end()},
                    "m03: this part of the experiments (default: all)");
-  arguments.uncommon({"--queries", "--rows", "--only"});
+  arguments.hide_from_help({"--queries", "--rows", "--only"});
   return [values](Session& session) { return reproduce(*values, session); };
 }
 

@@ -156,8 +156,9 @@ Run declare_ros2(Arguments& arguments) {
       {"--route", "--kind", "--camera", "--columns-run", "--forward-column", "--elevation-deg",
        "[signature]", "[preprocessing]"},
       [values] { return values->teach; }, "without --teach");
-  arguments.common({"--motion", "--pictures", "--use-sim-time"});
-  arguments.uncommon({"--node-name", "--domain-id", "--map-frame", "--odom-frame", "--base-frame"});
+  arguments.show_in_help({"--motion", "--pictures", "--use-sim-time"});
+  arguments.hide_from_help(
+      {"--node-name", "--domain-id", "--map-frame", "--odom-frame", "--base-frame"});
   return [values](Session& session) { return run_node(*values, session); };
 }
 

@@ -71,7 +71,7 @@ ordered_json as_json(const FollowedImage& image, bool headings_known) {
   return json;
 }
 
-std::string as_text(const FollowedImage& image, Session& session) {
+std::string format_line(const FollowedImage& image, Session& session) {
   if (!image.fix) return image.file + "  " + session.red("not on this route");
   const RouteFix& fix = *image.fix;
   std::string line = image.file + "  " + session.green(name_of(image.fix->origin)) + "  x " +
@@ -144,7 +144,7 @@ ExitCode follow_run(const Arguments& declared, const FollowArguments& arguments,
          [&](FollowedImage&& image) {
            progress.clear();
            session.print(session.json() ? json_line(as_json(image, headings_known))
-                                        : as_text(image, session));
+                                        : format_line(image, session));
            if (arguments.report) {
              recordings::RunMoment moment = *image.moment;
              moment.values.insert(moment.values.begin(), {"image", image.file});

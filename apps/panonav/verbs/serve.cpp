@@ -109,7 +109,7 @@ Run declare_serve(Arguments& arguments) {
                    "Memories on a server with more views are not held: 350 bytes a view instead of "
                    "2700, and a longer time for each image (docs/scale.md)");
   arguments.options("localiser", values->localiser);
-  arguments.common({"--top"});
+  arguments.show_in_help({"--top"});
   return [values, &arguments](Session& session) { return serve(arguments, *values, session); };
 }
 

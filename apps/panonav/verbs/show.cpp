@@ -72,10 +72,11 @@ ordered_json find_maps(const MemoryFile& file, ViewId view) {
   auto maps = ordered_json::array();
   for (const std::string& name : file.map_names()) {
     const auto map = file.map(name);
-    const auto node = std::ranges::find(map->nodes, view, &MapNode::view);
+    const auto node = std::ranges::find(map->nodes, view, &TopologicalMap::Node::view);
     if (node == map->nodes.end()) continue;
-    const auto edges = std::ranges::count_if(
-        map->edges, [&](const MapEdge& edge) { return edge.a == view || edge.b == view; });
+    const auto edges = std::ranges::count_if(map->edges, [&](const TopologicalMap::Edge& edge) {
+      return edge.a == view || edge.b == view;
+    });
     maps.push_back({{"map", name},
                     {"connected_component", node->component},
                     {"pose", pose_json(node->pose)},

@@ -1,6 +1,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "cli/option_values.hpp"
 #include "cli/stop_signals.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/io/panorama_reader.hpp"
@@ -130,11 +131,10 @@ ExitCode simulate(const Arguments& declared, SimulateArguments arguments, Sessio
 Run declare_simulate_verb(Arguments& arguments) {
   auto values = std::make_shared<SimulateArguments>();
   const auto scenes = simulation::scene_names();
-  std::string names;
-  for (const auto name : scenes) names += (names.empty() ? "" : ", ") + std::string(name);
-  arguments.positional("SCENE", values->scene,
-                       "Built-in scene (" + names + "), Gazebo world (.world, .sdf) or mesh file",
-                       {scenes.begin(), scenes.end()});
+  arguments.positional(
+      "SCENE", values->scene,
+      "Built-in scene (" + join_texts(scenes) + "), Gazebo world (.world, .sdf) or mesh file",
+      {scenes.begin(), scenes.end()});
   arguments.optional_positionals("OUT", values->out, "Folder for the data set; new or empty");
   arguments.flag("--ros2", values->ros2,
                  "No data set: a robot in the scene that ROS 2 sees and drives");
@@ -145,10 +145,10 @@ Run declare_simulate_verb(Arguments& arguments) {
   arguments.option("--trajectory FILE", values->trajectory,
                    "Poses of a trajectory file (TUM text or CSV)");
   declare_record(arguments, values->record);
-  arguments.uncommon({"--record"});
+  arguments.hide_from_help({"--record"});
   declare_simulation(arguments, values->simulation);
   values->robot.declare(arguments, [values] { return values->ros2; });
-  arguments.common({"--path", "--spacing-m", "--poses", "--kind", "--seed", "--light"});
+  arguments.show_in_help({"--path", "--spacing-m", "--poses", "--kind", "--seed", "--light"});
   const auto path = [values] {
     return values->random ? simulation::RecordingPath::random : values->simulation.recording.path;
   };

@@ -139,7 +139,7 @@ std::string format_position(const Pose2& pose) {
   return "x " + format_fixed(pose.x_m, 2) + " m  y " + format_fixed(pose.y_m, 2) + " m";
 }
 
-std::string as_text(const TrackedImage& image, Session& session) {
+std::string format_line(const TrackedImage& image, Session& session) {
   const MonteCarloEstimate& estimate = image.estimate;
   std::string line = image.file + "  ";
   const std::string state(name_of(estimate.state));
@@ -268,7 +268,7 @@ class LiveTrack {
     if (arguments_.tum && is_localised(image) && later) {
       trajectory_.push_back({*observation.stamp_s, *image.estimate.pose});
     }
-    return session_.json() ? json_line(as_json(image)) : as_text(image, session_);
+    return session_.json() ? json_line(as_json(image)) : format_line(image, session_);
   }
   /// Records the image that was observed last.
   void record() {
@@ -370,7 +370,7 @@ ExitCode track_run(const Arguments& declared, const TrackArguments& arguments, S
   Progress progress(session, "tracking", image_count);
   track(tracker, run, settings, session.executor(), [&](TrackedImage&& image) {
     progress.clear();
-    session.print(session.json() ? json_line(as_json(image)) : as_text(image, session));
+    session.print(session.json() ? json_line(as_json(image)) : format_line(image, session));
     if (arguments.report) add(played, image);
     if (record.is_active()) record.add(std::move(*image.moment));
     image.moment.reset();
@@ -419,7 +419,7 @@ Run declare_track(Arguments& arguments) {
   arguments.options("start", values->start, "start");
   arguments.options("monte_carlo", values->filter);
   arguments.options("odometry", values->odometry, "odometry");
-  arguments.common({"--seed"});
+  arguments.show_in_help({"--seed"});
   return [values, &arguments](Session& session) { return track_run(arguments, *values, session); };
 }
 

@@ -32,7 +32,7 @@ ordered_json as_json(const Panorama& panorama) {
   return json;
 }
 
-std::string as_text(const Panorama& panorama) {
+std::string format_line(const Panorama& panorama) {
   std::string text = std::to_string(panorama.columns()) + " x " + std::to_string(panorama.rows()) +
                      " pixels, clockwise, forward in the middle";
   if (const auto& band = panorama.elevations()) {
@@ -92,7 +92,7 @@ ExitCode unwrap_series(const UnwrapArguments& arguments, const Dataset& recordin
     session.print(json_line(json));
   } else {
     session.print(arguments.out + ": " + std::to_string(recording.entries.size()) +
-                  " panoramas of " + as_text(*last));
+                  " panoramas of " + format_line(*last));
   }
   return ExitCode::done;
 }
@@ -121,7 +121,7 @@ ExitCode unwrap(const Arguments& declared, const UnwrapArguments& arguments, Ses
     json.update(as_json(panorama));
     session.print(json_line(json));
   } else {
-    session.print(arguments.out + ": " + as_text(panorama));
+    session.print(arguments.out + ": " + format_line(panorama));
   }
   return ExitCode::done;
 }
@@ -135,7 +135,7 @@ Run declare_unwrap(Arguments& arguments) {
                             "PNG image to write; of several images a new folder for them");
   declare_pictures(arguments, values->pictures);
   arguments.options("unwarper", values->unwarper);
-  arguments.common({"--rows", "--columns"});
+  arguments.show_in_help({"--rows", "--columns"});
   return [values, &arguments](Session& session) { return unwrap(arguments, *values, session); };
 }
 

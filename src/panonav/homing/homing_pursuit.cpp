@@ -30,7 +30,7 @@ void visit_options(HomingPursuitOptions& options, OptionVisitor& visitor) {
       option<&T::middle>("highest frequency of the second stage", 1, 62),
       option<&T::fine>("highest frequency of the third stage", 1, 62),
       option<&T::typical_distance_m>("typical distance of the things around", above(0), 1000),
-      option<&T::max_step_m>("longest way between two views", above(0), 100),
+      option<&T::max_step_m>("longest path between two views", above(0), 100),
       option<&T::stop_length>("homing stops when the vector is shorter, in units of R", 0, 1),
       option<&T::min_step_m>("homing stops when the step is shorter", above(0), 100),
       option<&T::patience>(
@@ -77,7 +77,7 @@ FourierHomingOptions HomingPursuit::vector_options_of_stage(const HomingView& cu
 
 // Returns the view of a robot that is tilted as at home. The heading is better known once the view
 // is level, and then the tilt, too.
-HomingView HomingPursuit::level_as_at_home(const HomingView& view) const {
+HomingView HomingPursuit::align_tilt_to_home(const HomingView& view) const {
   constexpr int passes = 2;
   HomingView level = view;
   for (int i = 0; i < passes; ++i) {
@@ -90,8 +90,8 @@ HomingView HomingPursuit::level_as_at_home(const HomingView& view) const {
 }
 
 HomingPursuit::Decision HomingPursuit::decide(const HomingView& view) {
-  const HomingView current = vector_.tilt && home_.elevations() ? level_as_at_home(view) : view;
-  HomingPursuit::Decision decision;
+  const HomingView current = vector_.tilt && home_.elevations() ? align_tilt_to_home(view) : view;
+  Decision decision;
   decision.difference = image_difference(home_, current);
   ++steps_since_min_;
   if (decision.difference < min_difference_) {
@@ -116,14 +116,14 @@ HomingPursuit::Decision HomingPursuit::decide(const HomingView& view) {
     const bool stops = vector.length() < options_.stop_length ||
                        decision.advance_m < options_.min_step_m ||
                        steps_since_min_ >= options_.patience;
-    if (state_ == HomingPursuit::State::moving && !stops && steps_ >= options_.max_steps) {
-      state_ = HomingPursuit::State::exhausted;
+    if (state_ == State::moving && !stops && steps_ >= options_.max_steps) {
+      state_ = State::exhausted;
     }
-    if (state_ == HomingPursuit::State::moving && !stops) {
+    if (state_ == State::moving && !stops) {
       ++steps_;
       return decision;
     }
-    if (state_ == HomingPursuit::State::moving && has_next_stage(decision.difference)) {
+    if (state_ == State::moving && has_next_stage(decision.difference)) {
       ++stage_;
       min_difference_ = decision.difference;
       steps_since_min_ = 0;
@@ -131,10 +131,9 @@ HomingPursuit::Decision HomingPursuit::decide(const HomingView& view) {
       direction_in_home_rad_.reset();
       continue;
     }
-    if (state_ == HomingPursuit::State::moving) {
-      state_ = decision.difference <= options_.arrived_difference
-                   ? HomingPursuit::State::arrived
-                   : HomingPursuit::State::wrong_place;
+    if (state_ == State::moving) {
+      state_ =
+          decision.difference <= options_.arrived_difference ? State::arrived : State::wrong_place;
     }
     decision.state = state_;
     decision.advance_m = 0.0;

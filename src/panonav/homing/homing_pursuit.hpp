@@ -86,7 +86,7 @@ class HomingPursuit {
   }  ///< Number of decisions to move so far.
 
  private:
-  [[nodiscard]] HomingView level_as_at_home(const HomingView& view) const;
+  [[nodiscard]] HomingView align_tilt_to_home(const HomingView& view) const;
   [[nodiscard]] FourierHomingOptions vector_options_of_stage(const HomingView& current) const;
   [[nodiscard]] bool has_next_stage(double difference) const noexcept;
 

@@ -65,7 +65,7 @@ void visit_options(HomingSurveyOptions& options, OptionVisitor& visitor) {
   constexpr OptionTable table{
       option<&T::typical_distance_m>("distance of things: what a home vector of length 1 is worth",
                                      1e-3, 1e3),
-      option<&T::max_step_m>("longest way between two views", 1e-3, 1e3),
+      option<&T::max_step_m>("longest path between two views", 1e-3, 1e3),
       option<&T::obstacle_m>("distance from all places beyond which a step stops the run", 1e-3,
                              1e3),
       option<&T::max_steps>("steps after which a run stops", 1, 1e6),

@@ -367,6 +367,7 @@ std::vector<std::size_t> selected_pictures(const std::vector<double>& stamps_s,
 }
 
 void select_pictures(Dataset& dataset, const Dataset::Selection& selection) {
+  if (!selection.by_time() && selection.every <= 1) return;
   const std::string name = dataset.folder.string();
   std::vector<double> stamps_s(dataset.entries.size(), 0.0);
   if (selection.by_time()) {

@@ -79,7 +79,7 @@ PanoramaReader::PanoramaReader(PictureSource source, PanoramaShape shape)
   wide_ = std::make_shared<Wide>();
 }
 
-const PanoramaReader::Wide& PanoramaReader::get_or_create_wide() const {
+const PanoramaReader::Wide* PanoramaReader::get_or_create_wide() const {
   std::call_once(wide_->is_made, [&] {
     constexpr double margin_rad = 0.175;  // 10 degrees: robots lean less
     const WiderBand band = widen_band(unwarper_->elevations(), unwarper_->rows(),
@@ -89,7 +89,7 @@ const PanoramaReader::Wide& PanoramaReader::get_or_create_wide() const {
                             UnwarperOptions{band.rows, unwarper_->columns(), band.band});
     if (source_.mask) wide_->hidden = find_hidden_values(source_.mask->view(), *wide_->unwarper);
   });
-  return *wide_;
+  return wide_->unwarper ? wide_.get() : nullptr;
 }
 
 Panorama PanoramaReader::convert(ImageView picture, const Tilt& tilt) const {
@@ -101,8 +101,7 @@ Panorama PanoramaReader::convert(ImageView picture, const Tilt& tilt) const {
   }
   if (!unwarper_)
     return level_panorama(panorama_from_picture(picture, source_.layout, shape_), tilt);
-  const Wide* const more =
-      is_level || !get_or_create_wide().unwarper ? nullptr : &get_or_create_wide();
+  const Wide* const more = is_level ? nullptr : get_or_create_wide();
   Panorama panorama = (more == nullptr ? *unwarper_ : *more->unwarper).unwrap(picture);
   const auto& hidden = more == nullptr ? hidden_ : more->hidden;
   if (!hidden.empty()) fill_hidden_values(panorama, hidden);

@@ -40,7 +40,7 @@ class PanoramaReader {
  private:
   /// The table of a wider band of mirror pictures, made when the first tilted picture comes.
   struct Wide;
-  const Wide& get_or_create_wide() const;
+  const Wide* get_or_create_wide() const;
 
   PictureSource source_;
   PanoramaShape shape_;

@@ -17,13 +17,13 @@ namespace panonav::kernels {
 /// 2) bytes, without gaps.
 void halve(ImageView image, std::uint8_t* halved, Instructions instructions);
 
-/// Puts every pixel beside the one below: pair v * width + u holds pixel (u, v) in the low byte and
-/// (u, v + 1) in the high one; v = 0 .. height - 2. Then the four pixels around any point lie in 32
-/// consecutive bits.
+/// Packs each pixel with the one below it into 16 bits: pair v * width + u holds pixel (u, v) in
+/// the low byte and (u, v + 1) in the high one; v = 0 .. height - 2. Then the four pixels around
+/// any point lie in 32 consecutive bits.
 void pair_rows(ImageView image, std::uint16_t* pairs, Instructions instructions);
 
-/// The four weights of a tap: bytes for (u, v), (u, v + 1), (u + 1, v), (u + 1, v + 1), from the
-/// low byte on. They add up to this.
+/// Sum of the four weights of a tap. The weights are bytes, from the low one: (u, v), (u, v + 1),
+/// (u + 1, v), (u + 1, v + 1).
 inline constexpr int tap_weight_sum = 127;
 
 /// values[i] = scale * sum over t < taps of the weighted mean at pair positions[t * values.size() +

@@ -13,8 +13,8 @@
 
 namespace panonav {
 
-/// Finds places of a memory from single views, in any heading of the robot. The memory is held, or
-/// searched where it is stored; the answers are the same.
+/// Finds places of a memory from single views, in any heading of the robot. The memory is
+/// in RAM or searched where it is stored; the answers are the same.
 class Localiser {
  public:
   /// Learns both models from the memory, which must outlive *this. Views appended later can be
@@ -47,14 +47,16 @@ class Localiser {
   /// Learnt at construction, or as passed to the constructor.
   [[nodiscard]] const PositionModel& position_model() const noexcept { return position_model_; }
 
-  /// Topological localisation. The exact search finds the views of smallest dissimilarity;
-  /// comparing columns orders them, up to `reranked_views` of them if a part of the view may be
-  /// hidden. Between places that look alike the references around each decide (`NeighbourSupport`).
-  /// The visual compass gives the heading relative to each match. Then follow whether the place is
-  /// known, the position between references [M04 footnote 1] and the absolute heading. `features`:
-  /// makes those of the query, at most once; empty: they do not count. Throws ContractError on a
-  /// query of another shape, and if the memory is not held. Cost: one exact search and 0.2 ms; 3 ms
-  /// and a second search for 1000 views; 2 to 4 ms with features.
+  /// Localises one query:
+  /// 1. The exact search finds the views of smallest dissimilarity.
+  /// 2. Comparing columns orders them, up to `reranked_views` of them if a part may be hidden.
+  /// 3. References around each decide between places that look alike (`NeighbourSupport`).
+  /// 4. The visual compass gives the heading relative to each match.
+  /// 5. The models decide whether the place is known, the position between references
+  ///    [M04 footnote 1] and the absolute heading.
+  /// `features` is called at most once to compute local features; if empty, none are used. Throws
+  /// ContractError on another shape and if the memory is not in RAM. Cost: a search and 0.2 ms; 3
+  /// ms and a second search for 1000 views; 2 to 4 ms with features.
   [[nodiscard]] Place localise(const PackedSignature& query, const SearchMask& mask = {},
                                const QueryFeatures& features = {}) const;
   /// Localises by an index of the memory. Of a memory that is not held, it loads the views that the

@@ -39,7 +39,7 @@ void visit_options(MemoryUpdateOptions& options, OptionVisitor& visitor) {
 }
 
 MemoryUpdate::MemoryUpdate(const ColumnRanking& ranking, const ObservationModel& model,
-                           MemoryUse use, const MemoryUpdateOptions& options)
+                           MemoryUpdate::Use use, const MemoryUpdateOptions& options)
     : ranking_(&ranking), use_(std::move(use)), options_(options) {
   validate(options);
   if (!(use_.spacing_m > 0.0)) {
@@ -171,7 +171,8 @@ bool MemoryUpdate::is_near_known_place() const {
 bool MemoryUpdate::is_less_useful(ViewId a, ViewId b) const {
   const auto rank = [&](ViewId view) {
     const auto found = use_.views.find(view);
-    const MemoryUse::View use = found == use_.views.end() ? MemoryUse::View{} : found->second;
+    const MemoryUpdate::Use::View use =
+        found == use_.views.end() ? MemoryUpdate::Use::View{} : found->second;
     return std::tuple(!(use.learnt && use.matched == 0), -use.failed, use.last_run, use.matched,
                       view);
   };
@@ -184,7 +185,7 @@ MemoryUpdate::Changes MemoryUpdate::finish() {
   changes.certain = certain_;
   changes.matched.assign(matched_.begin(), matched_.end());
   for (const ViewId view : matched_) {
-    MemoryUse::View& use = use_.views[view];
+    MemoryUpdate::Use::View& use = use_.views[view];
     ++use.matched;
     use.failed = 0;
     use.last_run = use_.runs;

@@ -24,30 +24,6 @@ struct MemoryUpdateOptions {
 };
 void visit_options(MemoryUpdateOptions& options, OptionVisitor& visitor);
 
-/// Knowledge of earlier runs that updates of a memory need. Plain numbers, to be stored with the
-/// memory.
-struct MemoryUse {
-  /// Usefulness of one view so far.
-  struct View {
-    int matched = 0;   ///< runs in which it explained the robot's view at its place
-    int failed = 0;    ///< runs in a row in which another view of the place did, but not this one
-    int last_run = 0;  ///< in which it matched or was learnt; 0: none
-    bool learnt = false;  ///< by an update
-    friend bool operator==(const View&, const View&) = default;
-  };
-
-  int runs = 0;  ///< by which the memory was updated
-  /// Of the memory before its first update: appearances of a place make references seem nearer to
-  /// each other and less similar than places are. 0 before that.
-  double spacing_m = 0.0;
-  double far_difference = 0.0;   ///< `ObservationModel::far_difference` of the same memory
-  double range_m = 0.0;          ///< `ObservationModel::range_m` of the same memory
-  int places = 0;                ///< views of the same memory, and of places that came later
-  int size = 0;                  ///< views of the memory after the last update
-  std::map<ViewId, View> views;  ///< those that have been used
-  friend bool operator==(const MemoryUse&, const MemoryUse&) = default;
-};
-
 /// Decides which changes a run through the places of a memory makes there. Where the robot
 /// certainly was (`find_witnessed_pose`), the references around are compared with its view; one
 /// explains it if their similarity is at least half of that expected at their distance
@@ -62,6 +38,30 @@ struct MemoryUse {
 /// same changes.
 class MemoryUpdate {
  public:
+  /// Knowledge of earlier runs that updates of a memory need. Plain numbers, to be stored with the
+  /// memory.
+  struct Use {
+    /// Usefulness of one view so far.
+    struct View {
+      int matched = 0;   ///< runs in which it explained the robot's view at its place
+      int failed = 0;    ///< runs in a row in which another view of the place did, but not this one
+      int last_run = 0;  ///< in which it matched or was learnt; 0: none
+      bool learnt = false;  ///< by an update
+      friend bool operator==(const View&, const View&) = default;
+    };
+
+    int runs = 0;  ///< by which the memory was updated
+    /// Of the memory before its first update: appearances of a place make references seem nearer to
+    /// each other and less similar than places are. 0 before that.
+    double spacing_m = 0.0;
+    double far_difference = 0.0;   ///< `ObservationModel::far_difference` of the same memory
+    double range_m = 0.0;          ///< `ObservationModel::range_m` of the same memory
+    int places = 0;                ///< views of the same memory, and of places that came later
+    int size = 0;                  ///< views of the memory after the last update
+    std::map<ViewId, View> views;  ///< those that have been used
+    friend bool operator==(const Use&, const Use&) = default;
+  };
+
   /// One image of a run, as a `Localiser` answered it by the memory at the beginning of the run.
   struct AnsweredView {
     Pose2 odometry;                  ///< absolute, in its own frame
@@ -83,11 +83,11 @@ class MemoryUpdate {
     std::vector<ViewId> forgotten;  ///< dropped because others have long been better; ascending
     std::vector<ViewId> matched;    ///< ascending
     std::size_t certain = 0;        ///< images whose place was certain
-    MemoryUse use;                  ///< to store; without the added views and the new size
+    Use use;                        ///< to store; without the added views and the new size
   };
 
   /// `ranking` and its memory must outlive *this and not change. Throws OptionError.
-  MemoryUpdate(const ColumnRanking& ranking, const ObservationModel& model, MemoryUse use = {},
+  MemoryUpdate(const ColumnRanking& ranking, const ObservationModel& model, Use use,
                const MemoryUpdateOptions& options = {});
 
   /// Adds the next image; its number is the count of those before. One that lies less than a
@@ -120,7 +120,7 @@ class MemoryUpdate {
   [[nodiscard]] bool is_less_useful(ViewId a, ViewId b) const;
 
   const ColumnRanking* ranking_;
-  MemoryUse use_;
+  Use use_;
   MemoryUpdateOptions options_;
   std::deque<Image> images_;  // those before `undecided_` are witnesses only
   std::size_t undecided_ = 0;

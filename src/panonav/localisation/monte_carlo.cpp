@@ -324,7 +324,7 @@ void visit_options(MonteCarloOptions& options, OptionVisitor& visitor) {
       option<&T::compass>("weigh headings by the visual compass"),
       choice<&T::injection>("where new particles are drawn", "none", "explained"),
       option<&T::reranked_views>(
-          "views compared column by column when no near one explains the picture", 0, 1e6),
+          "views compared column by column when no near one explains the image", 0, 1e6),
       option<&T::seed>("seed of all random choices", 0),
   };
   table.visit(options, visitor);

@@ -365,7 +365,7 @@ TopologicalMap to_topological_map(const Lattice& lattice) {
     map.edges.push_back({.a = a.view,
                          .b = b.view,
                          .a_from_b = inverse(a.pose) * b.pose,
-                         .kind = LinkKind::neighbour,
+                         .kind = Link::Kind::neighbour,
                          .weight = spring.weight});
   }
   return map;

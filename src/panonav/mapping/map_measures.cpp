@@ -11,6 +11,10 @@ namespace panonav {
 
 namespace {
 
+constexpr int compared_neighbours = 8;
+/// Comparing the neighbours of all takes time with the square of the points; more are thinned out.
+constexpr std::size_t max_neighbour_points = 2000;
+
 // Returns for each point its rank by distance from the centre, from 1; 0 for the centre itself.
 std::vector<std::size_t> rank_around(std::span<const Point2> points, std::size_t centre) {
   std::vector<std::size_t> order(points.size());
@@ -32,8 +36,28 @@ bool is_comparable(std::span<const Point2> map, std::span<const Point2> truth) {
   return map.size() >= 3 && truth.size() == map.size() && has_extent(map) && has_extent(truth);
 }
 
-NeighbourPreservation neighbour_preservation(std::span<const Point2> map,
-                                             std::span<const Point2> truth, int neighbours) {
+std::optional<MapComparison> compare_positions(std::span<const Point2> map,
+                                               std::span<const Point2> truth, bool allow_scale) {
+  if (!is_comparable(map, truth)) return std::nullopt;
+  MapComparison comparison{.compared = map.size(),
+                           .shape = shape_difference(map, truth),
+                           .truth_from_map = align(map, truth, {.allow_scale = allow_scale}),
+                           .neighbours = {}};
+  const std::size_t every = (map.size() + max_neighbour_points - 1) / max_neighbour_points;
+  std::vector<Point2> thinned_map;
+  std::vector<Point2> thinned_truth;
+  for (std::size_t i = 0; i < map.size(); i += every) {
+    thinned_map.push_back(map[i]);
+    thinned_truth.push_back(truth[i]);
+  }
+  if (3 * compared_neighbours + 1 < 2 * static_cast<int>(thinned_map.size())) {
+    comparison.neighbours = neighbour_preservation(thinned_map, thinned_truth, compared_neighbours);
+  }
+  return comparison;
+}
+
+MapComparison::Neighbours neighbour_preservation(std::span<const Point2> map,
+                                                 std::span<const Point2> truth, int neighbours) {
   const std::size_t n = map.size();
   require(truth.size() == n, "points of the truth", static_cast<double>(truth.size()),
           "as many as of the map");
@@ -61,12 +85,12 @@ NeighbourPreservation neighbour_preservation(std::span<const Point2> map,
   return {1.0 - untrue / max_sum, 1.0 - lost / max_sum};
 }
 
-ClosureCount count_closures(const TopologicalMap& map,
-                            const std::function<std::optional<Point2>(ViewId)>& truth,
-                            double right_within_m) {
-  ClosureCount count;
-  for (const MapEdge& edge : map.edges) {
-    if (edge.kind != LinkKind::closure) continue;
+MapComparison::Closures count_closures(const TopologicalMap& map,
+                                       const std::function<std::optional<Point2>(ViewId)>& truth,
+                                       double right_within_m) {
+  MapComparison::Closures count;
+  for (const TopologicalMap::Edge& edge : map.edges) {
+    if (edge.kind != Link::Kind::closure) continue;
     const auto a = truth(edge.a);
     const auto b = truth(edge.b);
     if (!a || !b) {

@@ -59,7 +59,7 @@ std::vector<LoopClosure> find_matches(const VisualMemory& memory, const Topologi
   std::vector<std::size_t> number;  // in the second map, of the nodes after those of the first
   for (std::size_t i = 0; i < second.nodes.size(); ++i) {
     const ViewId view = second.nodes[i].view;
-    const auto same = std::ranges::lower_bound(first.nodes, view, {}, &MapNode::view);
+    const auto same = std::ranges::lower_bound(first.nodes, view, {}, &TopologicalMap::Node::view);
     if (same != first.nodes.end() && same->view == view) {
       matches.push_back({static_cast<std::size_t>(same - first.nodes.begin()), i, {}, 0.0});
       continue;
@@ -83,11 +83,11 @@ std::vector<LoopClosure> find_matches(const VisualMemory& memory, const Topologi
 std::optional<double> view_scale_m(const VisualMemory& memory, const TopologicalMap& map) {
   constexpr std::size_t max_edges = 200;  // the median of 200 ratios errs by a few percent
   const auto pose_of = [&](ViewId view) {
-    return std::ranges::lower_bound(map.nodes, view, {}, &MapNode::view)->pose;
+    return std::ranges::lower_bound(map.nodes, view, {}, &TopologicalMap::Node::view)->pose;
   };
   std::vector<KnownLength> lengths;
   for (std::size_t i = 0; i < std::min(max_edges, map.edges.size()); ++i) {
-    const MapEdge& edge = map.edges[i];
+    const TopologicalMap::Edge& edge = map.edges[i];
     const auto step =
         visual_step(OdometryView(memory.signature(edge.a)), OdometryView(memory.signature(edge.b)));
     if (!step) continue;
@@ -156,9 +156,10 @@ class Matches {
       };
       const std::size_t nearest = *std::ranges::min_element(set, {}, off_m);
       const Point2 place = (frames_[nearest] * second_->nodes[i].pose).position();
-      const bool is_overlapping = std::ranges::any_of(first_->nodes, [&](const MapNode& node) {
-        return distance(node.pose.position(), place) < 0.5 * tolerance_m_;
-      });
+      const bool is_overlapping =
+          std::ranges::any_of(first_->nodes, [&](const TopologicalMap::Node& node) {
+            return distance(node.pose.position(), place) < 0.5 * tolerance_m_;
+          });
       if (!is_overlapping) continue;
       last_m = here_m;
       ++alignment.expected_places;
@@ -261,22 +262,23 @@ std::optional<SessionAlignment> align_sessions(const VisualMemory& memory,
 TopologicalMap join_sessions(const TopologicalMap& first, const TopologicalMap& second,
                              const SessionAlignment& alignment, const PoseGraphOptions& graph) {
   std::map<ViewId, Pose2> poses;
-  for (const MapNode& node : first.nodes) poses.emplace(node.view, node.pose);
-  for (const MapNode& node : second.nodes) {
+  for (const TopologicalMap::Node& node : first.nodes) poses.emplace(node.view, node.pose);
+  for (const TopologicalMap::Node& node : second.nodes) {
     poses.emplace(node.view, alignment.first_from_second * node.pose);
   }
   TopologicalMap joined;
   for (const auto& [view, pose] : poses) joined.nodes.push_back({view, pose, 0});
   const auto number = [&](ViewId view) {
     return static_cast<std::size_t>(
-        std::ranges::lower_bound(joined.nodes, view, {}, &MapNode::view) - joined.nodes.begin());
+        std::ranges::lower_bound(joined.nodes, view, {}, &TopologicalMap::Node::view) -
+        joined.nodes.begin());
   };
   std::vector<PoseEdge> edges;
   const auto add_edges = [&](const TopologicalMap& map) {
     const auto pose_of = [&](ViewId view) {
-      return std::ranges::lower_bound(map.nodes, view, {}, &MapNode::view)->pose;
+      return std::ranges::lower_bound(map.nodes, view, {}, &TopologicalMap::Node::view)->pose;
     };
-    for (const MapEdge& edge : map.edges) {
+    for (const TopologicalMap::Edge& edge : map.edges) {
       const Pose2 motion = inverse(pose_of(edge.a)) * pose_of(edge.b);
       edges.push_back({number(edge.a), number(edge.b), motion,
                        edge_deviation * translation_m(motion) + shape_position_deviation_m,
@@ -292,10 +294,10 @@ TopologicalMap join_sessions(const TopologicalMap& first, const TopologicalMap& 
     if (a == b) continue;
     edges.push_back({number(a), number(b), match.earlier_from_later, match_position_deviation_m,
                      match_heading_deviation_rad, true});
-    joined.edges.push_back({a, b, match.earlier_from_later, LinkKind::closure, 1.0});
+    joined.edges.push_back({a, b, match.earlier_from_later, Link::Kind::closure, 1.0});
   }
   std::vector<Pose2> found;
-  for (const MapNode& node : joined.nodes) found.push_back(node.pose);
+  for (const TopologicalMap::Node& node : joined.nodes) found.push_back(node.pose);
   const PoseGraphReport report = optimise_pose_graph(found, edges, graph);
   for (std::size_t i = 0; i < found.size(); ++i) joined.nodes[i].pose = found[i];
   for (std::size_t i = 0; i < edges.size(); ++i) {

@@ -131,20 +131,20 @@ TopologicalMap contract_map(const TopologicalMap& map, const SparseSelection& se
   validate(map);
   const Representatives kept = representatives_of(selection);
   TopologicalMap left;
-  for (const MapNode& node : map.nodes) {
+  for (const TopologicalMap::Node& node : map.nodes) {
     if (representative(kept, node.view) == node.view) left.nodes.push_back(node);
   }
-  const auto node_of = [&](ViewId view) -> const MapNode* {
-    const auto found = std::ranges::lower_bound(left.nodes, view, {}, &MapNode::view);
+  const auto node_of = [&](ViewId view) -> const TopologicalMap::Node* {
+    const auto found = std::ranges::lower_bound(left.nodes, view, {}, &TopologicalMap::Node::view);
     return found != left.nodes.end() && found->view == view ? &*found : nullptr;
   };
   std::set<std::pair<ViewId, ViewId>> pairs;
-  for (const MapEdge& edge : map.edges) {
-    MapEdge moved = edge;
+  for (const TopologicalMap::Edge& edge : map.edges) {
+    TopologicalMap::Edge moved = edge;
     moved.a = representative(kept, edge.a);
     moved.b = representative(kept, edge.b);
-    const MapNode* const a = node_of(moved.a);
-    const MapNode* const b = node_of(moved.b);
+    const TopologicalMap::Node* const a = node_of(moved.a);
+    const TopologicalMap::Node* const b = node_of(moved.b);
     // A view outside of the map, or of another component, may stand for one in it.
     if (moved.a == moved.b || a == nullptr || b == nullptr || a->component != b->component)
       continue;
@@ -156,10 +156,10 @@ TopologicalMap contract_map(const TopologicalMap& map, const SparseSelection& se
   return left;
 }
 
-SparseLoss measure_loss(const VisualMemory& memory, const SparseSelection& selection,
-                        std::size_t max_queries) {
+SparseSelection::Loss measure_loss(const VisualMemory& memory, const SparseSelection& selection,
+                                   std::size_t max_queries) {
   require(max_queries >= 1, "max_queries", static_cast<double>(max_queries), ">= 1");
-  SparseLoss loss;
+  SparseSelection::Loss loss;
   const std::size_t count = selection.redundant.size();
   if (count == 0) return loss;
   std::vector<ViewId> dropped;
@@ -192,9 +192,9 @@ SparseLoss measure_loss(const VisualMemory& memory, const SparseSelection& selec
   loss.queries = queries;
   loss.median_difference = order_statistic(differences, 0.5);
   if (before_m.size() >= 2) {
-    loss.positions =
-        SparseLoss::Positions{order_statistic(before_m, 0.5), order_statistic(before_m, 0.95),
-                              order_statistic(after_m, 0.5), order_statistic(after_m, 0.95)};
+    loss.positions = SparseSelection::Loss::Positions{
+        order_statistic(before_m, 0.5), order_statistic(before_m, 0.95),
+        order_statistic(after_m, 0.5), order_statistic(after_m, 0.95)};
   }
   return loss;
 }

@@ -26,6 +26,22 @@ void visit_options(SparseMemoryOptions& options, OptionVisitor& visitor);
 
 /// The views that a memory keeps and drops.
 struct SparseSelection {
+  /// The price of dropping views: dropped views are searched among the kept ones, and among all
+  /// others as before.
+  struct Loss {
+    std::size_t queries = 0;         ///< dropped views that were searched
+    double median_difference = 0.0;  ///< to the view that represents it; 0 when nothing is dropped
+    /// Distance to the reference found first.
+    struct Positions {
+      double median_before_m = 0.0;  ///< where all other views are searched
+      double p95_before_m = 0.0;     ///< quantile of 95 % of the same
+      double median_after_m = 0.0;   ///< where the kept views are searched
+      double p95_after_m = 0.0;      ///< quantile of 95 % of the same
+    };
+    /// nullopt where fewer than two dropped views have a position.
+    std::optional<Positions> positions;
+  };
+
   /// A view that is dropped, and the one that represents it.
   struct Redundant {
     ViewId view;              ///< is dropped
@@ -56,25 +72,10 @@ struct SparseSelection {
 [[nodiscard]] TopologicalMap contract_map(const TopologicalMap& map,
                                           const SparseSelection& selection);
 
-/// The price of dropping views: dropped views are searched among the kept ones, and among all
-/// others as before.
-struct SparseLoss {
-  std::size_t queries = 0;         ///< dropped views that were searched
-  double median_difference = 0.0;  ///< to the view that represents it; 0 when nothing is dropped
-  /// Distance to the reference found first.
-  struct Positions {
-    double median_before_m = 0.0;  ///< where all other views are searched
-    double p95_before_m = 0.0;     ///< quantile of 95 % of the same
-    double median_after_m = 0.0;   ///< where the kept views are searched
-    double p95_after_m = 0.0;      ///< quantile of 95 % of the same
-  };
-  /// nullopt where fewer than two dropped views have a position.
-  std::optional<Positions> positions;
-};
-
 /// Searches at most `max_queries` dropped views, evenly spread. Throws ContractError unless
 /// max_queries >= 1.
-[[nodiscard]] SparseLoss measure_loss(const VisualMemory& memory, const SparseSelection& selection,
-                                      std::size_t max_queries = 1000);
+[[nodiscard]] SparseSelection::Loss measure_loss(const VisualMemory& memory,
+                                                 const SparseSelection& selection,
+                                                 std::size_t max_queries = 1000);
 
 }  // namespace panonav

@@ -11,7 +11,7 @@ namespace panonav {
 
 void validate(const TopologicalMap& map) {
   for (std::size_t i = 0; i < map.nodes.size(); ++i) {
-    const MapNode& node = map.nodes[i];
+    const TopologicalMap::Node& node = map.nodes[i];
     if (i > 0 && node.view <= map.nodes[i - 1].view) {
       throw ContractError("view of node " + std::to_string(i), static_cast<double>(node.view.value),
                           "larger than that of the node before");
@@ -25,10 +25,10 @@ void validate(const TopologicalMap& map) {
     }
   }
   for (std::size_t i = 0; i < map.edges.size(); ++i) {
-    const MapEdge& edge = map.edges[i];
+    const TopologicalMap::Edge& edge = map.edges[i];
     const std::string name = "edge " + std::to_string(i);
     const auto is_node = [&](ViewId view) {
-      return std::ranges::binary_search(map.nodes, view, {}, &MapNode::view);
+      return std::ranges::binary_search(map.nodes, view, {}, &TopologicalMap::Node::view);
     };
     if (edge.a == edge.b || !is_node(edge.a) || !is_node(edge.b)) {
       throw ContractError(name,
@@ -42,15 +42,15 @@ void validate(const TopologicalMap& map) {
 
 void renumber_components(TopologicalMap& map) {
   std::map<std::size_t, std::size_t> numbers;
-  for (const MapNode& node : map.nodes) numbers.emplace(node.component, 0);
+  for (const TopologicalMap::Node& node : map.nodes) numbers.emplace(node.component, 0);
   std::size_t next = 0;
   for (auto& [component, number] : numbers) number = next++;
-  for (MapNode& node : map.nodes) node.component = numbers.at(node.component);
+  for (TopologicalMap::Node& node : map.nodes) node.component = numbers.at(node.component);
 }
 
 std::size_t count_components(const TopologicalMap& map) {
   std::set<std::size_t> components;
-  for (const MapNode& node : map.nodes) components.insert(node.component);
+  for (const TopologicalMap::Node& node : map.nodes) components.insert(node.component);
   return components.size();
 }
 

@@ -8,28 +8,27 @@
 
 namespace panonav {
 
-/// A node of the map: a view and its pose.
-struct MapNode {
-  ViewId view;                ///< an id of the memory
-  Pose2 pose;                 ///< in the frame of its connected component
-  std::size_t component = 0;  ///< its connected component; components have no common frame
-  friend bool operator==(const MapNode&, const MapNode&) = default;
-};
-
-/// Two nodes and the motion between them.
-struct MapEdge {
-  ViewId a;                            ///< one node, by its view
-  ViewId b;                            ///< the other
-  Pose2 a_from_b;                      ///< pose of b in the frame of a, metres
-  LinkKind kind = LinkKind::sequence;  ///< of the edge
-  double weight = 1.0;  ///< 0 .. 1; small where the rest of the map contradicts a closure
-  friend bool operator==(const MapEdge&, const MapEdge&) = default;
-};
-
 /// A map of places [F11 section 4] with closed loops.
 struct TopologicalMap {
-  std::vector<MapNode> nodes;  ///< ascending by view
-  std::vector<MapEdge> edges;  ///< each joins two nodes of the map
+  /// A node of the map: a view and its pose.
+  struct Node {
+    ViewId view;                ///< an id of the memory
+    Pose2 pose;                 ///< in the frame of its connected component
+    std::size_t component = 0;  ///< its connected component; components have no common frame
+    friend bool operator==(const Node&, const Node&) = default;
+  };
+  /// Two nodes and the motion between them.
+  struct Edge {
+    ViewId a;                                ///< one node, by its view
+    ViewId b;                                ///< the other
+    Pose2 a_from_b;                          ///< pose of b in the frame of a, metres
+    Link::Kind kind = Link::Kind::sequence;  ///< of the edge
+    double weight = 1.0;  ///< 0 .. 1; small where the rest of the map contradicts a closure
+    friend bool operator==(const Edge&, const Edge&) = default;
+  };
+
+  std::vector<Node> nodes;  ///< ascending by view
+  std::vector<Edge> edges;  ///< each joins two nodes of the map
   friend bool operator==(const TopologicalMap&, const TopologicalMap&) = default;
 };
 

@@ -130,7 +130,8 @@ class TopologicalMapper::Implementation {
     for (std::size_t i = 0; i < edges_.size(); ++i) {
       const PoseEdge& edge = edges_[i];
       map.edges.push_back({nodes_[edge.a].view, nodes_[edge.b].view, edge.a_from_b,
-                           edge.doubtful ? LinkKind::closure : LinkKind::sequence, weights_[i]});
+                           edge.doubtful ? Link::Kind::closure : Link::Kind::sequence,
+                           weights_[i]});
     }
     return map;
   }

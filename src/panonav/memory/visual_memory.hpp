@@ -32,18 +32,18 @@ struct ReferenceInfo {
   friend bool operator==(const ReferenceInfo&, const ReferenceInfo&) = default;
 };
 
-/// Reason why two views are linked.
-enum class LinkKind {
-  sequence,   ///< taken one after the other
-  neighbour,  ///< beside each other in an arrangement by similarity
-  closure     ///< the same place passed at another time
-};
-
 /// Two views between which a robot can move.
 struct Link {
-  ViewId a;                            ///< one view
-  ViewId b;                            ///< the other; links have no direction
-  LinkKind kind = LinkKind::sequence;  ///< of several kinds the last one
+  /// Reason why two views are linked.
+  enum class Kind {
+    sequence,   ///< taken one after the other
+    neighbour,  ///< beside each other in an arrangement by similarity
+    closure     ///< the same place passed at another time
+  };
+
+  ViewId a;                    ///< one view
+  ViewId b;                    ///< the other; links have no direction
+  Kind kind = Kind::sequence;  ///< of several kinds the last one
   friend bool operator==(const Link&, const Link&) = default;
 };
 

@@ -65,7 +65,7 @@ class StepSampler {
   [[nodiscard]] double rotation_deviation_rad() const noexcept { return rotation_deviation_rad_; }
   /// Scales normal deviates of mean 0 and deviation 1 (the third for a holonomic drive only) to
   /// errors of travel and turn, in the frame of the robot before the step, which the error of the
-  /// turn rotates first by `share_before` of itself.
+  /// turn rotates first by `turn_share_before_travel` of itself.
   [[nodiscard]] Pose2 error_from_deviates(double first, double second,
                                           double third) const noexcept {
     if (is_holonomic_) {

@@ -13,8 +13,8 @@ namespace panonav {
 void visit_options(KnownRouteOptions& options, OptionVisitor& visitor) {
   using T = KnownRouteOptions;
   constexpr OptionTable table{
-      option<&T::beside_m>("largest distance of references and robots beside a route", above(0),
-                           100),
+      option<&T::max_lateral_m>("largest distance of references and robots beside a route",
+                                above(0), 100),
       options_of<&T::tracker>(),
       options_of<&T::fit>(),
   };
@@ -30,7 +30,7 @@ std::span<const double> KnownRoute::along_m(ViewId view) const {
 KnownRoute make_known_route(const RoutePanorama& route, std::span<const KnownRoute::View> views,
                             const KnownRouteOptions& options) {
   validate(options);
-  KnownRoute known{RouteTracker(route, options.tracker, options.fit), {}, options.beside_m};
+  KnownRoute known{RouteTracker(route, options.tracker, options.fit), {}, options.max_lateral_m};
   for (const KnownRoute::View& placed : views) {
     if (!std::isfinite(placed.pose.x_m) || !std::isfinite(placed.pose.y_m)) {
       throw ContractError("place of view " + std::to_string(placed.view.value), "not finite",
@@ -38,7 +38,7 @@ KnownRoute make_known_route(const RoutePanorama& route, std::span<const KnownRou
     }
     KnownRoute::Reference reference{placed.view, {}};
     for (const RoutePosition& pass :
-         find_passes(route.poses(), placed.pose.position(), options.beside_m)) {
+         find_passes(route.poses(), placed.pose.position(), options.max_lateral_m)) {
       reference.along_m.push_back(pass.along_m);
     }
     if (!reference.along_m.empty()) known.references.push_back(std::move(reference));

@@ -16,7 +16,7 @@ namespace panonav {
 struct KnownRouteOptions {
   /// Largest lateral offset of references and robots from the route. A search tries positions up to
   /// 0.5 m beside it; a robot at a reference may be a little farther off than that reference.
-  double beside_m = 0.4;
+  double max_lateral_m = 0.4;
   RouteTrackerOptions tracker;  ///< of the robot on the route
   RouteFitOptions fit;          ///< of its scanlines
 };
@@ -39,7 +39,7 @@ struct KnownRoute {
   };
   RouteTracker tracker;               ///< holds the route; copied for each run along it
   std::vector<Reference> references;  ///< on the route, ascending by view
-  double beside_m = 0.0;              ///< as in the options
+  double max_lateral_m = 0.0;         ///< as in the options
 
   /// Returns the distances along the route at which it passes the view; none when it does not.
   [[nodiscard]] std::span<const double> along_m(ViewId view) const;

@@ -212,16 +212,16 @@ NavigationGraph graph_from_stored_lattice(const TopologicalMap& arrangement,
                                           double min_weight) {
   validate(arrangement);
   std::vector<ViewId> views;
-  for (const MapNode& node : arrangement.nodes) views.push_back(node.view);
+  for (const TopologicalMap::Node& node : arrangement.nodes) views.push_back(node.view);
   const auto number_of = [&](ViewId view) {
     return static_cast<std::size_t>(std::ranges::lower_bound(views, view) - views.begin());
   };
   std::vector<Link> links;
   std::vector<Spring> springs;
-  for (const MapEdge& edge : arrangement.edges) {
+  for (const TopologicalMap::Edge& edge : arrangement.edges) {
     const EdgeEnds ends{number_of(edge.a), number_of(edge.b)};
-    const MapNode& a = arrangement.nodes[ends.a];
-    const MapNode& b = arrangement.nodes[ends.b];
+    const TopologicalMap::Node& a = arrangement.nodes[ends.a];
+    const TopologicalMap::Node& b = arrangement.nodes[ends.b];
     links.push_back({edge.a, edge.b, edge.kind});
     springs.push_back({ends, std::nullopt, distance(a.pose.position(), b.pose.position()),
                        edge.weight, a.component == b.component});

@@ -147,12 +147,14 @@ NavigationGraph graph_from_links(const ViewSource& source, std::span<const Link>
 NavigationGraph graph_from_map(const TopologicalMap& map, double min_weight) {
   validate(map);
   std::vector<ViewId> views;
-  for (const MapNode& node : map.nodes) views.push_back(node.view);
+  for (const TopologicalMap::Node& node : map.nodes) views.push_back(node.view);
   std::vector<NavigationGraph::Edge> edges;
-  for (const MapEdge& edge : map.edges) {
+  for (const TopologicalMap::Edge& edge : map.edges) {
     if (edge.weight < min_weight) continue;
-    const MapNode& a = *std::ranges::lower_bound(map.nodes, edge.a, {}, &MapNode::view);
-    const MapNode& b = *std::ranges::lower_bound(map.nodes, edge.b, {}, &MapNode::view);
+    const TopologicalMap::Node& a =
+        *std::ranges::lower_bound(map.nodes, edge.a, {}, &TopologicalMap::Node::view);
+    const TopologicalMap::Node& b =
+        *std::ranges::lower_bound(map.nodes, edge.b, {}, &TopologicalMap::Node::view);
     if (a.component != b.component) continue;
     const Pose2 a_from_b = inverse(a.pose) * b.pose;
     edges.push_back({edge.a, edge.b, length_of(a_from_b), a_from_b});
@@ -166,16 +168,16 @@ namespace {
 // Returns nodes of one component within `reach` of each other that no edge joins.
 std::vector<EdgeEnds> near_pairs(const TopologicalMap& map, double reach) {
   std::set<std::pair<ViewId, ViewId>> known;
-  for (const MapEdge& edge : map.edges) known.insert(std::minmax(edge.a, edge.b));
+  for (const TopologicalMap::Edge& edge : map.edges) known.insert(std::minmax(edge.a, edge.b));
   // In the order of x, so that nodes too far along it need not be visited.
   std::vector<std::size_t> order(map.nodes.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::ranges::stable_sort(order, {}, [&](std::size_t i) { return map.nodes[i].pose.x_m; });
   std::vector<EdgeEnds> pairs;
   for (std::size_t i = 0; i < order.size(); ++i) {
-    const MapNode& node = map.nodes[order[i]];
+    const TopologicalMap::Node& node = map.nodes[order[i]];
     for (std::size_t j = i + 1; j < order.size(); ++j) {
-      const MapNode& other = map.nodes[order[j]];
+      const TopologicalMap::Node& other = map.nodes[order[j]];
       if (other.pose.x_m - node.pose.x_m > reach) break;
       if (other.component != node.component ||
           distance(node.pose.position(), other.pose.position()) > reach ||
@@ -211,8 +213,8 @@ NavigationGraph graph_from_map_and_neighbours(const TopologicalMap& map, const V
   executor.for_chunks(
       pairs.size(), pairs_per_chunk, [&](std::size_t begin, std::size_t end, std::size_t) {
         for (std::size_t i = begin; i < end; ++i) {
-          const MapNode& a = map.nodes[pairs[i].a];
-          const MapNode& b = map.nodes[pairs[i].b];
+          const TopologicalMap::Node& a = map.nodes[pairs[i].a];
+          const TopologicalMap::Node& b = map.nodes[pairs[i].b];
           const HomingView view_a = homing_view(memory.signature(a.view));
           const HomingView view_b = homing_view(memory.signature(b.view));
           if (image_difference(view_a, view_b) > max_difference) continue;

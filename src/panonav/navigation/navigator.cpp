@@ -81,7 +81,7 @@ void Navigator::Core::set_goal(ViewId view) {
   last = {};
   obstruction = {};
   progress = {};
-  state = NavigationState::moving;
+  state = NavigationDecision::State::moving;
   replan();
 }
 
@@ -97,7 +97,7 @@ void Navigator::Core::forget_place() {
 void Navigator::Core::abandon_plans(Step& step) {
   homing.reset();
   plan.committed.reset();
-  if (pilot.is_on_leg()) step.add_event(NavigationEvent::route_left);
+  if (pilot.is_on_leg()) step.add_event(NavigationDecision::Event::route_left);
   pilot.end_leg();
 }
 
@@ -132,7 +132,7 @@ void Navigator::Core::home_to_goal(Step& step) {
     // Well inside, as the vector has an error of its own.
     pursuit.stop_length = 0.25 * arrival.max_length;
     homing.emplace(goal->view, pursuit);
-    step.add_event(NavigationEvent::homing);
+    step.add_event(NavigationDecision::Event::homing);
   }
   const HomingPursuit::Decision pursued = homing->decide(step.view.view);
   NavigationDecision& decision = step.decision;
@@ -150,13 +150,14 @@ void Navigator::Core::home_to_goal(Step& step) {
       (pursued.difference <=
            std::max(2.0 * arrival.max_difference, scales.place.max_difference()) &&
        length <= 0.5 * arrival.max_length)) {
-    state = NavigationState::arrived;
+    state = NavigationDecision::State::arrived;
     return;
   }
-  step.add_event(NavigationEvent::homing_failed);
+  step.add_event(NavigationDecision::Event::homing_failed);
   homing.reset();
   obstruction.level = 0;
-  unblock_edges_or_end(step, is_obstructed ? NavigationState::blocked : NavigationState::lost);
+  unblock_edges_or_end(
+      step, is_obstructed ? NavigationDecision::State::blocked : NavigationDecision::State::lost);
 }
 
 // Returns the direction in which the robot last knew its place: by its own steps, as something near
@@ -166,8 +167,8 @@ std::optional<double> Navigator::Core::direction_to_known_place(const QueryView&
       known && std::hypot(known->x_m, known->y_m) >= 0.5 * options.step_m) {
     return std::atan2(known->y_m, known->x_m);
   }
-  const HomeVector back =
-      home_vector(views.coefficients(graph().view(*place.known_node), view.components), view.view);
+  const HomeVector back = home_vector(
+      views.read_coefficients(graph().view(*place.known_node), view.components), view.view);
   if (back.confidence <= min_vector_confidence) return std::nullopt;
   return back.direction_rad();
 }
@@ -185,8 +186,7 @@ bool Navigator::Core::return_to_known_place(Step& step) {
     // Something hides the place that should come next, as an obstacle does.
     const Guide& ahead = plan.field.at(areas.place_of[node]);
     if (ahead.is_reachable() && ahead.next != node) {
-      EdgeAttempts& attempts =
-          progress.edge_attempts.try_emplace(ahead.edge, EdgeAttempts{node}).first->second;
+      EdgeAttempts& attempts = progress.get_or_create_attempts(ahead.edge, node);
       ++attempts.steps;
       attempts.obstructed_steps += 2;
     }
@@ -229,7 +229,7 @@ std::optional<double> Navigator::Core::direction_along_edge(std::size_t from, co
   const ViewId next = graph().view(ahead.next);
   if (!views.holds(next)) return direction;
   const HomeVector to_next =
-      home_vector(views.coefficients(next, step.view.components), step.view.view);
+      home_vector(views.read_coefficients(next, step.view.components), step.view.view);
   if (to_next.confidence <= min_vector_confidence) return direction;
   const double next_rad = to_next.direction_rad();
   const std::optional<double> expected =
@@ -256,7 +256,7 @@ void Navigator::Core::follow_field(Step& step) {
   step.decision.direction_rad = wrap_angle(*direction + detour);
   step.decision.advance_m = options.step_m;
   last.direction_rad = step.decision.direction_rad;
-  ++progress.edge_attempts.try_emplace(ahead.edge, EdgeAttempts{from}).first->second.steps;
+  ++progress.get_or_create_attempts(ahead.edge, from).steps;
   if (obstruction.level >= 2 || std::abs(detour) < max_aside_rad) last.target_edge = ahead.edge;
 }
 
@@ -272,7 +272,7 @@ void Navigator::Core::begin_leg_if_possible(Step& step) {
   for (const std::size_t node : planner.plan_path(*place.node)) path.push_back(graph().view(node));
   if (!pilot.begin_leg(path, step.report.line, options.min_leg_m)) return;
   plan.committed.reset();
-  step.add_event(NavigationEvent::route);
+  step.add_event(NavigationDecision::Event::route);
 }
 
 // Repeats a recorded route [Y03]; false where no leg is under way.
@@ -283,7 +283,7 @@ bool Navigator::Core::follow_route(Step& step) {
              obstruction.level >= 2 * options.min_agreeing_steps ||
              progress.steps_without_progress > max_steps_without_progress()) {
     pilot.abandon_leg();
-    step.add_event(NavigationEvent::route_left);
+    step.add_event(NavigationDecision::Event::route_left);
     // The path by views has not been tried here.
     progress.edge_attempts.clear();
     obstruction.level = progress.steps_without_progress = 0;
@@ -307,17 +307,18 @@ bool Navigator::Core::follow_route(Step& step) {
 // [M04 section 3.5]
 void Navigator::Core::decide(Step& step) {
   locate(step);
-  if (state == NavigationState::moving) update_progress(step);
-  if (state == NavigationState::moving && !guide().is_reachable() && !relocalise_with_path(step)) {
-    unblock_edges_or_end(step, NavigationState::unreachable);
+  if (state == NavigationDecision::State::moving) update_progress(step);
+  if (state == NavigationDecision::State::moving && !guide().is_reachable() &&
+      !relocalise_with_path(step)) {
+    unblock_edges_or_end(step, NavigationDecision::State::unreachable);
     // Nothing was blocked that could be unblocked.
-    if (!guide().is_reachable()) state = NavigationState::unreachable;
+    if (!guide().is_reachable()) state = NavigationDecision::State::unreachable;
   }
   update_probability(step);
   last = {};
-  if (state == NavigationState::moving) choose_motion(step);
-  if (state == NavigationState::moving && progress.steps >= options.max_run_steps) {
-    state = NavigationState::blocked;
+  if (state == NavigationDecision::State::moving) choose_motion(step);
+  if (state == NavigationDecision::State::moving && progress.steps >= options.max_run_steps) {
+    state = NavigationDecision::State::blocked;
   }
   last.view = step.view.view;
   last.advance_m = step.decision.advance_m;
@@ -343,7 +344,7 @@ NavigationDecision Navigator::Core::observe(const FourierSignature& view,
                                             const RobotReport& report) {
   if (!goal) throw ContractError("goal", "none", "one that was set");
   const int number = ++progress.steps;
-  if (state != NavigationState::moving) {
+  if (state != NavigationDecision::State::moving) {
     NavigationDecision stopped{.step = number, .state = state};
     if (place.node) stopped.nearest = graph().view(*place.node);
     return stopped;
@@ -355,7 +356,7 @@ NavigationDecision Navigator::Core::observe(const FourierSignature& view,
   decide(step);
   NavigationDecision& decision = step.decision;
   decision.state = state;
-  if (state != NavigationState::moving) decision.advance_m = 0.0;
+  if (state != NavigationDecision::State::moving) decision.advance_m = 0.0;
   decision.nearest = graph().view(*place.node);
   decision.area = *views.area();
   decision.path_length = guide().path_length;
@@ -363,18 +364,19 @@ NavigationDecision Navigator::Core::observe(const FourierSignature& view,
   decision.bytes_read = views.bytes_read() - bytes_before;
   // An observation that entered an area has loaded enough.
   const bool entered_area =
-      std::ranges::find(decision.events, NavigationEvent::entered_area) != decision.events.end();
-  if (state == NavigationState::moving && !entered_area) prefetch_next_area();
+      std::ranges::find(decision.events, NavigationDecision::Event::entered_area) !=
+      decision.events.end();
+  if (state == NavigationDecision::State::moving && !entered_area) prefetch_next_area();
   return std::move(decision);
 }
 
-std::string_view name_of(NavigationState state) {
+std::string_view name_of(NavigationDecision::State state) {
   constexpr std::array<std::string_view, 5> names{"moving", "arrived", "blocked", "lost",
                                                   "unreachable"};
   return names.at(static_cast<std::size_t>(state));
 }
 
-std::string_view name_of(NavigationEvent event) {
+std::string_view name_of(NavigationDecision::Event event) {
   constexpr std::array<std::string_view, 11> names{
       "relocalised", "kidnapped", "entered_area",  "unknown_place", "obstructed", "closed",
       "reopened",    "homing",    "homing_failed", "route",         "route_left"};
@@ -400,14 +402,15 @@ std::string describe(const NavigationDecision& decision) {
                   decision.advance_m, degrees(decision.direction_rad));
     line += numbers.data();
   }
-  for (const NavigationEvent event : decision.events) line += ", " + std::string(name_of(event));
+  for (const NavigationDecision::Event event : decision.events)
+    line += ", " + std::string(name_of(event));
   return line;
 }
 
 void visit_options(NavigatorOptions& options, OptionVisitor& visitor) {
   using T = NavigatorOptions;
   constexpr OptionTable table{
-      option<&T::step_m>("longest way between two steps", above(0), 100),
+      option<&T::step_m>("longest path between two steps", above(0), 100),
       option<&T::near_links>("edges from the last place within which the next one is searched", 1,
                              10),
       option<&T::coarse_components>("components compared in the open, 0 for all", 0, 1000),
@@ -419,9 +422,9 @@ void visit_options(NavigatorOptions& options, OptionVisitor& visitor) {
                                 1e6),
       option<&T::edge_patience>("steps without coming nearer after which an edge counts as blocked",
                                 1, 1e6),
-      option<&T::min_leg_m>("shortest way along a recorded route that is worth a leg", above(0),
+      option<&T::min_leg_m>("shortest path along a recorded route that is worth a leg", above(0),
                             1000),
-      option<&T::attempts>("times that closed edges, or the last stretch, are tried", 1, 1000),
+      option<&T::attempts>("times that blocked edges, or homing, are tried", 1, 1000),
       option<&T::max_run_steps>("steps after which a run ends", 1, 1e9),
   };
   table.visit(options, visitor);

@@ -43,34 +43,6 @@ struct NavigatorOptions {
 };
 void visit_options(NavigatorOptions& options, OptionVisitor& visitor);
 
-/// Progress of a run to a goal.
-enum class NavigationState {
-  moving,       ///< the run continues
-  arrived,      ///< the views show the goal
-  blocked,      ///< the robot cannot pass although the memory has a path
-  lost,         ///< the view is nowhere in the memory, or not where the robot should be
-  unreachable,  ///< no path leads to the goal, or all of them turned out to be blocked
-};
-/// "moving", "arrived", "blocked", "lost", "unreachable".
-[[nodiscard]] std::string_view name_of(NavigationState state);
-
-/// Why a decision is not simply the next step.
-enum class NavigationEvent {
-  relocalised,    ///< the place was searched in the whole memory
-  kidnapped,      ///< another place than the expected one is accepted
-  entered_area,   ///< another area was loaded
-  unknown_place,  ///< the reference does not match the view
-  obstructed,     ///< the robot could not make its last step
-  closed,         ///< edges were blocked and the path was planned again
-  reopened,       ///< blocked edges are tried again
-  homing,         ///< homing to the goal begins
-  homing_failed,  ///< homing ended at another place
-  route,          ///< a leg along a recorded route begins
-  route_left,     ///< the leg ended before its end
-};
-/// In lower case with underscores, as logs and JSON have it: "relocalised", "entered_area", ...
-[[nodiscard]] std::string_view name_of(NavigationEvent event);
-
 /// Report of a robot besides its view.
 struct RobotReport {
   bool obstacle = false;  ///< something stopped the robot before the last step was done
@@ -89,10 +61,33 @@ struct RobotReport {
 
 /// One decision with its reasons: the log entry of an observation.
 struct NavigationDecision {
-  int step = 0;                                     ///< counts from 1
-  NavigationState state = NavigationState::moving;  ///< after this observation
-  double direction_rad = 0.0;                       ///< of motion, in the current robot frame
-  double advance_m = 0.0;                           ///< length of the step; 0 unless moving
+  /// Progress of a run to a goal.
+  enum class State {
+    moving,       ///< the run continues
+    arrived,      ///< the views show the goal
+    blocked,      ///< the robot cannot pass although the memory has a path
+    lost,         ///< the view is nowhere in the memory, or not where the robot should be
+    unreachable,  ///< no path leads to the goal, or all of them turned out to be blocked
+  };
+  /// Why a decision is not simply the next step.
+  enum class Event {
+    relocalised,    ///< the place was searched in the whole memory
+    kidnapped,      ///< another place than the expected one is accepted
+    entered_area,   ///< another area was loaded
+    unknown_place,  ///< the reference does not match the view
+    obstructed,     ///< the robot could not make its last step
+    closed,         ///< edges were blocked and the path was planned again
+    reopened,       ///< blocked edges are tried again
+    homing,         ///< homing to the goal begins
+    homing_failed,  ///< homing ended at another place
+    route,          ///< a leg along a recorded route begins
+    route_left,     ///< the leg ended before its end
+  };
+
+  int step = 0;                   ///< counts from 1
+  State state = State::moving;    ///< after this observation
+  double direction_rad = 0.0;     ///< of motion, in the current robot frame
+  double advance_m = 0.0;         ///< length of the step; 0 unless moving
   bool homing = false;            ///< the robot homes to the goal by the home vector
   bool on_route = false;          ///< a leg along a recorded route, by the horizon scanline
   std::optional<ViewId> nearest;  ///< the place
@@ -107,8 +102,12 @@ struct NavigationDecision {
   int components = 0;        ///< by which references were compared
   /// Of the loaded area's signatures and index, by this observation, without `probability`.
   std::uint64_t bytes_read = 0;
-  std::vector<NavigationEvent> events;  ///< in the order in which they happened
+  std::vector<Event> events;  ///< in the order in which they happened
 };
+/// "moving", "arrived", "blocked", "lost", "unreachable".
+[[nodiscard]] std::string_view name_of(NavigationDecision::State state);
+/// In lower case with underscores, as logs and JSON have it: "relocalised", "entered_area", ...
+[[nodiscard]] std::string_view name_of(NavigationDecision::Event event);
 /// Returns one line for a log.
 [[nodiscard]] std::string describe(const NavigationDecision& decision);
 
@@ -117,7 +116,7 @@ struct NavigationDecision {
 /// path follows a recorded route and the robot reports its horizon scanlines, it repeats the route
 /// instead [Y03].
 ///
-/// Holds the state of a run and the views of one area, two at a border. `command_towards`
+/// Holds the state of a run and the views of one area, two at a border. `compute_command_towards`
 /// (motion/velocity.hpp) makes the robot's commands. Same calls, same bits. Cost of an observation
 /// without a change of area: the search among the loaded views and three home vectors at most; near
 /// a route also a plan or a fit.

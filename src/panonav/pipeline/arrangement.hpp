@@ -1,9 +1,14 @@
 #pragma once
 
+#include <cstddef>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "panonav/io/dataset.hpp"
 #include "panonav/mapping/lattice.hpp"
+#include "panonav/mapping/map_measures.hpp"
+#include "panonav/motion/trajectory.hpp"
 #include "panonav/storage/memory_file.hpp"
 
 namespace panonav {
@@ -19,5 +24,23 @@ void store_lattice(const Lattice& lattice, const VisualMemory& memory, MemoryFil
 /// memory has. Throws OptionError.
 [[nodiscard]] std::vector<CoarseMotion> make_coarse_motions(
     const Dataset& recording, const VisualMemory& memory, const CoarseMotionOptions& options = {});
+
+/// Returns the number of springs with a weight below `min_spring_weight`.
+[[nodiscard]] std::size_t count_rejected_springs(const Lattice& lattice);
+
+/// Returns the poses of the largest component by stamp; views have their numbers for stamps unless
+/// all have stamps. Throws ContractError where two views have the same stamp.
+[[nodiscard]] std::vector<StampedPose> make_trajectory(const Lattice& lattice,
+                                                       const VisualMemory& memory);
+
+/// Returns the arranged and the true positions of the views of the largest component whose position
+/// the memory knows.
+[[nodiscard]] std::pair<std::vector<Point2>, std::vector<Point2>> collect_known_positions(
+    const Lattice& lattice, const VisualMemory& memory);
+
+/// Compares the largest component with the positions that the memory knows. nullopt where fewer
+/// than three views have one, or all are at one place.
+[[nodiscard]] std::optional<MapComparison> compare_with_ground_truth(const Lattice& lattice,
+                                                                     const VisualMemory& memory);
 
 }  // namespace panonav

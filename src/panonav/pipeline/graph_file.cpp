@@ -10,13 +10,13 @@ namespace panonav {
 
 namespace {
 
-std::string_view name_of(LinkKind kind) {
+std::string_view name_of(Link::Kind kind) {
   switch (kind) {
-    case LinkKind::sequence:
+    case Link::Kind::sequence:
       return "sequence";
-    case LinkKind::neighbour:
+    case Link::Kind::neighbour:
       return "neighbour";
-    case LinkKind::closure:
+    case Link::Kind::closure:
       return "closure";
   }
   return "";
@@ -72,12 +72,12 @@ void write_graph(const std::filesystem::path& path, const TopologicalMap& map,
       "<key id=\"kind\" for=\"edge\" attr.name=\"kind\" attr.type=\"string\"/>\n"
       "<key id=\"weight\" for=\"edge\" attr.name=\"weight\" attr.type=\"double\"/>\n"
       "<graph edgedefault=\"directed\">\n";
-  for (const MapNode& node : map.nodes) {
+  for (const TopologicalMap::Node& node : map.nodes) {
     text += "<node id=\"" + std::to_string(node.view.value) + "\">" +
             data("name", escape_xml(name(node.view))) + format_pose(node.pose) +
             data("component", std::to_string(node.component)) + "</node>\n";
   }
-  for (const MapEdge& edge : map.edges) {
+  for (const TopologicalMap::Edge& edge : map.edges) {
     text += "<edge source=\"" + std::to_string(edge.a.value) + "\" target=\"" +
             std::to_string(edge.b.value) + "\">" + data("kind", name_of(edge.kind)) +
             data("weight", to_text(edge.weight)) + format_pose(edge.a_from_b) + "</edge>\n";

@@ -129,9 +129,8 @@ struct LiveMemory::Implementation {
   }
 
   [[nodiscard]] std::unique_ptr<PlaceRecogniser> make_recogniser() const {
-    PlaceRecogniserOptions recogniser_options{.localiser = options.localiser,
-                                              .source = options.memoriser.source};
-    if (options.areas) recogniser_options.areas = options.areas;
+    PlaceRecogniserOptions recogniser_options{
+        .localiser = options.localiser, .source = options.memoriser.source, .areas = options.areas};
     if (options.add || options.update || options.hold) {
       recogniser_options.max_held_views = std::numeric_limits<std::size_t>::max();
     }

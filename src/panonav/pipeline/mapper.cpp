@@ -22,7 +22,7 @@ double seconds_since(Clock::time_point start) {
 
 std::size_t find_largest_component(const TopologicalMap& map) {
   std::map<std::size_t, std::size_t> sizes;
-  for (const MapNode& node : map.nodes) ++sizes[node.component];
+  for (const TopologicalMap::Node& node : map.nodes) ++sizes[node.component];
   std::size_t largest = 0;
   for (const auto& [component, size] : sizes) {
     if (size > sizes[largest]) largest = component;
@@ -104,13 +104,14 @@ Mapper::Result Mapper::finish() {
   run_.scale_m = mapper_.scale_m();
   run_.wheels = options_.mapping.wheels && all_odometry_;
   std::vector<Link> links;
-  for (const MapEdge& edge : run_.map.edges) links.push_back({edge.a, edge.b, edge.kind});
+  for (const TopologicalMap::Edge& edge : run_.map.edges)
+    links.push_back({edge.a, edge.b, edge.kind});
   file_.change([&] {
     file_.link(links);
     file_.save_map(map_name, run_.map);
     if (!any_pose_) {
       const std::size_t component = find_largest_component(run_.map);
-      for (const MapNode& node : run_.map.nodes) {
+      for (const TopologicalMap::Node& node : run_.map.nodes) {
         if (node.component != component) continue;
         file_.set_pose(node.view,
                        ReferencePose{node.pose.x_m, node.pose.y_m, node.pose.heading_rad});

@@ -25,7 +25,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Returns a file name within the folder that no other file or folder of the export uses.
+/// True if the name can be that of a file in the folder, which no other file or folder of the
+/// export uses.
 bool is_file_name(const std::string& name) {
   constexpr std::array<std::string_view, 8> own{"dataset.toml", "poses.csv",      "images.csv",
                                                 "views.csv",    "signatures.npy", "memorise.toml",

@@ -39,7 +39,7 @@ TopologicalMap read_or_make_map(const MemoryFile& file, const VisualMemory& view
       const auto pose = get_complete_pose(views.info(view));
       if (!pose) continue;
       if (!map.nodes.empty()) {
-        const MapNode& before = map.nodes.back();
+        const TopologicalMap::Node& before = map.nodes.back();
         map.edges.push_back({before.view, view, inverse(before.pose) * *pose});
       }
       map.nodes.push_back({view, *pose, 0});
@@ -47,7 +47,7 @@ TopologicalMap read_or_make_map(const MemoryFile& file, const VisualMemory& view
     return map;
   }
   const std::size_t largest = find_largest_component(map);
-  for (MapNode& node : map.nodes) {
+  for (TopologicalMap::Node& node : map.nodes) {
     if (node.component == largest) {
       node.component = 0;
     } else if (node.component < largest) {
@@ -58,7 +58,7 @@ TopologicalMap read_or_make_map(const MemoryFile& file, const VisualMemory& view
   std::size_t nodes = 0;
   std::size_t positions = 0;
   std::size_t poses = 0;
-  for (const MapNode& node : map.nodes) {
+  for (const TopologicalMap::Node& node : map.nodes) {
     if (node.component != 0) continue;
     ++nodes;
     positions += views.info(node.view).pose.has_value() ? 1 : 0;
@@ -71,7 +71,7 @@ TopologicalMap read_or_make_map(const MemoryFile& file, const VisualMemory& view
                         std::to_string(poses) + " a heading; a merge needs both for all or none");
   }
   if (poses == nodes) {
-    for (MapNode& node : map.nodes) {
+    for (TopologicalMap::Node& node : map.nodes) {
       if (node.component == 0) node.pose = *get_complete_pose(views.info(node.view));
     }
   }
@@ -80,13 +80,13 @@ TopologicalMap read_or_make_map(const MemoryFile& file, const VisualMemory& view
 
 TopologicalMap select_components(const TopologicalMap& map, bool largest) {
   TopologicalMap part;
-  for (const MapNode& node : map.nodes) {
+  for (const TopologicalMap::Node& node : map.nodes) {
     if ((node.component == 0) == largest) part.nodes.push_back(node);
   }
   const auto is_in = [&](ViewId view) {
-    return std::ranges::binary_search(part.nodes, view, {}, &MapNode::view);
+    return std::ranges::binary_search(part.nodes, view, {}, &TopologicalMap::Node::view);
   };
-  for (const MapEdge& edge : map.edges) {
+  for (const TopologicalMap::Edge& edge : map.edges) {
     if (is_in(edge.a) && is_in(edge.b)) part.edges.push_back(edge);
   }
   return part;
@@ -94,12 +94,12 @@ TopologicalMap select_components(const TopologicalMap& map, bool largest) {
 
 TopologicalMap with_new_ids(const TopologicalMap& map, const NewIds& ids) {
   TopologicalMap result;
-  for (MapNode node : map.nodes) {
+  for (TopologicalMap::Node node : map.nodes) {
     node.view = ids.at(node.view);
     result.nodes.push_back(node);
   }
-  std::ranges::sort(result.nodes, {}, &MapNode::view);
-  for (MapEdge edge : map.edges) {
+  std::ranges::sort(result.nodes, {}, &TopologicalMap::Node::view);
+  for (TopologicalMap::Edge edge : map.edges) {
     edge.a = ids.at(edge.a);
     edge.b = ids.at(edge.b);
     result.edges.push_back(edge);
@@ -111,20 +111,20 @@ TopologicalMap with_new_ids(const TopologicalMap& map, const NewIds& ids) {
 /// nothing: it stays where it is.
 void add_apart(TopologicalMap& map, const TopologicalMap& more) {
   std::size_t next = 0;
-  for (const MapNode& node : map.nodes) next = std::max(next, node.component + 1);
-  const std::vector<MapNode> there = map.nodes;
+  for (const TopologicalMap::Node& node : map.nodes) next = std::max(next, node.component + 1);
+  const std::vector<TopologicalMap::Node> there = map.nodes;
   const auto is_there = [&](ViewId view) {
-    return std::ranges::binary_search(there, view, {}, &MapNode::view);
+    return std::ranges::binary_search(there, view, {}, &TopologicalMap::Node::view);
   };
-  for (MapNode node : more.nodes) {
+  for (TopologicalMap::Node node : more.nodes) {
     if (is_there(node.view)) continue;
     node.component += next;
     map.nodes.push_back(node);
   }
-  for (const MapEdge& edge : more.edges) {
+  for (const TopologicalMap::Edge& edge : more.edges) {
     if (!is_there(edge.a) && !is_there(edge.b)) map.edges.push_back(edge);
   }
-  std::ranges::sort(map.nodes, {}, &MapNode::view);
+  std::ranges::sort(map.nodes, {}, &TopologicalMap::Node::view);
   renumber_components(map);
 }
 
@@ -262,7 +262,7 @@ class Merge {
     if (!result_.alignment) return;
     // Poses that the pose graph moved.
     const std::size_t joined = map.nodes.front().component;
-    for (const MapNode& node : map.nodes) {
+    for (const TopologicalMap::Node& node : map.nodes) {
       if (node.component != joined) continue;
       file.set_pose(node.view, ReferencePose{node.pose.x_m, node.pose.y_m, node.pose.heading_rad});
     }

@@ -29,7 +29,7 @@ std::string exact(double value) {
   return text.data();
 }
 
-std::string to_parameter(const MemoryUse& use) {
+std::string to_parameter(const MemoryUpdate::Use& use) {
   std::string text = std::string(use_version) + " " + std::to_string(use.runs) + " " +
                      exact(use.spacing_m) + " " + exact(use.far_difference) + " " +
                      exact(use.range_m) + " " + std::to_string(use.places) + " " +
@@ -43,8 +43,8 @@ std::string to_parameter(const MemoryUse& use) {
 }
 
 // A text of an unknown version counts as none.
-MemoryUse parse_memory_use(const std::optional<std::string>& text) {
-  MemoryUse use;
+MemoryUpdate::Use parse_memory_use(const std::optional<std::string>& text) {
+  MemoryUpdate::Use use;
   if (!text) return use;
   std::istringstream words(*text);
   std::string version, spacing, far, range;
@@ -56,7 +56,7 @@ MemoryUse parse_memory_use(const std::optional<std::string>& text) {
   use.far_difference = std::strtod(far.c_str(), nullptr);
   use.range_m = std::strtod(range.c_str(), nullptr);
   std::uint32_t view = 0;
-  MemoryUse::View one;
+  MemoryUpdate::Use::View one;
   std::string learnt;
   while (words >> view >> one.matched >> one.failed >> one.last_run >> learnt) {
     one.learnt = learnt == "learnt";
@@ -185,11 +185,11 @@ MemoryUpdater::Changes MemoryUpdater::finish(const std::string& what) {
         self.file.set_parameter(use_parameter, to_parameter(planned.use));
         if (!added.empty() || !dropped.empty()) keep_models(self.file);
       },
-      what + ": " + as_text(changes));
+      what + ": " + summarise(changes));
   return changes;
 }
 
-std::string as_text(const MemoryUpdater::Changes& changes) {
+std::string summarise(const MemoryUpdater::Changes& changes) {
   return std::to_string(changes.added) + " views added, " + std::to_string(changes.replaced) +
          " replaced, " + std::to_string(changes.forgotten) + " forgotten, " +
          std::to_string(changes.reinforced) + " reinforced";

@@ -58,6 +58,6 @@ class MemoryUpdater {
 };
 
 /// Returns "12 views added, 3 replaced, 1 forgotten, 40 reinforced".
-[[nodiscard]] std::string as_text(const MemoryUpdater::Changes& changes);
+[[nodiscard]] std::string summarise(const MemoryUpdater::Changes& changes);
 
 }  // namespace panonav

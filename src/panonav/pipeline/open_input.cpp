@@ -31,7 +31,7 @@ std::string list_names(const std::vector<std::string>& names) {
   return text;
 }
 
-void warn_of_left_out(Dataset& opened) {
+void add_warning_of_skipped_files(Dataset& opened) {
   std::vector<std::string> files;
   std::vector<std::string> folders;
   for (const std::string& name : opened.left_out) {
@@ -77,16 +77,15 @@ void warn_of_low_band(Dataset& opened) {
 
 /// A picture twice as wide as high that is said to be a panorama shows the whole sphere in all
 /// likelihood: as a panorama of square pixels it would reach from pole to pole.
-void warn_of_other_kind(Dataset& opened) {
+void add_warning_of_other_kind(Dataset& opened) {
   constexpr double max_band_deg = 170.0;  // from here on the band is nearly the sphere's
-  const Dataset& dataset = opened;
-  if (dataset.source.kind != PictureKind::panorama) return;
-  const auto& band = dataset.source.layout.elevations;
+  if (opened.source.kind != PictureKind::panorama) return;
+  const auto& band = opened.source.layout.elevations;
   if (band && band->top_rad - band->bottom_rad < radians(max_band_deg)) return;
-  const auto size = read_first_picture_size(dataset);
+  const auto size = read_first_picture_size(opened);
   if (!size || size->width != 2 * size->height) return;
   opened.warnings.push_back(
-      "hint: " + to_readable_line(dataset.entries.front().path.string()) + " is " +
+      "hint: " + to_readable_line(opened.entries.front().path.string()) + " is " +
       std::to_string(size->width) + " x " + std::to_string(size->height) +
       " px; a picture of the whole sphere is of the kind equirectangular, a panorama has an "
       "elevation band");
@@ -127,8 +126,8 @@ void refuse_unregistered(const fs::path& path) {
   }
 }
 
-const PictureSource& make_stated_source(const fs::path& path, const InputOptions& options,
-                                        std::string_view why) {
+const PictureSource& choose_source(const fs::path& path, const InputOptions& options,
+                                   std::string_view why) {
   if (options.source) return *options.source;
   if (options.default_source) return *options.default_source;
   throw FileError(path.string(), std::string(why) + " with 'source' (a PictureSource)");
@@ -142,13 +141,13 @@ Dataset open_registered(const fs::path& path, const DatasetReader& reader,
         "the option odometry_topic and the option odometry_frames do not go together");
   }
   const PictureSource& source =
-      make_stated_source(path, options, "does not say how its pictures lie; say what they show");
+      choose_source(path, options, "does not say how its pictures lie; say what they show");
   if (options.recursive) {
     throw OptionError(path.string() + " is a " + reader.name + "; leave out the option recursive");
   }
   Dataset opened = reader.read(path, source, options);
   for (std::string& warning : opened.warnings) warning = path.string() + ": " + warning;
-  if (options.source) warn_of_other_kind(opened);
+  if (options.source) add_warning_of_other_kind(opened);
   return opened;
 }
 
@@ -164,14 +163,14 @@ Dataset open_described(const fs::path& folder, const InputOptions& options) {
   }
   Dataset opened = read_dataset(folder);
   warn_of_low_band(opened);
-  warn_of_other_kind(opened);
+  add_warning_of_other_kind(opened);
   return opened;
 }
 
 Dataset open_pictures(const fs::path& path, const InputOptions& options) {
   refuse_unregistered(path);
   const PictureSource& source =
-      make_stated_source(path, options, "has no dataset.toml; say what the pictures show");
+      choose_source(path, options, "has no dataset.toml; say what the pictures show");
   std::error_code ignored;
   Dataset opened;
   if (fs::is_directory(path, ignored)) {
@@ -185,8 +184,8 @@ Dataset open_pictures(const fs::path& path, const InputOptions& options) {
   } else {
     opened = read_single_picture(path, source);
   }
-  warn_of_left_out(opened);
-  if (options.source) warn_of_other_kind(opened);
+  add_warning_of_skipped_files(opened);
+  if (options.source) add_warning_of_other_kind(opened);
   return opened;
 }
 
@@ -206,9 +205,7 @@ Dataset open_input(const fs::path& path, const InputOptions& options) {
   refuse_topics(path, options.topics);
   Dataset opened =
       has_dataset_file(path) ? open_described(path, options) : open_pictures(path, options);
-  if (options.selection.by_time() || options.selection.every > 1) {
-    select_pictures(opened, options.selection);
-  }
+  select_pictures(opened, options.selection);
   return opened;
 }
 

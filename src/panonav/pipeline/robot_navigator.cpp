@@ -19,36 +19,37 @@ namespace {
 constexpr std::array<std::string_view, 4> origin_names{"map", "lattice", "links", "arrangement"};
 
 /// Empty when the file has nothing of the kind.
-std::optional<NavigationGraph> load_graph(GraphOrigin origin, const MemoryFileViews& source,
-                                          Executor& executor) {
+std::optional<NavigationGraph> load_graph(RobotNavigatorOptions::GraphOrigin origin,
+                                          const MemoryFileViews& source, Executor& executor) {
   const MemoryFile& file = source.file();
   switch (origin) {
-    case GraphOrigin::map: {
+    case RobotNavigatorOptions::GraphOrigin::map: {
       const auto map = file.map(map_name);
       if (!map) return std::nullopt;
       std::vector<ViewId> views;
-      for (const MapNode& node : map->nodes) views.push_back(node.view);
+      for (const TopologicalMap::Node& node : map->nodes) views.push_back(node.view);
       return graph_from_map_and_neighbours(*map, file.load(views), executor);
     }
-    case GraphOrigin::lattice: {
+    case RobotNavigatorOptions::GraphOrigin::lattice: {
       const auto map = file.map("lattice");
       if (!map) return std::nullopt;
       return graph_from_stored_lattice(*map, source, executor);
     }
-    case GraphOrigin::links: {
+    case RobotNavigatorOptions::GraphOrigin::links: {
       const std::vector<Link> links = file.links();
       if (links.empty()) return std::nullopt;
       return graph_from_links(source, links, executor);
     }
-    case GraphOrigin::arrangement:
+    case RobotNavigatorOptions::GraphOrigin::arrangement:
       return graph_from_lattice(arrange(file.load(), {}, {}, executor));
   }
   return std::nullopt;
 }
 
-NavigationGraph load_requested_graph(const MemoryFileViews& source,
-                                     const std::optional<GraphOrigin>& requested,
-                                     GraphOrigin& origin, Executor& executor) {
+NavigationGraph load_requested_graph(
+    const MemoryFileViews& source,
+    const std::optional<RobotNavigatorOptions::GraphOrigin>& requested,
+    RobotNavigatorOptions::GraphOrigin& origin, Executor& executor) {
   const std::string path = source.file().path().string();
   if (source.views().empty()) throw FileError(path, "holds no views; allowed: 2 or more");
   if (requested) {
@@ -59,7 +60,7 @@ NavigationGraph load_requested_graph(const MemoryFileViews& source,
                               "; leave out the option edges for what there is");
   }
   for (std::size_t i = 0;; ++i) {
-    origin = static_cast<GraphOrigin>(i);
+    origin = static_cast<RobotNavigatorOptions::GraphOrigin>(i);
     auto graph = load_graph(origin, source, executor);
     if (graph) return std::move(*graph);
   }
@@ -97,24 +98,24 @@ KnownRoute load_known_route(const MemoryFileViews& source, const std::string& na
   KnownRoute known = make_known_route(route, views, options);
   if (known.references.empty()) {
     throw FileError(path, "none of the " + std::to_string(views.size()) +
-                              " views with a pose lies within " + format_number(options.beside_m) +
-                              " m of the route '" + name +
+                              " views with a pose lies within " +
+                              format_number(options.max_lateral_m) + " m of the route '" + name +
                               "'; allowed: views and a route in one frame, or a larger value of "
-                              "the option route_beside_m");
+                              "the option route_max_lateral_m");
   }
   return known;
 }
 
 }  // namespace
 
-std::string_view name_of(GraphOrigin origin) {
+std::string_view name_of(RobotNavigatorOptions::GraphOrigin origin) {
   return origin_names.at(static_cast<std::size_t>(origin));
 }
 
-std::optional<GraphOrigin> find_graph_origin(std::string_view name) {
+std::optional<RobotNavigatorOptions::GraphOrigin> find_graph_origin(std::string_view name) {
   const auto found = std::ranges::find(origin_names, name);
   if (found == origin_names.end()) return std::nullopt;
-  return static_cast<GraphOrigin>(found - origin_names.begin());
+  return static_cast<RobotNavigatorOptions::GraphOrigin>(found - origin_names.begin());
 }
 
 RobotNavigator::RobotNavigator(const std::filesystem::path& memory, const std::string& goal,
@@ -187,7 +188,7 @@ RobotNavigator::Step RobotNavigator::step(const Observation& observation, RobotR
   }
   last_.velocity = {};
   const double left_m = std::hypot(target_.x_m, target_.y_m);
-  if (last_.decision.state == NavigationState::moving && left_m > 0.0) {
+  if (last_.decision.state == NavigationDecision::State::moving && left_m > 0.0) {
     last_.velocity = compute_command_towards(std::atan2(target_.y_m, target_.x_m), left_m, base);
   }
   return last_;

@@ -18,20 +18,16 @@
 
 namespace panonav {
 
-/// Source of the edges between the views of a memory.
-enum class GraphOrigin {
-  map,          ///< stored by a `Mapper`: the motions of the map
-  lattice,      ///< stored by the verb `arrange`: directions from the views' phases
-  links,        ///< of the memory: lengths, too
-  arrangement,  ///< none of these is there: the views are arranged first
-};
-/// Returns "map", "lattice", "links" or "arrangement".
-[[nodiscard]] std::string_view name_of(GraphOrigin origin);
-/// Returns the origin of that name; empty if there is none.
-[[nodiscard]] std::optional<GraphOrigin> find_graph_origin(std::string_view name);
-
 /// Options for sending a robot to a goal.
 struct RobotNavigatorOptions {
+  /// Source of the edges between the views of a memory.
+  enum class GraphOrigin {
+    map,          ///< stored by a `Mapper`: the motions of the map
+    lattice,      ///< stored by the verb `arrange`: directions from the views' phases
+    links,        ///< of the memory: lengths, too
+    arrangement,  ///< none of these is there: the views are arranged first
+  };
+
   NavigatorOptions navigator;        ///< how it decides
   PlannerOptions planner;            ///< how it plans
   BaseOptions base;                  ///< what velocity commands are made for
@@ -40,6 +36,11 @@ struct RobotNavigatorOptions {
   std::optional<std::string> route;
   KnownRouteOptions known_route;  ///< how the route is followed
 };
+/// Returns "map", "lattice", "links" or "arrangement".
+[[nodiscard]] std::string_view name_of(RobotNavigatorOptions::GraphOrigin origin);
+/// Returns the origin of that name; empty if there is none.
+[[nodiscard]] std::optional<RobotNavigatorOptions::GraphOrigin> find_graph_origin(
+    std::string_view name);
 
 /// Drives a robot to a remembered view by its pictures: a picture in, a velocity out. Views are
 /// read from the memory file when they are needed: those of one area and around it are held, of the
@@ -74,7 +75,7 @@ class RobotNavigator {
   [[nodiscard]] Step step(const Observation& observation, RobotReport report = {});
 
   /// Returns the source of the edges.
-  [[nodiscard]] GraphOrigin origin() const noexcept { return origin_; }
+  [[nodiscard]] RobotNavigatorOptions::GraphOrigin origin() const noexcept { return origin_; }
   [[nodiscard]] ViewId goal() const noexcept { return goal_; }  ///< The goal's id in the memory.
   /// Returns the views and the edges between them.
   [[nodiscard]] const NavigationGraph& graph() const noexcept { return planner().graph(); }
@@ -99,7 +100,7 @@ class RobotNavigator {
   RobotNavigatorOptions options_;
   MemoryFileViews views_;
   ViewEncoder encoder_;
-  GraphOrigin origin_ = GraphOrigin::map;
+  RobotNavigatorOptions::GraphOrigin origin_ = RobotNavigatorOptions::GraphOrigin::map;
   ViewId goal_;
   std::vector<KnownRoute> routes_;
   std::optional<RouteSource> route_source_;

@@ -19,7 +19,7 @@ std::map<ViewId, std::size_t> find_components(const MemoryFile& file) {
   const bool driven = std::ranges::find(names, "map") != names.end();
   const auto map = file.map(driven ? "map" : names.front());
   std::map<ViewId, std::size_t> components;
-  for (const MapNode& node : map->nodes) components[node.view] = node.component;
+  for (const TopologicalMap::Node& node : map->nodes) components[node.view] = node.component;
   return components;
 }
 

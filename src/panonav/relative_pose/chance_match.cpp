@@ -108,8 +108,8 @@ class NoiseGenerator {
   std::vector<float> energy_;                  // by row
 };
 
-double sum_of_correlations(const HomingView& home, const HomingView& current,
-                           const FourierHomingOptions& options) {
+double sum_correlation_both_ways(const HomingView& home, const HomingView& current,
+                                 const FourierHomingOptions& options) {
   return home_vector(home, current, options).correlation +
          home_vector(current, home, options).correlation;
 }
@@ -135,12 +135,12 @@ ChanceMatch compare_with_chance(const HomingView& home, const HomingView& curren
   const HomingView goal = average_to_bands(home);
   const HomingView here = average_to_bands(current);
   ChanceMatch result;
-  result.match = sum_of_correlations(goal, here, options);
+  result.match = sum_correlation_both_ways(goal, here, options);
   const NoiseGenerator noise(here);
   constexpr std::uint64_t seed = 1;
   std::vector<double> matches;
   for (std::uint64_t i = 0; i < noise_views; ++i) {
-    matches.push_back(sum_of_correlations(goal, noise.draw_view(Random(seed, i)), options));
+    matches.push_back(sum_correlation_both_ways(goal, noise.draw_view(Random(seed, i)), options));
     result.chance += matches.back() / noise_views;
   }
   double square = 0.0;

@@ -33,7 +33,7 @@ using BandView = std::array<std::array<float, columns>, bands>;
 constexpr int max_components = columns / 2;
 
 // The columns of a quarter turn, both ends included; the others follow by symmetry. Filled up to
-// scale vectors.
+// whole vectors.
 constexpr std::size_t quarter = columns / 4 + 1;
 constexpr std::size_t padded_quarter = (quarter + 3) / 4 * 4;
 using Quarter = std::array<float, padded_quarter>;
@@ -58,7 +58,7 @@ const Waves& wave_table() {
   return made;
 }
 
-// Rows that count, spread over the bands as evenly as scale rows allow.
+// Rows that count, spread over the bands as evenly as whole rows allow.
 int reconstruct_view(const PackedSignature& signature, int components,
                      std::span<const std::uint8_t> allowed_rows, BandView& view) {
   const auto rows = static_cast<std::size_t>(signature.shape.rows);

@@ -257,7 +257,7 @@ void MemoryFile::link(std::span<const Link> links) {
 }
 
 void MemoryFile::unlink(ViewId a, ViewId b) {
-  const Link pair = order_ends({a, b, LinkKind::sequence});
+  const Link pair = order_ends({a, b, Link::Kind::sequence});
   implementation_->write([&](MemoryTables& tables) { tables.erase_link(pair.a, pair.b); });
 }
 
@@ -303,7 +303,7 @@ std::optional<std::string> MemoryFile::parameter(std::string_view name) const {
 void MemoryFile::save_map(std::string_view name, const TopologicalMap& map) {
   implementation_->write([&](MemoryTables& tables) {
     std::vector<ViewId> views;
-    for (const MapNode& node : map.nodes) views.push_back(node.view);
+    for (const TopologicalMap::Node& node : map.nodes) views.push_back(node.view);
     tables.require_views(views);
     write_map(tables, name, map);
   });

@@ -27,7 +27,7 @@ class AreasOfViews {
   [[nodiscard]] bool has(ViewId view) const {
     return view.value < numbers_.size() && numbers_[view.value] != no_view;
   }
-  /// Returns the names, ascending. Cost: a pass over all ids.
+  /// Returns the views of these areas, ascending. Cost: a pass over all ids.
   [[nodiscard]] std::vector<ViewId> within(const std::set<MemoryArea>& areas) const {
     std::vector<std::uint32_t> known;
     for (const MemoryArea& area : areas) {

@@ -114,7 +114,7 @@ class PostgresqlTables final : public MemoryTables {
 
   /// Returns the connection, for statements that only servers have (server_exchange.hpp).
   [[nodiscard]] PostgresqlConnection& connection() noexcept { return connection_; }
-  [[nodiscard]] std::int64_t memory() const noexcept { return memory_; }
+  [[nodiscard]] std::int64_t memory_id() const noexcept { return memory_; }
   /// Returns the changed areas as text for a notification, and forgets them; empty for many areas,
   /// and where views without a position were changed.
   [[nodiscard]] std::string consume_changed_areas();

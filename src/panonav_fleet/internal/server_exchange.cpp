@@ -77,7 +77,7 @@ ServerExchange::ServerExchange(const ServerAddress& address, PostgresqlConnectio
 
 PostgresqlValues ServerExchange::values() const {
   PostgresqlValues values;
-  values.add(tables_.memory());
+  values.add(tables_.memory_id());
   return values;
 }
 
@@ -421,7 +421,7 @@ std::size_t ServerExchange::submit_links(std::span<const Link> added,
                                          std::span<const ChangedLink> changed) {
   // a, b, kind, checksum; a, b, former kind, kind, checksum; a, b
   std::array<std::vector<std::int64_t>, 11> columns;
-  const auto kind_of = [](LinkKind kind) { return std::int64_t{static_cast<int>(kind)}; };
+  const auto kind_of = [](Link::Kind kind) { return std::int64_t{static_cast<int>(kind)}; };
   for (const Link& link : added) {
     columns[0].push_back(link.a.value);
     columns[1].push_back(link.b.value);

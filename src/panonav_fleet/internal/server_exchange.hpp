@@ -130,7 +130,7 @@ class ServerExchange {
       const std::map<ViewId, std::int64_t>& checksums);
   struct ChangedLink {
     Link former;
-    std::optional<LinkKind> new_kind;  ///< nullopt: the link is removed
+    std::optional<Link::Kind> new_kind;  ///< nullopt: the link is removed
   };
   /// Adds links between existing views that have none, and changes or removes links that still have
   /// the former kind. Returns how many.

@@ -168,7 +168,7 @@ class SketchSearch {
     result_.bytes_read += scratch.bytes_read;
   }
 
-  /// Returns a first limit for the `top` views, from the segments with the best samples. Views of
+  /// Finds a first limit for the `top` views, from the segments with the best samples. Views of
   /// nearby places are adjacent in a segment.
   void find_limit() {
     if (segments_.empty()) return;

@@ -37,7 +37,7 @@ class RecordingFile {
   [[nodiscard]] std::vector<std::string> warnings() const;
   /// Returns the span of the messages' times of each block; nullopt for a block without messages.
   [[nodiscard]] virtual std::vector<std::optional<TimeSpan>> blocks() const = 0;
-  /// Appends the places of the messages of a block that are of the wanted topics and within the
+  /// Appends the places of the messages of a block that are of the chosen topics and within the
   /// span, in any order. Throws FileError beyond `max_places` places in all.
   virtual void list(std::size_t block, const std::vector<bool>& chosen_topics,
                     const TimeSpan& within, std::size_t max_places,

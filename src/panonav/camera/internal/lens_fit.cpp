@@ -23,7 +23,7 @@ namespace {
 /// Tukey's weights: outliers are mismatches, anywhere in the area that was searched. In standard
 /// deviations; 95 % efficient for Gaussian errors.
 constexpr double tukey = 4.685;
-/// Parameters on which a point depends: those of its lens and of its picture's stand.
+/// Parameters on which a point depends: those of its lens and of its picture's rotation.
 constexpr int own = lens_size + rotation_size;
 
 Vector2d residual(const std::vector<PosedLens>& lenses, const Match& match) {

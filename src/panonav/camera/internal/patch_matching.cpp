@@ -116,7 +116,7 @@ struct Direction {
   int region = 0;
 };
 /// Returns direction i of `count`: evenly over the sphere (Fibonacci), but for the poles: floor or
-/// rotation, and the hand above.
+/// tripod, and the hand above.
 Direction direction_at(std::size_t i, int count) {
   const double z = 0.94 * (1 - (2.0 * static_cast<double>(i) + 1) / count);
   const double azimuth = std::numbers::pi * (3 - std::sqrt(5.0)) * static_cast<double>(i);
@@ -146,7 +146,7 @@ std::vector<std::array<int, 2>> view_pairs(int pictures) {
 
 }  // namespace
 
-/// One lens in one picture as it is believed to rotation.
+/// One lens in one picture, posed as the state has it.
 class PatchMatcher::View {
  public:
   View(const State& state, int picture, int lens, const Plane& plane, double mirror_sign)

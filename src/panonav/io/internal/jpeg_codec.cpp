@@ -90,7 +90,7 @@ bool start_steps(Reader& reader) {
   return true;
 }
 
-bool pixel_steps(Reader& reader, std::uint8_t* pixels, std::size_t stride) {
+bool read_pixels(Reader& reader, std::uint8_t* pixels, std::size_t stride) {
   if (setjmp(reader.on_failure)) return false;
   while (reader.jpeg.output_scanline < reader.jpeg.output_height) {
     JSAMPROW row = pixels + reader.jpeg.output_scanline * stride;
@@ -227,7 +227,7 @@ Image decode_jpeg(std::span<const std::uint8_t> bytes, std::string_view name,
     throw FileError(name, "damaged JPEG: unknown colour type");
   }
   Image image(size.width, size.height, channels);
-  if (!pixel_steps(reader, image.pixels().data(),
+  if (!read_pixels(reader, image.pixels().data(),
                    static_cast<std::size_t>(size.width) * channels)) {
     fail(reader, name);
   }

@@ -68,7 +68,7 @@ bool open_steps(Reader& reader, ImageSize& size) {
 }
 
 // Asks for 8 bit grey or RGB and tells how many channels that is.
-bool transform_steps(Reader& reader, int& channels) {
+bool set_transforms(Reader& reader, int& channels) {
   if (setjmp(png_jmpbuf(reader.png))) return false;
   png_set_scale_16(reader.png);
   png_set_expand(reader.png);
@@ -79,7 +79,7 @@ bool transform_steps(Reader& reader, int& channels) {
   return true;
 }
 
-bool pixel_steps(Reader& reader, png_bytepp rows) {
+bool read_pixels(Reader& reader, png_bytepp rows) {
   if (setjmp(png_jmpbuf(reader.png))) return false;
   png_read_image(reader.png, rows);
   // Also reads the end of the file: a picture without its end is cut short.
@@ -185,13 +185,13 @@ Image decode_png(std::span<const std::uint8_t> bytes, std::string_view name,
     throw FileError(name, "damaged PNG: the file ends too early");
   }
   int channels = 0;
-  if (!transform_steps(reader, channels)) fail(reader, name);
+  if (!set_transforms(reader, channels)) fail(reader, name);
   if (channels != 1 && channels != 3) throw FileError(name, "damaged PNG: unknown colour type");
 
   Image image(size.width, size.height, channels);
   std::vector<png_bytep> rows(static_cast<std::size_t>(size.height));
   for (int v = 0; v < size.height; ++v) rows[v] = &image.at(0, v);
-  if (!pixel_steps(reader, rows.data())) fail(reader, name);
+  if (!read_pixels(reader, rows.data())) fail(reader, name);
   return upright(std::move(image), exif_orientation(reader.exif));
 }
 

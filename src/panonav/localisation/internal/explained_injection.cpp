@@ -54,7 +54,7 @@ bool ExplainedInjection::find_places(const Particles& particles, Random& random)
   Particles poses;
   const auto add = [&](PoseSampler::Candidate place) {
     places_.push_back(place);
-    poses.add(sampler_->find_pose(place, particles, random), 0.0);
+    poses.add(sampler_->make_pose_at(place, particles, random), 0.0);
   };
   const auto sites = likelihood_->sites();
   for (const std::uint32_t site : likelihood_->compared_sites()) {

@@ -27,8 +27,8 @@ bool PoseSampler::has_heading(std::uint32_t site) const {
   return compass_ && !std::isnan(likelihood_->sites()[site].heading_rad);
 }
 
-Pose2 PoseSampler::find_pose(Candidate candidate, const Particles& particles,
-                             Random& random) const {
+Pose2 PoseSampler::make_pose_at(Candidate candidate, const Particles& particles,
+                                Random& random) const {
   const auto& site = likelihood_->sites()[candidate.site];
   const double heading_rad =
       has_heading(candidate.site)
@@ -40,7 +40,7 @@ Pose2 PoseSampler::find_pose(Candidate candidate, const Particles& particles,
 
 Pose2 PoseSampler::draw_around(Candidate candidate, const Particles& particles,
                                Random& random) const {
-  Pose2 pose = find_pose(candidate, particles, random);
+  Pose2 pose = make_pose_at(candidate, particles, random);
   pose.x_m += random.normal(0.0, position_deviation_spacings * model_->spacing_m);
   pose.y_m += random.normal(0.0, position_deviation_spacings * model_->spacing_m);
   if (has_heading(candidate.site)) {

@@ -25,8 +25,8 @@ class PoseSampler {
   [[nodiscard]] bool has_heading(std::uint32_t site) const;
   /// Returns the position of the site with the heading of the compass, else with that of a random
   /// particle.
-  [[nodiscard]] Pose2 find_pose(Candidate candidate, const Particles& particles,
-                                Random& random) const;
+  [[nodiscard]] Pose2 make_pose_at(Candidate candidate, const Particles& particles,
+                                   Random& random) const;
   /// Draws a pose around it, as far as the truth may lie.
   [[nodiscard]] Pose2 draw_around(Candidate candidate, const Particles& particles,
                                   Random& random) const;

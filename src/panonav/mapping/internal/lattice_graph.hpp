@@ -41,14 +41,16 @@ class LatticeGraph {
   [[nodiscard]] std::vector<double> shortest_path_lengths(std::size_t from) const;
 
   /// Calls visit(a, to_b, to_c, ac) for all nodes a, b and c that edges join to each other: `to_b`
-  /// leads from a, `to_c` from b, and `ac` is the number of the edge between a and c.
-  template <class Visit>
-  void visit_triangles(const Visit& visit) const {
+  /// leads from a, `to_c` from b, and `ac` is the number of the edge between a and c. Only
+  /// triangles for which use_edge(a, to_b) is true are visited.
+  template <class UseEdge, class Visit>
+  void visit_triangles(const UseEdge& use_edge, const Visit& visit) const {
     constexpr auto none = static_cast<std::size_t>(-1);
     std::vector<std::size_t> edge_to(size(), none);  // from a
     for (std::size_t a = 0; a < size(); ++a) {
       for (const Neighbour& to_b : neighbours(a)) edge_to[to_b.node] = to_b.edge;
       for (const Neighbour& to_b : neighbours(a)) {
+        if (!use_edge(a, to_b)) continue;
         for (const Neighbour& to_c : neighbours(to_b.node)) {
           if (edge_to[to_c.node] != none) visit(a, to_b, to_c, edge_to[to_c.node]);
         }

@@ -59,14 +59,16 @@ std::vector<unsigned char> find_supported(std::size_t nodes, std::span<const Lat
     return node == link.a ? link.step : inverse(link.step);
   };
   LatticeGraph(nodes, edges)
-      .visit_triangles([&](std::size_t a, const auto& to_b, const auto& to_c, std::size_t ac) {
-        if (to_c.node <= a || ranks[to_b.edge] >= low_rank || ranks[to_c.edge] >= low_rank) return;
-        const double longest =
-            std::max({links[to_b.edge].length, links[to_c.edge].length, links[ac].length});
-        const Pose2 around =
-            step_from(a, links[to_b.edge]) * step_from(to_b.node, links[to_c.edge]);
-        if (is_near(around, step_from(a, links[ac]), max_triangle_gap * longest)) supported[ac] = 1;
-      });
+      .visit_triangles([&](std::size_t, const auto& to_b) { return ranks[to_b.edge] < low_rank; },
+                       [&](std::size_t a, const auto& to_b, const auto& to_c, std::size_t ac) {
+                         if (to_c.node <= a || ranks[to_c.edge] >= low_rank) return;
+                         const double longest = std::max(
+                             {links[to_b.edge].length, links[to_c.edge].length, links[ac].length});
+                         const Pose2 around = step_from(a, links[to_b.edge]) *
+                                              step_from(to_b.node, links[to_c.edge]);
+                         if (is_near(around, step_from(a, links[ac]), max_triangle_gap * longest))
+                           supported[ac] = 1;
+                       });
   return supported;
 }
 

@@ -29,9 +29,9 @@ constexpr double default_length_error = 0.25;
 /// leave 0.4 degrees each, averaged over the components.
 constexpr double min_angle_deviation_rad = 0.0035;
 
-/// Displacement and turn of the spring from one of its ends.
+/// Returns displacement and turn of the spring from one of its ends.
 Pose2 step_from(std::size_t from, const Lattice::Spring& spring) {
-  const PhaseReading phases = from == spring.a ? *spring.phases : spring.phases->reversed();
+  const PhaseReading phases = read_phases_from(from, spring);
   return {spring.length * std::cos(phases.direction_a_rad),
           spring.length * std::sin(phases.direction_a_rad), phases.turn_rad};
 }
@@ -143,27 +143,30 @@ std::vector<double> closing_triangle_shares(std::size_t nodes,
   std::vector<double> all(springs.size());
   std::vector<double> closing(springs.size());
   LatticeGraph(nodes, edges)
-      .visit_triangles([&](std::size_t a, const auto& to_b, const auto& to_c, std::size_t ac) {
-        // Each triangle once.
-        if (to_b.node < a || to_c.node < to_b.node) return;
-        const std::array numbers{to_b.edge, to_c.edge, ac};
-        double longest = 0.0;
-        for (const std::size_t number : numbers) {
-          if (!has_direction(springs[number])) return;
-          longest = std::max(longest, springs[number].length);
-        }
-        const Pose2 by_b =
-            step_from(a, springs[to_b.edge]) * step_from(to_b.node, springs[to_c.edge]);
-        const Pose2 straight = step_from(a, springs[ac]);
-        const bool closes =
-            std::abs(angle_difference(by_b.heading_rad, straight.heading_rad)) <=
-                turn_closing_rad &&
-            distance(by_b.position(), straight.position()) <= displacement_closing * longest;
-        for (const std::size_t number : numbers) {
-          all[number] += 1.0;
-          closing[number] += closes ? 1.0 : 0.0;
-        }
-      });
+      .visit_triangles(
+          [&](std::size_t a, const auto& to_b) {  // each triangle once
+            return to_b.node >= a && has_direction(springs[to_b.edge]);
+          },
+          [&](std::size_t a, const auto& to_b, const auto& to_c, std::size_t ac) {
+            if (to_c.node < to_b.node) return;
+            const std::array numbers{to_b.edge, to_c.edge, ac};
+            double longest = 0.0;
+            for (const std::size_t number : numbers) {
+              if (!has_direction(springs[number])) return;
+              longest = std::max(longest, springs[number].length);
+            }
+            const Pose2 by_b =
+                step_from(a, springs[to_b.edge]) * step_from(to_b.node, springs[to_c.edge]);
+            const Pose2 straight = step_from(a, springs[ac]);
+            const bool closes =
+                std::abs(angle_difference(by_b.heading_rad, straight.heading_rad)) <=
+                    turn_closing_rad &&
+                distance(by_b.position(), straight.position()) <= displacement_closing * longest;
+            for (const std::size_t number : numbers) {
+              all[number] += 1.0;
+              closing[number] += closes ? 1.0 : 0.0;
+            }
+          });
   for (std::size_t s = 0; s < springs.size(); ++s) {
     if (all[s] > 0.0) closing[s] /= all[s];
   }

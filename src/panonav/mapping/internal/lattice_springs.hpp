@@ -17,6 +17,12 @@ inline constexpr double normal_over_median = 1.4826;
 /// Two nodes, the smaller one first.
 using NodePair = std::pair<std::size_t, std::size_t>;
 
+/// Returns the phases of a spring that has them, as its node `from` sees the other one.
+[[nodiscard]] inline PhaseReading read_phases_from(std::size_t from,
+                                                   const Lattice::Spring& spring) {
+  return from == spring.a ? *spring.phases : spring.phases->reversed();
+}
+
 /// The views of a memory in the forms that springs need, in the memory's order.
 class SpringViews {
  public:

@@ -180,8 +180,7 @@ LatticeStart lay_out_by_motion(std::size_t nodes, std::span<const NodeMotion> mo
         const auto found = spring_between.find(std::minmax(moved.a, moved.b));
         if (found != spring_between.end()) {
           const Lattice::Spring& spring = *found->second;
-          const PhaseReading phases =
-              moved.a == spring.a ? *spring.phases : spring.phases->reversed();
+          const PhaseReading phases = read_phases_from(moved.a, spring);
           if (is_compatible(phases, moved.motion)) {
             step.heading_rad = phases.turn_rad;
             if (phases.has_direction) {

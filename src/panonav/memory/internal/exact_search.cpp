@@ -57,7 +57,7 @@ class Search {
     bounds_ = {bounds.get(), rows};
     smallest_ = {smallest.get(), blocks};
     searched_.index.compute_coarse_bounds(kernels_, query_, bounds_, smallest_);
-    result_.bytes_read += std::uint64_t{rows} * searched_.index.coarse_bytes(query_);
+    result_.bytes_read += std::uint64_t{rows} * searched_.index.coarse_bytes_per_row(query_);
     for (const Row row : comparison_.excluded_rows()) bounds_[row] = SketchIndex::no_view;
 
     NearestMatches nearest(top_, find_first_limit());

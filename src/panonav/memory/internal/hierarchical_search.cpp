@@ -71,7 +71,7 @@ class Hierarchy {
           index.make_query(comparison_.query(), components, mask_.allowed_rows);
       index.compute_coarse_bounds(kernels_, query, bounds, smallest);
       for (const Row row : comparison_.excluded_rows()) bounds[row] = SketchIndex::no_view;
-      bytes_read_ += std::uint64_t{bounds.size()} * index.coarse_bytes(query);
+      bytes_read_ += std::uint64_t{bounds.size()} * index.coarse_bytes_per_row(query);
     };
     compute_bounds(comparison_.components());
     const auto first = std::ranges::min_element(bounds);

@@ -130,7 +130,7 @@ class SketchIndex {
     return (rows_end_ + rows_per_block - 1) / rows_per_block;
   }
   /// Bytes that `compute_coarse_bounds` reads for one row.
-  [[nodiscard]] std::size_t coarse_bytes(const Query& query) const noexcept {
+  [[nodiscard]] std::size_t coarse_bytes_per_row(const Query& query) const noexcept {
     return query.coarse_groups * 8 + sizeof(std::int32_t);
   }
 

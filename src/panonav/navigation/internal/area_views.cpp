@@ -71,7 +71,7 @@ std::optional<CompassReading> AreaViews::read_compass(ViewId view, const QueryVi
   return compass(query.packed, part.packed(view), query.components);
 }
 
-const HomingView& AreaViews::coefficients(ViewId view, int components) {
+const HomingView& AreaViews::read_coefficients(ViewId view, int components) {
   const auto held = here_.coefficients.find(view);
   require(held != here_.coefficients.end(), "view", static_cast<double>(view.value),
           "one that is loaded");
@@ -97,7 +97,7 @@ std::optional<FoundView> AreaViews::find_nearest(const NavigationGraph& graph,
   }
   if (best) {
     best->difference =
-        image_difference(coefficients(graph.view(best->node), query.components), query.view);
+        image_difference(read_coefficients(graph.view(best->node), query.components), query.view);
   }
   return best;
 }
@@ -115,7 +115,7 @@ std::optional<FoundView> AreaViews::find_nearest(const NavigationGraph& graph,
   }
   if (!best) return std::nullopt;
   return FoundView{*graph.node_of(best->view), best->dissimilarity,
-                   image_difference(coefficients(best->view, query.components), query.view)};
+                   image_difference(read_coefficients(best->view, query.components), query.view)};
 }
 
 std::vector<PackedSignature> AreaViews::most_similar_signatures(ViewId view, const QueryView& query,

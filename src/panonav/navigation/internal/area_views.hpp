@@ -52,7 +52,7 @@ class AreaViews {
   [[nodiscard]] std::optional<CompassReading> read_compass(ViewId view, const QueryView& query);
   /// Returns all coefficients of the view, computed when it was loaded. Counts the bytes of
   /// `components` of them as read (0: all). Valid until the next `enter`.
-  [[nodiscard]] const HomingView& coefficients(ViewId view, int components = 0);
+  [[nodiscard]] const HomingView& read_coefficients(ViewId view, int components = 0);
   /// Returns the view of least dissimilarity among those of `nodes` that are loaded; the lower node
   /// of equal ones.
   [[nodiscard]] std::optional<FoundView> find_nearest(const NavigationGraph& graph,

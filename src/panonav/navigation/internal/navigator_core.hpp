@@ -87,11 +87,15 @@ struct Progress {
   double min_path_length = std::numeric_limits<double>::infinity();  ///< since the last plan
   int steps_without_progress = 0;  ///< since the path became shorter or an edge was blocked
   std::map<std::size_t, EdgeAttempts> edge_attempts;  ///< by edge, since the path became shorter
-  bool is_near_blocked_edge = false;           ///< since it was blocked, without leaving its nodes
-  std::vector<std::size_t> near_blocked_edge;  ///< nodes around that edge, ascending
-  std::set<std::size_t> suspect_edges;         ///< that were blocked in earlier attempts
+  /// Nodes around the latest blocked edge, ascending, until the robot leaves them.
+  std::vector<std::size_t> near_blocked_edge;
+  std::set<std::size_t> suspect_edges;  ///< that were blocked in earlier attempts
 
   [[nodiscard]] bool was_obstructed() const;
+  /// Returns the attempts along an edge, which begin from `node` if there were none.
+  EdgeAttempts& get_or_create_attempts(std::size_t edge, std::size_t node) {
+    return edge_attempts.try_emplace(edge, EdgeAttempts{node}).first->second;
+  }
 };
 
 /// An edge that is followed to its end, although other references may be nearer on the way.
@@ -116,7 +120,7 @@ struct Step {
   /// Direction of the step before in the frame of the robot now; empty where it failed.
   std::optional<double> last_direction_rad;
 
-  void add_event(NavigationEvent event) { decision.events.push_back(event); }
+  void add_event(NavigationDecision::Event event) { decision.events.push_back(event); }
 };
 
 struct Navigator::Core {
@@ -131,7 +135,7 @@ struct Navigator::Core {
   PlaceCriterion criterion;
   RoutePilot pilot;
 
-  NavigationState state = NavigationState::moving;
+  NavigationDecision::State state = NavigationDecision::State::moving;
   std::optional<NavigationGoal> goal;
   NavigationPlace place;
   LastStep last;
@@ -173,7 +177,7 @@ struct Navigator::Core {
   void detect_obstruction(Step& step);
   void update_path_length();
   void block_edge(std::size_t edge, Step& step);
-  void unblock_edges_or_end(Step& step, NavigationState end_state);
+  void unblock_edges_or_end(Step& step, NavigationDecision::State end_state);
   [[nodiscard]] bool relocalise_with_path(Step& step);
   [[nodiscard]] double relative_length(const Guide& ahead) const;
   [[nodiscard]] int max_steps_without_progress() const;

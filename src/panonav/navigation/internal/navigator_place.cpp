@@ -32,16 +32,16 @@ void Navigator::Core::set_place(std::size_t node, Step& step) {
   if (views.area() == area) return;
   views.enter(graph(), planner.areas(), area);
   plan.field = planner.field(area);
-  step.add_event(NavigationEvent::entered_area);
+  step.add_event(NavigationDecision::Event::entered_area);
 }
 
 void Navigator::Core::relocalise(Step& step) {
   const auto found = search_whole_memory(*source, graph(), planner.areas(), step.signature);
-  step.add_event(NavigationEvent::relocalised);
+  step.add_event(NavigationDecision::Event::relocalised);
   if (!found) return;
   // A place that does not match either is no reason to leave the expected one.
   if (place.node && found->difference > scales.place.max_difference()) return;
-  if (place.node) step.add_event(NavigationEvent::kidnapped);
+  if (place.node) step.add_event(NavigationDecision::Event::kidnapped);
   step.decision.difference = found->difference;
   abandon_plans(step);
   set_place(found->node, step);
@@ -106,7 +106,7 @@ void Navigator::Core::choose_place(const PlaceCandidates& candidates, Step& step
     set_place(found->node, step);
   }
   if (is_kidnapped) {
-    step.add_event(NavigationEvent::kidnapped);
+    step.add_event(NavigationDecision::Event::kidnapped);
     reset_other_place();
     abandon_plans(step);
   }
@@ -158,14 +158,14 @@ void Navigator::Core::update_known_place(Step& step) {
     if (matches() && !plan.committed) place.known_node = place.node;
     return;
   }
-  step.add_event(NavigationEvent::unknown_place);
+  step.add_event(NavigationDecision::Event::unknown_place);
   ++unknown_steps;
   if (unknown_steps % options.min_agreeing_steps == 0) relocalise(step);
   if (matches()) {
     unknown_steps = 0;
     place.known_node = place.node;
   } else if (unknown_steps >= options.lost_patience) {
-    state = NavigationState::lost;
+    state = NavigationDecision::State::lost;
   }
 }
 
@@ -187,17 +187,18 @@ void Navigator::Core::update_probability(Step& step) {
     ++improbable_steps;
   }
   const bool has_relocalised =
-      std::ranges::find(step.decision.events, NavigationEvent::relocalised) !=
+      std::ranges::find(step.decision.events, NavigationDecision::Event::relocalised) !=
       step.decision.events.end();
-  if (state == NavigationState::moving && improbable_steps > 0 && !has_relocalised &&
+  if (state == NavigationDecision::State::moving && improbable_steps > 0 && !has_relocalised &&
       improbable_steps % options.min_agreeing_steps == 0) {
     relocalise(step);
     step.decision.probability = place_probability_of(step);
   }
   if (step.decision.probability >= 0.5) {
     improbable_steps = 0;
-  } else if (state == NavigationState::moving && improbable_steps >= options.lost_patience) {
-    state = NavigationState::lost;
+  } else if (state == NavigationDecision::State::moving &&
+             improbable_steps >= options.lost_patience) {
+    state = NavigationDecision::State::lost;
   }
 }
 

@@ -40,7 +40,7 @@ void Navigator::Core::block_edge(std::size_t edge, Step& step) {
   const EdgeAttempts tried = progress.edge_attempts.at(edge);
   std::vector<std::size_t> blocked{edge};
   const auto motion = graph().motion_from(tried.node, edge);
-  const bool is_wide = tried.obstructed_steps > 1 || progress.is_near_blocked_edge ||
+  const bool is_wide = tried.obstructed_steps > 1 || !progress.near_blocked_edge.empty() ||
                        !progress.suspect_edges.empty();
   if (is_wide && motion && (motion->x_m != 0.0 || motion->y_m != 0.0)) {
     const double half = 0.5 * std::hypot(motion->x_m, motion->y_m);
@@ -57,16 +57,15 @@ void Navigator::Core::block_edge(std::size_t edge, Step& step) {
     blocked.insert(blocked.end(), progress.suspect_edges.begin(), progress.suspect_edges.end());
   }
   planner.block(blocked);
-  step.add_event(NavigationEvent::closed);
+  step.add_event(NavigationDecision::Event::closed);
   obstruction.level = progress.steps_without_progress = 0;
-  progress.is_near_blocked_edge = true;
   progress.near_blocked_edge = nodes_around(graph(), {&tried.node, 1}, 2 * options.near_links);
   progress.edge_attempts.clear();
   replan();
 }
 
 // Begins another attempt with all edges unblocked, or ends the run after the last attempt.
-void Navigator::Core::unblock_edges_or_end(Step& step, NavigationState end_state) {
+void Navigator::Core::unblock_edges_or_end(Step& step, NavigationDecision::State end_state) {
   if (++progress.attempts >= options.attempts) {
     state = end_state;
     return;
@@ -79,8 +78,8 @@ void Navigator::Core::unblock_edges_or_end(Step& step, NavigationState end_state
   planner.unblock_all();
   progress.edge_attempts.clear();
   progress.steps_without_progress = progress.path_searches = 0;
-  progress.is_near_blocked_edge = false;
-  step.add_event(NavigationEvent::reopened);
+  progress.near_blocked_edge.clear();
+  step.add_event(NavigationDecision::Event::reopened);
   replan();
 }
 
@@ -99,7 +98,7 @@ bool Navigator::Core::relocalise_with_path(Step& step) {
   }
   const auto found = search_whole_memory(*source, graph(), areas, step.signature,
                                          [&](std::size_t node) { return has_path[node] != 0; });
-  step.add_event(NavigationEvent::relocalised);
+  step.add_event(NavigationDecision::Event::relocalised);
   if (!found || found->difference > scales.place.max_difference()) return false;
   step.decision.difference = found->difference;
   abandon_plans(step);
@@ -116,7 +115,7 @@ void Navigator::Core::update_path_length() {
     path_reductions.push_back(*last.path_length - length);
   }
   if (!std::ranges::binary_search(progress.near_blocked_edge, *place.node)) {
-    progress.is_near_blocked_edge = false;
+    progress.near_blocked_edge.clear();
   }
   auto& attempts = progress.edge_attempts;
   const auto tried = last.target_edge ? attempts.find(*last.target_edge) : attempts.end();
@@ -161,7 +160,7 @@ void Navigator::Core::detect_obstruction(Step& step) {
   if (obstruction.is_present) {
     obstruction.level += 2;
     plan.committed.reset();
-    step.add_event(NavigationEvent::obstructed);
+    step.add_event(NavigationDecision::Event::obstructed);
   } else if (obstruction.level > 0) {
     --obstruction.level;
   }

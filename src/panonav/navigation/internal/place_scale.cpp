@@ -17,7 +17,7 @@ namespace {
 
 using ViewPair = std::pair<ViewId, ViewId>;
 
-VisualMemory views_of(const ViewSource& source, const std::vector<ViewPair>& pairs) {
+VisualMemory load_views_of_pairs(const ViewSource& source, const std::vector<ViewPair>& pairs) {
   std::set<ViewId> ids;
   for (const auto& [a, b] : pairs) ids.insert({a, b});
   return source.load(std::vector<ViewId>(ids.begin(), ids.end()));
@@ -25,7 +25,7 @@ VisualMemory views_of(const ViewSource& source, const std::vector<ViewPair>& pai
 
 double median_difference(const ViewSource& source, const std::vector<ViewPair>& pairs,
                          int components) {
-  const VisualMemory memory = views_of(source, pairs);
+  const VisualMemory memory = load_views_of_pairs(source, pairs);
   const auto view = [&](ViewId id) {
     const HomingView whole = homing_view(memory.signature(id));
     return components == 0 ? whole : first_components(whole, components);
@@ -79,7 +79,7 @@ ArrivalScale learn_arrival_scale(const ViewSource& source, const NavigationGraph
     }
     if (!pairs.empty()) break;
   }
-  const VisualMemory memory = views_of(source, pairs);
+  const VisualMemory memory = load_views_of_pairs(source, pairs);
   const HomingView home = homing_view(memory.signature(goal));
   std::vector<std::pair<double, double>> nearest;  // length, difference
   for (const auto& [unused, neighbour] : pairs) {

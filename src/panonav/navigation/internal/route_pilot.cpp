@@ -79,7 +79,7 @@ bool RoutePilot::begin_leg(std::span<const ViewId> path, std::span<const float> 
   // Line and view must agree on the place, which the route may pass several times.
   const auto poses = route.tracker.lines().poses();
   std::vector<double> starts_m;
-  for (const RoutePosition& start : find_passes(poses, fix->pose.position(), route.beside_m)) {
+  for (const RoutePosition& start : find_passes(poses, fix->pose.position(), route.max_lateral_m)) {
     const auto agrees = [&](double along_m) {
       return std::abs(along_m - start.along_m) <= min_length_m;
     };
@@ -110,7 +110,7 @@ void RoutePilot::track(std::span<const float> line, const Pose2& moved) {
   update_target();
   // A place of the route that is not on the leg is of no use.
   is_known &= distance(tracker.pose()->position(), leg_->follower.position()) <=
-              routes_[leg_->route].beside_m;
+              routes_[leg_->route].max_lateral_m;
   leg_->unknown_steps = is_known ? 0 : leg_->unknown_steps + 1;
 }
 

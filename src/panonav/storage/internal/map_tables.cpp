@@ -69,13 +69,13 @@ void write_map(MemoryTables& tables, std::string_view name, const TopologicalMap
   if (name.empty()) throw ContractError("name of a map", "empty", "at least one character");
   validate(map);
   std::vector<std::uint8_t> nodes;
-  for (const MapNode& node : map.nodes) {
+  for (const TopologicalMap::Node& node : map.nodes) {
     append_little_endian(nodes, node.view.value);
     append_little_endian(nodes, static_cast<std::uint32_t>(node.component));
     append_pose(nodes, node.pose);
   }
   std::vector<std::uint8_t> edges;
-  for (const MapEdge& edge : map.edges) {
+  for (const TopologicalMap::Edge& edge : map.edges) {
     append_little_endian(edges, edge.a.value);
     append_little_endian(edges, edge.b.value);
     append_little_endian(edges, static_cast<std::uint32_t>(edge.kind));
@@ -97,7 +97,7 @@ std::optional<TopologicalMap> read_map(MemoryTables& tables, std::string_view na
   TopologicalMap map;
   RecordReader node_reader(nodes);
   for (std::size_t i = 0; i < nodes.size() / node_bytes; ++i) {
-    MapNode node;
+    TopologicalMap::Node node;
     node.view.value = node_reader.number();
     node.component = node_reader.number();
     node.pose = node_reader.pose();
@@ -105,14 +105,14 @@ std::optional<TopologicalMap> read_map(MemoryTables& tables, std::string_view na
   }
   RecordReader edge_reader(edges);
   for (std::size_t i = 0; i < edges.size() / edge_bytes; ++i) {
-    MapEdge edge;
+    TopologicalMap::Edge edge;
     edge.a.value = edge_reader.number();
     edge.b.value = edge_reader.number();
     const std::uint32_t kind = edge_reader.number();
-    if (kind > static_cast<std::uint32_t>(LinkKind::closure)) {
+    if (kind > static_cast<std::uint32_t>(Link::Kind::closure)) {
       fail_map(tables, name, "an edge of kind " + std::to_string(kind) + "; allowed: 0 .. 2");
     }
-    edge.kind = static_cast<LinkKind>(kind);
+    edge.kind = static_cast<Link::Kind>(kind);
     edge.a_from_b = edge_reader.pose();
     edge.weight = edge_reader.real();
     map.edges.push_back(edge);
@@ -136,10 +136,11 @@ void forget_in_maps(MemoryTables& tables, std::span<const ViewId> views) {
   for (const std::string& name : tables.map_names()) {
     auto map = read_map(tables, name);
     if (!map) continue;
-    const auto nodes = std::erase_if(
-        map->nodes, [&](const MapNode& node) { return forgotten.contains(node.view); });
+    const auto nodes = std::erase_if(map->nodes, [&](const TopologicalMap::Node& node) {
+      return forgotten.contains(node.view);
+    });
     if (nodes == 0) continue;
-    std::erase_if(map->edges, [&](const MapEdge& edge) {
+    std::erase_if(map->edges, [&](const TopologicalMap::Edge& edge) {
       return forgotten.contains(edge.a) || forgotten.contains(edge.b);
     });
     renumber_components(*map);
@@ -154,7 +155,7 @@ void verify_maps(MemoryTables& tables, const std::function<bool(ViewId)>& known,
   for (const std::string& name : names) {
     check([&] {
       const auto map = read_map(tables, name);
-      for (const MapNode& node : map.value().nodes) {
+      for (const TopologicalMap::Node& node : map.value().nodes) {
         if (!known(node.view)) {
           fail_map(tables, name,
                    "view " + std::to_string(node.view.value) + " is not in the memory");

@@ -14,15 +14,15 @@ ViewId MemoryTables::to_view_id(std::int64_t number) const {
 }
 
 Link MemoryTables::checked(const LinkRow& row) const {
-  Link link{row.a, row.b, LinkKind::sequence};
-  if (row.kind < 0 || row.kind > static_cast<int>(LinkKind::closure)) {
+  Link link{row.a, row.b, Link::Kind::sequence};
+  if (row.kind < 0 || row.kind > static_cast<int>(Link::Kind::closure)) {
     fail_damaged("a link of unknown kind");
   }
   if (link.b <= link.a) {
     fail_damaged("a link of views " + std::to_string(link.a.value) + " and " +
                  std::to_string(link.b.value) + "; allowed: the smaller id first");
   }
-  link.kind = static_cast<LinkKind>(row.kind);
+  link.kind = static_cast<Link::Kind>(row.kind);
   if (row.checksum != link_checksum(link)) {
     fail_damaged("the link of views " + std::to_string(link.a.value) + " and " +
                  std::to_string(link.b.value) + " does not match its checksum");

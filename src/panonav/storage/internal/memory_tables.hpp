@@ -135,11 +135,11 @@ class MemoryTables {
   [[nodiscard]] virtual std::optional<ViewId> find(std::string_view name) = 0;
   /// Returns the names of all views by ascending id.
   [[nodiscard]] virtual std::vector<std::string> names() = 0;
-  /// Returns the names, ascending.
+  /// Returns the ids of all views, ascending.
   [[nodiscard]] virtual std::vector<ViewId> views() = 0;
-  /// Returns the names, ascending.
+  /// Returns the views within the bounds, ascending.
   [[nodiscard]] virtual std::vector<PositionRow> views_within(const PositionBounds& bounds) = 0;
-  /// Returns the names, ascending.
+  /// Returns the views that have one, ascending.
   [[nodiscard]] virtual std::vector<ViewId> views_with_attachment(ViewAttachment table) = 0;
   [[nodiscard]] virtual bool has_attachments(ViewAttachment table) = 0;
   [[nodiscard]] virtual std::optional<StoredBytes> bytes(ViewAttachment table, ViewId view) = 0;
@@ -151,7 +151,7 @@ class MemoryTables {
   /// With a < b; a pair that is there gets the new kind.
   virtual void write_links(std::span<const Link> links) = 0;
   virtual void erase_link(ViewId a, ViewId b) = 0;
-  /// Returns the names, ascending.
+  /// Reads all links, ascending.
   virtual void read_links(const Consume<LinkRow>& consume) = 0;
 
   virtual void write_map(std::string_view name, const MapRow& row) = 0;

@@ -78,10 +78,10 @@ SynchronisedLinks read_synchronised_links(SqliteTables& file) {
   Statement rows(file.database(), "SELECT a, b, kind, checksum FROM synchronised_links");
   while (rows.step()) {
     Link link{file.to_view_id(rows.integer(0)), file.to_view_id(rows.integer(1)),
-              LinkKind::sequence};
+              Link::Kind::sequence};
     const std::int64_t kind = rows.integer(2);
-    link.kind = static_cast<LinkKind>(kind);
-    if (kind < 0 || kind > static_cast<int>(LinkKind::closure) ||
+    link.kind = static_cast<Link::Kind>(kind);
+    if (kind < 0 || kind > static_cast<int>(Link::Kind::closure) ||
         rows.integer(3) != link_checksum(link)) {
       file.fail_damaged("what is synchronised of a link does not match its checksum");
     }

@@ -31,7 +31,7 @@ struct SynchronisedView {
 
 using SynchronisedViews = std::map<ViewId, SynchronisedView>;
 /// Kinds of links that both sides had, by the server's ids, the smaller first.
-using SynchronisedLinks = std::map<std::pair<ViewId, ViewId>, LinkKind>;
+using SynchronisedLinks = std::map<std::pair<ViewId, ViewId>, Link::Kind>;
 
 /// The tables of a file with the state of a server. All throw FileError on damage; those that
 /// change something are to be called within a writing transaction.
