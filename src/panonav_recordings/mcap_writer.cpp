@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/temporary_file.hpp"
 #include "panonav_recordings/internal/mcap_records.hpp"
 #include "panonav_recordings/internal/packing.hpp"
 #include "panonav_recordings/internal/recording_file.hpp"
@@ -211,6 +212,7 @@ McapWriter::McapWriter(const std::filesystem::path& path, const McapWriterOption
     : state_(std::make_unique<State>()) {
   state_->path = path;
   state_->options = options;
+  require_no_database(path);
   constexpr int readable_by_all = 0644;
   state_->descriptor =
       ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, readable_by_all);

@@ -16,6 +16,7 @@
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav/io/unfinished_folder.hpp"
 #include "panonav_simulation/load_gazebo.hpp"
 #include "panonav_simulation/load_mesh.hpp"
 #include "panonav_simulation/mirror.hpp"
@@ -145,14 +146,6 @@ std::string image_file_name(std::size_t index) {
   const std::string digits = std::to_string(index);
   constexpr std::size_t width = 5;
   return "view_" + std::string(width - std::min(width, digits.size()), '0') + digits + ".png";
-}
-
-/// Removes an unfinished data set.
-void remove_dataset(const Dataset& dataset, bool with_folder) {
-  std::error_code ignored;
-  for (const auto& entry : dataset.entries) fs::remove(entry.path, ignored);
-  for (const char* name : {"poses.csv", "camera.toml"}) fs::remove(dataset.folder / name, ignored);
-  if (with_folder) fs::remove(dataset.folder, ignored);
 }
 
 }  // namespace
@@ -288,36 +281,30 @@ Image SimulatedWorld::take_picture(const Pose2& pose, std::uint64_t seed,
 Dataset record_dataset(const SimulatedWorld& world, const fs::path& folder,
                        std::span<const RecordedPose> poses, bool with_path, Executor& executor,
                        const std::function<void(const DatasetEntry&, const Image&)>& on_image) {
-  std::error_code error;
-  const bool made_folder = fs::create_directories(folder, error);
-  if (error) throw FileError(folder.string(), "cannot be made: " + error.message());
-
-  Dataset dataset{folder, world.source(), {}};
+  UnfinishedFolder unfinished(folder);
+  Dataset dataset{unfinished.path(), world.source(), {}};
   const auto& options = world.options();
-  try {
-    record(world.renderer(), poses, world.camera(), options.frame, options.sensor,
-           static_cast<std::uint64_t>(options.simulation.scene.seed), executor,
-           [&](const RecordedFrame& frame) {
-             const RecordedPose& recorded = frame.pose;
-             DatasetEntry entry;
-             entry.file = image_file_name(frame.number);
-             entry.path = folder / entry.file;
-             entry.pose =
-                 ReferencePose{recorded.pose.x_m, recorded.pose.y_m, recorded.pose.heading_rad};
-             if (with_path) {
-               entry.stamp_s = recorded.stamp_s;
-               entry.odometry = recorded.odometry;
-             }
-             if (options.frame.tilt_rad > 0.0) entry.tilt = frame.tilt;
-             write_png(entry.path, frame.picture.view());
-             dataset.entries.push_back(std::move(entry));
-             if (on_image) on_image(dataset.entries.back(), frame.picture);
-           });
-    write_dataset(dataset);
-  } catch (...) {
-    remove_dataset(dataset, made_folder);
-    throw;
-  }
+  record(
+      world.renderer(), poses, world.camera(), options.frame, options.sensor,
+      static_cast<std::uint64_t>(options.simulation.scene.seed), executor,
+      [&](const RecordedFrame& frame) {
+        const RecordedPose& recorded = frame.pose;
+        DatasetEntry entry;
+        entry.file = image_file_name(frame.number);
+        entry.path = folder / entry.file;
+        entry.pose = ReferencePose{recorded.pose.x_m, recorded.pose.y_m, recorded.pose.heading_rad};
+        if (with_path) {
+          entry.stamp_s = recorded.stamp_s;
+          entry.odometry = recorded.odometry;
+        }
+        if (options.frame.tilt_rad > 0.0) entry.tilt = frame.tilt;
+        write_png(unfinished.path() / entry.file, frame.picture.view());
+        dataset.entries.push_back(std::move(entry));
+        if (on_image) on_image(dataset.entries.back(), frame.picture);
+      });
+  write_dataset(dataset);
+  unfinished.finish();
+  dataset.folder = folder;
   return dataset;
 }
 

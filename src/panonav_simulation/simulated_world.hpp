@@ -105,9 +105,10 @@ class SimulatedWorld {
   std::shared_ptr<const Renderer> renderer_;
 };
 
-/// Writes a data set: pictures first, dataset.toml last. `with_path`: the poses are a path, so
-/// stamps and odometry mean something. `on_image` is called after each picture. Throws FileError;
-/// what was written is then removed again.
+/// Writes a data set into a new or empty folder, which gets its name when all is written.
+/// `with_path`: the poses are a path, so stamps and odometry mean something. `on_image` is called
+/// after each picture, whose file does not have its path yet. Throws FileError; what was written is
+/// then removed again, and what a killed process left by the next one.
 Dataset record_dataset(const SimulatedWorld& world, const std::filesystem::path& folder,
                        std::span<const RecordedPose> poses, bool with_path, Executor& executor,
                        const std::function<void(const DatasetEntry&, const Image&)>& on_image = {});

@@ -54,6 +54,22 @@ TEST_F(Simulate, WritesADataSetThatSaysWhereEachViewWasTaken) {
   EXPECT_NE(bytes_of(dataset.entries[0].path), bytes_of(dataset.entries[1].path));
 }
 
+TEST_F(Simulate, AKilledRunDoesNotBlockItsFolder) {
+  const std::string out = folder / "run";
+  const auto words = with_small({"simulate", "office", out, "--grid", "0.5"});
+  for (const int after_ms : {20, 60, 120, 250, 500}) {
+    if (fs::exists(fs::path(out) / "dataset.toml")) fs::remove_all(out);
+    (void)run_panonav(words, {.kill_after_ms = after_ms});
+    EXPECT_EQ(fs::exists(out), fs::exists(fs::path(out) / "dataset.toml")) << "not whole";
+  }
+  fs::remove_all(out);
+  fs::create_directory(out);
+  run_well(words);
+  for (const auto& entry : fs::directory_iterator(folder.path())) {
+    EXPECT_EQ(entry.path(), out) << "is left of a killed run";
+  }
+}
+
 TEST_F(Simulate, ARecordOfASimulatedRunIsTheDataSetAgain) {
   const std::string record = folder / "run.mcap";
   run_well(with_small({"simulate", "office", folder / "run", "--path", "walk", "--poses", "12",
@@ -180,7 +196,7 @@ TEST_F(Simulate, WrongValuesAreNamedWithTheirRange) {
     return refusal(more);
   };
   expect_refusal({"simulate", "castle", out}, "office, ");
-  EXPECT_TRUE(contains(line_of({"--grid", "0"}), "--grid is 0; allowed: > 0"));
+  EXPECT_TRUE(contains(line_of({"--grid", "0"}), "--grid is 0; allowed: 0.001 to 1000 metres"));
   EXPECT_TRUE(contains(line_of({"--grid", "nan"}), "--grid"));
   EXPECT_TRUE(contains(line_of({"--random", "0"}), "--random is 0; allowed: 1 to"));
   EXPECT_TRUE(contains(line_of({"--random", "-3"}), "--random"));

@@ -138,6 +138,9 @@ TEST(Usage, SwappedArgumentsAreRecognised) {
   expect_refusal({"memorise", "m.panonav", "folder"},
                  "MEMORY is 'folder' and INPUT is 'm.panonav'");
   expect_refusal({"forget", "a.png", "b.png", "m.panonav"}, "swapped");
+  // No memory stands in the place of another one.
+  EXPECT_EQ(refusal({"serve", "a=postgresql://127.0.0.1:1/none", "no.panonav"}).find("swapped"),
+            std::string::npos);
   // A folder of pictures may have any name.
   const TemporaryFolder folder;
   EXPECT_EQ(refusal({"localise", "no.db", folder.path()}).find("swapped"), std::string::npos);

@@ -128,6 +128,8 @@ TEST_F(Views, ShowTellsAllOfAView) {
 
 TEST_F(Views, GalleryIsOnePageWithAllThumbnails) {
   const fs::path out = folder / "gallery";
+  fs::create_directory(out);
+  write_file(out / ".gallery.html.tmp", std::string_view("left by a killed gallery"));
   const json said = answer_of({"gallery", memory, "-o", out, "--json"});
   EXPECT_EQ(said["shown"], 16);
   EXPECT_EQ(said["thumbnails"], 16);

@@ -4,6 +4,7 @@
 
 #include <optional>
 
+#include "panonav/core/error.hpp"
 #include "support/temporary_folder.hpp"
 
 namespace panonav::testing {
@@ -16,6 +17,16 @@ TEST_F(TemporaryFileNames, WhatADeadProcessLeftIsRemoved) {
   const TemporaryFile file(folder / "a.txt");
   EXPECT_EQ(file.path(), folder / ".a.txt.tmp");
   EXPECT_EQ(std::filesystem::file_size(file.path()), 0U);
+}
+
+TEST_F(TemporaryFileNames, ADatabaseIsNoTarget) {
+  folder.write("m.panonav", std::string("SQLite format 3") + '\0');
+  folder.write("text", "SQLite format 3");
+  std::filesystem::create_symlink("m.panonav", folder / "link");
+  EXPECT_THROW(TemporaryFile(folder / "m.panonav"), FileError);
+  EXPECT_THROW(TemporaryFile(folder / "link"), FileError);
+  EXPECT_FALSE(std::filesystem::exists(folder / ".m.panonav.tmp"));
+  EXPECT_NO_THROW(TemporaryFile(folder / "text"));
 }
 
 TEST_F(TemporaryFileNames, WhatIsInUseIsLeftAlone) {

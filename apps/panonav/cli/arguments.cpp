@@ -11,6 +11,7 @@
 
 #include "cli/json.hpp"
 #include "cli/option_values.hpp"
+#include "cli/outputs.hpp"
 #include "cli/texts.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
@@ -40,6 +41,14 @@ struct Arguments::Implementation {
   /// Flags outside options structs that stand in option files, and what a file or the command line
   /// says.
   std::map<std::string, std::optional<std::string>, std::less<>> plain = {};
+  std::set<std::string, std::less<>> outputs = {};  ///< names of arguments that the verb writes
+  std::vector<NamedValue> values = {};              ///< all that were taken
+
+  void take(std::size_t number, std::span<const std::string> words) {
+    takes[number](words);
+    const std::string& name = infos[number].name;
+    for (const auto& word : words) values.push_back({name, word, outputs.contains(name)});
+  }
 };
 
 namespace {
@@ -231,6 +240,15 @@ void Arguments::set_common(std::initializer_list<std::string_view> flags, bool c
   }
 }
 
+void Arguments::writes(std::initializer_list<std::string_view> names) {
+  for (const auto name : names) {
+    if (std::ranges::find(infos(), name, &ArgumentInfo::name) == infos().end()) {
+      throw std::logic_error(std::string(name) + " is not declared");
+    }
+    implementation_->outputs.emplace(name);
+  }
+}
+
 std::string Arguments::explain_unknown_flag(const std::string& typed) const {
   std::vector<std::string_view> names;
   for (const auto& info : infos()) {
@@ -278,7 +296,7 @@ void Arguments::read(std::span<const std::string> words, std::string_view verb, 
     if (seen[number] && value_count > 0) throw UsageError(found->name + " is given twice");
     seen[number] = true;
     implementation_->typed.insert(found->name);
-    implementation_->takes[number](values);
+    implementation_->take(number, values);
     const auto plain = implementation_->plain.find(found->name);
     if (plain != implementation_->plain.end()) plain->second = values.front();
   }
@@ -299,8 +317,8 @@ void Arguments::read_positionals(std::span<const std::string> words, std::string
   }
   // A memory file where something else belongs, and no memory in its place.
   for (std::size_t i = 0; i < std::min(positionals.size(), words.size()); ++i) {
-    if (infos[positionals[i]].name != "MEMORY" || words[i].ends_with(".panonav") ||
-        is_server_address(words[i])) {
+    if (infos[positionals[i]].name != "MEMORY" || infos[positionals[i]].repeated ||
+        words[i].ends_with(".panonav") || is_server_address(words[i])) {
       continue;
     }
     const auto other = std::ranges::find_if(words, is_memory_file);
@@ -321,7 +339,7 @@ void Arguments::read_positionals(std::span<const std::string> words, std::string
       continue;
     }
     const std::size_t count = infos[i].repeated ? words.size() - next : 1;
-    implementation_->takes[i](words.subspan(next, count));
+    implementation_->take(i, words.subspan(next, count));
     next += count;
   }
   if (next < words.size()) {
@@ -346,7 +364,7 @@ void Arguments::resolve(const std::optional<std::string>& config,
     if (plain == implementation_->plain.end()) continue;
     const auto text = file->take_text(info.section, to_member_name(info.name));
     if (text && !implementation_->typed.contains(info.name)) {
-      implementation_->takes[i](std::span(&*text, 1));
+      implementation_->take(i, std::span(&*text, 1));
       plain->second = text;
     }
   }
@@ -362,6 +380,7 @@ void Arguments::resolve(const std::optional<std::string>& config,
   for (const auto& [options, used, why] : implementation_->refusals) {
     if (!used()) refuse_unused(options, why);
   }
+  require_separate_outputs(implementation_->values);
 }
 
 void Arguments::refuse_unless(std::vector<std::string> options, std::function<bool()> used,

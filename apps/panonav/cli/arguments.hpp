@@ -107,6 +107,10 @@ class Arguments {
   /// --config file beside the options of it.
   void in_files(const std::string& section, std::initializer_list<std::string_view> flags);
 
+  /// Flags and positionals declared before whose value names what the verb writes; none may be what
+  /// another value names (outputs.hpp). Throws logic_error when there is none of that name.
+  void writes(std::initializer_list<std::string_view> names);
+
   /// Flags declared before that `--help` shows, or leaves to `--help-all`. Throws logic_error when
   /// there is no such flag.
   void show_in_help(std::initializer_list<std::string_view> flags) { set_common(flags, true); }

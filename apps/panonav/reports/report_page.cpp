@@ -1,6 +1,7 @@
 #include "reports/report_page.hpp"
 
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <numbers>
 #include <string>
@@ -20,6 +21,16 @@ bool is_made_by(const std::filesystem::path& page, std::string_view generator) {
          std::string::npos;
 }
 
+/// True if the folder holds nothing, or only what a killed process left of the page.
+bool is_free(const std::filesystem::path& folder, const std::string& page) {
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with("." + page + ".") || !name.ends_with("tmp")) return false;
+  }
+  return !error;
+}
+
 }  // namespace
 
 void prepare_report_folder(const std::filesystem::path& folder, std::string_view verb,
@@ -28,7 +39,8 @@ void prepare_report_folder(const std::filesystem::path& folder, std::string_view
   std::error_code error;
   const bool there = fs::exists(folder, error);
   const bool ours = is_made_by(folder / page, "panonav " + std::string(verb));
-  if (there && (!fs::is_directory(folder, error) || (!ours && !fs::is_empty(folder, error)))) {
+  if (there &&
+      (!fs::is_directory(folder, error) || (!ours && !is_free(folder, std::string(page))))) {
     throw FileError(folder.string(), "is there already and was not made by panonav " +
                                          std::string(verb) +
                                          "; allowed: a new folder, or that of an earlier one");

@@ -36,6 +36,7 @@ std::function<std::vector<std::uint8_t>(const std::string&)> make_thumbnail_read
 void declare_record(Arguments& arguments, RunRecordArguments& record) {
   arguments.option("--record FILE", record.file,
                    "Record images and answers as MCAP, for Rerun, Foxglove and Lichtblick");
+  arguments.writes({"--record"});
 }
 
 void declare_view(Arguments& arguments, RunRecordArguments& record) {
@@ -48,13 +49,6 @@ RunRecord::RunRecord(const RunRecordArguments& arguments, std::span<const std::s
                      bool live, Session& session, const Offers& offers)
     : session_(session), live_(live) {
   if (arguments.file) {
-    for (const std::string& other : read) {
-      std::error_code ignored;
-      if (std::filesystem::equivalent(*arguments.file, other, ignored)) {
-        throw UsageError("--record is " + *arguments.file +
-                         ", which the run reads; allowed: another file");
-      }
-    }
     recorder_.emplace(*arguments.file, recordings::RunRecorderOptions{.wait = !live});
   }
   if (arguments.view) {

@@ -37,9 +37,9 @@ class RunRecord {
   };
 
   /// Does nothing without a file or viewer. Of a live run moments are left out that the disk or a
-  /// viewer does not keep up with; any other run waits for both. Throws UsageError where the file
-  /// is one of those that the run reads or there is no such address, FileError where the file
-  /// cannot be made.
+  /// viewer does not keep up with; any other run waits for both. Throws UsageError where
+  /// there is no such address, FileError where the file cannot be made. `read`: what the run reads;
+  /// the first names it to viewers.
   RunRecord(const RunRecordArguments& arguments, std::span<const std::string> read, bool live,
             Session& session, const Offers& offers);
 

@@ -122,7 +122,8 @@ void print_result(const Lattice& lattice, const VisualMemory& memory, Session& s
     session.print("compared with the ground truth: Procrustes disparity (shape difference) " +
                   session.bold(format_fixed(comparison->shape.value, 4)) + " over " +
                   std::to_string(comparison->compared) + " views, " +
-                  format_fixed(comparison->truth_from_map.rms_m, 2) + " m rms with a free scale of " +
+                  format_fixed(comparison->truth_from_map.rms_m, 2) +
+                  " m rms with a free scale of " +
                   format_fixed(comparison->truth_from_map.scale, 3));
     print_neighbours(*comparison, session);
   }
@@ -191,6 +192,7 @@ Run declare_arrange(Arguments& arguments) {
   arguments.show_in_help({"--neighbours"});
   arguments.refuse_unless(
       {"[coarse_motion]"}, [values] { return values->odometry.has_value(); }, "without --odometry");
+  arguments.writes({"--tum", "--graphml", "--picture", "--report"});
   return [values](Session& session) { return arrange_views(*values, session); };
 }
 

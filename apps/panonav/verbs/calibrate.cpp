@@ -33,8 +33,8 @@ void visit_options(MirrorOptions& options, OptionVisitor& visitor) {
                           "equiangular", "hyperboloidal", "unified", "dual-fisheye"),
       option<&T::inner_elevation_deg>("Elevation seen at the inner radius (equiangular)", -90, 90),
       option<&T::rim_elevation_deg>("Elevation seen at the mirror's rim", -90, 90),
-      option<&T::mirror_a_mm>("a of the hyperboloid [Y03 eq. 1]", above(0)),
-      option<&T::mirror_b_mm>("b of the hyperboloid [Y03 eq. 1]", above(0)),
+      option<&T::mirror_a_mm>("a of the hyperboloid [Y03 eq. 1]", 0.01, 1e5),
+      option<&T::mirror_b_mm>("b of the hyperboloid [Y03 eq. 1]", 0.01, 1e5),
       option<&T::xi>("Mirror parameter of the unified model", 0, 10),
       choice<&T::direction>(
           "Direction in which the image moves when the robot rotates to the left: clockwise where "
@@ -362,6 +362,7 @@ Run declare_calibrate(Arguments& arguments) {
   arguments.refuse_unless(
       {"--rim-elevation-deg", "--forward-angle-deg", "--inner-radius-px", "[mirror_search]"},
       [shaped] { return !shaped(dual_fisheye_profile)(); }, "with --profile dual-fisheye");
+  arguments.writes({"--out", "--overlay"});
   return [values, &arguments](Session& session) { return calibrate(arguments, *values, session); };
 }
 

@@ -314,6 +314,7 @@ Run declare_catchment(Arguments& arguments) {
       "with --ahead, which compares the images of one recording in their order");
   arguments.refuse_unless(
       {"--goal"}, [values] { return values->report.has_value(); }, "without --report");
+  arguments.writes({"--report"});
   return [values, &arguments](Session& session) { return catchment(arguments, *values, session); };
 }
 

@@ -76,6 +76,7 @@ Run declare_convert(Arguments& arguments) {
   arguments.positional("OUTPUT", values->output,
                        "Recording to write, FILE.mcap, or a new folder for a data set");
   declare_pictures(arguments, values->pictures);
+  arguments.writes({"OUTPUT"});
   return [values](Session& session) { return convert(*values, session); };
 }
 

@@ -33,6 +33,7 @@ Run declare_copy(Arguments& arguments) {
   auto values = std::make_shared<CopyArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file, or address of one on a server");
   arguments.positional("COPY", values->copy, "The copy: a new file, or an address");
+  arguments.writes({"COPY"});
   return [values](Session& session) { return copy(*values, session); };
 }
 

@@ -86,6 +86,7 @@ Run declare_export(Arguments& arguments) {
   arguments.positional("MEMORY", values->memory, "Memory file");
   arguments.required_option("-o,--out FOLDER", values->out,
                             "Folder to write: a new or an empty one");
+  arguments.writes({"--out"});
   return [values](Session& session) { return export_all(*values, session); };
 }
 

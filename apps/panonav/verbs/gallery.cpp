@@ -169,6 +169,7 @@ Run declare_gallery(Arguments& arguments) {
   arguments.required_option("-o,--out FOLDER", values->out,
                             "Folder to write: a new one, or that of an earlier gallery");
   declare_selection(arguments, values->selection);
+  arguments.writes({"--out"});
   return [values](Session& session) { return gallery(*values, session); };
 }
 

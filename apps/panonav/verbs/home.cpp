@@ -167,6 +167,7 @@ Run declare_home(Arguments& arguments) {
                    "Write a page with both views and the direction home into this folder: a new "
                    "one, or that of an earlier report");
   declare_homing(arguments, values->homing);
+  arguments.writes({"--report"});
   return [values, &arguments](Session& session) { return home(arguments, *values, session); };
 }
 

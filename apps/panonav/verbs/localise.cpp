@@ -190,6 +190,7 @@ Run declare_localise(Arguments& arguments) {
   declare_changes(arguments, values);
   arguments.refuse_unless(
       {"[accuracy]"}, [values] { return values->areas; }, "without --areas");
+  arguments.writes({"--out", "--report"});
   return [values, &arguments](Session& session) { return localise(arguments, *values, session); };
 }
 

@@ -87,9 +87,9 @@ void print_comparison(const RecordedMapComparison& comparison, const Mapper::Res
   session.print("compared with the ground truth: Procrustes disparity (shape difference) " +
                 session.bold(format_fixed(positions.shape.value, 4)) + ", " +
                 format_fixed(positions.truth_from_map.rms_m, 2) + " m rms" +
-                (run.wheels ? ""
-                            : " with a free scale of " +
-                                  format_fixed(positions.truth_from_map.scale, 2)));
+                (run.wheels
+                     ? ""
+                     : " with a free scale of " + format_fixed(positions.truth_from_map.scale, 2)));
   if (comparison.odometry_shape_difference) {
     session.print("the odometry alone: Procrustes disparity " +
                   format_fixed(*comparison.odometry_shape_difference, 4));
@@ -370,6 +370,7 @@ Run declare_map(Arguments& arguments) {
       {"--iterations", "--nearer-side"},
       [values] { return values->mapper.odometry.rule == VisualOdometryOptions::Rule::home_vector; },
       "with --rule published");
+  arguments.writes({"--tum", "--graphml", "--picture", "--report"});
   return [values, &arguments](Session& session) { return map(arguments, *values, session); };
 }
 

@@ -372,6 +372,7 @@ Run declare_navigate(Arguments& arguments) {
       {"--fine"},
       [&homing] { return homing.strategy == HomingPursuitOptions::Strategy::coarse_to_fine; },
       "without --strategy coarse_to_fine");
+  arguments.writes({"--log", "--picture", "--report"});
   return [values, &arguments](Session& session) { return navigate(arguments, *values, session); };
 }
 

@@ -112,6 +112,7 @@ Run declare_reproduce(Arguments& arguments) {
   arguments.choice("--only", values->only, {parts.begin(), parts.end()},
                    "m03: this part of the experiments (default: all)");
   arguments.hide_from_help({"--queries", "--rows", "--only"});
+  arguments.writes({"--out"});
   return [values](Session& session) { return reproduce(*values, session); };
 }
 

@@ -205,6 +205,7 @@ Run declare_route_follow(Arguments& arguments) {
       "with --no-odometry");
   arguments.refuse_unless(
       {"--coarse-deg"}, [values] { return values->fit.levels > 1; }, "with --levels 1");
+  arguments.writes({"--tum", "--report"});
   return [values, &arguments](Session& session) { return follow_run(arguments, *values, session); };
 }
 

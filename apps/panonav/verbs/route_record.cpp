@@ -188,6 +188,7 @@ Run declare_route_record(Arguments& arguments) {
                    "an earlier report");
   declare_pictures(arguments, values->pictures);
   arguments.options("line", values->line);
+  arguments.writes({"--report"});
   return [values, &arguments](Session& session) { return record(arguments, *values, session); };
 }
 

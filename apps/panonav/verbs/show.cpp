@@ -184,6 +184,7 @@ Run declare_show(Arguments& arguments) {
   arguments.positional("VIEW", values->view, "Name or id of a view");
   arguments.option("-o,--thumbnail FILE", values->thumbnail,
                    "Write its thumbnail into this PNG file");
+  arguments.writes({"--thumbnail"});
   return [values](Session& session) { return show(*values, session); };
 }
 

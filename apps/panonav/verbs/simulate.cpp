@@ -38,8 +38,9 @@ void apply_shorthands(const Arguments& declared, SimulateArguments& arguments) {
   }
   auto& recording = arguments.simulation.recording;
   if (arguments.grid_m) {
-    if (!(*arguments.grid_m > 0.0)) {
-      throw UsageError("--grid is " + to_text(*arguments.grid_m) + "; allowed: > 0 metres");
+    if (!(*arguments.grid_m >= 0.001 && *arguments.grid_m <= 1000.0)) {  // as --spacing-m
+      throw UsageError("--grid is " + to_text(*arguments.grid_m) +
+                       "; allowed: 0.001 to 1000 metres");
     }
     recording.path = simulation::RecordingPath::grid;
     recording.spacing_m = *arguments.grid_m;
@@ -179,6 +180,7 @@ Run declare_simulate_verb(Arguments& arguments) {
                          path() == simulation::RecordingPath::zigzag;
       },
       "without --heading fixed");
+  arguments.writes({"OUT"});
   return [values, &arguments](Session& session) { return simulate(arguments, *values, session); };
 }
 

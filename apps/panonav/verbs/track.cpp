@@ -420,6 +420,7 @@ Run declare_track(Arguments& arguments) {
   arguments.options("monte_carlo", values->filter);
   arguments.options("odometry", values->odometry, "odometry");
   arguments.show_in_help({"--seed"});
+  arguments.writes({"--tum", "--report"});
   return [values, &arguments](Session& session) { return track_run(arguments, *values, session); };
 }
 

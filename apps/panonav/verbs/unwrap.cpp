@@ -5,6 +5,7 @@
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/io/panorama_reader.hpp"
+#include "panonav/io/unfinished_folder.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "runs/recording.hpp"
 
@@ -57,13 +58,7 @@ std::string panorama_name(const std::string& file) {
 
 ExitCode unwrap_series(const UnwrapArguments& arguments, const Dataset& recording,
                        Session& session) {
-  std::error_code error;
-  if (fs::exists(arguments.out) &&
-      (!fs::is_directory(arguments.out) || !fs::is_empty(arguments.out))) {
-    throw FileError(arguments.out, "is there already and not empty; allowed: a new folder");
-  }
-  fs::create_directories(arguments.out, error);
-  if (error) throw FileError(arguments.out, "cannot be made: " + error.message());
+  UnfinishedFolder unfinished(arguments.out);
   const PanoramaReader reader(recording.source,
                               {arguments.unwarper.rows, arguments.unwarper.columns});
   Progress progress(session, "unwrapping", recording.entries.size());
@@ -79,11 +74,11 @@ ExitCode unwrap_series(const UnwrapArguments& arguments, const Dataset& recordin
       },
       [&](std::size_t i, Panorama&& panorama) {
         const Image picture = to_picture(panorama);
-        write_png(fs::path(arguments.out) / panorama_name(recording.entries[i].file),
-                  picture.view());
+        write_png(unfinished.path() / panorama_name(recording.entries[i].file), picture.view());
         last = std::move(panorama);
         progress.advance();
       });
+  unfinished.finish();
   progress.clear();
   if (session.json()) {
     ordered_json json{
@@ -136,6 +131,7 @@ Run declare_unwrap(Arguments& arguments) {
   declare_pictures(arguments, values->pictures);
   arguments.options("unwarper", values->unwarper);
   arguments.show_in_help({"--rows", "--columns"});
+  arguments.writes({"--out"});
   return [values, &arguments](Session& session) { return unwrap(arguments, *values, session); };
 }
 

@@ -5,9 +5,11 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <random>
 #include <string>
+#include <string_view>
 #include <system_error>
 
 #include "panonav/core/error.hpp"
@@ -48,7 +50,27 @@ void remove_if_abandoned(const fs::path& path) {
 
 }  // namespace
 
+void require_no_database(const fs::path& path) {
+  // The first bytes of each SQLite 3 file (sqlite.org/fileformat), with the zero that ends them.
+  constexpr std::string_view magic("SQLite format 3\0", 16);
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  if (descriptor < 0) return;
+  struct stat status {};
+  std::array<char, magic.size()> begin{};
+  const bool is_database =
+      ::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode) &&
+      ::pread(descriptor, begin.data(), begin.size(), 0) == static_cast<ssize_t>(begin.size()) &&
+      std::string_view(begin.data(), begin.size()) == magic;
+  ::close(descriptor);
+  if (is_database) {
+    throw FileError(path.string(),
+                    "is a memory or another SQLite file, which is not replaced; allowed: another "
+                    "name, or remove that file first");
+  }
+}
+
 TemporaryFile::TemporaryFile(const fs::path& target) {
+  require_no_database(target);
   // Names may have 255 bytes.
   constexpr std::size_t max_name_bytes = 200;
   const std::string stem = "." + target.filename().string().substr(0, max_name_bytes) + ".";

@@ -4,10 +4,15 @@
 
 namespace panonav {
 
+/// Throws FileError where `path` is, also through links, an SQLite file, such as a memory: it is
+/// never what an output was meant to replace. Costs a look at the file's first bytes.
+void require_no_database(const std::filesystem::path& path);
+
 /// A new empty file that is to become `target`, in the same folder: ".NAME.tmp", which replaces the
 /// one of a dead process, or ".NAME.<16 random digits>.tmp" while another process uses that name.
 /// It is locked as long as the object lives, so that no process takes it for an abandoned one, and
-/// is removed with the object unless `keep` was called. Throws FileError on `target`.
+/// is removed with the object unless `keep` was called. Throws FileError on `target`, also as
+/// `require_no_database` does.
 class TemporaryFile {
  public:
   /// Creates the file at once, with the permissions that the process's umask leaves.

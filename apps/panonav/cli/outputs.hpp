@@ -1,0 +1,21 @@
+#pragma once
+
+#include <span>
+#include <string>
+
+namespace panonav::command {
+
+/// A value of the command line that may be the path of a file or folder.
+struct NamedValue {
+  std::string name;  ///< of the argument: "--tum" or "MEMORY"
+  std::string value;
+  bool is_output = false;  ///< the verb writes it
+};
+
+/// Throws UsageError where writing an output would replace what another value names: the same file
+/// (device and inode, also through links), a file in a folder that is named, one that a TOML file
+/// names, or a log of a memory file; likewise where two outputs are one file. Costs a look at each
+/// file of the folders, only where an output exists already.
+void require_separate_outputs(std::span<const NamedValue> values);
+
+}  // namespace panonav::command
