@@ -1,6 +1,7 @@
 #include "lab/reporting/results_document.hpp"
 
 #include <algorithm>
+#include <locale>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -28,6 +29,7 @@ std::string list_item(const std::string& text) {
   std::string result = "-";
   std::size_t column = result.size();
   std::istringstream words(text);
+  words.imbue(std::locale::classic());
   for (std::string word; words >> word;) {
     if (column + 1 + word.size() > width) {
       result += "\n ";

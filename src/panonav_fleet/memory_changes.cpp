@@ -1,10 +1,10 @@
 #include "panonav_fleet/memory_changes.hpp"
 
 #include <cmath>
-#include <sstream>
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/storage/memory_address.hpp"
 #include "panonav_fleet/internal/postgresql_memory.hpp"
 
@@ -29,10 +29,15 @@ std::optional<MemoryChange> MemoryChanges::wait(std::chrono::milliseconds timeou
       std::chrono::duration<double>(timeout).count());
   if (!payload) return std::nullopt;
   MemoryChange change;
-  std::istringstream words(*payload);
-  MemoryArea area;
-  char comma = 0;
-  while (words >> area.column >> comma >> area.row) change.areas.push_back(area);
+  for (const std::string& word : split_words(*payload)) {
+    const std::size_t comma = word.find(',');
+    MemoryArea area;
+    if (comma == std::string::npos || !read_number(word.substr(0, comma), area.column) ||
+        !read_number(word.substr(comma + 1), area.row)) {
+      break;
+    }
+    change.areas.push_back(area);
+  }
   return change;
 }
 

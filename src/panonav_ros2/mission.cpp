@@ -2,6 +2,7 @@
 
 #include <fstream>
 #include <istream>
+#include <locale>
 #include <system_error>
 
 #include "panonav/core/error.hpp"
@@ -67,6 +68,7 @@ std::optional<Mission> MissionFile::load(WarningLog& log) {
   const double age_s =
       std::chrono::duration<double>(fs::file_time_type::clock::now() - written).count();
   std::ifstream in(path_);
+  in.imbue(std::locale::classic());  // as it was written, whatever the host program has set
   auto mission = read_mission(in);
   if (mission && age_s <= max_age_s_) return mission;
   log.warn("mission", path_.string() +

@@ -9,6 +9,7 @@
 #include <assimp/Importer.hpp>
 #include <cmath>
 #include <limits>
+#include <locale>
 #include <map>
 #include <optional>
 #include <sstream>
@@ -289,6 +290,7 @@ std::optional<std::string> repair_collada(const fs::path& path) {
     const pugi::xml_document document = parse_xml(text_of_scene_file(path));
     const ColladaHoles joined(document.document_element());
     std::ostringstream text;
+    text.imbue(std::locale::classic());
     document.save(text, "", pugi::format_raw | pugi::format_no_declaration);
     return std::move(text).str();
   } catch (const Error&) {

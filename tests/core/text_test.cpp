@@ -3,6 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <string>
+#include <vector>
+
+#include "panonav/core/error.hpp"
+#include "panonav/core/number_text.hpp"
+#include "support/comma_locale.hpp"
+#include "support/text.hpp"
 
 namespace panonav::testing {
 namespace {
@@ -21,6 +28,59 @@ TEST(ToReadableLine, KeepsUtf8AndReplacesTheRest) {
   EXPECT_EQ(to_readable_line("\xE0\x80\xAF"), replaced + replaced + replaced);
   EXPECT_EQ(to_readable_line("\xED\xA0\x80"), replaced + replaced + replaced) << "half of a pair";
   EXPECT_EQ(to_readable_line("\xF4\x90\x80\x80"), replaced + replaced + replaced + replaced);
+}
+
+TEST(ToReadableLine, NoNameTurnsTheDirectionOfWriting) {
+  EXPECT_EQ(to_readable_line("a\u202Egnp.exe"), "a gnp.exe");
+  for (const std::string mark :
+       {"\u061C", "\u200E", "\u200F", "\u2028", "\u2029", "\u202A", "\u202B", "\u202C", "\u202D",
+        "\u2066", "\u2067", "\u2068", "\u2069"}) {
+    EXPECT_EQ(to_readable_line("a" + mark + "b"), "a b");
+  }
+  const std::string kept = "\u05D0 \u0627 \u200D \u2010 \u2030 \u2065 \u206A \u00A0";
+  EXPECT_EQ(to_readable_line(kept), kept);
+}
+
+TEST(ToSheetField, IsNoFormula) {
+  EXPECT_EQ(to_sheet_field("=1+1"), "'=1+1");
+  EXPECT_EQ(to_sheet_field("@x,y"), "\"'@x,y\"");
+  for (const std::string begin : {"+", "-", "@", "=", "\t=", "\r=", " =", "\uFF1D", "\uFF20"}) {
+    EXPECT_TRUE(contains(to_sheet_field(begin + "cmd"), "'" + begin)) << begin;
+  }
+  EXPECT_EQ(to_sheet_field("view_1=2.png"), "view_1=2.png");
+  EXPECT_EQ(to_sheet_field(""), "\"\"");
+}
+
+TEST(NumberText, IsThatOfTheCLocale) {
+  const CommaLocale locale;  // streams at least
+  EXPECT_EQ(to_hex_text(1.5), "0x1.8p+0");
+  EXPECT_EQ(to_hex_text(-0.1), "-0x1.999999999999ap-4");
+  EXPECT_EQ(to_hex_text(0.0), "0x0p+0");
+  EXPECT_EQ(to_fixed_text(-1234567.125, 2), "-1234567.12");
+  EXPECT_EQ(to_general_text(1234567.0, 4), "1.235e+06");
+  EXPECT_EQ(format_fixed(1234.5, 1), "1234.5");
+  EXPECT_EQ(format_number(1e15), "1e+15");
+  EXPECT_EQ(to_hex_digits(0xABCDEF, 8), "00abcdef");
+  EXPECT_EQ(to_hex_digits(~0ULL), "ffffffffffffffff");
+  for (const double value : {0.1, -1e300, 5e-324, 2.2250738585072014e-308, 1.0 / 3.0}) {
+    double read = 0.0;
+    EXPECT_TRUE(read_hex_number(to_hex_text(value), read));
+    EXPECT_EQ(read, value);
+    EXPECT_TRUE(read_number(to_text(value), read));
+    EXPECT_EQ(read, value);
+  }
+  double kept = 7.0;
+  for (const char* wrong : {"", "-", "0x", "--1", "-0x-1", "0x1,8p+0", "1,5", "0x1p+0 "}) {
+    EXPECT_FALSE(read_hex_number(wrong, kept)) << wrong;
+  }
+  int whole = 7;
+  for (const char* wrong : {"", "1.5", "1e308", "99999999999", " 1"}) {
+    EXPECT_FALSE(read_number(wrong, whole)) << wrong;
+  }
+  EXPECT_EQ(kept, 7.0);
+  EXPECT_EQ(whole, 7);
+  EXPECT_EQ(split_words(" a\tb\n\nc "), (std::vector<std::string>{"a", "b", "c"}));
+  EXPECT_TRUE(split_words(" \n").empty());
 }
 
 TEST(ShortenMiddle, LeavesOutTheMiddleAndCutsNoCharacter) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/localisation/localiser.hpp"
@@ -16,6 +17,7 @@
 #include "panonav/pipeline/tracker.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
 #include "panonav/storage/memory_file.hpp"
+#include "support/comma_locale.hpp"
 #include "support/temporary_folder.hpp"
 
 namespace panonav {
@@ -66,6 +68,33 @@ TEST_F(KeptModels, ComeBackFromTheFileToTheBit) {
   EXPECT_TRUE(kept->position.learnt);
   ASSERT_TRUE(kept->observation);
   EXPECT_DOUBLE_EQ(kept->spacing_m, 0.5);
+}
+
+TEST_F(KeptModels, AreTheSameInAProgramWithDecimalCommas) {
+  MemoryFile file = make_file();
+  keep_models(file);
+  const auto text = file.parameter("learnt models");
+  ASSERT_TRUE(text);
+  PANONAV_REQUIRE_COMMA_LOCALE(locale);
+  EXPECT_EQ(load_kept_models(file, file.load()), learn_models(file.load()));
+  file.set_parameter("learnt models", "");
+  keep_models(file);
+  EXPECT_EQ(file.parameter("learnt models"), text);
+}
+
+TEST_F(KeptModels, OfAStrangerHoldNoNumberThatDoesNotFit) {
+  MemoryFile file = make_file();
+  keep_models(file);
+  const auto words = split_words(file.parameter("learnt models").value());
+  for (const char* wrong : {"1e308", "0x1p+900", "1.5", "-", "99999999999"}) {
+    std::string text;
+    for (std::size_t i = 0; i < words.size(); ++i) {
+      constexpr std::size_t number_of_views = 4;
+      text += (i == number_of_views ? wrong : words[i]) + std::string(" ");
+    }
+    file.set_parameter("learnt models", text);
+    EXPECT_EQ(load_kept_models(file), std::nullopt) << wrong;
+  }
 }
 
 TEST_F(KeptModels, OfOtherViewsAreNotUsed) {

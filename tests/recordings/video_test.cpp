@@ -14,6 +14,7 @@
 #include "panonav/core/random.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/io/image_file.hpp"
+#include "support/comma_locale.hpp"
 #include "support/temporary_folder.hpp"
 #include "support/text.hpp"
 
@@ -51,6 +52,15 @@ class Video : public ::testing::Test {
   }
   TemporaryFolder folder;
 };
+
+TEST_F(Video, IsReadByAProgramWithDecimalCommas) {
+  const fs::path file = make("walk.mkv", "-c:v ffv1 -pix_fmt bgr0");
+  PANONAV_REQUIRE_COMMA_LOCALE(locale);
+  const Dataset video = read_video(file, {});
+  ASSERT_EQ(video.entries.size(), 20U);
+  EXPECT_NEAR(video.entries.back().stamp_s.value(), 1.9, 1e-6);
+  EXPECT_EQ(read_picture(video.entries[1]), noise(1));
+}
 
 TEST_F(Video, EveryPictureComesWithItsPixelsAndItsStamp) {
   for (const auto& [name, codec] : {std::pair{"it's a walk.mp4", "-c:v libx264rgb -qp 0"},

@@ -31,7 +31,7 @@ ordered_json as_json(const LocalisedQuery& answer, bool areas) {
 std::string csv_row(const LocalisedQuery& answer) {
   const Place& place = answer.place;
   const auto& position = place.position;
-  std::string row = to_csv_field(answer.file);
+  std::string row = to_sheet_field(answer.file);
   const auto add = [&row](const std::string& field) {
     row += ',';
     row += field;
@@ -47,12 +47,12 @@ std::string csv_row(const LocalisedQuery& answer) {
   add_degrees(place.heading_rad);
   for (std::size_t i = 0; i < 2; ++i) {
     const PlaceMatch* const match = i < place.matches.size() ? &place.matches[i] : nullptr;
-    add(match ? to_csv_field(match->name) : "");
+    add(match ? to_sheet_field(match->name) : "");
     add(match ? std::to_string(match->dissimilarity) : "");
     add(match ? to_text(match->column_difference) : "");
     if (i == 0) add_degrees(match ? match->heading_rad : std::nullopt);
   }
-  add(answer.error.empty() ? "" : to_csv_field(to_readable_line(answer.error)));
+  add(answer.error.empty() ? "" : to_sheet_field(to_readable_line(answer.error)));
   return row + '\n';
 }
 

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iomanip>
-#include <sstream>
 #include <utility>
 #include <vector>
+
+#include "panonav/core/number_text.hpp"
 
 namespace panonav {
 
@@ -40,6 +40,17 @@ std::size_t utf8_character_size(std::string_view text) {
   return 0;
 }
 
+// Control characters behind ASCII: C1; marks, embeddings, overrides and isolates of the direction
+// of writing (Unicode TR9); separators of lines and paragraphs.
+bool is_invisible_control(std::string_view character) {
+  const auto is_within = [character](std::string_view first, std::string_view last) {
+    return character.size() == first.size() && character >= first && character <= last;
+  };
+  return is_within("\xC2\x80", "\xC2\x9F") || character == "\xD8\x9C" ||
+         is_within("\xE2\x80\x8E", "\xE2\x80\x8F") || is_within("\xE2\x80\xA8", "\xE2\x80\xAE") ||
+         is_within("\xE2\x81\xA6", "\xE2\x81\xA9");
+}
+
 // Insertions, deletions, changes and swaps of neighbours that make one text of the other.
 std::size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<std::vector<std::size_t>> cost(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
@@ -62,9 +73,7 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 }  // namespace
 
 std::string format_fixed(double value, int digits) {
-  std::ostringstream text;
-  text << std::fixed << std::setprecision(digits) << value;
-  const std::string shown = text.str();
+  std::string shown = to_fixed_text(value, digits);
   // A value that rounds to zero has no sign.
   const bool is_zero = shown.find_first_not_of("-0.") == std::string::npos;
   return is_zero && shown.front() == '-' ? shown.substr(1) : shown;
@@ -72,7 +81,7 @@ std::string format_fixed(double value, int digits) {
 
 std::string format_number(double value, std::string_view unit, int significant) {
   if (!std::isfinite(value)) return "none";
-  if (std::abs(value) >= 1e15) return (std::ostringstream() << value).str();
+  if (std::abs(value) >= 1e15) return to_general_text(value, 6);
   constexpr std::array<std::pair<std::string_view, int>, 9> decimal_places{{{"m", 5},
                                                                             {"cm", 3},
                                                                             {"mm", 2},
@@ -116,8 +125,7 @@ std::string to_readable_line(std::string_view text) {
     const auto first = static_cast<unsigned char>(size == 0 ? '?' : character.front());
     if (size == 0) {
       line += "\xEF\xBF\xBD";
-    } else if (first < 0x20U || first == 0x7FU ||
-               (character >= "\xC2\x80" && character < "\xC2\xA0")) {
+    } else if (first < 0x20U || first == 0x7FU || is_invisible_control(character)) {
       line += ' ';
     } else {
       line += character;
@@ -138,6 +146,18 @@ std::string to_csv_field(std::string_view text) {
     result += c;
   }
   return result + "\"";
+}
+
+std::string to_sheet_field(std::string_view text) {
+  // Sheets take the wide forms of =, +, - and @ for these, too.
+  constexpr std::array<std::string_view, 10> begins{
+      "=",           "+", "-", "@", "\t", "\r", "\xEF\xBC\x9D", "\xEF\xBC\x8B", "\xEF\xBC\x8D",
+      "\xEF\xBC\xA0"};
+  std::string_view shown = text;
+  while (shown.starts_with(' ')) shown.remove_prefix(1);
+  const bool is_formula =
+      std::ranges::any_of(begins, [&](std::string_view begin) { return shown.starts_with(begin); });
+  return to_csv_field(is_formula ? "'" + std::string(text) : std::string(text));
 }
 
 std::string shorten_middle(std::string_view text, std::size_t max_characters) {

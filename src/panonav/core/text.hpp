@@ -18,7 +18,8 @@ namespace panonav {
                                         int significant = 6);
 
 /// Makes one line of valid UTF-8 of any bytes, such as a file's name. Control
-/// characters become spaces, bytes that are not UTF-8 the replacement character U+FFFD.
+/// characters, also those that turn the direction of writing, become spaces, bytes that are not
+/// UTF-8 the replacement character U+FFFD.
 [[nodiscard]] std::string to_readable_line(std::string_view text);
 
 /// Replaces the capital letters of ASCII by small ones; other bytes stay.
@@ -27,6 +28,11 @@ namespace panonav {
 /// Quotes a field for a CSV file where it holds a comma, a quote, a `#` or a line
 /// break, is empty or has a blank at an end.
 [[nodiscard]] std::string to_csv_field(std::string_view text);
+
+/// The same for a table that people open as a sheet: a text that a sheet would compute as a formula
+/// (it begins with =, +, -, @ or a tab) has an apostrophe in front. No reader of ours takes it
+/// away.
+[[nodiscard]] std::string to_sheet_field(std::string_view text);
 
 /// Leaves out the middle ("...") of valid UTF-8 where it has more than `max_characters` (>= 8).
 [[nodiscard]] std::string shorten_middle(std::string_view text, std::size_t max_characters);

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/navigation/internal/navigator_core.hpp"
@@ -385,22 +385,18 @@ std::string_view name_of(NavigationDecision::Event event) {
 
 std::string describe(const NavigationDecision& decision) {
   std::string line = std::to_string(decision.step) + " " + std::string(name_of(decision.state));
-  std::array<char, 120> numbers{};
   if (decision.nearest) {
-    std::snprintf(numbers.data(), numbers.size(), " at view %u (probability %.2f)",
-                  static_cast<unsigned>(decision.nearest->value), decision.probability);
-    line += numbers.data();
+    line += " at view " + std::to_string(decision.nearest->value) + " (probability " +
+            to_fixed_text(decision.probability, 2) + ")";
   }
   if (decision.next) line += " to view " + std::to_string(decision.next->value);
   line += " in area " + std::to_string(decision.area);
-  std::snprintf(numbers.data(), numbers.size(), ", way left %.4g, difference %.3f",
-                decision.path_length, decision.difference);
-  line += numbers.data();
+  line += ", way left " + to_general_text(decision.path_length, 4) + ", difference " +
+          to_fixed_text(decision.difference, 3);
   if (decision.advance_m > 0.0) {
     const char* how = decision.homing ? "home" : decision.on_route ? "along a route" : "go";
-    std::snprintf(numbers.data(), numbers.size(), ", %s %.3f m towards %.1f degrees", how,
-                  decision.advance_m, degrees(decision.direction_rad));
-    line += numbers.data();
+    line += std::string(", ") + how + " " + to_fixed_text(decision.advance_m, 3) + " m towards " +
+            to_fixed_text(degrees(decision.direction_rad), 1) + " degrees";
   }
   for (const NavigationDecision::Event event : decision.events)
     line += ", " + std::string(name_of(event));
@@ -410,7 +406,7 @@ std::string describe(const NavigationDecision& decision) {
 void visit_options(NavigatorOptions& options, OptionVisitor& visitor) {
   using T = NavigatorOptions;
   constexpr OptionTable table{
-      option<&T::step_m>("longest path between two steps", above(0), 100),
+      option<&T::step_m>("longest path between two steps", 0.001, 100),
       option<&T::near_links>("edges from the last place within which the next one is searched", 1,
                              10),
       option<&T::coarse_components>("components compared in the open, 0 for all", 0, 1000),
@@ -422,7 +418,7 @@ void visit_options(NavigatorOptions& options, OptionVisitor& visitor) {
                                 1e6),
       option<&T::edge_patience>("steps without coming nearer after which an edge counts as blocked",
                                 1, 1e6),
-      option<&T::min_leg_m>("shortest path along a recorded route that is worth a leg", above(0),
+      option<&T::min_leg_m>("shortest path along a recorded route that is worth a leg", 0.001,
                             1000),
       option<&T::attempts>("times that blocked edges, or homing, are tried", 1, 1000),
       option<&T::max_run_steps>("steps after which a run ends", 1, 1e9),

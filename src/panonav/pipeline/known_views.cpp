@@ -3,13 +3,12 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
-#include <iomanip>
 #include <optional>
-#include <sstream>
 #include <variant>
 #include <vector>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/storage/checksum.hpp"
 #include "panonav/storage/memory_header.hpp"
@@ -45,17 +44,12 @@ std::string compute_fingerprint(const Dataset& recording, const MemoryFile& memo
     const auto changed = fs::last_write_time(entry.path, ignored).time_since_epoch();
     bytes.add(static_cast<std::int64_t>(changed.count()));
   }
-  std::ostringstream text;
-  text << std::hex << std::setfill('0') << std::setw(16) << checksum(bytes.bytes());
-  return text.str();
+  return to_hex_digits(checksum(bytes.bytes()), 16);
 }
 
 bool is_known_recording(const MemoryFile& memory, const std::string& mark) {
-  std::istringstream marks(memory.parameter(recordings_parameter).value_or(""));
-  for (std::string met; marks >> met;) {
-    if (met == mark) return true;
-  }
-  return false;
+  const auto marks = split_words(memory.parameter(recordings_parameter).value_or(""));
+  return std::ranges::find(marks, mark) != marks.end();
 }
 
 }  // namespace

@@ -1,15 +1,13 @@
 #include "panonav/pipeline/learnt_models.hpp"
 
-#include <array>
 #include <cmath>
 #include <concepts>
-#include <cstdio>
-#include <cstdlib>
-#include <sstream>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/localisation/neighbour_support.hpp"
 #include "panonav/pipeline/internal/learnt_models.hpp"
 #include "panonav/storage/checksum.hpp"
@@ -48,11 +46,7 @@ void visit_members(Model& m, const Visit& visit) {
 /// Words with a blank between them; doubles with all their bits.
 class Writer {
  public:
-  void operator()(double value) const {
-    std::array<char, 40> text{};
-    std::snprintf(text.data(), text.size(), "%a ", value);
-    text_ += text.data();
-  }
+  void operator()(double value) const { text_ += to_hex_text(value) + " "; }
   void operator()(int value) const { text_ += std::to_string(value) + " "; }
   void operator()(bool value) const { text_ += value ? "yes " : "no "; }
   void operator()(const std::optional<double>& value) const {
@@ -72,15 +66,15 @@ class Writer {
 /// Fails for good at the first word that is not what was written.
 class Reader {
  public:
-  explicit Reader(const std::string& text) : words_(text) {}
+  explicit Reader(const std::string& text) : words_(split_words(text)) {}
 
   [[nodiscard]] std::string word() const {
-    std::string word;
-    if (!(words_ >> word)) ok_ = false;
-    return word;
+    if (next_ < words_.size()) return words_[next_++];
+    ok_ = false;
+    return {};
   }
   void operator()(double& value) const { value = number(word()); }
-  void operator()(int& value) const { value = static_cast<int>(number(word())); }
+  void operator()(int& value) const { ok_ = read_number(word(), value) && ok_; }
   void operator()(bool& value) const {
     const std::string read = word();
     value = read == "yes";
@@ -94,12 +88,12 @@ class Reader {
 
  private:
   [[nodiscard]] double number(const std::string& word) const {
-    char* end = nullptr;
-    const double value = std::strtod(word.c_str(), &end);
-    if (word.empty() || *end != '\0' || !std::isfinite(value)) ok_ = false;
+    double value = 0.0;
+    if (!read_hex_number(word, value) || !std::isfinite(value)) ok_ = false;
     return value;
   }
-  mutable std::istringstream words_;
+  std::vector<std::string> words_;
+  mutable std::size_t next_ = 0;
   mutable bool ok_ = true;
 };
 
@@ -120,9 +114,7 @@ std::string compute_fingerprint(const VisualMemory& memory) {
     hash = checksum(signature.magnitudes, hash);
     hash = checksum(signature.phases, hash);
   }
-  std::ostringstream text;
-  text << std::hex << hash;
-  return text.str();
+  return to_hex_digits(hash);
 }
 
 /// Models of other views than the memory's are ignored; null: those of any views.

@@ -1,9 +1,9 @@
 #include "panonav/pipeline/line_encoder.hpp"
 
 #include <algorithm>
-#include <sstream>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/route/route_panorama.hpp"
@@ -37,15 +37,18 @@ RouteSource read_route_source(const MemoryFile& memory, const std::string& name,
   source.line.columns = columns;
   const auto text = memory.parameter(make_parameter_name(name));
   if (!text) return source;
-  std::istringstream in(*text);
-  std::string word;
+  const std::vector<std::string> words = split_words(*text);
+  const auto read_next = [&words](std::size_t& at, auto& value) {
+    return ++at < words.size() && read_number(words[at], value);
+  };
   bool good = true;
-  while (good && in >> word) {
+  for (std::size_t i = 0; good && i < words.size(); ++i) {
+    const std::string& word = words[i];
     if (word == "half_band_rad") {
-      good = static_cast<bool>(in >> source.line.half_band_rad);
+      good = read_next(i, source.line.half_band_rad);
     } else if (word == "horizon_rows") {
-      source.horizon_rows.emplace();
-      good = static_cast<bool>(in >> source.horizon_rows->first >> source.horizon_rows->second);
+      auto& [first, second] = source.horizon_rows.emplace();
+      good = read_next(i, first) && read_next(i, second);
     } else if (word == "odometry") {
       source.from_odometry = true;
     } else {

@@ -1,15 +1,13 @@
 #include "panonav/pipeline/memory_updater.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cstdio>
 #include <map>
 #include <optional>
-#include <sstream>
 #include <utility>
 #include <vector>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/pipeline/internal/learnt_models.hpp"
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
@@ -23,16 +21,10 @@ namespace {
 constexpr const char* use_parameter = "use of views";
 constexpr const char* use_version = "1";
 
-std::string exact(double value) {
-  std::array<char, 40> text{};
-  std::snprintf(text.data(), text.size(), "%a", value);
-  return text.data();
-}
-
 std::string to_parameter(const MemoryUpdate::Use& use) {
   std::string text = std::string(use_version) + " " + std::to_string(use.runs) + " " +
-                     exact(use.spacing_m) + " " + exact(use.far_difference) + " " +
-                     exact(use.range_m) + " " + std::to_string(use.places) + " " +
+                     to_hex_text(use.spacing_m) + " " + to_hex_text(use.far_difference) + " " +
+                     to_hex_text(use.range_m) + " " + std::to_string(use.places) + " " +
                      std::to_string(use.size) + "\n";
   for (const auto& [view, one] : use.views) {
     text += std::to_string(view.value) + " " + std::to_string(one.matched) + " " +
@@ -46,20 +38,23 @@ std::string to_parameter(const MemoryUpdate::Use& use) {
 MemoryUpdate::Use parse_memory_use(const std::optional<std::string>& text) {
   MemoryUpdate::Use use;
   if (!text) return use;
-  std::istringstream words(*text);
-  std::string version, spacing, far, range;
-  if (!(words >> version >> use.runs >> spacing >> far >> range >> use.places >> use.size) ||
-      version != use_version) {
+  constexpr std::size_t head = 7;  // words before the views
+  constexpr std::size_t per_view = 5;
+  const std::vector<std::string> words = split_words(*text);
+  if (words.size() < head || words[0] != use_version || !read_number(words[1], use.runs) ||
+      !read_hex_number(words[2], use.spacing_m) || !read_hex_number(words[3], use.far_difference) ||
+      !read_hex_number(words[4], use.range_m) || !read_number(words[5], use.places) ||
+      !read_number(words[6], use.size)) {
     return {};
   }
-  use.spacing_m = std::strtod(spacing.c_str(), nullptr);
-  use.far_difference = std::strtod(far.c_str(), nullptr);
-  use.range_m = std::strtod(range.c_str(), nullptr);
-  std::uint32_t view = 0;
-  MemoryUpdate::Use::View one;
-  std::string learnt;
-  while (words >> view >> one.matched >> one.failed >> one.last_run >> learnt) {
-    one.learnt = learnt == "learnt";
+  for (std::size_t i = head; i + per_view <= words.size(); i += per_view) {
+    std::uint32_t view = 0;
+    MemoryUpdate::Use::View one;
+    if (!read_number(words[i], view) || !read_number(words[i + 1], one.matched) ||
+        !read_number(words[i + 2], one.failed) || !read_number(words[i + 3], one.last_run)) {
+      break;
+    }
+    one.learnt = words[i + 4] == "learnt";
     use.views[ViewId{view}] = one;
   }
   return use;

@@ -60,7 +60,7 @@ std::string view_table(std::span<const ViewRecord> views, std::span<const std::s
     const auto& [view, info, links, thumbnail, component] = views[i];
     const auto& pose = info.pose;
     table += std::to_string(view.value);
-    add(to_csv_field(info.name));
+    add(to_sheet_field(info.name));
     add(pose ? to_text(pose->x_m) : "");
     add(pose ? to_text(pose->y_m) : "");
     add(pose && pose->heading_rad ? to_text(round_trip_degrees(*pose->heading_rad)) : "");
@@ -68,7 +68,7 @@ std::string view_table(std::span<const ViewRecord> views, std::span<const std::s
     add(std::to_string(links));
     add(component ? std::to_string(*component) : "");
     add(thumbnail ? "1" : "0");
-    if (!pictures.empty()) add(pictures[i].empty() ? "" : to_csv_field(pictures[i]));
+    if (!pictures.empty()) add(pictures[i].empty() ? "" : to_sheet_field(pictures[i]));
     table += '\n';
   }
   return table;

@@ -5,10 +5,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdio>
+#include <string_view>
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/number_text.hpp"
 
 namespace panonav::recordings {
 
@@ -42,16 +43,20 @@ void DecodedVideo::take_line(const std::string& line) {
   if (line.starts_with("[Parsed_showinfo")) {
     const auto at = line.find("] [info] n:");
     if (at == std::string::npos) return;
-    long long stamp = 0;
-    double stamp_s = 0.0;
+    // "n: 0 pts: 512 pts_time:0.04 ... s:96x12 ...": the first of each name counts.
+    const auto read_field = [&](std::string_view name, auto& value) {
+      const auto begin = line.find(name, at);
+      if (begin == std::string::npos) return std::string_view();
+      std::string_view rest = std::string_view(line).substr(begin + name.size());
+      rest.remove_prefix(std::min(rest.find_first_not_of(' '), rest.size()));
+      return read_leading_number(rest, value) ? rest : std::string_view();
+    };
     Head head{};
-    const char* const text = line.c_str() + at;
-    const auto size = line.find(" s:", at);
-    if (std::sscanf(text, "] [info] n:%*d pts:%lld pts_time:%lf", &stamp, &stamp_s) == 2 &&
-        size != std::string::npos &&
-        std::sscanf(line.c_str() + size, " s:%dx%d", &head.size.width, &head.size.height) == 2) {
-      head.stamp = stamp;
-      head.stamp_s = stamp_s;
+    const std::string_view size = read_field(" s:", head.size.width);
+    const auto x = size.find('x');
+    if (x != std::string_view::npos && read_leading_number(size.substr(x + 1), head.size.height) &&
+        !read_field(" pts:", head.stamp).empty() &&
+        !read_field(" pts_time:", head.stamp_s).empty()) {
       heads_.push_back(head);
     }
     return;

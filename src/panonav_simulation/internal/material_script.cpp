@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <charconv>
 #include <fstream>
-#include <sstream>
+#include <utility>
 
+#include "panonav/core/number_text.hpp"
 #include "panonav_simulation/internal/gazebo_files.hpp"
 
 namespace panonav::simulation {
@@ -61,8 +62,7 @@ std::vector<std::string> split_words(const fs::path& file) {
         spaced += c;
       }
     }
-    std::istringstream parts(spaced);
-    for (std::string word; parts >> word;) words.push_back(word);
+    for (std::string& word : panonav::split_words(spaced)) words.push_back(std::move(word));
   }
   return words;
 }

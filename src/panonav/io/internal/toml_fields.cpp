@@ -21,6 +21,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <locale>
 #include <sstream>
 #include <type_traits>
 #include <utility>
@@ -40,6 +41,7 @@ TomlTable convert(const toml::table& table);
 TomlValue convert(const toml::node& node) {
   TomlValue result;
   std::ostringstream shown;
+  shown.imbue(std::locale::classic());
   node.visit([&](const auto& value) {
     using Value = std::remove_cvref_t<decltype(value)>;
     if constexpr (std::is_same_v<Value, toml::table>) {
