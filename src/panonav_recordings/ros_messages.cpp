@@ -11,6 +11,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
+#include "panonav/geometry/position_bound.hpp"
 
 namespace panonav::recordings::ros {
 
@@ -231,8 +232,9 @@ class Reader {
   void check(const Value& /*of*/) const {}
   void check(const Pose& pose) const {
     const auto& [p, q] = pose;
-    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
-      fail("position", to_text(p.x) + ", " + to_text(p.y) + ", " + to_text(p.z), "finite");
+    if (!is_position(p.x) || !is_position(p.y) || !is_position(p.z)) {
+      fail("position", to_text(p.x) + ", " + to_text(p.y) + ", " + to_text(p.z),
+           std::string(position_range));
     }
     const double length = std::sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w);
     if (!(std::abs(length - 1.0) <= quaternion_tolerance)) {

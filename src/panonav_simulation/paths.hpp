@@ -68,6 +68,9 @@ enum class GridOrder {
   };
   const int columns = steps("extent of the grid in x", high.x_m - low.x_m) + 1;
   const int rows = steps("extent of the grid in y", high.y_m - low.y_m) + 1;
+  constexpr double max_count = 1e7;  // as of random places
+  require(static_cast<double>(rows) * columns <= max_count, "the option spacing_m", spacing_m,
+          "a spacing with at most 10000000 places in the grid");
   const auto margin = [spacing_m](double extent, int count) {
     const double rest = extent - (count - 1) * spacing_m;
     return rest > rounding_slack * spacing_m ? 0.5 * rest : 0.0;

@@ -121,9 +121,9 @@ void visit_options(RecordingOptions& options, OptionVisitor& visitor) {
                        "random"),
       choice<&T::heading>("which way the robot faces", "fixed", "path", "random"),
       option<&T::heading_rad>("the fixed heading"),
-      option<&T::spacing_m>("spacing of the grid, or along the path", above(0), 1000),
+      option<&T::spacing_m>("spacing of the grid, or along the path", 0.001, 1000),
       option<&T::poses>("number of poses of a walk, or of random ones", 1, 1e7),
-      option<&T::speed_m_s>("speed of the robot, which gives the time stamps", above(0), 100),
+      option<&T::speed_m_s>("speed of the robot, which gives the time stamps", 0.001, 100),
   };
   table.visit(options, visitor);
 }

@@ -180,6 +180,10 @@ TEST(HomingSurvey, RefusesWhatMakesNoSense) {
   const std::vector<Pose2> far{{std::nan(""), 0.0, 0.0}};
   EXPECT_THROW((void)survey_homing(far, poses, rule, {}, executor), ContractError);
   EXPECT_THROW((void)final_places({}, 0), ContractError);
+  const HomingSurvey survey = survey_homing(poses, poses, rule, {}, executor);
+  for (const double bin_m : {0.0, -1.0, 1e-9, 1e9, std::nan("")}) {
+    EXPECT_THROW((void)homeward_by_distance(survey, bin_m), ContractError) << bin_m;
+  }
 }
 
 }  // namespace

@@ -102,6 +102,12 @@ TEST_F(DatasetFolder, EveryFaultHasItsLine) {
       {"file,x_m\na.png,1\n", "no column 'y_m'"},
       {"file,x_m,y_m\na.png,1,2\na.png,1,2\n", "'a.png' for the second time"},
       {"file,x_m,y_m\nc.png,1,2\n", "'c.png', which is not there"},
+      {"file,x_m,y_m\n../a.png,1,2\n", "line 2: file is '../a.png'; allowed: a picture in"},
+      {"file,x_m,y_m\nb/../../a.png,1,2\n", "file is 'b/../../a.png'; allowed: a picture in"},
+      {"file,x_m,y_m\n/etc/a.png,1,2\n", "file is '/etc/a.png'; allowed: a picture in"},
+      {"file,x_m,y_m\na.png,1e308,2\n", "line 2: x_m is 1e308; allowed: -10000000 to 10000000 m"},
+      {"file,odom_x_m,odom_y_m,odom_heading_deg\na.png,1,-1e200,2\n",
+       "line 2: odom_y_m is -1e200; allowed: -10000000 to 10000000 m"},
       {"file,x_m,y_m,roll_deg\na.png,1,2,3\n", "no column 'pitch_deg'"},
       {"file,x_m,y_m,roll_deg,pitch_deg\na.png,1,2,3,-31\n",
        "line 2: pitch_deg is -31; allowed: -30 to 30"},
@@ -116,6 +122,8 @@ TEST_F(DatasetFolder, EveryFaultHasItsLine) {
   }
   fs::remove(folder / "poses.csv");
   expect_error("poses.csv");
+  write("dataset.toml", "[images]\nkind = \"panorama\"\n[list]\nfile = \"../poses.csv\"\n");
+  expect_error("file is \"../poses.csv\"; allowed: a table in the data set's folder");
   write("dataset.toml", "[images]\nkind = \"film\"\n[list]\nfile = \"poses.csv\"\n");
   expect_error("kind is \"film\"; allowed: \"panorama\"");
   write("dataset.toml",

@@ -228,6 +228,15 @@ TEST_F(RecordingTest, PackedMessagesAreUnpackedUpToTheLimit) {
   }
 }
 
+TEST_F(RecordingTest, AFewBytesThatClaimManyAreNotUnpacked) {
+  const std::string bomb = long_frame(512);
+  const auto recording = Recording::open(
+      folder.write("a.mcap", mcap_begin + mcap_chunk("zstd", bomb, 64U << 20U) + mcap_end));
+  ASSERT_EQ(recording->warnings().size(), 1U);
+  EXPECT_TRUE(
+      contains(recording->warnings()[0], "that claim to unpack to 67108864; allowed: up to"));
+}
+
 TEST_F(RecordingTest, WhatIsTooLargeIsLeftOutInOneLine) {
   const std::string bomb = long_frame(512);
   const std::string good = mcap_chunk("", mcap_channel + mcap_message(5, "x"),

@@ -29,8 +29,8 @@ void visit_options(HomingPursuitOptions& options, OptionVisitor& visitor) {
       option<&T::coarse>("highest frequency of the first stage", 1, 62),
       option<&T::middle>("highest frequency of the second stage", 1, 62),
       option<&T::fine>("highest frequency of the third stage", 1, 62),
-      option<&T::typical_distance_m>("typical distance of the things around", above(0), 1000),
-      option<&T::max_step_m>("longest path between two views", above(0), 100),
+      option<&T::typical_distance_m>("typical distance of the things around", 0.001, 1000),
+      option<&T::max_step_m>("longest path between two views", 0.001, 100),
       option<&T::stop_length>("homing stops when the vector is shorter, in units of R", 0, 1),
       option<&T::min_step_m>("homing stops when the step is shorter", above(0), 100),
       option<&T::patience>(

@@ -7,6 +7,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/point_grid.hpp"
+#include "panonav/geometry/position_bound.hpp"
 
 namespace panonav {
 
@@ -122,7 +123,18 @@ HomingSurvey survey_homing(std::span<const Pose2> goals, std::span<const Pose2> 
 }
 
 std::vector<HomingSurvey::Bin> homeward_by_distance(const HomingSurvey& survey, double bin_m) {
-  require(bin_m > 0.0, "bin_m", bin_m, "> 0");
+  // Curves of more points are drawn by nobody; a bin takes 24 bytes.
+  constexpr double max_bins = 1e5;
+  double farthest_m = 0.0;
+  for (const Pose2& goal : survey.goals) {
+    for (const Pose2& place : survey.places) {
+      farthest_m = std::max(farthest_m, distance(goal.position(), place.position()));
+    }
+  }
+  const double min_bin_m = farthest_m / max_bins;
+  require(bin_m > 0.0 && bin_m >= min_bin_m && bin_m <= max_position_m, "the option bin_m", bin_m,
+          (farthest_m > 0.0 ? to_text(min_bin_m) : "above 0") + " to " + to_text(max_position_m) +
+              " m, at most 100000 bins");
   std::vector<HomingSurvey::Bin> bins;
   for (std::size_t g = 0; g < survey.goals.size(); ++g) {
     const auto homeward = survey.homeward_of(g);

@@ -66,7 +66,7 @@ using SurveyProgress = std::function<void(double fraction)>;
 
 /// Averages the homeward component by distance [S06 eq. 48]. Bin i holds the distances within half
 /// a bin of i `bin_m`; so places on a grid of this spacing fall into the middle of bins. Throws
-/// ContractError unless bin_m > 0.
+/// ContractError unless bin_m > 0 and there are at most 100,000 bins.
 [[nodiscard]] std::vector<HomingSurvey::Bin> homeward_by_distance(const HomingSurvey& survey,
                                                                   double bin_m = 0.025);
 

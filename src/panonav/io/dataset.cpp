@@ -75,6 +75,12 @@ PictureSource read_source(TomlFields& images, const fs::path& folder) {
   return source;
 }
 
+// A data set comes from anybody: its table names files of its own folder alone.
+bool is_inside_folder(const std::string& name) {
+  const fs::path path(name);
+  return path.is_relative() && *path.lexically_normal().begin() != "..";
+}
+
 void require_picture(const fs::path& table, const DatasetEntry& entry) {
   std::error_code error;
   if (!fs::is_regular_file(entry.path, error)) {
@@ -133,6 +139,9 @@ std::vector<DatasetEntry> read_entries(const fs::path& folder, const fs::path& p
     DatasetEntry entry;
     entry.file = table.text(row, "file");
     if (entry.file.empty()) table.fail(row, "file", "empty", "a picture in the data set's folder");
+    if (!is_inside_folder(entry.file)) {
+      table.fail(row, "file", "'" + entry.file + "'", "a picture in the data set's folder");
+    }
     if (!seen.insert(entry.file).second) {
       table.fail(row, "file", "'" + entry.file + "' for the second time", "each picture once");
     }
@@ -140,13 +149,14 @@ std::vector<DatasetEntry> read_entries(const fs::path& folder, const fs::path& p
     require_picture(path, entry);
     if (table.has("stamp_s")) entry.stamp_s = table.number(row, "stamp_s");
     if (has_position) {
-      entry.pose = ReferencePose{table.number(row, "x_m"), table.number(row, "y_m"), std::nullopt};
+      entry.pose =
+          ReferencePose{table.position(row, "x_m"), table.position(row, "y_m"), std::nullopt};
       if (table.has("heading_deg")) {
         entry.pose->heading_rad = wrap_angle(radians(table.number(row, "heading_deg")));
       }
     }
     if (has_odometry) {
-      entry.odometry = Pose2{table.number(row, "odom_x_m"), table.number(row, "odom_y_m"),
+      entry.odometry = Pose2{table.position(row, "odom_x_m"), table.position(row, "odom_y_m"),
                              wrap_angle(radians(table.number(row, "odom_heading_deg")))};
     }
     if (has_tilt) {
@@ -334,6 +344,9 @@ Dataset read_dataset(const fs::path& folder) {
   dataset.source = read_source(*images, folder);
   TomlFields& entries = poses ? *poses : *list;
   const std::string file = entries.required_text("file", "the name of a table");
+  if (!is_inside_folder(file)) {
+    entries.fail("file", "\"" + file + "\"", "a table in the data set's folder");
+  }
   dataset.entries = read_entries(folder, folder / file, poses.has_value());
   images->finish();
   entries.finish();

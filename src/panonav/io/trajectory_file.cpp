@@ -9,6 +9,7 @@
 
 #include "panonav/core/error.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/geometry/position_bound.hpp"
 #include "panonav/io/atomic_file.hpp"
 #include "panonav/io/internal/csv_table.hpp"
 
@@ -22,7 +23,7 @@ std::vector<StampedPose> read_csv(const std::filesystem::path& path) {
   const CsvTable table = CsvTable::read(path);
   std::vector<StampedPose> trajectory;
   for (std::size_t row = 0; row < table.rows(); ++row) {
-    const Pose2 pose{table.number(row, "x_m"), table.number(row, "y_m"),
+    const Pose2 pose{table.position(row, "x_m"), table.position(row, "y_m"),
                      wrap_angle(radians(table.number(row, "heading_deg")))};
     const double stamp_s = table.number(row, "stamp_s");
     if (!trajectory.empty() && stamp_s <= trajectory.back().stamp_s) {
@@ -72,6 +73,12 @@ std::vector<StampedPose> read_trajectory(const std::filesystem::path& path) {
       throw FileError(
           path.string(),
           where + " is not a pose; allowed: stamp x y z qx qy qz qw, eight finite numbers");
+    }
+    for (const std::size_t axis : {1U, 2U}) {
+      if (is_position(n[axis])) continue;
+      throw FileError(path.string(), where + (axis == 1U ? ": x is " : ": y is ") +
+                                         to_text(n[axis]) +
+                                         "; allowed: " + std::string(position_range));
     }
     const double norm = std::sqrt(n[4] * n[4] + n[5] * n[5] + n[6] * n[6] + n[7] * n[7]);
     if (std::abs(norm - 1.0) > 1e-2) {

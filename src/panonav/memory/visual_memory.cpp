@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/geometry/position_bound.hpp"
 #include "panonav/memory/internal/comparison.hpp"
 #include "panonav/memory/internal/exact_search.hpp"
 #include "panonav/memory/internal/link_set.hpp"
@@ -26,8 +27,8 @@ using Row = ViewStore::Row;
 
 void require_pose(const std::optional<ReferencePose>& pose) {
   if (!pose) return;
-  require(std::isfinite(pose->x_m), "pose x_m", pose->x_m, "finite");
-  require(std::isfinite(pose->y_m), "pose y_m", pose->y_m, "finite");
+  require(is_position(pose->x_m), "pose x_m", pose->x_m, position_range);
+  require(is_position(pose->y_m), "pose y_m", pose->y_m, position_range);
   if (pose->heading_rad) {
     require(std::isfinite(*pose->heading_rad), "pose heading_rad", *pose->heading_rad, "finite");
   }

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "panonav/core/error.hpp"
+#include "panonav/geometry/position_bound.hpp"
 
 namespace panonav {
 
@@ -16,8 +17,8 @@ void check(const StampedPose& pose, const StampedPose* before, std::size_t numbe
     require(std::isfinite(value), name + field, value, "a finite number");
   };
   finite("stamp_s", pose.stamp_s);
-  finite("x_m", pose.pose.x_m);
-  finite("y_m", pose.pose.y_m);
+  require(is_position(pose.pose.x_m), name + "x_m", pose.pose.x_m, position_range);
+  require(is_position(pose.pose.y_m), name + "y_m", pose.pose.y_m, position_range);
   finite("heading_rad", pose.pose.heading_rad);
   if (before != nullptr) {
     require(pose.stamp_s > before->stamp_s, name + "stamp_s", pose.stamp_s,

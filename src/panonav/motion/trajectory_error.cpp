@@ -59,9 +59,9 @@ void compute_relative_errors(const std::vector<Pair>& pairs, double distance_m,
 void visit_options(TrajectoryError::Options& options, OptionVisitor& visitor) {
   using T = TrajectoryError::Options;
   constexpr OptionTable table{
-      option<&T::max_gap_s>("longest gap of the truth over which it is interpolated", above(0)),
+      option<&T::max_gap_s>("longest gap of the truth over which it is interpolated", 0.001, 1e9),
       option<&T::relative_distance_m>(
-          "distance along the true path over which the relative error is taken", above(0)),
+          "distance along the true path over which the relative error is taken", 0.001, 1e7),
       option<&T::align>("align the estimate with the truth first"),
       option<&T::align_scale>("the alignment may change the scale"),
       option<&T::align_reflection>("the alignment may be a mirror image"),

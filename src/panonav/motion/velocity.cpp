@@ -13,9 +13,9 @@ void visit_options(BaseOptions& options, OptionVisitor& visitor) {
   using T = BaseOptions;
   constexpr OptionTable table{
       choice<&T::drive>("how the robot moves", "differential", "holonomic"),
-      option<&T::speed_m_s>("highest speed", above(0), 100),
-      option<&T::turn_rad_s>("highest speed of turning", above(0), 100),
-      option<&T::period_s>("time for which a command holds", above(0), 10),
+      option<&T::speed_m_s>("highest speed", 0.001, 100),
+      option<&T::turn_rad_s>("highest speed of turning", 0.001, 100),
+      option<&T::period_s>("time for which a command holds", 0.001, 10),
       option<&T::on_spot_rad>("a differential drive turns on the spot for larger angles", above(0),
                               std::numbers::pi / 2),
   };

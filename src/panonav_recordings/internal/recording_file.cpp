@@ -166,6 +166,16 @@ Buffer ChunkedFile::unpack_block(const Block& block) const {
          std::to_string(std::max(head.packed_bytes, head.unpacked_bytes)) +
          " bytes; allowed: up to " + std::to_string(limits_.chunk_bytes));
   }
+  // A few bytes may claim hundreds of megabytes, which cost seconds. 20,000 is the most that black
+  // images reach block by block (bzip2); the first bytes leave room for one of them alone.
+  constexpr std::uint64_t free_bytes = 8U << 20U;
+  constexpr std::uint64_t max_ratio = 20'000;
+  const std::uint64_t max_bytes = free_bytes + max_ratio * head.packed_bytes;
+  if (head.unpacked_bytes > max_bytes) {
+    fail(describe_chunk(block.at) + " has " + std::to_string(head.packed_bytes) +
+         " bytes that claim to unpack to " + std::to_string(head.unpacked_bytes) +
+         "; allowed: up to " + std::to_string(max_bytes));
+  }
   const auto there = head.at > size_ ? 0 : size_ - head.at;
   const auto count = block.is_cut ? std::min(head.packed_bytes, there) : head.packed_bytes;
   Buffer packed = bytes_at(head.at, count);

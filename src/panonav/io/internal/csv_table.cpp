@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "panonav/core/error.hpp"
+#include "panonav/geometry/position_bound.hpp"
 #include "panonav/io/atomic_file.hpp"
 
 namespace panonav {
@@ -115,6 +116,12 @@ double CsvTable::number(std::size_t row, std::string_view column) const {
       !std::isfinite(value)) {
     fail(row, column, field.empty() ? "empty" : "'" + field + "'", "a finite number");
   }
+  return value;
+}
+
+double CsvTable::position(std::size_t row, std::string_view column) const {
+  const double value = number(row, column);
+  if (!is_position(value)) fail(row, column, text(row, column), position_range);
   return value;
 }
 

@@ -28,6 +28,8 @@ class CsvTable {
   [[nodiscard]] const std::string& text(std::size_t row, std::string_view column) const;
   /// Throws FileError that names line, column and value unless it is a finite number.
   [[nodiscard]] double number(std::size_t row, std::string_view column) const;
+  /// The same for a coordinate in metres, which `is_position`.
+  [[nodiscard]] double position(std::size_t row, std::string_view column) const;
   /// Throws FileError: the field of this row is `found`, and what is allowed instead.
   [[noreturn]] void fail(std::size_t row, std::string_view column, std::string_view found,
                          std::string_view allowed) const;
