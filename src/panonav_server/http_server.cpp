@@ -12,7 +12,6 @@
 #include <array>
 #include <atomic>
 #include <cctype>
-#include <charconv>
 #include <csignal>
 #include <cstdint>
 #include <cstring>
@@ -22,7 +21,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
-#include "panonav/core/text.hpp"
+#include "panonav_server/internal/http_head.hpp"
 
 namespace panonav::server {
 
@@ -31,8 +30,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-constexpr std::size_t max_head_bytes = 8192;
-constexpr std::size_t max_connections = 64;
+constexpr std::size_t max_connections = 256;
 /// Memory of one connection, for the head and pieces of its answer: libmicrohttpd allocates no
 /// more.
 constexpr std::size_t connection_bytes = 4 * max_head_bytes;
@@ -40,7 +38,7 @@ constexpr std::size_t connection_bytes = 4 * max_head_bytes;
 constexpr int send_buffer_bytes = 256 * 1024;
 constexpr unsigned request_timeout_s = 5;
 constexpr unsigned idle_timeout_s = 30;  ///< between two requests of a trusted client
-constexpr std::size_t min_body_bytes_per_s = 100'000;
+constexpr double min_body_bytes_per_s = 100e3;
 constexpr milliseconds tick_interval(400);
 
 enum class Stage {
@@ -53,13 +51,14 @@ struct Connection {
   MHD_Connection* handle = nullptr;
   int socket = -1;
   Stage stage = Stage::idle;
-  Clock::time_point since = Clock::now();  ///< of the stage
-  bool trusted = false;                    ///< got an answer below 400
+  Clock::time_point heard = Clock::now();  ///< last time that something came or was answered
+  Clock::time_point due = heard + std::chrono::seconds(request_timeout_s);  ///< then it is late
+  bool trusted = false;  ///< sent a head that `judge_head` trusts
   bool evicted = false;
   bool suspended = false;  ///< waits for `more` or `later`
   bool has_head = false;
+  int refused_body = 0;  ///< status of an answer for which the rest of the body is skipped; 0: none
   HttpRequest request;
-  std::size_t body_bytes = 0;  ///< that were announced
   std::function<std::optional<std::string>()> more;
   std::function<std::optional<HttpAnswer>()> later;
   std::optional<HttpAnswer> answer;
@@ -68,14 +67,26 @@ struct Connection {
 
   void enter(Stage next) {
     stage = next;
-    since = Clock::now();
+    heard = Clock::now();
+    const bool is_pause = stage == Stage::idle && trusted;
+    due = heard + std::chrono::seconds(is_pause ? idle_timeout_s : request_timeout_s);
+  }
+  /// Gives a body the time for `bytes` more; time is not saved up by who was quick.
+  void extend_by(std::size_t bytes) {
+    heard = Clock::now();
+    due = std::min(due + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(
+                             static_cast<double>(bytes) / min_body_bytes_per_s)),
+                   heard + std::chrono::seconds(request_timeout_s));
   }
   [[nodiscard]] bool is_late() const {
-    if (stage == Stage::answering) return false;  // libmicrohttpd sees who takes nothing
-    const bool is_pause = stage == Stage::idle && trusted;
-    return Clock::now() - since >
-           std::chrono::seconds(is_pause ? idle_timeout_s
-                                         : request_timeout_s + body_bytes / min_body_bytes_per_s);
+    // libmicrohttpd sees who takes nothing of an answer.
+    return stage != Stage::answering && Clock::now() > due;
+  }
+  /// Order in which connections make room for others; nullopt: this one stays.
+  [[nodiscard]] std::optional<int> eviction_rank() const {
+    if (evicted || (trusted && stage == Stage::answering)) return std::nullopt;
+    if (!trusted) return 0;
+    return stage == Stage::idle ? 1 : 2;
   }
   /// libmicrohttpd closes the connection when it reads the end of it.
   void evict() {
@@ -91,42 +102,6 @@ struct Connection {
     if (std::exchange(suspended, false)) MHD_resume_connection(handle);
   }
 };
-
-/// Reads the fields of a head into a request. `status`: 0, or why it is refused.
-struct HeadReader {
-  Connection& to;
-  std::size_t max_body;
-  int status = 0;
-  bool has_length = false;
-
-  void read_field(const std::string& name, std::string_view value) {
-    if (name == "host") read_once(to.request.host, value);
-    if (name == "origin") read_once(to.request.origin, value);
-    if (name == "authorization") read_once(to.request.authorization, value);
-    if (name == "transfer-encoding") status = 501;
-    if (name == "content-length") read_length(value);
-  }
-
- private:
-  void read_once(std::string& field, std::string_view value) {
-    if (!field.empty() || value.empty()) status = 400;
-    field = value;
-  }
-  void read_length(std::string_view value) {
-    const char* const end = value.data() + value.size();
-    const auto [read, error] = std::from_chars(value.data(), end, to.body_bytes);
-    if (std::exchange(has_length, true) || error == std::errc::invalid_argument || read != end) {
-      status = 400;
-    } else if (error != std::errc() || to.body_bytes > max_body) {
-      status = 413;
-    }
-  }
-};
-
-MHD_Result read_field(void* reader, MHD_ValueKind /*kind*/, const char* name, const char* value) {
-  static_cast<HeadReader*>(reader)->read_field(to_lower_case(name), value == nullptr ? "" : value);
-  return MHD_YES;
-}
 
 Connection& get_connection(MHD_Connection* handle) {
   return *static_cast<Connection*>(
@@ -156,7 +131,6 @@ ssize_t read_more(void* connection, std::uint64_t /*position*/, char* buffer, st
 MHD_Result put(Connection& one, HttpAnswer answer, std::string_view headers) {
   one.enter(Stage::answering);
   const auto status = static_cast<unsigned>(answer.status);
-  if (status < 400) one.trusted = true;
   if (answer.content.empty() && status >= 400) {
     answer.content = std::string(MHD_get_reason_phrase_for(status)) + ".\n";
   }
@@ -240,6 +214,7 @@ struct HttpServer::Implementation {
     daemon = MHD_start_daemon(
         MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_SUPPRESS_DATE_NO_CLOCK, 0, nullptr,
         nullptr, &take, this, MHD_OPTION_SOCK_ADDR, reinterpret_cast<sockaddr*>(&place),
+        MHD_OPTION_STRICT_FOR_CLIENT, is_lenient_version() ? 0 : 1,
         // Those that were evicted are there a moment longer.
         MHD_OPTION_CONNECTION_LIMIT, static_cast<unsigned>(2 * max_connections),
         MHD_OPTION_CONNECTION_TIMEOUT, request_timeout_s, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
@@ -323,15 +298,22 @@ struct HttpServer::Implementation {
       return;
     }
     const auto staying = std::ranges::count(connections, false, &Connection::evicted);
+    Connection* leaving = nullptr;
+    for (Connection& other : connections) {
+      const auto order = [](const Connection& of) {
+        return std::pair(*of.eviction_rank(), of.heard);
+      };
+      if (other.eviction_rank() && (leaving == nullptr || order(other) < order(*leaving))) {
+        leaving = &other;
+      }
+    }
     Connection& one = connections.emplace_back();
     *context = &one;
     one.handle = handle;
     one.socket = MHD_get_connection_info(handle, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd;
     setsockopt(one.socket, SOL_SOCKET, SO_SNDBUF, &send_buffer_bytes, sizeof(send_buffer_bytes));
     if (static_cast<std::size_t>(staying) < max_connections) return;
-    std::ranges::find_if(connections, [](const Connection& other) {
-      return !other.trusted && !other.evicted;
-    })->evict();  // the new one where there is no other
+    (leaving == nullptr ? &one : leaving)->evict();
   }
 
   static void complete(void* /*self*/, MHD_Connection* handle, void** /*request*/,
@@ -341,7 +323,8 @@ struct HttpServer::Implementation {
     one.later = nullptr;
     one.answer.reset();
     one.has_head = false;
-    one.body_bytes = 0;
+    one.refused_body = 0;
+    one.request = {};
     one.enter(Stage::idle);
     MHD_set_connection_option(handle, MHD_CONNECTION_OPTION_TIMEOUT, idle_timeout_s);
   }
@@ -349,15 +332,18 @@ struct HttpServer::Implementation {
   /// Is called with the head, with each piece of the body, at its end, and again when a connection
   /// that was suspended continues.
   static MHD_Result take(void* self, MHD_Connection* handle, const char* path, const char* method,
-                         const char* /*version*/, const char* data, std::size_t* size,
+                         const char* version, const char* data, std::size_t* size,
                          void** /*request*/) {
     auto& server = *static_cast<Implementation*>(self);
     Connection& one = get_connection(handle);
     if (one.evicted) return MHD_NO;
-    if (!one.has_head) return server.take_head(one, path, method);
+    if (!one.has_head) return server.take_head(one, path, method, version);
     if (*size > 0) {
-      one.request.body.append(data, std::exchange(*size, 0));
+      server.take_piece(one, {data, std::exchange(*size, 0)});
       return MHD_YES;
+    }
+    if (one.refused_body != 0) {
+      return put(one, {.status = one.refused_body}, server.options.headers);
     }
     if (!one.answer) server.answer_request(one);
     if (one.later && !one.answer) one.answer = one.later();
@@ -367,32 +353,51 @@ struct HttpServer::Implementation {
     return MHD_YES;
   }
 
-  MHD_Result take_head(Connection& one, const char* path, const char* method) {
+  MHD_Result take_head(Connection& one, const char* path, const char* method, const char* version) {
     one.has_head = true;
     one.request = {.method = method, .path = path};
     if (one.stage == Stage::idle) one.enter(Stage::reading);
     MHD_set_connection_option(one.handle, MHD_CONNECTION_OPTION_TIMEOUT, request_timeout_s);
-    HeadReader head{.to = one, .max_body = options.max_body};
-    MHD_get_connection_values(one.handle, MHD_HEADER_KIND, &read_field, &head);
-    if (head.status == 0 && one.request.host.empty()) head.status = 400;
-    const auto* const size =
-        MHD_get_connection_info(one.handle, MHD_CONNECTION_INFO_REQUEST_HEADER_SIZE);
-    if (size->header_size > max_head_bytes) head.status = 431;
-    std::size_t bodies = 0;
-    for (const Connection& other : connections) bodies += other.body_bytes;
-    if (head.status == 0 && bodies > std::max(options.max_bodies, options.max_body)) {
-      head.status = 503;
+    HttpHead head = read_http_head(one.handle, method, version, options.max_body, one.request);
+    if (head.status == 0 && head.body_bytes > 0 && has_full_bodies(0)) head.status = 503;
+    if (head.status != 0) return put(one, {.status = head.status}, options.headers);
+    HeadVerdict verdict = judge(one.request);
+    one.trusted = one.trusted || verdict.is_trusted;
+    if (verdict.refusal) return put(one, std::move(*verdict.refusal), options.headers);
+    one.enter(Stage::reading);  // the body has its own time
+    return MHD_YES;
+  }
+
+  [[nodiscard]] HeadVerdict judge(const HttpRequest& head) const {
+    try {
+      return options.judge_head ? options.judge_head(head) : HeadVerdict{.is_trusted = true};
+    } catch (const std::exception&) {
+      return {.refusal = HttpAnswer{.status = 500}};
     }
-    if (head.status == 0) return MHD_YES;
-    one.body_bytes = 0;
-    return put(one, {.status = head.status}, options.headers);
+  }
+
+  /// True if what was received of all bodies, and `more` bytes, are beyond the limit.
+  [[nodiscard]] bool has_full_bodies(std::size_t more) const {
+    std::size_t bytes = more;
+    for (const Connection& one : connections) bytes += one.request.body.size();
+    return bytes >= std::max(options.max_bodies, options.max_body) + (more > 0 ? 1 : 0);
+  }
+
+  void take_piece(Connection& one, std::string_view piece) const {
+    one.extend_by(piece.size());
+    if (one.refused_body != 0) return;
+    if (has_full_bodies(piece.size())) {
+      one.refused_body = 503;
+      one.request.body = {};
+      return;
+    }
+    one.request.body += piece;
   }
 
   /// Sets `answer` or `later`.
   void answer_request(Connection& one) {
     if (one.later) return;
     one.enter(Stage::answering);
-    one.body_bytes = 0;
     try {
       one.answer = handler(std::move(one.request));
     } catch (const std::exception&) {

@@ -34,13 +34,22 @@ struct HttpAnswer {
   std::function<std::optional<HttpAnswer>()> later;
 };
 
+/// Verdict on the sender of a request, by its head.
+struct HeadVerdict {
+  bool is_trusted = false;  ///< the sender may keep its connection longer than strangers
+  std::optional<HttpAnswer> refusal{};  ///< sent at once, without reading the body; `content` only
+};
+
 struct HttpServerOptions {
   std::string address = "127.0.0.1";  ///< an IPv4 address of this machine
   int port = 0;                       ///< 0 .. 65535; 0: a free one
   std::string headers;                ///< headers of every answer, each ended by "\r\n"
   std::size_t max_body = 1024;        ///< largest body of a request, bytes
-  /// Largest total size of the bodies being received; further requests get status 503.
+  /// Largest total size of what was received of unfinished bodies; a body beyond gets status 503.
   std::size_t max_bodies = std::size_t{64} * 1024;
+  /// Judges a request by its head, before a byte of its body is kept; called on the server's
+  /// thread. Empty: all are trusted.
+  std::function<HeadVerdict(const HttpRequest& head)> judge_head;
   /// Time that the destructor waits for answers that are not sent yet.
   std::chrono::milliseconds last_answers{0};
 };
@@ -52,12 +61,13 @@ struct HttpServerOptions {
 /// True if the two are equal; takes the same time wherever they differ.
 [[nodiscard]] bool is_same_secret(std::string_view sent, std::string_view secret);
 
-/// A small HTTP/1.1 server (libmicrohttpd) for a few viewers and any number of strangers: one
-/// thread, and bounded memory whatever is sent to it. A request has at most 8 kB of head. A
-/// connection is closed if its request is not complete 5 s after the first byte, and a further
-/// second for each 100 kB of body, or if it accepts no bytes for 5 s. There are at most 64
-/// connections: a further one replaces the oldest that never got an answer below 400, or is closed
-/// if there is none.
+/// A small HTTP/1.1 server (libmicrohttpd) for a few clients and any number of strangers: one
+/// thread, and bounded memory whatever is sent to it. A request has at most 8 kB of head, which
+/// must be complete 5 s after its first byte. A connection is closed when 5 s have passed in which
+/// a body did not come at 100 kB/s, or if it accepts no bytes for 5 s. There are at most 256
+/// connections: a further one replaces that of a stranger (`HeadVerdict`), else of a client between
+/// two requests, else of one that sends a body: each time the one that was silent for the longest.
+/// It is closed itself if all others wait for answers.
 class HttpServer {
  public:
   /// Called on the server's thread, and may keep the request; its exceptions become status 500.

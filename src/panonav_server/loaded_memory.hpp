@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -49,5 +50,20 @@ struct LoadedMemory {
   MemoryFile file;  // of the thread that speaks HTTP, once it is there
   PlaceRecogniser recogniser;
 };
+
+/// A memory that is served; what was loaded is swapped when the file changes.
+struct Served {
+  ServedMemory memory;
+  std::optional<MemoryWatch> watch;
+  std::shared_ptr<LoadedMemory> loaded;
+  std::uint64_t known = 0;
+  std::uint64_t unknown = 0;
+  std::uint64_t reloads = 0;
+  std::uint64_t failed_reloads = 0;
+};
+
+/// Returns the metrics of memories, by their names: views, reloads, and searches of those that are
+/// searched on their server.
+[[nodiscard]] std::string describe_memories(const std::map<std::string, Served>& served);
 
 }  // namespace panonav::server

@@ -76,16 +76,6 @@ HttpAnswer make_refusal(int status, std::string_view why) {
 }  // namespace
 
 struct LocalisationServer::Implementation {
-  /// A memory that is served; what was loaded is swapped when the file changes.
-  struct Served {
-    ServedMemory memory;
-    std::optional<MemoryWatch> watch;
-    std::shared_ptr<LoadedMemory> loaded;
-    std::uint64_t known = 0;
-    std::uint64_t unknown = 0;
-    std::uint64_t reloads = 0;
-    std::uint64_t failed_reloads = 0;
-  };
   /// A picture that waits for its answer, as long as its client does.
   struct Job {
     std::string memory;
@@ -119,9 +109,14 @@ struct LocalisationServer::Implementation {
     server.emplace(HttpServerOptions{.address = options.address,
                                      .port = options.port,
                                      .headers = "X-Content-Type-Options: nosniff\r\n"
+                                                "Referrer-Policy: no-referrer\r\n"
+                                                "Cross-Origin-Resource-Policy: same-origin\r\n"
+                                                "Content-Security-Policy: default-src 'none'; "
+                                                "frame-ancestors 'none'\r\n"
                                                 "Cache-Control: no-store\r\n",
                                      .max_body = max_picture_bytes,
                                      .max_bodies = max_in_flight_bytes,
+                                     .judge_head = [this](const auto& head) { return judge(head); },
                                      .last_answers = std::chrono::seconds(5)},
                    [this](HttpRequest request) { return answer(std::move(request)); });
     for (int i = 0; i < (options.threads == 0 ? cores : options.threads); ++i) {
@@ -153,6 +148,30 @@ struct LocalisationServer::Implementation {
     return result;
   }
 
+  /// Refuses strangers before their bodies are read. `/health` is for everybody and earns no trust.
+  HeadVerdict judge(const HttpRequest& head) {
+    if (head.path == "/health") return {};
+    std::optional<HttpAnswer> refusal;
+    if (options.token.empty()) {
+      if (!is_own_page(head)) {
+        refusal = make_refusal(403,
+                               "without a token this server answers programs that call it by its "
+                               "number or as localhost");
+      }
+    } else {
+      constexpr std::string_view bearer = "Bearer ";
+      const std::string_view sent = head.authorization;
+      if (!sent.starts_with(bearer) || !is_same_secret(sent.substr(bearer.size()), options.token)) {
+        refusal =
+            make_refusal(401, "the token of this server is missing: Authorization: Bearer TOKEN");
+      }
+    }
+    if (!refusal) return {.is_trusted = true};
+    const std::lock_guard lock(mutex);
+    ++refused[refusal->status];
+    return {.refusal = std::move(refusal)};
+  }
+
   HttpAnswer answer_to(HttpRequest request) {
     constexpr std::string_view memories = "/v1/memories";
     const std::string_view path = request.path;
@@ -160,19 +179,6 @@ struct LocalisationServer::Implementation {
       if (request.method != "GET") return make_refusal(405, "allowed: GET");
       const std::lock_guard lock(mutex);
       return make_json_answer({{"status", ending ? "ending" : "ok"}}, ending ? 503 : 200);
-    }
-    if (!options.token.empty()) {
-      constexpr std::string_view bearer = "Bearer ";
-      const std::string_view sent = request.authorization;
-      if (!sent.starts_with(bearer) || !is_same_secret(sent.substr(bearer.size()), options.token)) {
-        return make_refusal(401,
-                            "the token of this server is missing: Authorization: Bearer TOKEN");
-      }
-    } else if (!is_own_page(request)) {
-      return make_refusal(
-          403,
-          "without a token this server answers programs that call it by its number or "
-          "as localhost");
     }
     if (path == "/metrics" || path == memories || path == "/") {
       if (request.method != "GET") return make_refusal(405, "allowed: GET");
@@ -293,49 +299,11 @@ struct LocalisationServer::Implementation {
             queueing.text("panonav_waiting_seconds");
     text += describe_metric("panonav_waiting", "gauge", "Pictures that wait for a thread.") +
             "panonav_waiting " + std::to_string(waiting.size()) + "\n";
-    text += describe_metric("panonav_memory_views", "gauge", "Views of a memory.");
-    for (const auto& [name, one] : served) {
-      text += "panonav_memory_views{memory=\"" + name + "\"} " +
-              std::to_string(one.loaded->recogniser.size()) + "\n";
-    }
-    text += search_metrics();
-    text += describe_metric("panonav_memory_reloads_total", "counter",
-                            "Times that a changed memory file was read again, by result.");
-    for (const auto& [name, one] : served) {
-      const std::string memory = "panonav_memory_reloads_total{memory=\"" + name + "\",result=\"";
-      text += memory + "done\"} " + std::to_string(one.reloads) + "\n";
-      text += memory + "failed\"} " + std::to_string(one.failed_reloads) + "\n";
-    }
+    text += describe_memories(served);
     text += describe_metric("process_resident_memory_bytes", "gauge",
                             "Memory that the process holds.") +
             "process_resident_memory_bytes " + std::to_string(resident_bytes()) + "\n";
     return {.type = "text/plain; version=0.0.4; charset=utf-8", .content = std::move(text)};
-  }
-
-  /// Returns metrics of memories that are searched on their server.
-  [[nodiscard]] std::string search_metrics() const {
-    const auto of_each = [this](const std::string& name, const std::string& type,
-                                const std::string& help, const auto& value) {
-      std::string lines;
-      for (const auto& [memory, one] : served) {
-        if (one.loaded->recogniser.is_held()) continue;
-        lines += name + "{memory=\"" + memory + "\"} " + value(one.loaded->recogniser) + "\n";
-      }
-      return lines.empty() ? lines : describe_metric(name, type, help) + lines;
-    };
-    return of_each("panonav_sketch_bytes", "gauge", "Bytes of sketches of a memory.",
-                   [](const PlaceRecogniser& of) { return std::to_string(of.index_bytes()); }) +
-           of_each("panonav_searches_total", "counter", "Exact searches in a memory on its server.",
-                   [](const PlaceRecogniser& of) {
-                     return std::to_string(of.search_counters().searches);
-                   }) +
-           of_each("panonav_search_views_read_total", "counter",
-                   "Views that searches read in full.",
-                   [](const PlaceRecogniser& of) {
-                     return std::to_string(of.search_counters().views_read);
-                   }) +
-           of_each("panonav_search_seconds_total", "counter", "Time that searches took.",
-                   [](const PlaceRecogniser& of) { return to_text(of.search_counters().seconds); });
   }
 
   // ---- on the threads that answer

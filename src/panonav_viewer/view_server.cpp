@@ -129,7 +129,10 @@ struct ViewServer::Implementation {
       : options(server_options),
         token(make_random_token()),
         page(live_page(options.title, options.replay, name_of(options.takes))),
-        server({.address = options.address, .port = options.port, .headers = answer_headers},
+        server({.address = options.address,
+                .port = options.port,
+                .headers = answer_headers,
+                .judge_head = [this](const auto& head) { return judge(head); }},
                [this](const server::HttpRequest& request) { return answer(request); }) {}
 
   ~Implementation() {
@@ -142,13 +145,17 @@ struct ViewServer::Implementation {
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
   }
 
+  /// Refuses strangers, who do not know the token.
+  [[nodiscard]] server::HeadVerdict judge(const server::HttpRequest& head) const {
+    if (head.path.starts_with('/') && server::is_own_page(head) &&
+        server::is_same_secret(std::string_view(head.path).substr(1, token.size()), token)) {
+      return {.is_trusted = true};
+    }
+    return {.refusal = server::HttpAnswer{.status = 404}};
+  }
+
   [[nodiscard]] server::HttpAnswer answer(const server::HttpRequest& request) {
     const auto only = [](int status) { return server::HttpAnswer{.status = status}; };
-    if (!request.path.starts_with('/') ||
-        !server::is_same_secret(std::string_view(request.path).substr(1, token.size()), token) ||
-        !server::is_own_page(request)) {
-      return only(404);
-    }
     const std::string_view resource = std::string_view(request.path).substr(1 + token.size());
     if ((options.replay || options.takes != ViewWish::none) && resource == "/control") {
       if (request.method != "POST") return only(405);

@@ -69,6 +69,7 @@ class LocalisationServerTest : public ::testing::Test {
     return get(server, "/v1/memories/hall/localise", more, "POST", picture);
   }
 
+  const Clock::time_point started_ = Clock::now();
   const TemporaryFolder folder_;
   const ToyWorld world_ = landmark_world(5);
 };
@@ -98,6 +99,9 @@ TEST_F(LocalisationServerTest, TellsWhatThereIs) {
   const std::string picture = get(server, "/v1/memories/hall/views/a%20view%2F7/picture");
   EXPECT_EQ(status_of(picture), 200);
   EXPECT_NE(picture.find("Content-Type: image/png\r\n"), std::string::npos);
+  // A page of another origin does not get it as an image either, for which it sends no Origin.
+  EXPECT_NE(picture.find("\r\nCross-Origin-Resource-Policy: same-origin\r\n"), std::string::npos);
+  EXPECT_NE(picture.find("\r\nContent-Security-Policy: default-src 'none'"), std::string::npos);
   EXPECT_EQ(picture.substr(picture.find("\r\n\r\n") + 5, 3), "PNG");
   for (const std::string path :
        {"/v1/memories/hall/views/a view/picture", "/v1/memories/hall/views/%zz/picture",
@@ -227,6 +231,103 @@ TEST_F(LocalisationServerTest, WithoutATokenPagesOfOthersGetNothing) {
   EXPECT_EQ(answer("localhost", "http://localhost"), 200);
   EXPECT_EQ(answer("localhost", "http://example.com"), 403);
   EXPECT_EQ(answer("example.com", ""), 403);
+}
+
+TEST_F(LocalisationServerTest, StrangersGetTheirAnswerOnTheHeadAndHoldNobodyUp) {
+  const LocalisationServer server(hall(), {.token = "0123456789abcdef"});
+  const std::string token = "Authorization: Bearer 0123456789abcdef\r\n";
+  Peer client(server.url() + "/");
+  const auto asks_again = [&] {
+    client.say("GET /v1/memories HTTP/1.1\r\nHost: localhost\r\n" + token + "\r\n");
+    const bool answered = client.hear_until("]}\n");
+    client.forget();
+    return answered;
+  };
+  EXPECT_TRUE(asks_again());
+  std::vector<std::unique_ptr<Peer>> strangers;
+  for (int i = 0; i < 300; ++i) {
+    strangers.push_back(std::make_unique<Peer>(server.url() + "/"));
+    ASSERT_TRUE(strangers.back()->connected());
+    if (i % 3 == 0) {  // announces a picture and sends none
+      strangers.back()->say(
+          "POST /v1/memories/hall/localise HTTP/1.1\r\nHost: localhost\r\n"
+          "Content-Length: 16000000\r\n\r\n");
+      ASSERT_EQ(status_of(strangers.back()->hear_all()), 401);
+    } else if (i % 3 == 1) {  // stays after a question that everybody may ask
+      strangers.back()->say("GET /health HTTP/1.1\r\nHost: localhost\r\n\r\n");
+      ASSERT_TRUE(strangers.back()->hear_until("\"ok\"")) << i;
+    }
+  }
+  EXPECT_EQ(status_of(localise(server, picture_at(world_, {1.0, 1.0, 0.0}), token)), 200);
+  EXPECT_TRUE(asks_again());
+}
+
+TEST_F(LocalisationServerTest, BodiesThatDoNotComeHoldNobodyUp) {
+  const LocalisationServer server(hall(), {});
+  const std::string head =
+      "POST /v1/memories/hall/localise HTTP/1.1\r\nHost: localhost\r\n"
+      "Content-Length: 16000000\r\n\r\n";
+  std::vector<std::unique_ptr<Peer>> slow;
+  for (int i = 0; i < 8; ++i) {
+    slow.push_back(std::make_unique<Peer>(server.url() + "/"));
+    slow.back()->say(head + std::string(i < 4 ? 0 : 1'000'000, 'x'));
+  }
+  EXPECT_EQ(status_of(localise(server, picture_at(world_, {1.0, 1.0, 0.0}))), 200);
+  // A byte now and then does not keep a connection, however much came before.
+  for (const auto& peer : slow) {
+    while (peer->say("x") && Clock::now() < started_ + patience) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    }
+    EXPECT_LT(Clock::now(), started_ + std::chrono::seconds(60));
+  }
+}
+
+TEST_F(LocalisationServerTest, OpenServersLetTheLongestIdleGoFirst) {
+  const LocalisationServer server(hall(), {});
+  std::vector<std::unique_ptr<Peer>> idle;
+  for (int i = 0; i < 260; ++i) {
+    idle.push_back(std::make_unique<Peer>(server.url() + "/"));
+    idle.back()->say("GET /v1/memories HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    ASSERT_TRUE(idle.back()->hear_until("]}\n")) << i;
+  }
+  EXPECT_FALSE(idle.front()->hear());
+  idle.back()->forget();
+  idle.back()->say("GET /v1/memories HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  EXPECT_TRUE(idle.back()->hear_until("]}\n"));
+}
+
+TEST_F(LocalisationServerTest, RefusesHeadsThatOthersWouldReadInAnotherWay) {
+  const LocalisationServer server(hall(), {});
+  const auto answer = [&](const std::string& head) {
+    Peer peer(server.url() + "/");
+    peer.say(head);
+    return status_of(peer.hear_all());
+  };
+  const std::string line = "GET /health HTTP/1.1\r\n";
+  const std::string last = "Connection: close\r\n\r\n";
+  for (const std::string& good :
+       {line + "Host: localhost\r\nX: 1\r\n" + last,
+        line + "Host:localhost\r\nX:\t 1 \t\r\n" + last,
+        line + "Host: localhost\r\nX:\r\nx-y_z: \xff\r\nCookie: a=b; c=d\r\n" + last,
+        line + "Host: localhost\r\nX: " + std::string(5000, 'x') + "\r\n" + last,
+        line + "Host: localhost\r\n\r\n" + line + "Host: localhost\r\n" + last,
+        "GET /health?a=b HTTP/1.1\r\nHost: localhost\r\n" + last}) {
+    EXPECT_EQ(answer(good), 200) << good;
+  }
+  for (const std::string& bad :
+       {line + "Host : localhost\r\n\r\n", line + "Host\t: localhost\r\n\r\n",
+        line + "Host: localhost\r\nX-A : 1\r\n\r\n",
+        line + "Host: localhost\r\nContent-Length : 0\r\n\r\n",
+        line + "Host: localhost\r\nX(A): 1\r\n\r\n", line + "Host: localhost\r\n: 1\r\n\r\n",
+        line + "Host: localhost\r\n X: 1\r\n\r\n",
+        line + "Host: localhost\r\nX: 1\r\n folded\r\n\r\n",
+        line + "Host: localhost\r\nX: 1\r\n\tfolded\r\n\r\n",
+        line + "Host: localhost\nX: 1\r\n\r\n", line + "Host: localhost\r\nX: 1\n\r\n",
+        line + "Host: localhost\r\nX: 1\r\n\n", line + "Host: localhost\r\nX: a\rb\r\n\r\n",
+        std::string("GET /health HTTP/1.1\nHost: localhost\r\n\r\n"),
+        std::string("GET /health HTTP/1.1\nHost: localhost\n\n")}) {
+    EXPECT_EQ(answer(bad), 400) << bad;
+  }
 }
 
 TEST_F(LocalisationServerTest, ReadsAChangedMemoryAgain) {
