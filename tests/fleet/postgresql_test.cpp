@@ -4,8 +4,10 @@
 
 #include <chrono>
 #include <iostream>
+#include <nlohmann/json.hpp>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav/mapping/topological_map.hpp"
 #include "panonav/route/route_panorama.hpp"
 #include "panonav/storage/memory_address.hpp"
@@ -15,6 +17,7 @@
 
 namespace panonav::fleet {
 using namespace testing;
+using nlohmann::json;
 namespace {
 
 TEST(MemoryAddress, AddressesAreToldFromPaths) {
@@ -34,16 +37,45 @@ TEST(MemoryAddress, PasswordsAreNotShown) {
   EXPECT_EQ(
       without_passwords("to postgres://u:se/cr@et@h/d and postgresql://h/d?password=secret&a=1"),
       "to postgres://u:***@h/d and postgresql://h/d?password=***&a=1");
-  for (const char* plain : {"", "a:b@c", "postgresql://h:5432/d?memory=m", "postgresql://u@h/d"}) {
+  for (const char* plain : {"", "a:b@c", "postgresql://h:5432/d?memory=m", "postgresql://u@h/d",
+                            "rtsp://camera:554/stream?profile=1", "? token=1 in http://h/"}) {
     EXPECT_EQ(without_passwords(plain), plain);
+    EXPECT_EQ(mask_credentials(plain), plain);
+  }
+  EXPECT_EQ(without_passwords("at rtsp://root:secret@10.0.0.7:554/main, again"),
+            "at rtsp://root:***@10.0.0.7:554/main, again");
+  EXPECT_EQ(mask_credentials("http://10.0.0.7/video.cgi?User=root&Pwd=se'c r@et&size=1"),
+            "http://10.0.0.7/video.cgi?User=root&Pwd=***&size=1");
+  EXPECT_EQ(mask_credentials("postgresql://h:5/d?password=a@secret"), "postgresql://h:***");
+  // Whatever was not escaped in an address that is known.
+  for (const std::string secret : {"se cret", "'secret", "a\"secret", "a\\secret", "a\tsecret",
+                                   "\xff secret", "secret&x secret", "a' \"b secret"}) {
+    const std::string address = "rtsp://root:" + secret + "@h/1";
+    remember_address(address);
+    for (const std::string& text :
+         {address, json(address).dump(-1, ' ', false, json::error_handler_t::replace),
+          "'" + address + "'", std::string(FileError(address, "is not there").what()),
+          to_readable_line(address)}) {
+      const std::string shown = without_passwords("x " + text + " y");
+      EXPECT_EQ(shown.find("secret"), std::string::npos) << shown;
+      EXPECT_NE(shown.find("rtsp://root:***@h/1"), std::string::npos) << shown;
+    }
+    const std::string message = message_of<FileError>([&] {
+      static_cast<void>(MemoryFile::open("postgresql://u:" + secret + "@127.0.0.1:1/d?memory=m",
+                                         Access::read_only));
+    });
+    EXPECT_EQ(message.find("secret"), std::string::npos) << message;
   }
 }
 
 TEST(MemoryAddress, WrongOnesAreRefusedInOneLine) {
   for (const char* wrong :
-       {"postgresql://u:secret@h/d",
-        "postgresql://u:secret@h/d?memory=", "postgres://u:secret@h?memory=%0A",
-        "postgresql://u:secret@h/d?memory=%4", "postgresql://u:secret@h/d?memory=m&robot="}) {
+       {"postgresql://u:secret@h/d", "postgresql://u:secret@h/d?memory=",
+        "postgres://u:secret@h?memory=%0A", "postgresql://u:secret@h/d?memory=%4",
+        "postgresql://u:secret@h/d?memory=m&robot=", "postgresql://u:secret/a@h/d?memory=m",
+        "postgresql://u:a/secret@h/d?memory=m", "postgresql://u:1?secret@h/d?memory=m",
+        "postgresql://u:1/secret@h/d?memory=m", "postgresql://u:a@secret@h/d?memory=m",
+        "postgresql://h:secret/d?memory=m"}) {
     const std::string message = message_of<FileError>(
         [&] { static_cast<void>(MemoryFile::open(wrong, Access::read_only)); });
     EXPECT_TRUE(contains(message, "allowed")) << message;

@@ -11,9 +11,9 @@
 #include "cli/option_values.hpp"
 #include "cli/session.hpp"
 #include "cli/verbs.hpp"
+#include "panonav/core/address.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
-#include "panonav/storage/memory_address.hpp"
 
 namespace {
 
@@ -23,7 +23,7 @@ using panonav::command::ExitCode;
 void report(std::string_view verb, std::string_view message) {
   std::cerr << "panonav" << (verb.empty() ? "" : " ") << verb << ": "
             << panonav::to_readable_line(
-                   panonav::without_passwords(panonav::command::name_flags(message)))
+                   panonav::command::name_flags(panonav::without_passwords(message)))
             << '\n';
 }
 
@@ -49,6 +49,12 @@ int main(int argc, char** argv) {
   std::string_view verb;
   try {
     const std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+    for (const std::string& word : words) {
+      panonav::remember_address(word);
+      if (const auto equals = word.find('='); equals < word.find("://")) {  // NAME=ADDRESS
+        panonav::remember_address(std::string_view(word).substr(equals + 1));
+      }
+    }
     return static_cast<int>(run(verb, words));
   } catch (const panonav::command::UsageError& error) {
     std::string hint = verb.empty() ? "panonav --help" : "panonav " + std::string(verb) + " --help";

@@ -11,8 +11,8 @@
 #include <utility>
 
 #include "cli/option_values.hpp"
+#include "panonav/core/address.hpp"
 #include "panonav/core/error.hpp"
-#include "panonav/storage/memory_address.hpp"
 
 namespace panonav::command {
 
@@ -63,7 +63,7 @@ Session::Session(const SessionOptions& options)
 
 void Session::write_line(std::string_view line) {
   clear_bar();
-  std::cerr << escape_control_characters(without_passwords(name_flags(line))) << '\n';
+  std::cerr << escape_control_characters(name_flags(without_passwords(line))) << '\n';
 }
 
 void Session::print(std::string_view text) {

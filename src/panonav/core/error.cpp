@@ -3,6 +3,8 @@
 #include <array>
 #include <charconv>
 
+#include "panonav/core/address.hpp"
+
 namespace panonav {
 
 namespace {
@@ -28,6 +30,7 @@ ContractError::ContractError(std::string_view field, double value, std::string_v
     : Error(describe_fault(field, to_text(value), allowed)) {}
 
 FileError::FileError(std::string_view path, std::string_view fault)
-    : Error(std::string(path) + ": " + std::string(fault)) {}
+    : Error((is_address(path) ? mask_credentials(path) : std::string(path)) + ": " +
+            std::string(fault)) {}
 
 }  // namespace panonav

@@ -34,8 +34,8 @@ class OptionError : public Error {
 /// written.
 class FileError : public Error {
  public:
-  /// Message "`path`: `fault`". `fault` names the field, the value and the allowed range where
-  /// there are any.
+  /// Message "`path`: `fault`", of an address without its password. `fault` names the field, the
+  /// value and the allowed range where there are any.
   FileError(std::string_view path, std::string_view fault);
 };
 

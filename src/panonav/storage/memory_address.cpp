@@ -1,6 +1,8 @@
 #include "panonav/storage/memory_address.hpp"
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <map>
 #include <mutex>
 #include <utility>
@@ -32,24 +34,7 @@ std::shared_ptr<const MemoryScheme> find_registered(const std::filesystem::path&
   return nullptr;
 }
 
-// An address with what may hide a password replaced: all between the first colon of the host part
-// and the last @, whatever was forgotten to be escaped, and the parameter.
-std::string mask_password(std::string_view address, std::size_t scheme) {
-  std::string masked(address);
-  const std::size_t query = std::min(masked.find('?'), masked.size());
-  const std::size_t at = masked.rfind('@');
-  const std::size_t colon = masked.find(':', scheme);
-  if (at != std::string::npos && colon < at) masked.replace(colon + 1, at - colon - 1, "***");
-  for (const std::string_view name : {"password=", "sslpassword="}) {
-    std::size_t from = std::min(query, masked.size());
-    while ((from = masked.find(name, from)) != std::string::npos) {
-      from += name.size();
-      const std::size_t end = std::min(masked.find('&', from), masked.size());
-      masked.replace(from, end - from, "***");
-    }
-  }
-  return masked;
-}
+std::atomic<std::chrono::milliseconds> process_reply_timeout{std::chrono::minutes(10)};
 
 }  // namespace
 
@@ -57,6 +42,16 @@ void register_memory_scheme(std::string_view name, std::shared_ptr<const MemoryS
   RegisteredSchemes& registered = registered_schemes();
   const std::lock_guard lock(registered.mutex);
   registered.schemes.insert_or_assign(std::string(name) + "://", std::move(scheme));
+}
+
+void set_reply_timeout(std::chrono::milliseconds timeout) {
+  require(timeout >= std::chrono::seconds(2), "reply time-out in ms",
+          static_cast<double>(timeout.count()), "2000 or more");
+  process_reply_timeout = timeout;
+}
+
+std::chrono::milliseconds reply_timeout() {
+  return process_reply_timeout;
 }
 
 std::shared_ptr<const MemoryScheme> find_memory_scheme(const std::filesystem::path& memory) {
@@ -82,27 +77,6 @@ bool memory_exists(const std::filesystem::path& memory) {
 std::string memory_name(const std::filesystem::path& memory) {
   const auto scheme = find_memory_scheme(memory);
   return scheme ? scheme->name_memory(memory) : memory.filename().string();
-}
-
-std::string without_passwords(std::string_view text) {
-  std::string result;
-  while (!text.empty()) {
-    std::size_t begin = text.size();
-    std::size_t scheme = 0;
-    for (const std::string_view name : {"postgresql://", "postgres://"}) {
-      const std::size_t found = text.find(name);
-      if (found < begin) {
-        begin = found;
-        scheme = name.size();
-      }
-    }
-    result += text.substr(0, begin);
-    text.remove_prefix(begin);
-    const std::size_t end = std::min(text.find_first_of(" \t\n\"'"), text.size());
-    result += mask_password(text.substr(0, end), scheme);
-    text.remove_prefix(end);
-  }
-  return result;
 }
 
 }  // namespace panonav

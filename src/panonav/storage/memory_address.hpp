@@ -2,7 +2,8 @@
 
 #include <filesystem>
 #include <string>
-#include <string_view>
+
+#include "panonav/core/address.hpp"
 
 namespace panonav {
 
@@ -16,8 +17,5 @@ namespace panonav {
 
 /// Returns the name of the memory's file, or its name on the server.
 [[nodiscard]] std::string memory_name(const std::filesystem::path& memory);
-
-/// Returns the text with "***" for each password in addresses of servers, for printing.
-[[nodiscard]] std::string without_passwords(std::string_view text);
 
 }  // namespace panonav

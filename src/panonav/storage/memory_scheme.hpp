@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -43,6 +44,13 @@ class MemoryScheme {
 /// Registers a scheme ("postgresql"), whose addresses this process then accepts wherever it takes
 /// the path of a memory file; replaces the scheme of that name. Any thread may call.
 void register_memory_scheme(std::string_view name, std::shared_ptr<const MemoryScheme> scheme);
+
+/// Sets for how long a server of memories may be silent before whoever waits for its answer gets a
+/// FileError, also those who wait already. 10 minutes if it is never called, as one statement may
+/// change a large memory. Throws ContractError for less than 2 s. Any thread may call.
+void set_reply_timeout(std::chrono::milliseconds timeout);
+/// Returns it, for schemes.
+[[nodiscard]] std::chrono::milliseconds reply_timeout();
 
 /// Returns the scheme of an address, nullptr for the path of a file. Throws FileError on an address
 /// of a scheme that is not registered.

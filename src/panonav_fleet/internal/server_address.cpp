@@ -35,6 +35,33 @@ std::optional<std::string> decode_percent(std::string_view text) {
   return decoded;
 }
 
+// False if a password may reach into what libpq takes for a host, port or database, which it names
+// in its messages.
+bool has_escaped_password(std::string_view address) {
+  const std::string_view rest = address.substr(address.find("://") + 3);
+  const std::string_view authority = rest.substr(0, rest.find_first_of("/?#"));
+  const std::size_t at = authority.rfind('@');
+  const std::string_view user = authority.substr(0, at == std::string_view::npos ? 0 : at);
+  const std::string_view hosts = authority.substr(at == std::string_view::npos ? 0 : at + 1);
+  if (user.find('@') != std::string_view::npos) return false;
+  // Further on an @ is good in the value of a parameter alone.
+  const std::string_view below = rest.substr(authority.size());
+  if (below.find('@') < std::min(below.find('='), below.size())) return false;
+  for (std::size_t colon = hosts.find(':'); colon < hosts.size();) {
+    if (hosts.find(']', colon) != std::string_view::npos) {  // within a number such as [::1]
+      colon = hosts.find(':', hosts.find(']', colon));
+      continue;
+    }
+    const std::size_t end = std::min(hosts.find(',', colon), hosts.size());
+    if (hosts.substr(colon + 1, end - colon - 1).find_first_not_of("0123456789") !=
+        std::string_view::npos) {
+      return false;
+    }
+    colon = hosts.find(':', end);
+  }
+  return true;
+}
+
 }  // namespace
 
 bool is_postgresql_address(const std::filesystem::path& memory) {
@@ -44,10 +71,16 @@ bool is_postgresql_address(const std::filesystem::path& memory) {
 ServerAddress parse_server_address(const std::filesystem::path& memory) {
   const std::string& text = memory.native();
   fleet::ServerAddress address;
-  address.printable = without_passwords(text);
+  remember_address(text);
+  address.printable = mask_credentials(text);
   const auto refuse = [&](const std::string& what) {
     throw FileError(address.printable.native(), what);
   };
+  if (!has_escaped_password(text)) {
+    refuse(
+        "its user and password are not written as in a URL, or its port is no number; allowed: "
+        "special characters as %40 for @ and %2F for /");
+  }
   const std::size_t query = std::min(text.find('?'), text.size());
   address.uri = text.substr(0, query);
   char separator = '?';
