@@ -3,6 +3,7 @@
 #include <system_error>
 
 #include "panonav/core/error.hpp"
+#include "panonav/storage/memory_address.hpp"
 #include "panonav_server/metrics.hpp"
 
 namespace panonav::server {
@@ -44,21 +45,24 @@ bool MemoryWatch::has_changed() {
 LoadedMemory::LoadedMemory(const std::filesystem::path& memory,
                            const LocalisationServerOptions& options)
     : path(memory),
-      file(MemoryFile::open(path, Access::read_only)),
-      recogniser(path, {.localiser = options.localiser, .max_held_views = options.max_held_views}) {
+      is_on_server(is_server_address(memory)),
+      recogniser(path, {.localiser = options.localiser, .max_held_views = options.max_held_views}),
+      file_(MemoryFile::open(path, Access::read_only)) {
+  shape = file_.header().shape;
 }
 
 std::optional<std::vector<std::uint8_t>> LoadedMemory::thumbnail(const std::string& view) {
+  const std::lock_guard lock(mutex_);
   const auto read = [&]() -> std::optional<std::vector<std::uint8_t>> {
-    const auto id = view.empty() ? std::nullopt : file.find(view);
-    return id ? file.thumbnail(*id) : std::nullopt;
+    const auto id = view.empty() ? std::nullopt : file_.find(view);
+    return id ? file_.thumbnail(*id) : std::nullopt;
   };
   try {
     return read();
   } catch (const FileError&) {
-    if (recogniser.is_held()) throw;
+    if (!is_on_server) throw;
   }
-  file = MemoryFile::open(path, Access::read_only);
+  file_ = MemoryFile::open(path, Access::read_only);
   return read();
 }
 

@@ -1,11 +1,13 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
@@ -43,12 +45,17 @@ struct LoadedMemory {
   LoadedMemory(const std::filesystem::path& memory, const LocalisationServerOptions& options);
 
   /// Returns the picture of a view, `nullopt` if it has none. Opens the memory again if its server
-  /// was away.
+  /// was away. Any thread may call.
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> thumbnail(const std::string& view);
 
   std::filesystem::path path;
-  MemoryFile file;  // of the thread that speaks HTTP, once it is there
+  bool is_on_server;
+  SignatureShape shape;
   PlaceRecogniser recogniser;
+
+ private:
+  std::mutex mutex_;  // of the file
+  MemoryFile file_;
 };
 
 /// A memory that is served; what was loaded is swapped when the file changes.
@@ -56,6 +63,9 @@ struct Served {
   ServedMemory memory;
   std::optional<MemoryWatch> watch;
   std::shared_ptr<LoadedMemory> loaded;
+  bool is_lost = false;  ///< it was noted that the memory cannot be read
+  /// When a request failed the last time because the memory could not be read.
+  std::chrono::steady_clock::time_point failed{};
   std::uint64_t known = 0;
   std::uint64_t unknown = 0;
   std::uint64_t reloads = 0;

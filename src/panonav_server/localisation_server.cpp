@@ -6,11 +6,11 @@
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
+#include <list>
 #include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <set>
 #include <string_view>
 #include <thread>
 #include <utility>
@@ -19,6 +19,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/io/image_file.hpp"
+#include "panonav/storage/memory_address.hpp"
 #include "panonav_server/http_server.hpp"
 #include "panonav_server/loaded_memory.hpp"
 #include "panonav_server/metrics.hpp"
@@ -34,6 +35,10 @@ using nlohmann::ordered_json;
 constexpr std::size_t max_picture_bytes = std::size_t{16} << 20U;
 constexpr std::size_t max_in_flight_bytes = std::size_t{64} << 20U;
 constexpr std::size_t max_waiting_bytes = std::size_t{128} << 20U;
+/// Deadline of an answer, after which its client is told to try again: longer than the silence of a
+/// memory's server and the time of a full queue.
+constexpr std::chrono::seconds request_deadline(30);
+constexpr std::chrono::seconds time_for_last_answers(5);
 constexpr ImageLimits picture_limits{
     .side_px = 16384, .area_px = 33'554'432, .scanned_px = std::int64_t{16} * 33'554'432};
 
@@ -76,13 +81,24 @@ HttpAnswer make_refusal(int status, std::string_view why) {
 }  // namespace
 
 struct LocalisationServer::Implementation {
-  /// A picture that waits for its answer, as long as its client does.
+  /// A request that a memory answers, as long as its client waits.
   struct Job {
     std::string memory;
-    std::string picture;
+    std::string picture;  ///< to be localised; empty: the thumbnail of `view` is asked for
+    std::string view;
     Clock::time_point came = Clock::now();
     std::atomic<bool> answered = false;  ///< then `answer` is there
     HttpAnswer answer;
+  };
+  /// Memories with threads of their own: those in files together, and each one on a server, which
+  /// may be silent for a while.
+  struct Lane {
+    std::vector<std::string> memories;
+    std::condition_variable came;  // a job, or the end
+    std::deque<std::pair<std::weak_ptr<Job>, std::size_t>> waiting;
+    std::size_t waiting_bytes = 0;
+    std::vector<std::thread> workers;
+    std::thread watcher;
   };
 
   Implementation(std::span<const ServedMemory> memories,
@@ -104,6 +120,9 @@ struct LocalisationServer::Implementation {
       at->second.memory = memory;
       at->second.watch.emplace(memory.path);
       at->second.loaded = std::make_shared<LoadedMemory>(memory.path, options);
+      Lane& lane = is_server_address(memory.path) ? lanes.emplace_back() : lanes.front();
+      lane.memories.push_back(memory.name);
+      lane_by_memory[memory.name] = &lane;
     }
     const auto cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
     server.emplace(HttpServerOptions{.address = options.address,
@@ -117,23 +136,29 @@ struct LocalisationServer::Implementation {
                                      .max_body = max_picture_bytes,
                                      .max_bodies = max_in_flight_bytes,
                                      .judge_head = [this](const auto& head) { return judge(head); },
-                                     .last_answers = std::chrono::seconds(5)},
+                                     .last_answers = time_for_last_answers},
                    [this](HttpRequest request) { return answer(std::move(request)); });
-    for (int i = 0; i < (options.threads == 0 ? cores : options.threads); ++i) {
-      workers.emplace_back([this] { work(); });
+    for (Lane& lane : lanes) {
+      if (lane.memories.empty()) continue;
+      for (int i = 0; i < (options.threads == 0 ? cores : options.threads); ++i) {
+        lane.workers.emplace_back([this, &lane] { work(lane); });
+      }
+      lane.watcher = std::thread([this, &lane] { watch(lane); });
     }
-    watcher = std::thread([this] { watch(); });
   }
 
   ~Implementation() {
     {
       const std::lock_guard lock(mutex);
       ending = true;
+      last_answer = Clock::now() + time_for_last_answers;
     }
-    came.notify_all();
     ended.notify_all();
-    watcher.join();
-    for (std::thread& worker : workers) worker.join();
+    for (Lane& lane : lanes) lane.came.notify_all();
+    for (Lane& lane : lanes) {
+      if (lane.watcher.joinable()) lane.watcher.join();
+      for (std::thread& worker : lane.workers) worker.join();
+    }
     server.reset();
   }
 
@@ -202,7 +227,9 @@ struct LocalisationServer::Implementation {
     }
     if (below == "/localise") {
       if (request.method != "POST") return make_refusal(405, "allowed: POST, with a PNG or JPEG");
-      return enqueue(name, std::move(request.body));
+      if (request.body.empty())
+        return make_refusal(422, "the body is empty; allowed: a PNG or JPEG");
+      return enqueue(name, std::move(request.body), "");
     }
     if (request.method != "GET") return make_refusal(405, "allowed: GET");
     if (below.empty()) return make_json_answer(describe(name));
@@ -210,42 +237,41 @@ struct LocalisationServer::Implementation {
     constexpr std::string_view picture = "/picture";
     if (below.starts_with(views) && below.ends_with(picture) &&
         below.size() > views.size() + picture.size()) {
-      return thumbnail(name, decode_percent(below.substr(
-                                 views.size(), below.size() - views.size() - picture.size())));
+      return enqueue(
+          name, "",
+          decode_percent(below.substr(views.size(), below.size() - views.size() - picture.size())));
     }
     return make_refusal(404, "no such path; allowed: localise and views/NAME/picture");
   }
 
-  HttpAnswer enqueue(const std::string& name, std::string picture) {
+  HttpAnswer enqueue(const std::string& name, std::string picture, std::string view) {
     auto job = std::make_shared<Job>();
     job->memory = name;
     const std::size_t bytes = picture.size();
     job->picture = std::move(picture);
+    job->view = std::move(view);
+    Lane& lane = *lane_by_memory.at(name);
     {
       const std::lock_guard lock(mutex);
-      if (ending || waiting.size() >= options.max_waiting ||
-          waiting_bytes + bytes > max_waiting_bytes) {
+      if (ending || lane.waiting.size() >= options.max_waiting ||
+          lane.waiting_bytes + bytes > max_waiting_bytes) {
         return make_refusal(
             503, ending ? "the server is ending" : "too many pictures wait; try again in a moment");
       }
-      waiting_bytes += bytes;
-      waiting.emplace_back(job, bytes);
+      lane.waiting_bytes += bytes;
+      lane.waiting.emplace_back(job, bytes);
     }
-    came.notify_one();
+    lane.came.notify_one();
     return {.later = [job]() -> std::optional<HttpAnswer> {
-      if (!job->answered) return std::nullopt;
-      return std::move(job->answer);
+      if (job->answered) return std::move(job->answer);
+      if (Clock::now() < job->came + request_deadline) return std::nullopt;
+      return make_refusal(503, "there was no answer in time; try again in a moment");
     }};
   }
 
   HttpAnswer list() {
-    std::vector<std::string> names;
-    {
-      const std::lock_guard lock(mutex);
-      for (const auto& [name, one] : served) names.push_back(name);
-    }
     auto found = ordered_json::array();
-    for (const std::string& name : names) found.push_back(describe(name));
+    for (const auto& [name, one] : served) found.push_back(describe(name));
     return make_json_answer({{"memories", std::move(found)}});
   }
 
@@ -256,24 +282,11 @@ struct LocalisationServer::Implementation {
 
   [[nodiscard]] ordered_json describe(const std::string& name) const {
     const auto memory = loaded(name);
-    const SignatureShape& shape = memory->file.header().shape;
+    const SignatureShape& shape = memory->shape;
     return {{"name", name},
             {"views", memory->recogniser.size()},
             {"rows", shape.rows},
             {"components", shape.components}};
-  }
-
-  [[nodiscard]] HttpAnswer thumbnail(const std::string& name, const std::string& view) const {
-    const auto memory = loaded(name);
-    try {
-      const auto picture = memory->thumbnail(view);
-      if (!picture) return make_refusal(404, "the memory has no view of that name with a picture");
-      const bool jpeg = image_format(*picture, "the picture") == ImageFormat::jpeg;
-      return {.type = jpeg ? "image/jpeg" : "image/png",
-              .content = std::string(picture->begin(), picture->end())};
-    } catch (const Error& error) {
-      return make_refusal(500, error.what());
-    }
   }
 
   HttpAnswer metrics() const {
@@ -297,8 +310,10 @@ struct LocalisationServer::Implementation {
     text += describe_metric("panonav_waiting_seconds", "histogram",
                             "Time for which a picture waited for a thread.") +
             queueing.text("panonav_waiting_seconds");
+    std::size_t waiting = 0;
+    for (const Lane& lane : lanes) waiting += lane.waiting.size();
     text += describe_metric("panonav_waiting", "gauge", "Pictures that wait for a thread.") +
-            "panonav_waiting " + std::to_string(waiting.size()) + "\n";
+            "panonav_waiting " + std::to_string(waiting) + "\n";
     text += describe_memories(served);
     text += describe_metric("process_resident_memory_bytes", "gauge",
                             "Memory that the process holds.") +
@@ -308,28 +323,37 @@ struct LocalisationServer::Implementation {
 
   // ---- on the threads that answer
 
-  void work() {
+  void work(Lane& lane) {
     std::unique_lock lock(mutex);
     while (true) {
-      came.wait(lock, [this] { return ending || !waiting.empty(); });
-      if (waiting.empty()) return;  // and it is ending
-      const auto job = waiting.front().first.lock();
-      waiting_bytes -= waiting.front().second;
-      waiting.pop_front();
+      lane.came.wait(lock, [&] { return ending || !lane.waiting.empty(); });
+      if (lane.waiting.empty()) return;  // and it is ending
+      const auto job = lane.waiting.front().first.lock();
+      lane.waiting_bytes -= lane.waiting.front().second;
+      lane.waiting.pop_front();
       if (!job) continue;  // its client has gone
       const auto from = Clock::now();
-      queueing.add(from - job->came);
-      const std::shared_ptr<LoadedMemory> memory = served.at(job->memory).loaded;
-      lock.unlock();
+      Served& one = served.at(job->memory);
+      const bool is_picture = !job->picture.empty();
       bool known = false;
-      HttpAnswer answer = localise(*job, *memory, known);
-      lock.lock();
-      if (answer.status == 200) {
-        answering.add(Clock::now() - from);
-        Served& one = served.at(job->memory);
-        ++(known ? one.known : one.unknown);
+      HttpAnswer answer;
+      if (ending && from > last_answer) {
+        answer = make_refusal(503, "the server is ending");
+      } else if (job->came < one.failed) {
+        // Each would wait for a server that is silent.
+        answer = make_refusal(503, unreadable(job->memory));
       } else {
+        if (is_picture) queueing.add(from - job->came);
+        const std::shared_ptr<LoadedMemory> memory = one.loaded;
+        lock.unlock();
+        answer = is_picture ? localise(*job, *memory, known) : thumbnail(*job, *memory);
+        lock.lock();
+      }
+      if (answer.status >= 400) {
         ++refused[answer.status];
+      } else if (is_picture) {
+        answering.add(Clock::now() - from);
+        ++(known ? one.known : one.unknown);
       }
       job->answer = std::move(answer);
       job->answered = true;
@@ -337,114 +361,127 @@ struct LocalisationServer::Implementation {
     }
   }
 
-  static HttpAnswer localise(const Job& job, const LoadedMemory& memory, bool& known) {
-    bool decoded = false;
+  HttpAnswer localise(const Job& job, const LoadedMemory& memory, bool& known) {
+    std::optional<Observation> observation;
     try {
       const auto* const bytes = reinterpret_cast<const std::uint8_t*>(job.picture.data());
-      const Observation observation(
+      observation.emplace(
           decode_image(std::span(bytes, job.picture.size()), "the picture", picture_limits));
-      decoded = true;
-      const Place place = memory.recogniser.localise(observation);
+    } catch (const Error& error) {
+      return make_refusal(422, error.what());
+    } catch (const std::exception&) {
+      return make_refusal(500, "the picture cannot be decoded");
+    }
+    try {
+      const Place place = memory.recogniser.localise(*observation);
       known = place.known;
       ordered_json json{{"memory", job.memory}};
       json.update(place_json(place));
       return make_json_answer(json);
-    } catch (const FileError& error) {  // the picture's, or the memory's server
-      return make_refusal(decoded ? 503 : 422, error.what());
+    } catch (const FileError& error) {
+      return refuse_for_memory(503, job.memory, error);
     } catch (const Error& error) {
       return make_refusal(422, error.what());
     } catch (const std::exception& error) {
-      return make_refusal(500, error.what());
+      return refuse_for_memory(500, job.memory, error);
     }
   }
 
-  // ---- on the thread that reads changed memories again
+  HttpAnswer thumbnail(const Job& job, LoadedMemory& memory) {
+    try {
+      const auto picture = memory.thumbnail(job.view);
+      if (!picture) return make_refusal(404, "the memory has no view of that name with a picture");
+      const bool jpeg = image_format(*picture, "the picture") == ImageFormat::jpeg;
+      return {.type = jpeg ? "image/jpeg" : "image/png",
+              .content = std::string(picture->begin(), picture->end())};
+    } catch (const std::exception& error) {
+      return refuse_for_memory(memory.is_on_server ? 503 : 500, job.memory, error);
+    }
+  }
 
-  void watch() {
+  /// Tells the fault to whoever runs the server: it may hold addresses, which are not for clients.
+  HttpAnswer refuse_for_memory(int status, const std::string& name, const std::exception& error) {
+    report_loss(name, to_readable_line(error.what()));
+    const std::lock_guard lock(mutex);
+    served.at(name).failed = Clock::now();
+    return make_refusal(status, unreadable(name));
+  }
+  static std::string unreadable(const std::string& name) {
+    return "the memory " + name + " cannot be read now; try again in a moment";
+  }
+
+  /// Notes that a memory cannot be read, once until it is back. Returns true if it was noted.
+  bool report_loss(const std::string& name, const std::string& fault) {
+    {
+      const std::lock_guard lock(mutex);
+      if (std::exchange(served.at(name).is_lost, true)) return false;
+    }
+    if (options.note)
+      options.note(name + ": the memory cannot be read; what was loaded stays: " + fault);
+    return true;
+  }
+
+  // ---- on the thread of a lane that reads changed memories again
+
+  void watch(Lane& lane) {
     std::chrono::milliseconds pause = options.look_every;
     std::unique_lock lock(mutex);
     while (!ended.wait_for(lock, pause, [this] { return ending; })) {
       pause = options.look_every;
-      for (auto& [name, one] : served) {
+      for (const std::string& name : lane.memories) {
+        if (ending) return;
         lock.unlock();
         const auto from = Clock::now();
-        std::shared_ptr<LoadedMemory> again;
-        std::string fault;
-        if (const auto searched = loaded(name); !searched->recogniser.is_held()) {
-          if (refresh(name, searched->recogniser, fault)) {
-            lock.lock();
-            ++(fault.empty() ? one.reloads : one.failed_reloads);
-            lock.unlock();
-          }
-          lock.lock();
-          continue;
-        }
-        const bool same = !one.watch->has_changed();
-        if (!same) {
-          try {
-            again = std::make_shared<LoadedMemory>(one.memory.path, options);
-          } catch (const std::exception& error) {
-            fault = to_readable_line(error.what());
-          }
-          // A memory that grows all the time leaves time to answer.
+        // A memory that grows all the time leaves time to answer.
+        if (update(name)) {
           pause = std::max(pause, std::chrono::duration_cast<std::chrono::milliseconds>(
                                       10 * (Clock::now() - from)));
-          if (options.note) {
-            options.note(name + ": " +
-                         (again ? "the memory was changed; " +
-                                      std::to_string(again->recogniser.size()) + " views"
-                                : "the memory was changed and cannot be read; the memory stays as "
-                                  "it was: " +
-                                      fault));
-          }
         }
-        lock.lock();
-        if (same) continue;
-        ++(again ? one.reloads : one.failed_reloads);
-        if (again) one.loaded.swap(again);
-        lock.unlock();
-        again.reset();
         lock.lock();
       }
     }
   }
 
-  /// Returns true if the memory was changed, or its server lost; then `fault` says why. A fault is
-  /// reported once, until the server is back.
-  bool refresh(const std::string& name, PlaceRecogniser& searched, std::string& fault) {
-    bool changed = false;
+  /// Reads a memory again if it was changed. Returns true if it did, or tried.
+  bool update(const std::string& name) {
+    Served& one = served.at(name);
+    std::string fault;
+    std::shared_ptr<LoadedMemory> again;
+    const auto now = loaded(name);
     try {
-      changed = searched.refresh();
+      if (!now->recogniser.is_held()) {
+        if (now->recogniser.refresh()) again = now;
+      } else if (one.watch->has_changed()) {
+        again = std::make_shared<LoadedMemory>(one.memory.path, options);
+      }
     } catch (const std::exception& error) {
       fault = to_readable_line(error.what());
     }
-    const bool was_reported = !fault.empty() && !lost.insert(name).second;
-    if (fault.empty()) lost.erase(name);
-    if (!changed && (fault.empty() || was_reported)) return false;
-    if (options.note) {
-      options.note(name + ": " +
-                   (changed
-                        ? "the memory was changed; " + std::to_string(searched.size()) + " views"
-                        : "the memory cannot be searched: " + fault));
+    if (!fault.empty() && !report_loss(name, fault)) return true;
+    if (again && options.note) {
+      options.note(name + ": the memory was changed; " + std::to_string(again->recogniser.size()) +
+                   " views");
     }
+    const std::lock_guard lock(mutex);
+    one.is_lost = !fault.empty();
+    if (!again && fault.empty()) return false;
+    ++(again ? one.reloads : one.failed_reloads);
+    if (again) one.loaded.swap(again);
     return true;
   }
 
   const LocalisationServerOptions options;
-  std::set<std::string> lost;  // memories whose server is away; of the watcher
   mutable std::mutex mutex;
-  std::condition_variable came;          // a picture, or the end
-  std::condition_variable ended;         // for the watcher
-  std::map<std::string, Served> served;  // names stay; `watch` is of the watcher
-  std::deque<std::pair<std::weak_ptr<Job>, std::size_t>> waiting;
-  std::size_t waiting_bytes = 0;
+  std::condition_variable ended;         // for the watchers
+  std::map<std::string, Served> served;  // names stay; `watch` is of the lane's watcher
+  std::list<Lane> lanes{1};              // the first of the memories in files
+  std::map<std::string, Lane*> lane_by_memory;
   std::map<int, std::uint64_t> refused;
   Histogram answering;
   Histogram queueing;
   bool ending = false;
+  Clock::time_point last_answer;  // when it is ending
   std::optional<HttpServer> server;
-  std::vector<std::thread> workers;
-  std::thread watcher;
 };
 
 LocalisationServer::LocalisationServer(std::span<const ServedMemory> memories,

@@ -12,6 +12,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import urllib.error
 import urllib.request
@@ -188,6 +189,73 @@ def searched(server, folder):
             one.end()
 
 
+def stalled(server, folder):
+    """While a server of memories hangs, `serve` answers /health and for other memories, tells clients of its own to
+    try again, without an address, and ends when it is asked to; a verb waits no longer than a lock does."""
+    memory = server.memory("searched")
+    process = subprocess.Popen(
+        [PANONAV, "serve", f"file={folder / 'hall.panonav'}", f"m={memory}", "--listen", "0", "--json",
+         "--max-held-views", "0", "--threads", "1"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    line = process.stdout.readline() or process.stderr.read()
+    assert line.startswith("{"), line
+    url = json.loads(line)["url"].rstrip("/")
+    picture = next((folder / "grid").glob("*.png")).read_bytes()
+    answers = []
+
+    def ask(path, body=None):
+        began = time.monotonic()
+        try:
+            with urllib.request.urlopen(urllib.request.Request(url + path, body), timeout=120) as answer:
+                said = answer.status, answer.read().decode(errors="replace")
+        except urllib.error.HTTPError as error:
+            said = error.code, error.read().decode()
+        answers.append((path, *said, time.monotonic() - began))
+        return said[0]
+
+    assert ask("/v1/memories/m/localise", picture) == ask("/v1/memories/file/localise", picture) == 200
+    hung = [int((server.folder / "data/postmaster.pid").read_text().split()[0])] + [int(pid) for pid in server.sql(
+        "SELECT pid FROM pg_stat_activity WHERE backend_type = 'client backend' AND pid <> pg_backend_pid()").split()]
+    assert len(hung) >= 3, hung
+    for pid in hung:
+        os.kill(pid, signal.SIGSTOP)
+    try:
+        waiting = [threading.Thread(target=ask, args=("/v1/memories/m" + path, body)) for path, body in
+                   2 * (("/localise", picture), ("/views/view_00003.png/picture", None))]
+        for thread in waiting:
+            thread.start()
+        answers.clear()
+        for _ in range(5):
+            for path, body in (("/health", None), ("/v1/memories", None), ("/metrics", None),
+                               ("/v1/memories/file/localise", picture),
+                               ("/v1/memories/file/views/view_00003.png/picture", None)):
+                assert ask(path, body) == 200, answers[-1]
+        others = max(seconds for path, *_, seconds in answers if not path.startswith("/v1/memories/m/"))
+        for thread in waiting:
+            thread.join()
+        own = [answer for answer in answers if answer[0].startswith("/v1/memories/m/")]
+        assert len(own) == 4 and all(status == 503 for _, status, *_ in own), own
+        assert not any(re.search("postgres|host=|panonav@|/", text) for _, _, text, _ in own), own
+        late = threading.Thread(target=lambda: subprocess.run(
+            ["curl", "--silent", "--max-time", "60", "--data-binary", "@-", url + "/v1/memories/m/localise"],
+            input=picture, capture_output=True))
+        late.start()
+        time.sleep(0.5)
+        began = time.monotonic()
+        process.send_signal(signal.SIGTERM)
+        noted = process.communicate(timeout=100)[1]
+        late.join()
+        assert process.returncode == 0 and "cannot be read" in noted, noted
+        print(f"a server that hangs: others answered within {others:.2f} s, 503 after {max(one[3] for one in own):.1f} "
+              f"s, ended after {time.monotonic() - began:.1f} s")
+    finally:
+        process.kill()
+        for pid in hung:
+            try:
+                os.kill(pid, signal.SIGCONT)
+            except ProcessLookupError:
+                pass
+
+
 def roles(server, folder):
     server.sql("""CREATE ROLE reads LOGIN IN ROLE panonav_reader; CREATE ROLE adds LOGIN IN ROLE panonav_contributor;
         CREATE ROLE curates LOGIN IN ROLE panonav_curator; CREATE ROLE stranger LOGIN;
@@ -350,6 +418,7 @@ def main():
             print("served")
             searched(server, folder)
             print("searched")
+            stalled(server, folder)
             roles(server, folder)
             print("roles")
             synchronised(server, folder)

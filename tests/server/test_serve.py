@@ -1,18 +1,102 @@
 #!/usr/bin/env python3
-"""panonav serve as clients meet it that nobody here wrote: Python's http.client, and curl where it is installed.
+"""panonav serve as clients meet it that nobody here wrote: Python's http.client, and curl where it is installed; and
+as strangers attack it: prints how many of 200 authorised requests were answered within a second.
 
 Usage: test_serve.py PANONAV
 """
+import contextlib
 import http.client
 import json
+import multiprocessing
+import os
 import pathlib
 import re
+import selectors
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
+import time
 import urllib.parse
+
+HOSTILE = 200  # connections at a time
+POST = b"POST /v1/memories/hall/localise HTTP/1.1\r\nHost: localhost\r\nContent-Length: 16000000\r\n"
+# Words of a stranger once it is connected, and then again and again.
+ATTACKS = [
+    (b"", b""),  # nothing at all
+    (b"GET /v1/mem", b"o"),  # a head without an end
+    (POST + b"\r\n", b""),  # a body that does not come
+    (POST + b"Expect: 100-continue\r\n\r\n", b"x"),
+    (POST + b"Authorization: Bearer another-token-of-some-length\r\n\r\n", b"x" * 1000),
+    (b"GET /health HTTP/1.1\r\nHost: localhost\r\n\r\n", b""),  # stays after its answer
+    (b"", b"GET /health HTTP/1.1\r\nHost: localhost\r\n\r\n" * 10),
+    (b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03", b"\0"),
+]
+
+
+def attack(address: tuple[str, int]) -> None:
+    """Keeps up HOSTILE connections until it is killed."""
+    selector = selectors.DefaultSelector()
+
+    def connect(number: int) -> None:
+        peer = socket.socket()
+        peer.setblocking(False)
+        with contextlib.suppress(BlockingIOError):
+            peer.connect(address)
+        selector.register(peer, selectors.EVENT_READ, [number, ATTACKS[number % len(ATTACKS)][0]])
+
+    for number in range(HOSTILE):
+        connect(number)
+    while os.getppid() == multiprocessing.parent_process().pid:
+        for key, _ in selector.select(0.02):
+            try:
+                gone = not key.fileobj.recv(65536)
+            except OSError:
+                gone = True
+            if gone:
+                selector.unregister(key.fileobj)
+                key.fileobj.close()
+                connect(key.data[0])
+        for key in list(selector.get_map().values()):
+            with contextlib.suppress(OSError):
+                number, unsaid = key.data
+                key.fileobj.send(unsaid or ATTACKS[number % len(ATTACKS)][1])
+                key.data[1] = b""
+
+
+def serve_under_attack(place: urllib.parse.SplitResult, picture: bytes, token: str) -> None:
+    """Authorised requests are answered, on new connections and on one that stays."""
+    attacker = multiprocessing.get_context("spawn").Process(
+        target=attack, args=((place.hostname, place.port),), daemon=True)
+    attacker.start()
+    headers = {"Authorization": f"Bearer {token}"}
+    try:
+        time.sleep(3)
+        durations = []
+        staying = http.client.HTTPConnection(place.hostname, place.port, timeout=60)
+        for number in range(200):
+            client = staying if number % 4 == 0 else http.client.HTTPConnection(place.hostname, place.port, timeout=60)
+            began = time.monotonic()
+            if number % 2:
+                client.request("GET", "/v1/memories", headers=headers)
+            else:
+                client.request("POST", "/v1/memories/hall/localise", picture, headers)
+            response = client.getresponse()
+            response.read()
+            assert response.status == 200, response.status
+            durations.append(time.monotonic() - began)
+            if client is not staying:
+                client.close()
+            time.sleep(0.02)
+        durations.sort()
+        print(f"serve at {HOSTILE} hostile connections: {sum(one < 1.0 for one in durations)} of {len(durations)} "
+              f"authorised requests within 1 s; median {1e3 * durations[100]:.1f} ms, longest "
+              f"{1e3 * durations[-1]:.1f} ms")
+    finally:
+        attacker.kill()
+        attacker.join()
 
 
 def main() -> int:
@@ -85,6 +169,8 @@ def main() -> int:
                 client.request("GET", "/v1/memories/hall", headers=headers)
                 assert client.getresponse().status == status
                 client.close()
+            picture = (recording / next(iter(expected))).read_bytes()
+            serve_under_attack(place, picture, "a-token-of-some-length")
             server.send_signal(signal.SIGINT)
             assert server.wait(timeout=120) == 0
         finally:

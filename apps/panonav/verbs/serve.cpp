@@ -7,6 +7,7 @@
 #include "cli/stop_signals.hpp"
 #include "cli/verbs.hpp"
 #include "panonav/storage/memory_address.hpp"
+#include "panonav/storage/memory_scheme.hpp"
 #include "panonav_server/localisation_server.hpp"
 #include "runs/listening_place.hpp"
 
@@ -78,6 +79,7 @@ ExitCode serve(const Arguments& declared, const ServeArguments& arguments, Sessi
   if (std::ranges::none_of(memories, is_server_address, &server::ServedMemory::path)) {
     declared.refuse_unused({"--max-held-views"}, "where all memories are files");
   }
+  set_reply_timeout(std::chrono::seconds(5));  // clients wait
   const server::LocalisationServer server(memories, options);
   std::unique_lock lock(mutex);
   if (session.json()) {
@@ -90,6 +92,7 @@ ExitCode serve(const Arguments& declared, const ServeArguments& arguments, Sessi
   }
   session.flush();
   stop_requested.wait(lock, [&] { return stopped; });
+  set_reply_timeout(std::chrono::seconds(2));
   return ExitCode::done;
 }
 

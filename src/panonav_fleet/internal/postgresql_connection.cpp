@@ -2,25 +2,23 @@
 
 #include <libpq-fe.h>
 #include <poll.h>
+#include <sys/socket.h>
 
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cerrno>
 #include <chrono>
-#include <limits>
 #include <utility>
 
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/storage/memory_address.hpp"
+#include "panonav/storage/memory_scheme.hpp"
 
 namespace panonav::fleet {
 
 namespace {
-
-// Numbers of PostgreSQL's own types, which never change.
-constexpr unsigned bytea_type = 17, int8_type = 20, text_type = 25, float8_type = 701,
-                   int8_array_type = 1016, text_array_type = 1009;
 
 struct ClearResult {
   void operator()(pg_result* result) const noexcept { PQclear(result); }
@@ -33,133 +31,6 @@ std::string get_sqlstate(const pg_result* result) {
 }
 
 }  // namespace
-
-void append_big_endian(std::string& bytes, std::uint64_t value, int size) {
-  for (int shift = 8 * (size - 1); shift >= 0; shift -= 8) {
-    bytes += static_cast<char>((value >> static_cast<unsigned>(shift)) & 255U);
-  }
-}
-
-std::uint64_t read_big_endian(std::string_view bytes) {
-  std::uint64_t word = 0;
-  for (const char c : bytes) word = (word << 8U) | static_cast<unsigned char>(c);
-  return word;
-}
-
-PostgresqlValues::Value& PostgresqlValues::next(unsigned type) {
-  return values_.emplace_back(Value{type, false, {}});
-}
-
-PostgresqlValues& PostgresqlValues::add(std::int64_t value) {
-  append_big_endian(next(int8_type).bytes, static_cast<std::uint64_t>(value), 8);
-  return *this;
-}
-
-PostgresqlValues& PostgresqlValues::add(const std::optional<double>& value) {
-  Value& field = next(float8_type);
-  field.null = !value;
-  // Checksums do not know the sign of zero, as SQLite does not keep it.
-  if (value) append_big_endian(field.bytes, std::bit_cast<std::uint64_t>(*value + 0.0), 8);
-  return *this;
-}
-
-PostgresqlValues& PostgresqlValues::add(std::string_view text) {
-  next(text_type).bytes = text;
-  return *this;
-}
-
-PostgresqlValues& PostgresqlValues::add_null() {
-  next(text_type).null = true;
-  return *this;
-}
-
-PostgresqlValues& PostgresqlValues::add(std::span<const std::uint8_t> bytes) {
-  next(bytea_type).bytes.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  return *this;
-}
-
-PostgresqlValues& PostgresqlValues::add(std::span<const std::int64_t> values) {
-  std::string& bytes = next(int8_array_type).bytes;
-  // Dimensions, whether there are nulls, the type, then the size and first index of the dimension.
-  append_big_endian(bytes, values.empty() ? 0 : 1, 4);
-  append_big_endian(bytes, 0, 4);
-  append_big_endian(bytes, int8_type, 4);
-  if (!values.empty()) {
-    append_big_endian(bytes, values.size(), 4);
-    append_big_endian(bytes, 1, 4);
-  }
-  for (const std::int64_t value : values) {
-    append_big_endian(bytes, 8, 4);
-    append_big_endian(bytes, static_cast<std::uint64_t>(value), 8);
-  }
-  return *this;
-}
-
-PostgresqlValues& PostgresqlValues::add(std::span<const std::string> texts) {
-  std::string& bytes = next(text_array_type).bytes;
-  append_big_endian(bytes, texts.empty() ? 0 : 1, 4);
-  append_big_endian(bytes, 0, 4);
-  append_big_endian(bytes, text_type, 4);
-  if (!texts.empty()) {
-    append_big_endian(bytes, texts.size(), 4);
-    append_big_endian(bytes, 1, 4);
-  }
-  for (const std::string& text : texts) {
-    append_big_endian(bytes, text.size(), 4);
-    bytes += text;
-  }
-  return *this;
-}
-
-CopyRows& CopyRows::begin_row(int fields) {
-  append_big_endian(bytes_, static_cast<std::uint64_t>(fields), 2);
-  return *this;
-}
-
-CopyRows& CopyRows::add(std::int64_t value) {
-  append_big_endian(bytes_, 8, 4);
-  append_big_endian(bytes_, static_cast<std::uint64_t>(value), 8);
-  return *this;
-}
-
-CopyRows& CopyRows::add(const std::optional<double>& value) {
-  if (!value) return add_null();
-  return add(std::bit_cast<std::int64_t>(*value + 0.0));
-}
-
-CopyRows& CopyRows::add(std::string_view text) {
-  append_big_endian(bytes_, text.size(), 4);
-  bytes_ += text;
-  return *this;
-}
-
-CopyRows& CopyRows::add(std::span<const std::uint8_t> bytes) {
-  return add(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
-}
-
-CopyRows& CopyRows::add_null() {
-  append_big_endian(bytes_, 0xFFFFFFFFU, 4);
-  return *this;
-}
-
-std::string_view CopyRows::finish() {
-  append_big_endian(bytes_, 0xFFFFU, 2);
-  return bytes_;
-}
-
-PostgresqlValues::Bound PostgresqlValues::bound() const {
-  Bound bound;
-  for (const Value& value : values_) {
-    if (value.bytes.size() > static_cast<std::size_t>(std::numeric_limits<int>::max()) / 2) {
-      throw ContractError("a text or picture for a server", "too long", "less than 1 GB");
-    }
-    bound.types.push_back(value.type);
-    bound.data.push_back(value.null ? nullptr : value.bytes.data());
-    bound.lengths.push_back(static_cast<int>(value.bytes.size()));
-    bound.binary.push_back(1);
-  }
-  return bound;
-}
 
 void PostgresqlRows::Clear::operator()(pg_result* result) const noexcept {
   PQclear(result);
@@ -226,14 +97,17 @@ PostgresqlConnection::PostgresqlConnection(const ServerAddress& address)
       "connect_timeout",           "tcp_user_timeout", "keepalives_idle",
       "keepalives_interval",       "keepalives_count", "dbname",
       "fallback_application_name", "client_encoding",  nullptr};
-  const std::array<const char*, 9> values{"10",      "20000", "10",   "5", "3", address.uri.c_str(),
-                                          "panonav", "UTF8",  nullptr};
+  const std::string seconds = std::to_string(
+      std::min<std::int64_t>(10, std::chrono::ceil<std::chrono::seconds>(reply_timeout()).count()));
+  const std::array<const char*, 9> values{seconds.c_str(),     "20000",   "10",   "5",    "3",
+                                          address.uri.c_str(), "panonav", "UTF8", nullptr};
   connection_.reset(PQconnectdbParams(keys.data(), values.data(), 1));
   if (connection_ == nullptr)
     throw FileError(printable_address_.native(), "cannot be opened: out of memory");
   if (PQstatus(connection_.get()) != CONNECTION_OK) {
     throw FileError(printable_address_.native(), "cannot be opened: " + message());
   }
+  PQsetnonblocking(connection_.get(), 1);
   PQsetNoticeProcessor(
       connection_.get(), [](void*, const char*) {}, nullptr);
   constexpr int oldest = 150000;
@@ -245,17 +119,18 @@ PostgresqlConnection::PostgresqlConnection(const ServerAddress& address)
   }
   // The text of statements must mean the same whatever the server's settings are, and what was
   // acknowledged must be on its disk.
-  execute(
-      "SET search_path = pg_catalog; SET lock_timeout = '10s'; SET bytea_output = hex; "
-      "SET extra_float_digits = 1; SET standard_conforming_strings = on; "
-      "SELECT set_config('synchronous_commit', 'on', false) "
-      "WHERE current_setting('synchronous_commit') = 'off'");
+  execute("SET search_path = pg_catalog; SET lock_timeout = '" + seconds +
+          "s'; SET bytea_output = hex; "
+          "SET extra_float_digits = 1; SET standard_conforming_strings = on; "
+          "SELECT set_config('synchronous_commit', 'on', false) "
+          "WHERE current_setting('synchronous_commit') = 'off'");
   // A robot that lost its network during a change holds the memory's lock until the server knows.
   // Not every system has all of these settings; one message, as a network may be slow.
   try_execute(
       "DO $$ DECLARE wanted text[]; BEGIN FOREACH wanted SLICE 1 IN ARRAY ARRAY["
       "['tcp_keepalives_idle', '10'], ['tcp_keepalives_interval', '5'], "
-      "['tcp_keepalives_count', '3'], ['tcp_user_timeout', '20000']] LOOP "
+      "['tcp_keepalives_count', '3'], ['tcp_user_timeout', '20000'], "
+      "['client_connection_check_interval', '5s']] LOOP "
       "BEGIN PERFORM set_config(wanted[1], wanted[2], false); "
       "EXCEPTION WHEN OTHERS THEN NULL; END; END LOOP; END $$");
 }
@@ -307,12 +182,63 @@ PostgresqlRows PostgresqlConnection::checked(pg_result* raw) {
   return {printable_address_, result.release()};
 }
 
+bool PostgresqlConnection::wait_for_server(bool is_sending) const {
+  using Clock = std::chrono::steady_clock;
+  pollfd waiting{PQsocket(connection_.get()), POLLIN, 0};
+  if (is_sending) waiting.events |= POLLOUT;
+  // In steps, as the time-out may be shortened meanwhile.
+  constexpr int step_ms = 250;
+  const auto begin = Clock::now();
+  int ready = 0;
+  while ((ready = ::poll(&waiting, 1, step_ms)) == 0) {
+    if (Clock::now() - begin < reply_timeout()) continue;
+    // Whatever else is asked of this connection fails at once.
+    ::shutdown(PQsocket(connection_.get()), SHUT_RDWR);
+    throw FileError(printable_address_.native(),
+                    "its server did not answer within " +
+                        to_text(std::chrono::duration<double>(reply_timeout()).count()) +
+                        " s; a change that was under way is there whole or not at all");
+  }
+  if (ready < 0) return errno == EINTR;
+  return (waiting.revents & ~POLLOUT) == 0 || PQconsumeInput(connection_.get()) == 1;
+}
+
+bool PostgresqlConnection::flush() const {
+  int unsent = 0;
+  while ((unsent = PQflush(connection_.get())) > 0 && wait_for_server(true)) {
+  }
+  return unsent == 0;
+}
+
+pg_result* PostgresqlConnection::next_result() const {
+  while (flush() && PQisBusy(connection_.get()) != 0 && wait_for_server(false)) {
+  }
+  return PQgetResult(connection_.get());
+}
+
+void PostgresqlConnection::send(const std::string& sql, const PostgresqlValues* values) const {
+  int sent = 0;
+  if (values == nullptr) {
+    sent = PQsendQuery(connection_.get(), sql.c_str());
+  } else {
+    const auto bound = values->bound();
+    sent = PQsendQueryParams(connection_.get(), sql.c_str(), static_cast<int>(bound.types.size()),
+                             bound.types.data(), bound.data.data(), bound.lengths.data(),
+                             bound.binary.data(), 1);
+  }
+  if (sent == 0) fail(nullptr);
+}
+
 pg_result* PostgresqlConnection::exchange(const std::string& sql, const PostgresqlValues* values) {
-  if (values == nullptr) return PQexec(connection_.get(), sql.c_str());
-  const auto bound = values->bound();
-  return PQexecParams(connection_.get(), sql.c_str(), static_cast<int>(bound.types.size()),
-                      bound.types.data(), bound.data.data(), bound.lengths.data(),
-                      bound.binary.data(), 1);
+  send(sql, values);
+  Result last;
+  while (pg_result* const result = next_result()) {
+    last.reset(result);
+    const auto status = PQresultStatus(result);
+    if (status == PGRES_COPY_IN || status == PGRES_COPY_OUT) break;
+    if (PQstatus(connection_.get()) != CONNECTION_OK) break;
+  }
+  return last.release();
 }
 
 void PostgresqlConnection::execute(const std::string& sql) {
@@ -331,29 +257,33 @@ PostgresqlRows PostgresqlConnection::run(const std::string& sql, const Postgresq
 }
 
 void PostgresqlConnection::discard_results() noexcept {
-  while (pg_result* rest = PQgetResult(connection_.get())) {
-    const auto status = PQresultStatus(rest);
-    PQclear(rest);
-    if (status == PGRES_COPY_IN) PQputCopyEnd(connection_.get(), "given up");
-    char* sent = nullptr;
-    while (status == PGRES_COPY_OUT && PQgetCopyData(connection_.get(), &sent, 0) > 0) {
-      PQfreemem(sent);
+  try {
+    while (pg_result* rest = next_result()) {
+      const auto status = PQresultStatus(rest);
+      PQclear(rest);
+      if (status == PGRES_COPY_IN) PQputCopyEnd(connection_.get(), "given up");
+      char* sent = nullptr;
+      while (status == PGRES_COPY_OUT && next_copy_data(sent) > 0) PQfreemem(sent);
+      if (PQstatus(connection_.get()) != CONNECTION_OK) return;
     }
-    if (PQstatus(connection_.get()) != CONNECTION_OK) return;
+  } catch (const FileError&) {  // NOLINT(bugprone-empty-catch): nothing more comes
   }
+}
+
+int PostgresqlConnection::next_copy_data(char*& sent) const {
+  int size = 0;
+  while ((size = PQgetCopyData(connection_.get(), &sent, 1)) == 0) {
+    if (!wait_for_server(false)) return PQgetCopyData(connection_.get(), &sent, 0);
+  }
+  return size;
 }
 
 void PostgresqlConnection::stream(const std::string& sql, const PostgresqlValues& values,
                                   const std::function<void(const PostgresqlRows&)>& take) {
-  const auto bound = values.bound();
-  if (PQsendQueryParams(connection_.get(), sql.c_str(), static_cast<int>(bound.types.size()),
-                        bound.types.data(), bound.data.data(), bound.lengths.data(),
-                        bound.binary.data(), 1) == 0) {
-    fail(nullptr);
-  }
+  send(sql, &values);
   PQsetSingleRowMode(connection_.get());
   try {
-    while (pg_result* result = PQgetResult(connection_.get())) {
+    while (pg_result* result = next_result()) {
       const PostgresqlRows rows = checked(result);
       if (rows.size() > 0) take(rows);
     }
@@ -365,19 +295,29 @@ void PostgresqlConnection::stream(const std::string& sql, const PostgresqlValues
 
 void PostgresqlConnection::copy_in(const std::string& sql, std::string_view bytes) {
   {
-    Result begun(PQexec(connection_.get(), sql.c_str()));
+    Result begun(exchange(sql, nullptr));
     if (PQresultStatus(begun.get()) != PGRES_COPY_IN) fail(begun.get());
   }
   constexpr std::size_t piece = 1 << 20;
   for (std::size_t at = 0; at < bytes.size(); at += piece) {
     const auto size = static_cast<int>(std::min(piece, bytes.size() - at));
-    if (PQputCopyData(connection_.get(), bytes.data() + at, size) != 1) {
+    int put = 0;
+    while ((put = PQputCopyData(connection_.get(), bytes.data() + at, size)) == 0) {
+      if (!wait_for_server(true)) break;
+    }
+    if (put != 1) {
       discard_results();
       fail(nullptr);
     }
+    // libpq would keep all that the network does not take.
+    flush();
   }
-  if (PQputCopyEnd(connection_.get(), nullptr) != 1) fail(nullptr);
-  Result done(PQgetResult(connection_.get()));
+  int ended = 0;
+  while ((ended = PQputCopyEnd(connection_.get(), nullptr)) == 0) {
+    if (!wait_for_server(true)) break;
+  }
+  if (ended != 1) fail(nullptr);
+  Result done(next_result());
   discard_results();
   if (PQresultStatus(done.get()) != PGRES_COMMAND_OK) fail(done.get());
 }
@@ -386,7 +326,7 @@ void PostgresqlConnection::copy_out(
     const std::string& sql, int fields,
     const std::function<void(std::span<const std::optional<std::string_view>>)>& take) {
   {
-    Result begun(PQexec(connection_.get(), sql.c_str()));
+    Result begun(exchange(sql, nullptr));
     if (PQresultStatus(begun.get()) != PGRES_COPY_OUT) fail(begun.get());
   }
   struct Free {
@@ -400,7 +340,7 @@ void PostgresqlConnection::copy_out(
   int size = 0;
   try {
     char* sent = nullptr;
-    while ((size = PQgetCopyData(connection_.get(), &sent, 0)) > 0) {
+    while ((size = next_copy_data(sent)) > 0) {
       const std::unique_ptr<char, Free> kept(sent);
       std::string_view rest(sent, static_cast<std::size_t>(size));
       const auto read_bytes_of_row = [&](std::size_t count) {
@@ -429,7 +369,7 @@ void PostgresqlConnection::copy_out(
     discard_results();
     throw;
   }
-  Result done(PQgetResult(connection_.get()));
+  Result done(next_result());
   discard_results();
   if (size != -1 || PQresultStatus(done.get()) != PGRES_COMMAND_OK) fail(done.get());
 }
@@ -460,7 +400,10 @@ void PostgresqlConnection::try_cancel() noexcept {
 }
 
 void PostgresqlConnection::try_execute(const char* sql) noexcept {
-  PQclear(PQexec(connection_.get(), sql));
+  try {
+    PQclear(exchange(sql, nullptr));
+  } catch (const FileError&) {  // NOLINT(bugprone-empty-catch): as promised
+  }
 }
 
 }  // namespace panonav::fleet

@@ -71,8 +71,9 @@ class PostgresqlRows {
   std::unique_ptr<pg_result, Clear> result_;
 };
 
-/// A connection to a PostgreSQL server. Whatever the server refuses and a lost connection are
-/// thrown as a FileError of one line, without a password.
+/// A connection to a PostgreSQL server. Whatever the server refuses, a lost connection, and a
+/// server that is silent for `reply_timeout` are thrown as a FileError of one line, without a
+/// password.
 class PostgresqlConnection {
  public:
   /// Throws FileError: no such server, wrong password, no such database, older than version 15.
@@ -108,6 +109,17 @@ class PostgresqlConnection {
   struct Close {
     void operator()(pg_conn* connection) const noexcept;
   };
+  /// Waits until the server sends something, or if `is_sending`, takes something. False if the
+  /// connection is lost: the next call of libpq says why. After the time-out shuts the connection
+  /// and throws FileError.
+  [[nodiscard]] bool wait_for_server(bool is_sending) const;
+  /// Sends what libpq still holds. False if the connection is lost.
+  bool flush() const;
+  void send(const std::string& sql, const PostgresqlValues* values) const;
+  /// The next result of what was sent; null after the last.
+  [[nodiscard]] pg_result* next_result() const;
+  /// Same as PQgetCopyData, but waits: the size of `sent`, -1 at the end, -2 on a fault.
+  [[nodiscard]] int next_copy_data(char*& sent) const;
   [[nodiscard]] pg_result* exchange(const std::string& sql, const PostgresqlValues* values);
   PostgresqlRows checked(pg_result* result);
   [[noreturn]] void fail(const pg_result* result) const;
