@@ -1,5 +1,6 @@
 #include "panonav_ros2/mission.hpp"
 
+#include <ctime>
 #include <fstream>
 #include <istream>
 #include <locale>
@@ -37,6 +38,34 @@ std::optional<Mission> read_mission(std::istream& in) {
   return mission;
 }
 
+/// When something happened, in one run of the system.
+struct BootTime {
+  std::string boot;  ///< number of the run; empty: not known
+  double seconds = 0.0;
+};
+
+BootTime read_boot_time() {
+  BootTime now;
+  std::ifstream("/proc/sys/kernel/random/boot_id") >> now.boot;
+  timespec clock{};
+  if (clock_gettime(CLOCK_BOOTTIME, &clock) != 0) now.boot.clear();
+  now.seconds = static_cast<double>(clock.tv_sec) + 1e-9 * static_cast<double>(clock.tv_nsec);
+  return now;
+}
+
+/// Why the robot is not sent on by a mission that was written then; empty: it is.
+std::string find_fault(const BootTime& written, double file_age_s, double max_age_s) {
+  const BootTime now = read_boot_time();
+  if (now.boot.empty() || written.boot != now.boot) {
+    return " was written before the system was started";
+  }
+  for (const double age_s : {now.seconds - written.seconds, file_age_s}) {
+    if (!(age_s >= 0.0)) return " comes from the future; was a clock set back?";
+    if (age_s > max_age_s) return " is " + format_fixed(age_s, 0) + " s old";
+  }
+  return "";
+}
+
 }  // namespace
 
 MissionFile::MissionFile(const std::filesystem::path& memory, double max_age_s)
@@ -51,7 +80,10 @@ void MissionFile::store_if_due(const Mission& mission, const std::optional<Pose2
                                  ? "goal " + to_line(*mission.goal)
                                  : "repeat " + to_text(mission.along_m.value_or(0.0)) + " " +
                                        to_text(mission.min_correlation) + " " + mission.route;
-  write_file(path_, to_line(*map_from_odom) + target);
+  const BootTime written = read_boot_time();
+  std::string text = to_line(*map_from_odom) + target;
+  if (mission.goal) text.pop_back();
+  write_file(path_, text + "\nwritten " + written.boot + " " + to_text(written.seconds) + "\n");
 }
 
 void MissionFile::remove() {
@@ -70,10 +102,14 @@ std::optional<Mission> MissionFile::load(WarningLog& log) {
   std::ifstream in(path_);
   in.imbue(std::locale::classic());  // as it was written, whatever the host program has set
   auto mission = read_mission(in);
-  if (mission && age_s <= max_age_s_) return mission;
-  log.warn("mission", path_.string() +
-                          (mission ? " is " + format_fixed(age_s, 0) + " s old" : " is damaged") +
-                          "; the robot is not sent on");
+  std::string word;
+  BootTime at;
+  std::string fault = " is damaged";
+  if (mission && in >> word >> at.boot >> at.seconds && word == "written") {
+    fault = find_fault(at, age_s, max_age_s_);
+    if (fault.empty()) return mission;
+  }
+  log.warn("mission", path_.string() + fault + "; the robot is not sent on");
   remove();
   return std::nullopt;
 }

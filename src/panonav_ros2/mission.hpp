@@ -21,7 +21,8 @@ struct Mission {
 };
 
 /// Stores the mission of a running node in a file next to its memory, so that a restarted node
-/// continues it.
+/// continues it. The file says in which run of the system it was written, and when by a clock that
+/// nobody sets and that runs while the system sleeps.
 class MissionFile {
  public:
   /// `max_age_s`: older missions are not continued; 0: nothing is stored.
@@ -31,8 +32,9 @@ class MissionFile {
   /// node died.
   void store_if_due(const Mission& mission, const std::optional<Pose2>& map_from_odom);
   void remove();
-  /// Reads the mission of another node. `nullopt` if there is no file; one that is too old or
-  /// damaged is removed with a warning.
+  /// Reads the mission of another node. `nullopt` if there is no file; one that is too old, comes
+  /// from the future or from before the system was started, or is damaged is removed with a
+  /// warning.
   [[nodiscard]] std::optional<Mission> load(WarningLog& log);
 
  private:
