@@ -15,7 +15,9 @@
 #include <utility>
 #include <variant>
 
+#include "panonav/core/address.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/core/text.hpp"
 #include "panonav_recordings/internal/decoded_video.hpp"
 #include "panonav_recordings/internal/v4l2_camera.hpp"
 #include "panonav_recordings/jpeg_stream.hpp"
@@ -102,21 +104,27 @@ class CameraInput final : public Input {
 
 class AddressInput final : public Input {
  public:
-  AddressInput(const std::string& address, const ImageLimits& limits)
+  AddressInput(const std::string& address, const ImageLimits& limits, double max_silence_s)
       : address_(address),
+        max_silence_s_(max_silence_s),
         video_({"-fflags", "nobuffer", "-flags", "low_delay", "-protocol_whitelist",
                 "rtsp,rtp,rtmp,http,https,tls,tcp,udp,crypto", "-i", address},
                "", address, limits) {}
   std::optional<RawPicture> take() override {
-    auto frame = video_.next();
+    const double max_wait_s =
+        std::exchange(is_first_, false) ? 3.0 * max_silence_s_ : max_silence_s_;
+    auto frame = video_.next(std::chrono::milliseconds(static_cast<int>(1000.0 * max_wait_s)));
     if (frame) return RawPicture{std::move(frame->picture), now_s(), Steady::now(), 0};
-    throw FileError(address_,
-                    "has broken off" + (video_.trouble().empty() ? "" : ": " + video_.trouble()));
+    throw FileError(
+        address_, "has broken off" +
+                      (video_.trouble().empty() ? "" : ": " + without_passwords(video_.trouble())));
   }
   void stop() noexcept override { video_.stop(); }
 
  private:
   std::string address_;
+  double max_silence_s_;
+  bool is_first_ = true;
   DecodedVideo video_;
 };
 
@@ -151,7 +159,7 @@ struct LivePictures::Implementation {
   [[nodiscard]] std::shared_ptr<Input> open() const {
     if (address == "-") return std::make_shared<StandardInput>(stop_event);
     if (is_camera(address)) return std::make_shared<CameraInput>(address, options.size, stop_event);
-    return std::make_shared<AddressInput>(address, options.limits);
+    return std::make_shared<AddressInput>(address, options.limits, options.max_silence_s);
   }
 
   /// Takes pictures until the input ends.
@@ -163,6 +171,8 @@ struct LivePictures::Implementation {
       if (stopped) return;
       if (newest) ++counts.dropped;
       newest = std::pair(std::move(*picture), input);
+      if (std::exchange(is_broken_off, false))
+        notes.push_back(mask_credentials(address) + " sends images again");
       arrived.notify_one();
     }
   }
@@ -172,10 +182,15 @@ struct LivePictures::Implementation {
       try {
         take_all();
         break;
-      } catch (const Error&) {
+      } catch (const Error& error) {
         const std::lock_guard lock(mutex);
         if (stopped) break;
         ++counts.interruptions;
+        if (!std::exchange(is_broken_off, true)) {
+          notes.push_back(to_readable_line(error.what()) +
+                          "; it is opened again until images come");
+        }
+        arrived.notify_one();
       }
       while (!stopped) {
         pollfd wait{stop_event, POLLIN, 0};
@@ -206,6 +221,8 @@ struct LivePictures::Implementation {
   std::shared_ptr<Input> input;
   std::optional<std::pair<RawPicture, std::shared_ptr<Input>>> newest;
   Counts counts;
+  std::vector<std::string> notes;  // of which the caller of `next` was not told yet
+  bool is_broken_off = false;
   bool has_been_read = false;  // for the first picture
   std::atomic<bool> stopped = false;
   bool ended = false;
@@ -215,6 +232,7 @@ struct LivePictures::Implementation {
 LivePictures::LivePictures(std::string address, const LiveOptions& options)
     : implementation_(std::make_unique<Implementation>(std::move(address), options)) {
   auto& self = *implementation_;
+  remember_address(self.address);
   if (!is_live(self.address)) {
     throw FileError(self.address,
                     "is no live source; allowed: -, /dev/video*, rtsp://, rtmp://, http://, "
@@ -256,13 +274,22 @@ std::optional<LivePicture> LivePictures::next() {
   auto& self = *implementation_;
   while (true) {
     std::optional<std::pair<RawPicture, std::shared_ptr<Input>>> newest;
+    std::vector<std::string> notes;
     {
       std::unique_lock lock(self.mutex);
       if (!std::exchange(self.has_been_read, true)) self.counts.dropped = 0;
-      self.arrived.wait(lock, [&] { return self.newest || self.ended || self.stopped; });
-      if (self.stopped || !self.newest) return std::nullopt;
-      newest = std::exchange(self.newest, std::nullopt);
-      self.consumed.notify_one();
+      self.arrived.wait(
+          lock, [&] { return self.newest || self.ended || self.stopped || !self.notes.empty(); });
+      notes.swap(self.notes);
+      if (notes.empty()) {
+        if (self.stopped || !self.newest) return std::nullopt;
+        newest = std::exchange(self.newest, std::nullopt);
+        self.consumed.notify_one();
+      }
+    }
+    if (!notes.empty()) {
+      if (self.options.note) std::ranges::for_each(notes, self.options.note);
+      continue;
     }
     auto& [received, input] = *newest;
     if (auto* const picture = std::get_if<Image>(&received.picture)) {

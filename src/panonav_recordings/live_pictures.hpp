@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -34,12 +35,18 @@ struct LiveOptions {
   /// Size requested from a camera, which may give its nearest. Empty: the camera's setting.
   std::optional<ImageSize> size;
   double reopen_after_s = 1.0;  ///< until a source that broke off is opened again
-  ImageLimits limits;           ///< of each picture; those beyond count as damaged
+  /// Longest silence of an address, after which it has broken off; three times as long before its
+  /// first image, which may take a while.
+  double max_silence_s = 5.0;
+  /// Receives a line when the source has broken off, and when its images come again; `next` calls.
+  std::function<void(const std::string& line)> note;
+  ImageLimits limits;  ///< of each picture; those beyond count as damaged
 };
 
 /// Reads pictures of a source that does not wait. A thread receives them, and `next` returns the
 /// newest; those between are dropped and counted. Standard input waits instead, and none of its
-/// pictures is dropped. A camera or address that breaks off is opened again until `stop`. Pictures
+/// pictures is dropped. A camera or address that breaks off or
+/// falls silent is opened again until `stop`. Pictures
 /// that cannot be decoded are counted as damaged. Memory: two pictures, packed or not.
 class LivePictures {
  public:

@@ -15,6 +15,7 @@
 #include "panonav/core/error.hpp"
 #include "panonav/core/random.hpp"
 #include "panonav/core/text.hpp"
+#include "panonav/io/image_file.hpp"
 #include "panonav_recordings/jpeg_stream.hpp"
 #include "support/temporary_folder.hpp"
 #include "support/text.hpp"
@@ -153,6 +154,53 @@ TEST(LivePictures, AnAddressGivesPicturesIsOpenedAgainAndStops) {
   stopper.join();
   EXPECT_FALSE(live->next());
   server.join();
+}
+
+TEST(LivePictures, AnAddressThatFallsSilentIsOpenedAgain) {
+  // Whoever calls gets twenty pictures and then nothing, but stays connected.
+  const int port = free_port();
+  const int listener = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  sockaddr_in place{};
+  place.sin_family = AF_INET;
+  place.sin_port = htons(static_cast<std::uint16_t>(port));
+  place.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  ASSERT_EQ(bind(listener, reinterpret_cast<sockaddr*>(&place), sizeof(place)), 0);
+  ASSERT_EQ(listen(listener, 4), 0);
+  const Image black(64, 32, 3);
+  const Bytes picture = encode_jpeg(black.view());
+  std::string text;
+  for (int i = 0; i < 20; ++i) {
+    text +=
+        "--frame\r\nContent-Type: image/jpeg\r\nContent-Length: " + std::to_string(picture.size()) +
+        "\r\n\r\n" + std::string(picture.begin(), picture.end()) + "\r\n";
+  }
+  std::vector<int> callers;
+  std::thread server([&] {
+    for (int caller = 0; (caller = accept(listener, nullptr, nullptr)) >= 0;) {
+      callers.push_back(caller);
+      (void)!send(caller, text.data(), text.size(), MSG_NOSIGNAL);
+    }
+  });
+  const std::string address = "tcp://root:secret@127.0.0.1:" + std::to_string(port);
+  std::vector<std::string> notes;
+  {
+    LivePictures live(address, {.reopen_after_s = 0.05,
+                                .max_silence_s = 2.0,
+                                .note = [&](const std::string& line) { notes.push_back(line); }});
+    std::size_t seen = 0;
+    while (notes.size() < 2 && live.next()) ++seen;
+    EXPECT_GE(live.counts().interruptions, 1U);
+    EXPECT_GE(seen, 1U);
+  }
+  const std::string shown = "tcp://root:***@127.0.0.1:" + std::to_string(port);
+  ASSERT_EQ(notes.size(), 2U);
+  EXPECT_EQ(notes[0],
+            shown + ": has sent no picture in time; it is opened again until images come");
+  EXPECT_EQ(notes[1], shown + " sends images again");
+  shutdown(listener, SHUT_RDWR);
+  server.join();
+  for (const int caller : callers) close(caller);
+  close(listener);
 }
 
 TEST(LivePictures, WhatCannotBeOpenedIsRefusedInOneLine) {

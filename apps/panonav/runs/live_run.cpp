@@ -4,6 +4,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <deque>
+#include <iostream>
 #include <mutex>
 #include <thread>
 #include <utility>
@@ -136,7 +137,7 @@ void declare_live(Arguments& arguments, LiveArguments& live) {
 
 std::unique_ptr<recordings::LiveObservations> open_live(
     const Arguments& arguments, const std::string& input, const PictureArguments& pictures,
-    const std::optional<PictureSource>& remembered, const LiveArguments& live) {
+    const std::optional<PictureSource>& remembered, const LiveArguments& live, Session& session) {
   arguments.refuse_unused(
       {"--image-topic", "--odometry-topic", "--odometry-frames", "--imu-topic", "--recursive"},
       "where " + input + " is a live source");
@@ -148,6 +149,7 @@ std::unique_ptr<recordings::LiveObservations> open_live(
     throw UsageError("say what the images of " + input + " show with --kind");
   }
   recordings::LiveOptions options;
+  options.note = [&session](const std::string& line) { session.note(line); };
   if (live.camera_width) options.size = ImageSize{*live.camera_width, *live.camera_height};
   return std::make_unique<recordings::LiveObservations>(input, stated ? *stated : *remembered,
                                                         options);
@@ -185,7 +187,15 @@ struct LiveRun::Implementation {
         selection(to_selection(part)),
         count(arguments.count),
         session(its_session),
-        printer(session, live == nullptr) {}
+        printer(session, live == nullptr) {
+    // A note would flush the lines first, and so wait for a reader that has stalled.
+    if (live != nullptr) tied = std::cerr.tie(nullptr);
+  }
+  ~Implementation() {
+    if (live != nullptr) std::cerr.tie(tied);
+  }
+  Implementation(const Implementation&) = delete;
+  Implementation& operator=(const Implementation&) = delete;
 
   void add_delay() {
     constexpr std::size_t max_kept = 100'000;
@@ -207,6 +217,7 @@ struct LiveRun::Implementation {
   LiveCounts counts;
   std::size_t delays = 0;
   LinePrinter printer;
+  std::ostream* tied = nullptr;  // what the stream of notes flushed before
 };
 
 LiveRun::LiveRun(ObservationSource& source, const PartArguments& part, const LiveArguments& live,

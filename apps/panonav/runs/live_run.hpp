@@ -25,10 +25,11 @@ struct LiveArguments {
 void declare_live(Arguments& arguments, LiveArguments& live);
 
 /// A live source (`is_live`) whose pictures lie as the user says, or else as `remembered`: refuses
-/// what goes with recordings only. Throws UsageError, FileError.
+/// what goes with recordings only. Notes of the source go to the session, which must outlive it.
+/// Throws UsageError, FileError.
 [[nodiscard]] std::unique_ptr<recordings::LiveObservations> open_live(
     const Arguments& arguments, const std::string& input, const PictureArguments& pictures,
-    const std::optional<PictureSource>& remembered, const LiveArguments& live);
+    const std::optional<PictureSource>& remembered, const LiveArguments& live, Session& session);
 /// Refuses what goes with live sources only; --count, too, where a verb ends with its input.
 void refuse_live(const Arguments& arguments, const std::string& input, bool count);
 

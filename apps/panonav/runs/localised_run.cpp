@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "cli/json.hpp"
+#include "panonav/core/address.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/io/atomic_file.hpp"
@@ -246,7 +247,8 @@ class LocalisedRun {
   void open_source(const Arguments& declared) {
     const auto remembered = remembered_source(declared, arguments_);
     if (live_) {
-      auto live = open_live(declared, input(), arguments_.pictures, remembered, arguments_.live);
+      auto live =
+          open_live(declared, input(), arguments_.pictures, remembered, arguments_.live, session_);
       pictures_ = live->pictures();
       source_ = std::move(live);
       return;
@@ -317,7 +319,7 @@ class LocalisedRun {
   /// Stores what waits, and says what was changed. A reader of the lines may never go on.
   std::string finish() {
     std::string text;
-    const auto changes = memory_->finish("update from " + input());
+    const auto changes = memory_->finish("update from " + mask_credentials(input()));
     if (arguments_.add) text += ", " + std::to_string(memory_->added()) + " views added";
     if (changes) {
       has_changed_ = changes->certain > 0;

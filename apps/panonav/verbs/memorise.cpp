@@ -128,7 +128,7 @@ void print_result(const MemoriseArguments& arguments, const MemoryFile& memory,
 ExitCode memorise_live(const Arguments& declared, const MemoriseArguments& arguments,
                        const std::optional<PictureSource>& remembered, Session& session) {
   const auto source =
-      open_live(declared, arguments.input, arguments.pictures, remembered, arguments.live);
+      open_live(declared, arguments.input, arguments.pictures, remembered, arguments.live, session);
   std::vector<Skipped> skipped;
   Memoriser memoriser(arguments.memory,
                       make_options(arguments, source->pictures(), skipped, session));

@@ -304,7 +304,7 @@ ExitCode track_live(const Arguments& declared, const TrackArguments& arguments,
                     const MemoryFile& file, Session& session) {
   declared.refuse_unused({"--report"}, "where " + arguments.dataset + " is a live source");
   const auto source =
-      open_live(declared, arguments.dataset, {}, file.header().source, arguments.live);
+      open_live(declared, arguments.dataset, {}, file.header().source, arguments.live, session);
   LiveTrack track(declared, arguments, file, source->pictures(), session);
   LiveRun loop(*source, arguments.part, arguments.live, session);
   loop.run(

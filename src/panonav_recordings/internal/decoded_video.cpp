@@ -86,9 +86,31 @@ bool DecodedVideo::read_messages() {
   return true;
 }
 
-std::optional<DecodedFrame> DecodedVideo::next() {
+DecodedVideo::Ready DecodedVideo::wait(bool for_picture,
+                                       const std::optional<Clock::time_point>& until) const {
+  std::array<pollfd, 2> pipes{pollfd{for_picture ? child_->output() : -1, POLLIN, 0},
+                              pollfd{messages_end_ ? -1 : child_->errors(), POLLIN, 0}};
+  int ready = -1;
+  while (ready < 0) {  // a signal
+    const auto left = until ? std::chrono::ceil<std::chrono::milliseconds>(*until - Clock::now())
+                            : std::chrono::milliseconds(-1);
+    ready =
+        poll(pipes.data(), pipes.size(), until ? std::max(0, static_cast<int>(left.count())) : -1);
+  }
+  if (ready == 0) {
+    child_->stop();
+    throw FileError(about_, "has sent no picture in time");
+  }
+  return {pipes[0].revents != 0, pipes[1].revents != 0};
+}
+
+std::optional<DecodedFrame> DecodedVideo::next(std::optional<std::chrono::milliseconds> max_wait) {
+  std::optional<Clock::time_point> until;
+  if (max_wait) until = Clock::now() + *max_wait;
   while (heads_.empty()) {
-    if (messages_end_ || !read_messages()) return std::nullopt;
+    if (messages_end_) return std::nullopt;
+    static_cast<void>(wait(false, until));
+    if (!read_messages()) return std::nullopt;
   }
   const Head head = heads_.front();
   heads_.pop_front();
@@ -105,11 +127,9 @@ std::optional<DecodedFrame> DecodedVideo::next() {
   std::size_t filled = 0;
   while (filled < pixels.size()) {
     // Messages are read meanwhile: a full pipe would stop the program.
-    std::array<pollfd, 2> pipes{pollfd{child_->output(), POLLIN, 0},
-                                pollfd{messages_end_ ? -1 : child_->errors(), POLLIN, 0}};
-    if (poll(pipes.data(), pipes.size(), -1) < 0) continue;
-    if (pipes[1].revents != 0) read_messages();
-    if (pipes[0].revents == 0) continue;
+    const Ready ready = wait(true, until);
+    if (ready.messages) read_messages();
+    if (!ready.picture) continue;
     const auto got = read(child_->output(), pixels.data() + filled, pixels.size() - filled);
     if (got <= 0) return std::nullopt;
     filled += static_cast<std::size_t>(got);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <deque>
 #include <memory>
@@ -32,8 +33,10 @@ class DecodedVideo {
   DecodedVideo(const std::vector<std::string>& input, const std::string& chosen, std::string about,
                const ImageLimits& limits);
 
-  /// Empty at the end. Throws FileError on pictures beyond the limits.
-  [[nodiscard]] std::optional<DecodedFrame> next();
+  /// Empty at the end. Throws FileError on pictures beyond the limits, and if there is no whole one
+  /// within `max_wait`; then the program is ended.
+  [[nodiscard]] std::optional<DecodedFrame> next(
+      std::optional<std::chrono::milliseconds> max_wait = {});
   /// Ends the program; `next`, which another thread may be in, then gives nothing more.
   void stop() const noexcept { child_->stop(); }
   /// Returns the last complaint of ffmpeg; empty without one.
@@ -47,6 +50,14 @@ class DecodedVideo {
   };
   /// Reads from the pipe of messages; false at its end.
   bool read_messages();
+  /// Waits until pictures (if `for_picture`) or messages have something, or ended; returns which.
+  /// Throws FileError when the time is over.
+  struct Ready {
+    bool picture = false;
+    bool messages = false;
+  };
+  using Clock = std::chrono::steady_clock;
+  [[nodiscard]] Ready wait(bool for_picture, const std::optional<Clock::time_point>& until) const;
   void take_line(const std::string& line);
 
   std::string about_;
