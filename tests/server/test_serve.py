@@ -160,6 +160,17 @@ def main() -> int:
         finally:
             server.kill()
 
+        for words, warned in ((("0.0.0.0:0",), True), (("127.0.0.1:0",), False),
+                              (("0.0.0.0:0", "--token-file", str(folder / "token")), False)):
+            server = subprocess.Popen([panonav, "serve", str(memory), "--json", "--listen", *words],
+                                      stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+            try:
+                server.stdout.readline()
+                server.send_signal(signal.SIGTERM)
+                assert ("warning: whoever reaches 0.0.0.0" in server.communicate(timeout=120)[1]) == warned, words
+            finally:
+                server.kill()
+
         server = subprocess.Popen([panonav, "serve", f"hall={memory}", "--listen", "0", "--json",
                                    "--token-file", str(folder / "token")], stdout=subprocess.PIPE, text=True)
         try:

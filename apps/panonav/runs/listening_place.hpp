@@ -9,6 +9,8 @@ namespace panonav::command {
 struct ListeningPlace {
   std::string address = "127.0.0.1";
   int port = 0;
+  /// True if only programs of this machine reach it.
+  [[nodiscard]] bool is_local() const { return address.starts_with("127."); }
 };
 
 /// Parses "8080" or "192.168.1.5:8080". Throws UsageError, which names the flag.

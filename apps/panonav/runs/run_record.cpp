@@ -5,6 +5,7 @@
 #include <memory>
 #include <utility>
 
+#include "panonav/core/address.hpp"
 #include "panonav/core/error.hpp"
 #include "panonav/core/text.hpp"
 #include "runs/listening_place.hpp"
@@ -56,10 +57,14 @@ RunRecord::RunRecord(const RunRecordArguments& arguments, std::span<const std::s
     viewer::ViewServerOptions options;
     options.address = place.address;
     options.port = place.port;
-    options.title = "panonav: " + (read.empty() ? std::string() : read.front());
+    options.title = "panonav: " + (read.empty() ? std::string() : mask_credentials(read.front()));
     options.replay = !live;
     options.takes = offers.takes;
     if (!offers.memory.empty()) options.thumbnail = make_thumbnail_reader(offers.memory);
+    if (!place.is_local()) {
+      session_.note("warning: the page is sent to the network of " + place.address +
+                    " without encryption: whoever listens there sees it and its address");
+    }
     viewer_.emplace(options);
     session_.prompt("Open " + viewer_->url() + " in a browser" +
                     (live ? "" : "; the run waits for it"));

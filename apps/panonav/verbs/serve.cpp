@@ -79,6 +79,11 @@ ExitCode serve(const Arguments& declared, const ServeArguments& arguments, Sessi
   if (std::ranges::none_of(memories, is_server_address, &server::ServedMemory::path)) {
     declared.refuse_unused({"--max-held-views"}, "where all memories are files");
   }
+  if (!place.is_local() && options.token.empty()) {
+    session.note("warning: whoever reaches " + place.address +
+                 " is answered, and sees thumbnails; --token-file FILE answers only those who send "
+                 "a token");
+  }
   set_reply_timeout(std::chrono::seconds(5));  // clients wait
   const server::LocalisationServer server(memories, options);
   std::unique_lock lock(mutex);
