@@ -42,6 +42,10 @@ TEST(MemoryAddress, PasswordsAreNotShown) {
     EXPECT_EQ(without_passwords(plain), plain);
     EXPECT_EQ(mask_credentials(plain), plain);
   }
+  for (const char* plain : {"serving at http://127.0.0.1:80; Ctrl-C ends it",
+                            "\033[1mat http://127.0.0.1:80\033[0m", "http://h:80: away"}) {
+    EXPECT_EQ(without_passwords(plain), plain);
+  }
   EXPECT_EQ(without_passwords("at rtsp://root:secret@10.0.0.7:554/main, again"),
             "at rtsp://root:***@10.0.0.7:554/main, again");
   EXPECT_EQ(mask_credentials("http://10.0.0.7/video.cgi?User=root&Pwd=se'c r@et&size=1"),

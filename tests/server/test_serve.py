@@ -160,6 +160,14 @@ def main() -> int:
         finally:
             server.kill()
 
+        server = subprocess.Popen([panonav, "serve", str(memory), "--listen", "0"], stdout=subprocess.PIPE, text=True)
+        try:
+            line = server.stdout.readline()
+            assert re.fullmatch(r"serving at http://127\.0\.0\.1:\d+; Ctrl-C ends it\n", line), line
+        finally:
+            server.kill()
+            server.communicate()
+
         for words, warned in ((("0.0.0.0:0",), True), (("127.0.0.1:0",), False),
                               (("0.0.0.0:0", "--token-file", str(folder / "token")), False)):
             server = subprocess.Popen([panonav, "serve", str(memory), "--json", "--listen", *words],

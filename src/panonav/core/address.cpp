@@ -57,18 +57,8 @@ std::string escape(std::string_view text,
   return escaped;
 }
 
-}  // namespace
-
-bool is_address(std::string_view text) {
-  const std::size_t colon = text.find(separator);
-  return colon != std::string_view::npos && colon > 0 &&
-         std::ranges::all_of(text.substr(0, colon), [](char c) {
-           return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-                  c == '+' || c == '-' || c == '.';
-         });
-}
-
-std::string mask_credentials(std::string_view address) {
+// `is_whole`: nothing follows the address, so that what is no number is no port.
+std::string mask(std::string_view address, bool is_whole) {
   const std::size_t scheme = address.find(separator);
   if (scheme == std::string_view::npos) return std::string(address);
   std::vector<bool> hidden(address.size(), false);
@@ -80,7 +70,8 @@ std::string mask_credentials(std::string_view address) {
   const std::size_t at = address.rfind('@');
   if (at != std::string_view::npos && colon < at) {
     hide(colon + 1, at);
-  } else if (colon != std::string_view::npos && !address.substr(scheme + 3).starts_with('[')) {
+  } else if (is_whole && colon != std::string_view::npos &&
+             !address.substr(scheme + 3).starts_with('[')) {
     // No port: a password whose host was forgotten.
     const std::size_t end = std::min(address.find_first_of("/?#,", colon), address.size());
     const std::string_view port = address.substr(colon + 1, end - colon - 1);
@@ -105,6 +96,21 @@ std::string mask_credentials(std::string_view address) {
     }
   }
   return masked;
+}
+
+}  // namespace
+
+bool is_address(std::string_view text) {
+  const std::size_t colon = text.find(separator);
+  return colon != std::string_view::npos && colon > 0 &&
+         std::ranges::all_of(text.substr(0, colon), [](char c) {
+           return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                  c == '+' || c == '-' || c == '.';
+         });
+}
+
+std::string mask_credentials(std::string_view address) {
+  return mask(address, true);
 }
 
 void remember_address(std::string_view address) {
@@ -132,7 +138,7 @@ std::string without_passwords(std::string_view text) {
     const std::size_t colon = std::min(rest.find(separator), rest.size());
     const std::size_t end =
         colon == rest.size() ? colon : std::min(rest.find_first_of(" \t\n\"'", colon), rest.size());
-    result += mask_credentials(rest.substr(0, end));
+    result += mask(rest.substr(0, end), false);
     rest.remove_prefix(end);
   }
   return result;
