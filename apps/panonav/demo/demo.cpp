@@ -314,10 +314,11 @@ void print(const DemoResults& done, Session& session) {
                 "; median error " + format_median(done.track.errors_m, 100.0, 1, "cm") + "; " +
                 of(done.track.wrong, done.track.localised) + " answers wrong");
   const auto centimetres = [](double metres) { return format_fixed(100.0 * metres, 0) + " cm"; };
-  session.print("  arranged by similarity alone: " +
-                (done.maps.lattice ? centimetres(done.maps.lattice->truth_from_map.rms_m) : "none") +
-                " from the true places; map of a drive: " + centimetres(done.maps.map_rms_m) +
-                " from the true path, its odometry alone " + centimetres(done.maps.wheels_rms_m));
+  session.print(
+      "  arranged by similarity alone: " +
+      (done.maps.lattice ? centimetres(done.maps.lattice->truth_from_map.rms_m) : "none") +
+      " from the true places; map of a drive: " + centimetres(done.maps.map_rms_m) +
+      " from the true path, its odometry alone " + centimetres(done.maps.wheels_rms_m));
   session.print("  home from one metre away: " + of(done.homing.arrived, done.homing.runs.size()) +
                 " runs ended within 10 cm; median " +
                 format_fixed(100.0 * median(done.homing.distances_m), 1) + " cm");
