@@ -49,7 +49,8 @@ class CommaLocale {
 }  // namespace panonav::testing
 
 /// Declares `locale`, and skips the test where functions of C have no decimal comma to use.
-#define PANONAV_REQUIRE_COMMA_LOCALE(locale)                                                      \
-  const panonav::testing::CommaLocale locale;                                                     \
-  if (!locale.has_c()) GTEST_SKIP() << "no locale with decimal commas, and no localedef to make " \
-                                       "one"
+#define PANONAV_REQUIRE_COMMA_LOCALE(locale)                                 \
+  const panonav::testing::CommaLocale locale;                                \
+  if (!locale.has_c())                                                       \
+  GTEST_SKIP() << "no locale with decimal commas, and no localedef to make " \
+                  "one"
