@@ -9,6 +9,7 @@
 #include "lab/rows.hpp"
 #include "lab/s06/support.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/relative_pose/turn_correlation.hpp"
 #include "panonav_viewer/plot.hpp"
@@ -140,7 +141,7 @@ void draw_spectrum(const Arena& arena, Reproduction& result) {
           "power falls with frequency to the power of minus this, k = 1 .. 15", slope, "",
           std::nullopt, std::pair(1.8, 1.8));
   viewer::Series line{
-      .label = "slope " + std::to_string(std::round(100.0 * slope) / 100.0).substr(0, 4),
+      .label = "slope " + to_fixed_text(std::round(100.0 * slope) / 100.0, 6).substr(0, 4),
       .style = viewer::SeriesStyle::lines};
   for (int k = 1; k <= top; ++k) {
     line.add(k, std::exp(mean_log - slope * (std::log(k) - mean_k)));
