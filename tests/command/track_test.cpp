@@ -288,14 +288,13 @@ TEST_F(Track, PositionsThatCannotBeMetresAreRefused) {
   far[1].x_m = 1e300;
   write_run(*folder_ / "far", *world_, far);
   const auto line = refusal({"track", memory(), *folder_ / "far"});
-  EXPECT_TRUE(contains(line, "odometry of " + view_name(1)));
-  EXPECT_TRUE(contains(line, "at most 1e"));
+  EXPECT_TRUE(contains(line, "line 3: x_m is 1e+300; allowed: -10000000 to 10000000 m"));
   std::vector<std::string> start{"track", memory(),      run(), "--start-x-m",
                                  "1e12",  "--start-y-m", "0",   "--start-heading-deg",
                                  "0"};
   expect_refusal(start, "--start-x-m");
   // Far, but possible: no answer and no crash.
-  start[4] = "9e8";
+  start[4] = "9e6";
   EXPECT_LE(run_panonav(start).exit_code, 1);
 }
 

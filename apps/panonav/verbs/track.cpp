@@ -7,6 +7,7 @@
 #include "cli/verbs.hpp"
 #include "panonav/core/statistics.hpp"
 #include "panonav/geometry/angles.hpp"
+#include "panonav/geometry/position_bound.hpp"
 #include "panonav/io/trajectory_file.hpp"
 #include "reports/report_page.hpp"
 #include "reports/track_report.hpp"
@@ -33,9 +34,6 @@ void visit_options(StartOptions& options, OptionVisitor& visitor) {
   };
   table.visit(options, visitor);
 }
-
-/// Largest plausible coordinate, metres.
-constexpr double farthest_m = 1e9;
 
 struct TrackArguments {
   std::string memory;
@@ -68,25 +66,14 @@ void check_arguments(const Arguments& declared, const TrackArguments& arguments)
         "--start-deviation-m and --start-heading-deviation-deg go with --start-x-m, --start-y-m "
         "and --start-heading-deg");
   }
-  if (x && std::max(std::abs(*arguments.start_x_m), std::abs(*arguments.start_y_m)) > farthest_m) {
+  if (x && !(is_position(*arguments.start_x_m) && is_position(*arguments.start_y_m))) {
     throw UsageError("--start-x-m and --start-y-m are " + to_text(*arguments.start_x_m) + " and " +
-                     to_text(*arguments.start_y_m) + "; allowed: " + to_text(-farthest_m) + " to " +
-                     to_text(farthest_m));
+                     to_text(*arguments.start_y_m) + "; allowed: " + std::string(position_range));
   }
   if (arguments.filter.min_particles > arguments.filter.max_particles) {
     throw UsageError("--min-particles is " + std::to_string(arguments.filter.min_particles) +
                      "; allowed: at most --max-particles, which is " +
                      std::to_string(arguments.filter.max_particles));
-  }
-}
-
-void check_odometry(const Dataset& run, const std::string& folder) {
-  for (const auto& entry : run.entries) {
-    const double largest = std::max(std::abs(entry.odometry->x_m), std::abs(entry.odometry->y_m));
-    if (largest > farthest_m) {
-      throw FileError(folder, "odometry of " + entry.file + " is " + to_text(largest) +
-                                  " m from its origin; allowed: at most " + to_text(farthest_m));
-    }
   }
 }
 
@@ -340,7 +327,6 @@ ExitCode track_run(const Arguments& declared, const TrackArguments& arguments, S
   refuse_live(declared, arguments.dataset, true);
   Dataset run = read_run(arguments.dataset, arguments.topics, arguments.part, file, session);
   const bool visual = odometry_poses(run).empty();
-  if (!visual) check_odometry(run, arguments.dataset);
   std::vector<double> seconds;
   if (arguments.tum)
     seconds = trajectory_stamps(run, "track", arguments.dataset, *arguments.tum, session);

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/geometry/position_bound.hpp"
 #include "panonav/pipeline/internal/learnt_models.hpp"
 
 namespace panonav {
@@ -76,6 +77,8 @@ MonteCarloEstimate Tracker::observe(const PackedSignature& view) {
 }
 
 void Tracker::move_to(const Pose2& odometry) {
+  require(is_position(odometry.x_m), "x_m of the odometry", odometry.x_m, position_range);
+  require(is_position(odometry.y_m), "y_m of the odometry", odometry.y_m, position_range);
   auto& last = implementation_->odometry;
   if (last) implementation_->localiser.move(inverse(*last) * odometry);
   last = odometry;

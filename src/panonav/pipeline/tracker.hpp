@@ -49,7 +49,7 @@ class Tracker {
   /// Takes only a picture into account, encoded by `encoder()` on another thread.
   MonteCarloEstimate observe(const PackedSignature& view);
   /// Moves the robot by the difference from the odometry before; the first call only sets it.
-  /// `odometry`: absolute, in its own frame.
+  /// `odometry`: absolute, in its own frame. Throws ContractError beyond `max_position_m`.
   void move_to(const Pose2& odometry);
 
   [[nodiscard]] const VisualMemory& memory() const noexcept;  ///< Returns the held views.
