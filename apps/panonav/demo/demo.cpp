@@ -433,6 +433,7 @@ Run declare_demo(Arguments& arguments) {
   auto seed = std::make_shared<std::optional<std::uint64_t>>();
   arguments.option("-o,--out FOLDER", *out,
                    "Folder for the report: a new one, or that of an earlier demo");
+  arguments.writes({"--out"});
   arguments.option("--seed", *seed, "Seed of the simulated office (default: 1)");
   arguments.flag("--quick", values->quick,
                  "A smoke run: fewer and smaller images, fewer questions and missions");

@@ -61,11 +61,11 @@ RunRecord::RunRecord(const RunRecordArguments& arguments, std::span<const std::s
     options.replay = !live;
     options.takes = offers.takes;
     if (!offers.memory.empty()) options.thumbnail = make_thumbnail_reader(offers.memory);
+    viewer_.emplace(options);
     if (!place.is_local()) {
       session_.note("warning: the page is sent to the network of " + place.address +
                     " without encryption: whoever listens there sees it and its address");
     }
-    viewer_.emplace(options);
     session_.prompt("Open " + viewer_->url() + " in a browser" +
                     (live ? "" : "; the run waits for it"));
   }
