@@ -75,13 +75,14 @@ bool is_named_by_toml(const fs::path& path, const FileId& id) {
   return false;
 }
 
-bool is_read_through(const std::string& value, const FileId& id) {
+bool is_read_through(const std::string& value, const FileId& id, bool is_page) {
   // "NAME=MEMORY" of serve names a file, too.
   for (const std::string& path : {value, value.substr(value.find('=') + 1)}) {
     const auto found = find_file(path);
     if (!found) continue;
     if (found->id == id) return true;
     if (S_ISDIR(found->mode)) {
+      if (is_page) continue;  // no recording has one
       std::set<FileId> visited{found->id};
       if (is_in_folder(path, id, visited)) return true;
       continue;
@@ -102,7 +103,8 @@ void require_separate_outputs(std::span<const NamedValue> values) {
     fs::path path = values[i].value;
     auto found = find_file(path);
     // Only the page in a folder would be replaced; a verb that fills a folder wants an empty one.
-    if (found && S_ISDIR(found->mode)) found = find_file(path /= "index.html");
+    const bool is_page = found && S_ISDIR(found->mode);
+    if (is_page) found = find_file(path /= "index.html");
     const bool exists = found && S_ISREG(found->mode);
     if (found && !exists) continue;  // a pipe or a device takes what anybody writes
     for (std::size_t j = 0; j < values.size(); ++j) {
@@ -110,9 +112,10 @@ void require_separate_outputs(std::span<const NamedValue> values) {
       const bool is_same_name =
           j < i && other.is_output &&
           fs::path(other.value).lexically_normal() == fs::path(values[i].value).lexically_normal();
-      const bool is_same_file = exists && i != j &&
-                                (other.is_output ? is_file(other.value, found->id)
-                                                 : is_read_through(other.value, found->id));
+      const bool is_same_file =
+          exists && i != j &&
+          (other.is_output ? is_file(other.value, found->id)
+                           : is_read_through(other.value, found->id, is_page));
       if (is_same_name || is_same_file) {
         throw UsageError(values[i].name + " is " + path.string() + ", which " + other.name + " " +
                          other.value + (other.is_output ? " writes" : " reads") +
