@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 
+#include "cli/option_values.hpp"
 #include "cli/texts.hpp"
 #include "panonav/core/text.hpp"
 

@@ -12,6 +12,7 @@
 #include "panonav/geometry/alignment.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/mapping/internal/lattice_graph.hpp"
+#include "panonav/mapping/internal/lattice_springs.hpp"
 #include "panonav/mapping/internal/multidimensional_scaling.hpp"
 
 namespace panonav {
