@@ -43,7 +43,7 @@ void expect_eight_parts(const fs::path& folder) {
   std::size_t at = page.find("</nav>");
   ASSERT_NE(at, std::string::npos);
   int number = 0;
-  for (const char* title : {"What the robot sees", "Localisation", "Accuracy on demand", "Tracking",
+  for (const char* title : {"The robot's camera", "Localisation", "Adjustable accuracy", "Tracking",
                             "Maps", "Homing", "Routes", "Navigation"}) {
     const std::string part = std::to_string(++number);
     EXPECT_LT(page.find("<a href=\"#part" + part + "\">"), page.find("</nav>")) << title;

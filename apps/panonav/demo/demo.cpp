@@ -51,35 +51,36 @@ viewer::ReportPicture add_camera_part(const DemoRecordings& recordings, Session&
   const MirrorCircle& found = recordings.mirror;
   const std::string centre_px = format_fixed(
       std::hypot(found.centre.u_px - truth.centre.u_px, found.centre.v_px - truth.centre.v_px), 2);
-  page.begin_part("What the robot sees",
+  page.begin_part("The robot's camera",
                   {centre_px + " pixels",
-                   "is the error of the mirror's centre, calibrated from the robot's own images"});
+                   "error of the mirror's centre after calibration from the robot's own images"});
   page.add_text(
-      "A camera looks up into a curved mirror and sees all around at once. The dark disc in the "
-      "middle is the camera itself. First, calibration finds the mirror in some of the raw images: "
-      "centre, rim and inner radius. Everything below uses these values, not the simulator's.");
+      "The camera points up at a curved mirror and takes images of the whole surroundings. The "
+      "dark disc in the middle is the reflection of the camera. First, a calibration finds the "
+      "centre, the rim and the inner radius of the mirror in some of the raw images. All parts of "
+      "this page use the calibrated values, not the true values of the simulation.");
   viewer::ReportPicture mirror = embed_image(
       colour.view(), "Raw image of the mirror camera, " + std::to_string(truth.image_size.width) +
                          " x " + std::to_string(truth.image_size.height) +
-                         " (in colour for you; the robot works on grey)");
+                         " pixels. The robot itself uses grey images.");
   page.add_pictures(
       {mirror,
        embed_image(overlay.view(),
                    "Calibration from " + std::to_string(recordings.calibrated_on) +
-                       " raw images: rim green, inner radius orange, centre red. The centre "
-                       "has an error of " +
-                       centre_px + " pixels, the rim of " +
+                       " raw images. Green: rim; orange: inner radius; red: centre. The error of "
+                       "the centre is " +
+                       centre_px + " pixels. The error of the rim's radius is " +
                        format_fixed(std::abs(found.rim_radius_px - truth.rim_radius_px), 2) +
                        ".")});
   page.add_text(
-      "The image is then unwrapped to a panoramic cylinder. Of each of its 80 rows only the first "
-      "15 Fourier components are kept, 2.4 kB a view. Their magnitudes do not change when the "
-      "robot rotates, so they identify the place at any heading; their phases give the heading.");
-  page.add_views(
-      {{std::move(cylinder),
-        {},
-        "The same view as a cylinder of 512 x 80 pixels, forward in the middle, left on the "
-        "left"}});
+      "The robot then unwraps the image to a panorama of 80 rows. It stores only the first 15 "
+      "Fourier components of each row: 2.4 kB per view. The magnitudes of the components do not "
+      "change when the robot rotates, so they identify the place at any heading. The phases give "
+      "the heading.");
+  page.add_views({{std::move(cylinder),
+                   {},
+                   "The same image as a panorama of 512 x 80 pixels. The forward direction is in "
+                   "the middle."}});
   return mirror;
 }
 
@@ -145,28 +146,28 @@ void add_answers_part(const VisualMemory& memory, const std::vector<viewer::MapL
                       const Outcome& foreign, double spacing_m, viewer::ReportPage& page) {
   const std::string spacing = format_fixed(100.0 * spacing_m, 0) + " cm";
   page.begin_part("Localisation", {format_median(own.errors_m, 100.0, 1, "cm"),
-                                   "is the median error of its position, from one image"});
-  page.add_text(
-      "The robot took a view every " + spacing + " and remembered it. Then it was put down at " +
-      std::to_string(queries.size()) +
-      " random places between them, facing anywhere, and asked from one new image each: "
-      "where are you, and what is your heading? It was also put into another room, where the "
-      "right answer is that it does not know the place.");
+                                   "median error of the position computed from one image"});
+  page.add_text("The robot stored a view every " + spacing + ". Then it was put at " +
+                std::to_string(queries.size()) +
+                " random places between these views, with random headings. At each place it "
+                "computed its position and heading from one new image. It was also put in another "
+                "room. There, the correct answer is that the place is unknown.");
   page.add_figures(
-      {{std::to_string(memory.size()), "views remembered, " + spacing + " apart"},
+      {{std::to_string(memory.size()), "stored views with a spacing of " + spacing},
        {format_median(own.errors_m, 100.0, 1, "cm"), "median error of the position"},
        {format_median(own.heading_errors_rad, degrees(1.0), 2, "degrees"),
         "median error of the heading"},
-       {format_percent(own.known), "of its own places recognised"},
-       {format_percent(foreign.known), "of the views of another room taken for this one"}});
+       {format_percent(own.known), "of the places in the office recognised"},
+       {format_percent(foreign.known), "of the images from the other room wrongly recognised"}});
   page.add_text(
-      "On the map, circles are the remembered views and green crosses the places where the robot "
-      "was put down. From each a line runs to where its memory says it is; the shorter, the "
-      "better. The nearest remembered view alone would be " +
+      "The circles on the map are the stored views. The green crosses are the places where the "
+      "robot was put. A line leads from each cross to the position that the robot computed; a "
+      "short line means a small error. With the position of the most similar view as the answer, "
+      "the median error would be " +
       format_median(own.nearest_errors_m, 100.0, 1, "cm") +
-      " off (median): the position is interpolated between views.");
+      ". The robot is more accurate because it interpolates between views.");
   page.add_plots(
-      {{draw_answers(memory, scene, queries), "True places, and the error of each answer"}});
+      {{draw_answers(memory, scene, queries), "True positions and the error of each answer"}});
 }
 
 /// The first place that was recognised stands for all.
@@ -183,31 +184,31 @@ viewer::UnfoldingMap add_levels_part(const VisualMemory& memory,
   AreasShown areas = draw_areas(memory, scene, view);
   const std::string first = format_fixed(areas.areas_m2.front(), 1);
   const std::string last = format_fixed(areas.areas_m2.back(), 2);
-  page.begin_part("Accuracy on demand",
-                  {first + " to " + last + " m²",
-                   "is the area where it may be: a coarse look is cheap, a fine one exact"});
-  page.add_text(
-      "With one Fourier component compared, the robot may be anywhere in a large area (" + first +
-      " square metres here); with each further component the area shrinks, down to " + last +
-      ". In the open a coarse answer is enough and costs less; at a door a fine one is needed.");
-  page.add_plots(
-      {{areas.map,
-        "The orange area is where the robot may be, with ever more components; the cross is where "
-        "it is."},
-       {draw_similarity(memory, spacing_m, view),
-        "How similar each remembered view is to the one asked for, taken at the cross: the nearest "
-        "view is the most similar, and similarity falls with distance on all sides. That is what "
-        "the areas are read from."}});
+  page.begin_part(
+      "Adjustable accuracy",
+      {first + " to " + last + " m²",
+       "area in which the robot may be: from a fast, rough answer to an accurate answer"});
+  page.add_text("With one Fourier component, the robot may be anywhere in an area of " + first +
+                " square metres. Each additional component reduces this area, at last to " + last +
+                " square metres. In open space a rough answer is sufficient and takes less "
+                "computation. At a door the robot needs an accurate answer.");
+  page.add_plots({{areas.map,
+                   "Orange: the area in which the robot may be, for an increasing number of "
+                   "components. Cross: the true position."},
+                  {draw_similarity(memory, spacing_m, view),
+                   "Similarity of each stored view to an image taken at the cross. The nearest "
+                   "view is the most similar one. Similarity decreases with distance in all "
+                   "directions. The areas on the left are computed from these similarities."}});
   return std::move(areas.map);
 }
 
 void add_commands(const DemoOptions& options, const DemoRecordings& recordings,
                   const DemoNavigation& navigation, viewer::ReportPage& page) {
   const auto in_out = [&](const char* name) { return (options.out / name).string(); };
-  page.begin_section("Try it yourself");
+  page.begin_section("Commands for this data");
   page.add_text(
-      "The recordings and the memory of this run are in the folder of this page. Each command "
-      "shows more with --help.");
+      "The recordings and the memory of this run are in the folder of this page. Every command has "
+      "the option --help.");
   const std::string memory = in_out("office.panonav");
   const simulation::SimulatedWorldOptions seen = demo_world_options(options, 0);
   std::string mission;
@@ -300,39 +301,43 @@ std::string of(std::size_t part, std::size_t all) {
 }
 
 void print(const DemoResults& done, Session& session) {
-  session.print("panonav demo: " + std::to_string(done.views) + " views of an office remembered, " +
-                std::to_string(done.questions) + " questions asked, " +
+  session.print("panonav demo: " + std::to_string(done.views) + " views of an office stored, " +
+                std::to_string(done.questions) + " images localised, " +
                 format_fixed(done.seconds, 0) + " s");
   session.print(
       "  position: median error " + format_median(done.own.errors_m, 100.0, 1, "cm") +
       "; heading: " + format_median(done.own.heading_errors_rad, degrees(1.0), 2, "degrees"));
   session.print(
-      "  own places recognised: " + format_percent(done.own.known) +
-      "; views of another room taken for this one: " + format_percent(done.foreign.known));
-  session.print("  tracked: localised " + format_delay(done.track.until_localised) +
-                "; kidnapped, found again " + format_delay(done.track.until_found_again) +
-                "; median error " + format_median(done.track.errors_m, 100.0, 1, "cm") + "; " +
+      "  places in the office recognised: " + format_percent(done.own.known) +
+      "; images of another room wrongly recognised: " + format_percent(done.foreign.known));
+  session.print("  tracking: localised " + format_delay(done.track.until_localised) +
+                "; after the robot was carried away, localised again " +
+                format_delay(done.track.until_found_again) + "; median error " +
+                format_median(done.track.errors_m, 100.0, 1, "cm") + "; " +
                 of(done.track.wrong, done.track.localised) + " answers wrong");
   const auto centimetres = [](double metres) { return format_fixed(100.0 * metres, 0) + " cm"; };
   session.print(
-      "  arranged by similarity alone: " +
+      "  arrangement from images alone: error " +
       (done.maps.lattice ? centimetres(done.maps.lattice->truth_from_map.rms_m) : "none") +
-      " from the true places; map of a drive: " + centimetres(done.maps.map_rms_m) +
-      " from the true path, its odometry alone " + centimetres(done.maps.wheels_rms_m));
-  session.print("  home from one metre away: " + of(done.homing.arrived, done.homing.runs.size()) +
-                " runs ended within 10 cm; median " +
-                format_fixed(100.0 * median(done.homing.distances_m), 1) + " cm");
-  session.print("  a route of " + format_fixed(done.route.length_m, 0) +
-                " m repeated from 0.3 m off: " + of(done.route.completed, done.route.runs.size()) +
-                " runs reached its end; distance from it: median " +
+      "; map of a drive: error " + centimetres(done.maps.map_rms_m) + "; odometry alone: error " +
+      centimetres(done.maps.wheels_rms_m));
+  session.print(
+      "  homing from a distance of one metre: " + of(done.homing.arrived, done.homing.runs.size()) +
+      " runs ended within 10 cm; median " +
+      format_fixed(100.0 * median(done.homing.distances_m), 1) + " cm");
+  session.print("  route of " + format_fixed(done.route.length_m, 0) +
+                " m, repeated from a start 0.3 m beside it: " +
+                of(done.route.completed, done.route.runs.size()) +
+                " runs reached the end; median distance from the route " +
                 format_median(done.route.lateral_m, 100.0, 1, "cm"));
   const DemoNavigation& navigation = done.navigation;
   session.print(
-      "  missions over views alone: " + of(navigation.arrived, navigation.runs.size()) +
-      " arrived; driven over shortest path: median " +
+      "  navigation: " + of(navigation.arrived, navigation.runs.size()) +
+      " missions arrived; median ratio of driven path to shortest path " +
       (navigation.detours.empty() ? "none" : format_fixed(median(navigation.detours), 2)) +
-      "; kidnapped on its path: " + std::string(name_of(navigation.kidnapped.end)) +
-      "; a screen across the path: " +
+      "; mission with a robot that was carried away: " +
+      std::string(name_of(navigation.kidnapped.end)) +
+      "; mission with a new obstacle on the path: " +
       (navigation.screened ? std::string(name_of(navigation.screened->end)) : "none"));
 }
 
@@ -360,20 +365,20 @@ ExitCode demonstrate(const DemoOptions& options, Session& session) {
     progress.relabel("part " + std::to_string(++part) + " of " + std::to_string(parts) + ": " +
                      what);
   };
-  next_part("simulates what the robot sees");
+  next_part("simulate images");
   const auto recordings = record_demo(options, session);
   if (!recordings) {
     return session.no_answer("panonav demo: no mirror was found in the simulated images");
   }
   viewer::ReportPage page(
-      "panonav: a robot that remembers what places look like",
-      "A robot with one camera remembers views of a place. It compares what it sees with the "
-      "remembered views to find its position, make maps, home, repeat routes and drive to goals. "
-      "All of this was simulated on this computer and compared with the true positions. Click an "
-      "animation to pause it.");
+      "panonav: image-based memory for robot navigation",
+      "A robot with one camera stores images of places as views. It compares new images with these "
+      "views. In this way it finds its position, makes maps, drives back to a place, repeats "
+      "routes and drives to goals. All data on this page were simulated on this computer, so the "
+      "true positions are known. Click an animation to pause it.");
   DemoStory story{.mirror = add_camera_part(*recordings, session, page)};
 
-  next_part("remembers and localises itself");
+  next_part("store views and localise");
   MemoryFile file =
       memorise_run(recordings->memory_run, out / "office.panonav", session.executor());
   const auto pipeline =
@@ -390,22 +395,22 @@ ExitCode demonstrate(const DemoOptions& options, Session& session) {
   const std::vector<viewer::MapLayer> scene = viewer::scene_layers(recordings->office_scene);
   add_answers_part(memory, scene, queries, done.own, done.foreign, options.spacing_m(), page);
   story.position_error = format_median(done.own.errors_m, 100.0, 1, "cm");
-  next_part("as accurate as needed");
+  next_part("adjustable accuracy");
   story.areas = add_levels_part(memory, scene, choose_view(queries), options.spacing_m(), page);
-  next_part("tracks itself");
+  next_part("track the robot");
   const MemoryFile corridor =
       memorise_run(recordings->corridor_run, out / "corridor.panonav", session.executor());
   done.track = demonstrate_tracking(options, *recordings, corridor, session, page);
-  next_part("arranges what it remembers");
+  next_part("make maps");
   done.maps = demonstrate_maps(memory, options.seed, options.quick, session, page);
   store_lattice(done.maps.arranged, memory, file);
-  next_part("goes home");
+  next_part("drive home");
   done.homing = demonstrate_homing(recordings->office_scene, options.homing_run_count(),
                                    options.seed, session, page);
-  next_part("repeats a route");
+  next_part("repeat a route");
   done.route =
       demonstrate_route(recordings->office_scene, options.route_m(), options.seed, session, page);
-  next_part("goes where it is told");
+  next_part("drive to goals");
   done.navigation = demonstrate_navigation(options, *recordings, file, memory, done.maps.arranged,
                                            pipeline, session, page);
   add_commands(options, *recordings, done.navigation, page);
@@ -432,11 +437,11 @@ Run declare_demo(Arguments& arguments) {
   auto out = std::make_shared<std::string>("demo");
   auto seed = std::make_shared<std::optional<std::uint64_t>>();
   arguments.option("-o,--out FOLDER", *out,
-                   "Folder for the report: a new one, or that of an earlier demo");
+                   "Folder for the page: a new folder, or the folder of an earlier demo");
   arguments.writes({"--out"});
   arguments.option("--seed", *seed, "Seed of the simulated office (default: 1)");
   arguments.flag("--quick", values->quick,
-                 "A smoke run: fewer and smaller images, fewer questions and missions");
+                 "Run a short demonstration with fewer and smaller images and fewer missions");
   return [values, out, seed](Session& session) {
     values->out = *out;
     values->seed = seed->value_or(1);
@@ -447,10 +452,10 @@ Run declare_demo(Arguments& arguments) {
 }  // namespace
 
 Verb demo_verb() {
-  return {"demo", "Demonstrate everything in a simulated office, and write a page about it",
-          "A robot memorises views, localises and tracks itself, arranges its views, homes, "
-          "repeats a route and navigates to goals. It takes about a minute on two cores. Files of "
-          "an earlier demo in the folder are replaced; a folder with other files is refused.",
+  return {"demo", "Run all functions in a simulated office and write a page with the results",
+          "A simulated robot stores views, finds its position, makes maps, drives home, repeats a "
+          "route and drives to goals. This takes about a minute on two cores. Files of an earlier "
+          "demo in the folder are replaced. A folder that contains other files is refused.",
           "  panonav demo\n  panonav demo --seed 5 -o other_office", declare_demo};
 }
 

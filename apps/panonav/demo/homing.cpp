@@ -49,7 +49,7 @@ viewer::UnfoldingMap draw_runs(const simulation::Scene& office,
     starts.circles.push_back(run.path.front().position());
     longest = std::max(longest, run.path.size());
   }
-  viewer::UnfoldingMap map{.title = "Runs home in the office",
+  viewer::UnfoldingMap map{.title = "Drives home in the office",
                            .backdrop = viewer::scene_layers(office)};
   map.backdrop.push_back(homes);
   map.backdrop.push_back(starts);
@@ -80,10 +80,11 @@ std::vector<viewer::ReportView> make_report_views(const Panorama& home, const Pa
   }
   const double columns = -vector.heading_rad / (2.0 * std::numbers::pi) * home.columns();
   return {{rotate_columns(home, static_cast<int>(std::lround(columns))), marks,
-           "The first run: the view at home, rotated to the robot's heading at the start."},
+           "First run: the view at home, rotated to the robot's heading at the start."},
           {current, marks,
-           "The view at the start. Orange: the direction home, from which the image expands on the "
-           "way; blue: the opposite direction; grey: straight ahead."}};
+           "First run: the image at the start. Orange: the direction home; objects in this "
+           "direction become larger during the drive. Blue: the opposite direction. Grey: the "
+           "robot's forward direction."}};
 }
 
 }  // namespace
@@ -109,24 +110,23 @@ DemoHoming demonstrate_homing(const simulation::Scene& office, int runs, std::ui
 
   page.begin_part("Homing",
                   {std::to_string(homing.arrived) + " of " + std::to_string(runs),
-                   "robots found home from a distance of one metre, with one remembered view"});
+                   "robots drove home from a distance of one metre with one stored view"});
   page.add_text(
-      "From one view of a place the robot finds the direction back to it, without a map and "
-      "without knowing its heading, by comparing the Fourier components of both views. It was put "
-      "down one metre away from " +
+      "The robot has one stored view of a place, its home. It compares the Fourier components of "
+      "this view and of its current image, and computes the direction home. It needs no map and "
+      "does not know its heading. In this test the robot was put one metre away from " +
       std::to_string(runs) +
-      " places, with random heading, and drove step by step, each after a new image. Its odometry "
-      "and its camera are noisy.");
+      " places, with random headings. It took an image, drove one step, and repeated this until it "
+      "was home. Its odometry and its images contain noise.");
   page.add_figures(
       {{std::to_string(homing.arrived) + " of " + std::to_string(runs),
         "runs that ended within 10 cm of home and reported so"},
        {format_fixed(100.0 * median(homing.distances_m), 1) + " cm",
         "median distance from home at the end"},
-       {format_fixed(static_cast<double>(steps) / runs, 0), "steps a run, on average"}});
-  page.add_plots(
-      {{draw_runs(office, homing.runs),
-        "All robots at once, step by step, from the green circles to the black squares. A "
-        "run that ended elsewhere turns orange."}});
+       {format_fixed(static_cast<double>(steps) / runs, 0), "steps per run on average"}});
+  page.add_plots({{draw_runs(office, homing.runs),
+                   "All runs at once, step by step, from the green circles to the black squares. A "
+                   "run that ends at another place turns orange."}});
   page.add_views(make_report_views(seen_from(shown.goal), seen_from(shown.path.front()),
                                    shown.vectors.front()));
   return homing;

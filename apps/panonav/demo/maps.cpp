@@ -83,8 +83,9 @@ viewer::UnfoldingMap draw_growth(const Lattice& arranged, const VisualMemory& of
   for (std::size_t i = anywhere.size(); i > 1; --i) {
     std::swap(anywhere[i - 1], anywhere[static_cast<std::size_t>(random.index(i))]);
   }
-  viewer::UnfoldingMap map{.title = "As the views arrange themselves"};
-  map.frames.push_back({.title = "in no order", .layers = colour_by_position(anywhere, truth)});
+  viewer::UnfoldingMap map{.title = "Arrangement of the views"};
+  map.frames.push_back(
+      {.title = "random positions", .layers = colour_by_position(anywhere, truth)});
   for (const Growth& at : growth) {
     std::map<std::size_t, std::vector<std::size_t>> groups;
     for (std::size_t i = 0; i < at.groups.size(); ++i) groups[at.groups[i]].push_back(i);
@@ -121,7 +122,7 @@ viewer::MapPlot draw_truth(const VisualMemory& office) {
   for (const ViewId view : office.views()) {
     truth.push_back(office.info(view).pose->position());
   }
-  return {.title = "As they were taken", .layers = colour_by_position(truth, truth)};
+  return {.title = "True positions", .layers = colour_by_position(truth, truth)};
 }
 
 /// The longer side of the floor on which the views were taken.
@@ -148,15 +149,15 @@ std::vector<std::pair<std::string, std::string>> make_figures(const DemoMaps& ma
   if (maps.lattice) {
     figures.push_back(
         {format_centimetres(maps.lattice->truth_from_map.rms_m),
-         "is the error of the arranged views (root mean square), in a room " +
-             format_fixed(room_length_m(office), 1) + " m long: " +
+         "error of the arranged views (root mean square) in a room " +
+             format_fixed(room_length_m(office), 1) + " m long; this is " +
              format_fixed(100.0 * maps.lattice->truth_from_map.rms_m / room_length_m(office), 1) +
-             " % of it"});
+             " % of the length"});
   }
   figures.push_back({format_centimetres(maps.map_rms_m),
-                     "is the error of the map of a drive of " +
+                     "error of the map of a drive of " +
                          format_fixed(spacing_m * static_cast<double>(drive_views), 0) + " m"});
-  figures.push_back({format_centimetres(maps.wheels_rms_m), "is the error of the odometry alone"});
+  figures.push_back({format_centimetres(maps.wheels_rms_m), "error of the odometry alone"});
   return figures;
 }
 
@@ -191,29 +192,30 @@ DemoMaps demonstrate_maps(const VisualMemory& office, std::uint64_t seed, bool q
 
   const std::string arranged =
       maps.lattice ? format_centimetres(maps.lattice->truth_from_map.rms_m) : "none";
-  page.begin_part("Maps",
-                  {arranged, "is the error of a map made from the similarity of views alone"});
+  page.begin_part("Maps", {arranged, "error of a map that was made from images alone"});
   page.add_text(
-      "Can images alone make a map? The remembered views of the office were shuffled and their "
-      "positions removed. Similar views attract each other like balls on springs until all are in "
-      "place.");
+      "This part makes a map from images alone. The robot forgot the order and the positions of "
+      "its views. An algorithm then treats similar views as balls that springs connect, and lets "
+      "the springs move the balls to their positions.");
   page.add_plots(
       {{draw_growth(maps.arranged, office, growth, seed),
-        "At first the positions are random. Similar views join into groups, and the groups grow "
-        "until all are connected; each group is drawn at its final position. The arrangement is "
-        "rotated and scaled to fit the truth, because images contain neither north nor metres."},
+        "At first the positions are random. Similar views form groups, and the groups grow until "
+        "all views are connected. Each group is drawn at its final position. The map is rotated "
+        "and scaled to fit the true positions, because images do not contain the north direction "
+        "or a length in metres."},
        {draw_truth(office),
-        "The true positions, which were not used. Colours run from west to east: if the "
-        "arrangement were perfect, the left map would end like this one."}});
+        "The true positions, which the algorithm did not use. Colours change from west to east. If "
+        "the result were perfect, the last step of the left map would look like this map."}});
   page.add_text(
-      "Below, a robot drives through rooms that it has never seen and makes a map of its path, "
-      "image by image and without odometry; where it passes a place again it recognises the place "
-      "and closes the loop.");
-  page.add_plots({{draw_drive(place, recording, mapped),
-                   "The drive: " + std::to_string(recording.truth.size()) + " views, one every " +
-                       format_centimetres(spacing_m) +
-                       ". The blue map should lie on the black path; it and the orange line, the "
-                       "odometry of a cheap robot, are scaled to the size of the true path."}});
+      "Below, a robot drives through unknown rooms and makes a map of its path from images, "
+      "without odometry. When it passes a place again, it recognises the place and corrects the "
+      "map.");
+  page.add_plots(
+      {{draw_drive(place, recording, mapped),
+        "A drive with " + std::to_string(recording.truth.size()) + " views and a spacing of " +
+            format_centimetres(spacing_m) +
+            ". Black: true path. Blue: map from images. Orange: odometry of a low-cost robot. The "
+            "map and the odometry are scaled to the size of the true path."}});
   page.add_figures(make_figures(maps, office, recording.truth.size()));
   return maps;
 }

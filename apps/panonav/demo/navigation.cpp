@@ -102,7 +102,7 @@ viewer::UnfoldingMap draw_runs(const DemoNavigation& navigation,
                                const simulation::RememberedPlace& remembered,
                                const std::vector<simulation::Mission>& missions,
                                const simulation::Scene& office) {
-  viewer::MapLayer views{.label = "remembered views", .colour = viewer::PlotColour::light_grey};
+  viewer::MapLayer views{.label = "stored views", .colour = viewer::PlotColour::light_grey};
   for (const Pose2& pose : remembered.truth) views.circles.push_back(pose.position());
   viewer::MapLayer starts{.label = "start", .colour = viewer::PlotColour::green};
   viewer::MapLayer goals{.label = "goal", .colour = viewer::PlotColour::black};
@@ -223,7 +223,7 @@ viewer::RunPage replay_run(const simulation::MissionPlace& place,
 std::string describe_end(const simulation::MissionRun& run, double within_m) {
   const std::string name(name_of(run.end));
   if (run.end != NavigationDecision::State::arrived) return name;
-  return run.arrives(within_m) ? "arrived" : "arrived, but too far off";
+  return run.arrives(within_m) ? "arrived" : "arrived, but too far from the goal";
 }
 
 /// A heading with what came of a run, and a line for each step.
@@ -237,7 +237,7 @@ std::string format_log(const std::string& title, const std::string& goal,
 
 /// Describes the result of a mission in a sentence.
 std::string describe_run(const simulation::MissionRun& run, double within_m) {
-  return "It ended as: " + describe_end(run, within_m) + ", " +
+  return "Result: " + describe_end(run, within_m) + ", " +
          format_fixed(100.0 * run.end_distance_m, 0) + " cm from the goal after " +
          std::to_string(run.decisions.size()) + " steps and " + format_fixed(run.travelled_m, 1) +
          " m.";
@@ -255,44 +255,45 @@ void add_part(const DemoNavigation& navigation, Shown shown, viewer::ReportPage&
   const std::string count = std::to_string(navigation.runs.size());
   const std::string arrived = std::to_string(navigation.arrived) + " of " + count;
   const std::string within = format_fixed(100.0 * navigation.within_m, 1) + " cm";
-  page.begin_part("Navigation", {arrived, "missions arrived, over views alone"});
+  page.begin_part("Navigation", {arrived, "missions reached their goal with images alone"});
   page.add_text(
-      "The goal is a remembered view. The robot uses the arrangement of the views (part 5) and its "
-      "current image. It knows no positions, neither its start nor its heading, and has no map of "
-      "walls: it only feels obstacles in front of it. Each remembered view has a direction towards "
-      "the goal, read from the phases of the views along the path. The robot takes an image, finds "
-      "the nearest remembered view, drives a step in its direction and repeats; near the goal it "
-      "homes to the goal's view.");
-  page.add_text(
-      "The robots started at " + count + " random places and were sent to " + count +
-      " random views. One more robot was kidnapped on its path, and another one met a screen "
-      "across its path that had not been there before. A mission counts if the robot reports "
-      "its arrival and is within half the spacing of the views, " +
-      within + ".");
+      "The goal is a stored view. The robot knows no positions: not its start, not its heading and "
+      "not the positions of the views. It has no map of walls and only detects obstacles directly "
+      "in front of it. It uses the arrangement of the views (part 5), which gives each stored view "
+      "a direction towards the goal. The robot takes an image, finds the most similar stored view, "
+      "and drives one step in the direction of this view. It repeats this until it is near the "
+      "goal. Then it drives to the goal with the method of part 6.");
+  page.add_text("The robots started at " + count + " random places and were sent to " + count +
+                " random stored views. In one additional mission the robot was carried away on its "
+                "path. In another one a new obstacle, a screen, stood across the path. A mission "
+                "is successful if the robot reports its arrival and is not farther from the goal "
+                "than half the spacing of the views, " +
+                within + ".");
   page.add_figures(
-      {{arrived, "missions arrived within " + within + " and reported so"},
+      {{arrived, "missions ended within " + within + " of the goal and reported their arrival"},
        {navigation.detours.empty() ? "none" : format_fixed(median(navigation.detours), 2),
-        "times the shortest path, driven by those that arrived (median)"},
-       {format_fixed(median(navigation.steps), 0), "steps a mission (median)"},
-       {describe_end(navigation.kidnapped, navigation.within_m), "the robot that was kidnapped"},
+        "median ratio of the driven path to the shortest path"},
+       {format_fixed(median(navigation.steps), 0), "median number of steps per mission"},
+       {describe_end(navigation.kidnapped, navigation.within_m),
+        "result of the robot that was carried away"},
        {navigation.screened ? describe_end(*navigation.screened, navigation.within_m) : "none",
-        navigation.screened ? "the robot with a screen across its path"
-                            : "no screen leaves a path around it here"}});
+        navigation.screened ? "result of the robot with a screen across its path"
+                            : "no test with a screen: it would block every path"}});
   page.add_text(
-      "The first mission, image by image. Short strokes: the direction in which each remembered "
-      "view sends the robot; thick line: the planned path. Below the robot's image is the "
-      "remembered view at which it localises itself, rotated to the same heading.");
+      "The first mission, image by image. Short lines: the direction in which each stored view "
+      "sends the robot. Thick line: the planned path. The stored view that is most similar to the "
+      "robot's image is shown below the image, rotated to the same heading.");
   page.add_run(shown.first);
   std::vector<viewer::ReportPlot> maps{
       {std::move(shown.all),
-       "All missions at once. A path that did not end at its goal is orange."},
+       "All missions at once. The path of a mission that did not reach its goal is orange."},
       {std::move(shown.kidnapped),
-       "This robot was kidnapped half way along its path and put down at the purple square. " +
+       "This robot was carried away in the middle of its path and put at the purple square. " +
            describe_run(navigation.kidnapped, navigation.within_m)}};
   if (shown.screened) {
     maps.push_back({std::move(*shown.screened),
-                    "A screen, the short dark line, stands across the middle of the planned path "
-                    "and is not in the memory. There is a path around it. " +
+                    "A screen (short dark line) stands across the middle of the planned path. The "
+                    "memory does not contain it. There is a path around it. " +
                         describe_run(*navigation.screened, navigation.within_m)});
   }
   page.add_plots(maps);

@@ -14,7 +14,7 @@ namespace panonav::command {
 namespace {
 
 viewer::MapLayer draw_references(const VisualMemory& memory, viewer::PlotColour colour) {
-  viewer::MapLayer layer{.label = "remembered views", .colour = colour};
+  viewer::MapLayer layer{.label = "stored views", .colour = colour};
   for (const ViewId view : memory.views()) {
     layer.circles.push_back(memory.info(view).pose->position());
   }
@@ -25,9 +25,8 @@ viewer::MapLayer draw_references(const VisualMemory& memory, viewer::PlotColour 
 
 viewer::MapPlot draw_answers(const VisualMemory& memory, const std::vector<viewer::MapLayer>& scene,
                              const std::vector<LocalisedView>& queries) {
-  viewer::MapLayer truth{.label = "true place", .colour = viewer::PlotColour::green};
-  viewer::MapLayer error{.label = "from there to the answer",
-                         .colour = viewer::PlotColour::vermilion};
+  viewer::MapLayer truth{.label = "true position", .colour = viewer::PlotColour::green};
+  viewer::MapLayer error{.label = "error of the answer", .colour = viewer::PlotColour::vermilion};
   for (const auto& view : queries) {
     truth.crosses.push_back(view.truth.position());
     if (view.found.position) {
@@ -49,10 +48,10 @@ AreasShown draw_areas(const VisualMemory& memory, const std::vector<viewer::MapL
   const ReferenceAreas areas(memory);
   const auto levels =
       localise_hierarchically(memory, areas, query.signature, {.tolerance = tolerance});
-  AreasShown shown{.map = {.title = "Where the robot may be", .backdrop = scene}};
+  AreasShown shown{.map = {.title = "Possible positions of the robot", .backdrop = scene}};
   shown.map.backdrop.push_back(draw_references(memory, viewer::PlotColour::light_grey));
   for (const auto& level : levels) {
-    viewer::MapLayer area{.label = "where the robot may be", .colour = viewer::PlotColour::orange};
+    viewer::MapLayer area{.label = "possible positions", .colour = viewer::PlotColour::orange};
     for (const auto& candidate : level.candidates) {
       area.filled_polygons.push_back(areas.cell(candidate.view));
     }
@@ -87,7 +86,7 @@ viewer::HeatMap draw_similarity(const VisualMemory& memory, double spacing_m,
   const auto row_of = [&](double y_m) {
     return static_cast<int>(std::lround((y_m - low.y_m) / spacing_m));
   };
-  viewer::HeatMap map{.title = "Similarity of every remembered view to the one asked for",
+  viewer::HeatMap map{.title = "Similarity of every stored view to the current image",
                       .value_label = "similarity, 0 to 1000",
                       .columns = column_of(high.x_m) + 1,
                       .rows = row_of(high.y_m) + 1,

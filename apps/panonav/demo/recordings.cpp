@@ -206,17 +206,20 @@ void prepare_demo_folder(const fs::path& out) {
   std::error_code error;
   const bool there = fs::exists(out, error);
   if (there && !fs::is_directory(out, error)) {
-    throw FileError(out.string(), "is no folder; allowed: a new folder, or one of an earlier demo");
+    throw FileError(out.string(),
+                    "is not a folder; allowed: a new folder, or the folder of an earlier demo");
   }
   if (there && !fs::exists(out / mark, error) && !fs::is_empty(out, error)) {
     throw FileError(out.string(),
-                    "is there already and was not made by panonav demo; allowed: a new folder, or "
-                    "one of an earlier demo");
+                    "exists and was not made by panonav demo; allowed: a new folder, or the folder "
+                    "of an earlier demo");
   }
   fs::create_directories(out, error);
-  if (error) throw FileError(out.string(), "cannot be made: " + error.message());
-  write_file(out / mark, std::string_view("This folder was made by panonav demo. Running it again "
-                                          "with this folder replaces its files.\n"));
+  if (error) throw FileError(out.string(), "cannot be created: " + error.message());
+  write_file(
+      out / mark,
+      std::string_view(
+          "panonav demo made this folder. Another run with this folder replaces its files.\n"));
   for (const auto name : made) {
     fs::remove_all(out / name, error);
     if (error) throw FileError((out / name).string(), "cannot be removed: " + error.message());

@@ -21,7 +21,7 @@ constexpr double seconds_a_look = 0.3;
 
 viewer::PicturePlot draw_route_image(const RoutePanorama& route) {
   const auto columns = static_cast<std::size_t>(route.columns());
-  viewer::PicturePlot plot{.title = "What the robot remembers of the route",
+  viewer::PicturePlot plot{.title = "Stored route: each row is the horizon at one place",
                            .x_label = "azimuth from straight ahead [degrees], left positive",
                            .y_label = "distance along the route [m]",
                            .x_range = {180.0, -180.0},
@@ -42,7 +42,7 @@ viewer::PicturePlot draw_route_image(const RoutePanorama& route) {
 /// The first run, line by line.
 viewer::RunPage replay_run(const lab::RouteScene& place, const RoutePanorama& panorama,
                            const lab::RouteRun& run, std::uint64_t seed, Executor& executor) {
-  viewer::RunPage page("A route is repeated", run.truth.size());
+  viewer::RunPage page("Repeated route", run.truth.size());
   std::vector<viewer::RouteMark> marks;
   for (std::size_t i = 0; i < run.truth.size(); ++i) {
     const Pose2& truth = run.truth[i];
@@ -104,8 +104,7 @@ DemoRoute demonstrate_route(const simulation::Scene& office, double length_m, st
   const auto way = lab::plan_curved_route(place, length_m, spacing_m, seed);
   const RoutePanorama panorama = lab::record_route(place, way, seed, executor);
   DemoRoute route = repeat_and_measure(place, panorama, seed, executor);
-  viewer::MapPlot map{.title = "The route, and both drives",
-                      .layers = viewer::scene_layers(office)};
+  viewer::MapPlot map{.title = "The route and both drives", .layers = viewer::scene_layers(office)};
   std::ranges::move(lab::make_route_layers(way, route.runs), std::back_inserter(map.layers));
 
   const auto median_cm = [](const std::vector<double>& values) {
@@ -113,31 +112,32 @@ DemoRoute demonstrate_route(const simulation::Scene& office, double length_m, st
   };
   page.begin_part("Routes",
                   {median_cm(route.lateral_m),
-                   "is the median distance of a robot from a route that it was shown once"});
+                   "median distance of the robot from a route that it drove once before"});
   page.add_text(
-      "Of a route the robot stores one line of pixels every 10 cm: its horizon, a byte a degree. "
-      "Light in the plane of the camera travels straight from place to place, so these lines also "
-      "predict what is seen to the sides of the route. The robot was shown a route of " +
+      "The robot stores a route as one line of pixels every 10 cm. Each line is the horizon around "
+      "the robot, one byte per degree. The lines also allow it to predict the horizon at positions "
+      "beside the route. A robot was driven once along a route of " +
       format_fixed(route.length_m, 0) +
-      " m once, then put down 0.3 m away from its start as if it stood on it, with an odometry "
-      "that is wrong by 5 %; it drove the route to its end, and another robot drove it back.");
-  page.add_figures({{std::to_string(route.completed) + " of " + std::to_string(route.runs.size()),
-                     "runs that reached the end of the route and reported so"},
-                    {median_cm(route.lateral_m), "median distance from the route, from 1 m on"},
-                    {median_cm(route.position_m), "median error of the position"},
-                    {format_fixed(1e-3 * static_cast<double>(route.bytes), 0) + " kB",
-                     "is the size of the route before compression"}});
+      " m. Then it was put 0.3 m beside the start, and it did not know this offset. Its odometry "
+      "has an error of 5 %. It drove the route to the end. A second robot drove the route in the "
+      "opposite direction.");
+  page.add_figures(
+      {{std::to_string(route.completed) + " of " + std::to_string(route.runs.size()),
+        "runs that reached the end of the route and reported it"},
+       {median_cm(route.lateral_m), "median distance from the route after the first metre"},
+       {median_cm(route.position_m), "median error of the position"},
+       {format_fixed(1e-3 * static_cast<double>(route.bytes), 0) + " kB",
+        "size of the route before compression"}});
   page.add_text(
-      "Below is the first run. The striped image is all that the robot stores of the route: each "
-      "row shows what it saw at one place, all around, straight ahead in the middle; the start is "
-      "the lowest row, the end the highest. An object that the robot passes is a curve from the "
-      "middle to one side. The mark shows the row at which the robot localises itself.");
+      "The animation below shows the first run. The striped image is the stored route. Each row "
+      "shows the horizon at one place. The start is the lowest row, the end is the highest row, "
+      "and the forward direction is in the middle. An object that the robot passes makes a curve "
+      "from the middle to one side. The mark shows the row of the robot's computed position.");
   page.add_run(replay_run(place, panorama, route.runs.front(), seed, executor));
-  page.add_plots(
-      {{map,
-        "The recorded route in black, below both drives: one forward, one back. Each robot "
-        "was put down at a circle, 0.3 m to the side of the route, and returns to it; where "
-        "only one colour is visible the drives coincide with the route."}});
+  page.add_plots({{map,
+                   "Black: the stored route. Colours: both drives, one forward and one back. Each "
+                   "robot started at a circle, 0.3 m beside the route, and returned to the route. "
+                   "Where only one line is visible, the drives coincide with the route."}});
   return route;
 }
 

@@ -9,28 +9,28 @@ void add_story(DemoStory story, viewer::ReportPage& page) {
       {{.title = "One omnidirectional camera",
         .shown = std::move(story.mirror),
         .value = "2.4 kB",
-        .meaning = "are stored for such a view. The robot recognises the place from it at "
-                   "any heading, without laser, GPU or training.",
+        .meaning = "per stored view. From one view the robot recognises the place at any heading. "
+                   "It needs no laser scanner, no GPU and no training.",
         .part = 1},
        {.title = "Localisation",
         .shown = viewer::ReportPlot{std::move(story.areas), ""},
         .value = std::move(story.position_error),
-        .meaning = "is the median error from one image. Orange: possible positions, as more "
-                   "Fourier components are compared; cross: true position.",
+        .meaning = "median error from one image. Orange: possible positions, for an increasing "
+                   "number of Fourier components. Cross: true position.",
         .part = 2},
-       {.title = "Kidnapped and found again",
+       {.title = "Tracking after the robot was carried away",
         .shown = viewer::ReportPlot{std::move(story.gathering), ""},
         .value = std::move(story.found_again),
-        .meaning = "until the robot was localised again after it had been carried away. "
-                   "Dots: possible positions; ring: true position.",
+        .meaning =
+            "until the robot was localised again. Dots: possible positions. Ring: true position.",
         .part = 4},
        {.title = "Navigation",
         .shown = viewer::ReportPlot{std::move(story.missions), ""},
         .value = std::move(story.arrived),
-        .meaning = "robots reached their goal, a remembered view. Squares: starts; crosses: "
-                   "goals; blue: driven paths.",
+        .meaning = "robots reached their goal, a stored view. Squares: starts. Crosses: goals. "
+                   "Blue: driven paths.",
         .part = 8}},
-      "With your own images",
+      "Commands for your own images",
       {"panonav memorise photos place.panonav --kind equirectangular --elevation-deg -30 40",
        "panonav localise place.panonav now.jpg"});
 }

@@ -48,10 +48,10 @@ DemoTrack summarise_outcome(const std::vector<TrackedImage>& images, std::size_t
 /// Describes the state at an image.
 std::string frame_title(const TrackedImage& image, std::size_t kidnapped_after, double within_m) {
   const std::string number = "image " + std::to_string(image.index + 1) + ": ";
-  if (image.index == kidnapped_after + 1) return number + "carried away";
+  if (image.index == kidnapped_after + 1) return number + "the robot was carried away";
   switch (image.estimate.state) {
     case LocalisationState::localised:
-      return number + (is_correct(image, within_m) ? "localised" : "it has not noticed");
+      return number + (is_correct(image, within_m) ? "localised" : "wrong, not yet noticed");
     case LocalisationState::ambiguous:
       return number + "several places are possible";
     case LocalisationState::lost:
@@ -67,12 +67,12 @@ viewer::UnfoldingMap draw_gathering(const std::vector<TrackedImage>& images,
                                     std::size_t kidnapped_after, double within_m) {
   viewer::UnfoldingMap map{.title = "", .backdrop = std::move(scene)};
   const viewer::MapLayer everywhere{
-      .label = "where it may be", .colour = viewer::PlotColour::vermilion, .dots = at_first};
+      .label = "possible positions", .colour = viewer::PlotColour::vermilion, .dots = at_first};
   map.frames.push_back({.title = "before the first image", .layers = {everywhere}});
   for (const TrackedImage& image : images) {
     viewer::MapLayer particles = everywhere;
     particles.dots = positions_of(image.particles);
-    const viewer::MapLayer truth{.label = "where it is",
+    const viewer::MapLayer truth{.label = "true position",
                                  .colour = viewer::PlotColour::black,
                                  .circles = {image.truth->position()}};
     map.frames.push_back(
@@ -88,33 +88,33 @@ void add_part(const DemoTrack& track, double spacing_m, std::size_t kidnapped_af
       track.errors_m.empty() ? "none" : format_fixed(100.0 * median(track.errors_m), 1) + " cm";
   page.begin_part("Tracking",
                   {format_image_count(track.until_localised),
-                   "until a robot was localised in one of " +
-                       std::to_string(track.places_at_first) + " places, several of them similar"});
+                   "until the robot was localised. At first, " +
+                       std::to_string(track.places_at_first) + " places were possible"});
   page.add_text(
-      "A corridor with identical doors and eight identical junctions. The robot knows neither its "
-      "position nor its heading, and it starts in one of two narrow crossings: the plan is "
-      "symmetric, so that at first several places explain what it sees. Each dot is a particle, a "
-      "possible pose of the robot. Its odometry, which drifts, moves the particles, and each image "
-      "keeps those that explain it: they gather in a few places, and in one once small differences "
-      "have added up.");
-  page.add_text(
-      "After " + std::to_string(kidnapped_after + 1) +
-      " images somebody carries the robot to the other crossing. It counts as localised when "
-      "it reports so and its error is at most " +
-      format_fixed(100.0 * spacing_m, 0) + " cm.");
+      "The robot drives in a corridor with identical doors and eight identical junctions. It knows "
+      "neither its position nor its heading. It starts in one of two narrow crossings. The floor "
+      "plan is symmetric, so several places match the first image. Each dot is a particle: a "
+      "possible pose of the robot. The odometry, which contains errors, moves the particles. After "
+      "each image only the particles that match it remain. They concentrate in a few places and, "
+      "when enough small differences were seen, in one place.");
+  page.add_text("After " + std::to_string(kidnapped_after + 1) +
+                " images somebody carries the robot to the other crossing. The robot counts as "
+                "correctly localised if it reports a position with an error of at most " +
+                format_fixed(100.0 * spacing_m, 0) + " cm.");
   page.add_figures(
-      {{std::to_string(track.places_at_first), "places possible after the first image"},
-       {format_image_count(track.until_localised), "until it was localised"},
+      {{std::to_string(track.places_at_first), "possible places after the first image"},
+       {format_image_count(track.until_localised), "until the robot was localised"},
        {format_image_count(track.until_found_again),
-        "until it was localised again after the kidnapping"},
-       {median_text, "median error while it reports to be localised"},
+        "until the robot was localised again after it was carried away"},
+       {median_text, "median error of the reported positions"},
        {std::to_string(track.wrong) + " of " + std::to_string(track.localised),
-        "of these answers are wrong; a kidnapped robot needs some images to notice"}});
+        "reported positions were wrong; the robot needs some images to notice that it was carried "
+        "away"}});
   page.add_run(played);
-  page.add_plots(
-      {{whole,
-        "The whole run. The true path in black starts again where the robot was put down; the "
-        "estimated path in blue lies on it, except for the images after the kidnapping."}});
+  page.add_plots({{whole,
+                   "The whole run. Black: the true path, which starts again where the robot was "
+                   "put down. Blue: the estimated path. Both agree except for the images after the "
+                   "robot was carried away."}});
 }
 
 }  // namespace
@@ -135,7 +135,7 @@ DemoTrack demonstrate_tracking(const DemoOptions& options, const DemoRecordings&
   const std::vector<Point2> at_first = positions_of(
       recordings::resample_systematically(tracker.localiser().particles(), particles_kept));
   std::vector<TrackedImage> images;
-  viewer::RunPage played("A robot that is kidnapped", run.entries.size());
+  viewer::RunPage played("A robot that is carried away", run.entries.size());
   const ShownReferences shown(memory);
   track(tracker, run, {.particles_kept = particles_kept, .recorded = &file, .shown = &shown},
         session.executor(), [&](TrackedImage&& image) {
