@@ -115,7 +115,7 @@ std::string to_markdown(const ResultsDocument& document) {
     text += "| [" + escape_markdown(paper.title) + "](#" + paper.paper + ") | " +
             std::to_string(of_paper.judged) + " | " + std::to_string(of_paper.held) + " |\n";
   }
-  text += "\n## Rows that do not hold\n\n";
+  text += "\n## Targets that were not met\n\n";
   const auto misses = list_misses(document);
   for (const std::string& line : misses) text += list_item(escape_markdown(line));
   if (misses.empty()) text += "None.\n";

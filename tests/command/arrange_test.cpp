@@ -39,9 +39,8 @@ TEST_F(Arrange, TheReportUnfolds) {
   run_well({"arrange", memory, "--no-save", "--report", report});
   const std::string page = bytes_of(report + "/index.html");
   (void)text_of_page(page);
-  EXPECT_EQ(plots_of(page),
-            (std::vector<std::string>{"The arrangement, step by step", "as they were taken",
-                                      "as the views arrange themselves"}));
+  EXPECT_EQ(plots_of(page), (std::vector<std::string>{"Arrangement, step by step", "true positions",
+                                                      "computed positions"}));
   const json frames = panels_of(page).front().data["frames"];
   ASSERT_GE(frames.size(), 5U);
   const auto views = [](const json& frame) {
@@ -52,7 +51,7 @@ TEST_F(Arrange, TheReportUnfolds) {
     return count;
   };
   EXPECT_LT(views(frames.front()), views(frames.back()));
-  EXPECT_EQ(frames.back()["title"], "the arrangement");
+  EXPECT_EQ(frames.back()["title"], "result");
   const auto largest =
       answer_of({"arrange", memory, "--no-save", "--json"})["connected_components"][0]["views"];
   EXPECT_EQ(views(frames.back()), largest.get<std::size_t>());

@@ -151,7 +151,7 @@ TEST_F(Home, TheSamePictureHasNoDirection) {
   const auto text =
       run_panonav({"home", folder / "home.png", folder / "home.png", "--kind", "panorama"});
   EXPECT_EQ(text.exit_code, 1);
-  EXPECT_TRUE(contains(text.out, "looks like home itself"));
+  EXPECT_TRUE(contains(text.out, "the robot is already at home"));
 }
 
 TEST_F(Home, BetweenPicturesOfNoiseThereIsNoAnswer) {
@@ -192,7 +192,7 @@ TEST_F(Home, SaysItInWords) {
   const auto result = run_panonav({"home", folder / "home.png", here, "--kind", "panorama"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_TRUE(contains(result.out, "degrees to the left, about 0."));
-  EXPECT_TRUE(contains(result.out, "the robot has turned by "));
+  EXPECT_TRUE(contains(result.out, "the robot has rotated by "));
   EXPECT_TRUE(contains(result.out, "degrees to the right; probability"));
 }
 

@@ -100,7 +100,7 @@ TEST_F(HostileNames, HomeReportShowsThem) {
   run_well({"home", run / names[0], run, "--report", report});
   const std::string text = text_of(report / "index.html");
   for (const std::string& name : names) EXPECT_TRUE(contains(text, "<td>" + name + "</td>"));
-  EXPECT_TRUE(contains(text, "From one view of a place"));
+  EXPECT_TRUE(contains(text, "Direction home"));
 }
 
 TEST_F(HostileNames, CatchmentReportShowsThem) {

@@ -43,8 +43,8 @@ void expect_eight_parts(const fs::path& folder) {
   std::size_t at = page.find("</nav>");
   ASSERT_NE(at, std::string::npos);
   int number = 0;
-  for (const char* title : {"The robot's camera", "Localisation", "Adjustable accuracy", "Tracking",
-                            "Maps", "Homing", "Routes", "Navigation"}) {
+  for (const char* title : {"Camera", "Localisation", "Adjustable accuracy", "Tracking", "Maps",
+                            "Homing", "Routes", "Navigation"}) {
     const std::string part = std::to_string(++number);
     EXPECT_LT(page.find("<a href=\"#part" + part + "\">"), page.find("</nav>")) << title;
     const std::string heading = "<h2 id=\"part" + part + "\">" + part + ". " + title + "</h2>";
@@ -126,7 +126,7 @@ TEST_F(Demo, TellsTheWholeStoryTwiceAndLeavesAMemoryThatAnswers) {
   // The page states lengths and how they were measured.
   const std::string page = bytes_of(fs::path(out) / "index.html");
   EXPECT_TRUE(std::regex_search(page, std::regex("Maps</small><b>[0-9]+ cm</b>")));
-  EXPECT_FALSE(contains(page, "shape difference"));
+  EXPECT_FALSE(contains(page, "difference of the shapes"));
   EXPECT_LT(said["arranged_procrustes_disparity"].get<double>(), 0.2);
   EXPECT_LT(said["drive_procrustes_disparity"].get<double>(), 0.1);
   EXPECT_EQ(said["route_runs"], 2);

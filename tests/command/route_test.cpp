@@ -315,13 +315,13 @@ TEST_F(RouteVerbs, ReportsShowTheRouteAndTheFixes) {
   const std::string recorded = bytes_of(folder_ / "recorded/index.html");
   (void)text_of_page(recorded);
   EXPECT_EQ(plots_of(recorded),
-            (Titles{"The route panorama: each row is the horizon at one place", "From above"}));
+            (Titles{"The route panorama: each row is the horizon at one place", "Map"}));
   const std::string followed = bytes_of(folder_ / "followed/index.html");
   (void)text_of_page(followed);
   EXPECT_EQ(
       plots_of(followed),
-      (Titles{"From above", "Seen (upper band) and shown by the route from there (lower band)",
-              "How well the route explains the images", "How far off"}));
+      (Titles{"Map", "Seen by the robot (upper band) and predicted from the route (lower band)",
+              "Correlation of seen and predicted lines", "Errors"}));
   const json run = panels_of(followed).front().data;
   ASSERT_GE(run["moments"].size(), 5U);
   ASSERT_EQ(run["route"]["marks"].size(), run["moments"].size());

@@ -51,7 +51,7 @@ viewer::ReportPicture add_camera_part(const DemoRecordings& recordings, Session&
   const MirrorCircle& found = recordings.mirror;
   const std::string centre_px = format_fixed(
       std::hypot(found.centre.u_px - truth.centre.u_px, found.centre.v_px - truth.centre.v_px), 2);
-  page.begin_part("The robot's camera",
+  page.begin_part("Camera",
                   {centre_px + " pixels",
                    "error of the mirror's centre after calibration from the robot's own images"});
   page.add_text(

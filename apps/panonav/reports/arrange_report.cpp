@@ -85,7 +85,7 @@ viewer::UnfoldingMap LatticeSteps::unfold(const Lattice& lattice,
   constexpr std::size_t numbers = 600'000;
   const std::size_t each = 1 + 2 * lattice.nodes.size() + 4 * springs.size();
   const std::size_t frames = std::clamp<std::size_t>(numbers / each, 10, 100);
-  viewer::UnfoldingMap map{.title = "The arrangement, step by step"};
+  viewer::UnfoldingMap map{.title = "Arrangement, step by step"};
   const std::string of = " of " + std::to_string(count_);
   const auto add = [&](const std::string& title, const std::vector<std::optional<Point2>>& places,
                        const std::vector<std::size_t>& components) {
@@ -119,7 +119,7 @@ viewer::UnfoldingMap LatticeSteps::unfold(const Lattice& lattice,
   }
   std::vector<std::size_t> components;
   for (const Lattice::Node& node : lattice.nodes) components.push_back(node.component);
-  add("the arrangement", end, components);
+  add("result", end, components);
   return map;
 }
 
@@ -129,8 +129,8 @@ void write_arrange_report(const std::filesystem::path& folder, const std::string
   viewer::ReportPage page(
       "Arrangement of the views",
       "The " + std::to_string(lattice.nodes.size()) + " views of " + name +
-          " in no order. Their similarity shows which views are near each other and in which "
-          "direction, and these relations give the positions of all.");
+          " were given in no order. panonav estimated the distance and direction between similar "
+          "views, and computed the positions of all views from these estimates.");
   const auto& components = lattice.components;
   std::vector<std::pair<std::string, std::string>> figures{
       {std::to_string(components.front().views) + " of " + std::to_string(lattice.nodes.size()),
@@ -138,21 +138,25 @@ void write_arrange_report(const std::filesystem::path& folder, const std::string
   const auto comparison = compare_with_ground_truth(lattice, memory);
   if (comparison) {
     figures.emplace_back(format_fixed(comparison->truth_from_map.rms_m, 2) + " m",
-                         "from the true places, root mean square, after the best alignment");
-    figures.emplace_back(format_fixed(comparison->shape.value, 4),
-                         "Procrustes disparity (shape difference): 0 the same shape, 1 none");
+                         "root mean square error of the positions after the best alignment");
+    figures.emplace_back(
+        format_fixed(comparison->shape.value, 4),
+        "Procrustes disparity (difference of the shapes): 0 if the shapes are equal, at most 1");
     if (comparison->neighbours) {
-      figures.emplace_back(format_fixed(100.0 * comparison->neighbours->trustworthiness, 0) + " %",
-                           "trustworthiness: neighbours on the map that truly are");
+      figures.emplace_back(
+          format_fixed(100.0 * comparison->neighbours->trustworthiness, 0) + " %",
+          "trustworthiness: degree to which neighbours in the result are true neighbours");
     }
   }
   page.add_figures(figures);
   page.begin_section("Step by step");
   page.add_text(
-      "Groups grow by views that certainly belong together, and join where both agree on their "
-      "relative position. Each group is drawn at its final position, in its shape at that step.");
-  page.add_plots({{steps.unfold(lattice, memory),
-                   "Grey lines are springs: pairs of views with known distance and direction"}});
+      "Views that certainly belong together form groups. Two groups are joined if several pairs of "
+      "views agree on the relative position of the groups. Each group is drawn at its final "
+      "position, with its shape at that step.");
+  page.add_plots(
+      {{steps.unfold(lattice, memory),
+        "Grey lines are springs: pairs of views with an estimated distance and direction"}});
   if (comparison) {
     page.begin_section("Comparison with the true positions");
     page.add_text(
@@ -161,17 +165,17 @@ void write_arrange_report(const std::filesystem::path& folder, const std::string
     std::vector<viewer::ReportPlot> plots;
     for (viewer::MapPlot& plot : draw_lattice(lattice, memory))
       plots.push_back({std::move(plot), ""});
-    plots.front().caption = "Where the views were taken";
-    plots.back().caption = "Positions by similarity";
+    plots.front().caption = "True positions";
+    plots.back().caption = "Computed positions";
     page.add_plots(plots);
   }
   page.begin_section("Groups");
   std::vector<std::vector<std::string>> rows;
   for (std::size_t i = 0; i < std::min<std::size_t>(20, components.size()); ++i) {
     rows.push_back({std::to_string(i + 1), std::to_string(components[i].views),
-                    components[i].handedness_known ? "yes" : "no: may be a mirror image"});
+                    components[i].handedness_known ? "yes" : "no: the group may be mirrored"});
   }
-  page.add_table({"group", "views", "left and right distinguished"}, rows);
+  page.add_table({"group", "views", "left and right known"}, rows);
   if (rows.size() < components.size()) {
     page.add_text("The largest 20 of " + std::to_string(components.size()) + " groups.");
   }

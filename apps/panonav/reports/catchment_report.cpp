@@ -62,20 +62,20 @@ std::vector<viewer::ReportPlot> draw_curves(const CatchmentResult& result) {
                             .y_label = "homeward component",
                             .series = {homeward},
                             .y_range = std::pair{-0.2, 1.0}},
-           "Cosine between home vector and true direction: 1 straight home, 0 chance "
-           "[S06 figure 10]"},
+           "Homeward component: cosine of the angle between home vector and true direction. 1: "
+           "straight home; 0: random direction [S06 figure 10]"},
           {viewer::LinePlot{.title = "Error of the heading",
                             .x_label = "distance from home [m]",
                             .y_label = "circular standard deviation [degrees]",
                             .series = {orientation}},
-           "Error of the heading that comes with it [S06 figure 8]"},
+           "Error of the heading that is computed with the home vector [S06 figure 8]"},
           {viewer::LinePlot{.title = "Mean catchment area",
                             .x_label = "accepted distance from home [m]",
                             .y_label = "share of all places [%]",
                             .series = {areas},
                             .y_range = std::pair{0.0, 100.0}},
-           "Runs from place to place: share of starts from which a run ends within a distance of "
-           "home [S06 figure 11]"}};
+           "Share of starts from which a simulated drive ends within this distance of home [S06 "
+           "figure 11]"}};
 }
 
 viewer::MapPlot draw_field(const RecordedViews& places, const std::vector<HomeVector>& vectors,
@@ -143,32 +143,35 @@ void write_catchment_report(const std::filesystem::path& folder, const RecordedV
   auto ends = rasterise(result.survey.places, result.spacing_m, [&](std::size_t p) {
     return static_cast<double>(result.final_m[goal * places.views.size() + p]);
   });
-  ends.title = "Where runs home end, by where they start (home: cross)";
+  ends.title = "End of each drive home, by its start (home: cross)";
   ends.value_label = "distance from home at the end [m]";
   ends.crosses = difference.crosses;
 
   viewer::ReportPage page(
-      "From how far do views lead home?",
-      "Every view of a recording as a home, every view of " + std::to_string(places.views.size()) +
-          " places as what the robot sees: does the home vector point home, and where "
-          "does a robot end that follows it from place to place?");
+      "Distances from which a robot finds home",
+      "A home vector is the computed direction from a current view to a home view. This page uses "
+      "every view of a recording as a home, and every view of " +
+          std::to_string(places.views.size()) +
+          " places as the current view. It measures the error of the home vectors, and where a "
+          "robot ends that follows them from place to place.");
   page.add_figures(
       {{format_fixed(result.component, 3),
         "average homeward component, " + std::to_string(result.pairs) + " pairs"},
        {format_fixed(degrees(result.orientation_error_rad), 1) + " degrees",
         "error of the heading"},
        {format_fixed(result.areas[1], 1) + " of " + std::to_string(result.survey.places.size()),
-        "places from which runs end within " + format_fixed(result.spacing_m, 2) + " m"}});
-  page.begin_section("Against the distance");
+        "places from which a drive ends within " + format_fixed(result.spacing_m, 2) + " m"}});
+  page.begin_section("Results by distance");
   page.add_plots(draw_curves(result));
-  page.begin_section("Place by place");
-  page.add_plots({{sizes, "Share of all places from which runs end within " +
-                              format_fixed(result.spacing_m, 2) + " m of home, home by home"}});
+  page.begin_section("Results by place");
+  page.add_plots({{sizes, "Share of all places from which a drive ends within " +
+                              format_fixed(result.spacing_m, 2) + " m of home, for each home"}});
   page.begin_section("One home: " + goals.files[goal]);
   page.add_plots({{draw_field(places, vectors, result, goal),
-                   "Home vectors, and the catchment area [S06 figure 9]"},
-                  {difference, "How far views differ from home's [S06 figure 9]"},
-                  {ends, "How far from home runs end [S06 figure 14]"}});
+                   "Home vectors and catchment area [S06 figure 9]: the places from which the "
+                   "robot reaches home"},
+                  {difference, "Difference of each view from the view at home [S06 figure 9]"},
+                  {ends, "Distance from home at the end of each drive [S06 figure 14]"}});
   page.begin_section("Numbers");
   page.add_table({"distance [m]", "pairs", "homeward component", "heading error [degrees]"},
                  format_bins(result.bins));

@@ -19,17 +19,17 @@ std::string in_words(double direction_rad) {
 std::string describe_rotation(double heading_rad) {
   // heading_rad is home's heading seen from here, so the robot has turned the other way.
   const double turned = wrap_angle(-heading_rad);
-  if (std::abs(degrees(turned)) < 0.5) return "the robot faces as at home";
-  if (std::abs(degrees(turned)) >= 179.5) return "the robot faces opposite to its heading at home";
-  return "the robot has turned by " + in_words(turned);
+  if (std::abs(degrees(turned)) < 0.5) return "same heading as at home";
+  if (std::abs(degrees(turned)) >= 179.5) return "opposite heading to the heading at home";
+  return "the robot has rotated by " + in_words(turned);
 }
 
 std::string explain_no_direction(const HomingResult& way) {
-  if (!way.known) return "the views match no better than chance";
+  if (!way.known) return "the views are not more similar than random views";
   // Above it more than half of the energy of either view is found in the other.
   constexpr double alike = std::numbers::sqrt2 / 2.0;
-  if (way.vector.correlation >= alike) return "this looks like home itself";
-  return "the views have too little in common";
+  if (way.vector.correlation >= alike) return "the robot is already at home";
+  return "the views are too different";
 }
 
 }  // namespace panonav::command

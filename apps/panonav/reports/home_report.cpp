@@ -82,7 +82,7 @@ std::vector<viewer::ReportView> make_report_views(const std::optional<Panorama>&
   if (home) {  // the robot at home turns to the current heading
     const double columns = -found.heading_rad / (2.0 * std::numbers::pi) * home->columns();
     views.push_back({rotate_columns(*home, static_cast<int>(std::lround(columns))), marks,
-                     "At home, rotated to the same heading"});
+                     "View at home, rotated to the current heading"});
   }
   views.push_back({current, marks, make_caption(answer)});
   return views;
@@ -93,37 +93,36 @@ std::vector<viewer::ReportView> make_report_views(const std::optional<Panorama>&
 void write_home_report(const std::filesystem::path& folder, const Goal& goal,
                        const std::vector<HomeAnswer>& answers,
                        const std::function<Panorama(std::size_t)>& current) {
-  viewer::ReportPage page("The path home",
-                          "From one view of a place, " + goal.name +
-                              ", and the robot's current view: the direction back, without a map "
-                              "and without knowing the heading.");
+  viewer::ReportPage page("Direction home",
+                          "panonav compared the view at home, " + goal.name +
+                              ", with the current image. It computed the direction home without a "
+                              "map and without knowing the robot's heading.");
   const HomingResult& first = answers.front().way;
   if (answers.size() == 1 && !first.known) {
     page.add_figures({{"no answer", explain_no_direction(first)}});
   } else if (answers.size() == 1) {
     page.add_figures(
         {{first.direction_rad ? in_words(*first.direction_rad) : "none", "direction home"},
-         {format_fixed(first.distance_r, 2) + " R", "distance, R that of the things around"},
+         {format_fixed(first.distance_r, 2) + " R",
+          "distance; R is the typical distance of the objects around"},
          {format_fixed(degrees(first.turn_rad), 0) + " degrees",
-          "turn of the robot since, left positive"},
+          "rotation of the robot since then, left positive"},
          {format_fixed(first.probability, 2),
           "probability that the direction is right within 45 degrees"}});
   }
-  page.begin_section(goal.panorama ? "Both views" : "What the robot sees");
-  page.add_text(
-      std::string(
-          goal.panorama
-              ? "Above, the view at home, rotated to the current heading; below, the current view. "
-              : "") +
-      "Forward is in the middle (grey mark). Orange: the direction home, from which the image "
-      "expands on the way; blue: the opposite direction, towards which it contracts.");
+  page.begin_section(goal.panorama ? "Both views" : "Current image");
+  page.add_text(std::string(goal.panorama ? "Above: the view at home, rotated to the current "
+                                            "heading. Below: the current image. "
+                                          : "") +
+                "The forward direction is in the middle (grey mark). Orange: the direction home; "
+                "objects in this direction become larger during the drive. Blue: the opposite "
+                "direction, where objects become smaller.");
   for (const std::size_t i : choose_shown(answers.size())) {
     page.add_views(make_report_views(goal.panorama, current(i), answers[i]));
   }
   if (const auto vectors = draw_field(goal, answers)) {
-    page.begin_section("From above");
-    page.add_plots(
-        {{*vectors, "The direction home at each place with known position and heading"}});
+    page.begin_section("Map");
+    page.add_plots({{*vectors, "Direction home at each place with known position and heading"}});
   }
   page.begin_section("Numbers");
   std::vector<std::vector<std::string>> rows;
@@ -137,7 +136,7 @@ void write_home_report(const std::filesystem::path& folder, const Goal& goal,
                     format_fixed(way.vector.correlation, 3), format_fixed(way.vector.residual, 3),
                     format_fixed(way.probability, 3)});
   }
-  page.add_table({"view", "direction home", "distance [R]", "turned [degrees]", "correlation",
+  page.add_table({"view", "direction home", "distance [R]", "rotation [degrees]", "correlation",
                   "residual", "probability"},
                  rows);
   page.write(folder, "index.html", "panonav home");

@@ -64,7 +64,7 @@ recordings::RunMoment make_moment(const LocalisedQuery& query, std::size_t numbe
   for (std::size_t i = 0; i < std::min<std::size_t>(3, matches.size()); ++i) {
     constexpr std::array names{"best match", "second", "third"};
     moment.values.emplace_back(
-        std::string("difference to the ") + names.at(i),
+        std::string("difference from the ") + names.at(i),
         format_fixed(matches[i].column_difference, 3) + ", " + matches[i].name);
   }
   moment.best_match = load_best_match(query.place, file);
@@ -75,7 +75,7 @@ void add_table(viewer::ReportPage& page, const std::vector<LocalisedQuery>& quer
   page.begin_section("All answers");
   if (queries.size() > max_rows) {
     page.add_text("The first " + std::to_string(max_rows) + " of " +
-                  std::to_string(queries.size()) + "; --out writes all of them.");
+                  std::to_string(queries.size()) + "; --out writes all answers.");
   }
   std::vector<std::vector<std::string>> rows;
   for (std::size_t i = 0; i < std::min(max_rows, queries.size()); ++i) {
@@ -97,7 +97,8 @@ void add_table(viewer::ReportPage& page, const std::vector<LocalisedQuery>& quer
                     difference(0), difference(1), dissimilarity(0), dissimilarity(1)});
   }
   page.add_text(
-      "Difference and dissimilarity (of the signatures) are to the best match and to the next.");
+      "'Difference' and 'dissimilarity' (of the signatures) are given for the best match and for "
+      "the next match.");
   page.add_table({"image", "answer", "probability", "position", "heading", "error [m]",
                   "difference", "to the next", "dissimilarity", "to the next"},
                  rows);
@@ -134,26 +135,27 @@ void write_localise_report(const std::filesystem::path& folder, const MemoryFile
     if (queries[i].error.empty()) readable.push_back(i);
   }
   viewer::ReportPage page("Localised images",
-                          "Each image, and the view of " + memory_name(file.path()) +
-                              " that is most similar, rotated to the same heading. If both show "
-                              "the same objects in the same directions, the answer is right.");
+                          "This page shows each image and the most similar view of " +
+                              memory_name(file.path()) +
+                              ", rotated to the same heading. If both show the same objects in the "
+                              "same directions, the answer is correct.");
   page.add_figures(summarise(queries, readable.size()));
   page.add_text(
-      "The difference compares the image with a view column by column, at the same heading: 0 if "
-      "they are equal. The probability that the place is known is computed from how much smaller "
-      "the difference of the better half of the columns is at the best match than at the tenth "
-      "best and at mirrored views, which show places that do not exist. Below one half the place "
-      "is unknown.");
+      "The difference compares the image with a view at the same heading, column by column; it is "
+      "0 if both are equal. If the best match is much more similar than other views, the place is "
+      "probably known. The other views are the tenth best match and mirrored views, which show "
+      "places that do not exist. Only the better half of the columns is compared. A place with a "
+      "probability below one half is reported as unknown.");
   const std::size_t shown = std::min(max_shown, readable.size());
   page.begin_section("Image by image");
   page.add_text(
-      "The upper view is the image, forward in its middle. Below it is the most similar view of "
-      "the memory, rotated to the same heading. Grey dots on the map are the views of the memory; "
-      "the large dot is the answer, its circle contains the true position in 95 % of cases; the "
-      "ring is the position of the data set.");
+      "The upper row is the image; the forward direction is in the middle. The lower row is the "
+      "most similar view of the memory, rotated to the same heading. Grey dots on the map are the "
+      "views of the memory. The large dot is the answer; its circle contains the true position in "
+      "95 % of cases. The ring is the position that the data set gives.");
   if (shown < readable.size()) {
-    page.add_text("Shown are " + std::to_string(shown) + " of " + std::to_string(readable.size()) +
-                  " images, evenly spread.");
+    page.add_text("The page shows " + std::to_string(shown) + " of " +
+                  std::to_string(readable.size()) + " images at equal intervals.");
   }
   viewer::RunPage run("", shown);
   run.unordered();
@@ -165,9 +167,9 @@ void write_localise_report(const std::filesystem::path& folder, const MemoryFile
     if (n == 0) moment.references = recordings::reference_positions(recogniser.memory());
     run.add(moment);
   }
-  if (!thumbnails) page.add_text("The memory holds no thumbnail of the best match of some images.");
+  if (!thumbnails) page.add_text("For some images, the memory has no thumbnail of the best match.");
   if (recordings::reference_positions(recogniser.memory()).empty()) {
-    page.add_text("The memory knows no positions, so there is no map.");
+    page.add_text("The memory contains no positions, so this page has no map.");
   }
   if (shown > 0) page.add_run(run);
   add_table(page, queries);

@@ -23,7 +23,7 @@ ordered_json closures_json(const std::optional<MapComparison::Closures>& closure
 }
 
 void print_closures(const MapComparison::Closures& closures, Session& session) {
-  session.print("closures: right " + std::to_string(closures.right) + ", wrong " +
+  session.print("closures: correct " + std::to_string(closures.right) + ", wrong " +
                 std::to_string(closures.wrong));
 }
 

@@ -104,45 +104,45 @@ void write_map_picture(const std::filesystem::path& path, const Dataset& recordi
 void write_map_report(const std::filesystem::path& folder, const std::string& name,
                       const Dataset& recording, const Mapper::Result& run,
                       const viewer::RunPage& played) {
-  viewer::ReportPage page(
-      "The map of " + name,
-      "A robot took " + std::to_string(recording.entries.size()) +
-          " images on its path. Each is placed by the step since the one before, which is read "
-          "from the images; where the robot passed a place again, the loop is closed.");
+  viewer::ReportPage page("Map of " + name,
+                          "A robot took " + std::to_string(recording.entries.size()) +
+                              " images on its path. panonav computed each step of the robot from "
+                              "two consecutive images. Where the robot passed a place again, "
+                              "panonav used this to correct the map (loop closure).");
   const auto closures =
       std::ranges::count(run.map.edges, Link::Kind::closure, &TopologicalMap::Edge::kind);
   std::vector<std::pair<std::string, std::string>> figures{
       {std::to_string(run.map.nodes.size()), "places"},
-      {std::to_string(closures), "closures: places that were passed again"}};
+      {std::to_string(closures), "loop closures: places that the robot passed again"}};
   const std::size_t components = count_components(run.map);
   if (components > 1) {
     figures.emplace_back(std::to_string(components),
-                         "connected components; the largest one is drawn");
+                         "separate parts of the map; the largest part is drawn");
   }
   const auto comparison = compare_with_ground_truth(recording, run);
   if (comparison) {
     figures.emplace_back(format_fixed(comparison->positions.truth_from_map.rms_m, 2) + " m",
-                         "from the true path, root mean square, after the best alignment" +
+                         "root mean square error of the path after the best alignment" +
                              std::string(run.wheels ? "" : " with a free scale"));
-    figures.emplace_back(format_fixed(comparison->positions.shape.value, 4),
-                         "Procrustes disparity (shape difference): 0 the same shape, 1 none");
+    figures.emplace_back(
+        format_fixed(comparison->positions.shape.value, 4),
+        "Procrustes disparity (difference of the shapes): 0 if the shapes are equal, at most 1");
     if (comparison->odometry_shape_difference) {
       figures.emplace_back(format_fixed(*comparison->odometry_shape_difference, 4),
-                           "the same of the odometry alone");
+                           "Procrustes disparity of the odometry alone");
     }
   }
   page.add_figures(figures);
   page.begin_section("The drive, image by image");
   page.add_text(
-      "Grey dots are the places of the map, lines its edges. The large dot is the image's position "
-      "in the map; images between places are not in the map.");
+      "Grey dots are the places of the map, and lines connect them. The large dot is the position "
+      "of the current image. Images between two places are not stored in the map.");
   page.add_run(played);
   page.begin_section("The whole map");
-  page.add_plots(
-      {{draw_map(recording, run),
-        comparison ? "The map, rotated and moved onto the true path; true positions were "
-                     "used for this only"
-                   : "The places in the order of the images, and the closures"}});
+  page.add_plots({{draw_map(recording, run),
+                   comparison ? "The map, rotated and moved to fit the true path. The true path "
+                                "was not used to make the map."
+                              : "Places in the order of the images, and loop closures"}});
   page.write(folder, "index.html", "panonav map");
 }
 

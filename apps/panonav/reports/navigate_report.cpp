@@ -12,15 +12,15 @@ namespace panonav::command {
 void write_navigate_report(const std::filesystem::path& folder, const MissionReport& mission,
                            const viewer::RunPage& played) {
   const simulation::MissionRun& run = mission.run;
-  viewer::ReportPage page("The path to " + mission.goal,
-                          "A simulated robot was sent to a remembered view. It uses only images: "
-                          "it knows neither its position nor those of its references.");
+  viewer::ReportPage page("Mission to " + mission.goal,
+                          "A simulated robot was sent to a stored view. It uses only images. It "
+                          "knows neither its own position nor the positions of the stored views.");
   std::vector<std::pair<std::string, std::string>> figures{
       {std::string(name_of(run.end)), mission.reason},
-      {std::to_string(run.decisions.size()), "steps, an image and a decision each"}};
+      {std::to_string(run.decisions.size()), "steps with one image and one decision each"}};
   if (std::isfinite(run.end_distance_m)) {
     figures.emplace_back(format_fixed(100.0 * run.end_distance_m, 0) + " cm",
-                         "from where the goal's view was taken");
+                         "distance from the goal at the end");
   }
   figures.emplace_back(format_fixed(run.travelled_m, 1) + " m",
                        std::isfinite(run.shortest_m) ? "driven; the shortest path is " +
@@ -29,12 +29,13 @@ void write_navigate_report(const std::filesystem::path& folder, const MissionRep
   page.add_figures(figures);
   page.begin_section("The mission, decision by decision");
   page.add_text(
-      "Grey dots are the remembered views, with the direction in which each sends the robot; the "
-      "thick line is the planned path, the ring its goal. The robot is drawn at its true position. "
-      "The list shows its decisions; click one to go there.");
+      "Grey dots are the stored views. Their lines show the direction in which each view sends the "
+      "robot. The thick line is the planned path, and the ring is the goal. The robot is drawn at "
+      "its true position. The list shows the robot's decisions; click a decision to see it on the "
+      "map.");
   page.add_run(played);
   page.begin_section("The whole mission");
-  page.add_plots({{mission.plot, "Planned and driven path, with the surroundings"}});
+  page.add_plots({{mission.plot, "Planned path, driven path and objects"}});
   page.write(folder, "index.html", "panonav navigate");
 }
 

@@ -41,12 +41,12 @@ void prepare_report_folder(const std::filesystem::path& folder, std::string_view
   const bool ours = is_made_by(folder / page, "panonav " + std::string(verb));
   if (there &&
       (!fs::is_directory(folder, error) || (!ours && !is_free(folder, std::string(page))))) {
-    throw FileError(folder.string(), "is there already and was not made by panonav " +
-                                         std::string(verb) +
-                                         "; allowed: a new folder, or that of an earlier one");
+    throw FileError(folder.string(),
+                    "exists and was not made by panonav " + std::string(verb) +
+                        "; allowed: a new folder, or the folder of an earlier report of this verb");
   }
   fs::create_directories(folder, error);
-  if (error) throw FileError(folder.string(), "cannot be made: " + error.message());
+  if (error) throw FileError(folder.string(), "cannot be created: " + error.message());
 }
 
 std::vector<Point2> arrow(const Pose2& from, double length_m) {

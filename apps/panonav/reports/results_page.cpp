@@ -25,18 +25,18 @@ void add_tables(viewer::ReportPage& page, std::vector<lab::ResultRow> rows) {
   const std::span<const lab::ResultRow> all(rows);
   if (judged > 0) add_table(page, all.first(judged));
   if (judged == all.size()) return;
-  page.add_text("Figures without a target:");
+  page.add_text("Results without a target:");
   add_table(page, all.subspan(judged));
 }
 
 void add_counts(viewer::ReportPage& page, const lab::TargetCount& count, std::size_t rows) {
   page.add_figures(
-      {{std::to_string(count.held) + " of " + std::to_string(count.judged), "targets hold"},
-       {std::to_string(rows - count.judged), "more figures are reported"}});
+      {{std::to_string(count.held) + " of " + std::to_string(count.judged), "targets met"},
+       {std::to_string(rows - count.judged), "other results without a target"}});
 }
 
 void add_misses(viewer::ReportPage& page, const lab::ResultsDocument& document) {
-  page.begin_section("Rows that do not hold");
+  page.begin_section("Targets that were not met");
   const auto misses = lab::list_misses(document);
   for (const std::string& line : misses) page.add_text(line);
   if (misses.empty()) page.add_text("None.");
@@ -51,7 +51,7 @@ void write_paper_page(const std::filesystem::path& folder, const ReproducedPaper
   add_misses(
       page,
       {.version = {}, .command = {}, .papers = {{std::string(paper.name), {}, reproduction.rows}}});
-  page.begin_section("Published and measured");
+  page.begin_section("Published and measured results");
   add_tables(page, reproduction.rows);
   page.begin_section("Images");
   std::vector<viewer::ReportPicture> pictures;
@@ -63,7 +63,7 @@ void write_paper_page(const std::filesystem::path& folder, const ReproducedPaper
 }
 
 void write_results_page(const std::filesystem::path& folder, const lab::ResultsDocument& document) {
-  viewer::ReportPage page("Results: published and measured",
+  viewer::ReportPage page("Results: published and measured values",
                           "Written by panonav " + document.version + ":");
   page.add_commands({document.command});
   std::size_t rows = 0;
@@ -72,7 +72,7 @@ void write_results_page(const std::filesystem::path& folder, const lab::ResultsD
   add_misses(page, document);
   for (const lab::PaperResults& paper : document.papers) {
     page.begin_section(paper.title);
-    page.add_link(paper.paper + "/index.html", "Its own page, with images");
+    page.add_link(paper.paper + "/index.html", "Page of this paper with images");
     add_tables(page, paper.rows);
   }
   page.write(folder);

@@ -27,7 +27,7 @@ void copy_line_clockwise(std::span<const float> line, float* to) {
 }
 
 viewer::MapLayer draw_path_layer(std::span<const Pose2> path) {
-  viewer::MapLayer layer{.label = "recorded route", .colour = viewer::PlotColour::grey};
+  viewer::MapLayer layer{.label = "stored route", .colour = viewer::PlotColour::grey};
   layer.lines.push_back(positions_of(path));
   return layer;
 }
@@ -91,9 +91,9 @@ viewer::PicturePlot draw_lines(const RouteLines& route, const std::vector<Follow
   const auto columns = static_cast<std::size_t>(route.columns());
   const int rows = rows_of_pair * static_cast<int>(chosen.size());
   viewer::PicturePlot plot{
-      .title = "Seen (upper band) and shown by the route from there (lower band)",
+      .title = "Seen by the robot (upper band) and predicted from the route (lower band)",
       .x_label = "azimuth from straight ahead [degrees], left positive",
-      .y_label = "image, the last one on top",
+      .y_label = "image, last image at the top",
       .x_range = {180.0, -180.0},
       .y_range = {0.0, static_cast<double>(chosen.size())},
       .columns = route.columns(),
@@ -116,10 +116,9 @@ viewer::PicturePlot draw_lines(const RouteLines& route, const std::vector<Follow
 
 viewer::MapPlot draw_path(const RouteLines& route, const std::vector<FollowedImage>& images) {
   viewer::MapLayer truth{.label = "ground truth", .colour = viewer::PlotColour::black};
-  viewer::MapLayer fixes{.label = "fixes", .colour = viewer::PlotColour::blue};
-  viewer::MapLayer changed{.label = "something changed in view",
-                           .colour = viewer::PlotColour::orange};
-  viewer::MapLayer off{.label = "true place where not on the route",
+  viewer::MapLayer fixes{.label = "computed positions", .colour = viewer::PlotColour::blue};
+  viewer::MapLayer changed{.label = "changed scene", .colour = viewer::PlotColour::orange};
+  viewer::MapLayer off{.label = "true position while off the route",
                        .colour = viewer::PlotColour::vermilion};
   std::vector<Point2> true_path;
   for (const FollowedImage& image : images) {
@@ -131,8 +130,7 @@ viewer::MapPlot draw_path(const RouteLines& route, const std::vector<FollowedIma
     if (!image.fix && image.truth) off.crosses.push_back(image.truth->position());
   }
   if (true_path.size() > 1) truth.lines.push_back(std::move(true_path));
-  return {.title = "From above",
-          .layers = {draw_path_layer(route.poses()), truth, changed, fixes, off}};
+  return {.title = "Map", .layers = {draw_path_layer(route.poses()), truth, changed, fixes, off}};
 }
 
 viewer::LinePlot draw_errors(const std::vector<FollowedImage>& images) {
@@ -149,20 +147,20 @@ viewer::LinePlot draw_errors(const std::vector<FollowedImage>& images) {
       along.add(number, 100.0 * std::abs(image.fix->along_m - image.true_place->along_m));
     }
   }
-  return {.title = "How far off",
+  return {.title = "Errors",
           .x_label = "image",
           .y_label = "error [cm]",
           .series = {position, along, lost}};
 }
 
 viewer::LinePlot draw_correlations(const std::vector<FollowedImage>& images) {
-  viewer::Series correlation{.label = "of seen and shown line",
+  viewer::Series correlation{.label = "of seen and predicted line",
                              .style = viewer::SeriesStyle::lines_and_points};
   for (std::size_t i = 0; i < images.size(); ++i) {
     if (!images[i].fix) continue;
     correlation.add(static_cast<double>(i + 1), images[i].fix->correlation);
   }
-  return {.title = "How well the route explains the images",
+  return {.title = "Correlation of seen and predicted lines",
           .x_label = "image",
           .y_label = "correlation",
           .series = {correlation}};
@@ -195,23 +193,23 @@ void write_record_report(const std::filesystem::path& folder, const std::string&
   viewer::MapLayer path = draw_path_layer(route.poses());
   viewer::MapLayer start{.label = "start", .colour = viewer::PlotColour::green};
   start.squares.push_back(route.poses().front().position());
-  viewer::ReportPage page(
-      "Route '" + name + "'",
-      "A robot drove this route once. For each place it stores one line of pixels, what its camera "
-      "sees at its own height; this is all it needs to follow the route again.");
+  viewer::ReportPage page("Route '" + name + "'",
+                          "A robot drove this route once. For each place it stored one line of "
+                          "pixels: the horizon around the robot at the height of its camera. It "
+                          "needs no other data to drive the route again.");
   page.add_figures(
       {{format_fixed(route.length_m(), 1) + " m", "long"},
        {std::to_string(route.size()), "lines of " + std::to_string(route.columns()) + " pixels"},
-       {format_fixed(1e-6 * bytes_per_km, 2) + " MB", "a kilometre in the memory"}});
+       {format_fixed(1e-6 * bytes_per_km, 2) + " MB", "per kilometre in the memory"}});
   page.begin_section("The route panorama");
   page.add_text(
-      "Each row is one place, the start at the bottom, the end on top; from left to right all "
-      "around the robot, straight ahead in the middle. Objects move from the middle outwards as "
-      "the robot passes them, the slower the farther they are.");
+      "Each row is the horizon at one place. The start is at the bottom, the end is at the top, "
+      "and the forward direction is in the middle. When the robot passes an object, the object "
+      "moves from the middle to one side. Distant objects move more slowly than near objects.");
   page.add_plots({{draw_panorama(route), "Omnidirectional route panorama"}});
   page.begin_section("Route");
-  page.add_plots({{viewer::MapPlot{.title = "From above", .layers = {path, start}},
-                   "Where the lines were taken"}});
+  page.add_plots(
+      {{viewer::MapPlot{.title = "Map", .layers = {path, start}}, "Positions of the lines"}});
   page.write(folder, "index.html", "panonav route record");
 }
 
@@ -227,40 +225,41 @@ void write_follow_report(const std::filesystem::path& folder, const FollowedRout
   add_figure(figures, summary.heading_rad, degrees(1.0), 2, " degrees", "median error of heading");
   viewer::ReportPage page(
       "Following route '" + route.name + "'",
-      "A robot that drives the route again, or at some distance from it, searches for the pose at "
-      "which the recorded lines predict what it sees.");
+      "A robot drives the route again, or drives beside it. panonav searches for the pose at which "
+      "the stored lines predict the robot's current image.");
   page.add_figures(figures);
   played.route(draw_panorama(route.panorama), make_marks(images));
   page.begin_section("The run, image by image");
   page.add_text(
-      "On the map, the recorded route and the robot's position. Below, the route panorama: each "
-      "row is the horizon at one place of the route, the start at the bottom, straight ahead in "
-      "the middle. The line across it is the robot's row; orange marks are directions in which the "
-      "scene has changed.");
+      "The map shows the stored route and the robot's position. The route panorama is below. Each "
+      "row is the horizon at one place of the route, with the start at the bottom and the forward "
+      "direction in the middle. The horizontal line marks the robot's row. Orange marks are "
+      "directions in which the scene has changed.");
   page.add_run(played);
   page.begin_section("Route");
   page.add_plots({{draw_path(route.lines, images),
-                   "Recorded route, fixes, and the true path where it is known"}});
+                   "Stored route, computed positions, and the true path if it is known"}});
   if (!chosen.empty()) {
-    page.begin_section("Seen and shown");
+    page.begin_section("Seen and predicted lines");
     page.add_text(
-        "For some images of the run, what the robot saw (upper band of each pair) and what the "
-        "route predicts at its estimated pose (lower band), composed of the lines of many places. "
-        "Light blue: the route has no data in this direction.");
+        "The upper band of each pair is the line that the robot saw. The lower band is the line "
+        "that the route predicts at the robot's computed pose; it combines the lines of many "
+        "places. Light blue: the route has no data in this direction.");
     page.add_plots(
-        {{draw_lines(route.lines, images, chosen), "Lines seen, and lines made from the route"},
-         {draw_correlations(images), "Correlation of the two, image by image"}});
+        {{draw_lines(route.lines, images, chosen), "Seen lines and predicted lines of some images"},
+         {draw_correlations(images), "Correlation of seen and predicted lines, image by image"}});
   }
   if (!summary.position_m.empty()) {
     page.begin_section("Errors");
-    page.add_plots({{draw_errors(images), "Distance of each fix from the data set's own pose"}});
+    page.add_plots({{draw_errors(images),
+                     "Distance of each computed position from the position in the data set"}});
   }
   const auto stretches = changed_stretches(images);
   if (!stretches.empty()) {
-    page.begin_section("Changed here");
+    page.begin_section("Changed scene");
     page.add_text(
-        "Along these stretches the route does not explain some directions in consecutive images: "
-        "the scene has changed.");
+        "On these sections of the route the stored lines do not match the images in some "
+        "directions. The scene has changed there.");
     std::vector<std::vector<std::string>> rows;
     for (const auto& [from_m, to_m] : stretches) {
       rows.push_back({format_fixed(from_m, 2) + " m", format_fixed(to_m, 2) + " m"});

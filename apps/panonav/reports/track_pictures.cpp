@@ -10,7 +10,7 @@ namespace {
 using Lines = std::vector<std::vector<Point2>>;
 
 viewer::MapLayer draw_references(const VisualMemory& memory) {
-  viewer::MapLayer layer{.label = "remembered views", .colour = viewer::PlotColour::grey};
+  viewer::MapLayer layer{.label = "stored views", .colour = viewer::PlotColour::grey};
   for (const ViewId view : memory.views()) {
     if (const auto& pose = memory.info(view).pose) layer.circles.push_back(pose->position());
   }
@@ -57,13 +57,15 @@ viewer::MapLayer draw_estimated_path(const std::vector<TrackedImage>& images,
 
 viewer::MapPlot draw_track(const VisualMemory& memory, const std::vector<TrackedImage>& images,
                            const TrackBackground& background) {
-  viewer::MapLayer localised{.label = "localised here", .colour = viewer::PlotColour::blue};
-  viewer::MapLayer guessed{.label = "ambiguous: likeliest place",
+  viewer::MapLayer localised{.label = "localised", .colour = viewer::PlotColour::blue};
+  viewer::MapLayer guessed{.label = "ambiguous: most likely position",
                            .colour = viewer::PlotColour::orange};
-  viewer::MapLayer lost{.label = "true place where lost", .colour = viewer::PlotColour::vermilion};
+  viewer::MapLayer lost{.label = "true position while lost",
+                        .colour = viewer::PlotColour::vermilion};
   viewer::MapLayer start{.label = "start", .colour = viewer::PlotColour::green};
   if (images.front().truth) start.squares.push_back(images.front().truth->position());
-  viewer::MapLayer kidnapped{.label = "kidnapped to here", .colour = viewer::PlotColour::purple};
+  viewer::MapLayer kidnapped{.label = "carried to this place",
+                             .colour = viewer::PlotColour::purple};
   if (background.kidnapped_after && images.at(*background.kidnapped_after + 1).truth) {
     kidnapped.squares.push_back(images[*background.kidnapped_after + 1].truth->position());
   }
@@ -77,7 +79,7 @@ viewer::MapPlot draw_track(const VisualMemory& memory, const std::vector<Tracked
       lost.crosses.push_back(image.truth->position());
     }
   }
-  viewer::MapPlot plot{.title = "The whole run from above", .layers = background.surroundings};
+  viewer::MapPlot plot{.title = "Map of the whole run", .layers = background.surroundings};
   for (viewer::MapLayer& layer : std::vector{
            draw_references(memory), draw_true_path(images, background),
            draw_estimated_path(images, background), localised, guessed, lost, start, kidnapped}) {

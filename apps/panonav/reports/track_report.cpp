@@ -36,7 +36,7 @@ viewer::LinePlot draw_errors(const std::vector<TrackedImage>& images, double spa
   }
   spacing.x = {1.0, static_cast<double>(images.size())};
   spacing.y = {spacing_m, spacing_m};
-  return viewer::LinePlot{.title = "How far off, and how sure",
+  return viewer::LinePlot{.title = "Errors and uncertainty",
                           .x_label = "image",
                           .y_label = "metres",
                           .series = {localised, guessed, spread, lost, spacing},
@@ -97,11 +97,11 @@ std::vector<std::pair<std::string, std::string>> main_figures(const TrackSummary
   std::vector<std::pair<std::string, std::string>> figures{
       {format_share(summary.localised, total), "of the images localised"},
       {summary.first_localised ? std::to_string(*summary.first_localised) : "never",
-       summary.first_localised ? "images until it was first localised" : "localised"}};
+       summary.first_localised ? "images until the robot was first localised" : "localised"}};
   if (!summary.errors_m.empty()) {
-    figures.emplace_back(length_text(median(summary.errors_m)), "median error where localised");
+    figures.emplace_back(length_text(median(summary.errors_m)), "median error while localised");
     figures.emplace_back(length_text(quantile(summary.errors_m, 0.95)),
-                         "holds 95 % of these errors");
+                         "limit for 95 % of these errors");
   }
   if (!summary.heading_errors_rad.empty()) {
     figures.emplace_back(format_fixed(degrees(median(summary.heading_errors_rad)), 1) + " degrees",
@@ -125,36 +125,37 @@ void write_track_report(const std::filesystem::path& folder, const VisualMemory&
   const bool truth_known =
       std::ranges::any_of(images, [](const auto& image) { return image.truth.has_value(); });
   viewer::ReportPage page(
-      "Where was the robot?",
-      "A robot moved, with odometry that drifts and a memory of " + std::to_string(memory.size()) +
-          " views, and took " + std::to_string(images.size()) +
-          " images. After each one, particles say where it may be: far apart while it does not "
-          "know, close together once it does.");
+      "Tracked run",
+      "A robot moved. It had odometry with errors and a memory of " +
+          std::to_string(memory.size()) + " views, and took " + std::to_string(images.size()) +
+          " images. Particles show its possible positions after each image. They are far apart "
+          "while the position is unknown, and close together when it is known.");
   page.add_figures(main_figures(summary, images.size()));
   page.begin_section("The run, image by image");
   page.add_text(
-      "Each small dot is a particle, a place where the robot may be. Grey dots are the remembered "
+      "Each small dot is a particle: a possible position of the robot. Grey dots are the stored "
       "views, " +
       format_fixed(100.0 * spacing_m, 0) +
-      " cm apart. The large dot is the estimate, the mean of the heaviest group of particles; it "
-      "is missing where the robot is lost." +
-      std::string(truth_known ? " The ring is where the robot truly is." : ""));
+      " cm apart. The large dot is the estimate: the mean of the group of particles with the "
+      "highest probability. There is no large dot while the robot is lost." +
+      std::string(truth_known ? " The ring is the true position." : ""));
   page.add_run(played);
   page.begin_section("The whole run");
   page.add_plots(
       {{draw_track(memory, images, {}),
-        truth_known ? "True and estimated path; crosses: true places where the robot was lost"
-                    : "The estimated path; it breaks off where the robot was not localised"},
+        truth_known ? "True and estimated path. Crosses: true positions while the robot was lost"
+                    : "The estimated path, with gaps where the robot was not localised"},
        {draw_errors(images, spacing_m),
-        truth_known ? "Error of each estimate, and how far the particles spread around their "
-                      "mean, on a logarithmic scale"
-                    : "How far the particles spread around their mean, on a logarithmic scale"}});
-  page.begin_section("State by state");
+        truth_known ? "Error of each estimate, and distance of the particles from their mean, on a "
+                      "logarithmic scale"
+                    : "Distance of the particles from their mean, on a logarithmic scale"}});
+  page.begin_section("States");
   page.add_table({"images", "state", "median error", "largest error"}, stretches(images));
   page.begin_section("Particles");
   page.add_text(
-      "More are used while much is possible, fewer once they lie close together. By those drawn "
-      "again, a kidnapped robot is found.");
+      "The tracker uses more particles while many positions are possible, and fewer when the "
+      "particles are close together. It also adds new particles at random positions, so that it "
+      "finds a robot that was carried away.");
   page.add_plots(
       {{draw_particles(images), "Number of particles after each image, on a logarithmic scale"}});
   page.write(folder, "index.html", "panonav track");
