@@ -97,7 +97,7 @@ TEST(ResultsDocument, SaysSoWhenNothingIsMissed) {
   ResultsDocument made = document();
   made.papers[0].rows[1].ours = 0.5;
   EXPECT_TRUE(list_misses(made).empty());
-  EXPECT_TRUE(contains(to_markdown(made), "## Rows that do not hold\n\nNone.\n"));
+  EXPECT_TRUE(contains(to_markdown(made), "## Targets that were not met\n\nNone.\n"));
 }
 
 }  // namespace
