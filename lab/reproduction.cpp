@@ -229,7 +229,7 @@ Reproduction reproduce(std::string_view paper, const ReproductionOptions& option
   const ReproductionPlan stages = find_paper(paper).plan({options, executor, result});
   std::error_code error;
   std::filesystem::create_directories(options.out, error);
-  if (error) throw FileError(options.out.string(), "cannot be made: " + error.message());
+  if (error) throw FileError(options.out.string(), "cannot be created: " + error.message());
   double all = 0.0;
   for (const ReproductionStage& stage : stages) all += stage.cost;
   double done = 0.0;

@@ -108,8 +108,8 @@ std::string to_markdown(const ResultsDocument& document) {
   std::string text = "# Results: published and measured\n\n";
   text += "Written by panonav " + document.version + ":\n\n    " + document.command + "\n\n";
   text += "**" + std::to_string(count.held) + " of " +
-          format_count(count.judged, "target holds", "targets hold") + ".**\n\n";
-  text += "| experiments | targets | hold |\n|---|---|---|\n";
+          format_count(count.judged, "target met", "targets met") + ".**\n\n";
+  text += "| experiments | targets | met |\n|---|---|---|\n";
   for (const PaperResults& paper : document.papers) {
     const TargetCount of_paper = count_targets(paper.rows);
     text += "| [" + escape_markdown(paper.title) + "](#" + paper.paper + ") | " +

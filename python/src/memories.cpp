@@ -429,7 +429,7 @@ void bind_synchronisation(py::module_& m) {
       },
       py::arg("file"), py::arg("server"), py::arg("areas") = py::none(),
       "Brings a robot's memory file and a memory on a PostgreSQL server to the same views, links, "
-      "names and poses, as `panonav synchronise` does; where one of the two is not there it is "
+      "names and poses, as `panonav synchronise` does; where one of the two does not exist it is "
       "made. `areas`: (column, row) of the squares of 10 m that the file keeps; None: all. When "
       "the link breaks, FileError is raised, nothing is lost or doubled, and the next call goes "
       "on.");

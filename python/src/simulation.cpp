@@ -55,7 +55,7 @@ Dataset record(const simulation::SimulatedWorld& world, const std::filesystem::p
                const std::optional<Trajectory>& trajectory, int threads) {
   std::error_code ignored;
   if (std::filesystem::exists(folder, ignored) && !std::filesystem::is_empty(folder, ignored)) {
-    throw FileError(folder.string(), "is there already and not empty; allowed: a new folder");
+    throw FileError(folder.string(), "already exists and is not empty; allowed: a new folder");
   }
   InterruptibleExecutor executor(threads);
   const auto poses = trajectory ? world.plan_along(trajectory->poses()) : world.plan();

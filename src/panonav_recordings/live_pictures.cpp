@@ -235,7 +235,7 @@ LivePictures::LivePictures(std::string address, const LiveOptions& options)
   remember_address(self.address);
   if (!is_live(self.address)) {
     throw FileError(self.address,
-                    "is no live source; allowed: -, /dev/video*, rtsp://, rtmp://, http://, "
+                    "is not a live source; allowed: -, /dev/video*, rtsp://, rtmp://, http://, "
                     "https://, tcp://, udp://");
   }
   self.stop_event = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);

@@ -114,7 +114,7 @@ std::optional<VideoIndex> read_index(const std::string& file, const std::string&
     }
   }
   if (index.stamps.empty() || index.unit_s <= 0.0) {
-    throw FileError(file, "holds no picture; allowed: a video");
+    throw FileError(file, "contains no picture; allowed: a video");
   }
   std::ranges::sort(index.stamps);
   index.stamps.erase(std::unique(index.stamps.begin(), index.stamps.end()), index.stamps.end());
@@ -223,7 +223,7 @@ Dataset read_video(const fs::path& file, PictureSource source, const Dataset::Se
                    const ImageLimits& limits) {
   std::error_code error;
   if (!fs::is_regular_file(file, error))
-    throw FileError(file.string(), "is not there; allowed: a video");
+    throw FileError(file.string(), "does not exist; allowed: a video");
   auto index = read_index(file.string(), "packet=pts,flags");
   if (!index) index = read_index(file.string(), "frame=best_effort_timestamp");
   if (!index) throw FileError(file.string(), "has pictures without a time");

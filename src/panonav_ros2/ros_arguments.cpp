@@ -81,7 +81,7 @@ void read_parameter_file(const std::string& path, const std::string& node,
   const std::string inside = name_space == "/" ? "" : name_space;
   try {
     const YAML::Node root = YAML::Load(std::string(bytes.begin(), bytes.end()));
-    if (!root.IsMap()) throw FileError(path, "holds no map of nodes' names");
+    if (!root.IsMap()) throw FileError(path, "contains no map of nodes' names");
     const auto take = [&](const YAML::Node& of_node) {
       if (!of_node.IsMap() || !of_node["ros__parameters"] || !of_node["ros__parameters"].IsMap()) {
         throw FileError(path,

@@ -178,7 +178,7 @@ class WorldReader {
       return place.world_from_scope * *scope_from_base * written;
     context_.warn(place.origin.object, "the pose of " + quote(part.attribute("name").value()) +
                                            " is relative to " + quote(frame) +
-                                           ", which is not there; taken relative to its parent");
+                                           ", which does not exist; taken relative to its parent");
     return world_from_parent * written;
   }
 

@@ -232,7 +232,7 @@ class ColladaHoles {
   [[nodiscard]] Vector3 position(const Corner& corner) const {
     const double index = corner[vertex_input_];
     if (!positions_ || !(index >= 0.0 && index < static_cast<double>(positions_->size() / 3)))
-      throw Error("a vertex that is not there");
+      throw Error("a vertex that does not exist");
     const double* p = &(*positions_)[3 * static_cast<std::size_t>(index)];
     return {p[0], p[1], p[2]};
   }
@@ -339,7 +339,7 @@ std::vector<FileMesh> MeshLibrary::read_new(const fs::path& path, UpAxis up) {
     collector.materials.push_back(convert_material(*source->mMaterials[i], path, textures_));
   }
   collector.visit(*source->mRootNode, correct_up_axis(up, path));
-  if (collector.meshes.empty()) throw FileError(path.string(), "holds no triangles");
+  if (collector.meshes.empty()) throw FileError(path.string(), "contains no triangles");
   return std::move(collector.meshes);
 }
 

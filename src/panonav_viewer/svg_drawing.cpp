@@ -93,8 +93,8 @@ int run_ffmpeg(const fs::path& svg, const fs::path& picture, const fs::path& log
   posix_spawn_file_actions_destroy(&actions);
   if (error != 0) {
     throw Error(
-        "pictures as PNG need the program ffmpeg, which cannot be started; install the package "
-        "ffmpeg, or give a name that ends in .svg");
+        "PNG images need the program ffmpeg, which cannot be started; install the package ffmpeg, "
+        "or choose a name that ends in .svg");
   }
   int status = 0;
   while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
@@ -225,7 +225,8 @@ void write_drawing(const std::filesystem::path& path, const std::string& svg) {
       std::ifstream in(log.path());
       std::string line;
       std::getline(in, line);
-      throw FileError(path.string(), "cannot be made of SVG by ffmpeg: " + to_readable_line(line));
+      throw FileError(path.string(),
+                      "cannot be converted from SVG by ffmpeg: " + to_readable_line(line));
     }
   }
   std::error_code error;

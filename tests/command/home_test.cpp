@@ -174,7 +174,7 @@ TEST_F(Home, BetweenPicturesOfNoiseThereIsNoAnswer) {
     const auto text =
         run_panonav({"home", folder / "a.png", folder / "b.png", "--kind", "panorama"});
     EXPECT_EQ(text.exit_code, 1);
-    EXPECT_TRUE(contains(text.out, "no answer: the views match no better than chance"));
+    EXPECT_TRUE(contains(text.out, "no answer: the views are not more similar than random views"));
     EXPECT_FALSE(contains(text.out, "probability"));
     PictureSource source;
     const HomingResult way =

@@ -155,8 +155,8 @@ TEST_F(Map, SaysWhatItWroteAndWhatAPictureShows) {
   EXPECT_GE(run["moments"].size(), 5U);
   EXPECT_FALSE(run["moments"][0].contains("truth")) << "it is in another frame";
   EXPECT_GE(run["retained"]["references"].size(), 4U);
-  EXPECT_TRUE(contains(result.out, memory() + " holds the map"));
-  EXPECT_TRUE(contains(result.out, std::string(folder_ / "m.tum") + " holds the poses"));
+  EXPECT_TRUE(contains(result.out, memory() + " contains the map"));
+  EXPECT_TRUE(contains(result.out, std::string(folder_ / "m.tum") + " contains the poses"));
   EXPECT_TRUE(contains(result.out, std::string(folder_ / "m.svg") + " shows the"));
 }
 

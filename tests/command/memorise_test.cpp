@@ -166,7 +166,7 @@ TEST_F(Memorise, WhereNoPictureCanBeReadThereIsNoMemory) {
   write_text(file, "no picture");
   const auto result = run_panonav({"memorise", file, memory(), "--kind", "panorama"});
   EXPECT_EQ(result.exit_code, 2);
-  EXPECT_TRUE(contains(result.err, "holds no image that can be read"));
+  EXPECT_TRUE(contains(result.err, "contains no image that can be read"));
   EXPECT_FALSE(fs::exists(memory()));
 }
 
@@ -267,7 +267,7 @@ TEST_F(Memorise, WrongOptionsInAFileAreRefusedByName) {
 
 TEST_F(Memorise, WhatWasForgottenComesBackWithUndo) {
   run_well({"memorise", data(), memory()});
-  expect_refusal({"undo", memory()}, "has nothing to undo");
+  expect_refusal({"undo", memory()}, "contains no change that can be reverted");
   const auto shown =
       answer_of({"forget", memory(), view_name(2), view_name(3), "--dry-run", "--json"});
   EXPECT_EQ(shown["forgotten"], 2);
@@ -279,9 +279,9 @@ TEST_F(Memorise, WhatWasForgottenComesBackWithUndo) {
   EXPECT_EQ(answer_of({"undo", memory(), "--dry-run", "--json"})["views"], 14);
   const auto undone = answer_of({"undo", memory(), "--json"});
   EXPECT_EQ(undone["views"], 16);
-  EXPECT_EQ(undone["undone"], "forget: 2 views dropped");
+  EXPECT_EQ(undone["undone"], "forget: 2 views deleted");
   EXPECT_EQ(run_panonav({"localise", memory(), data(), "--json"}).out, before.out);
-  expect_refusal({"undo", memory()}, "has nothing to undo");
+  expect_refusal({"undo", memory()}, "contains no change that can be reverted");
   run_well({"verify", memory()});
 
   const auto dry = answer_of({"prune", memory(), "--max-difference", "0.5", "--dry-run", "--json"});
@@ -350,7 +350,7 @@ TEST_F(Memorise, NamesThatAreTooLongOrNotUtf8) {
            {"forget", folder_ / long_name, view_name(1)}}) {
     const auto line = refusal(arguments);
     EXPECT_TRUE(contains(line, long_name)) << arguments.front();
-    EXPECT_EQ(line.find("fault of the program"), std::string::npos);
+    EXPECT_EQ(line.find("internal error of the program"), std::string::npos);
   }
   fs::remove(data() / "dataset.toml");
   fs::remove(data() / "poses.csv");

@@ -127,7 +127,7 @@ TEST_F(Navigate, IsLostInAnotherBuilding) {
   EXPECT_LE(reported.size(), 25U);
   for (std::size_t i = 0; i + 1 < reported.size(); ++i) EXPECT_LT(reported[i]["probability"], 0.5);
   const auto text = run_panonav(elsewhere);
-  EXPECT_NE(text.out.find("certain of its place (probability 0.5 or more) in 0 of "),
+  EXPECT_NE(text.out.find("certain of its position (probability 0.5 or more) in 0 of "),
             std::string::npos)
       << text.out;
 }
@@ -253,7 +253,7 @@ TEST_F(Navigate, RefusesInOneLine) {
   const std::string empty = *folder / "empty.panonav";
   static_cast<void>(
       MemoryFile::create(empty, MemoryFile::open(memory, Access::read_only).header()));
-  expect_refusal(ask(empty, "1"), "holds no views");
+  expect_refusal(ask(empty, "1"), "contains no views");
   const std::string lonely = *folder / "lonely.panonav";
   std::filesystem::copy_file(memory, lonely);
   {

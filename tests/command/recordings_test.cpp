@@ -367,7 +367,7 @@ TEST_F(Recordings, OptionsThatDoNotFitAreRefused) {
                  "--odometry-topic and --odometry-frames do not go together");
   expect_refusal({"convert", walk(), *folder_ / "copy"}, "does not end in .mcap");
   expect_refusal(with({"convert", walk("_lz4.mcap"), walk()}, kind),
-                 "is there already and not empty; allowed: a new folder");
+                 "already exists and is not empty; allowed: a new folder");
   std::ofstream(*folder_ / "empty.mcap") << "\x89MCAP0\r\n";
   expect_refusal({"localise", memory(), *folder_ / "empty.mcap"}, "empty.mcap: ");
 }

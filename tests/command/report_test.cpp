@@ -199,11 +199,11 @@ TEST_F(Reproduce, RefusesBadInput) {
   std::ofstream(folder / "file") << "mine";
   expect_refusal({"reproduce", "m04", "--quick", "-o", folder / "file/x"}, "file/x");
   expect_refusal({"reproduce", "m04", "--scenes", "1"}, "--scenes is '1'");
-  expect_refusal({"reproduce", "m04", "--only", "office"}, "--only has no meaning for m04");
-  expect_refusal({"reproduce", "y03", "--queries", "3"}, "--queries has no meaning for y03");
+  expect_refusal({"reproduce", "m04", "--only", "office"}, "--only cannot be used with m04");
+  expect_refusal({"reproduce", "y03", "--queries", "3"}, "--queries cannot be used with y03");
   expect_refusal({"reproduce", "y03", "--scenes", "1"}, "allowed for y03: from 2");
   expect_refusal({"reproduce", "y03", "--quick", "-o", folder / "file/x"}, "file/x");
-  expect_refusal({"reproduce", "m03", "--queries", "3"}, "--queries has no meaning");
+  expect_refusal({"reproduce", "m03", "--queries", "3"}, "--queries cannot be used with m03");
   expect_refusal({"reproduce", "m03", "--data", folder / "nowhere"}, "no such folder");
   expect_refusal({"reproduce", "m03", "--only", "kitchen"}, "--only");
   expect_refusal({"reproduce", "m04", "--sead", "3"}, "--sead");

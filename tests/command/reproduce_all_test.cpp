@@ -75,11 +75,11 @@ TEST_F(ReproduceAll, WritesOneTableOfWhatIsFinished) {
   auto arguments = continued();
   const auto people = run_panonav(arguments);
   ASSERT_EQ(people.exit_code, 0) << people.err;
-  EXPECT_TRUE(contains(people.out, "m04: 0 of 1 targets hold (finished by an earlier run)"));
+  EXPECT_TRUE(contains(people.out, "m04: 0 of 1 targets met (finished by an earlier run)"));
   EXPECT_TRUE(contains(people.out,
                        "missed in m04: 0.5 (0.4 .. 0.6) m, target at most 0.25: missed by "
                        "0.25; the floor is wet."));
-  EXPECT_TRUE(contains(people.out, "6 of 7 targets hold"));
+  EXPECT_TRUE(contains(people.out, "6 of 7 targets met"));
   const std::string markdown = bytes_of(out_ / "results.md");
   EXPECT_EQ(markdown.rfind("# Results", 0), 0U);
   EXPECT_TRUE(contains(markdown, "panonav reproduce all --quick --seed 7 --data DATA\n"));
@@ -106,7 +106,7 @@ TEST_F(ReproduceAll, RunsWhatIsNotFinishedAndKeepsTheRest) {
   std::ofstream(out_ / "results.json") << "of an earlier table";
   const std::string run = bytes_of(out_ / "run.json");
   const std::string kept = bytes_of(out_ / "y03/results.json");
-  expect_refusal(continued(), "m03: cannot be made");
+  expect_refusal(continued(), "m03: cannot be created");
   EXPECT_FALSE(fs::exists(out_ / "results.json")) << "an old table beside new rows";
   EXPECT_EQ(bytes_of(out_ / "y03/results.json"), kept);
   EXPECT_EQ(bytes_of(out_ / "run.json"), run);
@@ -114,7 +114,7 @@ TEST_F(ReproduceAll, RunsWhatIsNotFinishedAndKeepsTheRest) {
 
 TEST_F(ReproduceAll, BeginsAnewWithoutContinue) {
   cannot_be_run("f11");
-  expect_refusal(command({"--seed", "8"}), "f11: cannot be made");
+  expect_refusal(command({"--seed", "8"}), "f11: cannot be created");
   EXPECT_EQ(json::parse(bytes_of(out_ / "run.json"))["seed"], 8);
   for (const std::string& paper : papers) {
     EXPECT_FALSE(fs::exists(out_ / paper / "results.json")) << paper;
@@ -145,9 +145,9 @@ TEST_F(ReproduceAll, RefusesToContinueARunOfOtherOptions) {
   write(out_ / "run.json", run);
   expect_refusal(continued(), "run.json: version is missing");
   std::ofstream(out_ / "run.json") << "{";
-  expect_refusal(continued(), "run.json: is no JSON object");
+  expect_refusal(continued(), "run.json: is not a complete JSON object");
   fs::remove(out_ / "run.json");
-  expect_refusal(continued(), "run.json: is not there");
+  expect_refusal(continued(), "run.json: does not exist");
   EXPECT_TRUE(fs::exists(out_ / "y03/results.json"));
 }
 
@@ -156,9 +156,9 @@ TEST_F(ReproduceAll, RefusesDamagedResultsAndWhatHasNoMeaning) {
   rows[1]["ours"] = "much";
   write(out_ / "s06/results.json", rows);
   expect_refusal(continued(), "s06/results.json: row 2: ours is \"much\"; allowed: ");
-  expect_refusal(command({"--only", "office"}), "--only has no meaning for all");
+  expect_refusal(command({"--only", "office"}), "--only cannot be used with all");
   expect_refusal({"reproduce", "m04", "--quick", "-o", folder_ / "x", "--continue"},
-                 "--continue has no meaning for m04");
+                 "--continue cannot be used with m04");
 }
 
 }  // namespace

@@ -220,7 +220,7 @@ TEST_F(RouteVerbs, ARouteGrowsWhereItEndsAndNowhereElse) {
   expect_refusal({"route", "follow", folder_ / "m.panonav", folder_ / "repeat"},
                  "say which with --name: by wheels, route");
   expect_refusal({"route", "follow", folder_ / "m.panonav", folder_ / "repeat", "--name", "other"},
-                 "holds no route 'other'");
+                 "contains no route 'other'");
   const auto by_wheels = answers_of({"route", "follow", folder_ / "m.panonav", folder_ / "repeat",
                                      "--name", "by wheels", "--json"});
   ASSERT_EQ(by_wheels.size(), 21U);

@@ -360,10 +360,10 @@ TEST_F(Walk, RunRefusesWhatHasNoEffect) {
   run_well({"memorise", path("walk"), path("a.panonav")});
   const std::vector<std::string> ask{"localise", path("a.panonav"), path("walk")};
   expect_refusal(with(ask, {"--add-interval-s", "1"}), "without --add");
-  expect_refusal(with(ask, {"--camera-width", "96", "--camera-height", "12"}), "no live source");
+  expect_refusal(with(ask, {"--camera-width", "96", "--camera-height", "12"}), "not a live source");
   for (const char* verb : {"localise", "track"}) {
     expect_refusal({verb, path("a.panonav"), "/dev/video99", "--report", path("r")}, "live source");
-    expect_refusal({verb, path("a.panonav"), path("walk"), "--count", "3"}, "no live source");
+    expect_refusal({verb, path("a.panonav"), path("walk"), "--count", "3"}, "not a live source");
   }
   expect_refusal({"localise", path("a.panonav"), "/dev/video99", "--image-topic", "/a"},
                  "live source");

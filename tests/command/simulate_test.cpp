@@ -200,7 +200,7 @@ TEST_F(Simulate, WrongValuesAreNamedWithTheirRange) {
   EXPECT_TRUE(contains(line_of({"--grid", "nan"}), "--grid"));
   EXPECT_TRUE(contains(line_of({"--random", "0"}), "--random is 0; allowed: 1 to"));
   EXPECT_TRUE(contains(line_of({"--random", "-3"}), "--random"));
-  EXPECT_TRUE(contains(line_of({"--grid", "1", "--random", "2"}), "exclude each other"));
+  EXPECT_TRUE(contains(line_of({"--grid", "1", "--random", "2"}), "cannot be combined"));
   EXPECT_TRUE(contains(line_of({"--kind", "panorama", "--rows", "0"}), "rows"));
   EXPECT_TRUE(contains(line_of({"--kind", "panorama", "--elevation-low-deg", "50"}),
                        "elevation_low_deg is 50"));

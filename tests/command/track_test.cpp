@@ -316,12 +316,12 @@ TEST_F(Track, WrongValuesAreNamedWithTheirRange) {
     return refusal(more);
   };
   EXPECT_TRUE(contains(refused({"--every", "0"}), "--every is '0'"));
-  EXPECT_TRUE(contains(refused({"--start-x-m", "1"}), "go together"));
+  EXPECT_TRUE(contains(refused({"--start-x-m", "1"}), "need --start-heading-deg"));
   EXPECT_TRUE(contains(refused({"--start-x-m", "1", "--start-y-m", "1"}), "--start-heading-deg"));
   EXPECT_TRUE(
       contains(refused({"--start-heading-deg", "north"}), "--start-heading-deg is 'north'"));
   EXPECT_TRUE(contains(refused({"--start-deviation-m", "-1"}), "deviation_m is -1"));
-  EXPECT_TRUE(contains(refused({"--start-deviation-m", "1"}), "go with --start-x-m"));
+  EXPECT_TRUE(contains(refused({"--start-deviation-m", "1"}), "need --start-x-m"));
   EXPECT_TRUE(contains(refused({"--injection", "sometimes"}), "injection"));
   EXPECT_TRUE(contains(refused({"--kld-error", "2"}), "kld_error is 2"));
   EXPECT_TRUE(contains(refused({"--min-particles", "300", "--max-particles", "200"}),

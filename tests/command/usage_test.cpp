@@ -92,15 +92,15 @@ TEST(Usage, VersionAndHelpGoToStandardOutput) {
 
 TEST(Usage, WrongUseIsOneLineWithAHint) {
   expect_refusal({}, "a verb is missing; see panonav --help");
-  expect_refusal({"frobnicate"}, "'frobnicate' is no verb; see");
+  expect_refusal({"frobnicate"}, "'frobnicate' is not a verb; see");
   (void)refusal({"--no-such-flag"});
   expect_refusal({"info"}, "FILE is required");
-  expect_refusal({"info", "a", "b"}, "'b' is one argument too many");
+  expect_refusal({"info", "a", "b"}, "'b' is an extra argument");
   expect_refusal({"info", "a", "--threads"}, "--threads needs a value: INT");
   expect_refusal({"info", "a", "--json=yes"}, "--json takes no value");
   expect_refusal({"info", "a", "--threads=1", "--threads", "2"}, "given twice");
-  expect_refusal({"info", "a", "--quiet", "--verbose"}, "exclude each other");
-  expect_refusal({"info", "--", "--json", "--threads"}, "'--threads' is one");
+  expect_refusal({"info", "a", "--quiet", "--verbose"}, "cannot be combined");
+  expect_refusal({"info", "--", "--json", "--threads"}, "'--threads' is an extra");
 }
 
 TEST(Usage, AMisspeltFlagIsNamedEvenWhereSomethingElseIsMissing) {
@@ -109,7 +109,7 @@ TEST(Usage, AMisspeltFlagIsNamedEvenWhereSomethingElseIsMissing) {
 }
 
 TEST(Usage, TheNearestNameIsProposed) {
-  expect_refusal({"locallise"}, "is no verb (did you mean 'localise'?)");
+  expect_refusal({"locallise"}, "is not a verb (did you mean 'localise'?)");
   expect_refusal({"rout", "record"}, "(did you mean 'route record'?)");
   expect_refusal({"route", "recrod"}, "(did you mean 'route record'?)");
   expect_refusal({"memorise", "a", "b", "--componnets", "5"},
@@ -153,7 +153,7 @@ TEST(Usage, VerbsHaveAnotherSpelling) {
   for (const auto& [spelling, verb] :
        {std::pair("localize", "localise"), {"memorize", "memorise"}}) {
     EXPECT_EQ(help_of(spelling), help_of(verb));
-    EXPECT_TRUE(contains(help_of(verb), "Also: panonav " + std::string(spelling)));
+    EXPECT_TRUE(contains(help_of(verb), "Other spelling: panonav " + std::string(spelling)));
     expect_refusal({spelling}, "panonav " + std::string(verb) + ": ");
   }
 }
@@ -180,8 +180,8 @@ TEST(Usage, EveryVerbHasAShortHelpWithAnExampleAndALongOneWithAllOptions) {
       EXPECT_TRUE(distinct.contains(flag)) << verb << flag;
     }
     const std::size_t hidden = all_flags.size() - flags.size();
-    EXPECT_TRUE(contains(help, "There are " + std::to_string(hidden) + " more options: panonav " +
-                                   verb + " --help-all"));
+    EXPECT_TRUE(contains(help, "This verb has " + std::to_string(hidden) +
+                                   " more options; to list them: panonav " + verb + " --help-all"));
     for (const auto& line : lines(help.substr(help.find("Arguments:") + 1))) {
       EXPECT_LE(line.size(), 80U) << line;
     }

@@ -122,7 +122,7 @@ TEST_F(Views, ShowTellsAllOfAView) {
 
   expect_refusal({"show", memory, "17"}, "has no view of the name or id '17'");
   expect_refusal({"show", bare(), "1", "-o", folder / "no.png"},
-                 "holds no thumbnail of 1; memorise keeps them unless");
+                 "contains no thumbnail of 1; memorise stores thumbnails unless");
   EXPECT_FALSE(fs::exists(folder / "no.png"));
 }
 
@@ -151,7 +151,7 @@ TEST_F(Views, GalleryIsOnePageWithAllThumbnails) {
   EXPECT_TRUE(contains(bytes_of(out / "gallery.html"), "(1 view)"));
   expect_refusal({"gallery", memory, "-o", folder / "grid"}, "not made by panonav");
   expect_refusal({"gallery", bare(), "-o", folder / "none"},
-                 "holds no thumbnails of these 16 views; to get them, memorise");
+                 "contains no thumbnails of these 16 views; to get them, memorise");
   EXPECT_FALSE(fs::exists(folder / "none"));
 }
 
@@ -176,7 +176,7 @@ TEST_F(Views, AThumbnailThatIsNoPictureReachesNoPage) {
   EXPECT_EQ(said["views"], 17);
   EXPECT_EQ(said["images"], 16);
   EXPECT_TRUE(contains(run_panonav({"export", memory, "-o", folder / "other"}).out,
-                       "1 views without a thumbnail are not in it."));
+                       "1 views without a thumbnail are not in the data set."));
 }
 
 TEST_F(Views, ExportMemorisedAgainIsTheSameMemory) {
@@ -195,7 +195,7 @@ TEST_F(Views, ExportMemorisedAgainIsTheSameMemory) {
   // Nothing was lost on the way, so the answers are the same to the bit.
   EXPECT_TRUE(answers_of({"localise", memory, folder / "grid", "--json"}) ==
               answers_of({"localise", again, folder / "grid", "--json"}));
-  expect_refusal({"export", memory, "-o", out}, "is there already and not empty");
+  expect_refusal({"export", memory, "-o", out}, "already exists and is not empty");
   fs::create_directory(folder / "empty");
   run_well({"export", memory, "-o", folder / "empty"});
   EXPECT_TRUE(fs::exists(folder / "empty" / "dataset.toml"));
@@ -232,7 +232,8 @@ TEST_F(Views, ExportWithoutThumbnailsSaysThatNothingComesBack) {
   const fs::path out = folder / "out";
   const auto result = run_panonav({"export", bare(), "-o", out});
   EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_TRUE(contains(result.out, "holds no thumbnails. memorise cannot read this folder."));
+  EXPECT_TRUE(
+      contains(result.out, "the memory has no thumbnails. memorise cannot read this folder."));
   EXPECT_FALSE(fs::exists(out / "dataset.toml"));
   const std::string array = bytes_of(out / "signatures.npy");
   EXPECT_TRUE(contains(array, "'shape': (16, 2, 15, 12)"));
@@ -255,7 +256,7 @@ TEST_F(Views, RenameIsOneChangeThatCanBeUndone) {
 
   const std::string held = bytes_of(memory);
   expect_refusal({"rename", memory, "nobody", "x"}, "no view of the name or id");
-  expect_refusal({"rename", memory, "6", view_name(4)}, "already holds");
+  expect_refusal({"rename", memory, "6", view_name(4)}, "already contains");
   expect_refusal({"rename", memory, "6", ""}, "view name is empty");
   expect_refusal({"rename", memory, "6", "a\nb"}, "control characters");
   expect_refusal({"rename", memory, "6", std::string(5000, 'x')}, "5000 bytes");

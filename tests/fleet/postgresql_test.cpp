@@ -58,7 +58,7 @@ TEST(MemoryAddress, PasswordsAreNotShown) {
     remember_address(address);
     for (const std::string& text :
          {address, json(address).dump(-1, ' ', false, json::error_handler_t::replace),
-          "'" + address + "'", std::string(FileError(address, "is not there").what()),
+          "'" + address + "'", std::string(FileError(address, "does not exist").what()),
           to_readable_line(address)}) {
       const std::string shown = without_passwords("x " + text + " y");
       EXPECT_EQ(shown.find("secret"), std::string::npos) << shown;

@@ -31,7 +31,7 @@ def synchronised(server, folder):
 
     first = sync(one, address)
     assert first["uploaded"] == first["views"] == len(views) and first["seconds"] > 0, first
-    assert "nothing was new" in run(PANONAV, "synchronise", one, address)
+    assert "no changes" in run(PANONAV, "synchronise", one, address)
     second = sync(two, address)
     assert second["downloaded"] == len(views), second
     assert names(one) == names(two)

@@ -84,8 +84,8 @@ def copies(server, folder):
     run(PANONAV, "copy", folder / "hall.panonav", server.memory("the%20copy"))
     run(PANONAV, "copy", server.memory("the%20copy"), folder / "back.panonav")
     assert said(folder / "back.panonav").replace("back.panonav", "hall.panonav") == said(folder / "hall.panonav")
-    refused(PANONAV, "copy", folder / "hall.panonav", server.memory("hall"), saying="is there already")
-    refused(PANONAV, "copy", server.memory("hall"), folder / "back.panonav", saying="is there already")
+    refused(PANONAV, "copy", folder / "hall.panonav", server.memory("hall"), saying="already exists")
+    refused(PANONAV, "copy", server.memory("hall"), folder / "back.panonav", saying="already exists")
 
 
 def served(server, folder):

@@ -101,7 +101,7 @@ TEST_F(DatasetFolder, EveryFaultHasItsLine) {
       {"file,x_m,y_m\na.png,1,\n", "line 2: y_m is empty"},
       {"file,x_m\na.png,1\n", "no column 'y_m'"},
       {"file,x_m,y_m\na.png,1,2\na.png,1,2\n", "'a.png' for the second time"},
-      {"file,x_m,y_m\nc.png,1,2\n", "'c.png', which is not there"},
+      {"file,x_m,y_m\nc.png,1,2\n", "'c.png', which does not exist"},
       {"file,x_m,y_m\n../a.png,1,2\n", "line 2: file is '../a.png'; allowed: a picture in"},
       {"file,x_m,y_m\nb/../../a.png,1,2\n", "file is 'b/../../a.png'; allowed: a picture in"},
       {"file,x_m,y_m\n/etc/a.png,1,2\n", "file is '/etc/a.png'; allowed: a picture in"},

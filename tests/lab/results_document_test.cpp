@@ -68,7 +68,7 @@ TEST(ResultsDocument, MarkdownHasEveryMissAndThenAllRowsWithATarget) {
   EXPECT_EQ(text.rfind("# Results", 0), 0U);
   std::size_t at = 0;
   for (const std::string part :
-       {"panonav 1.2.3", "    panonav reproduce all --quick", "1 of 2 targets hold",
+       {"panonav 1.2.3", "    panonav reproduce all --quick", "1 of 2 targets met",
         "Targets that were not met",
         "- a01: far\\_off: 3 m, target at most 1: missed by 2; the floor is \\*wet\\*.",
         "## Walking \\| running", "| what | published | ours (95 % interval) | unit |",

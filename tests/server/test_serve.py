@@ -128,7 +128,7 @@ def main() -> int:
         assert "no such file" in refusal(str(folder / "none.panonav"), "--listen", "0").lower()
         assert "--max-held-views" in refusal(str(memory), "--listen", "0", "--max-held-views", "5")
         (folder / "short").write_text("secret\n")
-        assert "is no token" in refusal(str(memory), "--listen", "0", "--token-file", str(folder / "short"))
+        assert "is not a valid token" in refusal(str(memory), "--listen", "0", "--token-file", str(folder / "short"))
         (folder / "token").write_text("a token of some length".replace(" ", "-") + "\n")
 
         server = subprocess.Popen([panonav, "serve", str(memory), "--listen", "0", "--json"], stdout=subprocess.PIPE,
@@ -175,7 +175,7 @@ def main() -> int:
             try:
                 server.stdout.readline()
                 server.send_signal(signal.SIGTERM)
-                assert ("warning: whoever reaches 0.0.0.0" in server.communicate(timeout=120)[1]) == warned, words
+                assert ("warning: everybody who can reach 0.0.0.0" in server.communicate(timeout=120)[1]) == warned, words
             finally:
                 server.kill()
 

@@ -228,7 +228,7 @@ TEST_F(GazeboWorld, WhatIsMissingOrFaultyIsLeftOutAndNamed) {
            {"frame",
             "<model name='odd'><link name='l'><pose relative_to='no'>1 0 0 0 0 "
             "0</pose></link></model>",
-            "is relative to \"no\", which is not there"},
+            "is relative to \"no\", which does not exist"},
            {"duplicates",
             "<model name='good'><link name='l'><collision name='c'/><collision name='c'/><visual "
             "name='v'/><visual name='v'/></link><link name='l'/></model>",

@@ -215,7 +215,7 @@ TEST_F(MemoryFileContent, ImpossibleHeadersAreRefused) {
 TEST_F(MemoryFileContent, CreateNeverReplaces) {
   const auto path = folder.write("m.panonav", "something else");
   EXPECT_TRUE(contains(message_of<FileError>([&] { MemoryFile::create(path, small_header()); }),
-                       "is there already"));
+                       "already exists"));
   EXPECT_EQ(std::filesystem::file_size(path), 14U);
   EXPECT_THROW(MemoryFile::create(folder / "no" / "m.panonav", small_header()), FileError);
 }

@@ -135,7 +135,7 @@ TEST_F(MemoryFileUndo, NamesAreRefusedThatAreTakenOrNone) {
   const auto refused = [&](const auto& body, const std::string& word) {
     EXPECT_TRUE(contains(message_of<ContractError>(body), word));
   };
-  refused([&] { file->rename(ids[4], "view_5.png"); }, "already holds");
+  refused([&] { file->rename(ids[4], "view_5.png"); }, "already contains");
   refused([&] { file->rename(ids[4], ""); }, "view name is empty");
   refused([&] { file->rename(ids[4], std::string("a\0b", 3)); }, "control characters");
   refused([&] { file->rename(ViewId{99}, "x"); }, "view is 99");

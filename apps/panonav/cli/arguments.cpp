@@ -330,7 +330,8 @@ void Arguments::read_positionals(std::span<const std::string> words, std::string
     for (const auto& word : swapped) command.append(" ").append(quote_for_shell(word));
     throw UsageError("MEMORY is '" + words[i] + "' and " +
                      infos[positionals[std::min(there, positionals.size() - 1)]].name + " is '" +
-                     *other + "': they seem to be swapped (did you mean '" + command + "'?)");
+                     *other + "': the arguments are in the wrong order (did you mean '" + command +
+                     "'?)");
   }
   std::size_t next = 0;
   for (const std::size_t i : positionals) {
@@ -343,7 +344,7 @@ void Arguments::read_positionals(std::span<const std::string> words, std::string
     next += count;
   }
   if (next < words.size()) {
-    throw UsageError("'" + words[next] + "' is one argument too many");
+    throw UsageError("'" + words[next] + "' is an extra argument");
   }
 }
 
@@ -443,8 +444,8 @@ bool Arguments::is_set(const std::string& section, const std::string& name) cons
 
 std::string Arguments::config_template(std::string_view verb) const {
   std::string text = "# Options for panonav " + std::string(verb) +
-                     " --config FILE. A line without '# ' in front sets its option;\n"
-                     "# the others show the defaults. Options on the command line win.\n";
+                     " --config FILE. Remove '# ' at the start of a line to set its option;\n# the "
+                     "values shown are the defaults. Options on the command line have priority.\n";
   for (const auto& section : implementation_->sections) {
     text += "\n[" + section.name + "]\n";
     OptionLister lister([&](const ListedOption& option) {
@@ -464,7 +465,7 @@ std::string Arguments::config_template(std::string_view verb) const {
     }
   }
   if (implementation_->sections.empty()) {
-    text += "# This verb has no option that a file can set.\n";
+    text += "# A file cannot set options of this verb.\n";
   }
   text.pop_back();  // whoever prints it ends the line
   return text;

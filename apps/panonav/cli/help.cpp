@@ -41,9 +41,9 @@ std::vector<Description> describe(std::span<const Verb> verbs) {
 std::span<const ExitMeaning> exit_meanings() {
   static constexpr std::array<ExitMeaning, 4> meanings{{
       {ExitCode::done, "done"},
-      {ExitCode::no_answer, "no answer, for example lost"},
-      {ExitCode::bad_input, "bad input; one line on standard error says what is wrong"},
-      {ExitCode::fault, "fault of the program"},
+      {ExitCode::no_answer, "no answer, for example because the robot is lost"},
+      {ExitCode::bad_input, "invalid input; one line on standard error explains the fault"},
+      {ExitCode::fault, "internal error of the program"},
   }};
   return meanings;
 }
@@ -113,7 +113,7 @@ std::string help_text(const Description& description, bool all) {
   const std::string name(verb.name);
   std::string text = wrapped(std::string(verb.summary) + ".", 0, 0) + "\n\n";
   text += "Usage: panonav " + name + " " + usage(description) + "\n";
-  if (!verb.alias.empty()) text += "Also: panonav " + std::string(verb.alias) + "\n";
+  if (!verb.alias.empty()) text += "Other spelling: panonav " + std::string(verb.alias) + "\n";
   text += "\nExamples:\n" + first_examples(verb.example, all ? arguments.size() + 100 : 2);
   std::string title;
   std::size_t hidden = 0;
@@ -133,8 +133,8 @@ std::string help_text(const Description& description, bool all) {
   }
   if (!verb.details.empty()) text.append("\n").append(wrapped(verb.details, 0, 0)).append("\n");
   if (hidden > 0) {
-    text += "\nThere are " + std::to_string(hidden) + " more options: panonav " + name +
-            " --help-all\n";
+    text += "\nThis verb has " + std::to_string(hidden) + " more options; to list them: panonav " +
+            name + " --help-all\n";
   }
   text.pop_back();  // whoever prints it ends the line
   return text;
@@ -142,16 +142,16 @@ std::string help_text(const Description& description, bool all) {
 
 std::string overview(std::span<const Verb> verbs) {
   std::string text = wrapped(
-                         "Image-based memory for robot navigation from omnidirectional images: it "
-                         "remembers what places look like and compares new images with them to "
+                         "Image-based memory for robot navigation. panonav stores omnidirectional "
+                         "images of places in a memory. It compares new images with this memory to "
                          "find the robot's position and heading.",
                          0, 0) +
                      "\n\nUsage: panonav VERB [OPTIONS] ARGUMENTS\n\nVerbs:\n";
   for (const auto& verb : verbs) text += format_row(std::string(verb.name), verb.summary, 17);
   text += "\n";
   text += wrapped(
-      "panonav help VERB shows how a verb is used, panonav VERB --help-all all its options, "
-      "and panonav --version the version.",
+      "panonav help VERB explains a verb. panonav VERB --help-all lists all its options. panonav "
+      "--version prints the version.",
       0, 0);
   text += "\n\nExit codes:\n";
   for (const auto& [code, meaning] : exit_meanings()) {

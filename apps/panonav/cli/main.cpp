@@ -71,7 +71,7 @@ int main(int argc, char** argv) {
     report(verb, "not enough memory");
     return static_cast<int>(ExitCode::fault);
   } catch (const std::exception& error) {
-    report(verb, std::string("fault of the program: ") + error.what());
+    report(verb, std::string("internal error of the program: ") + error.what());
     return static_cast<int>(ExitCode::fault);
   }
 }

@@ -14,22 +14,22 @@ struct Meaning {
 };
 
 constexpr std::array<Meaning, 4> environment{{
-    {"PANONAV_DATA", "Folder of the real recordings that panonav reproduce uses."},
+    {"PANONAV_DATA", "Folder with the real recordings that panonav reproduce uses."},
     {"PANONAV_INSTRUCTIONS",
-     "The instruction set of the processor to use: scalar, avx2, avx512 or neon. The best one is "
-     "found where it is not set."},
-    {"GAZEBO_MODEL_PATH, GZ_SIM_RESOURCE_PATH",
-     "Folders where models of Gazebo worlds are looked for."},
-    {"NO_COLOR", "Where it is set, output is not coloured."},
+     "Instruction set of the processor: scalar, avx2, avx512 or neon. By default panonav selects "
+     "the best one."},
+    {"GAZEBO_MODEL_PATH, GZ_SIM_RESOURCE_PATH", "Folders with the models of Gazebo worlds."},
+    {"NO_COLOR", "If this variable is set, output is not coloured."},
 }};
 
 constexpr std::array<Meaning, 4> files{{
     {"NAME.panonav",
-     "A memory: an SQLite database. NAME.panonav-wal and NAME.panonav-shm lie beside it while it "
-     "is open for writing, and belong to it."},
-    {"dataset.toml", "Says how the images of a data set lie; it is in the folder of them."},
-    {"camera.toml", "The calibration of a mirror camera, as panonav calibrate writes it."},
-    {"FILE of --config", "Options by section; panonav VERB --config-template prints one."},
+     "A memory, stored as an SQLite database. While it is open for writing, it also consists of "
+     "the files NAME.panonav-wal and NAME.panonav-shm in the same folder."},
+    {"dataset.toml",
+     "Describes the type of the images of a data set. It is in the folder of the data set."},
+    {"camera.toml", "Calibration of a mirror camera, written by panonav calibrate."},
+    {"FILE of --config", "Options in sections; panonav VERB --config-template prints an example."},
 }};
 
 /// Text that roff shows as it is; lines are filled.
@@ -120,12 +120,9 @@ std::string manual_page(const Description& description) {
 std::string manual_overview(std::span<const Description> verbs) {
   std::string text = format_header("panonav", "image-based memory for robot navigation");
   text +=
-      "\\fBpanonav\\fR \\fIVERB\\fR [OPTIONS] ARGUMENTS\n"
-      ".SH DESCRIPTION\n"
-      "Panonav remembers what places look like in omnidirectional images, and knows from that a "
-      "robot's position and heading.\n"
-      "Each verb has a page of its own.\n"
-      ".SH VERBS\n";
+      "\\fBpanonav\\fR \\fIVERB\\fR [OPTIONS] ARGUMENTS\n.SH DESCRIPTION\nPanonav stores "
+      "omnidirectional images of places in a memory. It compares new images with this memory to "
+      "find the position and heading of a robot.\nEach verb has its own manual page.\n.SH VERBS\n";
   for (const auto& [verb, arguments] : verbs)
     text += format_entry(verb.name, std::string(verb.summary) + ".");
   text += ".SH OPTIONS\n";

@@ -60,11 +60,11 @@ const Verb& find_required_verb(std::span<const Verb> verbs, std::span<const std:
   if (words.size() > 1) {  // the second word is part of what was meant, or is an argument
     const std::string both = words[0] + " " + words[1];
     if (const auto meant = suggest_name(both, names); !meant.empty()) {
-      throw UsageError("'" + both + "' is no verb" + meant);
+      throw UsageError("'" + both + "' is not a verb" + meant);
     }
   }
   throw UsageError(
-      "'" + typed + "' is no verb" +
+      "'" + typed + "' is not a verb" +
       (longer.empty() ? suggest_name(typed, names) : "; allowed: " + join_texts(longer)));
 }
 
@@ -113,16 +113,16 @@ std::shared_ptr<Declared> declare(const Verb& verb) {
   declared->own = arguments.infos().size();
   arguments.flag("--json", common.session.json, "Print results as JSON on standard output");
   arguments.flag("-q,--quiet", common.session.quiet,
-                 "Print results and errors only: no progress, no notes, no \"Next:\"");
+                 "Print only results and errors: no progress, no notes and no \"Next:\" lines");
   arguments.flag("-v,--verbose", common.session.verbose,
-                 "Say on standard error what is done, and how long it takes");
-  arguments.option("--threads", common.session.threads, 0, "Threads to use; 0 takes one per core");
+                 "Print each step and its duration on standard error");
+  arguments.option("--threads", common.session.threads, 0, "Number of threads; 0: one per core");
   arguments.option("--config FILE", common.config,
-                   "Read options from this TOML file; options typed here win over it");
+                   "Read options from this TOML file; options on the command line have priority");
   arguments.flag("--config-template", common.config_template,
-                 "Print such a file with all options, their defaults and ranges, and stop");
-  arguments.flag("-h,--help", declared->ignored, "Print a short help and stop");
-  arguments.flag("--help-all", declared->ignored, "Print the help with all options and stop");
+                 "Print a TOML file with all options, their defaults and ranges, and exit");
+  arguments.flag("-h,--help", declared->ignored, "Print a short help and exit");
+  arguments.flag("--help-all", declared->ignored, "Print the help with all options and exit");
   arguments.hide_from_help({"--threads", "--config", "--config-template"});
   return declared;
 }
@@ -166,7 +166,7 @@ ParsedCommand parse(std::span<const Verb> verbs, std::span<const std::string> wo
   const auto& common = declared->common;
   declared->arguments.read(translated, verb.name, wants_template);
   if (common.session.quiet && common.session.verbose) {
-    throw UsageError("--quiet and --verbose exclude each other");
+    throw UsageError("--quiet and --verbose cannot be combined");
   }
   declared->arguments.resolve(common.config, [&] {
     // One file may serve several verbs, so the sections of all of them are allowed in it.

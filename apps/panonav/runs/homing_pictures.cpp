@@ -14,10 +14,11 @@ const std::vector<std::string> rise{"--vertical-motion", "--tilt"};
 
 void declare_homing(Arguments& arguments, HomingArguments& values) {
   arguments.flag("--horizon", values.views.horizon,
-                 "Compare one row only, the mean of the rows within 5 degrees of the horizon (all "
-                 "rows where elevations are not known), as [S06] does");
-  arguments.option("--published K", values.published, 1,
-                   "Use the rule as published [S06] with K frequencies; goes with --iterations");
+                 "Compare only one row: the mean of the rows within 5 degrees of the horizon, as "
+                 "in [S06] (all rows if elevations are not known)");
+  arguments.option(
+      "--published K", values.published, 1,
+      "Use the published rule [S06] with K frequencies; can be combined with --iterations");
   arguments.options("signature", values.views.signature);
   arguments.options("preprocessing", values.views.preprocessing);
   arguments.options("homing", values.homing);
@@ -41,7 +42,7 @@ FourierHomingOptions make_homing_options(const Arguments& declared,
           "displacement_search", "vertical_motion", "tilt"}) {
       if (!declared.is_set("homing", name)) continue;
       throw UsageError("--published sets '" + std::string(name) +
-                       "' itself; leave one of them out");
+                       "' itself; leave out one of them");
     }
     options = published_homing_options(*arguments.published, arguments.homing.iterations);
   }
@@ -59,7 +60,7 @@ void refuse_unused_rise(const Arguments& arguments, const HomingView& view,
   if (view.elevations() && view.rows() >= 3) return;
   const std::string why = view.elevations()
                               ? " has fewer than three rows"
-                              : " does not tell the elevations of its rows (elevation_deg)";
+                              : " does not give the elevations of its rows (elevation_deg)";
   arguments.refuse_unused(rise, "where " + name + why);
 }
 

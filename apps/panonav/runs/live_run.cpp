@@ -129,9 +129,11 @@ double to_milliseconds(std::chrono::steady_clock::duration duration) {
 }  // namespace
 
 void declare_live(Arguments& arguments, LiveArguments& live) {
-  arguments.option("--count N", live.count, 1, "End after this many images");
-  arguments.option("--camera-width", live.camera_width, 1, "Wanted width of a camera's images");
-  arguments.option("--camera-height", live.camera_height, 1, "Wanted height of a camera's images");
+  arguments.option("--count N", live.count, 1, "Stop after N images");
+  arguments.option("--camera-width", live.camera_width, 1,
+                   "Image width that the camera should use");
+  arguments.option("--camera-height", live.camera_height, 1,
+                   "Image height that the camera should use");
   arguments.hide_from_help({"--count", "--camera-width", "--camera-height"});
 }
 
@@ -142,11 +144,11 @@ std::unique_ptr<recordings::LiveObservations> open_live(
       {"--image-topic", "--odometry-topic", "--odometry-frames", "--imu-topic", "--recursive"},
       "where " + input + " is a live source");
   if (live.camera_width.has_value() != live.camera_height.has_value()) {
-    throw UsageError("--camera-width and --camera-height go together");
+    throw UsageError("--camera-width and --camera-height must be used together");
   }
   const auto stated = picture_source(pictures);
   if (!stated && !remembered) {
-    throw UsageError("say what the images of " + input + " show with --kind");
+    throw UsageError("set --kind to the type of the images of " + input + "");
   }
   recordings::LiveOptions options;
   options.note = [&session](const std::string& line) { session.note(line); };
@@ -156,7 +158,7 @@ std::unique_ptr<recordings::LiveObservations> open_live(
 }
 
 void refuse_live(const Arguments& arguments, const std::string& input, bool count) {
-  const std::string why = "where " + input + " is no live source";
+  const std::string why = "where " + input + " is not a live source";
   arguments.refuse_unused({"--camera-width", "--camera-height"}, why);
   if (count) arguments.refuse_unused({"--count"}, why);
 }
@@ -167,10 +169,10 @@ std::string describe_events(const LiveCounts& counts, std::size_t moments_left_o
     if (count > 0) text += ", " + std::to_string(count) + " " + what;
   };
   add(counts.skipped + counts.source.damaged, "could not be read");
-  add(counts.source.dropped, "came too fast and were dropped");
+  add(counts.source.dropped, "were skipped because they came too fast");
   add(counts.source.interruptions, "interruptions of the source");
-  add(counts.lines_left_out, "lines were not printed for a slow reader");
-  add(moments_left_out, "moments were not recorded on a slow disk");
+  add(counts.lines_left_out, "lines were not printed because the reader was too slow");
+  add(moments_left_out, "moments were not recorded because the disk was too slow");
   if (!counts.delays_ms.empty()) {
     text += "; from arrival to answer " + format_fixed(quantile(counts.delays_ms, 0.5), 1) +
             " ms median (decoding " + format_fixed(quantile(counts.decoding_ms, 0.5), 1) + "), " +

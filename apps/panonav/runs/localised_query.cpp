@@ -76,7 +76,8 @@ std::string format_line(const LocalisedQuery& answer, Session& session) {
   if (found.heading_rad) {
     line += "  heading " + format_fixed(degrees(*found.heading_rad), 1) + " degrees";
   } else if (nearest.heading_rad) {
-    line += "  turned " + format_fixed(degrees(*nearest.heading_rad), 1) + " degrees from it";
+    line += "  turned " + format_fixed(degrees(*nearest.heading_rad), 1) +
+            " degrees relative to this view";
   }
   for (const auto& level : found.areas) {
     line += "\n    " + std::to_string(level.components) +

@@ -86,7 +86,7 @@ void refuse_to_continue_route(const LocaliseArguments& arguments, RoutePoses pos
   if (poses != RoutePoses::images || !memory_exists(arguments.memory)) return;
   if (!MemoryFile::open(arguments.memory, Access::read_only).route(*arguments.route)) return;
   throw UsageError("--route is " + *arguments.route + ", which " + arguments.memory +
-                   " holds already; allowed without odometry: a new name");
+                   " already contains; allowed without odometry: a new name");
 }
 
 ordered_json as_json(const RouteFollower::Step& step) {
@@ -155,7 +155,7 @@ std::optional<PictureSource> remembered_source(const Arguments& declared,
                                                const LocaliseArguments& arguments) {
   if (!memory_exists(arguments.memory)) {
     if (arguments.add) return std::nullopt;
-    throw FileError(arguments.memory, "no such file; --add makes it");
+    throw FileError(arguments.memory, "no such file; with --add it is created");
   }
   const auto memory = MemoryFile::open(arguments.memory, Access::read_only);
   require_components(declared, arguments, memory.header());
@@ -237,7 +237,7 @@ class LocalisedRun {
                                             1) +
                                " ms"
                          : ""));
-    if (has_changed_) session_.suggest({"panonav", "undo", arguments_.memory}, "To take it back:");
+    if (has_changed_) session_.suggest({"panonav", "undo", arguments_.memory}, "To revert this:");
     return (arguments_.add ? counts.pictures : known_) > 0 ? ExitCode::done : ExitCode::no_answer;
   }
 
@@ -264,7 +264,7 @@ class LocalisedRun {
         recording_->entries, [](const DatasetEntry& entry) { return entry.odometry.has_value(); });
     const PlaceRecogniser* const recogniser = memory_->recogniser();
     if (!arguments_.update || moves || recogniser == nullptr) return;
-    session_.note("motion is read from the images, as some have no odometry: " +
+    session_.note("motion is computed from the images, because some have no odometry: " +
                   add_visual_odometry(*recording_, recogniser->memory(), recogniser->encoder(),
                                       session_.executor()));
   }
@@ -334,7 +334,7 @@ class LocalisedRun {
   void write_report() {
     const PlaceRecogniser* const recogniser = memory_->recogniser();
     if (recogniser == nullptr) {
-      session_.note("no report: there was no memory yet to compare the images with");
+      session_.note("no report: there was no memory for a comparison");
       return;
     }
     const auto& entries = recording_copy_->entries;
@@ -391,7 +391,8 @@ Dataset open_queries(const LocaliseArguments& arguments,
   if (arguments.inputs.size() == 1) return open(arguments.inputs.front());
   const PartArguments& part = arguments.pictures.part;
   if (part.from_s || part.to_s || part.every) {
-    throw UsageError("--from, --to and --every go with one recording, not with several images");
+    throw UsageError(
+        "--from, --to and --every can be used with one recording, not with several images");
   }
   std::error_code ignored;
   std::optional<Dataset> queries;
@@ -430,7 +431,7 @@ ExitCode localise_in_order(const Arguments& declared, const LocaliseArguments& a
   }
   if (arguments.inputs.size() > 1 && (arguments.add || arguments.update || arguments.route)) {
     throw UsageError(
-        "--add, --update and --route go with one recording, whose images are in order");
+        "--add, --update and --route can be used with one recording, not with several images");
   }
   if (arguments.report) prepare_report_folder(*arguments.report, "localise");
   return LocalisedRun(declared, arguments, session).run();

@@ -52,12 +52,12 @@ PictureSource mirror_source(const PictureArguments& pictures,
                             const std::optional<ElevationBand>& band) {
   if (!pictures.camera) {
     throw UsageError(
-        "--camera is missing: images of a mirror need the file that panonav calibrate writes");
+        "--camera is missing: images of a mirror need a camera file (panonav calibrate)");
   }
   if (pictures.columns || pictures.forward_column) {
     throw UsageError(
-        "--columns-run and --forward-column do not go with a mirror; the camera file says where "
-        "forward is");
+        "--columns-run and --forward-column cannot be used with a mirror; the camera file contains "
+        "the forward direction");
   }
   PictureSource source{.kind = PictureKind::mirror};
   auto camera = read_camera(*pictures.camera);
@@ -71,39 +71,43 @@ PictureSource mirror_source(const PictureArguments& pictures,
 
 void declare_layout(Arguments& arguments, PictureArguments& pictures) {
   arguments.choice("--kind", pictures.kind, {"panorama", "equirectangular", "mirror"},
-                   "Kind of the images, unless a dataset.toml states it");
+                   "Type of the images; not needed if there is a dataset.toml");
   arguments.option("--camera FILE", pictures.camera,
                    "Calibration of a mirror camera (panonav calibrate)");
-  arguments.choice("--columns-run", pictures.columns, {"clockwise", "counter-clockwise"},
-                   "Direction of columns, seen from above; default clockwise");
-  arguments.option("--forward-column", pictures.forward_column,
-                   "Fraction of the width that looks along the heading; default 0.5");
+  arguments.choice(
+      "--columns-run", pictures.columns, {"clockwise", "counter-clockwise"},
+      "Direction in which the columns of the image run, seen from above; default clockwise");
+  arguments.option(
+      "--forward-column", pictures.forward_column,
+      "Position of the forward direction in the image, as a fraction of its width; default 0.5");
   arguments.option("--elevation-deg", pictures.elevation_deg,
-                   "Lower and upper edge of a panorama, or the band to keep of other images");
+                   "Elevation of the lower and upper edge of a panorama; for other images: the "
+                   "part that is used");
   arguments.hide_from_help({"--columns-run", "--forward-column"});
 }
 
 void declare_topics(Arguments& arguments, InputOptions::Topics& topics) {
-  arguments.option("--image-topic NAME", topics.image,
-                   "Images of a recording (MCAP, rosbag2, ROS 1 bag) with several topics of them");
-  arguments.option("--odometry-topic NAME", topics.odometry,
-                   "Its odometry (nav_msgs/Odometry) where there are several");
   arguments.option(
-      "--odometry-frames", "ODOM BASE", topics.odometry_frames,
-      "Odometry from its transforms (TF) instead; without an odometry topic: odom base_link");
+      "--image-topic NAME", topics.image,
+      "Topic of the images in a recording (MCAP, rosbag2, ROS 1 bag); needed if there are several");
+  arguments.option("--odometry-topic NAME", topics.odometry,
+                   "Topic of the odometry (nav_msgs/Odometry); needed if there are several");
+  arguments.option("--odometry-frames", "ODOM BASE", topics.odometry_frames,
+                   "Read the odometry from the transforms (TF) between these frames; default "
+                   "without an odometry topic: odom base_link");
   arguments.option("--imu-topic NAME", topics.imu,
-                   "Its inertial sensor (roll and pitch) where there are several");
+                   "Topic of the inertial sensor (roll and pitch); needed if there are several");
   arguments.hide_from_help(
       {"--image-topic", "--odometry-topic", "--odometry-frames", "--imu-topic"});
 }
 
 void declare_part(Arguments& arguments, PartArguments& part, bool every) {
   arguments.option("--from SECONDS", part.from_s,
-                   "Begin this long after the first image of a recording with stamps");
-  arguments.option("--to SECONDS", part.to_s, "End this long after its first image");
+                   "Start time after the first image; the recording needs stamps");
+  arguments.option("--to SECONDS", part.to_s, "End time after the first image");
   if (every) {
     arguments.option("--every N|TIME", part.every,
-                     "Take every N-th image only, or one in this time, such as 0.5s");
+                     "Use only every N-th image, or one image per time, for example 0.5s");
   }
   arguments.hide_from_help({"--from", "--to"});
   if (every) arguments.hide_from_help({"--every"});
@@ -168,7 +172,7 @@ std::optional<PictureSource> picture_source(const PictureArguments& pictures) {
 
   const std::optional<ElevationBand> band = parse_elevation_band(pictures);
   if (kind == "mirror") return mirror_source(pictures, band);
-  if (pictures.camera) throw UsageError("--camera goes only with --kind mirror");
+  if (pictures.camera) throw UsageError("--camera can only be used with --kind mirror");
   PictureSource source;
   if (pictures.columns == "counter-clockwise") {
     source.layout.direction = ColumnDirection::counter_clockwise;
@@ -220,9 +224,9 @@ void require_kept_band(const PictureArguments& pictures, const MemoryFile& memor
   const std::string typed =
       "--elevation-deg is " + format_number(low) + " " + format_number(high) + "; allowed: ";
   if (!header.elevations) {
-    throw UsageError(typed + "none, as " + memory.path().string() +
-                     " does not know the elevations of its views; leave it out or start a new "
-                     "memory");
+    throw UsageError(
+        typed + "none, as " + memory.path().string() +
+        " does not contain the elevations of its views; leave it out or start a new memory");
   }
   const double kept_low = degrees(header.elevations->bottom_rad);
   const double kept_high = degrees(header.elevations->top_rad);
@@ -294,7 +298,7 @@ Dataset read_described(const std::string& folder, const PictureArguments& pictur
   std::error_code ignored;
   if (fs::is_directory(folder, ignored) && !has_dataset_file(folder) &&
       !recordings::is_recording(folder) && !picture_source(pictures)) {
-    throw FileError(folder, "has no dataset.toml, so nothing tells where its images were taken" +
+    throw FileError(folder, "has no dataset.toml, so the positions of its images are unknown" +
                                 explain_columns(folder, columns, values));
   }
   return open_recording(folder, pictures, remembered, session);

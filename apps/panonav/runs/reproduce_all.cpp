@@ -47,17 +47,17 @@ ordered_json make_run_record(const ReproduceArguments& arguments) {
 void require_same_run(const fs::path& out, const ordered_json& record) {
   const std::string file = (out / run_file).string();
   if (!fs::exists(out / run_file)) {
-    throw FileError(file, "is not there: no run to continue; leave --continue out");
+    throw FileError(file, "does not exist: there is no run to continue; leave out --continue");
   }
   const auto earlier = ordered_json::parse(read_text(out / run_file), nullptr, false);
-  if (!earlier.is_object()) throw FileError(file, "is no JSON object, or not all of it");
+  if (!earlier.is_object()) throw FileError(file, "is not a complete JSON object");
   for (const auto& [field, value] : record.items()) {
     if (!earlier.contains(field)) throw FileError(file, field + " is missing");
     const ordered_json& before = earlier[field];
     if (before.is_structured()) throw FileError(file, field + " is an " + before.type_name());
     if (before == value) continue;
     throw OptionError("--continue: the run in " + out.string() + " has " + field + " " +
-                      before.dump() + ", this one " + value.dump() + "; allowed: the same");
+                      before.dump() + ", this run " + value.dump() + "; allowed: the same");
   }
 }
 
@@ -118,7 +118,7 @@ lab::Reproduction reproduce_paper(const ReproducedPaper& paper, const ReproduceA
 }
 
 ExitCode reproduce_all(const ReproduceArguments& arguments, Session& session) {
-  if (arguments.only) throw OptionError("--only has no meaning for all");
+  if (arguments.only) throw OptionError("--only cannot be used with all");
   check_scenes(arguments);  // before anything of an earlier run is removed
   const fs::path out(arguments.out.value_or("reproduction"));
   const ordered_json record = make_run_record(arguments);
@@ -128,7 +128,7 @@ ExitCode reproduce_all(const ReproduceArguments& arguments, Session& session) {
   } else {
     std::error_code error;
     fs::create_directories(out, error);
-    if (error) throw FileError(out.string(), "cannot be made: " + error.message());
+    if (error) throw FileError(out.string(), "cannot be created: " + error.message());
     // Nothing of an earlier run may be taken for a part of this one.
     for (const ReproducedPaper& paper : papers) remove_file(out / paper.name / results_file);
     write_file(out / run_file, record.dump(1) + "\n");
@@ -140,7 +140,7 @@ ExitCode reproduce_all(const ReproduceArguments& arguments, Session& session) {
     if (session.json()) return;
     const lab::TargetCount count = lab::count_targets(rows);
     session.print("  " + session.bold(paper.name) + ": " + std::to_string(count.held) + " of " +
-                  std::to_string(count.judged) + " targets hold" + std::string(how));
+                  std::to_string(count.judged) + " targets met" + std::string(how));
   };
   lab::ResultsDocument document{
       .version = PANONAV_VERSION, .command = command_line(arguments), .papers = {}};
@@ -165,11 +165,11 @@ ExitCode reproduce_all(const ReproduceArguments& arguments, Session& session) {
     return ExitCode::done;
   }
   for (const std::string& line : lab::list_misses(document)) {
-    session.print(session.red("DOES NOT HOLD") + "  " + line);
+    session.print(session.red("MISSED") + "  " + line);
   }
   const lab::TargetCount count = lab::count_targets(document);
   session.print(session.bold(std::to_string(count.held) + " of " + std::to_string(count.judged)) +
-                " targets hold; the table: " + (out / "index.html").string());
+                " targets met; table of results: " + (out / "index.html").string());
   return ExitCode::done;
 }
 

@@ -13,19 +13,21 @@ namespace {
 
 std::string introduce_f11(const lab::ReproductionOptions& options) {
   return "Fernandez, Paya, Reinoso, Amoros 2011, run in " + std::to_string(options.scenes) +
-         " variants of two simulated places; loops closed, which its authors left to later work; a "
-         "corridor of identical doors, Gazebo worlds and recordings where they are available, maps "
-         "of up to " +
-         std::to_string(options.max_views) + " views. Published and measured figures.";
+         " variants of two simulated places. Additional experiments: loop closures, which the "
+         "authors left to future work; a corridor of identical doors; Gazebo worlds and recordings "
+         "if they are available; maps of up to " +
+         std::to_string(options.max_views) +
+         " views. The tables compare published and measured results.";
 }
 
 std::string introduce_m03(const lab::ReproductionOptions& options) {
   return "Menegatti, Zoccarato, Pagello, Ishiguro 2003, run in " + std::to_string(options.scenes) +
          " simulated offices with a 25 cm grid of reference views, " +
          std::to_string(options.variants * options.runs) +
-         " runs in each, and what its authors announced: a corridor of identical doors and the "
-         "open air; Gazebo worlds and recordings where they are available. Published and measured "
-         "figures. Few runs give wide intervals, and rows may then miss their target by chance.";
+         " runs in each. Additional experiments that the authors announced: a corridor of "
+         "identical doors and outdoor scenes; Gazebo worlds and recordings if they are available. "
+         "The tables compare published and measured results. Few runs give wide confidence "
+         "intervals, so that a result can miss its target by chance.";
 }
 
 std::string introduce_m04(const lab::ReproductionOptions& options) {
@@ -35,44 +37,47 @@ std::string introduce_m04(const lab::ReproductionOptions& options) {
   }
   return "Menegatti, Maeda, Ishiguro 2004, run on " + std::to_string(options.scenes) +
          " simulated offices with a 25 cm grid of reference views, " +
-         std::to_string(options.queries) +
-         " questions in each; views that arrange themselves, and " + std::to_string(options.runs) +
-         " missions over such maps in each kind of place (" + places +
-         "). Published and measured figures. Few offices and questions give wide intervals, and "
-         "rows may then miss their target by chance.";
+         std::to_string(options.queries) + " queries in each; arrangements of views; and " +
+         std::to_string(options.runs) + " missions over such maps in each kind of place (" +
+         places +
+         "). The tables compare published and measured results. Few offices and queries give wide "
+         "confidence intervals, so that a result can miss its target by chance.";
 }
 
 std::string introduce_navigation(const lab::ReproductionOptions& options) {
-  return "What Menegatti, Maeda, Ishiguro 2004, section 3.5, leave to later work: maps of drives, "
-         "changes, a robot that is kidnapped, blocked edges. " +
+  return "Topics that Menegatti, Maeda, Ishiguro 2004, section 3.5, name as future work: maps of "
+         "drives, changed scenes, a robot that is carried away, blocked paths. " +
          std::to_string(options.runs) +
          " missions from random starts to random goals in each kind of place, " +
          std::to_string(options.scenes) +
-         " variants of each. The robot sees images and feels obstacles; it knows neither its "
-         "position nor those of its references.";
+         " variants of each. The robot uses images and detects obstacles. It knows neither its own "
+         "position nor the positions of its views.";
 }
 
 std::string introduce_elsewhere(const lab::ReproductionOptions& options) {
-  return "panonav in places for which it was not developed: " + std::to_string(options.scenes) +
-         " variants of each built-in scene, and the Gazebo worlds and recordings that are "
-         "available; queries from one place to the memory of all others, noise, robots that tilt, "
-         "whole floors. Rivals see the same images in the same run.";
+  return "panonav in places that were not used for its development: " +
+         std::to_string(options.scenes) +
+         " variants of each built-in scene, Gazebo worlds and recordings if they are available. "
+         "The experiments contain unknown places, noise, tilted robots and large buildings. Other "
+         "methods process the same images in the same run.";
 }
 
 std::string introduce_s06(const lab::ReproductionOptions& options) {
   return "Stürzl, Mallot 2006, run in " + std::to_string(options.scenes) +
-         " simulated toy house arenas, each recorded twice with different noise and slightly "
-         "different light, headings at random; images are of the first arena. Runs home and chains "
-         "of snapshots in rooms and Gazebo worlds. Published and measured figures.";
+         " simulated arenas of toy houses. Each arena is recorded twice with different noise, "
+         "slightly different light and random headings. The images show the first arena. "
+         "Additional experiments: drives home and chains of views in rooms and Gazebo worlds. The "
+         "tables compare published and measured results.";
 }
 
 std::string introduce_y03(const lab::ReproductionOptions& options) {
   return "Yagi, Imai, Yachida 2003, run in " + std::to_string(options.scenes) +
-         " variants of a simulated lab seen through a mirror camera with its noise; images are "
-         "of the first. Then routes of 60 m, each recorded once and repeated in closed loop, " +
+         " variants of a simulated lab with a mirror camera and its noise. The images show the "
+         "first variant. Additional experiments: routes of 60 m, each recorded once and then "
+         "driven again, " +
          std::to_string(options.runs) +
-         " runs in each place, and a real route; Gazebo worlds and the recording where they are "
-         "available. Published and measured figures.";
+         " runs in each place; a real route; Gazebo worlds and recordings if they are available. "
+         "The tables compare published and measured results.";
 }
 
 constexpr std::array<ReproducedPaper, 7> papers{{
@@ -93,14 +98,14 @@ constexpr std::array<ReproducedPaper, 7> papers{{
      .lead = introduce_m03},
     {.name = "m04",
      .title = "Image-based memory: the experiments of [M04]",
-     .subject = "localisation and views that arrange themselves",
+     .subject = "localisation and arrangement of views",
      .queries = true,
      .runs = true,
      .rows = true,
      .lead = introduce_m04},
     {.name = "navigation",
-     .title = "Navigation: what [M04] leaves to later work",
-     .subject = "what m04 leaves to later work",
+     .title = "Navigation: topics that [M04] names as future work",
+     .subject = "future work of m04",
      .runs = true,
      .data = true,
      .lead = introduce_navigation},
@@ -116,7 +121,7 @@ constexpr std::array<ReproducedPaper, 7> papers{{
      .data = true,
      .lead = introduce_y03},
     {.name = "elsewhere",
-     .title = "Elsewhere: scenes, worlds and recordings compared",
+     .title = "More scenes, worlds and recordings",
      .subject = "known and unknown places, recordings, rivals",
      .queries = true,
      .runs = true,
@@ -172,7 +177,7 @@ void check_scenes(const ReproduceArguments& arguments) {
 void refuse_meaningless(const ReproducedPaper& paper, const ReproduceArguments& arguments) {
   const auto refuse = [&](bool is_typed, bool known, const std::string& flag) {
     if (is_typed && !known) {
-      throw OptionError(flag + " has no meaning for " + std::string(paper.name));
+      throw OptionError(flag + " cannot be used with " + std::string(paper.name));
     }
   };
   refuse(arguments.queries.has_value(), paper.queries, "--queries");

@@ -38,7 +38,7 @@ ExitCode Ros2Robot::run(const simulation::SimulatedWorld& world, Session& sessio
   const StopSignals signals([&] { robot.stop(); });
   session.note("panonav simulate: a robot is in " + scene.name + " at " +
                format_fixed(start.x_m, 2) + ", " + format_fixed(start.y_m, 2) +
-               "; it obeys cmd_vel, and Ctrl-C ends it");
+               "; cmd_vel drives it, and Ctrl-C stops it");
   robot.run();
   return ExitCode::done;
 }

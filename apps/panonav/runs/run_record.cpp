@@ -36,14 +36,14 @@ std::function<std::vector<std::uint8_t>(const std::string&)> make_thumbnail_read
 
 void declare_record(Arguments& arguments, RunRecordArguments& record) {
   arguments.option("--record FILE", record.file,
-                   "Record images and answers as MCAP, for Rerun, Foxglove and Lichtblick");
+                   "Record images and answers in an MCAP file for Rerun, Foxglove and Lichtblick");
   arguments.writes({"--record"});
 }
 
 void declare_view(Arguments& arguments, RunRecordArguments& record) {
   arguments.option("--view PORT", record.view,
-                   "Show the run in browsers of this machine, at this port (0: a free one); "
-                   "ADDRESS:PORT shows it to the network of that address, too");
+                   "Show the run in browsers on this computer, at this port (0: a free port); "
+                   "ADDRESS:PORT also shows it to the network of this address");
 }
 
 RunRecord::RunRecord(const RunRecordArguments& arguments, std::span<const std::string> read,
@@ -63,8 +63,9 @@ RunRecord::RunRecord(const RunRecordArguments& arguments, std::span<const std::s
     if (!offers.memory.empty()) options.thumbnail = make_thumbnail_reader(offers.memory);
     viewer_.emplace(options);
     if (!place.is_local()) {
-      session_.note("warning: the page is sent to the network of " + place.address +
-                    " without encryption: whoever listens there sees it and its address");
+      session_.note(
+          "warning: the page is sent to the network of " + place.address +
+          " without encryption: others in this network can read the page and its address");
     }
     session_.prompt("Open " + viewer_->url() + " in a browser" +
                     (live ? "" : "; the run waits for it"));

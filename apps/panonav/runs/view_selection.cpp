@@ -32,11 +32,10 @@ std::array<double, 3> parse_circle(const std::string& text) {
 }  // namespace
 
 void declare_selection(Arguments& arguments, ViewSelection& selection) {
-  arguments.option(
-      "--name PATTERN", selection.name,
-      "Only views whose name fits a pattern: * stands for any text, ? for a character");
+  arguments.option("--name PATTERN", selection.name,
+                   "Only views with a matching name: * is any text, ? is any character");
   arguments.option("--near X,Y,METRES", selection.near,
-                   "Only views within this distance of a position");
+                   "Only views within METRES of the position X,Y");
 }
 
 std::vector<ViewRecord> selected(std::vector<ViewRecord> views, const ViewSelection& selection) {

@@ -42,7 +42,7 @@ std::vector<CoarseMotion> read_motions(const ArrangeArguments& arguments,
   auto motions = make_coarse_motions(recording, memory, arguments.motion);
   if (motions.empty()) {
     throw FileError(*arguments.odometry,
-                    "has no odometry between images that the memory knows by name");
+                    "has no odometry between images whose names are in the memory");
   }
   return motions;
 }
@@ -97,7 +97,7 @@ void print_result(const Lattice& lattice, const VisualMemory& memory, Session& s
                 std::to_string(lattice.springs.size()) + " springs of " +
                 std::to_string(lattice.candidates) + " candidates, " +
                 std::to_string(count_rejected_springs(lattice)) + " of them rejected; unit: " +
-                (lattice.metric ? "metres" : "the distance to the nearest view (median)"));
+                (lattice.metric ? "metres" : "median distance to the nearest view"));
   if (lattice.components.size() > 1) {
     std::string others;
     std::size_t single_views = 0;
@@ -107,7 +107,7 @@ void print_result(const Lattice& lattice, const VisualMemory& memory, Session& s
       others += (others.empty() ? "; the others hold " : ", ") + std::to_string(component.views);
     }
     if (single_views > 0)
-      others += "; " + std::to_string(single_views) + " views are joined to none";
+      others += "; " + std::to_string(single_views) + " views are not connected to any other view";
     session.print("The largest of " +
                   session.red(std::to_string(lattice.components.size()) + " connected components") +
                   " holds " + std::to_string(lattice.components.front().views) + " of the " +
@@ -116,7 +116,7 @@ void print_result(const Lattice& lattice, const VisualMemory& memory, Session& s
                   "one to another.");
   }
   if (!lattice.components.front().handedness_known) {
-    session.print("It may be the mirror image: left and right cannot be told apart.");
+    session.print("The result may be mirrored: left and right cannot be distinguished.");
   }
   if (const auto comparison = compare_with_ground_truth(lattice, memory)) {
     session.print("compared with the ground truth: Procrustes disparity (shape difference) " +
@@ -134,7 +134,7 @@ ExitCode arrange_views(const ArrangeArguments& arguments, Session& session) {
                                arguments.no_save ? Access::read_only : Access::read_write);
   const VisualMemory memory = file.load();
   if (memory.empty()) {
-    return session.no_answer("panonav arrange: " + arguments.memory + " holds no views");
+    return session.no_answer("panonav arrange: " + arguments.memory + " contains no views");
   }
   session.detail(std::to_string(memory.size()) + " views loaded");
   if (arguments.report) prepare_report_folder(*arguments.report, "arrange");
@@ -170,23 +170,22 @@ ExitCode arrange_views(const ArrangeArguments& arguments, Session& session) {
 
 Run declare_arrange(Arguments& arguments) {
   auto values = std::make_shared<ArrangeArguments>();
-  arguments.positional("MEMORY", values->memory, "Memory file; its views may be in any order");
-  arguments.option(
-      "--odometry DATASET", values->odometry,
-      "Take the robot's motion between views from this data set or recording, by name");
+  arguments.positional("MEMORY", values->memory, "Memory file");
+  arguments.option("--odometry DATASET", values->odometry,
+                   "Read the robot's motion between views from this data set or recording; images "
+                   "are assigned to views by their names");
   declare_topics(arguments, values->pictures.topics);
-  arguments.option(
-      "--tum FILE", values->tum,
-      "Write the poses of the largest component to this file: TUM text, or CSV for a name "
-      "that ends in .csv");
+  arguments.option("--tum FILE", values->tum,
+                   "Write the poses of the largest connected component to this file: as CSV if the "
+                   "name ends in .csv, otherwise as TUM text");
   arguments.option("--graphml FILE", values->graph, "Write the map as a graph to this file");
   arguments.option(
       "--picture FILE", values->picture,
-      "Draw the map, next to the true positions where they are known, into this PNG or SVG file");
+      "Draw the map into this PNG or SVG file, next to the true positions if they are known");
   arguments.option("--report FOLDER", values->report,
-                   "Write a page that shows the arrangement step by step into this folder: a new "
-                   "one, or that of an earlier report");
-  arguments.flag("--no-save", values->no_save, "Leave the memory file as it is");
+                   "Write a page that shows the arrangement step by step into this folder; the "
+                   "folder must be new or contain an earlier report");
+  arguments.flag("--no-save", values->no_save, "Do not change the memory file");
   arguments.options("lattice", values->lattice);
   arguments.options("coarse_motion", values->motion, "motion");
   arguments.show_in_help({"--neighbours"});
@@ -199,13 +198,14 @@ Run declare_arrange(Arguments& arguments) {
 }  // namespace
 
 Verb arrange_verb() {
-  return {"arrange", "Arrange the views of a memory in space, by their similarity alone",
-          "Views may be in any order; poses in the memory are only used for comparison. Parts that "
-          "are not connected are kept as separate components. The map is stored in the memory "
-          "under the name lattice.",
-          "  panonav arrange office.panonav --report arranged\n"
-          "  panonav arrange hall.panonav --odometry run --graphml hall.graphml --json",
-          declare_arrange};
+  return {
+      "arrange", "Compute the positions of all views of a memory from their similarity",
+      "The views may be in any order. Poses in the memory are only used to measure the error of "
+      "the result. If the views form several groups without connection, each group is a separate "
+      "component. The result is stored in the memory as a map with the name 'lattice'.",
+      "  panonav arrange office.panonav --report arranged\n"
+      "  panonav arrange hall.panonav --odometry run --graphml hall.graphml --json",
+      declare_arrange};
 }
 
 }  // namespace panonav::command

@@ -29,20 +29,21 @@ struct MirrorOptions {
 void visit_options(MirrorOptions& options, OptionVisitor& visitor) {
   using T = MirrorOptions;
   constexpr OptionTable table{
-      choice<&T::profile>("Shape of the mirror, or two fisheye lenses side by side in one image",
-                          "equiangular", "hyperboloidal", "unified", "dual-fisheye"),
-      option<&T::inner_elevation_deg>("Elevation seen at the inner radius (equiangular)", -90, 90),
-      option<&T::rim_elevation_deg>("Elevation seen at the mirror's rim", -90, 90),
-      option<&T::mirror_a_mm>("a of the hyperboloid [Y03 eq. 1]", 0.01, 1e5),
-      option<&T::mirror_b_mm>("b of the hyperboloid [Y03 eq. 1]", 0.01, 1e5),
+      choice<&T::profile>(
+          "Shape of the mirror; dual-fisheye: two fisheye lenses side by side in one image",
+          "equiangular", "hyperboloidal", "unified", "dual-fisheye"),
+      option<&T::inner_elevation_deg>("Elevation at the inner radius (for equiangular)", -90, 90),
+      option<&T::rim_elevation_deg>("Elevation at the mirror's rim", -90, 90),
+      option<&T::mirror_a_mm>("Parameter a of the hyperboloid [Y03 eq. 1]", 0.01, 1e5),
+      option<&T::mirror_b_mm>("Parameter b of the hyperboloid [Y03 eq. 1]", 0.01, 1e5),
       option<&T::xi>("Mirror parameter of the unified model", 0, 10),
       choice<&T::direction>(
-          "Direction in which the image moves when the robot rotates to the left: clockwise where "
-          "the camera looks up into the mirror, counter-clockwise where it looks down; "
-          "dual-fisheye: counter-clockwise where the image is mirrored",
+          "Direction in which the image moves when the robot rotates to the left: clockwise if the "
+          "camera points up into the mirror, counter-clockwise if it points down. dual-fisheye: "
+          "counter-clockwise if the image is mirrored",
           "clockwise", "counter-clockwise"),
-      option<&T::forward_angle_deg>(
-          "Where the robot's forward direction lies in the image: 0 right, 90 up", -360, 360),
+      option<&T::forward_angle_deg>("Robot's forward direction in the image: 0 is right, 90 is up",
+                                    -360, 360),
   };
   table.visit(options, visitor);
 }
@@ -61,16 +62,16 @@ struct LensesOptions {
 void visit_options(LensesOptions& options, OptionVisitor& visitor) {
   using T = LensesOptions;
   constexpr OptionTable table{
-      option<&T::left_roll_deg>("Position of the zenith side in the left circle: 0 at its top, 90 "
-                                "at its left, -90 at its right",
-                                -360, 360),
-      option<&T::right_roll_deg>("The same for the right circle", -360, 360),
-      option<&T::left_azimuth_deg>(
-          "Azimuth of the left lens, counter-clockwise from the robot's forward direction", -360,
-          360),
-      option<&T::field_of_view_deg>("Field of view of each lens; 0: estimated, 185 to 220", 0, 300),
+      option<&T::left_roll_deg>(
+          "Direction of the sky in the left circle: 0 is up, 90 is left, -90 is right", -360, 360),
+      option<&T::right_roll_deg>("Direction of the sky in the right circle", -360, 360),
+      option<&T::left_azimuth_deg>("Azimuth of the left lens relative to the robot's forward "
+                                   "direction, counter-clockwise positive",
+                                   -360, 360),
+      option<&T::field_of_view_deg>("Field of view of each lens; 0: estimated between 185 and 220",
+                                    0, 300),
       option<&T::turn_deg>(
-          "Rotation of the camera to the left between consecutive images; 0: estimated", -360, 360),
+          "Rotation of the camera to the left from one image to the next; 0: estimated", -360, 360),
   };
   table.visit(options, visitor);
 }
@@ -105,7 +106,7 @@ std::vector<DatasetEntry> choose_entries(const std::string& input,
   std::vector<DatasetEntry> all = open_recording(input, arguments.pictures, any, session).entries;
   if (all.size() <= max_pictures) return all;
   session.note("of the " + std::to_string(all.size()) + " images of " + to_readable_line(input) +
-               " " + std::to_string(max_pictures) + " are taken, evenly spread");
+               " " + std::to_string(max_pictures) + " are used, at equal intervals");
   std::vector<DatasetEntry> some;
   for (std::size_t i = 0; i < max_pictures; ++i) {
     some.push_back(all[i * (all.size() - 1) / (max_pictures - 1)]);
@@ -185,23 +186,24 @@ void print_text(const Arguments& declared, const CalibrateArguments& arguments, 
                 format_fixed(camera.inner_radius_px, 1) + " px" +
                 (mirror.inner_radius_px || arguments.inner_radius_px
                      ? ""
-                     : " (none found; give --inner-radius-px)"));
+                     : " (not found; set --inner-radius-px)"));
   session.print("quality " + format_fixed(mirror.quality, 2) + " of 1, edges within " +
                 format_fixed(mirror.residual_px, 2) + " px of the rim");
   if (const auto spread = agreement(mirror)) {
     session.print("over the " + std::to_string(spread->images) +
-                  " images that show the rim alone, the centre varies by " +
+                  " images that show the rim, the centre varies by " +
                   format_fixed(spread->centre_u_px, 2) + ", " +
                   format_fixed(spread->centre_v_px, 2) + " px and the radius by " +
                   format_fixed(spread->rim_radius_px, 2) + " px (standard deviations)");
   }
   if (!declared.is_set("mirror")) {
     session.print(
-        "An image does not show the mirror's profile: elevations are taken to run evenly from " +
+        "The mirror's profile cannot be found from images. panonav assumes that the elevation "
+        "increases evenly from " +
         format_number(arguments.mirror.inner_elevation_deg) + " degrees at the inner radius to " +
         format_number(arguments.mirror.rim_elevation_deg) +
-        " at the rim. If you know the mirror, set --profile, --rim-elevation-deg and related "
-        "options.");
+        " at the rim. If you know the profile of the mirror, set --profile, --rim-elevation-deg "
+        "and related options.");
   }
   session.suggest({"panonav", "unwrap", arguments.inputs.front(), "--camera", arguments.out, "-o",
                    several ? "panoramas" : "panorama.png"},
@@ -251,7 +253,7 @@ ExitCode calibrate_lenses(const CalibrateArguments& arguments,
   std::vector<ImageView> views;
   for (std::size_t i = 0; i < count; ++i) views.push_back(all[i * all.size() / count]);
   if (arguments.lenses.turn_deg != 0 && all.size() > count) {
-    throw UsageError("--turn-deg is the same between up to 12 images; there are " +
+    throw UsageError("--turn-deg needs equal rotations between at most 12 images; there are " +
                      std::to_string(all.size()));
   }
   const LensesOptions& options = arguments.lenses;
@@ -282,7 +284,7 @@ ExitCode calibrate_lenses(const CalibrateArguments& arguments,
                 format_fixed(degrees(2 * lenses[0].max_angle_rad), 1) + " and " +
                 format_fixed(degrees(2 * lenses[1].max_angle_rad), 1) +
                 " degrees, brightness 1 to " + format_fixed(lenses[1].gain / lenses[0].gain, 2));
-  session.print(std::to_string(found.matches) + " patches found again, " +
+  session.print(std::to_string(found.matches) + " patches matched, " +
                 format_fixed(100 * found.inlier_share, 0) + " % of those with structure, within " +
                 format_fixed(degrees(found.residual_rad), 3) + " degrees");
   session.print("azimuths are uncertain by " +
@@ -307,9 +309,10 @@ ExitCode calibrate(const Arguments& declared, const CalibrateArguments& argument
   }
   const auto mirror = find_mirror(views, arguments.search);
   if (!mirror) {
-    return session.no_answer("panonav calibrate: no mirror found in " + names.front() +
-                             (images.size() > 1 ? " and the others" : "") +
-                             "; give more images, or allow a fainter rim with --min-quality");
+    return session.no_answer(
+        "panonav calibrate: no mirror found in " + names.front() +
+        (images.size() > 1 ? " and the others" : "") +
+        "; add more images, or reduce --min-quality to accept a less visible rim");
   }
   const double forward_rad = radians(arguments.mirror.forward_angle_deg);
   const Camera camera = camera_from_mirror(
@@ -334,17 +337,18 @@ ExitCode calibrate(const Arguments& declared, const CalibrateArguments& argument
 
 Run declare_calibrate(Arguments& arguments) {
   auto values = std::make_shared<CalibrateArguments>();
-  arguments.positionals("INPUT", values->inputs,
-                        "Raw images of one mirror camera, more are better; or of a camera of two "
-                        "fisheye lenses turned round at one place. Or folders, videos or "
-                        "recordings of them, or - for JPEG images on standard input");
+  arguments.positionals(
+      "INPUT", values->inputs,
+      "Raw images of one mirror camera; more images give a better result. For a camera with two "
+      "fisheye lenses: images at one place with different rotations of the camera. Folders, videos "
+      "and recordings are also allowed; - reads JPEG images from standard input");
   declare_topics(arguments, values->pictures.topics);
   declare_part(arguments, values->pictures.part, true);
-  arguments.required_option("-o,--out", values->out, "Camera file to write (camera.toml)");
+  arguments.required_option("-o,--out", values->out, "Name of the new camera file (camera.toml)");
   arguments.option("--overlay FILE", values->overlay,
-                   "PNG image to write: what was found, drawn over the first image");
+                   "Write a PNG image with the result drawn over the first image");
   arguments.option("--inner-radius-px", values->inner_radius_px,
-                   "Radius that the camera's own reflection covers, instead of the one found");
+                   "Radius of the reflection of the camera; default: found in the images");
   arguments.options("mirror", values->mirror);
   arguments.options("lenses", values->lenses);
   arguments.options("mirror_search", values->search);
@@ -369,11 +373,11 @@ Run declare_calibrate(Arguments& arguments) {
 }  // namespace
 
 Verb calibrate_verb() {
-  return {"calibrate", "Find a mirror, or the two lenses of a 360 degree camera, in raw images",
-          "The exit code is 1 when no image shows a mirror's rim, or the images do not determine "
-          "two lenses. For two lenses, take three or four images at one place with many objects "
-          "around, and rotate the camera on its stand by about 90 degrees between them. Check the "
-          "overlay before you use the file.",
+  return {"calibrate", "Calibrate a mirror camera or a 360 degree camera with two lenses",
+          "For two lenses, take three or four images at one place with many objects around. Rotate "
+          "the camera on its stand by about 90 degrees between the images. Look at the overlay "
+          "image before you use the camera file. The exit code is 1 if no image shows the rim of a "
+          "mirror, or if the images are not sufficient for two lenses.",
           "  panonav calibrate mirror1.jpg mirror2.jpg -o camera.toml --overlay overlay.png\n"
           "  panonav calibrate turned?.jpg --profile dual-fisheye -o camera.toml\n"
           "  panonav calibrate theta?.jpg --profile dual-fisheye --left-roll-deg 90 "

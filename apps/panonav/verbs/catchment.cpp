@@ -90,9 +90,9 @@ void print_text(const CatchmentArguments& arguments, const CatchmentResult& resu
                                 : "";
   session.print("Average homeward component over " + std::to_string(result.pairs) + " pairs" +
                 range + ": " + session.bold(format_fixed(result.component, 3)) +
-                " (1: straight home, 0: chance)");
-  session.print("  heading off by " + format_fixed(degrees(result.orientation_error_rad), 1) +
-                " degrees (circular standard deviation); a home vector of length 1 is worth " +
+                " (1: straight home, 0: random direction)");
+  session.print("  heading error " + format_fixed(degrees(result.orientation_error_rad), 1) +
+                " degrees (circular standard deviation); a home vector of length 1 means " +
                 format_fixed(result.typical_distance_m, 2) + " m");
   session.print("  distance [m]  pairs     homeward  heading error [degrees]");
   for (const CatchmentResult::Bin& bin : result.bins) {
@@ -108,8 +108,8 @@ void print_text(const CatchmentArguments& arguments, const CatchmentResult& resu
                   padded(format_fixed(bin.homeward.component, 3), 10) +
                   format_fixed(degrees(bin.orientation_error_rad), 1));
   }
-  session.print("Runs home over the " + std::to_string(result.survey.places.size()) + " places, " +
-                format_fixed(result.spacing_m, 3) + " m apart; mean catchment area:");
+  session.print("Drives home between the " + std::to_string(result.survey.places.size()) +
+                " places, " + format_fixed(result.spacing_m, 3) + " m apart; mean catchment area:");
   const auto places = static_cast<double>(result.survey.places.size());
   for (std::size_t i = 0; i < result.areas.size(); ++i) {
     session.print("  ending within " + format_fixed(result.accepted_m[i], 3) + " m: from " +
@@ -151,9 +151,9 @@ ExitCode compare_ahead(const CatchmentArguments& arguments, const RecordedViews&
                   std::to_string(ahead) + " later: on average " +
                   session.bold(format_fixed(std::abs(degrees_left), 1) + " degrees to the " +
                                (degrees_left > 0.0 ? "left" : "right")) +
-                  " of straight ahead");
+                  " of the forward direction");
     session.print("  resultant length " + format_fixed(mean->resultant_length, 3) +
-                  " (1: all the same), spread " +
+                  " (1: all directions equal), spread " +
                   format_fixed(degrees(circular_standard_deviation(*mean)), 1) + " degrees, " +
                   std::to_string(sideways) + " point backwards");
   } else {
@@ -284,27 +284,30 @@ ExitCode catchment(const Arguments& declared, const CatchmentArguments& argument
 Run declare_catchment(Arguments& arguments) {
   auto values = std::make_shared<CatchmentArguments>();
   arguments.positional("DATASET", values->dataset,
-                       "Data set with positions and headings; each view is a home");
+                       "Data set with positions and headings; each view is used as a home");
   arguments.option("--current DATASET", values->current,
-                   "Data set of the views to go home from; default: the same recording");
+                   "Data set of the current views; default: the same data set");
   declare_pictures(arguments, values->pictures);
   arguments.option("--up-to-m", values->settings.up_to_m,
-                   "Leave out pairs that are farther apart from the averages");
-  arguments.option("--bin-m", values->settings.bin_m,
-                   "Width of a bin of distances; default: the spacing of the places");
-  arguments.option("--turn-randomly SEED", values->turn_seed,
-                   "Turn the robot before each current view by a random number of whole columns");
+                   "Largest distance of two views whose results are averaged");
+  arguments.option(
+      "--bin-m", values->settings.bin_m,
+      "Step of the distance in the table of results; default: the spacing of the places");
+  arguments.option(
+      "--turn-randomly SEED", values->turn_seed,
+      "Rotate each current view by a random number of columns; SEED is the random seed");
   arguments.option(
       "--stages K,K,...", values->stages,
-      "Runs go from coarse to fine: the highest frequency of each stage, as in 2,4,10");
+      "Drive home in stages; each K is the highest frequency of a stage, for example 2,4,10");
   arguments.option("--ahead N", values->ahead, 1,
-                   "Only compare each view with the one N images later: the direction of travel "
-                   "where the camera looks along it. Needs no positions");
-  arguments.option("--goal IMAGE", values->goal,
-                   "Image whose home vectors the report shows; default: the one in the middle");
+                   "Only compare each view with the view N images later; this measures the "
+                   "direction of travel relative to the camera and needs no positions");
+  arguments.option(
+      "--goal IMAGE", values->goal,
+      "Image for which the report shows home vectors; default: the image in the middle");
   arguments.option("--report FOLDER", values->report,
-                   "Write curves and maps into this folder: a new one, or that of an earlier "
-                   "report");
+                   "Write curves and maps into this folder; the folder must be new or contain an "
+                   "earlier report");
   declare_homing(arguments, values->homing);
   arguments.options("run", values->settings.run);
   arguments.hide_from_help({"--bin-m", "--goal"});
@@ -321,11 +324,11 @@ Run declare_catchment(Arguments& arguments) {
 }  // namespace
 
 Verb catchment_verb() {
-  return {"catchment", "Measure from how far away the views of a recording lead home",
-          "The verb computes home vectors between all pairs of views, and runs from place to place "
-          "[S06 section 4]. By default the longest step is twice the spacing of the places, a step "
-          "must end within 0.8 of it, and the typical distance of objects is estimated from near "
-          "pairs.",
+  return {"catchment", "Measure the distances from which the views of a data set lead home",
+          "The verb computes the direction home for all pairs of views and simulates drives home "
+          "from place to place [S06 section 4]. By default a step is at most twice as long as the "
+          "spacing of the places, and it must end within 0.8 of this spacing from a place. The "
+          "typical distance of objects is estimated from pairs of near views.",
           "  panonav catchment grid_run --up-to-m 0.3 --turn-randomly 1 --report catchment\n"
           "  panonav catchment monday_run --current tuesday_run --published 5 --json\n"
           "  panonav catchment grid_run --published 10 --stages 2,4,10\n"

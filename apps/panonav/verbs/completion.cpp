@@ -7,7 +7,8 @@ namespace {
 
 Run declare_completion(Arguments& arguments) {
   auto shell = std::make_shared<std::string>();
-  arguments.positional("SHELL", *shell, "bash, zsh or fish", completion_shells());
+  arguments.positional("SHELL", *shell, "Name of the shell: bash, zsh or fish",
+                       completion_shells());
   return [shell](Session& session) {
     return print_text(completion_script(describe(all_verbs()), *shell), session);
   };
@@ -16,10 +17,10 @@ Run declare_completion(Arguments& arguments) {
 }  // namespace
 
 Verb completion_verb() {
-  return {"completion", "Print a script that lets a shell complete verbs, options and values",
-          "The bash script is read with source, the fish script is kept in the folder "
-          "~/.config/fish/completions as panonav.fish, and the zsh script in a folder of fpath as "
-          "_panonav. An installed panonav has them already.",
+  return {"completion", "Print a script for the completion of verbs, options and values in a shell",
+          "Load the bash script with 'source'. Save the fish script as "
+          "~/.config/fish/completions/panonav.fish and the zsh script as _panonav in a folder of "
+          "fpath. An installed panonav already has these scripts.",
           "  panonav completion bash\n  panonav completion fish", declare_completion};
 }
 

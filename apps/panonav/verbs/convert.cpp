@@ -36,8 +36,8 @@ ExitCode convert(const ConvertArguments& arguments, Session& session) {
                    (fs::is_directory(arguments.input, ignored) &&
                     !recordings::is_recording(arguments.input)))) {
     throw UsageError(arguments.output +
-                     " does not end in .mcap; images of a folder become a "
-                     "recording, and a recording becomes a folder");
+                     " does not end in .mcap; a folder is converted to a recording, and a "
+                     "recording to a folder");
   }
   // A recording does not say how its pictures lie.
   PictureSource any{.kind = PictureKind::equirectangular};
@@ -64,7 +64,8 @@ ExitCode convert(const ConvertArguments& arguments, Session& session) {
   session.print(session.bold(std::to_string(dataset.entries.size())) + " images of " +
                 arguments.input + " in " + arguments.output + describe_fields(done));
   if (records && !done.stamps) {
-    session.print("Not all images have a stamp; they are one second apart.");
+    session.print(
+        "Some images have no stamp. The images are stored with an interval of one second.");
   }
   return ExitCode::done;
 }
@@ -74,7 +75,7 @@ Run declare_convert(Arguments& arguments) {
   arguments.positional("INPUT", values->input,
                        "Data set, folder of images, or recording (MCAP, rosbag2, ROS 1 bag)");
   arguments.positional("OUTPUT", values->output,
-                       "Recording to write, FILE.mcap, or a new folder for a data set");
+                       "New recording (FILE.mcap), or a new folder for a data set");
   declare_pictures(arguments, values->pictures);
   arguments.writes({"OUTPUT"});
   return [values](Session& session) { return convert(*values, session); };
@@ -85,8 +86,9 @@ Run declare_convert(Arguments& arguments) {
 Verb convert_verb() {
   return {"convert",
           "Convert a data set to a recording of ROS 2 messages, or a recording to a data set",
-          "Images are copied unchanged, with stamps, odometry, poses, roll and pitch. A data set "
-          "needs --kind, as a recording does not say how its images lie.",
+          "Images are copied unchanged, with stamps, odometry, poses, roll and pitch. To convert a "
+          "recording to a data set, set --kind, because a recording does not contain the type of "
+          "its images.",
           "  panonav convert walk walk.mcap\n"
           "  panonav convert drive.bag drive --kind equirectangular --image-topic /camera/image",
           declare_convert};

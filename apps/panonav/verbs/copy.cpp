@@ -31,8 +31,8 @@ ExitCode copy(const CopyArguments& arguments, Session& session) {
 
 Run declare_copy(Arguments& arguments) {
   auto values = std::make_shared<CopyArguments>();
-  arguments.positional("MEMORY", values->memory, "Memory file, or address of one on a server");
-  arguments.positional("COPY", values->copy, "The copy: a new file, or an address");
+  arguments.positional("MEMORY", values->memory, "Memory file, or address of a memory on a server");
+  arguments.positional("COPY", values->copy, "Name of the copy: a new file, or an address");
   arguments.writes({"COPY"});
   return [values](Session& session) { return copy(*values, session); };
 }
@@ -40,10 +40,10 @@ Run declare_copy(Arguments& arguments) {
 }  // namespace
 
 Verb copy_verb() {
-  return {"copy", "Copy a memory: to a server, back, or to another file",
-          "The copy has the same content with the same ids, so that it gives the same answers: "
-          "views, images, features, links, maps, routes and models. It is made completely or not "
-          "at all. The address of a memory on a PostgreSQL server is "
+  return {"copy", "Copy a memory to another file, to a server or from a server",
+          "The copy contains the same views, images, features, links, maps, routes and models, "
+          "with the same ids. It gives the same answers. If the copy is interrupted, nothing is "
+          "written. The address of a memory on a PostgreSQL server is "
           "postgresql://HOST/DATABASE?memory=NAME (docs/scale.md).",
           "  panonav copy office.panonav office_copy.panonav\n"
           "  panonav copy office.panonav 'postgresql://robots.example/panonav?memory=office'",

@@ -65,7 +65,7 @@ ExitCode evaluate(const EvaluateArguments& arguments, Session& session) {
   if (!evaluation) {
     return session.no_answer("panonav evaluate: fewer than two poses of " + arguments.estimate +
                              " have a stamp within " + arguments.truth +
-                             "; do both count the same seconds?");
+                             "; check that both use the same clock");
   }
   if (session.json()) {
     session.print(json_line(as_json(*evaluation)));
@@ -93,9 +93,10 @@ ExitCode evaluate(const EvaluateArguments& arguments, Session& session) {
 
 Run declare_evaluate(Arguments& arguments) {
   auto values = std::make_shared<EvaluateArguments>();
-  arguments.positional("ESTIMATE", values->estimate,
-                       "Trajectory as TUM text or CSV, or a memory file (NAME.panonav) with a map");
-  arguments.positional("GROUND_TRUTH", values->truth, "Trajectory as TUM text or CSV");
+  arguments.positional(
+      "ESTIMATE", values->estimate,
+      "Estimated trajectory as TUM text or CSV, or a memory file (NAME.panonav) with a map");
+  arguments.positional("GROUND_TRUTH", values->truth, "True trajectory as TUM text or CSV");
   arguments.options("evaluation", values->options);
   arguments.show_in_help({"--align", "--align-scale"});
   arguments.refuse_unless(
@@ -107,9 +108,10 @@ Run declare_evaluate(Arguments& arguments) {
 }  // namespace
 
 Verb evaluate_verb() {
-  return {"evaluate", "Compare an estimated trajectory or map with the ground truth",
-          "Poses are associated by stamp and aligned by least squares unless --align false. The "
-          "exit code is 1 when no stamps match.",
+  return {"evaluate", "Compare an estimated trajectory or map with the true trajectory",
+          "Poses with the same stamp are compared. The estimate is first aligned with the true "
+          "trajectory by least squares, unless --align is false. The exit code is 1 if no stamps "
+          "match.",
           "  panonav evaluate estimate.tum truth.tum\n"
           "  panonav evaluate estimate.csv truth.csv --align-scale true --json\n"
           "  panonav evaluate office.panonav run/poses.csv",

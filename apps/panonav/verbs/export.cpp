@@ -29,35 +29,38 @@ void print_export(const MemoryExport& done, const MemoryFile& memory, const std:
   if (done.pictures == 0) {
     session.print(
         info.thumbnails == 0
-            ? "No images: the memory holds no thumbnails. memorise cannot read this folder."
-            : "No images: the thumbnails are too small for the memory's " +
+            ? "No images were written, because the memory has no thumbnails. memorise cannot read "
+              "this folder."
+            : "No images were written, because the thumbnails are too small for the memory's " +
                   std::to_string(memory.header().shape.components) +
-                  " components, or are not panonav's. memorise cannot read this folder.");
+                  " components or were not made by panonav. memorise cannot read this folder.");
     return;
   }
-  session.print("A data set of " + std::to_string(done.pictures) + " images, the thumbnails" +
-                (done.enlarged ? ", enlarged to the size of the memory's panoramas: fine detail is "
-                                 "lost, and signatures differ a little from the memory's"
+  session.print("Data set with " + std::to_string(done.pictures) +
+                " images made from the thumbnails" +
+                (done.enlarged ? ", enlarged to the size of the memory's panoramas; fine detail is "
+                                 "lost, and signatures differ slightly from the memory's"
                                : "") +
                 ".");
   if (done.pictures < done.views) {
     session.print(std::to_string(done.views - done.pictures) +
-                  " views without a thumbnail are not in it.");
+                  " views without a thumbnail are not in the data set.");
   }
   if (done.renamed > 0) {
     session.print(std::to_string(done.renamed) +
-                  " images are not named as their views, whose names cannot be those of files; "
-                  "views.csv has both.");
+                  " images have other names than their views, because file names cannot contain "
+                  "the names of these views; views.csv lists both names.");
   }
   const std::string lost = lost_columns(done);
   if (!lost.empty()) {
-    session.print("Not in the data set, as not every view has them: " + lost +
-                  "; those that are known are in views.csv.");
+    session.print(
+        "The data set does not contain these values, because some views do not have them: " + lost +
+        "; views.csv lists the known values.");
   }
   const bool more = info.links + info.maps + info.routes > 0;
   if (more) session.print("Links, maps and routes are not exported.");
   session.suggest({"panonav", "memorise", out, "NEW.panonav", "--config", out + "/memorise.toml"},
-                  "Back again:");
+                  "To make a memory of this folder:");
 }
 
 ExitCode export_all(const ExportArguments& arguments, Session& session) {
@@ -84,8 +87,7 @@ ExitCode export_all(const ExportArguments& arguments, Session& session) {
 Run declare_export(Arguments& arguments) {
   auto values = std::make_shared<ExportArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file");
-  arguments.required_option("-o,--out FOLDER", values->out,
-                            "Folder to write: a new or an empty one");
+  arguments.required_option("-o,--out FOLDER", values->out, "New or empty folder");
   arguments.writes({"--out"});
   return [values](Session& session) { return export_all(*values, session); };
 }
@@ -93,14 +95,13 @@ Run declare_export(Arguments& arguments) {
 }  // namespace
 
 Verb export_verb() {
-  return {
-      "export", "Write views, poses, thumbnails and signatures of a memory as a data set",
-      "Thumbnails are all that a memory keeps of its images; they become panoramas of the "
-      "memory's size, which memorise takes back. views.csv and signatures.npy hold all views as "
-      "they are. Links, maps and routes are not exported. The folder appears whole or not at all.",
-      "  panonav export office.panonav -o office_views\n"
-      "  panonav memorise office_views again.panonav --config office_views/memorise.toml",
-      declare_export};
+  return {"export", "Export the views, poses, thumbnails and signatures of a memory as a data set",
+          "A memory stores its images only as thumbnails. export enlarges them to panoramas that "
+          "memorise can read. views.csv and signatures.npy contain all views without loss. Links, "
+          "maps and routes are not exported. If the export is interrupted, no folder is written.",
+          "  panonav export office.panonav -o office_views\n"
+          "  panonav memorise office_views again.panonav --config office_views/memorise.toml",
+          declare_export};
 }
 
 }  // namespace panonav::command

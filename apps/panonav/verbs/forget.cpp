@@ -23,7 +23,7 @@ ExitCode forget(const ForgetArguments& arguments, Session& session) {
     for (const auto& name : arguments.views) {
       const auto view = memory.find(name);
       if (!view) {
-        throw FileError(arguments.memory, "holds no view " + name + "; nothing was forgotten");
+        throw FileError(arguments.memory, "contains no view " + name + "; no view was deleted");
       }
       views.insert(*view);
     }
@@ -37,7 +37,7 @@ ExitCode forget(const ForgetArguments& arguments, Session& session) {
           memory.remove(find_all());
           keep_models(memory);
         },
-        "forget: " + std::to_string(views.size()) + " views dropped");
+        "forget: " + std::to_string(views.size()) + " views deleted");
   }
   const auto left = memory.info().views - (arguments.dry_run ? views.size() : 0);
   if (session.json()) {
@@ -55,34 +55,35 @@ ExitCode forget(const ForgetArguments& arguments, Session& session) {
               ? 1
               : 0;
     }
-    session.print("would forget " + std::to_string(views.size()) + " views and " +
-                  std::to_string(links) + " links to them; " + arguments.memory + " would hold " +
-                  std::to_string(left));
+    session.print("would delete " + std::to_string(views.size()) + " views and " +
+                  std::to_string(links) + " links to them; " + arguments.memory +
+                  " would then contain " + std::to_string(left));
     return ExitCode::done;
   }
-  session.print(std::to_string(views.size()) + " views forgotten; " + arguments.memory + " holds " +
+  session.print(std::to_string(views.size()) + " views deleted; " + arguments.memory + " holds " +
                 std::to_string(left));
-  session.suggest({"panonav", "undo", arguments.memory}, "To bring them back:");
+  session.suggest({"panonav", "undo", arguments.memory}, "To restore them:");
   return ExitCode::done;
 }
 
 Run declare_forget(Arguments& arguments) {
   auto values = std::make_shared<ForgetArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file");
-  arguments.positionals("VIEW", values->views, "Names of views, as localise shows them");
-  arguments.flag("--dry-run", values->dry_run, "List what would be forgotten, and change nothing");
+  arguments.positionals("VIEW", values->views, "Names of views");
+  arguments.flag("--dry-run", values->dry_run,
+                 "List the views that would be deleted, without a change");
   return [values](Session& session) { return forget(*values, session); };
 }
 
 }  // namespace
 
 Verb forget_verb() {
-  return {
-      "forget", "Drop views from a memory",
-      "If one of the named views does not exist, none is dropped. panonav undo brings them back.",
-      "  panonav forget office.panonav view_0012.png view_0013.png\n"
-      "  panonav forget office.panonav view_0012.png --dry-run",
-      declare_forget};
+  return {"forget", "Delete views from a memory",
+          "If one of the views does not exist, no view is deleted. panonav undo restores deleted "
+          "views.",
+          "  panonav forget office.panonav view_0012.png view_0013.png\n"
+          "  panonav forget office.panonav view_0012.png --dry-run",
+          declare_forget};
 }
 
 }  // namespace panonav::command

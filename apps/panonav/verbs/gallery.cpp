@@ -106,13 +106,13 @@ std::string make_caption(const ViewRecord& view, bool pictured) {
 ExitCode gallery(const GalleryArguments& arguments, Session& session) {
   const auto memory = MemoryFile::open(arguments.memory, Access::read_only);
   auto views = selected(list_views(memory), arguments.selection);
-  if (views.empty()) throw FileError(arguments.memory, "holds no such view");
+  if (views.empty()) throw FileError(arguments.memory, "contains no such view");
   const std::size_t found = views.size();
   const auto pictured =
       static_cast<std::size_t>(std::ranges::count_if(views, &ViewRecord::thumbnail));
   if (pictured == 0) {
     throw FileError(arguments.memory,
-                    "holds no thumbnails of these " + std::to_string(found) +
+                    "contains no thumbnails of these " + std::to_string(found) +
                         " views; to get them, memorise the recording into a new memory without "
                         "--no-thumbnails");
   }
@@ -121,17 +121,18 @@ ExitCode gallery(const GalleryArguments& arguments, Session& session) {
 
   viewer::ReportPage page(
       "What " + memory_name(arguments.memory) + " remembers",
-      "The reference views of the memory, each as the small image that is stored with it: all "
-      "around the robot, straight ahead in the middle, left and right as the robot sees them, the "
-      "edges behind it. Below each: the view's id and name, where it was taken and the heading.");
+      "This page shows the stored image (thumbnail) of each view of the memory. The forward "
+      "direction is in the middle, and the direction behind the robot is at both edges. Below each "
+      "image are the view's id, name, position and heading.");
   const auto placed = std::ranges::count_if(
       views, [](const ViewRecord& view) { return view.info.pose.has_value(); });
   page.add_figures({{std::to_string(views.size()), "views"},
                     {std::to_string(placed), "with a position"},
                     {std::to_string(std::min(pictured, views.size())), "with a thumbnail"}});
   if (views.size() < found) {
-    page.add_text("The first " + std::to_string(views.size()) + " of " + std::to_string(found) +
-                  " views; --name and --near of panonav gallery choose others.");
+    page.add_text("The page shows the first " + std::to_string(views.size()) + " of " +
+                  std::to_string(found) +
+                  " views. To select other views, use --name and --near of panonav gallery.");
   }
   Progress progress(session, "drawing", views.size());
   for (const auto& [title, members] : group_views(views)) {
@@ -167,7 +168,7 @@ Run declare_gallery(Arguments& arguments) {
   auto values = std::make_shared<GalleryArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file");
   arguments.required_option("-o,--out FOLDER", values->out,
-                            "Folder to write: a new one, or that of an earlier gallery");
+                            "Folder for the page; it must be new or contain an earlier gallery");
   declare_selection(arguments, values->selection);
   arguments.writes({"--out"});
   return [values](Session& session) { return gallery(*values, session); };
@@ -176,14 +177,13 @@ Run declare_gallery(Arguments& arguments) {
 }  // namespace
 
 Verb gallery_verb() {
-  return {
-      "gallery", "Write a page with the thumbnails of a memory",
-      "The page gallery.html has everything in it and needs no network and no script. Views are "
-      "grouped by the folder in their names, by the component of the map and by place. The page "
-      "holds 2000 views at most; --name and --near choose which.",
-      "  panonav gallery office.panonav -o gallery\n"
-      "  panonav gallery office.panonav -o corner --near 1,1,0.8",
-      declare_gallery};
+  return {"gallery", "Write a page with the thumbnails of a memory",
+          "The page gallery.html needs no other files, no network and no scripts. Views are "
+          "grouped by the folder in their names, by the connected component of the map and by "
+          "place. The page shows at most 2000 views; select views with --name and --near.",
+          "  panonav gallery office.panonav -o gallery\n"
+          "  panonav gallery office.panonav -o corner --near 1,1,0.8",
+          declare_gallery};
 }
 
 }  // namespace panonav::command

@@ -7,8 +7,8 @@ namespace {
 
 Run declare_help(Arguments& arguments) {
   auto words = std::make_shared<std::vector<std::string>>();
-  arguments.optional_positionals("VERB", *words,
-                                 "Verb to explain; none: all verbs with a line each", verb_names());
+  arguments.optional_positionals("VERB", *words, "Verb to explain; default: a list of all verbs",
+                                 verb_names());
   return [words](Session& session) {
     const auto verbs = all_verbs();
     return print_text(words->empty() ? overview(verbs)
@@ -20,8 +20,9 @@ Run declare_help(Arguments& arguments) {
 }  // namespace
 
 Verb help_verb() {
-  return {"help", "Show how a verb is used",
-          "The same as panonav VERB --help. panonav VERB --help-all shows every option of a verb.",
+  return {"help", "Explain a verb",
+          "panonav help VERB is the same as panonav VERB --help. panonav VERB --help-all lists all "
+          "options of a verb.",
           "  panonav help\n  panonav help route record", declare_help};
 }
 

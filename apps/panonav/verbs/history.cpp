@@ -37,7 +37,7 @@ ExitCode history(const std::string& path, Session& session) {
     return ExitCode::done;
   }
   for (const MemoryFile::KeptChange& change : changes) session.print(format_line(change));
-  if (changes.empty()) session.note(path + " keeps no change");
+  if (changes.empty()) session.note(path + " contains no changes");
   return ExitCode::done;
 }
 
@@ -50,10 +50,11 @@ Run declare_history(Arguments& arguments) {
 }  // namespace
 
 Verb history_verb() {
-  return {"history", "List the changes that a memory keeps, the newest first",
-          "Each forget, prune and rename, and each localise --update that changed something. "
-          "panonav undo takes back the newest, then the one before it. Only the newest 100 "
-          "changes, at most 64 MiB, can be taken back; up to 1000 are listed.",
+  return {"history", "List the changes of a memory, newest first",
+          "The list contains each forget, prune and rename, and each localise --update that "
+          "changed the memory. panonav undo reverts the newest change; use it again to revert the "
+          "change before. The newest 100 changes (at most 64 MiB) can be reverted. The list "
+          "contains up to 1000 changes.",
           "  panonav history office.panonav\n"
           "  panonav history office.panonav --json",
           declare_history};

@@ -96,7 +96,7 @@ ExitCode answer_all(const HomeArguments& arguments, const HomingGuide& guide, co
   progress.clear();
   if (!session.json() && total > 1) {
     session.print(session.bold(std::to_string(pointing) + " of " + std::to_string(total)) +
-                  " views tell the direction to " + goal.name);
+                  " views give the direction to " + goal.name);
   }
   if (arguments.report) {
     write_home_report(*arguments.report, goal, answers, [&](std::size_t i) {
@@ -136,7 +136,7 @@ ExitCode home(const Arguments& declared, const HomeArguments& arguments, Session
   const auto options = make_homing_options(declared, arguments.homing, views.signature.components);
   std::error_code ignored;
   if (fs::is_directory(arguments.goal, ignored)) {
-    throw FileError(arguments.goal, "is a folder; the goal is one image, or a view of --memory");
+    throw FileError(arguments.goal, "is a folder; allowed: one image, or a view of --memory");
   }
   // Either picture may be the one whose folder says how both lie.
   std::optional<PictureSource> known = source_of_folder(arguments.current);
@@ -158,14 +158,14 @@ ExitCode home(const Arguments& declared, const HomeArguments& arguments, Session
 Run declare_home(Arguments& arguments) {
   auto values = std::make_shared<HomeArguments>();
   arguments.positional("GOAL", values->goal,
-                       "Image of the place to return to; with --memory the name or id of a view");
+                       "Image of the place to return to; with --memory: name or id of a view");
   arguments.positional("CURRENT", values->current,
-                       "What the robot sees now: an image, or a data set (an answer for each)");
-  arguments.option("--memory FILE", values->memory, "Take GOAL from this memory file");
+                       "Current image, or a data set with several current images");
+  arguments.option("--memory FILE", values->memory, "Memory file that contains the view GOAL");
   declare_pictures(arguments, values->pictures);
   arguments.option("--report FOLDER", values->report,
-                   "Write a page with both views and the direction home into this folder: a new "
-                   "one, or that of an earlier report");
+                   "Write a page with both views and the direction home into this folder; the "
+                   "folder must be new or contain an earlier report");
   declare_homing(arguments, values->homing);
   arguments.writes({"--report"});
   return [values, &arguments](Session& session) { return home(arguments, *values, session); };
@@ -174,11 +174,12 @@ Run declare_home(Arguments& arguments) {
 }  // namespace
 
 Verb home_verb() {
-  return {"home", "Compute the direction back to a place from one view of it",
-          "Directions are relative to the robot's current heading, which need not be known. The "
-          "distance is in units of R, the typical distance of the things around. An image in the "
-          "folder of a data set lies as its dataset.toml says. The exit code is 1 when no view "
-          "tells a direction: at home itself, or where the views match no better than chance.",
+  return {"home", "Compute the direction back to a place from one image of it",
+          "Directions are relative to the robot's current heading; this heading may be unknown. "
+          "The distance is given in units of R, the typical distance of the objects around the "
+          "robot. For an image in the folder of a data set, dataset.toml gives its type. The exit "
+          "code is 1 if no direction is found: the robot is already at home, or the images are not "
+          "more similar than random images.",
           "  panonav home door.png now.png --kind panorama --elevation-deg -30 40\n"
           "  panonav home view_00012.png now.png --memory office.panonav --report way_home\n"
           "  panonav home office_run/view_00012.png office_run --json",

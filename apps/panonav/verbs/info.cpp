@@ -93,11 +93,12 @@ ExitCode print_memory(const std::string& path, Session& session) {
                 std::to_string(info.links) + " links");
   session.print("  signatures  " + std::to_string(header.shape.rows) + " rows x " +
                 std::to_string(header.shape.components) + " components, " +
-                std::to_string(2 * header.shape.size()) + " bytes a view");
+                std::to_string(2 * header.shape.size()) + " bytes per view");
   if (info.views_with_features > 0) {
     session.print("  features    " + std::to_string(info.views_with_features) +
                   " views with local features, " +
-                  std::to_string(info.feature_bytes / info.views_with_features) + " bytes a view");
+                  std::to_string(info.feature_bytes / info.views_with_features) +
+                  " bytes per view");
   }
   session.print("  images      " + std::string(kind_name(header.source.kind)) + ", " +
                 std::to_string(header.panorama_columns) + " columns, elevations " +
@@ -112,7 +113,7 @@ ExitCode print_memory(const std::string& path, Session& session) {
     session.print("  route       " + name + ": " + std::to_string(lines) + " lines over " +
                   format_fixed(length_m, 1) + " m, " +
                   (length_m > 0.0 ? format_fixed(1e-3 * static_cast<double>(bytes) / length_m, 2) +
-                                        " MB a kilometre"
+                                        " MB per kilometre"
                                   : std::to_string(bytes) + " bytes"));
   }
   return ExitCode::done;
@@ -166,7 +167,7 @@ ExitCode print_recording(const std::string& path, Session& session) {
   for (const auto& [topic, time, rate_hz, shows] : summary.topics) {
     session.print("  " + padded(topic.name, name_width) + "  " + padded(topic.type, type_width) +
                   "  " + std::to_string(topic.messages) +
-                  (rate_hz ? ", " + format_number(*rate_hz, {}, 3) + " a second" : "") +
+                  (rate_hz ? ", " + format_number(*rate_hz, {}, 3) + " per second" : "") +
                   (shows ? ", " + *shows : ""));
   }
   for (const std::string& warning : summary.warnings) session.note(path + ": " + warning);
@@ -226,7 +227,7 @@ Run declare_info(Arguments& arguments) {
 }  // namespace
 
 Verb info_verb() {
-  return {"info", "Show what a memory or a recording holds, or a camera offers", "",
+  return {"info", "Show the content of a memory or recording, or the image sizes of a camera", "",
           "  panonav info office.panonav\n  panonav info drive.mcap", declare_info};
 }
 

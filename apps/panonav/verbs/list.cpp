@@ -89,7 +89,7 @@ std::string list_names(const std::string& what, const std::vector<std::string>& 
 }
 
 ExitCode list(const ListArguments& arguments, Session& session) {
-  if (arguments.csv && session.json()) throw UsageError("--csv and --json exclude each other");
+  if (arguments.csv && session.json()) throw UsageError("--csv and --json cannot be combined");
   const auto memory = MemoryFile::open(arguments.memory, Access::read_only);
   const auto all = list_views(memory);
   const auto views = selected(all, arguments.selection);
@@ -126,17 +126,17 @@ Run declare_list(Arguments& arguments) {
   auto values = std::make_shared<ListArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file");
   declare_selection(arguments, values->selection);
-  arguments.flag("--csv", values->csv, "Print a table for other programs");
+  arguments.flag("--csv", values->csv, "Print the list as CSV");
   return [values](Session& session) { return list(*values, session); };
 }
 
 }  // namespace
 
 Verb list_verb() {
-  return {"list", "List the views of a memory, and its routes and maps",
-          "Each line has what the file knows of a view: id, name, position, heading, stamp, number "
-          "of links, connected component of its map, and whether a thumbnail is stored. The exit "
-          "code is 1 when there is no such view.",
+  return {"list", "List the views, routes and maps of a memory",
+          "Each line gives the id, name, position, heading and stamp of a view, its number of "
+          "links, the connected component of its map, and whether it has a thumbnail. The exit "
+          "code is 1 if there is no such view.",
           "  panonav list office.panonav\n"
           "  panonav list office.panonav --near 1,1,0.5\n"
           "  panonav list office.panonav --name 'view_0001*' --csv",

@@ -140,16 +140,18 @@ ExitCode localise(const Arguments& declared, const LocaliseArguments& arguments,
 }
 
 void declare_changes(Arguments& arguments, const std::shared_ptr<LocaliseArguments>& values) {
-  arguments.flag("--add", values->add,
-                 "Add views of places that the memory does not know; a new memory begins with 32");
+  arguments.flag(
+      "--add", values->add,
+      "Add images of unknown places to the memory; a new memory first collects 32 images");
   arguments.option("--add-interval-s", values->add_interval_s,
-                   "Time between two views that are added, at least; default 0.5");
+                   "Shortest time between two added views; default 0.5");
   arguments.hide_from_help({"--add-interval-s"});
   arguments.flag("--update", values->update,
-                 "Keep views of known places up to date: other appearances are added, up to "
-                 "--appearances, and views that keep failing are replaced");
+                 "Update views of known places: add changed views, up to --appearances per place, "
+                 "and replace views that repeatedly do not match");
   arguments.option("--route NAME", values->route,
-                   "Follow this route of the memory; with --add record it, a line each 0.1 m");
+                   "Locate the robot relative to this route; with --add: record the route, one "
+                   "line every 0.1 m");
   arguments.options("update", values->update_options);
   arguments.options("signature", values->signature, "new");
   arguments.options("preprocessing", values->preprocessing);
@@ -163,28 +165,30 @@ void declare_changes(Arguments& arguments, const std::shared_ptr<LocaliseArgumen
 Run declare_localise(Arguments& arguments) {
   auto values = std::make_shared<LocaliseArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file");
-  arguments.positionals(
-      "INPUT", values->inputs,
-      "Data set, folder of images, video, recording of topics, one or more images, or a live "
-      "source: - for JPEG images on standard input, a camera (/dev/video0), an address "
-      "(rtsp://, http://, tcp://)");
+  arguments.positionals("INPUT", values->inputs,
+                        "Data set, folder of images, video, recording, one or more images, or a "
+                        "live source. Live sources: - for JPEG images on standard input, a camera "
+                        "(/dev/video0), an address (rtsp://, http://, tcp://)");
   declare_pictures(arguments, values->pictures);
   declare_live(arguments, values->live);
   declare_record(arguments, values->record);
   declare_view(arguments, values->record);
   arguments.hide_from_help({"--record"});
-  arguments.option("-o,--out FILE", values->out, "Write a CSV table, one line for each image");
+  arguments.option("-o,--out FILE", values->out,
+                   "Write the answers as CSV, one line for each image");
   arguments.option("--report FOLDER", values->report,
-                   "Write a page with each image above its best match, rotated to the same "
-                   "heading, into this folder: a new one, or that of an earlier report");
-  arguments.flag("--exclude-same-file", values->exclude_same_file,
-                 "Leave out the reference view of the same file name (leave-one-out)");
+                   "Write a page with each image above its best match into this folder; the folder "
+                   "must be new or contain an earlier report");
+  arguments.flag(
+      "--exclude-same-file", values->exclude_same_file,
+      "Do not compare an image with the view of the same file name (leave-one-out test)");
   arguments.option("--turn-randomly SEED", values->turn_seed,
-                   "Turn the robot before each query by a random number of whole columns; "
-                   "turned_rad is the turn, counter-clockwise positive");
+                   "Rotate each image by a random number of columns; SEED is the random seed. "
+                   "'turned_rad' in the answers is the rotation, counter-clockwise positive");
   arguments.hide_from_help({"--exclude-same-file", "--turn-randomly"});
   arguments.flag("--areas", values->areas,
-                 "Also show the area where the robot may be, component by component");
+                 "Also print the area in which the robot may be, for an increasing number of "
+                 "Fourier components");
   arguments.options("localiser", values->localiser);
   arguments.options("accuracy", values->accuracy, "area");
   declare_changes(arguments, values);
@@ -199,14 +203,13 @@ Run declare_localise(Arguments& arguments) {
 Verb localise_verb() {
   return {
       "localise",
-      "Find where images were taken and the robot's heading",
-      "Images without a dataset.toml are read like those that the memory was made from. Images "
-      "that cannot be read are reported and skipped. A live source is answered until Ctrl-C, the "
-      "newest image first. --add adds views of places that the memory does not know. --update "
-      "keeps the views of known places up to date, by odometry or by motion that is read from the "
-      "images; panonav undo takes an update back. --route locates the robot relative to a recorded "
-      "route; with --add it records one, with the poses of the recording, its odometry, or motion "
-      "read from the images. The exit code is 1 when no image shows a place of the memory.",
+      "Find the position and heading of a robot from images",
+      "An image without a dataset.toml is read with the image type of the memory. Images that "
+      "cannot be read are reported and skipped. For a live source, the newest image is read each "
+      "time, until Ctrl-C. --update uses odometry, or motion computed from the images if there is "
+      "no odometry; panonav undo reverts an update. --route with --add records a route at the "
+      "poses of the recording, at its odometry, or at motion computed from the images. The exit "
+      "code is 1 if no image shows a place of the memory.",
       "  panonav localise office.panonav query_run --report answers\n"
       "  panonav localise office.panonav /dev/video0\n"
       "  panonav localise office.panonav one.png two.png -o answers.csv\n"

@@ -29,7 +29,7 @@ ExitCode man(const ManArguments& arguments, Session& session) {
   const fs::path folder(*arguments.out);
   std::error_code error;
   fs::create_directories(folder, error);
-  if (error) throw FileError(folder.string(), "cannot be made: " + error.message());
+  if (error) throw FileError(folder.string(), "cannot be created: " + error.message());
   write_file(folder / "panonav.1", manual_overview(descriptions) + "\n");
   for (const auto& description : descriptions) {
     write_file(folder / (manual_name(description.verb) + ".1"), manual_page(description) + "\n");
@@ -44,10 +44,10 @@ ExitCode man(const ManArguments& arguments, Session& session) {
 
 Run declare_man(Arguments& arguments) {
   auto values = std::make_shared<ManArguments>();
-  arguments.optional_positionals("VERB", values->words, "Verb of the page; none: the overview",
+  arguments.optional_positionals("VERB", values->words, "Verb of the page; default: the overview",
                                  verb_names());
   arguments.option("-o,--out FOLDER", values->out,
-                   "Write the pages of all verbs as files into this folder instead");
+                   "Write the pages of all verbs as files into this folder");
   arguments.writes({"--out"});
   return [values](Session& session) { return man(*values, session); };
 }
@@ -55,9 +55,9 @@ Run declare_man(Arguments& arguments) {
 }  // namespace
 
 Verb man_verb() {
-  return {"man", "Print the manual page of a verb as roff",
-          "An installed panonav has these pages: man panonav-localise. A page that is written to a "
-          "file is read with man -l FILE.",
+  return {"man", "Print the manual page of a verb",
+          "The page is printed in the format roff. To read a page that is saved in a file, use man "
+          "-l FILE. If panonav is installed, use for example man panonav-localise.",
           "  panonav man localise\n  panonav man --out pages", declare_man};
 }
 

@@ -123,7 +123,7 @@ void print_result(const MapArguments& arguments, const Dataset& recording,
   session.print(session.bold(std::to_string(nodes)) + " places from " +
                 std::to_string(recording.entries.size()) + " images, " +
                 std::to_string(count_closures(run.map)) + " closures; " + format_fixed(step_ms, 2) +
-                " ms an image");
+                " ms per image");
   if (sizes.size() > 1) {
     std::string text;
     for (const std::size_t size : sizes) text += (text.empty() ? "" : ", ") + std::to_string(size);
@@ -131,15 +131,15 @@ void print_result(const MapArguments& arguments, const Dataset& recording,
         session.red("The map has " + std::to_string(sizes.size()) + " connected components") +
         ", with these numbers of places: " + text + ".");
     session.print(
-        "To connect them, take images closer together, record odometry, or drive through the same "
-        "places again.");
+        "To connect them, take images at shorter distances, record odometry, or drive through the "
+        "same places again.");
   }
   const double height_m = arguments.mapper.odometry.camera_height_m;
   if (!run.wheels && height_m > 0.0) {
-    session.print("Lengths are read from the ground, " + format_number(height_m) +
+    session.print("Lengths are computed from the image of the ground, " + format_number(height_m) +
                   " m below the camera.");
   } else if (!run.wheels) {
-    session.print("Lengths are read from the views: one unit counts as " +
+    session.print("Lengths are computed from the images: one unit is " +
                   format_number(run.scale_m) + " m (--scale-m, --camera-height-m).");
   }
   if (comparison) print_comparison(*comparison, run, session);
@@ -150,12 +150,12 @@ void print_result(const MapArguments& arguments, const Dataset& recording,
                                           std::to_string(nodes) + " places"
                                     : "the map"));
   }
-  session.print(arguments.memory + " holds the map and the views of its places.");
+  session.print(arguments.memory + " contains the map and the views of its places.");
   if (arguments.tum) {
-    session.print(*arguments.tum + " holds the poses" +
+    session.print(*arguments.tum + " contains the poses" +
                   (sizes.size() > 1 ? " of the largest connected component." : "."));
   }
-  if (arguments.graph) session.print(*arguments.graph + " holds the map as a graph.");
+  if (arguments.graph) session.print(*arguments.graph + " contains the map as a graph.");
 }
 
 Mapper::Result map_recording(const Dataset& recording, Mapper& mapper, Session& session) {
@@ -260,20 +260,20 @@ void refuse_without_effect(const Arguments& declared, const MapArguments& argume
   const bool wheels = arguments.mapper.mapping.wheels && all;
   if (declared.is_set("visual_odometry", "camera_height_m") && !header.elevations) {
     throw FileError(arguments.dataset,
-                    "does not tell the elevations of its images' rows, without which the ground "
-                    "is not found; allowed with --camera-height-m: panoramas with elevation_deg, "
+                    "does not give the elevations of its images' rows, which are needed to find "
+                    "the ground; allowed with --camera-height-m: panoramas with elevation_deg, "
                     "equirectangular images, and mirror images with a camera");
   }
   if (declared.is_set("visual_odometry", "camera_height_m") && wheels) {
     throw FileError(arguments.dataset,
-                    "has odometry, which tells the lengths of all steps; allowed with "
-                    "--camera-height-m: recordings without it, or --wheels false");
+                    "has odometry, which gives the lengths of all steps; allowed with "
+                    "--camera-height-m: recordings without odometry, or --wheels false");
   }
   if (wheels) {
     declared.refuse_unused({"--scale-m", "--step-deviation"},
-                           "where odometry tells the lengths of all steps");
+                           "when odometry gives the lengths of all steps");
   }
-  if (all) declared.refuse_unused({"--bridge-m"}, "where odometry tells of all steps");
+  if (all) declared.refuse_unused({"--bridge-m"}, "when odometry gives all steps");
   if (std::ranges::none_of(recording.entries, has_odometry)) {
     if (arguments.mapper.mapping.wheels) {
       declared.refuse_unused({"--wheels"}, "as " + arguments.dataset + " has no odometry");
@@ -333,24 +333,23 @@ Run declare_map(Arguments& arguments) {
   auto values = std::make_shared<MapArguments>();
   arguments.positional(
       "DATASET", values->dataset,
-      "Data set, folder of images, video or recording, in the order in which they were taken");
+      "Data set, folder of images, video or recording with images in the order of the drive");
   arguments.positional("MEMORY", values->memory,
-                       "Memory file (NAME.panonav); views that it does not know are appended");
+                       "Memory file (NAME.panonav); new views are added to it");
   declare_pictures(arguments, values->pictures);
-  arguments.option(
-      "--tum FILE", values->tum,
-      "Write the poses of the largest component to this file: TUM text, or CSV for a name "
-      "that ends in .csv");
+  arguments.option("--tum FILE", values->tum,
+                   "Write the poses of the largest connected component to this file: as CSV if the "
+                   "name ends in .csv, otherwise as TUM text");
   arguments.option("--graphml FILE", values->graph, "Write the map as a graph to this file");
   declare_record(arguments, values->record);
   declare_view(arguments, values->record);
   arguments.hide_from_help({"--record"});
   arguments.option(
       "--picture FILE", values->picture,
-      "Draw the map, next to the true positions where they are known, into this PNG or SVG file");
+      "Draw the map into this PNG or SVG file, next to the true positions if they are known");
   arguments.option("--report FOLDER", values->report,
-                   "Write a page that replays the drive on its map into this folder: a new one, or "
-                   "that of an earlier report");
+                   "Write a page that replays the drive on its map into this folder; the folder "
+                   "must be new or contain an earlier report");
   arguments.hide_from_help({"--picture"});
   arguments.flag("--no-thumbnails", values->no_thumbnails, "Do not store thumbnails of the views");
   arguments.options("signature", values->signature);
@@ -377,11 +376,12 @@ Run declare_map(Arguments& arguments) {
 }  // namespace
 
 Verb map_verb() {
-  return {"map", "Make a map from images in the order in which they were taken",
-          "Each image is placed by the step since the one before, which is read from the views; "
-          "places that are passed again close loops. If the data set has odometry, it gives the "
-          "steps, and the views correct their rotations. Without odometry, --camera-height-m gives "
-          "lengths in metres. Parts that are not connected are kept as separate components.",
+  return {"map", "Make a map from the images of a drive",
+          "The images must be in the order of the drive. Each step is computed from two "
+          "consecutive images. If the data set has odometry, the odometry gives the steps, and the "
+          "images correct their rotations. When the robot passes a place again, this corrects the "
+          "map (loop closure). Without odometry, --camera-height-m gives lengths in metres. If the "
+          "map has several parts without connection, each part is a separate component.",
           "  panonav map office_run office.panonav\n"
           "  panonav map office_run office.panonav --report mapped --graphml map.graphml\n"
           "  panonav map walk walk.panonav --camera-height-m 0.6\n"

@@ -76,7 +76,7 @@ void memorise_missing(const Dataset& missing, const Dataset& recording, bool str
   }
   if (failure) std::rethrow_exception(failure);
   if (memoriser.file() == nullptr && skipped.size() == missing.entries.size()) {
-    throw FileError(recording.folder.string(), "holds no image that can be read");
+    throw FileError(recording.folder.string(), "contains no image that can be read");
   }
 }
 
@@ -114,12 +114,15 @@ void print_result(const MemoriseArguments& arguments, const MemoryFile& memory,
     return;
   }
   session.print(
-      session.bold(std::to_string(appended)) + " views memorised" +
-      (known_before > 0 ? ", " + std::to_string(known_before) + " were known before" : "") +
+      session.bold(std::to_string(appended)) + " views stored" +
+      (known_before > 0 ? ", " + std::to_string(known_before) + " were already in the memory"
+                        : "") +
       (skipped.empty() ? "" : ", " + std::to_string(skipped.size()) + " could not be read") + "; " +
       arguments.memory + " holds " + std::to_string(info.views));
   if (!memory.header().elevations) {
-    session.print("The images' elevations are not known: every row is treated as on the horizon.");
+    session.print(
+        "The elevations of the images are not known; every row is treated as a row at the "
+        "horizon.");
   }
   session.suggest({"panonav", "localise", arguments.memory, "INPUT"});
 }
@@ -136,7 +139,7 @@ ExitCode memorise_live(const Arguments& declared, const MemoriseArguments& argum
   loop.run([](const Observation&) { return ""; },
            [&](Observation&& observation) { memoriser.add(std::move(observation)); });
   const LiveCounts& counts = loop.finish();
-  if (counts.pictures == 0) throw FileError(arguments.input, "gave no image");
+  if (counts.pictures == 0) throw FileError(arguments.input, "provided no image");
   const auto stored = memoriser.finish(session.executor());
   print_result(arguments, *memoriser.file(), stored.appended, stored.known_before, skipped,
                session);
@@ -181,25 +184,21 @@ ExitCode memorise(const Arguments& declared, const MemoriseArguments& arguments,
 
 Run declare_memorise(Arguments& arguments) {
   auto values = std::make_shared<MemoriseArguments>();
-  arguments.positional(
-      "INPUT", values->input,
-      "Data set, folder of images, one image, video, recording of topics (MCAP, "
-      "rosbag2, ROS 1 bag), or a live source: - for JPEG images on standard input, a camera "
-      "(/dev/video0), an address (rtsp://, http://, tcp://)");
-  arguments.positional("MEMORY", values->memory,
-                       "Memory file (NAME.panonav); an existing one is continued");
+  arguments.positional("INPUT", values->input,
+                       "Data set, folder of images, one image, video, recording (MCAP, rosbag2, "
+                       "ROS 1 bag), or a live source. Live sources: - for JPEG images on standard "
+                       "input, a camera (/dev/video0), an address (rtsp://, http://, tcp://)");
+  arguments.positional("MEMORY", values->memory, "Memory file (NAME.panonav), new or existing");
   declare_pictures(arguments, values->pictures);
   declare_live(arguments, values->live);
   arguments.flag("--no-thumbnails", values->no_thumbnails, "Do not store thumbnails of the views");
-  arguments.flag(
-      "--no-features", values->no_features,
-      "Do not store local features (4 kB a view), which tell views 1 to 2 m apart from each other");
-  arguments.flag(
-      "--strict", values->strict,
-      "End at the first image that cannot be read or is of another size; otherwise it is "
-      "named and skipped");
-  arguments.flag("--recursive", values->pictures.recursive,
-                 "Also take the images of the folders within a folder");
+  arguments.flag("--no-features", values->no_features,
+                 "Do not store local features (4 kB per view); they distinguish views with a "
+                 "distance of 1 to 2 m");
+  arguments.flag("--strict", values->strict,
+                 "Stop at the first image that cannot be read or has another size; by default such "
+                 "images are reported and skipped");
+  arguments.flag("--recursive", values->pictures.recursive, "Also read the images in subfolders");
   arguments.options("signature", values->signature);
   arguments.options("preprocessing", values->preprocessing);
   arguments.show_in_help({"--components"});
@@ -210,11 +209,11 @@ Run declare_memorise(Arguments& arguments) {
 
 Verb memorise_verb() {
   return {"memorise",
-          "Add the views of a recording to a memory",
-          "Views are stored in batches of 16 (the first 32 of a new memory together), each batch "
-          "completely or not at all; after an interruption the same command continues where it "
-          "stopped. A view with a known name must be the same view: another pose, stamp or image "
-          "under that name is refused. A live source is memorised until Ctrl-C.",
+          "Store the images of a recording as views in a memory",
+          "Views are stored in batches of 16; the first batch of a new memory has 32 views. An "
+          "interruption never leaves an incomplete batch, and the same command then continues. An "
+          "image with the name of a stored view is refused if its pose, its stamp or its content "
+          "differs. For a live source, views are stored until Ctrl-C.",
           "  panonav memorise office_run office.panonav\n"
           "  panonav memorise photos walk.panonav --kind equirectangular --elevation-deg -30 40\n"
           "  panonav memorise /dev/video0 walk.panonav --kind equirectangular --every 0.5s",

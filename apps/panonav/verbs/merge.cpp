@@ -54,32 +54,33 @@ ExitCode merge(const MergeArguments& arguments, Session& session) {
         " places in common; of " + std::to_string(merged.alignment->expected_places) +
         " places where both maps overlap, " + std::to_string(merged.alignment->confirmed_places) +
         " match. " + arguments.second + " lies at x " + format_fixed(pose.x_m, 2) + " m, y " +
-        format_fixed(pose.y_m, 2) + " m, turned by " + format_fixed(degrees(pose.heading_rad), 1) +
+        format_fixed(pose.y_m, 2) + " m, rotated by " + format_fixed(degrees(pose.heading_rad), 1) +
         " degrees, in the frame of " + arguments.first + ".");
   } else {
     session.print(session.red("no place in common was found") +
-                  ": the map keeps both as connected components" +
+                  ": the map contains both as separate components" +
                   (merged.without_position > 0
                        ? ", and " + std::to_string(merged.without_position) + " views of " +
-                             arguments.second + " have no position, as theirs is in another frame"
+                             arguments.second +
+                             " have no position, because their positions are in another frame"
                        : "") +
                   ".");
   }
-  session.print(arguments.memory + " holds " + std::to_string(merged.views) + " views" +
-                (merged.shared > 0 ? "; " + std::to_string(merged.shared) + " were in both" : "") +
-                (merged.renamed > 0 ? "; " + std::to_string(merged.renamed) +
-                                          " were renamed, as another view has their name"
-                                    : "") +
-                ".");
-  session.suggest({"panonav", "prune", arguments.memory, "--dry-run"},
-                  "To see which views have become redundant:");
+  session.print(
+      arguments.memory + " holds " + std::to_string(merged.views) + " views" +
+      (merged.shared > 0 ? "; " + std::to_string(merged.shared) + " were in both memories" : "") +
+      (merged.renamed > 0 ? "; " + std::to_string(merged.renamed) +
+                                " were renamed, because another view has the same name"
+                          : "") +
+      ".");
+  session.suggest({"panonav", "prune", arguments.memory, "--dry-run"}, "To list redundant views:");
   return merged.alignment ? ExitCode::done : ExitCode::no_answer;
 }
 
 Run declare_merge(Arguments& arguments) {
   auto values = std::make_shared<MergeArguments>();
-  arguments.positional("FIRST", values->first, "Memory file whose frame is kept");
-  arguments.positional("SECOND", values->second, "Memory file that is added to it");
+  arguments.positional("FIRST", values->first, "Memory file; its coordinate frame is used");
+  arguments.positional("SECOND", values->second, "Memory file that is added to FIRST");
   arguments.required_option("-o,--out MEMORY", values->memory, "New memory file");
   arguments.options("merge", values->alignment);
   arguments.show_in_help({"--min-places"});
@@ -91,10 +92,10 @@ Run declare_merge(Arguments& arguments) {
 
 Verb merge_verb() {
   return {"merge", "Merge two memories that have places in common",
-          "Common places are found by their appearance. The maps of both are joined there and "
-          "optimised together, in the frame of FIRST. Where nothing in common is found, both stay "
-          "connected components of one map, and the verb ends with exit code 1. Views with one "
-          "name and one image are kept once; neither file is changed.",
+          "Common places are found by their appearance. The maps of both memories are joined at "
+          "these places and optimised together, in the coordinate frame of FIRST. If there is no "
+          "common place, the new map contains both maps as separate components, and the exit code "
+          "is 1. A view that both memories contain is stored once. Both files remain unchanged.",
           "  panonav merge monday.panonav tuesday.panonav -o both.panonav\n"
           "  panonav merge monday.panonav tuesday.panonav -o both.panonav --json",
           declare_merge};

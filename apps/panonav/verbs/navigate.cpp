@@ -92,9 +92,9 @@ ordered_json as_json(const NavigationDecision& decision, const Pose2& pose,
 std::string describe_event(NavigationDecision::Event event) {
   switch (event) {
     case NavigationDecision::Event::relocalised:
-      return "searches for its place in the whole memory";
+      return "searches for its position in the whole memory";
     case NavigationDecision::Event::kidnapped:
-      return "is at another place than expected";
+      return "is not at the expected place";
     case NavigationDecision::Event::entered_area:
       return "enters an area";
     case NavigationDecision::Event::unknown_place:
@@ -106,13 +106,13 @@ std::string describe_event(NavigationDecision::Event event) {
     case NavigationDecision::Event::reopened:
       return "tries blocked edges again";
     case NavigationDecision::Event::homing:
-      return "homes to the goal's view";
+      return "drives home to the goal's view";
     case NavigationDecision::Event::homing_failed:
-      return "homed to another place";
+      return "drove home to another place";
     case NavigationDecision::Event::route:
       return "follows the recorded route";
     case NavigationDecision::Event::route_left:
-      return "leaves the recorded route before the end of its leg";
+      return "leaves the recorded route early";
   }
   return std::string(name_of(event));
 }
@@ -137,11 +137,11 @@ std::string_view explain_end(NavigationDecision::State state) {
     case NavigationDecision::State::arrived:
       return "the image matches the goal's view";
     case NavigationDecision::State::blocked:
-      return "the robot is stuck, though the memory has a path";
+      return "the robot is stuck, but the memory has a path";
     case NavigationDecision::State::lost:
-      return "the image matches no view of the memory, or one elsewhere";
+      return "the image matches no view of the memory, or a view of another place";
     case NavigationDecision::State::unreachable:
-      return "no path in the memory leads to the goal, or all of them are blocked";
+      return "the memory has no path to the goal, or all paths are blocked";
     case NavigationDecision::State::moving:
       break;
   }
@@ -192,10 +192,10 @@ void print_summary(const simulation::MissionRun& run, Session& session) {
   const auto sure = std::ranges::count_if(run.decisions, [](const NavigationDecision& decision) {
     return decision.probability >= 0.5;
   });
-  session.print("certain of its place (probability 0.5 or more) in " + std::to_string(sure) +
+  session.print("certain of its position (probability 0.5 or more) in " + std::to_string(sure) +
                 " of " + std::to_string(run.decisions.size()) + " steps");
   if (run.kidnapped_at) {
-    session.print("kidnapped after step " + std::to_string(*run.kidnapped_at + 1));
+    session.print("carried away after step " + std::to_string(*run.kidnapped_at + 1));
   }
 }
 
@@ -242,7 +242,7 @@ void print_graph(const RobotNavigator& robot, Session& session) {
   session.print(std::to_string(robot.graph().size()) + " views, " +
                 std::to_string(robot.graph().edges().size()) + " edges from " +
                 (robot.origin() == RobotNavigatorOptions::GraphOrigin::arrangement
-                     ? "an arrangement made now (panonav arrange would keep one)"
+                     ? "a new arrangement (panonav arrange can store one)"
                      : "the memory's " + std::string(name_of(robot.origin()))));
 }
 
@@ -251,14 +251,15 @@ void require_known_goal(const NavigateArguments& arguments, const RobotNavigator
                         const simulation::RememberedPlace& remembered) {
   if (!std::isfinite(remembered.truth[*remembered.graph.node_of(robot.goal())].x_m)) {
     throw FileError(arguments.memory,
-                    "does not know where the view " + robot.info(robot.goal()).name +
-                        " was taken, so half of the path is unknown, too; leave out --kidnap");
+                    "does not contain the position of the view " + robot.info(robot.goal()).name +
+                        ", so the middle of the path is unknown; leave out --kidnap");
   }
 }
 
 ExitCode navigate(const Arguments& declared, const NavigateArguments& arguments, Session& session) {
   if (declared.is_set("odometry", "drive")) {
-    throw UsageError("--odometry-drive: the robot's drive is --drive here; leave it out");
+    throw UsageError(
+        "--odometry-drive: the drive of the robot is set with --drive; leave out --odometry-drive");
   }
   RobotNavigatorOptions options{.navigator = arguments.mission.navigator,
                                 .planner = arguments.mission.planner,
@@ -323,27 +324,26 @@ ExitCode navigate(const Arguments& declared, const NavigateArguments& arguments,
 Run declare_navigate(Arguments& arguments) {
   auto values = std::make_shared<NavigateArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file of a simulated data set");
-  arguments.required_option("--goal VIEW", values->goal, "Name or id of the view to go to");
+  arguments.required_option("--goal VIEW", values->goal, "Name or id of the goal view");
   arguments.required_option("--scene SCENE", values->scene,
-                            "Where the robot is: a scene as of panonav simulate");
+                            "Scene of the robot, as in panonav simulate");
   arguments.option("--start X,Y,DEG", values->start,
-                   "Place where the robot starts, with its heading in degrees; otherwise a free "
-                   "place at random");
+                   "Start position and heading in degrees; default: a random free place");
   arguments.option("--kidnap X,Y,DEG", values->kidnap,
-                   "Carry the robot to this place once half of the path is driven");
+                   "Carry the robot to this place in the middle of its path");
   arguments.choice("--edges", values->edges, {"map", "lattice", "links", "arrangement"},
-                   "Edges to plan over: a stored map, the memory's links, or an arrangement made "
-                   "now (default: the first that exists)");
+                   "Source of the connections between views: a stored map, the memory's links, or "
+                   "a new arrangement (default: the first that exists)");
   arguments.option("--route NAME", values->route,
-                   "Follow this recorded route where the path leads along it; views and route must "
-                   "have the poses of one data set");
-  arguments.option("--log FILE", values->log, "Write the decisions into this file, a line each");
+                   "Follow this recorded route on the parts of the path that lie on it; views and "
+                   "route must have poses of the same data set");
+  arguments.option("--log FILE", values->log, "Write the decisions into this file, one per line");
   arguments.option("--picture FILE", values->picture,
                    "Draw the directions to the goal, the planned path and the driven path into "
                    "this PNG or SVG file");
   arguments.option("--report FOLDER", values->report,
-                   "Write a page that replays the mission with its decisions into this folder: a "
-                   "new one, or that of an earlier report");
+                   "Write a page that replays the mission into this folder; the folder must be new "
+                   "or contain an earlier report");
   declare_record(arguments, values->record);
   declare_view(arguments, values->record);
   arguments.hide_from_help({"--record", "--view", "--picture"});
@@ -379,10 +379,11 @@ Run declare_navigate(Arguments& arguments) {
 }  // namespace
 
 Verb navigate_verb() {
-  return {"navigate", "Send a simulated robot to a remembered view, by its images alone",
-          "The robot's camera is that of the memory's views. Poses in the memory are only used to "
-          "measure how far from the goal it ended, and to find the views along a --route. The exit "
-          "code is 1 unless the robot arrives: blocked, lost or unreachable.",
+  return {"navigate", "Drive a simulated robot to a stored view with images alone",
+          "The simulated robot uses the same camera as the views of the memory. Poses in the "
+          "memory are only used to measure the distance from the goal at the end, and to find the "
+          "views on a --route. The exit code is 1 if the robot does not arrive: its path is "
+          "blocked, it is lost, or there is no path.",
           "  panonav navigate office.panonav --goal view_00012.png --scene office --report "
           "mission\n"
           "  panonav navigate office.panonav --goal 3 --scene office --light 0.7 --moved-objects "

@@ -28,7 +28,8 @@ ordered_json as_json(const std::optional<SparseSelection::Loss::Positions>& posi
 void require_unchanged(const MemoryFile& file, const VisualMemory& memory) {
   const auto views = memory.views();
   if (!std::ranges::equal(file.views(), views) || file.links().size() != memory.links().size()) {
-    throw FileError(file.path().string(), "was changed by another program meanwhile; try again");
+    throw FileError(file.path().string(),
+                    "was changed by another program during this command; try again");
   }
 }
 
@@ -39,9 +40,10 @@ void refuse_without_effect(const Arguments& arguments, const std::string& file,
       memory.views(), [&](ViewId view) { return memory.info(view).pose.has_value(); });
   if (posed == 0) {
     arguments.refuse_unused({"--reach-m", "--outdated-within-m"},
-                            "as " + file + " knows no positions");
+                            "as " + file + " contains no positions");
   } else if (posed == std::ssize(memory.views())) {
-    arguments.refuse_unused({"--reach-links"}, "as " + file + " knows the positions of all views");
+    arguments.refuse_unused({"--reach-links"},
+                            "as " + file + " contains the positions of all views");
   }
 }
 
@@ -54,16 +56,16 @@ void print_loss(const PruneArguments& arguments, const SparseSelection::Loss& lo
                 " views: " + format_fixed(factor, 1) + " times fewer" +
                 (outdated > 0 ? "; " + std::to_string(outdated) + " were outdated" : ""));
   if (arguments.dry_run) {
-    for (const std::string& name : names) session.print("  would drop  " + name);
+    for (const std::string& name : names) session.print("  would delete  " + name);
   }
   if (loss.positions) {
-    session.print("nearest reference of a dropped view  median " +
+    session.print("nearest reference of a deleted view  median " +
                   format_fixed(loss.positions->median_after_m, 3) + " m (before " +
                   format_fixed(loss.positions->median_before_m, 3) + ")  95 % within " +
                   format_fixed(loss.positions->p95_after_m, 3) + " m (before " +
                   format_fixed(loss.positions->p95_before_m, 3) + ")");
   } else if (loss.queries > 0) {
-    session.print("dropped views differ from their representatives by " +
+    session.print("deleted views differ from similar kept views by " +
                   format_fixed(loss.median_difference, 3) + " (median)");
   }
 }
@@ -99,7 +101,7 @@ ExitCode prune(const Arguments& declared, const PruneArguments& arguments, Sessi
           for (const auto& [name, map] : maps) file.save_map(name, map);
           keep_models(file);
         },
-        "prune: " + std::to_string(dropped.size()) + " views dropped");
+        "prune: " + std::to_string(dropped.size()) + " views deleted");
   }
   const double factor = selection.kept.empty() ? 1.0
                                                : static_cast<double>(memory.size()) /
@@ -120,7 +122,7 @@ ExitCode prune(const Arguments& declared, const PruneArguments& arguments, Sessi
   print_loss(arguments, loss, memory.size(), selection.kept.size(), factor, outdated, names,
              session);
   if (!arguments.dry_run && !dropped.empty()) {
-    session.suggest({"panonav", "undo", arguments.memory}, "To bring them back:");
+    session.suggest({"panonav", "undo", arguments.memory}, "To restore them:");
   }
   return ExitCode::done;
 }
@@ -128,7 +130,8 @@ ExitCode prune(const Arguments& declared, const PruneArguments& arguments, Sessi
 Run declare_prune(Arguments& arguments) {
   auto values = std::make_shared<PruneArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file");
-  arguments.flag("--dry-run", values->dry_run, "List what would be dropped, and change nothing");
+  arguments.flag("--dry-run", values->dry_run,
+                 "List the views that would be deleted, without a change");
   arguments.options("prune", values->options);
   arguments.show_in_help({"--max-difference", "--reach-m", "--outdated-within-m"});
   return [values, &arguments](Session& session) { return prune(arguments, *values, session); };
@@ -137,10 +140,10 @@ Run declare_prune(Arguments& arguments) {
 }  // namespace
 
 Verb prune_verb() {
-  return {"prune", "Drop redundant views of a memory",
-          "A view is dropped when a newer view near it differs by at most --max-difference. The "
-          "verb reports how much smaller the memory becomes, and how far the nearest reference of "
-          "a dropped view is before and after. panonav undo brings dropped views back.",
+  return {"prune", "Delete redundant views of a memory",
+          "A view is deleted if there is a newer view near it that differs from it by at most "
+          "--max-difference. The verb reports how much smaller the memory becomes, and the "
+          "distance to the nearest view before and after. panonav undo restores deleted views.",
           "  panonav prune office.panonav --dry-run\n"
           "  panonav prune office.panonav --max-difference 0.02\n"
           "  panonav prune office.panonav --outdated-within-m 0.3",

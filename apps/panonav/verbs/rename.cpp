@@ -43,17 +43,18 @@ ExitCode rename(const RenameArguments& arguments, Session& session) {
     return ExitCode::done;
   }
   session.print("the " + what + " " + to_readable_line(former) + " of " + arguments.memory +
-                " is now called " + session.bold(to_readable_line(arguments.new_name)));
-  session.suggest({"panonav", "undo", arguments.memory}, "To take it back:");
+                " was renamed to " + session.bold(to_readable_line(arguments.new_name)));
+  session.suggest({"panonav", "undo", arguments.memory}, "To revert this:");
   return ExitCode::done;
 }
 
 Run declare_rename(Arguments& arguments) {
   auto values = std::make_shared<RenameArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file");
-  arguments.positional("VIEW", values->name, "Name or id of a view; with --route that of a route");
-  arguments.positional("NEW_NAME", values->new_name, "A name that the memory does not hold yet");
-  arguments.flag("--route", values->route, "VIEW is the name of a route");
+  arguments.positional("VIEW", values->name,
+                       "Name or id of a view; with --route: name or id of a route");
+  arguments.positional("NEW_NAME", values->new_name, "New name, not yet used in the memory");
+  arguments.flag("--route", values->route, "Rename a route instead of a view");
   return [values](Session& session) { return rename(*values, session); };
 }
 
@@ -61,8 +62,8 @@ Run declare_rename(Arguments& arguments) {
 
 Verb rename_verb() {
   return {"rename", "Rename a view or a route of a memory",
-          "Its id, links and place in maps stay. A recording that holds the image under the "
-          "former name would be memorised as another view. panonav undo takes it back.",
+          "Id, links and position in maps do not change. If you memorise the same image again "
+          "under its old name, it is stored as another view. panonav undo reverts the new name.",
           "  panonav rename office.panonav view_00012.png door\n"
           "  panonav rename office.panonav route to_the_lab --route",
           declare_rename};

@@ -14,9 +14,8 @@ void print_rows(const lab::Reproduction& reproduction, Session& session) {
   for (const lab::ResultRow& row : reproduction.rows) {
     std::string line = "  " + row.what + ": " + session.bold(lab::format_figure(row));
     if (row.target) {
-      line += "  " + (row.holds()
-                          ? session.green("holds")
-                          : session.red("DOES NOT HOLD") + ", missed " + lab::explain_miss(row));
+      line += "  " + (row.holds() ? session.green("holds")
+                                  : session.red("MISSED") + ", missed " + lab::explain_miss(row));
     }
     session.print(line);
   }
@@ -82,35 +81,36 @@ Run declare_reproduce(Arguments& arguments) {
   papers.emplace_back("all");
   arguments.positional("PAPER", values->paper, names + "or all", std::move(papers));
   arguments.option("-o,--out FOLDER", values->out,
-                   "Folder for the report (default: reproduction/PAPER; all: reproduction)");
-  arguments.flag("--quick", values->quick, "A smoke run: few scenes, few questions or runs");
-  arguments.flag("--continue", values->continues,
-                 "all: continue a run of the same options that was stopped; papers that are "
-                 "finished are not run again");
+                   "Folder for the report (default: reproduction/PAPER; for all: reproduction)");
+  arguments.flag("--quick", values->quick, "Run a short test with few scenes and few runs");
+  arguments.flag(
+      "--continue", values->continues,
+      "all: continue an interrupted run with the same options; finished papers are not run again");
   using Options = lab::ReproductionOptions;
-  arguments.option("--seed", values->seed, "First of the scene seeds" + defaults(&Options::seed));
+  arguments.option("--seed", values->seed,
+                   "First random seed of the scenes" + defaults(&Options::seed));
   arguments.option("--scenes", values->scenes, 1,
                    "Variants of the scene" + defaults(&Options::scenes));
   arguments.option(
       "--queries", values->queries, 1,
-      meanings(&Options::queries, {{"m04", "questions in each"}, {"elsewhere", "the same"}}));
+      meanings(&Options::queries, {{"m04", "queries in each"}, {"elsewhere", "the same"}}));
   arguments.option(
       "--runs", values->runs, 2,
-      meanings(&Options::runs, {{"elsewhere", "homing runs and missions in each place"},
+      meanings(&Options::runs, {{"elsewhere", "drives home and missions in each place"},
                                 {"m04", "missions of figure 18 in each kind of place"},
                                 {"m03", "runs in each variant of an office"},
                                 {"f11", "paths in each Gazebo world"},
                                 {"navigation", "missions in each kind of place"},
-                                {"y03", "runs along routes of 60 m in each place"}}));
+                                {"y03", "drives along routes of 60 m in each place"}}));
   arguments.option("--rows", values->rows, 1,
                    meanings(&Options::rows, {{"elsewhere, m03, m04", "rows of the views"}}));
   arguments.option("--data FOLDER", values->data,
                    "elsewhere, f11, m03, navigation, s06, y03: folder with the recordings and "
-                   "Gazebo worlds (default: the environment's PANONAV_DATA; without it they are "
-                   "left out)");
+                   "Gazebo worlds (default: the environment variable PANONAV_DATA; if it is not "
+                   "set, these experiments are skipped)");
   const auto parts = lab::tracking_reproduction_parts();
   arguments.choice("--only", values->only, {parts.begin(), parts.end()},
-                   "m03: this part of the experiments (default: all)");
+                   "m03: run only this part of the experiments (default: all parts)");
   arguments.hide_from_help({"--queries", "--rows", "--only"});
   arguments.writes({"--out"});
   return [values](Session& session) { return reproduce(*values, session); };
@@ -119,11 +119,11 @@ Run declare_reproduce(Arguments& arguments) {
 }  // namespace
 
 Verb reproduce_verb() {
-  return {"reproduce", "Run the experiments of a paper: published and measured figures",
+  return {"reproduce",
+          "Run the experiments of a paper and compare the results with the published results",
           "The verb writes images, results.json, results.md and index.html into the folder. The "
-          "full run "
-          "of a paper takes minutes. `all` runs every paper in a folder of its own and writes one "
-          "table of all; targets that are missed are results and do not change the exit code.",
+          "full run of a paper takes minutes. 'all' runs every paper in a separate folder and "
+          "writes a table with all results. A missed target does not change the exit code.",
           "  panonav reproduce m03\n  panonav reproduce m04 --quick --json -o smoke\n"
           "  panonav reproduce y03 -o routes --data DATA\n"
           "  panonav reproduce all -o results --data DATA\n"

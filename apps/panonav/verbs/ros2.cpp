@@ -70,7 +70,7 @@ std::vector<std::string> translate_ros_arguments(std::span<const std::string> ty
       continue;
     } else if (info.value.empty()) {
       if (values.size() != 1 || (values[0] != "true" && values[0] != "false")) {
-        throw UsageError(where + ": " + name + " is no truth value; allowed: true, false");
+        throw UsageError(where + ": " + name + " is not valid; allowed: true, false");
       }
       if (values[0] == "true") words.push_back(info.name);
     } else {
@@ -81,7 +81,7 @@ std::vector<std::string> translate_ros_arguments(std::span<const std::string> ty
   for (const auto& [from, to] : read.remappings) {
     if (from == "__node" || from == "__ns") {
       const std::string flag = from == "__node" ? "--node-name" : "--namespace";
-      if (is_typed(flag)) throw UsageError(flag + " and " + from + " exclude each other");
+      if (is_typed(flag)) throw UsageError(flag + " and " + from + " cannot be combined");
       words.insert(words.end(), {flag, to});
     } else {
       words.push_back(from + ":=" + to);
@@ -99,7 +99,7 @@ ExitCode run_node(Ros2Arguments& arguments, Session& session) {
   }
   if (arguments.teach) {
     const auto pictures = picture_source(arguments.pictures);
-    if (!pictures) throw UsageError("say what the images show with --kind");
+    if (!pictures) throw UsageError("set --kind to the type of the images");
     arguments.setup.teacher = arguments.teacher;
     arguments.setup.teacher->pictures = *pictures;
     arguments.setup.teacher->route = arguments.route;
@@ -115,13 +115,13 @@ ExitCode run_node(Ros2Arguments& arguments, Session& session) {
   running = &node;
   if (stopped) return ExitCode::done;
   session.note("panonav ros2: " + arguments.memory +
-               (arguments.teach ? " is taught" : " is loaded") + "; the node listens");
+               (arguments.teach ? " is being made" : " is loaded") + "; the node is ready");
   node.run();
   running = nullptr;
   const auto counts = node.counts();
   session.note(std::to_string(counts.pictures) + " images, localised at " +
                std::to_string(counts.localised) + ", " +
-               (arguments.teach ? std::to_string(counts.taught) + " views taught, " : "") +
+               (arguments.teach ? std::to_string(counts.taught) + " views stored, " : "") +
                std::to_string(counts.dropped) + " came too fast and were dropped, " +
                std::to_string(counts.notes) + " warnings");
   return ExitCode::done;
@@ -131,18 +131,22 @@ Run declare_ros2(Arguments& arguments) {
   auto values = std::make_shared<Ros2Arguments>();
   auto& setup = values->setup;
   arguments.positional("MEMORY", values->memory, "Memory file");
-  arguments.optional_positionals("REMAPPING", values->remappings,
-                                 "Names of topics, FROM:=TO: image:=/camera/image_raw");
+  arguments.optional_positionals(
+      "REMAPPING", values->remappings,
+      "New name of a topic as FROM:=TO, for example image:=/camera/image_raw");
   arguments.flag("--teach", values->teach,
-                 "Make MEMORY, a new file, from a first drive, until finish is sent to ~/command");
-  arguments.option("--route NAME", values->route, "With --teach: record the drive as this route");
+                 "Make the new file MEMORY from a first drive; the message 'finish' on ~/command "
+                 "ends the drive");
+  arguments.option("--route NAME", values->route,
+                   "With --teach: also record the drive as a route with this name");
   arguments.option("--node-name NAME", setup.participant.node, "Name of the node");
   arguments.option("--namespace NAME", setup.participant.name_space, "Namespace of the node");
   arguments.option("--domain-id", values->domain, 0,
-                   "DDS domain; default: ROS_DOMAIN_ID of the environment, or 0");
-  arguments.option("--map-frame NAME", setup.frames.map, "Frame of the memory's positions");
-  arguments.option("--odom-frame NAME", setup.frames.odom, "Frame of the odometry");
-  arguments.option("--base-frame NAME", setup.frames.base, "Frame of the robot");
+                   "DDS domain; default: environment variable ROS_DOMAIN_ID, otherwise 0");
+  arguments.option("--map-frame NAME", setup.frames.map,
+                   "Name of the frame of the memory's positions");
+  arguments.option("--odom-frame NAME", setup.frames.odom, "Name of the frame of the odometry");
+  arguments.option("--base-frame NAME", setup.frames.base, "Name of the frame of the robot");
   arguments.in_files("ros2",
                      {"--node-name", "--namespace", "--map-frame", "--odom-frame", "--base-frame"});
   declare_layout(arguments, values->pictures);
@@ -165,18 +169,20 @@ Run declare_ros2(Arguments& arguments) {
 }  // namespace
 
 Verb ros2_verb() {
-  return {"ros2",
-          "Localise a robot as a ROS 2 node, without an installed ROS",
-          "Listens to image, odom, initialpose and goal_pose; sends map -> odom on /tf, and pose, "
-          "particles, references, best match and diagnostics, and on its path to a goal cmd_vel. "
-          "Any ROS 2 distribution on the network sees the node (docs/ros2.md). Ends on Ctrl-C.",
-          "  panonav ros2 office.panonav image:=/camera/image_raw\n"
-          "  panonav ros2 new.panonav --teach --kind mirror --camera mirror.toml --elevation-deg "
-          "-25 35\n"
-          "  panonav ros2 office.panonav --pictures compressed --use-sim-time true",
-          declare_ros2,
-          {},
-          translate_ros_arguments};
+  return {
+      "ros2",
+      "Run a ROS 2 node that localises a robot",
+      "The node reads the topics image, odom, initialpose and goal_pose. It sends the transform "
+      "map -> odom on /tf, and the pose, particles, references, best match and diagnostics. On a "
+      "path to a goal it also sends cmd_vel. ROS need not be installed; every ROS 2 distribution "
+      "on the network can use the node (docs/ros2.md). Ctrl-C stops the node.",
+      "  panonav ros2 office.panonav image:=/camera/image_raw\n"
+      "  panonav ros2 new.panonav --teach --kind mirror --camera mirror.toml --elevation-deg "
+      "-25 35\n"
+      "  panonav ros2 office.panonav --pictures compressed --use-sim-time true",
+      declare_ros2,
+      {},
+      translate_ros_arguments};
 }
 
 }  // namespace panonav::command

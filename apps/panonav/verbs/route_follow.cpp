@@ -107,8 +107,8 @@ void print_summary(const FollowSummary& summary, const std::vector<FollowedImage
   print_error("lateral error          ", summary.lateral_m, 1.0, 4, " m", session);
   print_error("error of heading       ", summary.heading_rad, degrees(1.0), 2, " degrees", session);
   for (const auto& [from_m, to_m] : changed_stretches(images)) {
-    session.print("changed here: something seen from " + format_fixed(from_m, 2) + " to " +
-                  format_fixed(to_m, 2) + " m along the route");
+    session.print("changed scene from " + format_fixed(from_m, 2) + " to " + format_fixed(to_m, 2) +
+                  " m along the route");
   }
 }
 
@@ -180,24 +180,24 @@ Run declare_route_follow(Arguments& arguments) {
   auto values = std::make_shared<FollowArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file with a route");
   arguments.positional("DATASET", values->dataset,
-                       "Data set, folder of images, video or recording of a later drive, in its "
-                       "order");
+                       "Data set, folder of images, video or recording of a later drive, with "
+                       "images in the order of the drive");
   declare_topics(arguments, values->topics);
   declare_part(arguments, values->part, false);
   arguments.option("--name NAME", values->name,
-                   "Name of the route; may be left out if there is only one");
+                   "Name of the route; needed if the memory contains several routes");
   arguments.option("--every N", values->every, 1,
-                   "Use every N-th image only, and odometry between them");
+                   "Use only every N-th image, and the odometry between these images");
   arguments.flag("--no-odometry", values->no_odometry,
-                 "Search the whole route for each image alone");
+                 "Search the whole route for each image, without odometry");
   arguments.option("--tum FILE", values->tum,
-                   "Write the poses on the route to this file: TUM text, or CSV for a name that "
-                   "ends in .csv");
+                   "Write the poses on the route to this file: as CSV if the name ends in .csv, "
+                   "otherwise as TUM text");
   declare_record(arguments, values->record);
   declare_view(arguments, values->record);
   arguments.option("--report FOLDER", values->report,
-                   "Write a page with the route, the fixes, and what was seen compared with what "
-                   "the route shows into this folder: a new one, or that of an earlier report");
+                   "Write a page with the route, the computed positions and the predicted images "
+                   "into this folder; the folder must be new or contain an earlier report");
   arguments.options("route_tracker", values->tracker);
   arguments.options("route_fit", values->fit);
   arguments.refuse_unless(
@@ -212,12 +212,12 @@ Run declare_route_follow(Arguments& arguments) {
 }  // namespace
 
 Verb route_follow_verb() {
-  return {"route follow", "Locate a robot relative to a recorded route, to the centimetre",
-          "Position and heading come from what the route shows at the robot's place, also between "
-          "the recorded lines and to their sides. Odometry predicts where the data set has it; "
-          "where the prediction does not hold the robot is searched for around it, then on the "
-          "whole route. Parts of the scene that differ from the recording are left out and "
-          "reported. The exit code is 1 when no image is on the route.",
+  return {"route follow", "Find the position of a robot relative to a recorded route",
+          "The verb searches for the pose at which the recorded lines of the route predict the "
+          "image. The robot may also be between the lines or beside the route. If the data set has "
+          "odometry, the search starts at the pose that the odometry predicts. If this fails, the "
+          "surroundings of this pose are searched, then the whole route. Changed parts of the "
+          "scene are ignored and reported. The exit code is 1 if no image is on the route.",
           "  panonav route follow office.panonav repeat_run\n"
           "  panonav route follow office.panonav repeat_run --report followed\n"
           "  panonav route follow office.panonav repeat_run --no-odometry --json",

@@ -61,7 +61,7 @@ std::vector<Pose2> choose_poses(const RecordArguments& arguments, const Dataset&
     if (!poses.empty()) {
       if (!dataset.entries.front().pose->heading_rad) {
         session.note("panonav route record: " + arguments.dataset +
-                     " has no headings; the direction of travel is used");
+                     " contains no headings; the direction of travel is used");
       }
       return poses;
     }
@@ -94,7 +94,7 @@ void set_line_options(const Arguments& declared, const RecordArguments& argument
   if (arguments.horizon_rows) options.horizon_rows = parse_rows(*arguments.horizon_rows);
   if (pictures.kind == PictureKind::panorama && !pictures.layout.elevations) {
     declared.refuse_unused({"--half-band-rad"},
-                           "as the elevations of the images are not known (--horizon-rows)");
+                           "because the elevations of the images are not known (--horizon-rows)");
   }
   const auto route = memory ? memory->route(arguments.name) : std::nullopt;
   if (!route) {
@@ -103,7 +103,7 @@ void set_line_options(const Arguments& declared, const RecordArguments& argument
   }
   const RouteSource before = read_route_source(*memory, arguments.name, route->columns());
   const std::string as = ", as the route '" + arguments.name + "' in " + arguments.memory +
-                         " was recorded; leave it out or take another --name";
+                         " was recorded; leave it out or choose another --name";
   declared.require_same("line", arguments.line, before.line, as);
   if (options.horizon_rows && options.horizon_rows != before.horizon_rows) {
     throw ContractError("--horizon-rows", *arguments.horizon_rows,
@@ -157,12 +157,12 @@ ExitCode record(const Arguments& declared, const RecordArguments& arguments, Ses
   session.print(session.bold(std::to_string(recorded.appended)) + " lines recorded; route '" +
                 arguments.name + "' in " + arguments.memory + " has " +
                 std::to_string(recorded.route.size()) + " over " + format_fixed(length_m, 2) +
-                " m, " + format_fixed(1e-6 * bytes_per_km, 2) + " MB a kilometre");
+                " m, " + format_fixed(1e-6 * bytes_per_km, 2) + " MB per kilometre");
   if (dataset.source.kind == PictureKind::panorama && !dataset.source.layout.elevations &&
       !recorder.source().horizon_rows) {
     session.print(
-        "The images' elevations are not known: all rows are averaged into a line. Say which show "
-        "the horizon with --horizon-rows.");
+        "The elevations of the images are not known; each line is the mean of all rows. Select the "
+        "rows at the horizon with --horizon-rows.");
   }
   session.suggest({"panonav", "route", "follow", arguments.memory, "DATASET"});
   return ExitCode::done;
@@ -172,20 +172,20 @@ Run declare_route_record(Arguments& arguments) {
   auto values = std::make_shared<RecordArguments>();
   arguments.positional(
       "DATASET", values->dataset,
-      "Data set or recording with positions or odometry, in the order of the drive");
-  arguments.positional("MEMORY", values->memory,
-                       "Memory file (NAME.panonav); made where there is none");
-  arguments.option("--name NAME", values->name, "Name of the route; an existing one is continued");
+      "Data set or recording with positions or odometry, with images in the order of the drive");
+  arguments.positional("MEMORY", values->memory, "Memory file (NAME.panonav), new or existing");
+  arguments.option("--name NAME", values->name,
+                   "Name of the route; an existing route is continued");
   arguments.option("--every-m METRES", values->every_m,
                    "Distance between lines, in metres (default 0.1)");
   arguments.option("--horizon-rows FIRST-LAST", values->horizon_rows,
-                   "Rows that show the horizon, from 0 at the top, of panoramas whose "
-                   "elevations are not known; all without it");
+                   "First and last row at the horizon, counted from 0 at the top; only for "
+                   "panoramas with unknown elevations (default: all rows)");
   arguments.flag("--odometry", values->odometry,
-                 "Record the poses of the odometry, even if the data set has positions");
+                 "Use the poses of the odometry, even if the data set has positions");
   arguments.option("--report FOLDER", values->report,
-                   "Write a page with the route panorama into this folder: a new one, or that of "
-                   "an earlier report");
+                   "Write a page with the route panorama into this folder; the folder must be new "
+                   "or contain an earlier report");
   declare_pictures(arguments, values->pictures);
   arguments.options("line", values->line);
   arguments.writes({"--report"});
@@ -195,15 +195,15 @@ Run declare_route_record(Arguments& arguments) {
 }  // namespace
 
 Verb route_record_verb() {
-  return {"route record", "Record a route as one line of pixels per step",
-          "The route holds what the camera sees at its own height, a byte a degree, from every "
-          "place of the route: a few megabytes a kilometre. Lines are stored in batches; after an "
-          "interruption the same command continues where it stopped, and a drive that continues "
-          "where the route ends makes it longer.",
-          "  panonav route record teach_run office.panonav\n"
-          "  panonav route record teach_run office.panonav --name corridor --odometry --report "
-          "corridor",
-          declare_route_record};
+  return {
+      "route record", "Record a route as one line of pixels for each step",
+      "A line is the horizon around the robot at one place of the route: one byte per degree, a "
+      "few megabytes per kilometre. Lines are stored in batches. After an interruption the same "
+      "command continues. A recording that starts at the end of the route makes the route longer.",
+      "  panonav route record teach_run office.panonav\n"
+      "  panonav route record teach_run office.panonav --name corridor --odometry --report "
+      "corridor",
+      declare_route_record};
 }
 
 }  // namespace panonav::command

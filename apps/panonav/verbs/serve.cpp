@@ -45,8 +45,8 @@ std::string read_token(const std::string& path) {
                     std::ranges::all_of(token, [](char c) { return c > ' ' && c <= '~'; });
   if (!fits) {
     throw FileError(path,
-                    "its first line is no token; allowed: 16 to 1024 visible characters of "
-                    "ASCII without blanks");
+                    "its first line is not a valid token; allowed: 16 to 1024 visible ASCII "
+                    "characters without spaces");
   }
   return token;
 }
@@ -77,12 +77,12 @@ ExitCode serve(const Arguments& declared, const ServeArguments& arguments, Sessi
   for (const std::string& memory : arguments.memories)
     memories.push_back(parse_served_memory(memory));
   if (std::ranges::none_of(memories, is_server_address, &server::ServedMemory::path)) {
-    declared.refuse_unused({"--max-held-views"}, "where all memories are files");
+    declared.refuse_unused({"--max-held-views"}, "if all memories are files");
   }
   if (!place.is_local() && options.token.empty()) {
-    session.note("warning: whoever reaches " + place.address +
-                 " is answered, and sees thumbnails; --token-file FILE answers only those who send "
-                 "a token");
+    session.note("warning: everybody who can reach " + place.address +
+                 " gets answers and can see thumbnails; with --token-file FILE only clients with a "
+                 "token get answers");
   }
   set_reply_timeout(std::chrono::seconds(5));  // clients wait
   const server::LocalisationServer server(memories, options);
@@ -103,19 +103,20 @@ ExitCode serve(const Arguments& declared, const ServeArguments& arguments, Sessi
 
 Run declare_serve(Arguments& arguments) {
   auto values = std::make_shared<ServeArguments>();
-  arguments.positionals("MEMORY", values->memories,
-                        "Memory files, or addresses of memories on a server, known to clients by "
-                        "their names without .panonav, or NAME=FILE");
+  arguments.positionals(
+      "MEMORY", values->memories,
+      "Memory files, or addresses of memories on a server. The name of a memory for clients is its "
+      "file name without .panonav; NAME=FILE sets another name");
   arguments.option("--listen PORT", values->listen,
-                   "Port for programs of this machine (0: a free one); ADDRESS:PORT serves the "
-                   "network of that address, too");
+                   "Port for programs on this computer (0: a free port); ADDRESS:PORT also answers "
+                   "to the network of this address");
   arguments.option("--token-file FILE", values->token_file,
-                   "Answer only clients that send the first line of this file as bearer token");
+                   "Only answer clients that send the first line of this file as bearer token");
   arguments.option("--max-waiting", values->max_waiting, 1,
-                   "Images that may wait for a thread; further clients are asked to try again");
+                   "Largest number of waiting images; further clients are told to try again");
   arguments.option("--max-held-views", values->max_held_views, 0,
-                   "Memories on a server with more views are not held: 350 bytes a view instead of "
-                   "2700, and a longer time for each image (docs/scale.md)");
+                   "A memory on a server with more views than this is not loaded; this needs 350 "
+                   "bytes per view instead of 2700, and more time per image (docs/scale.md)");
   arguments.options("localiser", values->localiser);
   arguments.show_in_help({"--top"});
   return [values, &arguments](Session& session) { return serve(arguments, *values, session); };
@@ -124,11 +125,12 @@ Run declare_serve(Arguments& arguments) {
 }  // namespace
 
 Verb serve_verb() {
-  return {"serve", "Answer over HTTP where images were taken",
-          "Clients POST a PNG or JPEG to /v1/memories/NAME/localise and get the JSON of localise. "
-          "GET /v1/memories lists the memories, /health tells whether the server is ready, "
-          "/metrics is for Prometheus. A memory whose file changes is read again. There is no "
-          "encryption: put a proxy that encrypts in front of a server that others can reach.",
+  return {"serve", "Run an HTTP server that finds the position and heading of images",
+          "Clients send a PNG or JPEG with POST to /v1/memories/NAME/localise and get the same "
+          "JSON as from panonav localise. GET /v1/memories lists the memories. GET /health reports "
+          "whether the server is ready. GET /metrics is for Prometheus. If the file of a memory "
+          "changes, the server loads it again. The server does not use encryption. If others can "
+          "reach the server, put a proxy with encryption in front of it.",
           "  panonav serve office.panonav\n"
           "  panonav serve office.panonav hall=monday.panonav --listen 8090\n"
           "  panonav serve office.panonav --listen 0.0.0.0:8080 --token-file token.txt",

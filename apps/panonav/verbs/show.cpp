@@ -154,8 +154,9 @@ ExitCode show(const ShowArguments& arguments, Session& session) {
   }
   const auto bytes = file.thumbnail(view);
   if (!bytes && arguments.thumbnail) {
-    throw FileError(arguments.memory, "holds no thumbnail of " + to_readable_line(arguments.view) +
-                                          "; memorise keeps them unless told --no-thumbnails");
+    throw FileError(arguments.memory,
+                    "contains no thumbnail of " + to_readable_line(arguments.view) +
+                        "; memorise stores thumbnails unless --no-thumbnails is set");
   }
   if (bytes) {
     std::optional<Image> picture;
@@ -183,7 +184,7 @@ Run declare_show(Arguments& arguments) {
   arguments.positional("MEMORY", values->memory, "Memory file");
   arguments.positional("VIEW", values->view, "Name or id of a view");
   arguments.option("-o,--thumbnail FILE", values->thumbnail,
-                   "Write its thumbnail into this PNG file");
+                   "Write the thumbnail of the view into this PNG file");
   arguments.writes({"--thumbnail"});
   return [values](Session& session) { return show(*values, session); };
 }
@@ -191,9 +192,9 @@ Run declare_show(Arguments& arguments) {
 }  // namespace
 
 Verb show_verb() {
-  return {"show", "Show everything that a memory stores about a view",
-          "The answer has the view's pose, links and place in maps, its size, and the five views "
-          "that are most similar and nearest to it.",
+  return {"show", "Show all data that a memory stores about a view",
+          "The output contains the pose, links, position in maps and size of the view. It also "
+          "lists the five most similar and the five nearest views.",
           "  panonav show office.panonav view_00012.png\n"
           "  panonav show office.panonav 13 -o view_13.png",
           declare_show};

@@ -34,7 +34,7 @@ void apply_shorthands(const Arguments& declared, SimulateArguments& arguments) {
   const int path_count =
       (arguments.grid_m ? 1 : 0) + (arguments.random ? 1 : 0) + (arguments.trajectory ? 1 : 0);
   if (path_count > 1 || (path_count == 1 && declared.is_set("recording", "path"))) {
-    throw UsageError("--grid, --random, --trajectory and --path exclude each other; take one");
+    throw UsageError("--grid, --random, --trajectory and --path cannot be combined; choose one");
   }
   auto& recording = arguments.simulation.recording;
   if (arguments.grid_m) {
@@ -61,14 +61,14 @@ void apply_shorthands(const Arguments& declared, SimulateArguments& arguments) {
 std::vector<simulation::RecordedPose> read_poses(const std::string& path,
                                                  const simulation::SimulatedWorld& world) {
   const auto trajectory = read_trajectory(path);
-  if (trajectory.empty()) throw FileError(path, "holds no pose; allowed: one or more");
+  if (trajectory.empty()) throw FileError(path, "contains no pose; allowed: one or more");
   return world.plan_along(trajectory);
 }
 
 void require_new_folder(const std::string& out) {
   std::error_code ignored;
   if (fs::exists(out, ignored) && !fs::is_empty(out, ignored)) {
-    throw FileError(out, "is there already and not empty; allowed: a new folder");
+    throw FileError(out, "already exists and is not empty; allowed: a new folder");
   }
 }
 
@@ -88,8 +88,8 @@ recordings::RunMoment make_moment(const DatasetEntry& entry, const Image& pictur
 
 ExitCode simulate(const Arguments& declared, SimulateArguments arguments, Session& session) {
   if (arguments.ros2 ? !arguments.out.empty() : arguments.out.size() != 1) {
-    throw UsageError(arguments.ros2 ? "--ros2 makes no data set; leave OUT away"
-                                    : "OUT is missing or given twice: a folder for the data set");
+    throw UsageError(arguments.ros2 ? "--ros2 does not make a data set; leave out OUT"
+                                    : "one folder OUT for the data set is required");
   }
   const std::string out = arguments.ros2 ? "" : arguments.out.front();
   apply_shorthands(declared, arguments);
@@ -136,15 +136,17 @@ Run declare_simulate_verb(Arguments& arguments) {
       "SCENE", values->scene,
       "Built-in scene (" + join_texts(scenes) + "), Gazebo world (.world, .sdf) or mesh file",
       {scenes.begin(), scenes.end()});
-  arguments.optional_positionals("OUT", values->out, "Folder for the data set; new or empty");
-  arguments.flag("--ros2", values->ros2,
-                 "No data set: a robot in the scene that ROS 2 sees and drives");
-  arguments.option("--grid METRES", values->grid_m,
-                   "Short for --path grid --spacing-m: all free places of a grid");
+  arguments.optional_positionals("OUT", values->out, "New or empty folder for the data set");
+  arguments.flag(
+      "--ros2", values->ros2,
+      "Simulate a robot for ROS 2 instead of a data set; ROS 2 reads its images and drives it");
+  arguments.option(
+      "--grid METRES", values->grid_m,
+      "Take images at all free places of a grid; same as --path grid --spacing-m METRES");
   arguments.option("--random N", values->random,
-                   "Short for --path random --poses: random places and headings");
+                   "Take images at N random poses; same as --path random --poses N");
   arguments.option("--trajectory FILE", values->trajectory,
-                   "Poses of a trajectory file (TUM text or CSV)");
+                   "Take images at the poses of this trajectory (TUM text or CSV)");
   declare_record(arguments, values->record);
   arguments.hide_from_help({"--record"});
   declare_simulation(arguments, values->simulation);
@@ -155,11 +157,11 @@ Run declare_simulate_verb(Arguments& arguments) {
   };
   arguments.refuse_unless(
       {"[recording]"}, [values] { return !values->trajectory; },
-      "with --trajectory, which says places and times");
+      "with --trajectory, which gives places and times");
   arguments.refuse_unless(
-      {"--spacing-m"}, [values] { return !values->grid_m; }, "with --grid, which is the spacing");
+      {"--spacing-m"}, [values] { return !values->grid_m; }, "with --grid, which sets the spacing");
   arguments.refuse_unless(
-      {"--poses"}, [values] { return !values->random; }, "with --random, which is their number");
+      {"--poses"}, [values] { return !values->random; }, "with --random, which sets the number");
   arguments.refuse_unless(
       {"--poses"},
       [path] {
@@ -170,7 +172,7 @@ Run declare_simulate_verb(Arguments& arguments) {
   arguments.refuse_unless(
       {"--spacing-m", "--speed-m-s", "[odometry]"},
       [values, path] { return values->trajectory || path() != simulation::RecordingPath::random; },
-      "with random places, which are no path");
+      "with random places");
   arguments.refuse_unless(
       {"--heading-rad"},
       [values, path, &arguments] {
@@ -187,9 +189,9 @@ Run declare_simulate_verb(Arguments& arguments) {
 }  // namespace
 
 Verb simulate_verb() {
-  return {"simulate", "Render a data set of a simulated robot with a mirror camera",
-          "All paths but random places have stamps and noisy odometry. The same options and seeds "
-          "give the same images on one kind of processor.",
+  return {"simulate", "Make a data set with the images of a simulated robot",
+          "The images have stamps and noisy odometry, except at random places. The same options "
+          "and seeds give the same images on the same type of processor.",
           "  panonav simulate office memory_run --grid 0.25\n"
           "  panonav simulate office query_run --random 20 --seed 7\n"
           "  panonav simulate house.world house_run --grid 0.5 --kind panorama\n"

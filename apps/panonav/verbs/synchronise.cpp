@@ -34,23 +34,23 @@ std::string describe_report(const fleet::SynchronisationReport& report) {
   const std::array<std::pair<std::size_t, const char*>, 12> counts{{
       {report.uploaded, "uploaded"},
       {report.downloaded, "downloaded"},
-      {report.adopted, "that both had"},
+      {report.adopted, "already in both"},
       {report.updated_on_server, "changed on the server"},
       {report.updated_in_file, "changed in the file"},
       {report.removed_on_server, "removed on the server"},
       {report.removed_in_file, "removed from the file"},
-      {report.left, "left, as they lie outside of its areas"},
-      {report.renamed, "renamed, as others had their names"},
+      {report.left, "skipped, because they lie outside of its areas"},
+      {report.renamed, "renamed, because other views had the same names"},
       {report.links_uploaded, "links changed on the server"},
       {report.links_downloaded, "links changed in the file"},
-      {report.withheld, "changes kept back, as this login may not make them there"},
+      {report.withheld, "changes not uploaded, because this login has no permission"},
   }};
   std::string text;
   for (const auto& [count, what] : counts) {
     if (count == 0) continue;
     text += (text.empty() ? "" : "; ") + std::to_string(count) + " " + what;
   }
-  return text.empty() ? "nothing was new" : text;
+  return text.empty() ? "no changes" : text;
 }
 
 ExitCode synchronise(const SynchroniseArguments& arguments, Session& session) {
@@ -94,26 +94,25 @@ ExitCode synchronise(const SynchroniseArguments& arguments, Session& session) {
                 ". " + arguments.memory + " holds " + std::to_string(report.views) + " views.");
   if (report.conflicts > 0) {
     session.note("of " + std::to_string(report.conflicts) +
-                 " views changes of this file were dropped, as others had changed or removed them "
-                 "first");
+                 " views changes of this file were discarded, because others had changed or "
+                 "removed these views first");
   }
   if (report.restored) {
     session.note(
-        "the server had lost views that it had acknowledged; those of this file were uploaded "
-        "again");
+        "the server had lost acknowledged views; the views of this file were uploaded again");
   }
   return ExitCode::done;
 }
 
 Run declare_synchronise(Arguments& arguments) {
   auto values = std::make_shared<SynchroniseArguments>();
-  arguments.positional("MEMORY", values->memory,
-                       "The robot's memory file; where there is none it is made");
+  arguments.positional("MEMORY", values->memory, "Memory file of the robot, new or existing");
   arguments.positional("ADDRESS", values->server,
-                       "Address of a memory on a server; where there is none it is made");
+                       "Address of a memory on a server, new or existing");
   arguments.option("--around", "X_M Y_M", values->around,
                    "Keep only the areas (squares of 10 m) around this position");
-  arguments.option("--within-m", values->within_m, "Distance from that position, metres");
+  arguments.option("--within-m", values->within_m,
+                   "Distance from the position of --around in metres");
   return [values](Session& session) { return synchronise(*values, session); };
 }
 
@@ -121,13 +120,13 @@ Run declare_synchronise(Arguments& arguments) {
 
 Verb synchronise_verb() {
   return {
-      "synchronise", "Synchronise the views of a memory file and of a memory on a server",
-      "Uploads what only the file has, each view once, and downloads what others changed since: "
-      "views with images and features, poses, names, removals and links. The first change that the "
-      "server acknowledged holds; a removal wins over a change; two replacements of one view are "
-      "both kept; a name that another view has becomes ROBOT/NAME. Maps, routes and models stay "
-      "with the file. If the connection breaks, nothing is lost or doubled: the same command "
-      "continues (docs/scale.md).",
+      "synchronise", "Synchronise a memory file with a memory on a server",
+      "The verb uploads new views and changes of the file, and downloads changes that others made: "
+      "views with images and features, poses, names, removals and links. If two robots change a "
+      "view, the change that the server received first is used; a removal is always used. If two "
+      "robots replace the same view, both new views are stored. If two views have the same name, "
+      "one becomes ROBOT/NAME. Maps, routes and models stay in the file. If the connection breaks, "
+      "run the same command again to continue (docs/scale.md).",
       "  panonav synchronise robot.panonav 'postgresql://robots.example/panonav?memory=office'\n"
       "  panonav synchronise robot.panonav ADDRESS --around 12.5 40 --within-m 60 --json",
       declare_synchronise};

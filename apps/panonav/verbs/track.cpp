@@ -29,7 +29,7 @@ struct StartOptions {
 void visit_options(StartOptions& options, OptionVisitor& visitor) {
   using T = StartOptions;
   constexpr OptionTable table{
-      option<&T::deviation_m>("standard deviation of x and of y of the start pose", 0, 1e6),
+      option<&T::deviation_m>("standard deviation of x and y of the start pose", 0, 1e6),
       option<&T::heading_deviation_deg>("standard deviation of the start heading", 0, 360),
   };
   table.visit(options, visitor);
@@ -58,13 +58,13 @@ void check_arguments(const Arguments& declared, const TrackArguments& arguments)
   const bool y = arguments.start_y_m.has_value();
   if (x != y || (x && !arguments.start_heading_deg)) {
     throw UsageError(
-        "--start-x-m, --start-y-m and --start-heading-deg go together; --start-heading-deg alone "
-        "sets the heading only");
+        "--start-x-m and --start-y-m need --start-heading-deg; --start-heading-deg can be used "
+        "alone");
   }
   if (!x && declared.is_set("start")) {
     throw UsageError(
-        "--start-deviation-m and --start-heading-deviation-deg go with --start-x-m, --start-y-m "
-        "and --start-heading-deg");
+        "--start-deviation-m and --start-heading-deviation-deg need --start-x-m, --start-y-m and "
+        "--start-heading-deg");
   }
   if (x && !(is_position(*arguments.start_x_m) && is_position(*arguments.start_y_m))) {
     throw UsageError("--start-x-m and --start-y-m are " + to_text(*arguments.start_x_m) + " and " +
@@ -380,28 +380,28 @@ ExitCode track_run(const Arguments& declared, const TrackArguments& arguments, S
 Run declare_track(Arguments& arguments) {
   auto values = std::make_shared<TrackArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file");
-  arguments.positional(
-      "DATASET", values->dataset,
-      "Data set, folder of images, video or recording, in the order of the run, or a live source "
-      "(-, /dev/video0, rtsp://); without odometry motion is read from the images");
+  arguments.positional("DATASET", values->dataset,
+                       "Data set, folder of images, video or recording with images in the order of "
+                       "the run, or a live source (-, /dev/video0, rtsp://). Without odometry, "
+                       "motion is computed from the images");
   declare_topics(arguments, values->topics);
   declare_part(arguments, values->part, false);
   arguments.option("--every N", values->every, 1,
-                   "Use every N-th image only, and odometry between them");
+                   "Use only every N-th image, and the odometry between these images");
   arguments.option("--start-x-m", values->start_x_m,
-                   "x of the start position; without it the start is unknown");
+                   "x of the start position; by default the start is unknown");
   arguments.option("--start-y-m", values->start_y_m, "y of the start position");
   arguments.option("--start-heading-deg", values->start_heading_deg,
-                   "Heading at the start; may be given without a position");
+                   "Heading at the start; can be used without a position");
   arguments.option("--tum FILE", values->tum,
-                   "Write the trajectory of localised images to this file: TUM text, or CSV for a "
-                   "name that ends in .csv");
+                   "Write the trajectory of localised images to this file: as CSV if the name ends "
+                   "in .csv, otherwise as TUM text");
   declare_record(arguments, values->record);
   declare_view(arguments, values->record);
   declare_live(arguments, values->live);
   arguments.option("--report FOLDER", values->report,
-                   "Write a page that replays the run into this folder: a new one, or that of an "
-                   "earlier report");
+                   "Write a page that replays the run into this folder; the folder must be new or "
+                   "contain an earlier report");
   arguments.options("start", values->start, "start");
   arguments.options("monte_carlo", values->filter);
   arguments.options("odometry", values->odometry, "odometry");
@@ -413,10 +413,11 @@ Run declare_track(Arguments& arguments) {
 }  // namespace
 
 Verb track_verb() {
-  return {"track", "Follow a moving robot through its images and odometry",
-          "Monte-Carlo localisation: the start may be unknown, several similar places are tracked "
-          "until an image tells them apart, and a kidnapped robot is found again. A live source is "
-          "followed until Ctrl-C. The exit code is 1 when the robot was never localised.",
+  return {"track", "Track the position of a moving robot from images and odometry",
+          "The verb uses Monte-Carlo localisation. The start may be unknown. If several places are "
+          "similar, all of them are tracked until an image shows the correct one. A robot that was "
+          "carried away is localised again. For a live source, tracking continues until Ctrl-C. "
+          "The exit code is 1 if the robot was never localised.",
           "  panonav track office.panonav run\n"
           "  panonav track office.panonav run --every 10 --report report\n"
           "  panonav track office.panonav run --tum estimate.tum --json\n"

@@ -15,9 +15,9 @@ ExitCode undo(const UndoArguments& arguments, Session& session) {
                                  arguments.dry_run ? Access::read_only : Access::read_write);
   const auto what = memory.undoable();
   if (!what) {
-    throw FileError(
-        arguments.memory,
-        "has nothing to undo; allowed: after forget, prune, rename and localise --update");
+    throw FileError(arguments.memory,
+                    "contains no change that can be reverted; allowed: after forget, prune, rename "
+                    "and localise --update");
   }
   if (!arguments.dry_run) memory.undo();
   const auto views = memory.info().views;
@@ -28,7 +28,7 @@ ExitCode undo(const UndoArguments& arguments, Session& session) {
                                          {"views", views}}));
     return ExitCode::done;
   }
-  session.print((arguments.dry_run ? "would undo \"" : "undone \"") + *what + "\"; " +
+  session.print((arguments.dry_run ? "would revert \"" : "reverted \"") + *what + "\"; " +
                 arguments.memory + " holds " + std::to_string(views) + " views");
   return ExitCode::done;
 }
@@ -36,18 +36,19 @@ ExitCode undo(const UndoArguments& arguments, Session& session) {
 Run declare_undo(Arguments& arguments) {
   auto values = std::make_shared<UndoArguments>();
   arguments.positional("MEMORY", values->memory, "Memory file");
-  arguments.flag("--dry-run", values->dry_run, "Report what would be undone, and change nothing");
+  arguments.flag("--dry-run", values->dry_run,
+                 "Print the change that would be reverted, without a change");
   return [values](Session& session) { return undo(*values, session); };
 }
 
 }  // namespace
 
 Verb undo_verb() {
-  return {"undo", "Take back the last forget, prune, rename or --update",
-          "Repeat it to take back earlier changes (panonav history lists them). Views come back "
-          "with their thumbnails, links, places in maps and former names. Views that were added "
-          "since stay. The verb is refused if one of them has the name of a view that would come "
-          "back, or if a map was made again.",
+  return {"undo", "Revert the last forget, prune, rename or localise --update",
+          "Use undo again to revert earlier changes; panonav history lists them. Views are "
+          "restored with their thumbnails, links, positions in maps and former names. Views that "
+          "were added later stay in the memory. undo is refused if such a view has the name of a "
+          "view that would be restored, or if a map was made again.",
           "  panonav undo office.panonav --dry-run\n"
           "  panonav undo office.panonav",
           declare_undo};

@@ -35,7 +35,7 @@ ordered_json as_json(const Panorama& panorama) {
 
 std::string format_line(const Panorama& panorama) {
   std::string text = std::to_string(panorama.columns()) + " x " + std::to_string(panorama.rows()) +
-                     " pixels, clockwise, forward in the middle";
+                     " pixels, clockwise, forward direction in the middle";
   if (const auto& band = panorama.elevations()) {
     text += ", elevations " + format_fixed(degrees(band->bottom_rad), 1) + " to " +
             format_fixed(degrees(band->top_rad), 1) + " degrees";
@@ -104,7 +104,7 @@ ExitCode unwrap(const Arguments& declared, const UnwrapArguments& arguments, Ses
   auto source = picture_source(arguments.pictures);
   if (!source) {
     throw UsageError(
-        "say what the image shows: --camera camera.toml for a mirror, or --kind equirectangular");
+        "set the type of the image: --camera camera.toml for a mirror, or --kind equirectangular");
   }
   const PanoramaReader reader(std::move(*source),
                               {arguments.unwarper.rows, arguments.unwarper.columns});
@@ -123,11 +123,12 @@ ExitCode unwrap(const Arguments& declared, const UnwrapArguments& arguments, Ses
 
 Run declare_unwrap(Arguments& arguments) {
   auto values = std::make_shared<UnwrapArguments>();
-  arguments.positional("INPUT", values->input,
-                       "Raw mirror image, 360 degree image or panorama; or a data set, folder, "
-                       "video or recording of them, or - for JPEG images on standard input");
+  arguments.positional(
+      "INPUT", values->input,
+      "Raw mirror image, 360 degree image or panorama. A data set, folder, video or recording of "
+      "such images is also allowed; - reads JPEG images from standard input");
   arguments.required_option("-o,--out", values->out,
-                            "PNG image to write; of several images a new folder for them");
+                            "Name of the new PNG image; for several images: a new folder");
   declare_pictures(arguments, values->pictures);
   arguments.options("unwarper", values->unwarper);
   arguments.show_in_help({"--rows", "--columns"});
@@ -138,7 +139,7 @@ Run declare_unwrap(Arguments& arguments) {
 }  // namespace
 
 Verb unwrap_verb() {
-  return {"unwrap", "Unwrap an image to a panoramic cylinder",
+  return {"unwrap", "Convert images to panoramas",
           "The columns of the result run clockwise, with the forward direction in the middle.",
           "  panonav unwrap mirror.jpg --camera camera.toml -o panorama.png\n"
           "  panonav unwrap photo360.jpg --kind equirectangular --elevation-deg -30 40 -o "

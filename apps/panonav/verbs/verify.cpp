@@ -28,7 +28,7 @@ ExitCode verify(const std::string& path, Session& session) {
   if (faults.empty()) return ExitCode::done;
   session.finish_output();
   throw FileError(path, "is damaged: " + std::to_string(faults.size()) +
-                            " faults, first: " + faults.front().what);
+                            " faults; first fault: " + faults.front().what);
 }
 
 Run declare_verify(Arguments& arguments) {
@@ -41,7 +41,7 @@ Run declare_verify(Arguments& arguments) {
 
 Verb verify_verb() {
   return {"verify", "Check a memory for damage",
-          "The exit code is 0 when the file is intact, and 2 when it is not.",
+          "The exit code is 0 if the file is intact, and 2 if it is damaged.",
           "  panonav verify office.panonav", declare_verify};
 }
 

@@ -86,7 +86,7 @@ void require_picture(const fs::path& table, const DatasetEntry& entry) {
   if (!fs::is_regular_file(entry.path, error)) {
     throw FileError(table.string(),
                     "file is '" + entry.file +
-                        "', which is not there; allowed: a picture in the data set's folder");
+                        "', which does not exist; allowed: a picture in the data set's folder");
   }
 }
 
@@ -229,7 +229,7 @@ Dataset find_pictures(const fs::path& folder, PictureSource source, bool is_recu
   if (error) throw FileError(folder.string(), "cannot be read: " + error.message());
   std::ranges::sort(dataset.left_out, is_naturally_less);
   if (names.empty())
-    throw FileError(folder.string(), "holds no PNG or JPEG picture; allowed: one or more");
+    throw FileError(folder.string(), "contains no PNG or JPEG picture; allowed: one or more");
   std::sort(names.begin(), names.end(), is_naturally_less);
   for (auto& name : names) {
     DatasetEntry entry;
@@ -424,7 +424,7 @@ std::vector<std::uint8_t> read_encoded_picture(const DatasetEntry& entry) {
 Dataset read_single_picture(const fs::path& file, PictureSource source) {
   std::error_code error;
   if (!fs::is_regular_file(file, error))
-    throw FileError(file.string(), "is not there; allowed: a PNG or JPEG picture");
+    throw FileError(file.string(), "does not exist; allowed: a PNG or JPEG picture");
   Dataset dataset{file.parent_path(), std::move(source), {}, {}};
   DatasetEntry entry;
   entry.file = file.filename().string();

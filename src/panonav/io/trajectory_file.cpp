@@ -31,7 +31,7 @@ std::vector<StampedPose> read_csv(const std::filesystem::path& path) {
     }
     trajectory.push_back({stamp_s, pose});
   }
-  if (trajectory.empty()) throw FileError(path.string(), "holds no pose; allowed: one or more");
+  if (trajectory.empty()) throw FileError(path.string(), "contains no pose; allowed: one or more");
   return trajectory;
 }
 
@@ -93,7 +93,7 @@ std::vector<StampedPose> read_trajectory(const std::filesystem::path& path) {
     }
     trajectory.push_back({n[0], {n[1], n[2], wrap_angle(heading)}});
   }
-  if (trajectory.empty()) throw FileError(path.string(), "holds no pose; allowed: one or more");
+  if (trajectory.empty()) throw FileError(path.string(), "contains no pose; allowed: one or more");
   return trajectory;
 }
 

@@ -14,10 +14,10 @@ fs::path resolve_free_target(const fs::path& target) {
   std::error_code error;
   if (fs::exists(fs::symlink_status(target, error)) &&
       (!fs::is_directory(target, error) || !fs::is_empty(target, error))) {
-    throw FileError(target.string(), "is there already and not empty; allowed: a new folder");
+    throw FileError(target.string(), "already exists and is not empty; allowed: a new folder");
   }
   fs::path resolved = fs::weakly_canonical(fs::absolute(target), error);
-  if (error) throw FileError(target.string(), "cannot be made: " + error.message());
+  if (error) throw FileError(target.string(), "cannot be created: " + error.message());
   return resolved.has_filename() ? resolved : resolved.parent_path();
 }
 
@@ -26,12 +26,12 @@ fs::path resolve_free_target(const fs::path& target) {
 UnfinishedFolder::UnfinishedFolder(const fs::path& target) : target_(resolve_free_target(target)) {
   std::error_code error;
   fs::create_directories(target_.parent_path(), error);
-  if (error) throw FileError(target.string(), "cannot be made: " + error.message());
+  if (error) throw FileError(target.string(), "cannot be created: " + error.message());
   mark_.emplace(target_);
   path_ = mark_->path().string() + ".d";
   fs::remove_all(path_, error);  // of a process that was killed: the mark's name was free
   if (!fs::create_directory(path_, error)) {
-    throw FileError(target.string(), "cannot be made: " + error.message());
+    throw FileError(target.string(), "cannot be created: " + error.message());
   }
 }
 
@@ -43,7 +43,7 @@ UnfinishedFolder::~UnfinishedFolder() {
 void UnfinishedFolder::finish() {
   std::error_code error;
   fs::rename(path_, target_, error);
-  if (error) throw FileError(target_.string(), "cannot be made: " + error.message());
+  if (error) throw FileError(target_.string(), "cannot be created: " + error.message());
 }
 
 }  // namespace panonav

@@ -163,7 +163,7 @@ void VisualMemory::append_with_id(ViewId id, const PackedSignature& signature, R
   require_signature(signature, memory.shape);
   if (info.name.empty()) throw ContractError("view name", "empty", "at least one character");
   if (memory.names.contains(info.name)) {
-    throw ContractError("view name", "\"" + info.name + "\", which the memory already holds",
+    throw ContractError("view name", "\"" + info.name + "\", which the memory already contains",
                         "a name that is unique");
   }
   require_pose(info.pose);

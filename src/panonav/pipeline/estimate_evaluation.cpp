@@ -24,7 +24,7 @@ Estimate read_map(const std::filesystem::path& path) {
   const MemoryFile file = MemoryFile::open(path, Access::read_only);
   auto map = file.map("map");
   if (!map || map->nodes.empty()) {
-    throw FileError(path.string(), "holds no map; allowed: a memory file that panonav map made");
+    throw FileError(path.string(), "contains no map; allowed: a memory file that panonav map made");
   }
   const VisualMemory memory = file.load();
   Estimate estimate;

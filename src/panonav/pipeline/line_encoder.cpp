@@ -114,7 +114,7 @@ std::string find_route_name(const MemoryFile& memory, const std::optional<std::s
   std::string all;
   for (const auto& known : names) all += (all.empty() ? "" : ", ") + known;
   if (names.empty()) {
-    throw FileError(memory.path().string(), "holds no route; allowed: one that was recorded");
+    throw FileError(memory.path().string(), "contains no route; allowed: one that was recorded");
   }
   if (!name) {
     if (names.size() == 1) return names.front();
@@ -123,7 +123,7 @@ std::string find_route_name(const MemoryFile& memory, const std::optional<std::s
   }
   if (std::ranges::find(names, *name) == names.end()) {
     throw FileError(memory.path().string(),
-                    "holds no route '" + *name + "'; allowed for the option name: " + all);
+                    "contains no route '" + *name + "'; allowed for the option name: " + all);
   }
   return *name;
 }

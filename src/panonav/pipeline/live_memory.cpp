@@ -114,7 +114,8 @@ struct LiveMemory::Implementation {
       memoriser.emplace(path, options.memoriser);
       if (!options.in_step) storer.emplace(*memoriser);
     } else if (!exists) {
-      throw FileError(without_passwords(path.string()), "is not there, and nothing is to be added");
+      throw FileError(without_passwords(path.string()),
+                      "does not exist, and nothing is to be added");
     }
     if (options.update && exists && (!options.add || can_be_updated())) {
       updater.emplace(path, options.update_options);

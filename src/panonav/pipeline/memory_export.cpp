@@ -123,7 +123,7 @@ MemoryExport export_memory(const MemoryFile& memory, const fs::path& folder,
                            const std::function<void()>& advance) {
   const MemoryHeader& header = memory.header();
   const auto views = list_views(memory);
-  if (views.empty()) throw FileError(memory.path().string(), "holds no view to export");
+  if (views.empty()) throw FileError(memory.path().string(), "contains no view to export");
   UnfinishedFolder unfinished(folder);
   const fs::path& out = unfinished.path();
   MemoryExport done{.views = views.size()};

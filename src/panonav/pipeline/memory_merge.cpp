@@ -307,7 +307,7 @@ MergedMemory merge_memories(const std::filesystem::path& first, const std::files
   require_comparable(a, b);
   if (memory_exists(memory)) {
     throw FileError(without_passwords(memory.string()),
-                    "is there already; a merged memory is a new one");
+                    "already exists; a merged memory is a new one");
   }
   const bool on_server = is_server_address(memory);
   TemporaryFile unfinished(on_server ? fs::temp_directory_path() / "merged.panonav" : memory);

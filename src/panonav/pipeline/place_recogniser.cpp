@@ -65,7 +65,7 @@ void check_options(const PlaceRecogniserOptions& options, const MemoryHeader& he
 }
 
 [[noreturn]] void refuse_empty(const MemoryFile& file) {
-  throw FileError(file.path().string(), "holds no view; memorise a recording first");
+  throw FileError(file.path().string(), "contains no view; memorise a recording first");
 }
 
 }  // namespace

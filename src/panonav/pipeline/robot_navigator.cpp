@@ -51,7 +51,7 @@ NavigationGraph load_requested_graph(
     const std::optional<RobotNavigatorOptions::GraphOrigin>& requested,
     RobotNavigatorOptions::GraphOrigin& origin, Executor& executor) {
   const std::string path = source.file().path().string();
-  if (source.views().empty()) throw FileError(path, "holds no views; allowed: 2 or more");
+  if (source.views().empty()) throw FileError(path, "contains no views; allowed: 2 or more");
   if (requested) {
     origin = *requested;
     auto graph = load_graph(origin, source, executor);
@@ -75,7 +75,7 @@ KnownRoute load_known_route(const MemoryFileViews& source, const std::string& na
   if (!file.route(name)) {
     std::string all;
     for (const auto& known : file.route_names()) all += (all.empty() ? "" : ", ") + known;
-    throw FileError(path, "holds no route '" + name + "'; allowed for the option route: " +
+    throw FileError(path, "contains no route '" + name + "'; allowed for the option route: " +
                               (all.empty() ? "none, as none was recorded" : all));
   }
   const RoutePanorama route = load_route_to_follow(file, name);

@@ -61,7 +61,7 @@ void create_postgresql_memory(const ServerAddress& address, const MemoryHeader& 
                          ") ON CONFLICT DO NOTHING RETURNING id, channel",
                      values);
   if (made.size() == 0) {
-    throw FileError(address.printable.native(), "is there already; allowed: a name that is free");
+    throw FileError(address.printable.native(), "already exists; allowed: a name that is free");
   }
   PostgresqlTables tables(address, std::move(connection), made.integer(0, 0),
                           std::string(made.text(0, 1)));

@@ -206,7 +206,7 @@ std::optional<V4l2Camera::Frame> V4l2Camera::next(int stop) {
       if (errno == EAGAIN && (waits[0].revents & (POLLERR | POLLHUP)) == 0) continue;
       fail(std::string("has gone: ") + std::strerror(errno));
     }
-    if (buffer.index >= buffers_.size()) fail("names a buffer that is not there");
+    if (buffer.index >= buffers_.size()) fail("names a buffer that does not exist");
     const bool damaged = (buffer.flags & V4L2_BUF_FLAG_ERROR) != 0;
     Frame frame;
     if (!damaged) {

@@ -188,7 +188,7 @@ fs::path GazeboFiles::find_description(const fs::path& folder) {
   for (fs::directory_iterator it(folder, code), end; !code && it != end; it.increment(code)) {
     if (it->path().extension() == ".sdf") others.push_back(it->path());
   }
-  if (others.empty()) throw FileError(folder.string(), "holds no model description (model.sdf)");
+  if (others.empty()) throw FileError(folder.string(), "contains no model description (model.sdf)");
   return *std::min_element(others.begin(), others.end());
 }
 

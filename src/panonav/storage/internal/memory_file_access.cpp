@@ -115,7 +115,7 @@ void prepare_for_changes(Database& database) {
 }
 
 [[noreturn]] void refuse_existing(const fs::path& path) {
-  throw FileError(path.string(), "is there already; allowed: a name that is free");
+  throw FileError(path.string(), "already exists; allowed: a name that is free");
 }
 
 void require_free_name(const fs::path& path) {
@@ -124,16 +124,16 @@ void require_free_name(const fs::path& path) {
   if (fs::exists(fs::symlink_status(path, ignored))) refuse_existing(path);
   const fs::path folder = parent_folder(path);
   if (!fs::is_directory(folder, ignored)) {
-    throw FileError(name, "cannot be made: there is no folder " + folder.string());
+    throw FileError(name, "cannot be created: there is no folder " + folder.string());
   }
   if (!is_writable(folder)) {
-    throw FileError(name, "cannot be made: no permission to write in " + folder.string());
+    throw FileError(name, "cannot be created: no permission to write in " + folder.string());
   }
   // A log without its file would be used as this file's own.
   for (const char* suffix : {"-wal", "-shm", "-journal"}) {
     const fs::path stray = with_suffix(path, suffix);
     if (fs::exists(fs::symlink_status(stray, ignored))) {
-      throw FileError(name, "cannot be made: " + stray.string() +
+      throw FileError(name, "cannot be created: " + stray.string() +
                                 " of an earlier file of that name is in the way");
     }
   }
@@ -145,7 +145,7 @@ void link_to_final_name(const fs::path& unfinished, const fs::path& path) {
     if (errno == EEXIST) refuse_existing(path);
     if ((errno != EPERM && errno != EOPNOTSUPP && errno != ENOSYS) ||
         ::rename(unfinished.c_str(), path.c_str()) != 0) {
-      throw FileError(path.string(), "cannot be made: " + system_message());
+      throw FileError(path.string(), "cannot be created: " + system_message());
     }
   }
   sync_folder(parent_folder(path));

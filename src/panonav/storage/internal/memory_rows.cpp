@@ -65,7 +65,7 @@ void refuse_view(ViewId view) {
 void refuse_used_name(std::string_view what, std::string_view name,
                       const std::filesystem::path& file) {
   throw ContractError(std::string(what) + " name",
-                      "\"" + std::string(name) + "\", which " + file.string() + " already holds",
+                      "\"" + std::string(name) + "\", which " + file.string() + " already contains",
                       "a name that is unique");
 }
 
