@@ -8,19 +8,22 @@ namespace panonav::ros2 {
 void visit_options(LocalisationNodeOptions& options, OptionVisitor& visitor) {
   using T = LocalisationNodeOptions;
   constexpr OptionTable table{
-      choice<&T::motion>("where motion is read: the topic odom, or TF", "odometry", "tf"),
-      choice<&T::pictures>("the topic image, or image/compressed", "raw", "compressed"),
-      option<&T::transform_tolerance_s>("how far the transform is dated ahead", 0, 60),
-      option<&T::transform_rate_hz>("how often the transform is sent", above(0), 1000),
-      option<&T::use_sim_time>("time is what the topic /clock says"),
-      option<&T::tilt_from_imu>("level pictures by the orientation on the topic imu"),
-      option<&T::command_timeout_s>("a driven robot stops after this time without a picture",
+      choice<&T::motion>("source of the robot's motion: the topic odom, or TF", "odometry", "tf"),
+      choice<&T::pictures>("type of the image topic: image, or image/compressed", "raw",
+                           "compressed"),
+      option<&T::transform_tolerance_s>("time by which the stamp of the transform is in the future",
+                                        0, 60),
+      option<&T::transform_rate_hz>("rate at which the transform is sent", above(0), 1000),
+      option<&T::use_sim_time>("use the time of the topic /clock"),
+      option<&T::tilt_from_imu>("level images with the orientation on the topic imu"),
+      option<&T::command_timeout_s>("time without an image after which a robot on its path stops",
                                     above(0), 60),
-      option<&T::resume_s>("a node that died and is started again within this time continues the "
-                           "goal it had; 0: never",
-                           0, 86400),
-      option<&T::camera_x_m>("camera in front of the base frame's origin", -10, 10),
-      option<&T::camera_y_m>("and to its left", -10, 10),
+      option<&T::resume_s>(
+          "time within which a restarted node continues to its last goal; 0: never", 0, 86400),
+      option<&T::camera_x_m>(
+          "position of the camera: distance in front of the origin of the base frame", -10, 10),
+      option<&T::camera_y_m>(
+          "position of the camera: distance to the left of the origin of the base frame", -10, 10),
   };
   table.visit(options, visitor);
 }

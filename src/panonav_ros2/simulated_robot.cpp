@@ -17,10 +17,11 @@ namespace panonav::ros2 {
 void visit_options(SimulatedRobotOptions& options, OptionVisitor& visitor) {
   using T = SimulatedRobotOptions;
   constexpr OptionTable table{
-      option<&T::picture_rate_hz>("pictures in a second of the simulation", 0.001, 100),
-      option<&T::odometry_rate_hz>("odometry in a second of the simulation", 0.001, 1000),
-      option<&T::time_factor>("seconds of the simulation in a second", 0.001, 100),
-      option<&T::velocity_timeout_s>("after so long without a command the robot stops", 0.001, 60),
+      option<&T::picture_rate_hz>("images per second of the simulation", 0.001, 100),
+      option<&T::odometry_rate_hz>("odometry messages per second of the simulation", 0.001, 1000),
+      option<&T::time_factor>("seconds of the simulation per second", 0.001, 100),
+      option<&T::velocity_timeout_s>("time without a command after which the robot stops", 0.001,
+                                     60),
   };
   table.visit(options, visitor);
 }

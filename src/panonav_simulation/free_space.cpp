@@ -60,10 +60,11 @@ void visit_options(FreeSpaceOptions& options, OptionVisitor& visitor) {
   using T = FreeSpaceOptions;
   constexpr OptionTable table{
       option<&T::robot_radius_m>("radius of the robot", 0, 10),
-      option<&T::robot_height_m>("height below which things are in the robot's way", above(0), 100),
-      option<&T::step_height_m>("height below which things are driven over", 0, 10),
+      option<&T::robot_height_m>("height of the robot; objects below this height are obstacles",
+                                 above(0), 100),
+      option<&T::step_height_m>("largest height of objects that the robot can drive over", 0, 10),
       option<&T::floor_height_m>("height of the floor in the scene"),
-      option<&T::cell_m>("side of the cells of the map of free space", 0.001, 1),
+      option<&T::cell_m>("cell size of the map of free space", 0.001, 1),
   };
   table.visit(options, visitor);
 }

@@ -34,7 +34,7 @@ std::vector<Pose2> plan_tour(const Scene& scene, const FreeSpace& space,
     stations = scene.tour;
     stations.push_back(stations.front());
   }
-  require(stations.size() >= 2, "way points of a tour", static_cast<double>(stations.size()),
+  require(stations.size() >= 2, "waypoints of a tour", static_cast<double>(stations.size()),
           ">= 2, or a scene that has a tour");
   std::vector<Pose2> line;
   for (std::size_t i = 1; i < stations.size(); ++i) {
@@ -43,7 +43,7 @@ std::vector<Pose2> plan_tour(const Scene& scene, const FreeSpace& space,
                          : space.shortest_path(stations[i - 1], stations[i]);
     if (!way) {
       const Point2 blocked = space.is_free(stations[i]) ? stations[i - 1] : stations[i];
-      throw ContractError("way point", format_point(blocked), "a free place of the scene");
+      throw ContractError("waypoint", format_point(blocked), "a free place of the scene");
     }
     for (const Point2 point : *way) line.push_back({point.x_m, point.y_m, 0.0});
   }
@@ -117,13 +117,14 @@ Viewpoint make_viewpoint(const Pose2& pose, const FrameOptions& options, std::ui
 void visit_options(RecordingOptions& options, OptionVisitor& visitor) {
   using T = RecordingOptions;
   constexpr OptionTable table{
-      choice<&T::path>("where the robot takes its pictures", "grid", "zigzag", "tour", "walk",
-                       "random"),
-      choice<&T::heading>("which way the robot faces", "fixed", "path", "random"),
-      option<&T::heading_rad>("the fixed heading"),
-      option<&T::spacing_m>("spacing of the grid, or along the path", 0.001, 1000),
-      option<&T::poses>("number of poses of a walk, or of random ones", 1, 1e7),
-      option<&T::speed_m_s>("speed of the robot, which gives the time stamps", 0.001, 100),
+      choice<&T::path>("positions at which the robot takes images", "grid", "zigzag", "tour",
+                       "walk", "random"),
+      choice<&T::heading>("heading of the robot at each position", "fixed", "path", "random"),
+      option<&T::heading_rad>("heading for --heading fixed"),
+      option<&T::spacing_m>("spacing of the grid, or distance of images along the path", 0.001,
+                            1000),
+      option<&T::poses>("number of poses of a walk, or number of random poses", 1, 1e7),
+      option<&T::speed_m_s>("speed of the robot; it gives the stamps", 0.001, 100),
   };
   table.visit(options, visitor);
 }
@@ -132,8 +133,8 @@ void visit_options(FrameOptions& options, OptionVisitor& visitor) {
   using T = FrameOptions;
   constexpr OptionTable table{
       option<&T::camera_height_m>("height of the camera above the floor", above(0), 100),
-      option<&T::tilt_rad>("tilt of the robot, in a random direction at each place", 0, 0.5),
-      option<&T::rays_per_axis>("rays per pixel and axis through a camera", 1, 8),
+      option<&T::tilt_rad>("tilt of the robot; its direction is random at each place", 0, 0.5),
+      option<&T::rays_per_axis>("rays per pixel and axis", 1, 8),
   };
   table.visit(options, visitor);
 }

@@ -155,9 +155,10 @@ void visit_options(SceneOptions& options, OptionVisitor& visitor) {
   constexpr OptionTable table{
       option<&T::seed>("seed of poses, noise, tilt and odometry", 0),
       option<&T::scene_seed>("seed of the textures and furniture of built-in scenes", 0),
-      option<&T::moved_objects>("share of the movable objects that stand elsewhere", 0, 1),
-      option<&T::moved_seed>("seed of which objects are moved, and where to", 0),
-      option<&T::light>("factor on the brightness of all lamps and the sky", above(0), 100),
+      option<&T::moved_objects>("share of the movable objects that are moved to another position",
+                                0, 1),
+      option<&T::moved_seed>("seed for the choice and the new positions of moved objects", 0),
+      option<&T::light>("factor for the brightness of all lamps and the sky", above(0), 100),
   };
   table.visit(options, visitor);
 }
@@ -165,16 +166,16 @@ void visit_options(SceneOptions& options, OptionVisitor& visitor) {
 void visit_options(SimulationOptions& options, OptionVisitor& visitor) {
   using T = SimulationOptions;
   constexpr OptionTable table{
-      choice<&T::kind>("what the camera writes: dual-fisheye is the picture of a 360 degree camera "
-                       "before it is stitched",
-                       "mirror", "panorama", "dual-fisheye"),
+      choice<&T::kind>(
+          "type of the images; dual-fisheye: the image of a 360 degree camera before stitching",
+          "mirror", "panorama", "dual-fisheye"),
       option<&T::rows>("rows of panoramas", 1, 4096),
       option<&T::columns>("columns of panoramas", 4, 16384),
       option<&T::elevation_low_deg>("lower edge of panoramas", -90, 90),
       option<&T::elevation_high_deg>("upper edge of panoramas", -90, 90),
-      option<&T::lens_seed>("seed of how the two lenses are misaligned and differ; 0: not at all",
+      option<&T::lens_seed>("seed of the misalignment and differences of the two lenses; 0: none",
                             0),
-      option<&T::lens_distance_m>("distance of the two lenses, which gives near things a parallax",
+      option<&T::lens_distance_m>("distance of the two lenses; it causes parallax of near objects",
                                   0, 1),
       options_of<&T::scene>(),
   };

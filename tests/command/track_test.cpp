@@ -338,7 +338,7 @@ TEST_F(Track, WithoutOdometryMotionIsReadFromThePicturesAndItSaysSo) {
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_TRUE(contains(result.err,
                        "has no odometry (columns odom_x_m,odom_y_m,odom_heading_deg); "
-                       "motion is read from the images"));
+                       "motion is computed from the images"));
   std::vector<double> errors;
   for (const json& image : tracked({folder})) {
     if (image["state"] != "localised") continue;
@@ -354,7 +354,7 @@ TEST_F(Track, WithoutOdometryMotionIsReadFromThePicturesAndItSaysSo) {
   for (const char* table : {"dataset.toml", "poses.csv"}) std::filesystem::remove(folder / table);
   const auto bare = run_panonav({"track", memory(), folder});
   EXPECT_EQ(bare.exit_code, 0) << bare.err;
-  EXPECT_TRUE(contains(bare.err, "motion is read from the images"));
+  EXPECT_TRUE(contains(bare.err, "motion is computed from the images"));
 }
 
 }  // namespace

@@ -148,7 +148,7 @@ std::unique_ptr<recordings::LiveObservations> open_live(
   }
   const auto stated = picture_source(pictures);
   if (!stated && !remembered) {
-    throw UsageError("set --kind to the type of the images of " + input + "");
+    throw UsageError("set --kind to the type of the images of " + input);
   }
   recordings::LiveOptions options;
   options.note = [&session](const std::string& line) { session.note(line); };

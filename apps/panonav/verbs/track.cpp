@@ -212,7 +212,7 @@ class LiveTrack {
         odometry_(visual_odometry(tracker_.memory())),
         record_(arguments.record, std::span(&arguments.memory, 1), true, session,
                 {.memory = arguments.memory, .takes = viewer::ViewWish::pose}) {
-    session.note("panonav track: motion is read from the images; one unit of the views is " +
+    session.note("panonav track: motion is computed from the images; one unit of the views is " +
                  format_number(odometry_.scale_m()) + " m, as in the memory");
     set_start(tracker_, arguments);
     if (record_.is_active()) shown_.emplace(tracker_.memory());
@@ -315,7 +315,7 @@ void write_localised(const std::string& path, const std::vector<TrackedImage>& i
 /// Adds the odometry that the pictures themselves show, and says so.
 void read_motion(Dataset& run, const std::string& name, const Tracker& tracker, Session& session) {
   session.note("panonav track: " + to_readable_line(name) +
-               " has no odometry (columns odom_x_m,odom_y_m,odom_heading_deg); motion is read "
+               " has no odometry (columns odom_x_m,odom_y_m,odom_heading_deg); motion is computed "
                "from the images, " +
                add_visual_odometry(run, tracker.memory(), tracker.encoder(), session.executor()));
 }

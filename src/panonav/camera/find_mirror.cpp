@@ -289,15 +289,15 @@ std::optional<Search> search_mirror(const SearchFields& seen, std::span<const Sm
 void visit_options(MirrorCircle::SearchOptions& options, OptionVisitor& visitor) {
   using T = MirrorCircle::SearchOptions;
   constexpr OptionTable table{
-      option<&T::min_rim>("smallest radius of the mirror's rim, in shorter sides of the image",
-                          above(0), 2),
-      option<&T::max_rim>("largest radius of the mirror's rim, in longer sides of the image",
-                          above(0), 2),
-      option<&T::visible_fraction>("smallest part of the rim that must lie inside the frame", 0.25,
-                                   1),
+      option<&T::min_rim>(
+          "smallest radius of the mirror's rim, as a share of the image's shorter side", above(0),
+          2),
+      option<&T::max_rim>(
+          "largest radius of the mirror's rim, as a share of the image's longer side", above(0), 2),
+      option<&T::visible_fraction>("smallest share of the rim inside the image", 0.25, 1),
       option<&T::min_quality>(
-          "lowest quality of a rim, from 0 (any circle) to 1 (a sharp edge all around)", above(0),
-          1),
+          "lowest quality of the rim, from 0 (any circle) to 1 (a sharp edge on the whole circle)",
+          above(0), 1),
   };
   table.visit(options, visitor);
 }

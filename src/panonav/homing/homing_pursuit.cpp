@@ -24,19 +24,20 @@ constexpr double agreeing_factor = 1.25;
 void visit_options(HomingPursuitOptions& options, OptionVisitor& visitor) {
   using T = HomingPursuitOptions;
   constexpr OptionTable table{
-      choice<&T::strategy>("which frequencies count at which stage", "steady", "coarse_to_fine",
+      choice<&T::strategy>("choice of the frequencies of each stage", "steady", "coarse_to_fine",
                            "recovering"),
       option<&T::coarse>("highest frequency of the first stage", 1, 62),
       option<&T::middle>("highest frequency of the second stage", 1, 62),
       option<&T::fine>("highest frequency of the third stage", 1, 62),
-      option<&T::typical_distance_m>("typical distance of the things around", 0.001, 1000),
-      option<&T::max_step_m>("longest path between two views", 0.001, 100),
-      option<&T::stop_length>("homing stops when the vector is shorter, in units of R", 0, 1),
-      option<&T::min_step_m>("homing stops when the step is shorter", above(0), 100),
+      option<&T::typical_distance_m>("typical distance of the objects around", 0.001, 1000),
+      option<&T::max_step_m>("longest step between two views", 0.001, 100),
+      option<&T::stop_length>("homing stops if the home vector is shorter than this, in units of R",
+                              0, 1),
+      option<&T::min_step_m>("homing stops if a step is shorter than this", above(0), 100),
       option<&T::patience>(
-          "homing stops when the views became no more similar for this number of steps", 1, 1e6),
-      option<&T::max_steps>("steps after which a run ends", 1, 1e6),
-      option<&T::arrived_difference>("largest difference of the views at home", 0, 2),
+          "homing stops if the views do not become more similar for this number of steps", 1, 1e6),
+      option<&T::max_steps>("largest number of steps of a run", 1, 1e6),
+      option<&T::arrived_difference>("largest difference of the two views at home", 0, 2),
   };
   table.visit(options, visitor);
 }

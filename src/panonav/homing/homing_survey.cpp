@@ -64,12 +64,14 @@ void check_poses(std::span<const Pose2> poses, const char* what) {
 void visit_options(HomingSurveyOptions& options, OptionVisitor& visitor) {
   using T = HomingSurveyOptions;
   constexpr OptionTable table{
-      option<&T::typical_distance_m>("distance of things: what a home vector of length 1 is worth",
-                                     1e-3, 1e3),
-      option<&T::max_step_m>("longest path between two views", 1e-3, 1e3),
-      option<&T::obstacle_m>("distance from all places beyond which a step stops the run", 1e-3,
-                             1e3),
-      option<&T::max_steps>("steps after which a run stops", 1, 1e6),
+      option<&T::typical_distance_m>(
+          "typical distance of objects: the length in metres of a home vector of length 1", 1e-3,
+          1e3),
+      option<&T::max_step_m>("longest step between two views", 1e-3, 1e3),
+      option<&T::obstacle_m>("largest distance of a step's end from the nearest place; a larger "
+                             "distance stops the run",
+                             1e-3, 1e3),
+      option<&T::max_steps>("largest number of steps of a run", 1, 1e6),
   };
   table.visit(options, visitor);
 }

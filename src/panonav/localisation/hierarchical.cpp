@@ -64,9 +64,10 @@ std::optional<Circle> ReferenceAreas::enclosing_circle(std::span<const Match> vi
 void visit_options(LocalisationAccuracy& accuracy, OptionVisitor& visitor) {
   using T = LocalisationAccuracy;
   constexpr OptionTable table{
-      option<&T::components>("Fourier components compared at most, 0 for all", 0),
-      option<&T::radius_m>("stop as soon as the place is known to this radius, 0 for never", 0),
-      option<&T::tolerance>("candidates are kept up to 1 + tolerance times the best dissimilarity",
+      option<&T::components>("largest number of compared Fourier components; 0: all", 0),
+      option<&T::radius_m>("stop when the position is known within this radius; 0: never", 0),
+      option<&T::tolerance>("candidates are kept if their dissimilarity is at most (1 + tolerance) "
+                            "times the best one",
                             0),
   };
   table.visit(accuracy, visitor);

@@ -149,10 +149,10 @@ VisualMemory join_memories(const VisualMemory& part, const VisualMemory& drawn) 
 void visit_options(LocaliserOptions& options, OptionVisitor& visitor) {
   using T = LocaliserOptions;
   constexpr OptionTable table{
-      option<&T::top>("number of matches listed", 1, 1e6),
-      option<&T::components>("Fourier components compared, 0 for all", 0),
-      option<&T::reranked_views>("views compared column by column when the nearest ones do not "
-                                 "explain the picture; 0 keeps the order of dissimilarity",
+      option<&T::top>("number of listed matches", 1, 1e6),
+      option<&T::components>("number of compared Fourier components; 0: all", 0),
+      option<&T::reranked_views>("number of views compared column by column if the most similar "
+                                 "views do not match the image; 0: keep the order of dissimilarity",
                                  0, 1e6),
   };
   table.visit(options, visitor);
@@ -355,7 +355,7 @@ Localiser::Localiser(const VisualMemory& memory, const PlaceModel& place_model,
   validate(options);
   held_ = std::make_shared<const ComparedViews>(memory, options, spacing_m, 0);
   require(position_model_.components == options_.components, "components of the position model",
-          position_model_.components, to_text(options_.components) + ", as asked for");
+          position_model_.components, to_text(options_.components) + ", as requested");
 }
 
 Localiser::Localiser(std::shared_ptr<const VisualMemory> drawn, const PlaceModel& place_model,
@@ -368,7 +368,7 @@ Localiser::Localiser(std::shared_ptr<const VisualMemory> drawn, const PlaceModel
       position_model_(position_model) {
   validate(options);
   require(position_model_.components == options_.components, "components of the position model",
-          position_model_.components, to_text(options_.components) + ", as asked for");
+          position_model_.components, to_text(options_.components) + ", as requested");
 }
 
 Place Localiser::localise(const PackedSignature& query, const SearchMask& mask,

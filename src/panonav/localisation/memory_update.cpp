@@ -29,11 +29,13 @@ constexpr double new_image_spacings = 0.25;
 void visit_options(MemoryUpdateOptions& options, OptionVisitor& visitor) {
   using T = MemoryUpdateOptions;
   constexpr OptionTable table{
-      option<&T::appearances>("views of one place that learning keeps beside each other", 1, 100),
-      option<&T::failures>("runs in a row in which a view failed before it is forgotten", 1, 1e6),
-      option<&T::max_views>("views that learning lets the memory grow to; 0: 'appearances' times "
-                            "its places",
-                            0, 4e9),
+      option<&T::appearances>("largest number of views of the same place with different appearance",
+                              1, 100),
+      option<&T::failures>(
+          "number of consecutive runs without a match after which a view is deleted", 1, 1e6),
+      option<&T::max_views>(
+          "largest number of views in the memory; 0: 'appearances' times the number of places", 0,
+          4e9),
   };
   table.visit(options, visitor);
 }

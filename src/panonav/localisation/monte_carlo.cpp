@@ -315,16 +315,18 @@ struct MonteCarloLocaliser::Implementation {
 void visit_options(MonteCarloOptions& options, OptionVisitor& visitor) {
   using T = MonteCarloOptions;
   constexpr OptionTable table{
-      option<&T::min_particles>("fewest particles", 1, 1e7),
-      option<&T::max_particles>("most particles", 1, 1e7),
+      option<&T::min_particles>("smallest number of particles", 1, 1e7),
+      option<&T::max_particles>("largest number of particles", 1, 1e7),
       option<&T::kld_error>(
-          "allowed error of the particles' distribution; smaller needs more particles", 1e-4, 1),
+          "allowed error of the particles' distribution; a smaller error needs more particles",
+          1e-4, 1),
       option<&T::resample_below>(
-          "effective sample size below which particles are resampled, as a share of them", 0, 1),
-      option<&T::compass>("weigh headings by the visual compass"),
-      choice<&T::injection>("where new particles are drawn", "none", "explained"),
+          "effective sample size below which particles are resampled, as a share of their number",
+          0, 1),
+      option<&T::compass>("weight the headings of particles with the visual compass"),
+      choice<&T::injection>("positions of new particles", "none", "explained"),
       option<&T::reranked_views>(
-          "views compared column by column when no near one explains the image", 0, 1e6),
+          "number of views compared column by column if no near view matches the image", 0, 1e6),
       option<&T::seed>("seed of all random choices", 0),
   };
   table.visit(options, visitor);

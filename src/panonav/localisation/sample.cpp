@@ -10,9 +10,10 @@ namespace panonav {
 void visit_options(LearningOptions& options, OptionVisitor& visitor) {
   using T = LearningOptions;
   constexpr OptionTable table{
-      option<&T::sampled_views>("views left out in turn to learn from", 8, 1e6),
-      option<&T::compared_views>("views with which each of them is compared", 8, 1e6),
-      option<&T::seed>("seed of the draws", 0),
+      option<&T::sampled_views>("number of views that are used as test images to learn the models",
+                                8, 1e6),
+      option<&T::compared_views>("number of views with which each test image is compared", 8, 1e6),
+      option<&T::seed>("seed of the random selection", 0),
   };
   table.visit(options, visitor);
 }

@@ -312,11 +312,13 @@ class Arranger {
 void visit_options(LatticeOptions& options, OptionVisitor& visitor) {
   using T = LatticeOptions;
   constexpr OptionTable table{
-      option<&T::neighbours>("springs of each view to the most similar views", 1, 1000),
-      option<&T::components>("Fourier components compared, 0 for all", 0),
-      option<&T::phases>("take directions and headings from phases"),
-      option<&T::landmarks>("views from which the initial arrangement is made", 3, 2000),
-      option<&T::rounds>("times that curve and springs are made again from the arrangement", 1, 20),
+      option<&T::neighbours>("number of most similar views to which each view is connected", 1,
+                             1000),
+      option<&T::components>("number of compared Fourier components; 0: all", 0),
+      option<&T::phases>("compute directions and headings from the phases"),
+      option<&T::landmarks>("number of views in the initial arrangement", 3, 2000),
+      option<&T::rounds>("number of times that the springs are computed again from the arrangement",
+                         1, 20),
   };
   table.visit(options, visitor);
 }
@@ -324,11 +326,11 @@ void visit_options(LatticeOptions& options, OptionVisitor& visitor) {
 void visit_options(CoarseMotionOptions& options, OptionVisitor& visitor) {
   using T = CoarseMotionOptions;
   constexpr OptionTable table{
-      option<&T::distance_deviation>("standard deviation of a step's length, as a share of it",
-                                     above(0), 10),
+      option<&T::distance_deviation>(
+          "standard deviation of a step's length, as a share of the length", above(0), 10),
       option<&T::direction_deviation_rad>("standard deviation of the direction of travel", above(0),
                                           std::numbers::pi),
-      option<&T::turn_deviation_rad>("standard deviation of a step's turn", above(0),
+      option<&T::turn_deviation_rad>("standard deviation of a step's rotation", above(0),
                                      std::numbers::pi),
   };
   table.visit(options, visitor);

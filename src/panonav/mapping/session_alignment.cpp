@@ -217,13 +217,13 @@ class Matches {
 void visit_options(SessionAlignmentOptions& options, OptionVisitor& visitor) {
   using T = SessionAlignmentOptions;
   constexpr OptionTable table{
-      option<&T::min_places>("places in common that must agree before two sessions are joined", 1,
-                             1000000),
-      option<&T::min_confirmed>(
-          "share of the places where both maps lie upon each other that must match", 0, 1),
-      option<&T::distinctness>("factor by which fewer places may agree on any other alignment", 1,
-                               1e6),
-      option<&T::max_drift>("drift of both maps for each metre between two places", 0, 100),
+      option<&T::min_places>("number of common places that must agree before two maps are joined",
+                             1, 1000000),
+      option<&T::min_confirmed>("share of the places in the overlap of both maps that must match",
+                                0, 1),
+      option<&T::distinctness>(
+          "factor by which the second best alignment must have fewer agreeing places", 1, 1e6),
+      option<&T::max_drift>("assumed drift of both maps per metre between two places", 0, 100),
   };
   table.visit(options, visitor);
 }

@@ -56,15 +56,16 @@ ViewId representative(const Representatives& kept, ViewId view) {
 void visit_options(SparseMemoryOptions& options, OptionVisitor& visitor) {
   using T = SparseMemoryOptions;
   constexpr OptionTable table{
-      option<&T::max_difference>("largest difference from a kept view at which a view is redundant",
-                                 0, 1),
+      option<&T::max_difference>("largest difference between a redundant view and a kept view", 0,
+                                 1),
       option<&T::reach_m>(
-          "distance within which a view stands for another, where positions are known", above(0),
-          1e6),
-      option<&T::reach_links>(
-          "links within which a view stands for another, where positions are not known", 0, 1000),
+          "largest distance between a redundant view and a kept view if positions are known",
+          above(0), 1e6),
+      option<&T::reach_links>("largest number of links between a redundant view and a kept view if "
+                              "positions are unknown",
+                              0, 1000),
       option<&T::outdated_within_m>(
-          "distance of a newer view within which a view is outdated; 0: never", 0, 1e6),
+          "a view is outdated if a newer view is within this distance; 0: never", 0, 1e6),
   };
   table.visit(options, visitor);
 }

@@ -58,14 +58,16 @@ void visit_options(MappingOptions& options, OptionVisitor& visitor) {
   using T = MappingOptions;
   constexpr OptionTable table{
       option<&T::capture_difference>(
-          "difference from the last node above which a view becomes a node; 0: every view", 0, 1),
-      option<&T::close_loops>("look for places passed before"),
-      option<&T::bridge_m>(
-          "length of steps that neither views nor wheels show; 0: a new component begins", 0, 1e6),
-      option<&T::wheels>("take steps from the wheels, and the turn from the views, too"),
-      option<&T::step_deviation>("deviation of positions read from views, for each metre", above(0),
+          "difference from the last stored view above which a view is stored; 0: store every view",
+          0, 1),
+      option<&T::close_loops>("search for loop closures"),
+      option<&T::bridge_m>("assumed length of a step that neither images nor odometry show; 0: "
+                           "start a new component",
+                           0, 1e6),
+      option<&T::wheels>("use the odometry for steps, corrected by the rotation from the images"),
+      option<&T::step_deviation>("standard deviation of positions from images, per metre", above(0),
                                  10),
-      option<&T::turn_deviation>("deviation of headings read from views (rad), for each metre",
+      option<&T::turn_deviation>("standard deviation of headings from images (rad), per metre",
                                  above(0), 10),
   };
   table.visit(options, visitor);

@@ -71,20 +71,20 @@ std::optional<VisualStep> home_vector_step(const OdometryView& before, const Odo
 void visit_options(VisualOdometryOptions& options, OptionVisitor& visitor) {
   using T = VisualOdometryOptions;
   constexpr OptionTable table{
-      choice<&T::rule>("how the motion between two views is read", "published", "home_vector"),
-      option<&T::scale_m>("metres for each unit of length that the views give", above(0), 1e6),
+      choice<&T::rule>("method for the motion between two views", "published", "home_vector"),
+      option<&T::scale_m>("metres per unit of length that is computed from the views", above(0),
+                          1e6),
       option<&T::camera_height_m>(
-          "height of the camera above level ground, which then gives lengths; 0: not known", 0,
+          "height of the camera above level ground; it is used to compute lengths; 0: unknown", 0,
           100),
       option<&T::distance_components>(
-          "components compared for the distance of the published rule (k1); 0: all", 0, 4096),
+          "number of components for the distance in the published rule (k1); 0: all", 0, 4096),
       option<&T::turn_components>(
-          "components compared for the turn of the published rule (k2); 0: all", 0, 4096),
-      option<&T::iterations>("times that the home vector is refined", 0, 20),
+          "number of components for the rotation in the published rule (k2); 0: all", 0, 4096),
+      option<&T::iterations>("number of refinements of the home vector", 0, 20),
       option<&T::nearer_side>(
-          "take out of turns what things nearer on one side of the way do to them"),
-      option<&T::max_residual>("share of the views' energy that a step may leave unexplained", 0,
-                               1),
+          "correct rotations for objects that are nearer on one side of the path"),
+      option<&T::max_residual>("largest unexplained share of the views' energy after a step", 0, 1),
   };
   table.visit(options, visitor);
 }

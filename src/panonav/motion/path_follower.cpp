@@ -12,12 +12,12 @@ namespace panonav {
 void visit_options(PathFollowerOptions& options, OptionVisitor& visitor) {
   using T = PathFollowerOptions;
   constexpr OptionTable table{
-      option<&T::look_ahead_m>("distance along the path to the point that the robot steers to",
+      option<&T::look_ahead_m>("distance along the path to the point to which the robot steers",
                                0.01, 100),
       option<&T::max_cut_m>("largest distance of the path from the straight line to that point",
                             1e-3, 10),
-      option<&T::arrived_m>("distance from the end of the path at which the robot has arrived",
-                            1e-3, 10),
+      option<&T::arrived_m>("distance from the end of the path at which the robot arrives", 1e-3,
+                            10),
   };
   table.visit(options, visitor);
 }

@@ -59,12 +59,12 @@ void compute_relative_errors(const std::vector<Pair>& pairs, double distance_m,
 void visit_options(TrajectoryError::Options& options, OptionVisitor& visitor) {
   using T = TrajectoryError::Options;
   constexpr OptionTable table{
-      option<&T::max_gap_s>("longest gap of the truth over which it is interpolated", 0.001, 1e9),
-      option<&T::relative_distance_m>(
-          "distance along the true path over which the relative error is taken", 0.001, 1e7),
-      option<&T::align>("align the estimate with the truth first"),
-      option<&T::align_scale>("the alignment may change the scale"),
-      option<&T::align_reflection>("the alignment may be a mirror image"),
+      option<&T::max_gap_s>("longest gap in the true trajectory that is interpolated", 0.001, 1e9),
+      option<&T::relative_distance_m>("distance along the true path for the relative error", 0.001,
+                                      1e7),
+      option<&T::align>("align the estimate with the true trajectory first"),
+      option<&T::align_scale>("allow the alignment to change the scale"),
+      option<&T::align_reflection>("allow the alignment to mirror the estimate"),
   };
   table.visit(options, visitor);
 }

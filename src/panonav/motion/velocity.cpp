@@ -12,12 +12,13 @@ namespace panonav {
 void visit_options(BaseOptions& options, OptionVisitor& visitor) {
   using T = BaseOptions;
   constexpr OptionTable table{
-      choice<&T::drive>("how the robot moves", "differential", "holonomic"),
-      option<&T::speed_m_s>("highest speed", 0.001, 100),
-      option<&T::turn_rad_s>("highest speed of turning", 0.001, 100),
-      option<&T::period_s>("time for which a command holds", 0.001, 10),
-      option<&T::on_spot_rad>("a differential drive turns on the spot for larger angles", above(0),
-                              std::numbers::pi / 2),
+      choice<&T::drive>("drive of the robot", "differential", "holonomic"),
+      option<&T::speed_m_s>("largest speed", 0.001, 100),
+      option<&T::turn_rad_s>("largest rotation speed", 0.001, 100),
+      option<&T::period_s>("time for which a command is valid", 0.001, 10),
+      option<&T::on_spot_rad>("largest angle that a differential drive steers while driving; for "
+                              "larger angles it rotates on the spot",
+                              above(0), std::numbers::pi / 2),
   };
   table.visit(options, visitor);
 }

@@ -14,9 +14,9 @@ namespace panonav {
 void visit_options(FieldOptions& options, OptionVisitor& visitor) {
   using T = FieldOptions;
   constexpr OptionTable table{
-      option<&T::links_ahead>("edges ahead that count for a direction", 1, 100),
+      option<&T::links_ahead>("number of edges ahead that are used to compute a direction", 1, 100),
       option<&T::max_bend_rad>(
-          "bend of the path beyond which edges no longer count for a direction", 0,
+          "bend of the path after which edges are not used to compute a direction", 0,
           std::numbers::pi),
   };
   table.visit(options, visitor);

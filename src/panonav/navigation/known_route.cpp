@@ -13,8 +13,8 @@ namespace panonav {
 void visit_options(KnownRouteOptions& options, OptionVisitor& visitor) {
   using T = KnownRouteOptions;
   constexpr OptionTable table{
-      option<&T::max_lateral_m>("largest distance of references and robots beside a route",
-                                above(0), 100),
+      option<&T::max_lateral_m>("largest distance of a view or robot from the route", above(0),
+                                100),
       options_of<&T::tracker>(),
       options_of<&T::fit>(),
   };

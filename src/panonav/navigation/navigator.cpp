@@ -406,22 +406,23 @@ std::string describe(const NavigationDecision& decision) {
 void visit_options(NavigatorOptions& options, OptionVisitor& visitor) {
   using T = NavigatorOptions;
   constexpr OptionTable table{
-      option<&T::step_m>("longest path between two steps", 0.001, 100),
-      option<&T::near_links>("edges from the last place within which the next one is searched", 1,
-                             10),
-      option<&T::coarse_components>("components compared in the open, 0 for all", 0, 1000),
-      option<&T::views_ahead>("views of the next area that a step loads", 0, 1e6),
+      option<&T::step_m>("length of the longest step", 0.001, 100),
+      option<&T::near_links>(
+          "number of edges around the last place within which the next place is searched", 1, 10),
+      option<&T::coarse_components>("number of components compared in open space; 0: all", 0, 1000),
+      option<&T::views_ahead>("number of views of the next area that are loaded in a step", 0, 1e6),
       options_of<&T::homing>(),
       option<&T::min_agreeing_steps>(
-          "steps that must agree before another place or a block is believed", 1, 1000),
-      option<&T::lost_patience>("steps without a known place after which the robot is lost", 1,
-                                1e6),
-      option<&T::edge_patience>("steps without coming nearer after which an edge counts as blocked",
+          "number of steps that must agree before a new place or a blocked edge is accepted", 1,
+          1000),
+      option<&T::lost_patience>(
+          "number of steps without a known place after which the robot is lost", 1, 1e6),
+      option<&T::edge_patience>("number of steps without progress after which an edge is blocked",
                                 1, 1e6),
-      option<&T::min_leg_m>("shortest path along a recorded route that is worth a leg", 0.001,
+      option<&T::min_leg_m>("shortest part of a path for which a recorded route is used", 0.001,
                             1000),
-      option<&T::attempts>("times that blocked edges, or homing, are tried", 1, 1000),
-      option<&T::max_run_steps>("steps after which a run ends", 1, 1e9),
+      option<&T::attempts>("number of attempts at blocked edges and at homing", 1, 1000),
+      option<&T::max_run_steps>("largest number of steps of a run", 1, 1e9),
   };
   table.visit(options, visitor);
 }

@@ -14,8 +14,8 @@ namespace panonav {
 void visit_options(SubAreaOptions& options, OptionVisitor& visitor) {
   using T = SubAreaOptions;
   constexpr OptionTable table{
-      option<&T::views_per_area>("number of views that an area should have", 2, 1e6),
-      option<&T::iterations>("relaxation steps for each cut", 0, 1e5),
+      option<&T::views_per_area>("intended number of views in an area", 2, 1e6),
+      option<&T::iterations>("number of relaxation steps for each cut between areas", 0, 1e5),
   };
   table.visit(options, visitor);
 }

@@ -52,10 +52,11 @@ void replace_by_gradients(Panorama& panorama, int first_row, int end_row) {
 void visit_options(PreprocessingOptions& options, OptionVisitor& visitor) {
   using T = PreprocessingOptions;
   constexpr OptionTable table{
-      option<&T::masked_rows_top>("rows at the upper edge that count for nothing", 0),
-      option<&T::masked_rows_bottom>("rows at the lower edge that count for nothing", 0),
-      option<&T::edge_channel>("take the length of the grey gradient instead of grey"),
-      option<&T::remove_mean>("subtract the mean of the view"),
+      option<&T::masked_rows_top>("number of rows at the upper edge that are ignored", 0),
+      option<&T::masked_rows_bottom>("number of rows at the lower edge that are ignored", 0),
+      option<&T::edge_channel>(
+          "use the length of the brightness gradient instead of the brightness"),
+      option<&T::remove_mean>("subtract the mean brightness of the view"),
       option<&T::normalise_gain>("scale the contrast of every view to the same standard deviation"),
   };
   table.visit(options, visitor);

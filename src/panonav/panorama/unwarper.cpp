@@ -48,9 +48,9 @@ Panorama unwrap_picture(const Camera& camera, ImageView image, const ElevationBa
 void visit_options(UnwarperOptions& options, OptionVisitor& visitor) {
   using T = UnwarperOptions;
   constexpr OptionTable table{
-      option<&T::rows>("rows of the panoramic cylinder", 1, 4096),
-      option<&T::columns>("columns of the panoramic cylinder", 4, 16384),
-      no_option<&T::elevations>("a band, which dataset.toml and verbs give in degrees"),
+      option<&T::rows>("rows of the panorama", 1, 4096),
+      option<&T::columns>("columns of the panorama", 4, 16384),
+      no_option<&T::elevations>("a valid range (dataset.toml and verbs use degrees)"),
   };
   table.visit(options, visitor);
 }

@@ -207,11 +207,13 @@ void visit_options(SignatureOptions& options, OptionVisitor& visitor) {
   using T = SignatureOptions;
   constexpr OptionTable table{
       option<&T::rows>(
-          "Rows of the panoramic cylinder; pictures are resampled; 0: 80, or a panorama's own", 0,
+          "Rows of the panorama; images are resampled; 0: 80, or the rows of the given panorama", 0,
           4096),
-      option<&T::columns>(
-          "Columns of the panoramic cylinder, likewise; 0: 512, or a panorama's own", 0, 16384),
-      option<&T::components>("Fourier components of a signature, k = 0 included", 1, 1024),
+      option<&T::columns>("Columns of the panorama; images are resampled; 0: 512, or the columns "
+                          "of the given panorama",
+                          0, 16384),
+      option<&T::components>("Number of Fourier components of a signature, including k = 0", 1,
+                             1024),
   };
   table.visit(options, visitor);
 }

@@ -401,17 +401,18 @@ double HomeVector::direction_rad() const noexcept {
 void visit_options(FourierHomingOptions& options, OptionVisitor& visitor) {
   using T = FourierHomingOptions;
   constexpr OptionTable table{
-      option<&T::highest>("highest frequency compared; 0 takes all", 0, 62),
-      option<&T::iterations>("times that the solution is refined", 0, 20),
-      option<&T::rising>("each iteration compares higher frequencies"),
-      choice<&T::turn>("how the heading is found first", "sequential", "global"),
-      choice<&T::gradient>("views whose gradients count", "current", "both"),
+      option<&T::highest>("highest compared frequency; 0: all", 0, 62),
+      option<&T::iterations>("number of refinements of the solution", 0, 20),
+      option<&T::rising>("compare higher frequencies in each iteration"),
+      choice<&T::turn>("method for the first estimate of the heading", "sequential", "global"),
+      choice<&T::gradient>("views whose gradients are used", "current", "both"),
       choice<&T::weights>("weights of components and rows", "equal", "coherence"),
-      option<&T::starting_estimates>("headings tried", 1,
+      option<&T::starting_estimates>("number of tested headings", 1,
                                      static_cast<double>(max_starting_estimates)),
-      option<&T::displacement_search>("try displacements up to two thirds of R before solving"),
-      option<&T::vertical_motion>("rows off the horizon move up and down, too"),
-      option<&T::tilt>("the robot may tilt a little, as on uneven ground"),
+      option<&T::displacement_search>("test displacements up to two thirds of R first"),
+      option<&T::vertical_motion>(
+          "also model the vertical motion of rows above and below the horizon"),
+      option<&T::tilt>("allow a small tilt of the robot"),
   };
   table.visit(options, visitor);
 }

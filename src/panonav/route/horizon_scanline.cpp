@@ -29,7 +29,7 @@ std::vector<float> average_rows(const Panorama& panorama, double half_band_rad) 
       throw ContractError(
           "elevations of the panorama",
           to_text(degrees(band.bottom_rad)) + " .. " + to_text(degrees(band.top_rad)) + " degrees",
-          "a band that holds the horizon");
+          "a range that contains the horizon");
     }
     // Rows go downwards: this is the next one on the other side of the horizon.
     const double elevation = panorama.elevation_rad(*near);
@@ -50,7 +50,7 @@ void visit_options(HorizonScanlineOptions& options, OptionVisitor& visitor) {
   using T = HorizonScanlineOptions;
   constexpr OptionTable table{
       option<&T::columns>("number of values of a line", 16, 16384),
-      option<&T::half_band_rad>("angle from the horizon within which rows are averaged", 0, 0.5),
+      option<&T::half_band_rad>("rows within this angle from the horizon are averaged", 0, 0.5),
   };
   table.visit(options, visitor);
 }

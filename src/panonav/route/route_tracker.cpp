@@ -16,18 +16,17 @@ namespace panonav {
 void visit_options(RouteTrackerOptions& options, OptionVisitor& visitor) {
   using T = RouteTrackerOptions;
   constexpr OptionTable table{
-      option<&T::search_step_m>("distance between the places along the path that a search tries",
-                                0.01, 100),
-      option<&T::search_lateral_m>(
-          "distance between the places beside the path that a search tries", 0.01, 100),
-      option<&T::search_sides>("places that a search tries to either side of the path", 0, 100),
-      option<&T::max_candidates>("places that a search fits", 1, 1000),
-      option<&T::recovery_m>("distance by which a prediction may be off", 0, 100),
+      option<&T::search_step_m>("distance between the tested positions along the route", 0.01, 100),
+      option<&T::search_lateral_m>("distance between the tested positions beside the route", 0.01,
+                                   100),
+      option<&T::search_sides>("number of tested positions on each side of the route", 0, 100),
+      option<&T::max_candidates>("number of positions that a search refines", 1, 1000),
+      option<&T::recovery_m>("largest error of a predicted position", 0, 100),
       option<&T::surprise_m>(
-          "distance from the odometry's prediction above which the next line must confirm a place",
+          "distance from the predicted position above which the next line must confirm the result",
           0, 100),
       option<&T::min_correlation>(
-          "correlation from which on a fit is accepted; 0: learnt from the route", 0, 1),
+          "smallest correlation of an accepted result; 0: learnt from the route", 0, 1),
   };
   table.visit(options, visitor);
 }

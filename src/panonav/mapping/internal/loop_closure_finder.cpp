@@ -29,23 +29,26 @@ double gap(const Pose2& a, const Pose2& b) {
 void visit_options(LoopClosureOptions& options, OptionVisitor& visitor) {
   using T = LoopClosureOptions;
   constexpr OptionTable table{
-      option<&T::candidates>("places looked at for each view", 1, 1000),
-      option<&T::min_loop_m>("shortest loop; views nearer along the way are no candidates",
-                             above(0), 1e6),
-      option<&T::max_residual>("share of the views' energy that a closure may leave unexplained", 0,
-                               1),
-      option<&T::max_length>("distance between the views of a closure in units of R, at most", 0,
-                             2),
-      option<&T::heading_tolerance_rad>("angle by which compass, way there and way back may differ",
-                                        0, 3.2),
-      option<&T::return_tolerance>(
-          "distance from the start that there and back may lead to, in units of R", 0, 2),
-      option<&T::distinctness>("factor by which other places must explain the view worse", 1, 1000),
-      option<&T::reciprocal_rank>(
-          "rank within which the search from the candidate must find the view", 1, 1000),
-      option<&T::sequence>("successive views whose closures must agree", 1, 1000),
-      option<&T::spacing_m>("shortest way between two closures that are reported", 0, 1e6),
-      option<&T::max_drift>("drift of the odometry for each metre since the last closure", 0, 100),
+      option<&T::candidates>("number of places that are tested for each view", 1, 1000),
+      option<&T::min_loop_m>("length of the shortest loop along the path", above(0), 1e6),
+      option<&T::max_residual>("largest unexplained share of the views' energy at a loop closure",
+                               0, 1),
+      option<&T::max_length>("largest distance between the views of a loop closure in units of R",
+                             0, 2),
+      option<&T::heading_tolerance_rad>(
+          "largest difference between the angles of compass, forward vector and backward vector", 0,
+          3.2),
+      option<&T::return_tolerance>("largest distance between the start and the end of forward plus "
+                                   "backward vector, in units of R",
+                                   0, 2),
+      option<&T::distinctness>("factor by which other places must match the view less well", 1,
+                               1000),
+      option<&T::reciprocal_rank>("rank at which the search from the candidate must find the view",
+                                  1, 1000),
+      option<&T::sequence>("number of successive views with agreeing loop closures", 1, 1000),
+      option<&T::spacing_m>("shortest path between two reported loop closures", 0, 1e6),
+      option<&T::max_drift>("assumed drift of the odometry per metre since the last loop closure",
+                            0, 100),
   };
   table.visit(options, visitor);
 }
