@@ -47,7 +47,7 @@ class SpooledPictures final : public PictureStore {
       if (got <= 0) fail();
       filled += static_cast<std::size_t>(got);
     }
-    return decode_image(bytes, name_ + ", picture " + std::to_string(index + 1));
+    return decode_image(bytes, name_ + ", image " + std::to_string(index + 1));
   }
 
  private:
@@ -83,7 +83,7 @@ Dataset read_jpeg_stream(int descriptor, const std::string& name, PictureSource 
     }
   }
   if (dataset.entries.empty()) {
-    throw FileError(name, "gave no picture; allowed: JPEG pictures one behind the other");
+    throw FileError(name, "gave no image; allowed: JPEG images one behind the other");
   }
   pictures->finish();
   return dataset;
@@ -92,8 +92,8 @@ Dataset read_jpeg_stream(int descriptor, const std::string& name, PictureSource 
 void JpegStream::add(std::span<const std::uint8_t> bytes, const std::string& name) {
   buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
   if (buffer_.size() > max_bytes + bytes.size()) {
-    throw FileError(name, "a picture of the stream has more than " + std::to_string(max_bytes) +
-                              " bytes; allowed: a stream of JPEG pictures");
+    throw FileError(name, "an image of the stream has more than " + std::to_string(max_bytes) +
+                              " bytes; allowed: a stream of JPEG images");
   }
 }
 

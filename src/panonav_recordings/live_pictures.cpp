@@ -55,7 +55,7 @@ class Input {
   /// broke off.
   virtual std::optional<RawPicture> take() = 0;
   virtual Image decode(std::span<const std::uint8_t> bytes, const ImageLimits& limits) const {
-    return decode_image(bytes, "the picture", limits);
+    return decode_image(bytes, "the image", limits);
   }
   /// Another thread's call.
   virtual void stop() noexcept {}
@@ -116,7 +116,7 @@ class AddressInput final : public Input {
     auto frame = video_.next(std::chrono::milliseconds(static_cast<int>(1000.0 * max_wait_s)));
     if (frame) return RawPicture{std::move(frame->picture), now_s(), Steady::now(), 0};
     throw FileError(
-        address_, "has broken off" +
+        address_, "was interrupted" +
                       (video_.trouble().empty() ? "" : ": " + without_passwords(video_.trouble())));
   }
   void stop() noexcept override { video_.stop(); }
@@ -188,7 +188,7 @@ struct LivePictures::Implementation {
         ++counts.interruptions;
         if (!std::exchange(is_broken_off, true)) {
           notes.push_back(to_readable_line(error.what()) +
-                          "; it is opened again until images come");
+                          "; panonav tries to open it again until images come");
         }
         arrived.notify_one();
       }

@@ -58,7 +58,7 @@ Image RecordedPictures::read(std::size_t index) const {
   const RecordedTopic& topic = recording_->topics()[place.topic];
   const auto bytes = recording_->read(place);
   const std::string name =
-      path_.string() + ": picture at " + to_text(to_seconds(place.time_ns)) + " s";
+      path_.string() + ": image at " + to_text(to_seconds(place.time_ns)) + " s";
   try {
     if (topic.type == ros::Image::type) {
       return ros::picture_of(ros::read_message<ros::Image>(bytes, topic.encoding));
@@ -121,11 +121,10 @@ class EntryMaker {
     if (messages_.orientation.size() > 0) {
       warn_if_any(without_tilt_, of_all + " have no orientation near their stamps");
     }
-    warn_if_any(
-        too_tilted_,
-        of_all +
-            " would be tilted by more than 30 degrees and count as level; an inertial sensor that "
-            "is not mounted x forward, z up cannot serve");
+    warn_if_any(too_tilted_,
+                of_all +
+                    " would be tilted by more than 30 degrees and are treated as level; the axes "
+                    "of the inertial sensor must be x forward and z up");
     warn_if_any(messages_.without_orientation,
                 " messages of the inertial sensor state no orientation; roll and pitch are not "
                 "guessed from accelerations");

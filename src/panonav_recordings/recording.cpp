@@ -311,7 +311,7 @@ std::unique_ptr<RecordingFile> open_file(const fs::path& path, const RecordingLi
   std::error_code code;
   if (!fs::exists(path, code)) throw FileError(path.string(), "is missing");
   throw FileError(path.string(),
-                  "is no recording; allowed: MCAP files, ROS 1 bags, .db3 files of rosbag2 and "
+                  "is not a recording; allowed: MCAP files, ROS 1 bags, .db3 files of rosbag2 and "
                   "folders of rosbag2 with metadata.yaml");
 }
 

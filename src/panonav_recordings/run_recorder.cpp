@@ -165,7 +165,7 @@ struct RunRecorder::Implementation {
 
   void write_picture(TopicWriter<ros::CompressedImage>& topic, std::int64_t ns,
                      std::span<const std::uint8_t> bytes) {
-    const bool is_png = image_format(bytes, "a picture of the run") == ImageFormat::png;
+    const bool is_png = image_format(bytes, "an image of the run") == ImageFormat::png;
     topic.write(log_ns, ns, {{ns, "camera"}, is_png ? "png" : "jpeg", bytes});
   }
 

@@ -53,12 +53,12 @@ std::string read_output(const std::vector<std::string>& arguments, const std::st
         errors.append(buffer.data(), static_cast<std::size_t>(got));
       }
     }
-    if (text.size() > max_bytes) throw FileError(file, "has more pictures than can be listed");
+    if (text.size() > max_bytes) throw FileError(file, "has more images than can be listed");
   }
   if (child->wait() != 0) {
     while (errors.ends_with('\n')) errors.pop_back();
     const auto line = errors.rfind('\n');
-    throw FileError(file, "is no video that ffmpeg can read: " +
+    throw FileError(file, "is not a video that ffmpeg can read: " +
                               to_readable_line(errors.substr(line == errors.npos ? 0 : line + 1)));
   }
   return text;
@@ -114,7 +114,7 @@ std::optional<VideoIndex> read_index(const std::string& file, const std::string&
     }
   }
   if (index.stamps.empty() || index.unit_s <= 0.0) {
-    throw FileError(file, "contains no picture; allowed: a video");
+    throw FileError(file, "contains no image; allowed: a video");
   }
   std::ranges::sort(index.stamps);
   index.stamps.erase(std::unique(index.stamps.begin(), index.stamps.end()), index.stamps.end());
@@ -146,7 +146,7 @@ class VideoStore final : public PictureStore {
     }
     const std::string why = frames_->trouble();
     frames_.reset();
-    throw FileError(file_, "the picture at " + format_number(seconds(stamp_to_find)) +
+    throw FileError(file_, "the image at " + format_number(seconds(stamp_to_find)) +
                                " s cannot be decoded" +
                                (why.empty() ? "" : ": " + to_readable_line(why)));
   }
@@ -226,7 +226,7 @@ Dataset read_video(const fs::path& file, PictureSource source, const Dataset::Se
     throw FileError(file.string(), "does not exist; allowed: a video");
   auto index = read_index(file.string(), "packet=pts,flags");
   if (!index) index = read_index(file.string(), "frame=best_effort_timestamp");
-  if (!index) throw FileError(file.string(), "has pictures without a time");
+  if (!index) throw FileError(file.string(), "has images without a time");
 
   Dataset dataset{file, std::move(source), {}, {}};
   for (const std::int64_t stamp : index->stamps) {

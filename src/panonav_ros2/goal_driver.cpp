@@ -37,7 +37,8 @@ std::optional<Mission> GoalDriver::load_interrupted_mission() {
 void GoalDriver::start(const Mission& mission) {
   end("another goal");
   try {
-    if (memory_ == nullptr) throw Error("the memory is being taught; allowed: finish, then this");
+    if (memory_ == nullptr)
+      throw Error("the memory is being made; allowed: first finish, then this");
     route_driver_.reset();
     if (mission.goal) {
       set_goal(mission.goal->position());
@@ -156,8 +157,8 @@ void GoalDriver::stop_if_silent() {
   if (!has_mission_ || Steady::now() - last_command_ < timeout) return;
   velocities_.publish({});
   last_command_ = Steady::now();
-  log_.warn("command", "no picture for " + format_fixed(setup_.node.command_timeout_s, 2) +
-                           " s; the robot is stopped until one comes");
+  log_.warn("command", "no image for " + format_fixed(setup_.node.command_timeout_s, 2) +
+                           " s; the robot is stopped until the next image");
 }
 
 /// Publishes the areas that ways are planned over, a number for each view.

@@ -112,7 +112,7 @@ struct LocalisationNode::Implementation {
     sensors.check_publishers();
     if (queue.time_without_picture() < 2s) return;
     recordings::RunMoment moment;
-    moment.state = "no pictures on " + sensors.picture_topic();
+    moment.state = "no images on " + sensors.picture_topic();
     diagnostics.publish(recordings::diagnostics_message(moment, sensors.now_ns()));
   }
 
@@ -138,8 +138,8 @@ struct LocalisationNode::Implementation {
     auto [observation, stamp_ns] = sensors.decode(message);
     const auto moved = motion.wait_for(stamp_ns);
     if (!moved) {
-      log.warn("motion", "no odometry of the time of a picture (" + sensors.motion_source() +
-                             "); the picture is left out");
+      log.warn("motion", "no odometry of the time of an image (" + sensors.motion_source() +
+                             "); the image is left out");
       return;
     }
     observation.stamp_s = 1e-9 * static_cast<double>(stamp_ns);
@@ -183,7 +183,7 @@ struct LocalisationNode::Implementation {
       } else if (command == "cancel") {
         driver.end("cancelled");
       } else if (teacher) {
-        refuse(words, "finish, as the memory is being taught");
+        refuse(words, "finish, because the memory is being made");
       } else if (command == "relocalise") {
         localiser.start_globally();
       } else if (command == "repeat" && !argument.empty()) {

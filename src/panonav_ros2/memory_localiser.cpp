@@ -24,7 +24,7 @@ MemoryLocaliser::MemoryLocaliser(Participant& participant, const LocalisationNod
       base_from_camera_(setup.node.base_from_camera()) {}
 
 LoadedMemory& MemoryLocaliser::loaded() const {
-  if (!memory_) throw Error("the memory is being taught; allowed: finish, then this");
+  if (!memory_) throw Error("the memory is being made; allowed: first finish, then this");
   return *memory_;
 }
 

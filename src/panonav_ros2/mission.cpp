@@ -60,7 +60,7 @@ std::string find_fault(const BootTime& written, double file_age_s, double max_ag
     return " was written before the system was started";
   }
   for (const double age_s : {now.seconds - written.seconds, file_age_s}) {
-    if (!(age_s >= 0.0)) return " comes from the future; was a clock set back?";
+    if (!(age_s >= 0.0)) return " has a time in the future; check the clock";
     if (age_s > max_age_s) return " is " + format_fixed(age_s, 0) + " s old";
   }
   return "";
@@ -109,7 +109,7 @@ std::optional<Mission> MissionFile::load(WarningLog& log) {
     fault = find_fault(at, age_s, max_age_s_);
     if (fault.empty()) return mission;
   }
-  log.warn("mission", path_.string() + fault + "; the robot is not sent on");
+  log.warn("mission", path_.string() + fault + "; the robot does not continue");
   remove();
   return std::nullopt;
 }

@@ -44,7 +44,7 @@ void set(Parameters& parameters, RosArguments::Parameter parameter) {
 /// YAML has more forms of true and false than the options have.
 std::string to_text_value(const YAML::Node& node, const std::string& name,
                           const std::string& where) {
-  if (!node.IsScalar()) throw FileError(where, name + " has a value that is no text or number");
+  if (!node.IsScalar()) throw FileError(where, name + " has a value that is not a text or number");
   const auto text = node.as<std::string>();
   if (text == "True" || text == "TRUE") return "true";
   return text == "False" || text == "FALSE" ? "false" : text;
@@ -102,7 +102,7 @@ void read_parameter_file(const std::string& path, const std::string& node,
       take(root[inside][node]);
     }
   } catch (const YAML::Exception& error) {
-    throw FileError(path, "is no parameter file: " + to_readable_line(error.what()));
+    throw FileError(path, "is not a parameter file: " + to_readable_line(error.what()));
   }
 }
 

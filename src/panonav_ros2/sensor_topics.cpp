@@ -66,7 +66,7 @@ void SensorTopics::check_publishers() const {
     const std::size_t publishers = participant_.publishers(topic);
     if (publishers < 2) continue;
     log_.warn("publishers of " + topic, topic + " has " + std::to_string(publishers) +
-                                            " publishers; one is expected, all are heard");
+                                            " publishers; one is expected, all are used");
   }
 }
 
@@ -122,9 +122,8 @@ void SensorTopics::receive(const recordings::ros::Imu& imu) {
 void SensorTopics::receive_picture(std::int64_t stamp_ns, std::span<const std::uint8_t> cdr) {
   if (last_picture_ns_ && stamp_ns <= *last_picture_ns_ &&
       stamp_ns > *last_picture_ns_ - MotionHistory::late_ns) {
-    log_.warn(
-        "order of pictures",
-        picture_topic() + ": a stamp is not after the one before it; the picture is left out");
+    log_.warn("order of images",
+              picture_topic() + ": a stamp is not after the one before it; the image is left out");
     return;
   }
   last_picture_ns_ = stamp_ns;

@@ -256,7 +256,7 @@ struct LocalisationServer::Implementation {
       if (ending || lane.waiting.size() >= options.max_waiting ||
           lane.waiting_bytes + bytes > max_waiting_bytes) {
         return make_refusal(
-            503, ending ? "the server is ending" : "too many pictures wait; try again in a moment");
+            503, ending ? "the server is ending" : "too many images wait; try again in a moment");
       }
       lane.waiting_bytes += bytes;
       lane.waiting.emplace_back(job, bytes);
@@ -292,7 +292,7 @@ struct LocalisationServer::Implementation {
   HttpAnswer metrics() const {
     const std::lock_guard lock(mutex);
     std::string text = describe_metric("panonav_localisations_total", "counter",
-                                       "Pictures that were answered, by memory and answer.");
+                                       "Images that were answered, by memory and answer.");
     for (const auto& [name, one] : served) {
       const std::string memory = "panonav_localisations_total{memory=\"" + name + "\",answer=\"";
       text += memory + "known\"} " + std::to_string(one.known) + "\n";
@@ -305,14 +305,14 @@ struct LocalisationServer::Implementation {
               std::to_string(times) + "\n";
     }
     text += describe_metric("panonav_localisation_seconds", "histogram",
-                            "Time in which a picture was decoded and answered.") +
+                            "Time in which an image was decoded and answered.") +
             answering.text("panonav_localisation_seconds");
     text += describe_metric("panonav_waiting_seconds", "histogram",
-                            "Time for which a picture waited for a thread.") +
+                            "Time for which an image waited for a thread.") +
             queueing.text("panonav_waiting_seconds");
     std::size_t waiting = 0;
     for (const Lane& lane : lanes) waiting += lane.waiting.size();
-    text += describe_metric("panonav_waiting", "gauge", "Pictures that wait for a thread.") +
+    text += describe_metric("panonav_waiting", "gauge", "Images that wait for a thread.") +
             "panonav_waiting " + std::to_string(waiting) + "\n";
     text += describe_memories(served);
     text += describe_metric("process_resident_memory_bytes", "gauge",
@@ -366,11 +366,11 @@ struct LocalisationServer::Implementation {
     try {
       const auto* const bytes = reinterpret_cast<const std::uint8_t*>(job.picture.data());
       observation.emplace(
-          decode_image(std::span(bytes, job.picture.size()), "the picture", picture_limits));
+          decode_image(std::span(bytes, job.picture.size()), "the image", picture_limits));
     } catch (const Error& error) {
       return make_refusal(422, error.what());
     } catch (const std::exception&) {
-      return make_refusal(500, "the picture cannot be decoded");
+      return make_refusal(500, "the image cannot be decoded");
     }
     try {
       const Place place = memory.recogniser.localise(*observation);
@@ -390,8 +390,8 @@ struct LocalisationServer::Implementation {
   HttpAnswer thumbnail(const Job& job, LoadedMemory& memory) {
     try {
       const auto picture = memory.thumbnail(job.view);
-      if (!picture) return make_refusal(404, "the memory has no view of that name with a picture");
-      const bool jpeg = image_format(*picture, "the picture") == ImageFormat::jpeg;
+      if (!picture) return make_refusal(404, "the memory has no view of that name with an image");
+      const bool jpeg = image_format(*picture, "the image") == ImageFormat::jpeg;
       return {.type = jpeg ? "image/jpeg" : "image/png",
               .content = std::string(picture->begin(), picture->end())};
     } catch (const std::exception& error) {

@@ -354,8 +354,7 @@ Image paint_pixels(const PicturePlot& plot) {
   require(plot.columns >= 1 && plot.rows >= 1 &&
               plot.values.size() ==
                   static_cast<std::size_t>(plot.columns) * static_cast<std::size_t>(plot.rows),
-          "number of picture values", static_cast<double>(plot.values.size()),
-          "columns * rows >= 1");
+          "number of image values", static_cast<double>(plot.values.size()), "columns * rows >= 1");
   constexpr std::array<std::uint8_t, 3> unknown{170, 214, 240};
   Image image(plot.columns, plot.rows, 3);
   for (int row = 0; row < plot.rows; ++row) {

@@ -47,7 +47,7 @@ std::string make_random_token() {
 
 /// Encodes the pixels of a foreign file again, so that a browser receives nothing else of it.
 std::string safe_picture(std::span<const std::uint8_t> stored) {
-  const Image picture = decode_image(stored, "picture of a view", {.side_px = 4096});
+  const Image picture = decode_image(stored, "image of a view", {.side_px = 4096});
   const std::vector<std::uint8_t> bytes = encode_jpeg(picture.view());
   return {bytes.begin(), bytes.end()};
 }

@@ -41,7 +41,7 @@ TEST_F(BadInput, WrongPicturesAreNamed) {
   const std::string name = view_name(5);
   fs::remove(data() / name);
   expect_refused({name});
-  write_text(data() / name, "this is no picture");
+  write_text(data() / name, "this is no image");
   expect_refused({name});
   write_picture(data() / name, world_, {0.0, 0.0, 0.0});
   fs::resize_file(data() / name, fs::file_size(data() / name) / 2);

@@ -69,7 +69,7 @@ TEST_F(CameraVerbs, CalibrateWithoutAMirrorIsNoAnswer) {
 
 TEST_F(CameraVerbs, CalibrateRefusesBadInput) {
   const std::string camera = out_ / "camera.toml";
-  std::ofstream(out_ / "text.png") << "no picture";
+  std::ofstream(out_ / "text.png") << "no image";
   Image other(64, 48);
   write_png(out_ / "other.png", other.view());
   const auto refused = [&](const std::vector<std::string>& images, const std::string& word) {
@@ -154,7 +154,7 @@ TEST_F(CameraVerbs, UnwrapGivesTheCylinder) {
   EXPECT_EQ(panorama.size(), (ImageSize{512, 80}));
   const auto [darkest, brightest] =
       std::minmax_element(panorama.pixels().begin(), panorama.pixels().end());
-  EXPECT_GT(*brightest - *darkest, 60) << "a plain picture";
+  EXPECT_GT(*brightest - *darkest, 60) << "a plain image";
 
   run_well({"unwrap", picture(0), "--camera", true_camera(), "-o", out_ / "s.png", "--rows", "20",
             "--columns", "128"});
@@ -189,7 +189,7 @@ TEST_F(CameraVerbs, RecordingsAreCalibratedAndUnwrappedAsTheirPicturesAre) {
 }
 
 TEST_F(CameraVerbs, UnwrapRefusesBadInput) {
-  std::ofstream(out_ / "text.png") << "no picture";
+  std::ofstream(out_ / "text.png") << "no image";
   Image other(64, 48);
   write_png(out_ / "other.png", other.view());
   std::ofstream(out_ / "bad.toml") << "model = \"unified\"\nxi = nan\n";
@@ -216,7 +216,7 @@ TEST_F(CameraVerbs, UnwrapRefusesBadInput) {
   EXPECT_TRUE(contains(refusal({"unwrap", picture(0), "--camera", true_camera(), "-o", panorama},
                                {.file_size_limit_bytes = 2000, .kill_after_ms = {}}),
                        "p.png"));
-  EXPECT_FALSE(fs::exists(panorama)) << "half a picture";
+  EXPECT_FALSE(fs::exists(panorama)) << "half an image";
 }
 
 }  // namespace

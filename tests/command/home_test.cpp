@@ -221,7 +221,7 @@ TEST_F(Home, BadInputIsOneLine) {
   expect_refusal({"home", home_file, run, "--masked-rows-top", "12"}, "leave none");
   write_picture(folder / "low.png", world, home, 96, 7);
   expect_refusal({"home", folder / "low.png", run}, "rows is 12; allowed: 7");
-  std::ofstream(folder / "broken.png") << "no picture";
+  std::ofstream(folder / "broken.png") << "no image";
   expect_refusal({"home", folder / "broken.png", run}, "broken.png");
 
   const std::string memory = folder / "run.panonav";

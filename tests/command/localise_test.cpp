@@ -238,7 +238,7 @@ TEST_F(Localise, SeveralPicturesAndATable) {
   const std::filesystem::path folder = queries();
   const std::string gone = folder / "gone.png";
   const std::string broken = *folder_ / "a, \"broken\".png";
-  std::ofstream(broken) << "no picture";
+  std::ofstream(broken) << "no image";
   const std::string table = *folder_ / "answers.csv";
   const std::vector<std::string> pictures{gone, folder / view_name(3), broken,
                                           folder / view_name(7)};
@@ -273,7 +273,7 @@ TEST_F(Localise, SeveralPicturesAndATable) {
 TEST_F(Localise, RunsInOrderKeepImagesThatCannotBeRead) {
   const std::filesystem::path data = *folder_ / "in_order";
   write_dataset(data, *world_, grid_poses(2));
-  std::ofstream(data / view_name(1)) << "no picture";
+  std::ofstream(data / view_name(1)) << "no image";
   const std::string table = *folder_ / "in_order.csv";
   const std::vector<std::string> in_order{"localise", memory(), data, "--record",
                                           *folder_ / "in_order.mcap"};
@@ -284,7 +284,7 @@ TEST_F(Localise, RunsInOrderKeepImagesThatCannotBeRead) {
   EXPECT_EQ(keys_of(json::parse(said[1])), (std::set<std::string>{"error", "file"}));
   EXPECT_EQ(json::parse(said[1])["file"], view_name(1));
   EXPECT_EQ(lines(bytes_of(table))[2].find(view_name(1) + ",unreadable,"), 0U);
-  for (std::size_t i = 0; i < 4; ++i) std::ofstream(data / view_name(i)) << "no picture";
+  for (std::size_t i = 0; i < 4; ++i) std::ofstream(data / view_name(i)) << "no image";
   const auto none = run_panonav(with(in_order, {"--json"}));
   EXPECT_EQ(none.exit_code, 2);
   EXPECT_TRUE(contains(none.err, view_name(0)));
@@ -399,7 +399,7 @@ TEST_F(Localise, BadQueriesAreNamed) {
   table("gone.png,0,0,0\n");
   refused({"gone.png"});
   table("view_000.png,0,0,0\n");
-  std::ofstream(data / view_name(0)) << "no picture";
+  std::ofstream(data / view_name(0)) << "no image";
   refused({view_name(0)});
 }
 

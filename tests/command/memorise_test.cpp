@@ -86,7 +86,7 @@ TEST_F(Memorise, AResumedMemoryTakesNoOtherPictureUnderAKnownName) {
   write_picture(data() / view_name(6), world_, {1.7, 0.1, 0.0});
   auto line = refusal({"memorise", data(), memory()});
   EXPECT_TRUE(contains(line, "m.panonav"));
-  EXPECT_TRUE(contains(line, "another picture under the name " + view_name(6)));
+  EXPECT_TRUE(contains(line, "another image under the name " + view_name(6)));
   // The robot turned on the spot: the same place, but another view.
   write_picture(data() / view_name(6), world_, {0.5, 1.0, 0.4});
   line = refusal({"memorise", data(), memory()});
@@ -163,7 +163,7 @@ TEST_F(Memorise, OneDamagedPictureIsNamedAndSkipped) {
 
 TEST_F(Memorise, WhereNoPictureCanBeReadThereIsNoMemory) {
   const fs::path file = folder_ / "a.png";
-  write_text(file, "no picture");
+  write_text(file, "no image");
   const auto result = run_panonav({"memorise", file, memory(), "--kind", "panorama"});
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_TRUE(contains(result.err, "contains no image that can be read"));
@@ -211,8 +211,7 @@ TEST_F(Memorise, ImplausiblePicturesAreRefusedOrHinted) {
   const std::vector<std::string> whole{"memorise", folder, folder_ / "d.panonav", "--kind",
                                        "equirectangular"};
   expect_refusal(whole,
-                 "a.png: equirectangular picture is 96 x 40 px; allowed: "
-                 "twice as wide as high");
+                 "a.png: equirectangular image is 96 x 40 px; allowed: twice as wide as high");
   // Radians in the place of degrees.
   expect_refusal({"memorise", folder, folder_ / "d.panonav", "--kind", "panorama",
                   "--elevation-deg", "-0.52", "0.7"},

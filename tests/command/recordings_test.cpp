@@ -346,7 +346,7 @@ TEST_F(Recordings, OfSeveralCamerasOneIsNamed) {
   }
   EXPECT_EQ(refusal({"localise", memory(), both}),
             "panonav localise: " + both +
-                ": has pictures of several topics: /left, /right; name one with --image-topic");
+                ": has images of several topics: /left, /right; choose one with --image-topic");
   const auto right = answers_of({"localise", memory(), both, "--image-topic", "/right", "--json"});
   write_picture(*folder_ / "right.png", *world_, {0.5, 0.5, -0.5});
   const auto picture = answers_of({"localise", memory(), *folder_ / "right.png", "--json"});
@@ -357,14 +357,14 @@ TEST_F(Recordings, OfSeveralCamerasOneIsNamed) {
 
 TEST_F(Recordings, OptionsThatDoNotFitAreRefused) {
   expect_refusal({"memorise", walk("_lz4.mcap"), *folder_ / "new.panonav"},
-                 "does not say how its pictures lie; say what they show with --kind");
+                 "does not give the type of its images; set the type with --kind");
   expect_refusal({"localise", memory(), walk(), "--imu-topic", "/imu"},
                  walk() + " has no topics; leave out --imu-topic");
   expect_refusal({"track", memory(), walk(), "--odometry-frames", "odom", "base"},
                  "has no topics; leave out --odometry-frames");
   expect_refusal({"track", memory(), walk("_lz4.mcap"), "--odometry-topic", "/odom",
                   "--odometry-frames", "odom", "base"},
-                 "--odometry-topic and --odometry-frames do not go together");
+                 "--odometry-topic and --odometry-frames cannot be combined");
   expect_refusal({"convert", walk(), *folder_ / "copy"}, "does not end in .mcap");
   expect_refusal(with({"convert", walk("_lz4.mcap"), walk()}, kind),
                  "already exists and is not empty; allowed: a new folder");

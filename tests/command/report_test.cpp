@@ -114,8 +114,7 @@ TEST_F(Demo, TellsTheWholeStoryTwiceAndLeavesAMemoryThatAnswers) {
   EXPECT_GT(log.size(), said["mission_kidnapped"]["steps"].get<std::size_t>());
   for (const auto& entry : fs::directory_iterator(out)) {
     const std::string kind = entry.path().extension();
-    EXPECT_TRUE(kind != ".svg" && kind != ".png")
-        << entry.path() << ": the page holds all pictures";
+    EXPECT_TRUE(kind != ".svg" && kind != ".png") << entry.path() << ": the page holds all images";
   }
   const std::string played = bytes_of(fs::path(out) / "index.html");
   EXPECT_EQ(count_of(played, "<pn-run>"), 3U) << "tracking, the route and the first mission";

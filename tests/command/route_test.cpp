@@ -218,7 +218,7 @@ TEST_F(RouteVerbs, ARouteGrowsWhereItEndsAndNowhereElse) {
   const auto second = record({"--name", "by wheels", "--odometry", "--every-m", "0.2"});
   EXPECT_EQ(second["lines"], 21);  // 4.08 m by the wheels, 0.204 m apart
   expect_refusal({"route", "follow", folder_ / "m.panonav", folder_ / "repeat"},
-                 "say which with --name: by wheels, route");
+                 "choose one with --name: by wheels, route");
   expect_refusal({"route", "follow", folder_ / "m.panonav", folder_ / "repeat", "--name", "other"},
                  "contains no route 'other'");
   const auto by_wheels = answers_of({"route", "follow", folder_ / "m.panonav", folder_ / "repeat",
@@ -298,7 +298,8 @@ TEST_F(RouteVerbs, WrongUseIsRefused) {
   (void)record();
   const auto rows = refusal(
       {"route", "record", folder_ / "teach", memory, "--name", "b", "--horizon-rows", "1-2"});
-  EXPECT_TRUE(contains(rows, "--horizon-rows goes with panoramas whose elevations are not known"));
+  EXPECT_TRUE(
+      contains(rows, "--horizon-rows can only be used with panoramas of unknown elevations"));
   expect_refusal({"route", "record", folder_ / "teach", memory, "--horizon-rows", "2-1"},
                  "FIRST-LAST");
   const auto help = run_panonav({"route", "record", "--help-all"});

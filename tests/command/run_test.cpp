@@ -76,10 +76,10 @@ TEST_F(Walk, PartsOfAVideoAreTaken) {
   const std::vector<std::string> ask{"localise", path("a.panonav"), path("walk.mp4")};
   expect_refusal(with(ask, {"--every", "0"}), "--every is 0");
   expect_refusal(with(ask, {"--every", "-1s"}), "--every is -1s");
-  expect_refusal(with(ask, {"--from", "60"}), "no picture in the time");
+  expect_refusal(with(ask, {"--from", "60"}), "no image in the requested time");
   expect_refusal({"localise", path("a.panonav"), path("walk"), "--to", "1"}, "stamp_s");
   expect_refusal({"localise", path("a.panonav"), path("walk/view_000.png"), "--every", "2"},
-                 "one picture");
+                 "one image");
   expect_refusal({"memorise", path("walk.mp4"), path("c.panonav")}, "--kind");
 }
 
@@ -340,7 +340,7 @@ TEST_F(Walk, PicturesThatCannotBeReadAreCountedAndDoNotFlood) {
   run_well({"memorise", path("walk"), path("a.panonav")});
   fs::create_directories(folder / "bad");
   for (std::size_t i = 0; i < 200; ++i) {
-    write_file(folder / "bad" / (std::to_string(i) + ".png"), std::string_view("no picture"));
+    write_file(folder / "bad" / (std::to_string(i) + ".png"), std::string_view("no image"));
   }
   fs::copy_file(folder / "walk" / view_name(0), folder / "bad" / "z.png");
   const auto result = run_panonav(

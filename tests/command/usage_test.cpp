@@ -133,8 +133,8 @@ TEST(Usage, FilesOfOptionsProposeTheNearestNameAndOnlyThisVerbsSections) {
 }
 
 TEST(Usage, SwappedArgumentsAreRecognised) {
-  expect_refusal({"localise", "my picture.jpg", "memory.panonav"},
-                 "did you mean 'panonav localise memory.panonav 'my picture.jpg''?");
+  expect_refusal({"localise", "my image.jpg", "memory.panonav"},
+                 "did you mean 'panonav localise memory.panonav 'my image.jpg''?");
   expect_refusal({"memorise", "m.panonav", "folder"},
                  "MEMORY is 'folder' and INPUT is 'm.panonav'");
   expect_refusal({"forget", "a.png", "b.png", "m.panonav"}, "swapped");

@@ -144,7 +144,7 @@ TEST_F(SynchronisedMemory, OtherMemoriesAndHeadersAreRefused) {
   const std::string other = std::string(std::getenv("PANONAV_TEST_SERVER")) +
                             "&memory=" + folder.path().filename().string() + "other";
   (void)MemoryFile::create(other, small_header());
-  refused("a", other, "is synchronised with another memory");
+  refused("a", other, "was synchronised with a memory other than");
   EXPECT_EQ(MemoryFile::open(other, Access::read_only).views().size(), 0U);
   EXPECT_EQ(open("a").views().size(), 4U);
   MemoryHeader coarser = small_header();
@@ -160,7 +160,7 @@ TEST_F(SynchronisedMemory, OtherMemoriesAndHeadersAreRefused) {
   (void)MemoryFile::create(folder / "steps", other_steps);
   refused("steps", server("x"), "preprocessing");
   folder.write("noise", std::string(5000, 'x'));
-  refused("noise", server("x"), "is no memory file");
+  refused("noise", server("x"), "is not a memory file");
   refused("absent", server("x") + "&memory=nothing", "no memory 'nothing'");
   EXPECT_FALSE(std::filesystem::exists(folder / "absent"));
   EXPECT_EQ(on_server().views().size(), 4U);

@@ -84,7 +84,7 @@ def synchronised(server, folder):
     # The other fleet has no such memory, and makes one of its own.
     run(PANONAV, "copy", one, folder / "south.panonav")
     assert sync(folder / "south.panonav", server.memory("fleet", "other"))["uploaded"] == len(names(one))
-    refused(PANONAV, "synchronise", one, server.memory("fleet", "other"), saying="with another memory than")
+    refused(PANONAV, "synchronise", one, server.memory("fleet", "other"), saying="with a memory other than")
     refused(PANONAV, "synchronise", one, server.memory("fleet", "stranger"), saying="permission denied")
 
     # A server that comes back from a backup gets back what it had lost.

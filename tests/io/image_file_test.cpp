@@ -170,7 +170,7 @@ TEST_F(ImageFile, SizesAreBounded) {
   ASSERT_NE(at, file.end());
   for (int i = 5; i < 9; ++i) *(at + i) = 0xFD;
   EXPECT_TRUE(contains(message_of<FileError>([&] { (void)decode_image(file, "huge.jpg"); }),
-                       "huge.jpg: picture is 65021 x 65021 px; allowed:"));
+                       "huge.jpg: image is 65021 x 65021 px; allowed:"));
 }
 
 TEST_F(ImageFile, LimitsAreTheCallers) {
@@ -187,7 +187,7 @@ TEST_F(ImageFile, LimitsAreTheCallers) {
 TEST_F(ImageFile, TheScansOfAJpegAreBoundedByItsSize) {
   const Bytes bomb = make_scan_bomb(64, 48);
   const Image image = decode_image(bomb, "bomb");
-  EXPECT_EQ(image.size(), (ImageSize{64, 48})) << "a small picture may have them";
+  EXPECT_EQ(image.size(), (ImageSize{64, 48})) << "a small image may have them";
   constexpr std::int64_t scan_px = 64 * 48 + 65536;
   EXPECT_EQ(decode_image(bomb, "bomb", {.scanned_px = 190 * scan_px}), image);
   EXPECT_EQ(message_of<FileError>(

@@ -77,7 +77,7 @@ TEST_F(OptionFiles, FaultsNameFileSectionFieldAndRange) {
 
   const auto stray = folder.write("b.toml", "count = 3\n");
   EXPECT_TRUE(
-      contains(message_of<FileError>([&] { OptionFile file(stray); }), "outside all sections"));
+      contains(message_of<FileError>([&] { OptionFile file(stray); }), "outside of all sections"));
   const OptionFile file(folder.write("c.toml", "[smaple]\ncount = 3\n"));
   EXPECT_TRUE(contains(message_of<FileError>([&] {
                          file.require_sections(std::array<std::string_view, 1>{"sample"});

@@ -104,7 +104,7 @@ TEST_F(RecordingTest, FilesThatArePackedAsAWholeAreUnpacked) {
   };
   EXPECT_TRUE(contains(refused(alone, {.file_bytes = 1000}), "unpacks to more than 1000 bytes"));
   const fs::path other = folder.write("other.db3.zstd", packed(folder.write("t", "no recording")));
-  EXPECT_TRUE(contains(refused(other, {}), other.string() + ": is no recording"));
+  EXPECT_TRUE(contains(refused(other, {}), other.string() + ": is not a recording"));
 }
 
 TEST_F(RecordingTest, AFolderOfRosbag2IsReadWithoutTheFilesThatAreMissing) {
@@ -145,11 +145,11 @@ TEST_F(RecordingTest, ADatabaseOfSomethingElseIsRefused) {
   std::string other = bytes;
   other.replace(other.find("CREATE TABLE topics"), 19, "CREATE TABLE tropes");
   other.replace(other.find("topicstopics"), 12, "tropestropes");
-  EXPECT_TRUE(contains(refusal(other), "is no recording of rosbag2: it lacks the tables"));
+  EXPECT_TRUE(contains(refusal(other), "is not a recording of rosbag2: it lacks the tables"));
   EXPECT_TRUE(contains(refusal(bytes.substr(0, 300)), "is damaged or no recording of rosbag2"));
   other = bytes;
   other.replace(68, 4, "PNAV");
-  EXPECT_TRUE(contains(refusal(other), "is no recording"));
+  EXPECT_TRUE(contains(refusal(other), "is not a recording"));
   EXPECT_FALSE(is_recording(folder / "a.db3"));
 }
 

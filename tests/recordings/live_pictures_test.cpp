@@ -194,8 +194,9 @@ TEST(LivePictures, AnAddressThatFallsSilentIsOpenedAgain) {
   }
   const std::string shown = "tcp://root:***@127.0.0.1:" + std::to_string(port);
   ASSERT_EQ(notes.size(), 2U);
-  EXPECT_EQ(notes[0],
-            shown + ": has sent no picture in time; it is opened again until images come");
+  EXPECT_EQ(
+      notes[0],
+      shown + ": has sent no image in time; panonav tries to open it again until images come");
   EXPECT_EQ(notes[1], shown + " sends images again");
   shutdown(listener, SHUT_RDWR);
   server.join();

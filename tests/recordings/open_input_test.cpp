@@ -73,8 +73,9 @@ TEST_F(OpenInput, ADataSetDescribesItself) {
   EXPECT_EQ(opened.source.kind, PictureKind::equirectangular);
   EXPECT_EQ(opened.entries.size(), 2U);
   EXPECT_TRUE(opened.warnings.empty());
-  EXPECT_TRUE(contains(refusal("data", {.source = panorama_}),
-                       "has a dataset.toml, which says how its pictures lie; leave out 'source'"));
+  EXPECT_TRUE(
+      contains(refusal("data", {.source = panorama_}),
+               "has a dataset.toml, which gives the type of its images; leave out 'source'"));
   EXPECT_TRUE(contains(refusal("data", {.recursive = true}), "leave out the option recursive"));
   EXPECT_TRUE(contains(refusal("data", {.topics = {.imu = "/imu"}}),
                        "has no topics; leave out the option imu_topic"));
@@ -91,17 +92,17 @@ TEST_F(OpenInput, PicturesLieAsTheCallerSays) {
   const Dataset deep = open_input(folder_ / "photos", {.source = panorama_, .recursive = true});
   EXPECT_EQ(deep.entries.size(), 3U);
   ASSERT_EQ(deep.warnings.size(), 2U);
-  EXPECT_TRUE(contains(deep.warnings[1], "is 16 x 8 px; a picture of the whole sphere"));
+  EXPECT_TRUE(contains(deep.warnings[1], "is 16 x 8 px; an image of the whole sphere"));
   EXPECT_TRUE(contains(fault("photos", {}),
-                       "has no dataset.toml; say what the pictures show with 'source'"));
+                       "has no dataset.toml; set the type of the images with 'source'"));
   EXPECT_TRUE(contains(fault("missing", {.source = panorama_}), "there is no such file or folder"));
   const std::string one = "photos/view_9.png";
   EXPECT_EQ(open_input(folder_ / one, {.default_source = panorama_}).entries.size(), 1U);
   EXPECT_TRUE(contains(refusal(one, {.source = panorama_, .recursive = true}),
-                       "is one picture; the option recursive goes with a folder"));
-  EXPECT_TRUE(
-      contains(refusal(one, {.source = panorama_, .selection = {.every = 2}}),
-               "is one picture; 'from_s', 'to_s' and the option every go with a recording"));
+                       "is one image; the option recursive can only be used with a folder"));
+  EXPECT_TRUE(contains(
+      refusal(one, {.source = panorama_, .selection = {.every = 2}}),
+      "is one image; 'from_s', 'to_s' and the option every can only be used with a recording"));
 }
 
 TEST_F(OpenInput, RadiansInThePlaceOfDegreesAreHinted) {

@@ -123,10 +123,9 @@ TEST_P(RecordedTopics, OdometryEndsAnIntervalBeyondItsLastMessage) {
     if (expected[i].second) expect_odometry(entry, expected[i].first * ms);
   }
   ASSERT_EQ(read_back.warnings.size(), 1U);
-  EXPECT_EQ(
-      read_back.warnings[0],
-      "3 of 7 pictures have no odometry: it begins later, ends before or pauses for more than "
-      "a second");
+  EXPECT_EQ(read_back.warnings[0],
+            "3 of 7 images have no odometry: it begins later, ends before or pauses for more than "
+            "a second");
 }
 
 TEST_P(RecordedTopics, TransformsGiveOdometryAlongTheirChain) {
@@ -172,7 +171,7 @@ TEST_P(RecordedTopics, TransformsInACircleConnectNothing) {
 
 TEST_P(RecordedTopics, TopicsAreChosenByTypeOrNamed) {
   EXPECT_TRUE(contains(error(),
-                       "drive.bag: has no pictures of sensor_msgs/Image or "
+                       "drive.bag: has no images of sensor_msgs/Image or "
                        "sensor_msgs/CompressedImage; its topics: none"));
   add_picture(0, "/left");
   add_picture(0, "/right");
@@ -181,17 +180,17 @@ TEST_P(RecordedTopics, TopicsAreChosenByTypeOrNamed) {
   add_imu(0, {}, "/imu0");
   add_imu(0, {}, "/imu1");
   EXPECT_EQ(error(),
-            "drive.bag: has pictures of several topics: /left, /right; name one with "
-            "the option image_topic");
+            "drive.bag: has images of several topics: /left, /right; choose one with the option "
+            "image_topic");
   const auto right = read({.image = "/right"});
   EXPECT_EQ(read_picture(right.entries.at(0)), images_[1]);
   EXPECT_FALSE(right.entries[0].odometry);
   ASSERT_EQ(right.warnings.size(), 2U);
   EXPECT_EQ(right.warnings[0],
-            "odometry of several topics, of which none is used: /filtered, /wheels; name one with "
-            "the option odometry_topic");
+            "odometry of several topics, of which none is used: /filtered, /wheels; choose one "
+            "with the option odometry_topic");
   EXPECT_EQ(right.warnings[1],
-            "inertial sensors of several topics, of which none is used: /imu0, /imu1; name one "
+            "inertial sensors of several topics, of which none is used: /imu0, /imu1; choose one "
             "with the option imu_topic");
   const auto named = read({.image = "/right", .odometry = "/wheels", .imu = "/imu1"});
   EXPECT_TRUE(named.warnings.empty());
@@ -221,7 +220,7 @@ TEST_P(RecordedTopics, WithoutStampsTheTimesOfRecordingServe) {
   recorded_->add("/camera", start_ns + 502 * ms, message);
   const Dataset dataset = read();
   ASSERT_EQ(dataset.warnings.size(), 1U);
-  EXPECT_EQ(dataset.warnings[0], "headers without stamps: the times of recording serve instead");
+  EXPECT_EQ(dataset.warnings[0], "headers without stamps: the times of recording are used instead");
   EXPECT_EQ(dataset.entries[0].file, "1700000000_502000000");
   expect_odometry(dataset.entries[0], 500 * ms);  // which is recorded 2 ms later
   EXPECT_EQ(read_encoded_picture(dataset.entries[0]), png);
@@ -240,8 +239,7 @@ TEST_P(RecordedTopics, TiltIsThatOfAnUprightSensor) {
   EXPECT_NEAR(read_back.entries[0].tilt->roll_rad, 0.1, 1e-12);
   EXPECT_NEAR(read_back.entries[0].tilt->pitch_rad, -0.2, 1e-12);
   EXPECT_FALSE(read_back.entries[1].tilt);
-  EXPECT_TRUE(
-      contains(read_back.warnings.at(0), "1 of 2 pictures would be tilted by more than 30"));
+  EXPECT_TRUE(contains(read_back.warnings.at(0), "1 of 2 images would be tilted by more than 30"));
   // Panoramas that cannot be levelled.
   const auto unknown = read({}, {});
   EXPECT_FALSE(unknown.entries[0].tilt);
@@ -280,8 +278,8 @@ TEST_P(RecordedTopics, DamagedMessagesAreLeftOut) {
   EXPECT_TRUE(contains(dataset.warnings[0],
                        "2 messages cannot be read and are left out; the first: "
                        "nav_msgs/Odometry message: position is nan"));
-  EXPECT_EQ(dataset.warnings[1], "stamps run back at 1 of 4 pictures");
-  EXPECT_EQ(dataset.warnings[2], "1 of 4 pictures are not of the size of the first, 8 x 4 px");
+  EXPECT_EQ(dataset.warnings[1], "stamps run back at 1 of 4 images");
+  EXPECT_EQ(dataset.warnings[2], "1 of 4 images are not of the size of the first, 8 x 4 px");
   // In the order of recording.
   EXPECT_EQ(dataset.entries[0].file, "1700000000_140000000");
   EXPECT_EQ(dataset.entries[1].file, "1700000000_150000000");
@@ -308,7 +306,7 @@ TEST(RecordedTopicsLimit, MorePicturesThanAMillionAreRefused) {
   const auto recorded = std::make_shared<RecordedMessages>(MessageEncoding::cdr);
   for (int i = 0; i <= 1'000'000; ++i) recorded->add("/camera", i, ros::CompressedImage{});
   EXPECT_EQ(message_of<FileError>([&] { (void)read_recording(recorded, "drive.bag", sphere); }),
-            "drive.bag: has more than 1000000 pictures; allowed: as many");
+            "drive.bag: has more than 1000000 images; allowed: as many");
 }
 
 }  // namespace

@@ -118,7 +118,7 @@ TEST_F(Video, ASelectionTakesTheSamePicturesAsOfAFolderWithStamps) {
             (Numbers{3, 7, 11, 15}));
   const std::string error =
       message_of<FileError>([&] { (void)read_video(file, {}, {.from_s = 30.0}); });
-  EXPECT_NE(error.find("no picture in the time"), std::string::npos) << error;
+  EXPECT_NE(error.find("no image in the requested time"), std::string::npos) << error;
 }
 
 TEST_F(Video, CutAndForeignFilesAreRefusedInOneLine) {
@@ -139,7 +139,7 @@ TEST_F(Video, CutAndForeignFilesAreRefusedInOneLine) {
   };
   std::ofstream(folder / "empty.mp4").flush();
   refused(folder / "empty.mp4");
-  std::ofstream(folder / "text.mp4") << "this is no video\n" << std::string(5000, 'x');
+  std::ofstream(folder / "text.mp4") << "this is not a video\n" << std::string(5000, 'x');
   refused(folder / "text.mp4");
   refused(folder / "missing.mp4");
   // A list of other files and addresses is no video, whatever its name.

@@ -173,7 +173,7 @@ TEST_F(LocalisationNodeOnTheWire, LearnsADriveRepeatsItAndGoesOnAfterItDied) {
   write_file(mission, left);
   fs::last_write_time(mission, fs::file_time_type::clock::now() - 60s);
   start(setup);
-  EXPECT_EQ(notes_with("the robot is not sent on"), 1U);
+  EXPECT_EQ(notes_with("the robot does not continue"), 1U);
   EXPECT_FALSE(fs::exists(mission));
   stop();
   write_file(mission, std::string_view("1 2 3 repeat"));

@@ -120,7 +120,7 @@ TEST_F(LocalisationServerTest, RefusesWhatIsNoPictureAndGoesOn) {
   const std::string good = picture_at(world_, {1.0, 1.0, 0.0});
   std::string large(2'000'000, 'x');
   for (const std::string& bad :
-       {std::string("no picture"), std::string(1, '\0'), good.substr(0, good.size() / 2),
+       {std::string("no image"), std::string(1, '\0'), good.substr(0, good.size() / 2),
         "\x89PNG\r\n\x1a\n" + std::string(100, '\xff'), large}) {
     const std::string answer = localise(server, bad);
     EXPECT_EQ(status_of(answer), 422);

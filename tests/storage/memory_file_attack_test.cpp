@@ -123,14 +123,14 @@ TEST_F(MemoryFileAttack, IsNamed) {
   const std::vector<Attack> attacks{
       // Code in the schema.
       {"CREATE TRIGGER t AFTER INSERT ON views BEGIN DELETE FROM views; END",
-       "trigger t is no part of a memory"},
+       "trigger t is not a part of a memory"},
       {"CREATE VIEW v AS WITH RECURSIVE n(i) AS (VALUES(1) UNION ALL SELECT i + 1 FROM n) SELECT "
        "max(i) FROM n",
-       "view v is no part of a memory"},
-      {"CREATE TABLE more(x)", "table more is no part of a memory"},
-      {"CREATE INDEX more ON views(x_m)", "index more is no part of a memory"},
-      {"CREATE VIRTUAL TABLE words USING fts5(word)", "is no part of a memory"},
-      {"ANALYZE", "table sqlite_stat1 is no part of a memory"},
+       "view v is not a part of a memory"},
+      {"CREATE TABLE more(x)", "table more is not a part of a memory"},
+      {"CREATE INDEX more ON views(x_m)", "index more is not a part of a memory"},
+      {"CREATE VIRTUAL TABLE words USING fts5(word)", "is not a part of a memory"},
+      {"ANALYZE", "table sqlite_stat1 is not a part of a memory"},
       {"PRAGMA writable_schema=ON; UPDATE sqlite_schema SET sql = replace(sql, 'STRICT', 'STRICT "
        "') "
        "WHERE name = 'thumbnails'",

@@ -147,8 +147,8 @@ void expect_refused_unchanged(const std::filesystem::path& path, std::string_vie
 
 TEST_F(MemoryFileDamage, ForeignFilesAreRefused) {
   expect_refused_unchanged(folder.write("text.panonav", std::string(1000, 'x')),
-                           "is no memory file");
-  expect_refused_unchanged(folder.write("empty.panonav", ""), "is no memory file");
+                           "is not a memory file");
+  expect_refused_unchanged(folder.write("empty.panonav", ""), "is not a memory file");
   const auto other = folder / "other.sqlite";
   run_sql(other, "CREATE TABLE songs(title TEXT)");
   expect_refused_unchanged(other, "application_id is 0x00000000; allowed: 0x504e4156");
@@ -180,10 +180,10 @@ TEST_F(MemoryFileDamage, OtherTablesAreRefused) {
   };
   refused_after("DROP TABLE links", "table links is missing");
   refused_after("CREATE TRIGGER t AFTER INSERT ON views BEGIN DELETE FROM views; END",
-                "trigger t is no part of a memory");
-  refused_after("CREATE VIEW extra AS SELECT 1", "view extra is no part of a memory");
-  refused_after("CREATE INDEX more ON views(x_m)", "index more is no part of a memory");
-  refused_after("ANALYZE", "table sqlite_stat1 is no part of a memory");
+                "trigger t is not a part of a memory");
+  refused_after("CREATE VIEW extra AS SELECT 1", "view extra is not a part of a memory");
+  refused_after("CREATE INDEX more ON views(x_m)", "index more is not a part of a memory");
+  refused_after("ANALYZE", "table sqlite_stat1 is not a part of a memory");
   refused_after("DELETE FROM settings WHERE key = 'full_scale'", "full_scale is missing");
   refused_after("UPDATE settings SET value = 3 WHERE key = 'rows'", "checksum of setting rows");
   refused_after("INSERT INTO settings VALUES('rows2', 3, 0)", "checksum of setting rows2");

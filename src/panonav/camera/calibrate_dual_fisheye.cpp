@@ -180,7 +180,7 @@ std::optional<std::string> Calibrator::fit_fields_of_view() {
       most_turned = std::max(most_turned, std::abs(wrap_angle(rotation.yaw_rad)));
     }
     if (grey_.size() > 1 && most_turned < radians(min_turn_deg)) {
-      return "the pictures are not turned against each other: 10 degrees are needed, 90 are good";
+      return "the camera was not rotated between the images: 10 degrees are needed, 90 are good";
     }
     fit_.solve(matcher_.match(fit_.state(), coarse_rad_, 10, directions).matches);
     if (!set_max_angles()) continue;
@@ -191,7 +191,7 @@ std::optional<std::string> Calibrator::fit_fields_of_view() {
       best_near = again.count_near_expected();
     }
   }
-  if (best_near < 0) return "the two circles show nothing in common";
+  if (best_near < 0) return "the two circles show no common objects";
   fit_.set_parameters(best);
   return std::nullopt;
 }
@@ -202,7 +202,7 @@ std::optional<std::string> Calibrator::refine_fit() {
   for (const double step_rad : {middle_rad, fine_rad_, fine_rad_}) {
     last_ = matcher_.match(fit_.state(), step_rad, 3, directions);
     fit_.solve(last_.matches);
-    if (!set_max_angles()) return "the lenses' distortion cannot be told";
+    if (!set_max_angles()) return "the lenses' distortion cannot be determined";
   }
   return std::nullopt;
 }
@@ -213,14 +213,14 @@ std::optional<std::string> Calibrator::count_matches(DualFisheyeCalibration& res
     return match.off_steps <= 1.0 && match.points[0].picture == match.points[1].picture;
   });
   if (last_.textured < min_textured) {
-    return "too little structure in the pictures: " + std::to_string(last_.textured) +
+    return "too little structure in the images: " + std::to_string(last_.textured) +
            " patches with contrast; needed: " + std::to_string(min_textured);
   }
   result.inlier_share = static_cast<double>(result.matches) / last_.textured;
   if (result.inlier_share < min_inlier_share || !both_lenses) {
-    return "the pictures do not agree: " + format_number(std::round(100 * result.inlier_share)) +
-           " % of the patches are found again, needed are 30 %; one place, turned about the "
-           "vertical only, and circles that lie as the rolls say?";
+    return "the images do not agree: " + format_number(std::round(100 * result.inlier_share)) +
+           " % of the patches are matched, 30 % are needed; take all images at one place, rotate "
+           "the camera only about its vertical axis, and check the roll angles of the circles";
   }
   return std::nullopt;
 }
@@ -285,16 +285,17 @@ std::variant<DualFisheyeCalibration, std::string> Calibrator::run() {
     validate(result.camera);
     static_cast<void>(visible_elevations(result.camera));
   } catch (const ContractError& error) {
-    return std::string("what is found is no camera: ") + error.what();
+    return std::string("what is found is not a camera: ") + error.what();
   }
   result.residual_rad = fit_.deviation_rad();
   result.azimuth_deviation_rad =
       std::hypot(correlation_error_px * fine_rad_,
                  azimuth_deviation(result.camera, fit_.covariance(last_.matches)));
   if (!(degrees(result.azimuth_deviation_rad) <= max_azimuth_deviation_deg)) {
-    return "the pictures leave azimuths uncertain by " +
+    return "the images leave azimuths uncertain by " +
            format_number(0.1 * std::round(10 * degrees(result.azimuth_deviation_rad))) +
-           " degrees, allowed is 1; add pictures turned by 60 to 120 degrees about the vertical";
+           " degrees, at most 1 is allowed; add images with rotations of 60 to 120 degrees about "
+           "the vertical";
   }
   return result;
 }
@@ -307,17 +308,16 @@ namespace panonav {
 std::variant<DualFisheyeCalibration, std::string> calibrate_dual_fisheye(
     std::span<const ImageView> pictures, const DualFisheyeCalibration::Knowledge& known,
     Executor& executor) {
-  require(!pictures.empty(), "number of pictures", 0, "at least 1");
+  require(!pictures.empty(), "number of images", 0, "at least 1");
   for (const ImageView& picture : pictures) {
-    require(picture.size() == pictures[0].size(), "picture width", picture.width,
-            "all of one size");
-    require(std::min(picture.width / 2, picture.height) >= 64, "picture height", picture.height,
+    require(picture.size() == pictures[0].size(), "image width", picture.width, "all of one size");
+    require(std::min(picture.width / 2, picture.height) >= 64, "image height", picture.height,
             "at least 64 px, and 128 px wide");
   }
   std::vector<Image> grey;
   for (const ImageView& picture : pictures) grey.push_back(to_grey(picture));
   const auto circles = dual_fisheye::find_circles(grey);
-  if (!circles) return "no circle of a lens in each half of the pictures";
+  if (!circles) return "no circle of a lens in each half of the images";
   return dual_fisheye::Calibrator(grey, *circles, known, executor).run();
 }
 

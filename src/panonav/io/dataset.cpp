@@ -86,7 +86,7 @@ void require_picture(const fs::path& table, const DatasetEntry& entry) {
   if (!fs::is_regular_file(entry.path, error)) {
     throw FileError(table.string(),
                     "file is '" + entry.file +
-                        "', which does not exist; allowed: a picture in the data set's folder");
+                        "', which does not exist; allowed: an image in the data set's folder");
   }
 }
 
@@ -132,18 +132,18 @@ std::vector<DatasetEntry> read_entries(const fs::path& folder, const fs::path& p
     throw FileError(path.string(),
                     "has no columns 'x_m' and 'y_m'; a table without positions is named by [list]");
   }
-  if (table.rows() == 0) throw FileError(path.string(), "names no picture; allowed: one or more");
+  if (table.rows() == 0) throw FileError(path.string(), "names no image; allowed: one or more");
   std::vector<DatasetEntry> entries;
   std::unordered_set<std::string> seen;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     DatasetEntry entry;
     entry.file = table.text(row, "file");
-    if (entry.file.empty()) table.fail(row, "file", "empty", "a picture in the data set's folder");
+    if (entry.file.empty()) table.fail(row, "file", "empty", "an image in the data set's folder");
     if (!is_inside_folder(entry.file)) {
-      table.fail(row, "file", "'" + entry.file + "'", "a picture in the data set's folder");
+      table.fail(row, "file", "'" + entry.file + "'", "an image in the data set's folder");
     }
     if (!seen.insert(entry.file).second) {
-      table.fail(row, "file", "'" + entry.file + "' for the second time", "each picture once");
+      table.fail(row, "file", "'" + entry.file + "' for the second time", "each image once");
     }
     entry.path = folder / entry.file;
     require_picture(path, entry);
@@ -229,7 +229,7 @@ Dataset find_pictures(const fs::path& folder, PictureSource source, bool is_recu
   if (error) throw FileError(folder.string(), "cannot be read: " + error.message());
   std::ranges::sort(dataset.left_out, is_naturally_less);
   if (names.empty())
-    throw FileError(folder.string(), "contains no PNG or JPEG picture; allowed: one or more");
+    throw FileError(folder.string(), "contains no PNG or JPEG image; allowed: one or more");
   std::sort(names.begin(), names.end(), is_naturally_less);
   for (auto& name : names) {
     DatasetEntry entry;
@@ -257,11 +257,11 @@ constexpr std::array<EntryField, 5> entry_fields{{
 
 /// Throws ContractError where some entries have a value and others have not.
 void require_whole_fields(const std::vector<DatasetEntry>& entries) {
-  require(!entries.empty(), "number of pictures", 0.0, ">= 1");
+  require(!entries.empty(), "number of images", 0.0, ">= 1");
   const auto all = static_cast<std::ptrdiff_t>(entries.size());
   for (const EntryField& field : entry_fields) {
     const auto count = std::ranges::count_if(entries, field.has);
-    require(count == 0 || count == all, "number of pictures with " + std::string(field.column),
+    require(count == 0 || count == all, "number of images with " + std::string(field.column),
             static_cast<double>(count), "0 or all " + std::to_string(all));
   }
 }
@@ -318,7 +318,7 @@ std::string images_text(const Dataset& dataset) {
             to_text(round_trip_degrees(band->top_rad)) + "]\n";
   }
   if (source.kind == PictureKind::mirror) {
-    require(source.camera.has_value(), "camera of mirror pictures", 0.0, "one camera");
+    require(source.camera.has_value(), "camera of mirror images", 0.0, "one camera");
     write_camera(dataset.folder / "camera.toml", {*source.camera, source.mask});
     text += "camera = \"camera.toml\"\n";
   }
@@ -332,7 +332,7 @@ Dataset read_dataset(const fs::path& folder) {
   const TomlTable table = read_toml(path);
   TomlFields top(path, "", table);
   auto images = top.section("images");
-  if (!images) top.fail("[images]", "missing", "a section that says what the pictures are");
+  if (!images) top.fail("[images]", "missing", "a section that says what the images are");
   auto poses = top.section("poses");
   auto list = top.section("list");
   if (poses.has_value() == list.has_value()) {
@@ -387,14 +387,14 @@ void select_pictures(Dataset& dataset, const Dataset::Selection& selection) {
     for (std::size_t i = 0; i < stamps_s.size(); ++i) {
       const DatasetEntry& entry = dataset.entries[i];
       if (!entry.stamp_s) {
-        throw FileError(name, "stamp_s of " + entry.file +
-                                  " is missing; pictures can be chosen by time only where all have "
-                                  "stamps");
+        throw FileError(name,
+                        "stamp_s of " + entry.file +
+                            " is missing; images can be chosen by time only where all have stamps");
       }
       stamps_s[i] = *entry.stamp_s;
       if (i > 0 && stamps_s[i] < stamps_s[i - 1]) {
         throw FileError(name, "stamp_s of " + entry.file + " is " + to_text(stamps_s[i]) +
-                                  "; allowed where pictures are chosen by time: at least " +
+                                  "; allowed where images are chosen by time: at least " +
                                   to_text(stamps_s[i - 1]) + ", the stamp before it");
       }
     }
@@ -404,7 +404,7 @@ void select_pictures(Dataset& dataset, const Dataset::Selection& selection) {
     kept.push_back(std::move(dataset.entries[i]));
   }
   if (kept.empty()) {
-    throw FileError(name, "has no picture in the time that was asked for; it is " +
+    throw FileError(name, "has no image in the requested time; it is " +
                               format_number(stamps_s.back() - stamps_s.front()) + " s long");
   }
   dataset.entries = std::move(kept);
@@ -424,7 +424,7 @@ std::vector<std::uint8_t> read_encoded_picture(const DatasetEntry& entry) {
 Dataset read_single_picture(const fs::path& file, PictureSource source) {
   std::error_code error;
   if (!fs::is_regular_file(file, error))
-    throw FileError(file.string(), "does not exist; allowed: a PNG or JPEG picture");
+    throw FileError(file.string(), "does not exist; allowed: a PNG or JPEG image");
   Dataset dataset{file.parent_path(), std::move(source), {}, {}};
   DatasetEntry entry;
   entry.file = file.filename().string();

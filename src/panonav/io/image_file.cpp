@@ -26,8 +26,8 @@ ImageFormat image_format(Bytes bytes, std::string_view name) {
   };
   if (starts_with(png)) return ImageFormat::png;
   if (starts_with(jpeg)) return ImageFormat::jpeg;
-  throw FileError(name, bytes.empty() ? "is empty; allowed: a PNG or JPEG picture"
-                                      : "is no picture that can be read; allowed: PNG, JPEG");
+  throw FileError(name, bytes.empty() ? "is empty; allowed: a PNG or JPEG image"
+                                      : "is not an image that can be read; allowed: PNG, JPEG");
 }
 
 std::vector<std::uint8_t> read_encoded_image(const std::filesystem::path& path) {
@@ -74,7 +74,7 @@ void check_image_size(ImageSize size, std::string_view name, const ImageLimits& 
       size.height <= limits.side_px && area <= limits.area_px) {
     return;
   }
-  throw FileError(name, "picture is " + std::to_string(size.width) + " x " +
+  throw FileError(name, "image is " + std::to_string(size.width) + " x " +
                             std::to_string(size.height) + " px; allowed: 1 .. " +
                             std::to_string(limits.side_px) + " px a side and at most " +
                             std::to_string(limits.area_px) + " px in all");

@@ -86,9 +86,10 @@ OptionFile::OptionFile(std::filesystem::path path)
     : path_(std::move(path)), table_(read_toml(path_)) {
   for (const TomlField& field : table_) {
     if (!std::holds_alternative<TomlTable>(field.value.content)) {
-      throw FileError(path_.string(), field.name +
-                                          " stands outside all sections; allowed: options "
-                                          "in a section, [name] above them");
+      throw FileError(
+          path_.string(),
+          field.name +
+              " is outside of all sections; allowed: options below a section name, [name]");
     }
   }
 }

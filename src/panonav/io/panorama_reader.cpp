@@ -18,10 +18,10 @@ namespace {
 void require_whole_sphere(ImageSize size) {
   constexpr double tolerance = 0.02;  // borders and scaling take or add a few pixels
   if (std::abs(size.width - 2.0 * size.height) <= tolerance * size.width) return;
-  throw ContractError("equirectangular picture",
+  throw ContractError("equirectangular image",
                       std::to_string(size.width) + " x " + std::to_string(size.height) + " px",
-                      "twice as wide as high, the whole sphere; a part of the sphere is of the "
-                      "kind panorama, with its elevation band");
+                      "twice as wide as high, with the whole sphere; for a part of the sphere use "
+                      "the kind panorama with an elevation band");
 }
 
 /// A band with more rows of the same height at both ends, as far as `limit` goes and at most
@@ -69,7 +69,7 @@ struct PanoramaReader::Wide {
 PanoramaReader::PanoramaReader(PictureSource source, PanoramaShape shape)
     : source_(std::move(source)), shape_(shape) {
   if (source_.kind != PictureKind::mirror) return;
-  require(source_.camera.has_value(), "camera of mirror pictures", 0.0, "one camera");
+  require(source_.camera.has_value(), "camera of mirror images", 0.0, "one camera");
   UnwarperOptions options;
   if (shape.rows != 0) options.rows = shape.rows;
   if (shape.columns != 0) options.columns = shape.columns;

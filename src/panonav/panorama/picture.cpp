@@ -110,8 +110,8 @@ std::vector<float> sample_grey(ImageView picture, const PictureLayout& layout, d
 Panorama panorama_from_picture(ImageView picture, const PictureLayout& layout,
                                PanoramaShape shape) {
   validate_layout(layout);
-  require(picture.width >= 4, "picture width", picture.width, ">= 4");
-  require(picture.height >= 1, "picture height", picture.height, ">= 1");
+  require(picture.width >= 4, "image width", picture.width, ">= 4");
+  require(picture.height >= 1, "image height", picture.height, ">= 1");
   require(shape.rows >= 0, "rows", shape.rows, ">= 0");
   require(shape.columns == 0 || shape.columns >= 4, "columns", shape.columns, "0 or >= 4");
 

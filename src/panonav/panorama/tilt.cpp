@@ -161,7 +161,7 @@ Panorama level_panorama(const Panorama& seen, const Tilt& tilt) {
   throw ContractError("tilt",
                       format_number(degrees(tilt.roll_rad)) + ", " +
                           format_number(degrees(tilt.pitch_rad)) + " degrees",
-                      "up to 0.5 degrees in pictures whose elevations are not known");
+                      "up to 0.5 degrees in images whose elevations are not known");
 }
 
 }  // namespace panonav

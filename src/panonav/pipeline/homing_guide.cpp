@@ -50,7 +50,7 @@ Panorama HomingEncoder::own_panorama(const OwnPictures& own, const Observation& 
   if (components_ > max_components) {
     throw ContractError(
         "components", components_,
-        "3 to " + std::to_string(max_components) + ", half the columns of the picture");
+        "3 to " + std::to_string(max_components) + ", half the columns of the image");
   }
   if (own.preprocessing.masked_rows_top + own.preprocessing.masked_rows_bottom >= panorama.rows()) {
     throw ContractError("has " + std::to_string(panorama.rows()) +

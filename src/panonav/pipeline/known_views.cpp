@@ -82,7 +82,7 @@ void check_known_views(const Dataset& recording, const MemoryFile& memory,
     for (std::size_t i = 0; i < count; ++i) {
       const auto& entry = *known[begin + i];
       if (!is_same_picture(*signatures[i], views.packed(*views.find(entry.file)))) {
-        refuse_known_view(memory.path(), entry.file, "another picture under the name");
+        refuse_known_view(memory.path(), entry.file, "another image under the name");
       }
     }
     if (compared) compared(count);

@@ -78,9 +78,8 @@ LineEncoder::LineEncoder(const PictureSource& pictures, const RouteSource& route
   if (route.horizon_rows &&
       (pictures.kind != PictureKind::panorama || pictures.layout.elevations)) {
     throw ContractError(
-        "the option horizon_rows goes with panoramas whose elevations are not known; these "
-        "pictures say "
-        "where the horizon is");
+        "the option horizon_rows can only be used with panoramas of unknown elevations; these "
+        "images have known elevations");
   }
 }
 
@@ -119,7 +118,7 @@ std::string find_route_name(const MemoryFile& memory, const std::optional<std::s
   if (!name) {
     if (names.size() == 1) return names.front();
     throw FileError(memory.path().string(),
-                    "holds several routes; say which with the option name: " + all);
+                    "contains several routes; choose one with the option name: " + all);
   }
   if (std::ranges::find(names, *name) == names.end()) {
     throw FileError(memory.path().string(),

@@ -115,7 +115,7 @@ struct LiveMemory::Implementation {
       if (!options.in_step) storer.emplace(*memoriser);
     } else if (!exists) {
       throw FileError(without_passwords(path.string()),
-                      "does not exist, and nothing is to be added");
+                      "does not exist, and no views are to be added");
     }
     if (options.update && exists && (!options.add || can_be_updated())) {
       updater.emplace(path, options.update_options);

@@ -75,7 +75,7 @@ MemoryHeader make_memory_header(std::span<const Observation> first, const Pictur
   if (!(header.full_scale > rounding)) {
     throw FileError(text_of(first.front()),
                     "the first " + std::to_string(first.size()) +
-                        " views are of one colour; a memory needs views with structure");
+                        " views have only one colour; a memory needs views with structure");
   }
   return header;
 }
@@ -97,7 +97,7 @@ Memoriser::Memoriser(const std::filesystem::path& memory, MemoriserOptions optio
     encoder_.emplace(file_->header(), options_.source.value_or(file_->header().source));
   } else if (!options_.source) {
     throw ContractError("source of " + without_passwords(path_.string()), "empty",
-                        "how pictures lie, as the file is a new one");
+                        "the type of images, because the file is new");
   }
 }
 
@@ -202,7 +202,7 @@ void Memoriser::require_same_view(const Observation& observation, const PackedSi
     refuse_known_view(path_, observation.name, "a view with another pose or stamp under the name");
   }
   if (!is_same_picture(signature, there.packed(view))) {
-    refuse_known_view(path_, observation.name, "another picture under the name");
+    refuse_known_view(path_, observation.name, "another image under the name");
   }
 }
 

@@ -133,7 +133,8 @@ void require_comparable(const MemoryFile& first, const MemoryFile& second) {
     if (same) return;
     throw ContractError(
         std::string(what) + " of " + second.path().string(), "another",
-        "that of " + first.path().string() + ", as views made in another way cannot be compared");
+        "that of " + first.path().string() +
+            ", because views that were made with other settings cannot be compared");
   };
   const MemoryHeader& a = first.header();
   const MemoryHeader& b = second.header();

@@ -84,11 +84,11 @@ void add_warning_of_other_kind(Dataset& opened) {
   if (band && band->top_rad - band->bottom_rad < radians(max_band_deg)) return;
   const auto size = read_first_picture_size(opened);
   if (!size || size->width != 2 * size->height) return;
-  opened.warnings.push_back(
-      "hint: " + to_readable_line(opened.entries.front().path.string()) + " is " +
-      std::to_string(size->width) + " x " + std::to_string(size->height) +
-      " px; a picture of the whole sphere is of the kind equirectangular, a panorama has an "
-      "elevation band");
+  opened.warnings.push_back("hint: " + to_readable_line(opened.entries.front().path.string()) +
+                            " is " + std::to_string(size->width) + " x " +
+                            std::to_string(size->height) +
+                            " px; an image of the whole sphere is of the kind equirectangular, a "
+                            "panorama has an elevation band");
 }
 
 void refuse_topics(const fs::path& path, const InputOptions::Topics& topics) {
@@ -138,10 +138,10 @@ Dataset open_registered(const fs::path& path, const DatasetReader& reader,
   if (!reader.has_topics) refuse_topics(path, options.topics);
   if (options.topics.odometry && options.topics.odometry_frames) {
     throw OptionError(
-        "the option odometry_topic and the option odometry_frames do not go together");
+        "the option odometry_topic and the option odometry_frames cannot be combined");
   }
   const PictureSource& source =
-      choose_source(path, options, "does not say how its pictures lie; say what they show");
+      choose_source(path, options, "does not give the type of its images; set the type");
   if (options.recursive) {
     throw OptionError(path.string() + " is a " + reader.name + "; leave out the option recursive");
   }
@@ -153,13 +153,14 @@ Dataset open_registered(const fs::path& path, const DatasetReader& reader,
 
 Dataset open_described(const fs::path& folder, const InputOptions& options) {
   if (options.source) {
-    throw OptionError(folder.string() +
-                      " has a dataset.toml, which says how its pictures lie; leave out 'source'");
+    throw OptionError(
+        folder.string() +
+        " has a dataset.toml, which gives the type of its images; leave out 'source'");
   }
   if (options.recursive) {
     throw OptionError(
         folder.string() +
-        " has a dataset.toml, which names its pictures; leave out the option recursive");
+        " has a dataset.toml, which names its images; leave out the option recursive");
   }
   Dataset opened = read_dataset(folder);
   warn_of_low_band(opened);
@@ -170,17 +171,19 @@ Dataset open_described(const fs::path& folder, const InputOptions& options) {
 Dataset open_pictures(const fs::path& path, const InputOptions& options) {
   refuse_unregistered(path);
   const PictureSource& source =
-      choose_source(path, options, "has no dataset.toml; say what the pictures show");
+      choose_source(path, options, "has no dataset.toml; set the type of the images");
   std::error_code ignored;
   Dataset opened;
   if (fs::is_directory(path, ignored)) {
     opened =
         options.recursive ? read_picture_tree(path, source) : read_picture_folder(path, source);
   } else if (options.recursive) {
-    throw OptionError(path.string() + " is one picture; the option recursive goes with a folder");
-  } else if (options.selection.by_time() || options.selection.every > 1) {
     throw OptionError(path.string() +
-                      " is one picture; 'from_s', 'to_s' and the option every go with a recording");
+                      " is one image; the option recursive can only be used with a folder");
+  } else if (options.selection.by_time() || options.selection.every > 1) {
+    throw OptionError(
+        path.string() +
+        " is one image; 'from_s', 'to_s' and the option every can only be used with a recording");
   } else {
     opened = read_single_picture(path, source);
   }

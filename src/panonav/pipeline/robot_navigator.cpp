@@ -57,7 +57,7 @@ NavigationGraph load_requested_graph(
     auto graph = load_graph(origin, source, executor);
     if (graph) return std::move(*graph);
     throw FileError(path, "has no " + std::string(name_of(origin)) +
-                              "; leave out the option edges for what there is");
+                              "; leave out the option edges to use the existing edges");
   }
   for (std::size_t i = 0;; ++i) {
     origin = static_cast<RobotNavigatorOptions::GraphOrigin>(i);
@@ -76,13 +76,14 @@ KnownRoute load_known_route(const MemoryFileViews& source, const std::string& na
     std::string all;
     for (const auto& known : file.route_names()) all += (all.empty() ? "" : ", ") + known;
     throw FileError(path, "contains no route '" + name + "'; allowed for the option route: " +
-                              (all.empty() ? "none, as none was recorded" : all));
+                              (all.empty() ? "none, because no route was recorded" : all));
   }
   const RoutePanorama route = load_route_to_follow(file, name);
   if (read_route_source(file, name, route.columns()).from_odometry) {
-    throw FileError(path, "route '" + name +
-                              "' is in the frame of its odometry, where no view is known to lie; "
-                              "allowed: one recorded with the poses of a data set");
+    throw FileError(
+        path, "route '" + name +
+                  "' is in the frame of its odometry, in which the positions of the views are "
+                  "unknown; allowed: a route that was recorded with the poses of a data set");
   }
   std::vector<KnownRoute::View> views;
   constexpr std::size_t at_once = 1024;
@@ -144,7 +145,7 @@ void RobotNavigator::set_goal(const std::string& goal) {
   if (!node || graph().exits(*node).empty()) {
     throw FileError(views_.file().path().string(),
                     "no edge leads to the view " + info(view).name +
-                        "; take another goal, or arrange the memory again");
+                        "; choose another goal, or arrange the memory again");
   }
   goal_ = view;
   navigator_->set_goal(view);

@@ -31,13 +31,13 @@ RouteSource choose_source(const MemoryFile& file, const RouteRecorderOptions& op
   if (source.line != before.line || source.horizon_rows != before.horizon_rows) {
     throw ContractError(
         describe_route(file, options.name) +
-        " was recorded with another value of the option columns, the option half_band_rad or "
-        "the option horizon_rows; leave them out or take another name");
+        " was recorded with another value of the option columns, the option half_band_rad or the "
+        "option horizon_rows; leave them out or choose another name");
   }
   if (source.from_odometry != before.from_odometry) {
     throw ContractError(describe_route(file, options.name) + " is in the frame of " +
                         (before.from_odometry ? "its odometry" : "its data set") +
-                        ", these poses are not; take another name");
+                        ", these poses are not; choose another name");
   }
   return source;
 }

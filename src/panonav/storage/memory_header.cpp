@@ -298,15 +298,15 @@ void validate(const MemoryHeader& header) {
           "forward_column", source.layout.forward_column, "0 .. 1");
   if (source.camera.has_value() != (source.kind == PictureKind::mirror)) {
     throw ContractError("camera", source.camera ? "there" : "missing",
-                        "there for mirror pictures and only for them");
+                        "there for mirror images and only for them");
   }
   if (header.picture_shape) {
     if (source.kind != PictureKind::panorama) {
       throw ContractError("picture_shape", "there", "there for panoramas only");
     }
-    require_picture(header.picture_shape->rows, header.picture_shape->columns, "picture rows",
-                    "picture columns");
-    require(header.picture_shape->columns >= 4, "picture columns", header.picture_shape->columns,
+    require_picture(header.picture_shape->rows, header.picture_shape->columns, "image rows",
+                    "image columns");
+    require(header.picture_shape->columns >= 4, "image columns", header.picture_shape->columns,
             ">= 4");
   }
   if (source.camera) require_camera(*source.camera);
@@ -315,7 +315,7 @@ void validate(const MemoryHeader& header) {
     throw ContractError(
         "mask",
         std::to_string(source.mask->width()) + " x " + std::to_string(source.mask->height()),
-        "one channel, the size of the camera's pictures");
+        "one channel, the size of the camera's images");
   }
   if (header.created_s) {
     require(std::isfinite(*header.created_s), "created_s", *header.created_s, "finite");

@@ -116,7 +116,7 @@ class PostgresqlScheme final : public MemoryScheme {
         memories.connection.run("SELECT has_table_privilege('panonav.views', 'INSERT')::int4::int8")
                 .integer(0, 0) == 0) {
       throw FileError(address.printable.native(),
-                      "cannot be changed: this login is no member of panonav_contributor, which "
+                      "cannot be changed: this login is not a member of panonav_contributor, which "
                       "adds, or of panonav_curator, which also changes and removes");
     }
     return std::make_unique<PostgresqlTables>(address, std::move(memories.connection), found->id,

@@ -88,7 +88,7 @@ PostgresqlConnection::PostgresqlConnection(const ServerAddress& address)
   PQfreemem(fault);  // it may quote a part of the password
   if (parsed == nullptr) {
     throw FileError(printable_address_.native(),
-                    "is no address that libpq reads; allowed: "
+                    "is not an address that libpq reads; allowed: "
                     "postgresql://USER@HOST:PORT/DATABASE?memory=NAME, special characters as %40");
   }
   PQconninfoFree(parsed);
@@ -149,8 +149,8 @@ bool PostgresqlConnection::is_in_transaction() const noexcept {
 void PostgresqlConnection::fail(const pg_result* result) const {
   if (PQstatus(connection_.get()) != CONNECTION_OK) {
     throw FileError(printable_address_.native(),
-                    "lost the connection to its server; a change that was under "
-                    "way is there whole or not at all: " +
+                    "lost the connection to its server; a change that was under way was made "
+                    "completely or not at all: " +
                         message());
   }
   const std::string state = get_sqlstate(result);
@@ -197,7 +197,7 @@ bool PostgresqlConnection::wait_for_server(bool is_sending) const {
     throw FileError(printable_address_.native(),
                     "its server did not answer within " +
                         to_text(std::chrono::duration<double>(reply_timeout()).count()) +
-                        " s; a change that was under way is there whole or not at all");
+                        " s; a change that was under way was made completely or not at all");
   }
   if (ready < 0) return errno == EINTR;
   return (waiting.revents & ~POLLOUT) == 0 || PQconsumeInput(connection_.get()) == 1;

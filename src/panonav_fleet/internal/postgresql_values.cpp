@@ -133,7 +133,7 @@ PostgresqlValues::Bound PostgresqlValues::bound() const {
   Bound bound;
   for (const Value& value : values_) {
     if (value.bytes.size() > static_cast<std::size_t>(std::numeric_limits<int>::max()) / 2) {
-      throw ContractError("a text or picture for a server", "too long", "less than 1 GB");
+      throw ContractError("a text or image for a server", "too long", "less than 1 GB");
     }
     bound.types.push_back(value.type);
     bound.data.push_back(value.null ? nullptr : value.bytes.data());

@@ -78,7 +78,7 @@ ServerAddress parse_server_address(const std::filesystem::path& memory) {
   };
   if (!has_escaped_password(text)) {
     refuse(
-        "its user and password are not written as in a URL, or its port is no number; allowed: "
+        "its user and password are not written as in a URL, or its port is not a number; allowed: "
         "special characters as %40 for @ and %2F for /");
   }
   const std::size_t query = std::min(text.find('?'), text.size());

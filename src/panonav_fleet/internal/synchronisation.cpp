@@ -16,8 +16,8 @@ void require_comparable(const MemoryHeader& file, const MemoryHeader& server,
     if (same) return;
     throw ContractError(std::string(what) + " of the file", "another",
                         "that of " + path.string() +
-                            ", as views made in another way cannot be compared; a file that is "
-                            "made by synchronising has it");
+                            ", because views that were made with other settings cannot be "
+                            "compared; a file that is made by synchronising has it");
   };
   require_same("rows and components", file.shape == server.shape);
   require_same("full scale", file.full_scale == server.full_scale);
@@ -72,9 +72,10 @@ void Synchronisation::match_with_server() {
     require_comparable(header_, to_header(server_.tables().settings()), server_.tables().path());
   } else if (state_.memory != there.identity) {
     throw FileError(file_.path().string(),
-                    "is synchronised with another memory than " + server_.tables().path().string() +
-                        " is now; allowed: the same memory, or a copy of the file (panonav "
-                        "copy), which is synchronised with none");
+                    "was synchronised with a memory other than " +
+                        server_.tables().path().string() +
+                        " is now; allowed: the same memory, or a copy of the file (panonav copy), "
+                        "which is not yet synchronised");
   }
   if (state_.file.empty()) state_.file = random_identity(file_);
   state_.memory = there.identity;
@@ -176,7 +177,8 @@ std::string Synchronisation::robot_prefixed_name(const std::string& name, int co
 std::uint32_t Synchronisation::read_last_view_id() {
   const ServerExchange::State there = server_.read_state();
   if (there.identity != state_.memory) {
-    throw FileError(server_.tables().path().string(), "was replaced by another memory meanwhile");
+    throw FileError(server_.tables().path().string(),
+                    "was replaced by another memory in the meantime");
   }
   if (there.last_view < 0 || there.last_view >= std::int64_t{UINT32_MAX}) {
     server_.tables().fail_damaged("the last view id is out of range");

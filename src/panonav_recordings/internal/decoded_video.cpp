@@ -99,7 +99,7 @@ DecodedVideo::Ready DecodedVideo::wait(bool for_picture,
   }
   if (ready == 0) {
     child_->stop();
-    throw FileError(about_, "has sent no picture in time");
+    throw FileError(about_, "has sent no image in time");
   }
   return {pipes[0].revents != 0, pipes[1].revents != 0};
 }
@@ -117,7 +117,7 @@ std::optional<DecodedFrame> DecodedVideo::next(std::optional<std::chrono::millis
   const auto [width, height] = head.size;
   if (width < 1 || height < 1 || width > limits_.side_px || height > limits_.side_px ||
       std::int64_t{width} * height > limits_.area_px) {
-    throw FileError(about_, "its pictures are " + std::to_string(width) + " x " +
+    throw FileError(about_, "its images are " + std::to_string(width) + " x " +
                                 std::to_string(height) + " px; allowed: up to " +
                                 std::to_string(limits_.area_px) + " px, sides up to " +
                                 std::to_string(limits_.side_px));

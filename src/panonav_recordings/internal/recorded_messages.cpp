@@ -38,7 +38,7 @@ class MessageCollector {
     }
     if (made_.pictures.size() > max_pictures) {
       throw FileError(path_.string(), "has more than " + std::to_string(max_pictures) +
-                                          " pictures; allowed: as many");
+                                          " images; allowed: as many");
     }
     if (samples_ > max_samples) {
       throw FileError(path_.string(), "has more than " + std::to_string(max_samples) +
@@ -53,7 +53,7 @@ class MessageCollector {
     }
     drop_chain_unless_connected();
     if (made_.pictures.empty()) {
-      throw FileError(path_.string(), "none of its pictures can be read: " + first_error_);
+      throw FileError(path_.string(), "none of its images can be read: " + first_error_);
     }
     return std::move(made_);
   }
@@ -175,7 +175,8 @@ bool RecordedMessages::sort() {
       std::ranges::any_of(pictures, [](const RecordedPicture& each) { return each.stamp_ns != 0; });
   const bool by_log = !has_stamps || !odometry.has_stamps() || !orientation.has_stamps() ||
                       !truth.has_stamps() || (chain && !chain->has_stamps());
-  if (by_log) warnings.emplace_back("headers without stamps: the times of recording serve instead");
+  if (by_log)
+    warnings.emplace_back("headers without stamps: the times of recording are used instead");
   for (RecordedTrack* track : {&odometry, &orientation, &truth}) track->sort(by_log);
   if (chain) chain->sort(by_log);
   return by_log;

@@ -62,11 +62,11 @@ class TopicChooser {
     if (names.size() > 1) std::erase_if(names, is_made_of_pictures);
     if (names.size() == 1) return use(numbers_of(names[0], is_picture_type), TopicRole::picture);
     if (names.empty()) {
-      throw FileError(path_.string(), "has no pictures of " + std::string(types) +
+      throw FileError(path_.string(), "has no images of " + std::string(types) +
                                           "; its topics: " + list_topics(names_of(is_any_type)));
     }
-    throw FileError(path_.string(), "has pictures of several topics: " + list_topics(names) +
-                                        "; name one with the option image_topic");
+    throw FileError(path_.string(), "has images of several topics: " + list_topics(names) +
+                                        "; choose one with the option image_topic");
   }
 
   void choose_odometry(const InputOptions::Topics& requested) {
@@ -82,8 +82,9 @@ class TopicChooser {
       return use(numbers_of(names[0], is_odometry_type), TopicRole::odometry);
     }
     if (!requested.odometry_frames && !names.empty()) {
-      choice_.warnings.push_back("odometry of several topics, of which none is used: " +
-                                 list_topics(names) + "; name one with the option odometry_topic");
+      choice_.warnings.push_back(
+          "odometry of several topics, of which none is used: " + list_topics(names) +
+          "; choose one with the option odometry_topic");
       return;
     }
     choice_.frames_are_named = requested.odometry_frames.has_value();
@@ -100,7 +101,7 @@ class TopicChooser {
     if (names.empty()) return;
     if (names.size() > 1) {
       choice_.warnings.push_back("inertial sensors of several topics, of which none is used: " +
-                                 list_topics(names) + "; name one with the option imu_topic");
+                                 list_topics(names) + "; choose one with the option imu_topic");
     } else if (source.kind == PictureKind::panorama && !source.layout.elevations) {
       choice_.warnings.push_back(
           "roll and pitch of " + to_readable_line(names[0]) +

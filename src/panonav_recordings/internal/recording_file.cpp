@@ -146,9 +146,9 @@ std::span<const std::uint8_t> ChunkedFile::peek(std::uint64_t at, std::size_t ma
 }
 
 void ChunkedFile::warn_cut(std::uint64_t at) const {
-  warn(at >= size_ ? "was not closed or is cut off; what there is of it is read"
+  warn(at >= size_ ? "was not closed or is cut off; the existing part is read"
                    : "is damaged or cut off at byte " + std::to_string(at) + " of " +
-                         std::to_string(size_) + "; what comes before is read");
+                         std::to_string(size_) + "; the part before it is read");
 }
 
 std::vector<std::optional<TimeSpan>> ChunkedFile::blocks() const {
@@ -228,7 +228,7 @@ void ChunkedFile::list(std::size_t block, const std::vector<bool>& chosen_topics
     warn("the index of " + describe_chunk(from.at) + " is damaged; the chunk itself is read");
     read.clear();
     if (!walk(content(block)->bytes(), read)) {
-      warn(describe_chunk(from.at) + " is damaged; what comes before the damage is read");
+      warn(describe_chunk(from.at) + " is damaged; the part before the damage is read");
     }
   }
   for (const Entry& entry : from.entries ? *from.entries : read) {
@@ -269,7 +269,7 @@ void ChunkedFile::add_chunk(std::uint64_t at, bool is_cut) {
     declare(content.bytes());
     std::vector<Entry> entries;
     if (!walk(content.bytes(), entries) && !is_cut) {
-      warn(describe_chunk(at) + " is damaged; what comes before the damage is read");
+      warn(describe_chunk(at) + " is damaged; the part before the damage is read");
     }
     if (entries.empty()) return;
     for (const Entry& entry : entries) note(block, entry);

@@ -182,7 +182,7 @@ class DatabaseFile : public RecordingFile {
         "SELECT count(*) FROM sqlite_schema WHERE name IN ('topics', 'messages') AND "
         "type = 'table' AND rootpage > 0");
     if (!step(rows) || sqlite3_column_int(rows.get(), 0) != 2) {
-      fail("is no recording of rosbag2: it lacks the tables 'topics' and 'messages'");
+      fail("is not a recording of rosbag2: it lacks the tables 'topics' and 'messages'");
     }
   }
 
@@ -240,7 +240,8 @@ std::vector<fs::path> read_rosbag2_folder(const fs::path& folder) {
       files.push_back(folder / fs::path(file.as<std::string>()).filename());
     }
   } catch (const YAML::Exception& error) {
-    throw FileError(path.string(), "is no metadata of rosbag2: " + to_readable_line(error.what()));
+    throw FileError(path.string(),
+                    "is not valid metadata of rosbag2: " + to_readable_line(error.what()));
   }
   return files;
 }

@@ -49,7 +49,7 @@ int open_device(const std::string& device) {
       (able.capabilities & V4L2_CAP_DEVICE_CAPS) != 0 ? able.device_caps : able.capabilities;
   if (!camera || (can & V4L2_CAP_VIDEO_CAPTURE) == 0 || (can & V4L2_CAP_STREAMING) == 0) {
     close(descriptor);
-    throw FileError(device, "is no camera that streams pictures");
+    throw FileError(device, "is not a camera that streams images");
   }
   return descriptor;
 }
@@ -141,14 +141,14 @@ void V4l2Camera::start(const std::optional<ImageSize>& size) {
     format.fmt.pix.height = static_cast<std::uint32_t>(size->height);
   }
   if (!control(descriptor_, VIDIOC_S_FMT, &format)) {
-    fail(std::string("does not take the format ") + format_name(*chosen) + ": " +
+    fail(std::string("does not support the format ") + format_name(*chosen) + ": " +
          std::strerror(errno));
   }
   const auto& pixels = format.fmt.pix;
   if (!is_usable(pixels.pixelformat) || pixels.width < 1 || pixels.height < 1 ||
       pixels.width > 65535 || pixels.height > 65535) {
-    fail("gives pictures of " + std::to_string(pixels.width) + " x " +
-         std::to_string(pixels.height) + " px as " + format_name(pixels.pixelformat));
+    fail("gives images of " + std::to_string(pixels.width) + " x " + std::to_string(pixels.height) +
+         " px as " + format_name(pixels.pixelformat));
   }
   pixels_ = pixels.pixelformat;
   size_ = {static_cast<int>(pixels.width), static_cast<int>(pixels.height)};
@@ -198,13 +198,13 @@ std::optional<V4l2Camera::Frame> V4l2Camera::next(int stop) {
     const int ready = poll(waits.data(), waits.size(), silent_ms);
     if (ready < 0) continue;  // a signal
     if (waits[1].revents != 0) return std::nullopt;
-    if (ready == 0) fail("has sent no picture for 5 s");
+    if (ready == 0) fail("has sent no image for 5 s");
     v4l2_buffer buffer{};
     buffer.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
     buffer.memory = V4L2_MEMORY_MMAP;
     if (!control(descriptor_, VIDIOC_DQBUF, &buffer)) {
       if (errno == EAGAIN && (waits[0].revents & (POLLERR | POLLHUP)) == 0) continue;
-      fail(std::string("has gone: ") + std::strerror(errno));
+      fail(std::string("was disconnected: ") + std::strerror(errno));
     }
     if (buffer.index >= buffers_.size()) fail("names a buffer that does not exist");
     const bool damaged = (buffer.flags & V4L2_BUF_FLAG_ERROR) != 0;

@@ -116,8 +116,8 @@ void Database::require_unmoved() const {
   sqlite3_file_control(handle_.get(), "main", SQLITE_FCNTL_HAS_MOVED, &moved);
   if (moved == 0) return;
   throw FileError(path_.string(),
-                  "was deleted, moved or replaced while it was being written; what was being "
-                  "written is not in the file of that name");
+                  "was deleted, moved or replaced while it was being written; the new data are not "
+                  "in the file with this name");
 }
 
 void Database::execute(const char* sql) {
@@ -197,7 +197,7 @@ Statement::Statement(Database& database, const char* sql, std::nullptr_t) : data
 void Statement::check_bind(int code) const {
   if (code == SQLITE_OK) return;
   if (code == SQLITE_TOOBIG) {
-    throw ContractError("a text or picture for " + database_->path().string(), "too long",
+    throw ContractError("a text or image for " + database_->path().string(), "too long",
                         "less than 256 MiB");
   }
   database_->fail(code);

@@ -134,7 +134,7 @@ void require_free_name(const fs::path& path) {
     const fs::path stray = with_suffix(path, suffix);
     if (fs::exists(fs::symlink_status(stray, ignored))) {
       throw FileError(name, "cannot be created: " + stray.string() +
-                                " of an earlier file of that name is in the way");
+                                " of an earlier file with this name still exists");
     }
   }
 }

@@ -111,7 +111,7 @@ void require_memory_file(const std::filesystem::path& path) {
     throw FileError(name, "cannot be read: " + std::generic_category().message(errno));
   }
   if (!std::filesystem::is_regular_file(path, ignored)) {
-    throw FileError(name, "is no file; allowed: a memory file");
+    throw FileError(name, "is not a file; allowed: a memory file");
   }
   const Database database(path, DatabaseMode::immutable);
   sqlite3_file* file = nullptr;
@@ -121,7 +121,7 @@ void require_memory_file(const std::filesystem::path& path) {
   if (code != SQLITE_OK && code != SQLITE_IOERR_SHORT_READ) database.fail(code);
   constexpr std::string_view magic("SQLite format 3\0", 16);
   if (code != SQLITE_OK || std::memcmp(head.data(), magic.data(), magic.size()) != 0) {
-    throw FileError(name, "is no memory file; allowed: memory files that panonav made");
+    throw FileError(name, "is not a memory file; allowed: memory files that panonav made");
   }
   const std::uint32_t application_id = big_endian(head.data() + 68);
   if (application_id != memory_application_id) {
@@ -162,7 +162,7 @@ void require_schema(Database& database) {
   std::set<std::int64_t> pages{1};
   while (rows.step()) {
     const auto found = missing.find(rows.text(1));
-    if (found == missing.end()) fail(rows.text(0), rows.text(1), "is no part of a memory");
+    if (found == missing.end()) fail(rows.text(0), rows.text(1), "is not a part of a memory");
     const Entry& entry = found->second;
     if (rows.text(0) != entry.type || rows.text(2) != entry.table || rows.text(3) != entry.sql ||
         !pages.insert(rows.integer(4)).second) {
