@@ -36,7 +36,7 @@ std::vector<MapLayer> make_field_layers(const simulation::RememberedPlace& remem
                                         const FieldOptions& options, ViewId goal) {
   constexpr double share_of_spacing = 0.55;
   MapLayer references{.label = "references", .colour = PlotColour::blue};
-  MapLayer arrows{.label = "their directions to the goal", .colour = PlotColour::sky};
+  MapLayer arrows{.label = "directions to the goal", .colour = PlotColour::sky};
   const auto field = direction_field(remembered.graph, goal, options);
   for (std::size_t i = 0; i < field.size(); ++i) {
     const Pose2& pose = remembered.truth[i];
@@ -92,7 +92,7 @@ MapPlot mission_plot(const std::string& title, const simulation::MissionPlace& p
   plot.layers.push_back(
       {.label = "start", .colour = PlotColour::green, .squares = {run.path.front().position()}});
   if (run.kidnapped_at) {
-    plot.layers.push_back({.label = "kidnapped to here",
+    plot.layers.push_back({.label = "carried to this place",
                            .colour = PlotColour::purple,
                            .squares = {run.path.at(*run.kidnapped_at + 1).position()}});
   }

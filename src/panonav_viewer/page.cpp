@@ -63,9 +63,9 @@ std::string whole_page(std::string_view title, std::string_view generator, std::
   const std::string imports =
       moving ? "<script type=\"importmap\">" + import_map() + "</script>\n" : std::string();
   constexpr std::string_view starting =
-      "<script type=\"module\">import 'panonav/main';</script>\n<noscript><p>Runs and plots of "
-      "this "
-      "page are drawn with scripts, which are switched off here.</p></noscript>\n";
+      "<script type=\"module\">import 'panonav/main';</script>\n<noscript><p>This page "
+      "needs scripts to show runs and plots. Scripts are switched off in this "
+      "browser.</p></noscript>\n";
   const std::string_view scripts = moving ? starting : std::string_view();
   const std::array filled{std::pair{std::string_view("{{title}}"), html_escaped(title)},
                           std::pair{std::string_view("{{generator}}"), maker},

@@ -50,7 +50,7 @@ def look_at_report(browser, file, shots):
         browser.call("Input.dispatchMouseEvent", type=kind, x=300, y=300, button="left", clickCount=1, buttons=1)
     assert text_of(browser, "#play") == "Play"
     browser.key("End")
-    browser.wait("document.querySelector('#clock').textContent.endsWith('picture 60 of 60')")
+    browser.wait("document.querySelector('#clock').textContent.endsWith('image 60 of 60')")
     browser.picture(shots / "report.png")
     assert not browser.errors, browser.errors
     elsewhere = [one for one in browser.requests if not one.startswith((file.as_uri(), "data:"))]

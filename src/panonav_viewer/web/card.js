@@ -34,14 +34,14 @@ class Card extends HTMLElement {
     const metres = ([x, y]) => `x ${x.toFixed(2)} m, y ${y.toFixed(2)} m`;
     this.at = at ?? place;
     this.querySelector('h2').textContent = (at ? `Nearest view, ${away.toFixed(2)} m away: ` : '') +
-      (names?.[reference] ?? `remembered view ${reference}`);
+      (names?.[reference] ?? `stored view ${reference}`);
     this.querySelector('.where').textContent = metres(place) +
       (typeof heading === 'number' ? `, heading ${degrees(heading).toFixed(0)}°` : '');
     const image = this.querySelector('img');
     image.hidden = !this.run.views;
     if (this.run.views) {
       image.src = this.run.views + reference;
-      image.alt = `Picture of ${names?.[reference] ?? 'the view'}`;
+      image.alt = `Image of ${names?.[reference] ?? 'the view'}`;
     }
     this.showNeighbours(reference);
     const form = this.querySelector('form'), { takes } = this.run;
@@ -68,7 +68,7 @@ class Card extends HTMLElement {
       const away = i => Math.hypot(references[2 * i] - x, references[2 * i + 1] - y);
       near = new Set([...number.values()].filter(i => i !== reference).sort((i, j) => away(i) - away(j)).slice(0, 4));
     }
-    this.querySelector('.near').replaceChildren(connected ? 'Connected with ' : 'Next to ', ...[...near].filter(i => i !== undefined).slice(0, 8).map(i => {
+    this.querySelector('.near').replaceChildren(connected ? 'Connected to ' : 'Next to ', ...[...near].filter(i => i !== undefined).slice(0, 8).map(i => {
       const button = document.createElement('button');
       button.type = 'button';
       button.textContent = names?.[i] ?? i;
@@ -80,7 +80,7 @@ class Card extends HTMLElement {
     const { takes } = this.run, typed = this.querySelector('input').value;
     const wish = takes === 'pose' ? [...this.at, typed === '' ? null : Number(typed) % 360 * Math.PI / 180] : this.place;
     const answer = await fetch('control', { method: 'POST', body: JSON.stringify({ [takes]: wish }) }).catch(() => undefined);
-    this.querySelector('output').textContent = answer?.ok ? 'Sent to the run.' : 'The run refused this.';
+    this.querySelector('output').textContent = answer?.ok ? 'Sent to the run.' : 'The run rejected this request.';
   }
 }
 customElements.define('pn-card', Card);

@@ -9,13 +9,13 @@ import 'panonav/chart';
 import 'panonav/plan';
 
 const skeleton = `
-<div class="head controls"><output class="state" role="status" aria-live="polite">waiting for the first picture</output>
+<div class="head controls"><output class="state" role="status" aria-live="polite">waiting for the first image</output>
 <span class="clock"></span><nav class="panels" aria-label="Panels"></nav></div>
 <div class="shown"></div>
 <div class="foot controls"><button class="play" type="button" aria-keyshortcuts="Space">Pause</button>
-<button class="back" type="button" aria-label="Previous picture" aria-keyshortcuts="ArrowLeft">&#9664;</button>
-<button class="forth" type="button" aria-label="Next picture" aria-keyshortcuts="ArrowRight">&#9654;</button>
-<input class="slider" type="range" min="0" max="0" value="0" aria-label="Picture of the run">
+<button class="back" type="button" aria-label="Previous image" aria-keyshortcuts="ArrowLeft">&#9664;</button>
+<button class="forth" type="button" aria-label="Next image" aria-keyshortcuts="ArrowRight">&#9654;</button>
+<input class="slider" type="range" min="0" max="0" value="0" aria-label="Image of the run">
 <label>Speed <select class="speed"><option>0.5</option><option selected>1</option><option>2</option><option>5</option><option>20</option></select></label>
 <span class="hint">Space: pause. Arrows: one picture. Home, End: first, last. Digits: panels. Plus, minus, 0: zoom of the map; on it, arrows and Enter: views.</span></div>`;
 const panels = { map: 'Map', pictures: 'Pictures', facts: 'Facts', route: 'Route', timeline: 'Timeline' };
@@ -166,7 +166,7 @@ class RunPlayer extends HTMLElement {
     // A run without stamps counts its pictures.
     this.counted ??= !this.live && run.moments.every(({ t }, i) => t === i);
     this.find('clock').textContent = (this.counted ? '' : `${(moment.t - run.moments[0].t).toFixed(1)} s, `) +
-      (!this.live ? `picture ${run.index + 1} of ${run.moments.length}` : run.ended ? 'the run has ended'
+      (!this.live ? `image ${run.index + 1} of ${run.moments.length}` : run.ended ? 'the run has ended'
         : !this.connected ? 'connection lost, reconnecting' : !this.playing ? 'paused' : content.replay ? 'replay' : 'live');
   }
 }

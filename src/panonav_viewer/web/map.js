@@ -99,7 +99,7 @@ class MapPanel extends Drawing {
     this.selected = reference;
     this.clicked = reference === undefined ? undefined : at;
     if (reference !== undefined) {
-      this.readout.textContent = `remembered view ${reference}${names ? `, ${names[reference]}` : ''}: ` +
+      this.readout.textContent = `stored view ${reference}${names ? `, ${names[reference]}` : ''}: ` +
         `x ${references[2 * reference].toFixed(2)} m, y ${references[2 * reference + 1].toFixed(2)} m`;
     } else {
       this.readout.textContent = '';
@@ -183,7 +183,7 @@ class MapPanel extends Drawing {
     this.drawWalls(context, walls, keys, colour);
     for (let i = 0; i < edges.length; i += 5) {
       const key = edgeColours[edges[i + 4]] ?? 'reference';
-      keys.set(edges[i + 4] === 2 ? 'closures' : 'edges', [key, 0]);
+      keys.set(edges[i + 4] === 2 ? 'loop closures' : 'edges', [key, 0]);
       context.strokeStyle = colour(key);
       context.globalAlpha = 0.5;
       context.lineWidth = 1;
@@ -191,7 +191,7 @@ class MapPanel extends Drawing {
     }
     context.globalAlpha = 1;
     if (references.length) {
-      keys.set('remembered views', ['reference', '50%']);
+      keys.set('stored views', ['reference', '50%']);
       context.fillStyle = colour('reference');
       const radius = Math.max(1, Math.min(3, this.scale / 15));
       for (let i = 0; i < references.length; i += 2) this.dot(context, references[i], references[i + 1], radius);
@@ -273,7 +273,7 @@ class MapPanel extends Drawing {
       `<span style="--key:${key.startsWith('linear') ? key : `var(--${key})`};--round:${round}"${key.startsWith('linear') ? ' class="scale"' : ''}>${name}</span>`).join('');
     if (this.shownLegend !== legend) this.legend.innerHTML = this.shownLegend = legend;
     const at = ([x, y]) => `x ${x.toFixed(1)} m, y ${y.toFixed(1)} m`;
-    const text = ['Map of the run', references.length && `${references.length / 2} remembered views`,
+    const text = ['Map of the run', references.length && `${references.length / 2} stored views`,
       moment?.compared && `most similar view ${this.nameOf(moment.compared[0])}`, moment?.pose && `robot at ${at(moment.pose)}`,
       moment?.modes?.length > 1 && `or at ${moment.modes.slice(1, 4).map(([weight, x, y]) => `${at([x, y])} with ${Math.round(100 * weight)} %`).join('; ')}`,
       this.run.retained.goal && `goal at ${at(this.run.retained.goal)}`].filter(Boolean).join(', ');
@@ -285,7 +285,7 @@ class MapPanel extends Drawing {
     if (!regions.length) return;
     const areas = new Map();  // number: its cells
     for (const [area, ...outline] of regions) areas.set(area, [...(areas.get(area) ?? []), outline]);
-    keys.set(areas.size > 1 ? 'areas of the memory' : 'memorised area', ['area', 0]);
+    keys.set(areas.size > 1 ? 'areas of the memory' : 'area of the memory', ['area', 0]);
     context.globalAlpha = 0.13;
     for (const [area, cells] of areas) {
       context.fillStyle = areaColours[area % areaColours.length];
@@ -319,7 +319,7 @@ class MapPanel extends Drawing {
   // Draws the compared views by colour and size, from the least to the most similar.
   drawSimilarity(context, references, compared, radius, keys, colour) {
     if (compared.length < 4) return;
-    keys.set('least &ndash; most similar', [`linear-gradient(90deg,${scale})`, 0]);
+    keys.set('similarity: low &ndash; high', [`linear-gradient(90deg,${scale})`, 0]);
     const best = compared[1], range = Math.max(1, compared.at(-1) - best);
     context.lineWidth = 0.7;
     context.strokeStyle = colour('soft');

@@ -8,9 +8,9 @@ class Pictures extends HTMLElement {
     this.address = address;
     this.innerHTML = `
 <figure class="panorama"><canvas role="img" aria-label="Panorama"></canvas><figcaption>Panorama, forward in the middle</figcaption></figure>
-<figure class="best"><canvas role="img" aria-label="Most similar remembered view"></canvas><figcaption></figcaption></figure>
+<figure class="best"><canvas role="img" aria-label="Most similar stored view"></canvas><figcaption></figcaption></figure>
 <figure class="difference"><canvas role="img" aria-label="Difference by column"></canvas><figcaption>Difference by column: higher is less similar</figcaption></figure>
-<figure class="camera"><img alt="Picture of the camera"><figcaption>Camera</figcaption></figure>
+<figure class="camera"><img alt="Image of the camera"><figcaption>Camera</figcaption></figure>
 <p class="readout"></p>`;
     for (const figure of this.querySelectorAll('figure')) {
       figure.hidden = true;
@@ -32,7 +32,7 @@ class Pictures extends HTMLElement {
     const found = await Promise.all(['camera', 'panorama', 'best'].map(which => this.load(moment, which)));
     const readout = this.querySelector('.readout');
     if (!found.some(Boolean) && !this.run.over && moment !== this.run.moments[this.run.last]) {
-      readout.textContent = 'Pictures of earlier moments of a live run are not kept; use --record to keep them.';
+      readout.textContent = 'Images of earlier moments of a live run are not stored; use --record to store them.';
     } else {
       readout.textContent = '';
       this.images = found;
@@ -66,8 +66,8 @@ class Pictures extends HTMLElement {
     if (best) {
       this.drawPanorama(figure('best').querySelector('canvas'), best, turn ?? 0, false);
       const name = this.moment.values?.best_match;
-      figure('best').querySelector('figcaption').textContent = `Most similar remembered view${name ? ` (${name})` : ''}` +
-        (turn === undefined ? '' : `, turned by ${Math.round(degrees(turn))}°`);
+      figure('best').querySelector('figcaption').textContent = `Most similar stored view${name ? ` (${name})` : ''}` +
+        (turn === undefined ? '' : `, rotated by ${Math.round(degrees(turn))}°`);
     }
     figure('difference').hidden = !(panorama && best && turn !== undefined);
     if (!figure('difference').hidden) this.drawDifference(figure, turn);
