@@ -102,7 +102,7 @@ class EntryMaker {
   }
 
   void append_warnings(std::vector<std::string>& warnings) const {
-    const std::string of_all = " of " + std::to_string(messages_.pictures.size()) + " pictures";
+    const std::string of_all = " of " + std::to_string(messages_.pictures.size()) + " images";
     const auto warn_if_any = [&](std::size_t count, const std::string& what) {
       if (count > 0) warnings.push_back(std::to_string(count) + what);
     };

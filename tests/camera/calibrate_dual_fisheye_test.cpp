@@ -164,7 +164,7 @@ TEST(CalibrateDualFisheye, RefusesWhatDoesNotDetermineTheLenses) {
   EXPECT_TRUE(contains(reason(calibrate({pictures[0], elsewhere[0]}, known)), "do not agree"));
   EXPECT_TRUE(contains(reason(calibrate(pictures, {})), "do not agree"));
   EXPECT_TRUE(contains(reason(calibrate({pictures[0]}, known)), "uncertain"));
-  EXPECT_TRUE(contains(reason(calibrate({pictures[0], pictures[0]}, known)), "not turned"));
+  EXPECT_TRUE(contains(reason(calibrate({pictures[0], pictures[0]}, known)), "not rotated"));
 
   EXPECT_THROW((void)calibrate({}, known), ContractError);
   EXPECT_THROW((void)calibrate({pictures[0], Image(640, 300)}, known), ContractError);

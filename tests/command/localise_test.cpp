@@ -323,7 +323,7 @@ TEST_F(Localise, TheReportShowsEachPictureAboveItsBestMatch) {
     EXPECT_EQ(shown["values"]["image"].get<std::string>() + ": " +
                   shown["values"]["answer"].get<std::string>(),
               title);
-    EXPECT_TRUE(shown["values"]["difference to the best match"].get<std::string>().starts_with(
+    EXPECT_TRUE(shown["values"]["difference from the best match"].get<std::string>().starts_with(
         format_fixed(best["column_difference"], 3)));
     const auto decoded = [&](const char* which) {
       return decode_image(bytes_of_url(shown["data"][which].get<std::string>()), which);

@@ -153,7 +153,8 @@ TEST_F(Memorise, OneDamagedPictureIsNamedAndSkipped) {
   write_picture(data() / view_name(5), world_, grid_poses(4)[5]);
   const auto again = run_panonav({"memorise", data(), memory()});
   ASSERT_EQ(again.exit_code, 0) << again.err;
-  EXPECT_TRUE(contains(again.out, "1 views memorised, 14 were known before, 1 could not be read"));
+  EXPECT_TRUE(
+      contains(again.out, "1 views stored, 14 were already in the memory, 1 could not be read"));
   EXPECT_EQ(views_in(memory()), 15);
 
   expect_refusal({"memorise", data(), folder_ / "s.panonav", "--strict"},

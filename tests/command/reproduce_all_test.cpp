@@ -129,11 +129,11 @@ TEST_F(ReproduceAll, KeepsAnEarlierRunWhenTheOptionsAreBad) {
 }
 
 TEST_F(ReproduceAll, RefusesToContinueARunOfOtherOptions) {
-  expect_refusal(command({"--continue"}), "has seed 7, this one null; allowed: the same");
+  expect_refusal(command({"--continue"}), "has seed 7, this run null; allowed: the same");
   expect_refusal(command({"--seed", "7", "--runs", "4", "--continue"}), "has runs null");
   expect_refusal(
       {"reproduce", "all", "-o", out_, "--seed", "7", "--data", folder_.path(), "--continue"},
-      "has quick true, this one false");
+      "has quick true, this run false");
   json run = json::parse(bytes_of(out_ / "run.json"));
   run["version"] = "0.0.1";
   write(out_ / "run.json", run);

@@ -137,15 +137,17 @@ TEST(Usage, SwappedArgumentsAreRecognised) {
                  "did you mean 'panonav localise memory.panonav 'my image.jpg''?");
   expect_refusal({"memorise", "m.panonav", "folder"},
                  "MEMORY is 'folder' and INPUT is 'm.panonav'");
-  expect_refusal({"forget", "a.png", "b.png", "m.panonav"}, "swapped");
+  expect_refusal({"forget", "a.png", "b.png", "m.panonav"}, "in the wrong order");
   // No memory stands in the place of another one.
-  EXPECT_EQ(refusal({"serve", "a=postgresql://127.0.0.1:1/none", "no.panonav"}).find("swapped"),
+  EXPECT_EQ(refusal({"serve", "a=postgresql://127.0.0.1:1/none", "no.panonav"})
+                .find("in the wrong order"),
             std::string::npos);
   // A folder of pictures may have any name.
   const TemporaryFolder folder;
-  EXPECT_EQ(refusal({"localise", "no.db", folder.path()}).find("swapped"), std::string::npos);
+  EXPECT_EQ(refusal({"localise", "no.db", folder.path()}).find("in the wrong order"),
+            std::string::npos);
   std::filesystem::create_directory(folder / "run.panonav");
-  EXPECT_EQ(refusal({"localise", "no.db", folder / "run.panonav"}).find("swapped"),
+  EXPECT_EQ(refusal({"localise", "no.db", folder / "run.panonav"}).find("in the wrong order"),
             std::string::npos);
 }
 
