@@ -6,7 +6,10 @@
 #include <chrono>
 #include <cmath>
 #include <condition_variable>
+#include <cstdint>
 #include <deque>
+#include <exception>
+#include <future>
 #include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
@@ -23,6 +26,7 @@
 #include "panonav_server/http_server.hpp"
 #include "panonav_viewer/moment_json.hpp"
 #include "panonav_viewer/page.hpp"
+#include "panonav_viewer/reference_pictures.hpp"
 
 namespace panonav::viewer {
 
@@ -43,13 +47,6 @@ std::string make_random_token() {
   std::string text;
   for (int i = 0; i < 32; ++i) text += "0123456789abcdef"[device() & 15U];
   return text;
-}
-
-/// Encodes the pixels of a foreign file again, so that a browser receives nothing else of it.
-std::string safe_picture(std::span<const std::uint8_t> stored) {
-  const Image picture = decode_image(stored, "image of a view", {.side_px = 4096});
-  const std::vector<std::uint8_t> bytes = encode_jpeg(picture.view());
-  return {bytes.begin(), bytes.end()};
 }
 
 /// Nothing but digits.
@@ -100,7 +97,7 @@ class Frame {
   [[nodiscard]] std::string encoded(const std::string& which) {
     std::vector<std::uint8_t> bytes;
     if (which == "best") {
-      if (!moment_.best_match.empty()) return safe_picture(moment_.best_match);
+      if (!moment_.best_match.empty()) return encode_again(moment_.best_match);
     } else if (which == "panorama" && moment_.panorama) {
       const Image image = to_picture(*moment_.panorama);
       bytes = encode_jpeg(image.view());
@@ -136,6 +133,7 @@ struct ViewServer::Implementation {
                [this](const server::HttpRequest& request) { return answer(request); }) {}
 
   ~Implementation() {
+    reference_pictures.stop();
     std::unique_lock lock(mutex);
     ended = true;
     if (viewing == 0) return;
@@ -187,10 +185,22 @@ struct ViewServer::Implementation {
       if (!options.thumbnail || number >= known.size()) return {.status = 404};
       name = known[number].name;
     }
-    const std::vector<std::uint8_t> stored = options.thumbnail(name);
-    if (stored.empty()) return {.status = 404};
-    const std::string bytes = safe_picture(stored);
-    return {.type = "image/jpeg", .content = bytes};
+    auto started = reference_pictures.read(std::move(name), [this] { server.poke(); });
+    if (!started) return {.status = 503};
+    const auto picture = std::make_shared<std::future<std::string>>(std::move(*started));
+    return {.later = [picture]() -> std::optional<server::HttpAnswer> {
+      if (picture->wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
+        return std::nullopt;
+      }
+      std::string bytes;
+      try {
+        bytes = picture->get();
+      } catch (const std::exception&) {  // no memory, no picture in it, or the viewer ends
+        return server::HttpAnswer{.status = 500};
+      }
+      if (bytes.empty()) return server::HttpAnswer{.status = 404};
+      return server::HttpAnswer{.type = "image/jpeg", .content = std::move(bytes)};
+    }};
   }
 
   [[nodiscard]] server::HttpAnswer picture(std::size_t number, const std::string& which) {
@@ -403,6 +413,7 @@ struct ViewServer::Implementation {
   Clock::time_point left;  // when a viewer did, the last time
   std::size_t number = 0;
   bool ended = false;
+  ReferencePictures reference_pictures{options.thumbnail};
   server::HttpServer server;  // last: its thread uses the others
 };
 

@@ -29,8 +29,8 @@ struct ViewServerOptions {
   /// the last viewer has left it continues without waiting.
   bool replay = false;
   ViewWish takes = ViewWish::none;  ///< anything else is refused
-  /// The picture (PNG or JPEG) of a reference by its name, empty where there is none; the server's
-  /// thread asks. Empty: viewers get no pictures of references.
+  /// Returns the picture (PNG or JPEG) of a reference by its name, empty where there is none; it is
+  /// called on a thread of its own and may be slow. Empty: viewers get no pictures of references.
   std::function<std::vector<std::uint8_t>(const std::string& name)> thumbnail;
 };
 

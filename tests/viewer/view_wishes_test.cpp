@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <chrono>
+#include <future>
 #include <optional>
 #include <string>
 #include <vector>
@@ -41,6 +44,30 @@ TEST(ViewServer, GivesPicturesOfReferences) {
   ViewServer without;
   without.add(moment_at(0.0));
   EXPECT_EQ(status_of(below_pictures(without.url(), 0)), 404);
+}
+
+TEST(ViewServer, AnswersWhileAMemoryIsSlow) {
+  std::promise<void> reading;
+  std::promise<void> release;
+  std::atomic<bool> was_released = false;
+  {
+    const Image picture(64, 48, 3);
+    ViewServer server({.thumbnail = [&, released = release.get_future().share()](const auto&) {
+      reading.set_value();
+      was_released = released.wait_for(std::chrono::seconds(20)) == std::future_status::ready;
+      return encode_png(picture.view());
+    }});
+    recordings::RunMoment moment = moment_at(0.0);
+    moment.references = {{1.0, 2.0}};
+    moment.reference_views = {{"a", 0.5}};
+    server.add(std::move(moment));
+    auto slow = std::async(std::launch::async, [&] { return below_pictures(server.url(), 0); });
+    reading.get_future().wait();
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(status_of(ask(server.url(), "")), 200);
+    release.set_value();
+    EXPECT_EQ(status_of(slow.get()), 200);
+  }
+  EXPECT_TRUE(was_released);  // before that the page was answered
 }
 
 TEST(ViewServer, TakesTheWishesThatTheRunTakes) {
