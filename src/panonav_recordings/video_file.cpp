@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cstdint>
 #include <cstdio>
 #include <deque>
@@ -15,6 +14,7 @@
 #include <utility>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav_recordings/internal/child_process.hpp"
 #include "panonav_recordings/internal/decoded_video.hpp"
@@ -78,9 +78,7 @@ std::vector<std::string> parse_fields(std::string_view line) {
 
 std::optional<std::int64_t> parse_whole_number(std::string_view text) {
   std::int64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return value;
+  return read_number(text, value) ? std::optional(value) : std::nullopt;
 }
 
 /// `entries` of the container's packets, or of its decoded frames where packets have no stamps.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <charconv>
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
@@ -17,6 +16,7 @@
 #include <vector>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav/storage/memory_address.hpp"
@@ -59,9 +59,7 @@ std::string decode_percent(std::string_view text) {
     }
     unsigned value = 0;
     const std::string_view digits = text.substr(i + 1, 2);
-    const auto [end, error] =
-        std::from_chars(digits.data(), digits.data() + digits.size(), value, 16);
-    if (digits.size() != 2 || error != std::errc() || end != digits.data() + 2) return {};
+    if (digits.size() != 2 || !read_number(digits, value, 16)) return {};
     decoded += static_cast<char>(value);
     i += 2;
   }
@@ -388,14 +386,16 @@ struct LocalisationServer::Implementation {
   }
 
   HttpAnswer thumbnail(const Job& job, LoadedMemory& memory) {
+    bool is_silent = memory.is_on_server;
     try {
       const auto picture = memory.thumbnail(job.view);
+      is_silent = false;
       if (!picture) return make_refusal(404, "the memory has no view of that name with an image");
       const bool jpeg = image_format(*picture, "the image") == ImageFormat::jpeg;
       return {.type = jpeg ? "image/jpeg" : "image/png",
               .content = std::string(picture->begin(), picture->end())};
     } catch (const std::exception& error) {
-      return refuse_for_memory(memory.is_on_server ? 503 : 500, job.memory, error);
+      return refuse_for_memory(is_silent ? 503 : 500, job.memory, error);
     }
   }
 
@@ -403,7 +403,8 @@ struct LocalisationServer::Implementation {
   HttpAnswer refuse_for_memory(int status, const std::string& name, const std::exception& error) {
     report_loss(name, to_readable_line(error.what()));
     const std::lock_guard lock(mutex);
-    served.at(name).failed = Clock::now();
+    // One picture that cannot be answered says nothing about the others.
+    if (status == 503) served.at(name).failed = Clock::now();
     return make_refusal(status, unreadable(name));
   }
   static std::string unreadable(const std::string& name) {

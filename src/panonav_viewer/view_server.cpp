@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <charconv>
 #include <chrono>
 #include <cmath>
 #include <condition_variable>
@@ -21,6 +20,7 @@
 #include <utility>
 #include <vector>
 
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/io/image_file.hpp"
 #include "panonav_server/http_server.hpp"
@@ -49,13 +49,9 @@ std::string make_random_token() {
   return text;
 }
 
-/// Nothing but digits.
-std::optional<std::size_t> number_in(std::string_view text) {
+std::optional<std::size_t> parse_index(std::string_view text) {
   std::size_t number = 0;
-  const char* const end = text.data() + text.size();
-  const auto [read, error] = std::from_chars(text.data(), end, number);
-  if (error != std::errc() || read != end) return std::nullopt;
-  return number;
+  return read_number(text, number) ? std::optional(number) : std::nullopt;
 }
 
 std::string_view name_of(ViewWish wish) {
@@ -164,14 +160,14 @@ struct ViewServer::Implementation {
     if (resource == "/events") return events();
     constexpr std::string_view views = "/view/";
     if (resource.starts_with(views)) {
-      const auto number = number_in(resource.substr(views.size()));
+      const auto number = parse_index(resource.substr(views.size()));
       return number ? reference(*number) : only(404);
     }
     constexpr std::string_view pictures = "/picture/";
     if (!resource.starts_with(pictures)) return only(404);
     const std::string_view rest = resource.substr(pictures.size());
     const std::size_t slash = rest.find('/');
-    const auto number = number_in(rest.substr(0, slash));
+    const auto number = parse_index(rest.substr(0, slash));
     if (slash == std::string_view::npos || !number) return only(404);
     return picture(*number, std::string(rest.substr(slash + 1)));
   }

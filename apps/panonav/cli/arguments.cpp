@@ -1,7 +1,6 @@
 #include "cli/arguments.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <deque>
 #include <filesystem>
 #include <map>
@@ -14,6 +13,7 @@
 #include "cli/outputs.hpp"
 #include "cli/texts.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/io/option_file.hpp"
 #include "panonav/storage/memory_address.hpp"
@@ -63,8 +63,7 @@ std::string to_member_name(std::string_view flag) {
 template <class Number>
 Number parse_whole_number(const std::string& flag, const std::string& text, Number low) {
   Number value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || value < low) {
+  if (!read_number(text, value) || value < low) {
     throw UsageError(flag + " is '" + text + "'; allowed: whole numbers from " +
                      std::to_string(low));
   }

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 
 #include "cli/arguments.hpp"
 #include "panonav/core/error.hpp"
+#include "panonav/core/number_text.hpp"
 
 namespace panonav::command {
 
@@ -46,10 +46,7 @@ bool looks_like_flag(std::string_view word) {
 
 double parse_number(std::string_view flag, std::string_view text) {
   double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) {
-    refuse(flag, text, "a number");
-  }
+  if (!read_number(text, value) || !std::isfinite(value)) refuse(flag, text, "a number");
   return value;
 }
 
@@ -61,8 +58,7 @@ const std::string* TextApplier::text(const OptionInfo& info) const {
 void TextApplier::visit(const OptionInfo& info, int& value) {
   const std::string* typed = text(info);
   if (typed == nullptr) return;
-  const auto [end, error] = std::from_chars(typed->data(), typed->data() + typed->size(), value);
-  if (error != std::errc() || end != typed->data() + typed->size()) {
+  if (!read_number(*typed, value)) {
     refuse(info.name, *typed, "whole numbers " + describe_range(info));
   }
 }

@@ -2,9 +2,8 @@
 
 #include <arpa/inet.h>
 
-#include <charconv>
-
 #include "cli/arguments.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/text.hpp"
 
 namespace panonav::command {
@@ -13,11 +12,10 @@ ListeningPlace parse_listening_address(std::string_view flag, const std::string&
   ListeningPlace place;
   const std::size_t colon = text.rfind(':');
   if (colon != std::string::npos) place.address = text.substr(0, colon);
-  const char* const from = text.data() + (colon == std::string::npos ? 0 : colon + 1);
-  const char* const to = text.data() + text.size();
-  const auto [end, error] = std::from_chars(from, to, place.port);
+  const std::string_view port =
+      std::string_view(text).substr(colon == std::string::npos ? 0 : colon + 1);
   in_addr ignored{};
-  if (error != std::errc() || end != to || place.port < 0 || place.port > 65535 ||
+  if (!read_number(port, place.port) || place.port < 0 || place.port > 65535 ||
       inet_pton(AF_INET, place.address.c_str(), &ignored) != 1) {
     throw UsageError(std::string(flag) + " is " + to_readable_line(text) +
                      "; allowed: a port, 0 to 65535, or an IPv4 address of this machine with a " +

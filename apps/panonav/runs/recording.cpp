@@ -1,12 +1,12 @@
 #include "runs/recording.hpp"
 
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <string_view>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/io/camera_file.hpp"
@@ -146,10 +146,8 @@ Dataset::Selection to_selection(const PartArguments& part) {
   const bool is_time = text.ends_with('s');
   if (is_time) text.pop_back();
   double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  const bool number = error == std::errc() && end == text.data() + text.size();
   constexpr double max_value = 1e9;
-  const bool fits = number && value > 0.0 && value <= max_value &&
+  const bool fits = read_number(text, value) && value > 0.0 && value <= max_value &&
                     (is_time || (value >= 1.0 && value == std::floor(value)));
   if (!fits) {
     throw UsageError("--every is " + to_readable_line(*part.every) +

@@ -1,9 +1,9 @@
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <filesystem>
 
 #include "cli/verbs.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/pipeline/catchment_survey.hpp"
 #include "reports/catchment_report.hpp"
@@ -203,8 +203,8 @@ std::vector<int> read_stages(const std::string& text, int max_frequency) {
   for (std::size_t begin = 0; begin <= text.size();) {
     const std::size_t end = std::min(text.find(',', begin), text.size());
     int value = 0;
-    const auto [last, error] = std::from_chars(text.data() + begin, text.data() + end, value);
-    if (error != std::errc() || last != text.data() + end || value < 1 || value > max_frequency) {
+    const std::string_view number = std::string_view(text).substr(begin, end - begin);
+    if (!read_number(number, value) || value < 1 || value > max_frequency) {
       throw UsageError("--stages is '" + text + "'; allowed: numbers from 1 to " +
                        std::to_string(max_frequency) +
                        ", components less two, with commas between them");

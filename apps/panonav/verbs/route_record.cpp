@@ -1,8 +1,8 @@
 #include <algorithm>
-#include <charconv>
 #include <filesystem>
 
 #include "cli/verbs.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/pipeline/observation_source.hpp"
 #include "panonav/pipeline/route_recorder.hpp"
 #include "panonav/pipeline/view_encoder.hpp"
@@ -40,8 +40,7 @@ std::pair<int, int> parse_rows(const std::string& text) {
   const auto dash = text.find('-');
   const auto number = [&](const std::string& part) {
     int value = -1;
-    const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), value);
-    return error == std::errc() && end == part.data() + part.size() ? value : -1;
+    return read_number(part, value) ? value : -1;
   };
   if (dash != std::string::npos) {
     const int first = number(text.substr(0, dash));

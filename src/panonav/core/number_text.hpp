@@ -25,13 +25,13 @@ namespace panonav {
 /// is one such number.
 [[nodiscard]] bool read_hex_number(std::string_view text, double& value);
 
-/// Reads a number in decimal digits. False, and `value` as before, unless the whole text is one
-/// number that the type can hold.
-template <class Number>
-[[nodiscard]] bool read_number(std::string_view text, Number& value) {
+/// Reads a number in decimal digits, or a whole number of another `base`, 2 .. 36. False, and
+/// `value` as before, unless the whole text is one number that the type can hold.
+template <class Number, class... Base>
+[[nodiscard]] bool read_number(std::string_view text, Number& value, Base... base) {
   const char* const end = text.data() + text.size();
   Number read{};
-  const auto result = std::from_chars(text.data(), end, read);
+  const auto result = std::from_chars(text.data(), end, read, base...);
   if (result.ec != std::errc() || result.ptr != end) return false;
   value = read;
   return true;

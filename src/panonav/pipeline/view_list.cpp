@@ -1,10 +1,10 @@
 #include "panonav/pipeline/view_list.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <map>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/text.hpp"
 #include "panonav/geometry/angles.hpp"
 #include "panonav/mapping/topological_map.hpp"
@@ -77,10 +77,9 @@ std::string view_table(std::span<const ViewRecord> views, std::span<const std::s
 ViewId find_view_by_name_or_id(const MemoryFile& file, const std::string& name_or_id) {
   if (const auto named = file.find(name_or_id)) return *named;
   std::uint32_t id = 0;
-  const auto [end, error] =
-      std::from_chars(name_or_id.data(), name_or_id.data() + name_or_id.size(), id);
-  const bool number = error == std::errc() && end == name_or_id.data() + name_or_id.size();
-  if (number && std::ranges::binary_search(file.views(), ViewId{id})) return ViewId{id};
+  if (read_number(name_or_id, id) && std::ranges::binary_search(file.views(), ViewId{id})) {
+    return ViewId{id};
+  }
   throw FileError(file.path().string(), "has no view of the name or id '" + name_or_id + "'");
 }
 

@@ -44,6 +44,8 @@ class PostgresqlValues {
     std::string bytes;
   };
   Value& next(unsigned type);
+  /// Adds the head of an array value; its elements follow in the returned bytes.
+  std::string& begin_array(unsigned type, unsigned element_type, std::size_t count);
   std::vector<Value> values_;
 };
 

@@ -32,6 +32,20 @@ PostgresqlValues::Value& PostgresqlValues::next(unsigned type) {
   return values_.emplace_back(Value{type, false, {}});
 }
 
+std::string& PostgresqlValues::begin_array(unsigned type, unsigned element_type,
+                                           std::size_t count) {
+  std::string& bytes = next(type).bytes;
+  // Dimensions, whether there are nulls, the type, then the size and first index of the dimension.
+  append_big_endian(bytes, count == 0 ? 0 : 1, 4);
+  append_big_endian(bytes, 0, 4);
+  append_big_endian(bytes, element_type, 4);
+  if (count > 0) {
+    append_big_endian(bytes, count, 4);
+    append_big_endian(bytes, 1, 4);
+  }
+  return bytes;
+}
+
 PostgresqlValues& PostgresqlValues::add(std::int64_t value) {
   append_big_endian(next(int8_type).bytes, static_cast<std::uint64_t>(value), 8);
   return *this;
@@ -61,15 +75,7 @@ PostgresqlValues& PostgresqlValues::add(std::span<const std::uint8_t> bytes) {
 }
 
 PostgresqlValues& PostgresqlValues::add(std::span<const std::int64_t> values) {
-  std::string& bytes = next(int8_array_type).bytes;
-  // Dimensions, whether there are nulls, the type, then the size and first index of the dimension.
-  append_big_endian(bytes, values.empty() ? 0 : 1, 4);
-  append_big_endian(bytes, 0, 4);
-  append_big_endian(bytes, int8_type, 4);
-  if (!values.empty()) {
-    append_big_endian(bytes, values.size(), 4);
-    append_big_endian(bytes, 1, 4);
-  }
+  std::string& bytes = begin_array(int8_array_type, int8_type, values.size());
   for (const std::int64_t value : values) {
     append_big_endian(bytes, 8, 4);
     append_big_endian(bytes, static_cast<std::uint64_t>(value), 8);
@@ -78,14 +84,7 @@ PostgresqlValues& PostgresqlValues::add(std::span<const std::int64_t> values) {
 }
 
 PostgresqlValues& PostgresqlValues::add(std::span<const std::string> texts) {
-  std::string& bytes = next(text_array_type).bytes;
-  append_big_endian(bytes, texts.empty() ? 0 : 1, 4);
-  append_big_endian(bytes, 0, 4);
-  append_big_endian(bytes, text_type, 4);
-  if (!texts.empty()) {
-    append_big_endian(bytes, texts.size(), 4);
-    append_big_endian(bytes, 1, 4);
-  }
+  std::string& bytes = begin_array(text_array_type, text_type, texts.size());
   for (const std::string& text : texts) {
     append_big_endian(bytes, text.size(), 4);
     bytes += text;

@@ -1,10 +1,10 @@
 #include "panonav/io/internal/csv_table.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/geometry/position_bound.hpp"
 #include "panonav/io/atomic_file.hpp"
 
@@ -110,10 +110,8 @@ const std::string& CsvTable::text(std::size_t row, std::string_view column) cons
 double CsvTable::number(std::size_t row, std::string_view column) const {
   const std::string& field = text(row, column);
   double value = 0.0;
-  const char* begin = field.data() + (field.starts_with('+') ? 1 : 0);
-  const auto result = std::from_chars(begin, field.data() + field.size(), value);
-  if (field.empty() || result.ec != std::errc{} || result.ptr != field.data() + field.size() ||
-      !std::isfinite(value)) {
+  const std::string_view digits = std::string_view(field).substr(field.starts_with('+') ? 1 : 0);
+  if (!read_number(digits, value) || !std::isfinite(value)) {
     fail(row, column, field.empty() ? "empty" : "'" + field + "'", "a finite number");
   }
   return value;
