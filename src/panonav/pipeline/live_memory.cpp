@@ -23,6 +23,11 @@ namespace panonav {
 
 namespace {
 
+/// A writer that was killed may have left a memory without views.
+bool holds_views(Memoriser& memoriser) {
+  return memoriser.file() != nullptr && memoriser.file()->info().views > 0;
+}
+
 /// Stores views on a thread of its own.
 class Storer {
  public:
@@ -41,10 +46,10 @@ class Storer {
     const std::lock_guard lock(mutex_);
     return waiting_.size();
   }
-  /// True if the memory has a file by now.
-  [[nodiscard]] bool has_file() const {
+  /// True if views are stored by now.
+  [[nodiscard]] bool has_views() const {
     const std::lock_guard lock(mutex_);
-    return has_file_;
+    return has_views_;
   }
   /// Stores all that waits and ends. Rethrows what went wrong.
   void finish() {
@@ -65,7 +70,7 @@ class Storer {
     lower_thread_priority();
     std::unique_lock lock(mutex_);
     while (true) {
-      has_file_ = memoriser_.file() != nullptr;
+      has_views_ = has_views_ || holds_views(memoriser_);
       came_.wait(lock, [this] { return over_ || !waiting_.empty(); });
       if (waiting_.empty()) return;
       Observation next = std::move(waiting_.front());
@@ -87,7 +92,7 @@ class Storer {
   std::condition_variable came_;
   std::deque<Observation> waiting_;  // the first one is being stored
   std::exception_ptr failure_;
-  bool has_file_ = false;
+  bool has_views_ = false;
   bool over_ = false;
   std::thread thread_;
 };
@@ -112,7 +117,6 @@ struct LiveMemory::Implementation {
     if (options.add) {
       if (options.areas) throw ContractError("areas", "given", "none of a memory that is added to");
       memoriser.emplace(path, options.memoriser);
-      if (!options.in_step) storer.emplace(*memoriser);
     } else if (!exists) {
       throw FileError(without_passwords(path.string()),
                       "does not exist, and no views are to be added");
@@ -120,7 +124,8 @@ struct LiveMemory::Implementation {
     if (options.update && exists && (!options.add || can_be_updated())) {
       updater.emplace(path, options.update_options);
     }
-    if (exists) recogniser = make_recogniser();
+    if (exists && (!options.add || holds_views(*memoriser))) recogniser = make_recogniser();
+    if (memoriser && !options.in_step) storer.emplace(*memoriser);  // it alone uses the file now
   }
 
   /// Other memories only grow.
@@ -144,7 +149,7 @@ struct LiveMemory::Implementation {
     constexpr std::size_t min_new = 16;
     const std::size_t views = recogniser ? recogniser->size() : 0;
     const bool due = !recogniser || added.size() >= std::max(min_new, views / 5);
-    if (due && !next.valid() && has_file()) {
+    if (due && !next.valid() && has_views()) {
       next = std::async(options.in_step ? std::launch::deferred : std::launch::async, [this] {
         if (!options.in_step) lower_thread_priority();
         return make_recogniser();
@@ -159,9 +164,7 @@ struct LiveMemory::Implementation {
     for (const auto& [info, signature] : added) recogniser->append(info, signature);
   }
 
-  [[nodiscard]] bool has_file() {
-    return storer ? storer->has_file() : memoriser->file() != nullptr;
-  }
+  [[nodiscard]] bool has_views() { return storer ? storer->has_views() : holds_views(*memoriser); }
 
   std::filesystem::path path;
   LiveMemoryOptions options;

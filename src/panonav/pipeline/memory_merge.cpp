@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <map>
+#include <random>
 #include <set>
 #include <string>
 #include <system_error>
@@ -10,6 +12,7 @@
 #include <vector>
 
 #include "panonav/core/error.hpp"
+#include "panonav/core/number_text.hpp"
 #include "panonav/core/temporary_file.hpp"
 #include "panonav/pipeline/known_views.hpp"
 #include "panonav/pipeline/learnt_models.hpp"
@@ -154,6 +157,39 @@ std::string make_free_name(const std::string& name, const MemoryFile& from,
   for (int i = 2; is_taken(new_name); ++i) new_name = base + " (" + std::to_string(i) + ")";
   return new_name;
 }
+
+/// Files of a memory that is being made: beside its target, or, where that is on a server, among
+/// the temporary files. A locked file reserves their names, so that two processes never use the
+/// same; those that a killed process left are removed.
+class UnfinishedMemory {
+ public:
+  explicit UnfinishedMemory(const fs::path& target)
+      : lock_(name_files(target)), path_(lock_.path().string() + "-memory") {
+    remove_files();
+  }
+  ~UnfinishedMemory() { remove_files(); }
+  UnfinishedMemory(const UnfinishedMemory&) = delete;
+  UnfinishedMemory& operator=(const UnfinishedMemory&) = delete;
+
+  [[nodiscard]] const fs::path& path() const noexcept { return path_; }
+
+ private:
+  static fs::path name_files(const fs::path& target) {
+    if (!is_server_address(target)) return target.string() + ".unfinished";
+    std::random_device device;  // others may make files there, too
+    const std::uint64_t number = (std::uint64_t{device()} << 32U) | device();
+    return fs::temp_directory_path() / ("merged." + to_hex_digits(number, 16));
+  }
+  void remove_files() const noexcept {
+    std::error_code ignored;
+    for (const char* suffix : {"", "-wal", "-shm", "-journal"}) {
+      fs::remove(path_.string() + suffix, ignored);
+    }
+  }
+
+  TemporaryFile lock_;
+  fs::path path_;
+};
 
 class Merge {
  public:
@@ -310,22 +346,13 @@ MergedMemory merge_memories(const std::filesystem::path& first, const std::files
     throw FileError(without_passwords(memory.string()),
                     "already exists; a merged memory is a new one");
   }
-  const bool on_server = is_server_address(memory);
-  TemporaryFile unfinished(on_server ? fs::temp_directory_path() / "merged.panonav" : memory);
-  fs::remove(unfinished.path());  // a memory file is made where nothing is
+  const UnfinishedMemory unfinished(memory);
   MergedMemory result;
-  {
-    MemoryFile file = MemoryFile::create(unfinished.path(), a.header());
-    Merge merge(a, b, alignment, graph);
-    file.change([&] { result = merge.write(file, advance); });
-    keep_models(file);
-    if (on_server) file.copy_to(memory);
-  }
-  if (on_server) return result;
-  std::error_code error;
-  fs::rename(unfinished.path(), memory, error);
-  if (error) throw FileError(memory.string(), "cannot be written: " + error.message());
-  unfinished.keep();
+  MemoryFile file = MemoryFile::create(unfinished.path(), a.header());
+  Merge merge(a, b, alignment, graph);
+  file.change([&] { result = merge.write(file, advance); });
+  keep_models(file);
+  file.copy_to(memory);
   return result;
 }
 

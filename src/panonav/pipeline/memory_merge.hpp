@@ -33,7 +33,7 @@ struct MergedMemory {
 ///
 /// Throws FileError: unreadable or unwritable files, something at `memory`, positions without
 /// headings; ContractError: other shape, preprocessing or elevations; OptionError. Holds both
-/// memories. Cost: `align_sessions`, and writing all views.
+/// memories. Cost: `align_sessions`, and writing all views twice.
 MergedMemory merge_memories(const std::filesystem::path& first, const std::filesystem::path& second,
                             const std::filesystem::path& memory,
                             const SessionAlignmentOptions& alignment = {},
