@@ -27,12 +27,6 @@ NewView numbered_view(SignatureShape shape, int number) {
   return random_view(random, shape, number);
 }
 
-int exit_code_of(pid_t child) {
-  int status = 0;
-  if (::waitpid(child, &status, 0) != child || !WIFEXITED(status)) return -1;
-  return WEXITSTATUS(status);
-}
-
 struct Acknowledgement {
   int number;
   std::uint32_t id;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cstdlib>
@@ -18,6 +19,13 @@ inline pid_t start_child(const std::function<int()>& body) {
   } catch (...) {
   }
   std::_Exit(code);
+}
+
+/// Waits for a child process and returns its exit code, -1 if a signal ended it.
+inline int exit_code_of(pid_t child) {
+  int status = 0;
+  if (::waitpid(child, &status, 0) != child || !WIFEXITED(status)) return -1;
+  return WEXITSTATUS(status);
 }
 
 }  // namespace panonav::testing

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdint>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -56,6 +57,17 @@ void remove_log_files(const fs::path& path) {
   }
 }
 
+/// Opens a file with changes in its log whose shared index cannot be made, as on a full disk: keeps
+/// the index in memory, which locks others out until it is closed.
+Database read_with_private_index(const fs::path& file) {
+  Database database(file, DatabaseMode::change);
+  database.leave_log_on_close();
+  database.execute("PRAGMA locking_mode=EXCLUSIVE");
+  database.execute("PRAGMA query_only=ON");
+  static_cast<void>(database.integer("PRAGMA schema_version"));
+  return database;
+}
+
 Database open_memory_database(const fs::path& path, Access access) {
   require_memory_file(path);
   const std::string name = path.string();
@@ -73,11 +85,17 @@ Database open_memory_database(const fs::path& path, Access access) {
     return database;
   }
   const fs::path log = with_suffix(file, "-wal");
-  const auto empty = [&](const fs::path& part) {
-    return !fs::exists(part, ignored) || fs::file_size(part, ignored) == 0;
+  const auto size_of = [&](const fs::path& part) -> std::uintmax_t {
+    return fs::exists(part, ignored) ? fs::file_size(part, ignored) : 0;
+  };
+  // Whoever uses a log shares an index of at least one region (sqlite.org/walformat.html); a full
+  // disk leaves a shorter one.
+  constexpr std::uintmax_t index_region_bytes = 32768;
+  const auto is_log_in_use = [&] {
+    return size_of(with_suffix(file, "-shm")) >= index_region_bytes;
   };
   // Nobody has the file open for writing and nobody left changes behind.
-  const auto at_rest = [&] { return empty(log) && empty(with_suffix(file, "-shm")); };
+  const auto at_rest = [&] { return size_of(log) == 0 && !is_log_in_use(); };
   // A reader without permission cannot make the log that SQLite wants to find.
   if (!may_write && at_rest()) {
     return {file, DatabaseMode::immutable};
@@ -95,7 +113,8 @@ Database open_memory_database(const fs::path& path, Access access) {
     // No room for a log on a full disk, or a file system that cannot share one. A file that is
     // damaged is found to be so again.
     if (at_rest()) return {file, DatabaseMode::immutable};
-    if (may_write || empty(log)) throw;
+    if (may_write && !is_log_in_use()) return read_with_private_index(file);
+    if (may_write || size_of(log) == 0) throw;
     throw FileError(name,
                     "has changes in " + log.string() +
                         " that can be read only with permission to write the folder; open the "
