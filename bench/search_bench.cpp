@@ -36,7 +36,7 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-double thread_seconds() {
+double get_thread_cpu_time_s() {
   timespec used{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);
   return static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec);
@@ -276,9 +276,9 @@ int ask(const std::string& address, std::size_t views) {
       std::uint64_t bytes = 0;
       for (std::size_t i = 0; i < kind.all.size(); ++i) {
         const auto from = Clock::now();
-        const double own = simulation::thread_seconds();
+        const double own = simulation::get_thread_cpu_time_s();
         const SearchResult result = search.search(kind.all[i]);
-        own_ms.push_back(1e3 * (simulation::thread_seconds() - own));
+        own_ms.push_back(1e3 * (simulation::get_thread_cpu_time_s() - own));
         ms.push_back(1e3 * seconds_since(from));
         in_full += result.views_in_full;
         bytes += result.bytes_read;

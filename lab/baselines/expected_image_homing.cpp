@@ -96,7 +96,7 @@ struct FlatRow {
 };
 
 // Puts the pixels that are seen from a position into `row`; returns their energy around their mean.
-float expect_row(std::span<const float> flat, const std::uint16_t* seen, float* row) {
+float compute_expected_row(std::span<const float> flat, const std::uint16_t* seen, float* row) {
   const std::size_t columns = flat.size();
   // Several sums side by side, so that one does not wait for the other.
   std::array<float, 4> sums{};
@@ -157,8 +157,8 @@ HomeVector ExpectedImageHoming::home_vector(std::span<const float> home,
     std::array<float, block> energies{};
     std::array<float, block> largest{};
     for (std::size_t p = 0; p < count; ++p) {
-      energies[p] =
-          expect_row(flat.values, pixels(first + p).data(), expected.data() + p * columns);
+      energies[p] = compute_expected_row(flat.values, pixels(first + p).data(),
+                                         expected.data() + p * columns);
     }
     turn_products(std::span(expected).first(count * columns), columns, periodic.values,
                   std::span(products).first(count * stride), std::span(largest).first(count));

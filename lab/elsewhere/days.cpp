@@ -92,7 +92,8 @@ class DrivingRobot {
   explicit DrivingRobot(DailyDrive drive) : drive_(drive) {}
 
   /// Returns the poses of the images of a day, which begins at a random place.
-  std::vector<Pose2> pass_day(const simulation::FreeSpace& space, int pictures, Random& random) {
+  std::vector<Pose2> simulate_day(const simulation::FreeSpace& space, int pictures,
+                                  Random& random) {
     ++day_;
     std::vector<simulation::GridPosition> grid;
     if (drive_ == DailyDrive::rounds) grid = space.grid(spacing_m);
@@ -285,14 +286,15 @@ class Days {
     Random light(options_.seed, 91);
     const int asked_every = std::max(1, options_.days / 6);
     for (int day = 1; day <= options_.days; ++day) {
-      changing_.pass_day(moved_share);
+      changing_.simulate_day(moved_share);
       const simulation::PlaceRecording today = place_today(light.uniform(0.6, 1.2));
       const std::uint64_t seed = options_.seed * 1000003U + static_cast<std::uint64_t>(day) * 1000U;
       if (day == 1 || day % asked_every == 0 || day == options_.days) ask_all(today, day, seed);
       if (day == options_.days) break;
       for (DailyRobot& robot : robots_) {
         Random driving(seed, 5);
-        const auto path = robot.driving.pass_day(*today.free_space, options_.day_pictures, driving);
+        const auto path =
+            robot.driving.simulate_day(*today.free_space, options_.day_pictures, driving);
         robot.learning.learn(
             simulation::take_views(today, place_.rendering, path, seed, {}, executor()), seed,
             executor());

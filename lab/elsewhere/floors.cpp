@@ -85,8 +85,8 @@ void ElsewhereExperiments::reproduce_floor(const std::string& world, double spac
       .reason = "the trustworthiness of its neighbourhoods is " + format_fixed(trustworthiness, 3);
   add_row(result, id + ".trustworthiness", what + ": trustworthiness of its neighbourhoods",
           trustworthiness, "");
-  const auto missions = simulation::draw_missions(place, remembered, {.count = options.runs},
-                                                  Random(options.seed, 2).next());
+  const auto missions = simulation::sample_missions(place, remembered, {.count = options.runs},
+                                                    Random(options.seed, 2).next());
   const auto runs = simulation::run_missions(place, remembered, missions, {},
                                              Random(options.seed, 3).next(), executor);
   const FloorMissions count = count_missions(remembered, missions, runs, spacing_m);

@@ -28,7 +28,7 @@ constexpr double arrived_m = 0.1;
 /// A home vector between two views, and its angular error where the true direction is known.
 struct HomeAnswered {
   bool answered = false;
-  double off_rad = 0.0;
+  double direction_error_rad = 0.0;
   double probability = 0.0;
 };
 
@@ -40,14 +40,15 @@ HomeAnswered find_home(const Panorama& goal, const Panorama& current) {
 
 /// Returns the angle between `direction_rad`, in the frame of a robot at `from`, and the direction
 /// of `to`.
-double off_rad(double direction_rad, const Pose2& from, const Pose2& to) {
+double direction_error_rad(double direction_rad, const Pose2& from, const Pose2& to) {
   const double truth = std::atan2(to.y_m - from.y_m, to.x_m - from.x_m);
   return std::abs(angle_difference(direction_rad + from.heading_rad, truth));
 }
 
 HomeAnswered find_home(const simulation::PlacedView& goal, const simulation::PlacedView& current) {
   HomeAnswered answer = find_home(goal.panorama, current.panorama);
-  answer.off_rad = off_rad(answer.off_rad, current.pose, goal.pose);
+  answer.direction_error_rad =
+      direction_error_rad(answer.direction_error_rad, current.pose, goal.pose);
   return answer;
 }
 
@@ -86,7 +87,7 @@ std::string explain_failures(const std::vector<HomingRun>& runs, std::size_t lev
     if (run.is_success(arrived_m)) continue;
     ++others;
     const double first_rad = run.vectors.front().direction_rad();
-    away += off_rad(first_rad, run.path.front(), run.goal) > radians(90.0) ? 1 : 0;
+    away += direction_error_rad(first_rad, run.path.front(), run.goal) > radians(90.0) ? 1 : 0;
     alike += run.end_difference < run.start_difference ? 1 : 0;
     wrongly += run.end == HomingRunEnd::arrived ? 1 : 0;
   }
@@ -127,15 +128,15 @@ class HomeVectors {
         random_(elsewhere.options.seed, 11),
         pairs_(static_cast<std::size_t>(elsewhere.options.queries)) {}
 
-  void ask_within(const Range& range) {
-    const auto pairs = draw_pairs(range);
+  void answer_pairs_within(const Range& range) {
+    const auto pairs = sample_pairs(range);
     const auto answers = simulation::make_each(
         elsewhere_.executor, pairs.size(),
         [&](std::size_t i) { return find_home(*pairs[i].goal, *pairs[i].current); });
     std::size_t off = 0;
     std::map<std::string, std::size_t> off_in;
     for (std::size_t i = 0; i < answers.size(); ++i) {
-      const bool is_right = answers[i].off_rad <= radians(45.0);
+      const bool is_right = answers[i].direction_error_rad <= radians(45.0);
       if (answers[i].answered && answers[i].probability >= 0.9) {
         ++sure_;
         surely_right_ += is_right ? 1 : 0;
@@ -170,7 +171,7 @@ class HomeVectors {
              surely_right_, sure_, at_least(0.9));
   }
 
-  void ask_between_grounds() {
+  void answer_pairs_of_other_grounds() {
     std::vector<std::pair<const simulation::PlacedView*, const simulation::PlacedView*>> foreign;
     for (const RecordedGround& a : elsewhere_.grounds) {
       for (const RecordedGround& b : elsewhere_.grounds) {
@@ -191,7 +192,7 @@ class HomeVectors {
                 at_most(0.02));
   }
 
-  void ask_between_noise(int smoothed) const {
+  void answer_noise_pairs(int smoothed) const {
     const Panorama& like = elsewhere_.grounds.front().variants.front().references.front().panorama;
     const auto noise_of = [&](std::size_t seed) {
       return make_noise(like.rows(), like.columns(), smoothed, seed);
@@ -212,7 +213,7 @@ class HomeVectors {
     return views[random_.index(views.size())];
   }
 
-  std::vector<ViewPair> draw_pairs(const Range& range) {
+  std::vector<ViewPair> sample_pairs(const Range& range) {
     std::vector<ViewPair> pairs;
     for (const RecordedGround& ground : elsewhere_.grounds) {
       const auto& place = ground.variants.front();
@@ -247,18 +248,18 @@ void ElsewhereExperiments::reproduce_home_vectors() {
   HomeVectors vectors(*this);
   for (const Range& range :
        {Range{"0_1m", 0.1, 1.0}, Range{"1_3m", 1.0, 3.0}, Range{"3_6m", 3.0, 6.0}}) {
-    vectors.ask_within(range);
+    vectors.answer_pairs_within(range);
   }
   vectors.report_probability();
-  vectors.ask_between_grounds();
-  for (const int smoothed : {1, 16}) vectors.ask_between_noise(smoothed);
+  vectors.answer_pairs_of_other_grounds();
+  for (const int smoothed : {1, 16}) vectors.answer_noise_pairs(smoothed);
 }
 
 void ElsewhereExperiments::reproduce_tilted_homing() {
   for (const std::string& name : list_ground_names()) {
     HomingPlace place = make_homing_place(
         simulation::make_or_read_scene(options.data, name, {.seed = options.seed}), {}, executor);
-    const auto tasks = draw_homing_tasks(place, options.runs, homing_radius_m, options.seed);
+    const auto tasks = sample_homing_tasks(place, options.runs, homing_radius_m, options.seed);
     struct Condition {
       int tilt_deg;
       bool measured;

@@ -114,9 +114,9 @@ class LeaveOneOut {
     places.resize(query_count());
     return simulation::make_each(elsewhere_.executor, query_count(), [&](std::size_t n) {
       const Observation seen(turned(n));
-      const double start = simulation::thread_seconds();
+      const double start = simulation::get_thread_cpu_time_s();
       places[n] = ours.localise(seen, {&views_[n / turns].file, 1});
-      const double spent = 1000.0 * (simulation::thread_seconds() - start);
+      const double spent = 1000.0 * (simulation::get_thread_cpu_time_s() - start);
       const auto match = std::ranges::find(views_, places[n].matches.at(0).name, &Recorded::file);
       return Found{static_cast<std::size_t>(match - views_.begin()), spent};
     });
@@ -133,9 +133,9 @@ class LeaveOneOut {
       const auto turn = static_cast<int>(
           std::lround(turn_of(n) * sharp.columns() / static_cast<double>(columns_)));
       const RivalView query{turned(n), to_picture(rotate_columns(sharp, turn))};
-      const double start = simulation::thread_seconds();
+      const double start = simulation::get_thread_cpu_time_s();
       const std::size_t view = rival.nearest(query, n / turns);
-      return Found{view, 1000.0 * (simulation::thread_seconds() - start)};
+      return Found{view, 1000.0 * (simulation::get_thread_cpu_time_s() - start)};
     });
   }
 

@@ -282,7 +282,7 @@ void MappingExperiments::reproduce_first_set() const {
     const simulation::PlaceRecording place = make_variant("loop", s);
     const simulation::MappingRecording recording = simulation::record_for_mapping(
         place, drive(place, {}, first_spacing_m, static_cast<std::size_t>(options.views)),
-        max_components + 2, simulation::cheap_wheels(), 1000 * place.seed, executor);
+        max_components + 2, simulation::make_noisy_wheels(), 1000 * place.seed, executor);
     set.add(place, recording, {});
     add_published_errors(recording, set.grid);
     variations.add_variations(recording, set.open.back(), set.closed.back());
@@ -313,7 +313,7 @@ void MappingExperiments::reproduce_second_set() const {
     way.insert(way.end(), place.scene.tour.begin(), place.scene.tour.end());
     const simulation::MappingRecording recording = simulation::record_for_mapping(
         place, drive(place, way, second_spacing_m, second_pictures * views), max_components + 2,
-        simulation::cheap_wheels(), 1000 * place.seed, executor);
+        simulation::make_noisy_wheels(), 1000 * place.seed, executor);
     const auto open = set.add(
         place, recording,
         {.mapping = {.capture_difference = capture_difference}, .max_nodes = views * 3 / 4});

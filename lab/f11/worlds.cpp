@@ -335,9 +335,9 @@ void MappingExperiments::reproduce_identical_doors() const {
     for (int round = 0; round < 3; ++round) {
       way.insert(way.end(), place.scene.tour.begin(), place.scene.tour.end());
     }
-    const auto recording =
-        simulation::record_for_mapping(place, drive(place, way, spacing_m, views), components + 2,
-                                       simulation::cheap_wheels(), 1000 * place.seed, executor);
+    const auto recording = simulation::record_for_mapping(
+        place, drive(place, way, spacing_m, views), components + 2, simulation::make_noisy_wheels(),
+        1000 * place.seed, executor);
     for (const bool wheels : {false, true}) {
       const auto mapped = simulation::map_recording(recording, {.wheels = wheels});
       right += mapped.right_closures;
@@ -362,7 +362,7 @@ void MappingExperiments::reproduce_world(const std::string& name) const {
     Random random(options.seed, 300 + static_cast<std::uint64_t>(run));
     const auto recording = simulation::record_for_mapping(
         place, plan_two_loops(place, length_m, spacing_m, random), components + 2,
-        simulation::cheap_wheels(),
+        simulation::make_noisy_wheels(),
         1000 * options.seed + 10'000 * static_cast<std::uint64_t>(run + 1), executor);
     errors.add(place, recording, name);
   }
@@ -427,7 +427,7 @@ void MappingExperiments::measure_large_maps() const {
   }
   const auto recording = simulation::record_for_mapping(
       place, drive(place, way, 0.1, static_cast<std::size_t>(options.max_views)), components + 2,
-      simulation::cheap_wheels(), 1000 * options.seed, executor);
+      simulation::make_noisy_wheels(), 1000 * options.seed, executor);
   for (std::size_t views = 100; views <= recording.views.size(); views *= 10) {
     const auto mapped = simulation::map_recording(recording, {.max_nodes = views});
     const std::string id = "f11.large." + std::to_string(views);

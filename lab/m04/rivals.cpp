@@ -75,9 +75,9 @@ class Rivals final : public Experiment {
       for (std::size_t r = 0; r < rival_count; ++r) {
         std::vector<std::size_t> found(queries.size());
         auto seconds = simulation::make_each(executor, queries.size(), [&](std::size_t q) {
-          const double start = simulation::thread_seconds();
+          const double start = simulation::get_thread_cpu_time_s();
           found[q] = recognisers[r]->nearest(queries[q]);
-          return simulation::thread_seconds() - start;
+          return simulation::get_thread_cpu_time_s() - start;
         });
         for (std::size_t q = 0; q < found.size(); ++q) {
           const Point2 position = views[q].pose.position();

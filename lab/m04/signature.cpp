@@ -32,7 +32,7 @@ std::vector<double> mean_power(const Panorama& view, int components) {
 }
 
 // Returns the slope of log power against log k, k = 1 .. last, by least squares.
-double spectrum_slope(const std::vector<double>& power, int last) {
+double fit_spectrum_exponent(const std::vector<double>& power, int last) {
   double n = 0.0;
   double sx = 0.0;
   double sy = 0.0;
@@ -154,7 +154,8 @@ class PowerSpectrum final : public Experiment {
             median_figure(shares_), "", at_least(0.5));
     add_row(result, "m04.fig5.slope",
             "slope of the power spectrum, k = 1 .. 30 ([S06] reports about 1.8)",
-            -spectrum_slope(total_, shown_frequencies), "", std::nullopt, std::pair{1.8, 1.8});
+            -fit_spectrum_exponent(total_, shown_frequencies), "", std::nullopt,
+            std::pair{1.8, 1.8});
   }
 
  private:

@@ -164,7 +164,7 @@ void NavigationExperiments::reproduce_grid_missions(const std::string& scene,
         simulation::make_mission_place(simulation::make_scene(scene, {.seed = seed}), executor);
     const simulation::RememberedPlace remembered =
         simulation::memorise_grid(place, spacing_m, Random(seed, 1).next(), executor);
-    const auto missions = simulation::draw_missions(
+    const auto missions = simulation::sample_missions(
         place, remembered, {.count = count_runs(options, i)}, Random(seed, 2).next());
     simulation::MissionOptions mission;
     mission.base.drive = i % 2 == 0 ? DriveKind::differential : DriveKind::holonomic;
@@ -189,9 +189,9 @@ void NavigationExperiments::reproduce_drive_missions(const std::string& scene) c
     simulation::SceneVariation variation{.seed = seed};
     const simulation::MissionPlace place = simulation::make_mission_place(
         simulation::make_or_read_scene(options.data, scene, variation), executor);
-    const simulation::RememberedPlace remembered =
-        simulation::memorise_drive(place, plan_exploring_drive(place, seed),
-                                   simulation::cheap_wheels(), Random(seed, 1).next(), executor);
+    const simulation::RememberedPlace remembered = simulation::memorise_drive(
+        place, plan_exploring_drive(place, seed), simulation::make_noisy_wheels(),
+        Random(seed, 1).next(), executor);
     variation.light = i % 2 == 0 ? 1.0 - light_change : 1.0 + light_change;
     variation.moved_objects = moved_objects_share;
     variation.moved_seed = Random(seed, 4).next();
@@ -202,11 +202,11 @@ void NavigationExperiments::reproduce_drive_missions(const std::string& scene) c
     const double radius_m = 0.5 * remembered.spacing_m;
     const auto run = [&](const simulation::MissionPlace& where, bool is_kidnapped,
                          std::uint64_t stream, Measures& measures) {
-      const auto missions = simulation::draw_missions(where, remembered,
-                                                      {.count = count_runs(options, i),
-                                                       .max_distance_m = beside_drive_m,
-                                                       .kidnapped = is_kidnapped},
-                                                      Random(seed, stream).next());
+      const auto missions = simulation::sample_missions(where, remembered,
+                                                        {.count = count_runs(options, i),
+                                                         .max_distance_m = beside_drive_m,
+                                                         .kidnapped = is_kidnapped},
+                                                        Random(seed, stream).next());
       const auto runs = simulation::run_missions(where, remembered, missions, mission,
                                                  Random(seed, stream + 1).next(), executor);
       measures.add(runs, radius_m);
@@ -259,13 +259,13 @@ void NavigationExperiments::reproduce_tours() const {
     const std::uint64_t seed = options.seed + static_cast<std::uint64_t>(i);
     const simulation::MissionPlace place =
         simulation::make_mission_place(simulation::make_scene("loop", {.seed = seed}), executor);
-    const simulation::RememberedPlace remembered =
-        simulation::memorise_drive(place, plan_exploring_drive(place, seed),
-                                   simulation::cheap_wheels(), Random(seed, 1).next(), executor);
+    const simulation::RememberedPlace remembered = simulation::memorise_drive(
+        place, plan_exploring_drive(place, seed), simulation::make_noisy_wheels(),
+        Random(seed, 1).next(), executor);
     const AreaPlanner planner(remembered.graph);
     const MemoryViewSource source(remembered.memory);
     const int tours = (count_runs(options, i) + goals_a_tour - 1) / goals_a_tour;
-    const auto missions = simulation::draw_missions(
+    const auto missions = simulation::sample_missions(
         place, remembered, {.count = tours * goals_a_tour, .max_distance_m = beside_drive_m},
         Random(seed, 12).next());
     for (Kind& kind : kinds) {
@@ -311,8 +311,8 @@ void NavigationExperiments::reproduce_route_missions() const {
     place.line = simulation::make_line_sensor(place);
     const auto drive = plan_exploring_drive(place, seed);
     simulation::RememberedPlace remembered = simulation::memorise_drive(
-        place, drive, simulation::cheap_wheels(), Random(seed, 1).next(), executor);
-    const auto missions = simulation::draw_missions(
+        place, drive, simulation::make_noisy_wheels(), Random(seed, 1).next(), executor);
+    const auto missions = simulation::sample_missions(
         place, remembered, {.count = count_runs(options, i), .max_distance_m = beside_drive_m},
         Random(seed, 13).next());
     for (Kind& kind : kinds) {
@@ -357,7 +357,7 @@ void NavigationExperiments::reproduce_blocked_missions() const {
     const simulation::MissionPlace place = simulation::make_mission_place(scene, executor);
     const auto way = plan_exploring_drive(place, seed);
     const simulation::RememberedPlace remembered = simulation::memorise_drive(
-        place, way, simulation::cheap_wheels(), Random(seed, 1).next(), executor);
+        place, way, simulation::make_noisy_wheels(), Random(seed, 1).next(), executor);
     double tour_m = 0.0;
     for (std::size_t k = 0; k < scene.tour.size(); ++k) {
       tour_m += distance(scene.tour[k], scene.tour[(k + 1) % scene.tour.size()]);

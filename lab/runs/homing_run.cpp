@@ -22,7 +22,7 @@ HomingView take_homing_view(const HomingPlace& place, const Pose2& pose, std::ui
   const HomingCamera& camera = place.camera;
   const Panorama seen = simulation::take_panorama(*place.renderer, pose, camera.rendering,
                                                   camera.frame, camera.sensor, seed, here);
-  const Tilt measured = camera.levelled ? draw_tilt(camera.frame, seed) : Tilt{};
+  const Tilt measured = camera.levelled ? sample_tilt(camera.frame, seed) : Tilt{};
   return homing_view(compute_signature(level_panorama(seen, measured), camera.components));
 }
 
@@ -85,8 +85,8 @@ HomingRun run_home(const HomingPlace& place, const HomingView& home, const Pose2
   }
 }
 
-std::vector<HomingTask> draw_homing_tasks(const HomingPlace& place, int count, double radius_m,
-                                          std::uint64_t seed) {
+std::vector<HomingTask> sample_homing_tasks(const HomingPlace& place, int count, double radius_m,
+                                            std::uint64_t seed) {
   require(count >= 1, "runs home", count, ">= 1");
   require(radius_m > 0.0, "radius of the starts", radius_m, "> 0");
   std::vector<HomingTask> tasks;

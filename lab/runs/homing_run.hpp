@@ -87,8 +87,8 @@ struct HomingTask {
 /// Draws random goals in the free space, each with a start uniform over the free places within
 /// `radius_m`, all headings random. Places as the scene has them: walls and things may stand in
 /// between. Throws ContractError unless count >= 1 and radius_m > 0.
-[[nodiscard]] std::vector<HomingTask> draw_homing_tasks(const HomingPlace& place, int count,
-                                                        double radius_m, std::uint64_t seed);
+[[nodiscard]] std::vector<HomingTask> sample_homing_tasks(const HomingPlace& place, int count,
+                                                          double radius_m, std::uint64_t seed);
 
 /// Runs all tasks; run i has the stream (seed, i).
 [[nodiscard]] std::vector<HomingRun> run_home(const HomingPlace& place,

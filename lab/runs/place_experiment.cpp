@@ -77,7 +77,7 @@ std::vector<PlaceResult> run_place_experiment(const simulation::PlaceRecording& 
       const Panorama seen =
           simulation::take_panorama(*place.renderer, place.queries[begin].pose, place.rendering,
                                     frame, condition.sensor, seed + begin, here);
-      const Tilt measured = condition.levelled ? draw_tilt(frame, seed + begin) : Tilt{};
+      const Tilt measured = condition.levelled ? sample_tilt(frame, seed + begin) : Tilt{};
       answers[begin] = remembered.localise(level_panorama(seen, measured));
     });
     seed += query_count;

@@ -120,7 +120,7 @@ void reproduce_homing_in_world(const std::string& name, const Experiments& conte
   const std::uint64_t seed = options.seed;
   const HomingPlace place =
       make_homing_place(simulation::read_world(options.data, name), {}, executor);
-  const auto tasks = draw_homing_tasks(place, options.starts, homing_start_radius_m, seed);
+  const auto tasks = sample_homing_tasks(place, options.starts, homing_start_radius_m, seed);
   const auto runs = run_home(place, tasks, {}, seed, executor);
 
   const std::string id = "s06.world." + name;
@@ -188,7 +188,7 @@ void reproduce_homing_in_scenes(int starts, const Experiments& context) {
       const std::uint64_t number = seed + variant;
       HomingPlace place =
           make_homing_place(simulation::make_scene(name, {.seed = number}), {}, executor);
-      const auto tasks = draw_homing_tasks(place, starts, homing_start_radius_m, number);
+      const auto tasks = sample_homing_tasks(place, starts, homing_start_radius_m, number);
       const auto append = [&](std::vector<HomingRun>& all, const HomingRunOptions& changed) {
         for (HomingRun& run : run_home(place, tasks, changed, number, executor)) {
           all.push_back(std::move(run));

@@ -171,23 +171,23 @@ class LabMeasures {
   void report() const {
     const std::string drive = "5 m route, a line every 2 cm, driven at 30 degrees to it";
     const std::string moved = "the same with things moved, a tenth of what is seen";
-    report_way("straight.fit", drive + ", direct fit", at_most(0.5), straight_, at_most(0.3));
+    report_method("straight.fit", drive + ", direct fit", at_most(0.5), straight_, at_most(0.3));
     add_row(result_, "y03.straight.fit.heading", drive + ", direct fit: mean error of the heading",
             mean_figure(errors_.at("straight.fit").heading_deg, options_.seed), "deg",
             at_most(0.1));
-    report_way("straight.contours", drive + ", dual contours as published", std::nullopt,
-               straight_);
+    report_method("straight.contours", drive + ", dual contours as published", std::nullopt,
+                  straight_);
     add_mean(result_, "y03.changed.share", "directions that show something else after things moved",
              "%", changed_percent_);
-    report_way("changed.fit", moved + ", direct fit with masking", at_most(0.8), moved_);
+    report_method("changed.fit", moved + ", direct fit with masking", at_most(0.8), moved_);
     report_named("before", "scene as memorised", errors_.at("straight.fit"));
     report_named("after", "things moved; the first four of a drive cannot be",
                  errors_.at("changed.fit"));
-    report_way("changed.plain", moved + ", direct fit without masking", std::nullopt, moved_);
-    report_way("changed.contours", moved + ", dual contours as published", std::nullopt, moved_);
-    report_way("sparse.fit", "the same with a line every 10 cm, direct fit", at_most(0.8));
-    report_way("scale.fit", "recorded with 1 % error of the odometry's scale, direct fit",
-               at_most(3.0));
+    report_method("changed.plain", moved + ", direct fit without masking", std::nullopt, moved_);
+    report_method("changed.contours", moved + ", dual contours as published", std::nullopt, moved_);
+    report_method("sparse.fit", "the same with a line every 10 cm, direct fit", at_most(0.8));
+    report_method("scale.fit", "recorded with 1 % error of the odometry's scale, direct fit",
+                  at_most(3.0));
     add_median(result_, "y03.goal.error",
                "closed loop (100, 0) to (200, -50) to (300, 0) cm: error at the goal", "cm",
                goal_cm_, at_most(2.0), std::pair(4.0, 4.0));
@@ -221,9 +221,9 @@ class LabMeasures {
   static constexpr Published straight_{1.98, 1.0};
   static constexpr Published moved_{3.46, 0.56};
 
-  void report_way(const std::string& id, const std::string& what, std::optional<Target> target,
-                  std::optional<Published> published = std::nullopt,
-                  std::optional<Target> sigma_target = std::nullopt) const {
+  void report_method(const std::string& id, const std::string& what, std::optional<Target> target,
+                     std::optional<Published> published = std::nullopt,
+                     std::optional<Target> sigma_target = std::nullopt) const {
     const Errors& errors = errors_.at(id);
     const auto range = [&](double Published::*value) {
       return published ? std::optional(std::pair((*published).*value, (*published).*value))

@@ -25,7 +25,7 @@ namespace {
 constexpr double side_room_m = 0.1;
 
 // Returns the space where the robot has room on both sides; without any, all free space.
-simulation::FreeSpace make_roomy_space(const RouteScene& place) {
+simulation::FreeSpace make_wide_free_space(const RouteScene& place) {
   simulation::FreeSpaceOptions options = simulation::free_space_options(place.scene);
   options.robot_radius_m += side_room_m;
   try {
@@ -148,7 +148,7 @@ std::vector<Pose2> plan_curved_route(const RouteScene& place, double length_m, d
                                      std::uint64_t seed) {
   require(length_m > 0.0, "length of a route", length_m, "> 0");
   require(spacing_m > 0.0, "spacing of a route", spacing_m, "> 0");
-  const simulation::FreeSpace space = make_roomy_space(place);
+  const simulation::FreeSpace space = make_wide_free_space(place);
   Random random(seed, 1);
   std::vector<Pose2> corners{space.random_pose(random)};
   double heading = corners.front().heading_rad;

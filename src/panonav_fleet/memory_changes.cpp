@@ -18,7 +18,7 @@ struct MemoryChanges::Implementation {
   explicit Implementation(const ServerAddress& address)
       : memories(connect_to_memories(address, false)) {
     const auto found = find_memory(memories, address);
-    if (!found) refuse_missing_memory(address);
+    if (!found) throw_missing_memory(address);
     memories.connection.execute("LISTEN \"" + found->channel + "\"");  // of the server's making
   }
   MemoriesConnection memories;

@@ -41,7 +41,7 @@ namespace {
 void require_path_and_address(const std::filesystem::path& file,
                               const std::filesystem::path& server) {
   if (is_postgresql_address(file)) {
-    throw ContractError("file", without_passwords(file.string()), "the path of a memory file");
+    throw ContractError("file", mask_passwords(file.string()), "the path of a memory file");
   }
   if (!is_postgresql_address(server)) {
     throw ContractError("server", server.string(), "the address of a memory on a server");
@@ -63,7 +63,7 @@ std::unique_ptr<ServerExchange> connect_or_make(const ServerAddress& address,
     throw;
   }
   auto made = ServerExchange::connect(address);
-  if (!made) refuse_missing_memory(address);
+  if (!made) throw_missing_memory(address);
   return made;
 }
 
@@ -80,7 +80,7 @@ SynchronisationReport synchronise_memory(const std::filesystem::path& file,
   std::error_code ignored;
   if (!std::filesystem::exists(std::filesystem::symlink_status(file, ignored))) {
     exchange = ServerExchange::connect(address);
-    if (!exchange) refuse_missing_memory(address);
+    if (!exchange) throw_missing_memory(address);
     create_memory_tables(file, to_header(exchange->tables().settings()), {});
   }
   OpenedMemory opened = open_memory_tables(file, Access::read_write);

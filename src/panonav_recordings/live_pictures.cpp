@@ -115,9 +115,9 @@ class AddressInput final : public Input {
         std::exchange(is_first_, false) ? 3.0 * max_silence_s_ : max_silence_s_;
     auto frame = video_.next(std::chrono::milliseconds(static_cast<int>(1000.0 * max_wait_s)));
     if (frame) return RawPicture{std::move(frame->picture), now_s(), Steady::now(), 0};
-    throw FileError(
-        address_, "was interrupted" +
-                      (video_.trouble().empty() ? "" : ": " + without_passwords(video_.trouble())));
+    throw FileError(address_,
+                    "was interrupted" +
+                        (video_.trouble().empty() ? "" : ": " + mask_passwords(video_.trouble())));
   }
   void stop() noexcept override { video_.stop(); }
 

@@ -47,7 +47,7 @@ struct Bytes : std::vector<std::uint8_t> {
   }
 };
 
-std::uint32_t sum_of(std::span<const std::uint8_t> bytes, std::uint32_t before = 0) {
+std::uint32_t compute_crc(std::span<const std::uint8_t> bytes, std::uint32_t before = 0) {
   return static_cast<std::uint32_t>(::crc32_z(before, bytes.data(), bytes.size()));
 }
 
@@ -96,7 +96,7 @@ struct McapWriter::State {
 
   // `known`: the checksum of the bytes, if it is known.
   void put(std::span<const std::uint8_t> bytes, std::optional<std::uint32_t> known = {}) {
-    const std::uint32_t own = known ? *known : sum_of(bytes);
+    const std::uint32_t own = known ? *known : compute_crc(bytes);
     sum = static_cast<std::uint32_t>(::crc32_combine(sum, own, static_cast<z_off_t>(bytes.size())));
     written += bytes.size();
     while (!bytes.empty()) {
@@ -120,7 +120,7 @@ struct McapWriter::State {
 
   void put_chunk() {
     if (chunk.empty()) return;
-    const std::uint32_t chunk_sum = sum_of(chunk);
+    const std::uint32_t chunk_sum = compute_crc(chunk);
     std::span<const std::uint8_t> stored = chunk;
     std::string_view name;
     if (options.compression != McapCompression::none) {
@@ -202,7 +202,7 @@ struct McapWriter::State {
     const std::uint64_t offsets_at = start + end.size();
     end.raw(offsets).number(McapRecord::footer).number(std::uint64_t{20});
     end.number(start).number(offsets_at);
-    end.number(sum_of(end));
+    end.number(compute_crc(end));
     for (const char c : mcap_magic) end.push_back(static_cast<std::uint8_t>(c));
     put(end);
   }

@@ -61,9 +61,9 @@ Image RecordedPictures::read(std::size_t index) const {
       path_.string() + ": image at " + to_text(to_seconds(place.time_ns)) + " s";
   try {
     if (topic.type == ros::Image::type) {
-      return ros::picture_of(ros::read_message<ros::Image>(bytes, topic.encoding));
+      return ros::to_image(ros::read_message<ros::Image>(bytes, topic.encoding));
     }
-    return ros::picture_of(ros::read_message<ros::CompressedImage>(bytes, topic.encoding), name);
+    return ros::to_image(ros::read_message<ros::CompressedImage>(bytes, topic.encoding), name);
   } catch (const ContractError& error) {
     throw FileError(name, error.what());
   }
@@ -145,7 +145,7 @@ class EntryMaker {
       ++without_odometry_;
       return;
     }
-    entry.odometry = ros::planar(*pose);
+    entry.odometry = ros::to_pose2(*pose);
   }
 
   void set_tilt(DatasetEntry& entry, std::int64_t ns) {
@@ -154,7 +154,7 @@ class EntryMaker {
       ++without_tilt_;
       return;
     }
-    const Tilt tilt = ros::tilt_of(pose->orientation);
+    const Tilt tilt = ros::to_tilt(pose->orientation);
     if (std::abs(tilt.roll_rad) <= max_tilt_rad && std::abs(tilt.pitch_rad) <= max_tilt_rad) {
       entry.tilt = tilt;
     } else {
@@ -165,7 +165,7 @@ class EntryMaker {
   void set_truth(DatasetEntry& entry, std::int64_t ns) const {
     const auto pose = messages_.truth.at(ns);
     if (!pose) return;
-    const Pose2 plane = ros::planar(*pose);
+    const Pose2 plane = ros::to_pose2(*pose);
     entry.pose = ReferencePose{plane.x_m, plane.y_m, std::nullopt};
     if (messages_.truth_has_headings) entry.pose->heading_rad = plane.heading_rad;
   }

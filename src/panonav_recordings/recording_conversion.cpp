@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 
 Dataset::Fields convert_to_recording(const Dataset& dataset, const fs::path& file,
                                      const std::function<void()>& advance) {
-  const Dataset::Fields shared = shared_fields(dataset);
+  const Dataset::Fields shared = find_shared_fields(dataset);
   TemporaryFile unfinished(file);
   // JPEG and PNG are packed already.
   McapWriter writer(unfinished.path(), {.compression = McapCompression::none});

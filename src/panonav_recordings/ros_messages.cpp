@@ -133,7 +133,7 @@ void visit_fields(A& a, Is<String> auto& m) {
 }
 
 template <class Number>
-Number swapped(Number value) {
+Number swap_bytes(Number value) {
   auto bytes = std::bit_cast<std::array<std::uint8_t, sizeof(Number)>>(value);
   std::ranges::reverse(bytes);
   return std::bit_cast<Number>(bytes);
@@ -201,7 +201,7 @@ class Reader {
     take(padding(cdr_, at_, sizeof(Number)));
     Number value;
     std::memcpy(&value, take(sizeof(Number)).data(), sizeof(Number));
-    return swaps_ ? swapped(value) : value;
+    return swaps_ ? swap_bytes(value) : value;
   }
   void read_value(std::string& text) {
     auto bytes = take(number<std::uint32_t>());
@@ -304,7 +304,7 @@ class Writer {
   void write_value(const Value& of) {
     if constexpr (std::is_arithmetic_v<Value>) {
       bytes_.resize(bytes_.size() + padding(cdr_, bytes_.size(), sizeof(Value)));
-      const Value little = std::endian::native == std::endian::little ? of : swapped(of);
+      const Value little = std::endian::native == std::endian::little ? of : swap_bytes(of);
       append(&little, sizeof(Value));
     } else {
       visit_fields(*this, of);

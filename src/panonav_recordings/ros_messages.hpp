@@ -59,11 +59,11 @@ inline constexpr double quaternion_tolerance = 0.1;
 [[nodiscard]] Pose between(const Pose& a, const Pose& b, double share);
 /// Returns a pose with the heading about the vertical, then roll and pitch as in `Tilt`:
 /// R_z(heading) R_y R_x.
-[[nodiscard]] Pose pose_of(const Pose2& pose, const Tilt& tilt = {});
+[[nodiscard]] Pose to_pose(const Pose2& pose, const Tilt& tilt = {});
 /// Returns the pose seen from above: x, y and the yaw.
-[[nodiscard]] Pose2 planar(const Pose& pose);
+[[nodiscard]] Pose2 to_pose2(const Pose& pose);
 /// Returns roll and pitch, in radians, of any quaternion but zero.
-[[nodiscard]] Tilt tilt_of(const Quaternion& orientation);
+[[nodiscard]] Tilt to_tilt(const Quaternion& orientation);
 
 using Covariance3 = std::array<double, 9>;   ///< row-major; [0] = -1: there is no such measurement
 using Covariance6 = std::array<double, 36>;  ///< row-major, x y z and turns about x, y, z
@@ -74,7 +74,7 @@ struct Image {
   Header header;                  ///< when it was taken; frame of the camera
   std::uint32_t height = 0;       ///< rows
   std::uint32_t width = 0;        ///< columns
-  std::string encoding;           ///< of the pixels, see `picture_of`
+  std::string encoding;           ///< of the pixels, see `to_image`
   std::uint8_t is_bigendian = 0;  ///< 1: numbers of several bytes begin with the most significant
   std::uint32_t step = 0;         ///< bytes from one row to the next
   std::span<const std::uint8_t> data;  ///< height x step bytes, rows from the top
@@ -276,10 +276,10 @@ template <class Message>
 /// - yuv422 or uyvy, yuv422_yuy2 or yuyv: ITU-R BT.601, luma 16 .. 235, as in OpenCV.
 /// Throws ContractError on other encodings, sizes beyond the limits, a step shorter than a row and
 /// data of another length than height x step.
-[[nodiscard]] panonav::Image picture_of(const Image& message, const ImageLimits& limits = {});
+[[nodiscard]] panonav::Image to_image(const Image& message, const ImageLimits& limits = {});
 /// Decodes a JPEG or PNG, distinguished by content. Errors name `name`. Throws ContractError on
 /// another format (compressedDepth, h264), FileError on bytes that cannot be decoded.
-[[nodiscard]] panonav::Image picture_of(const CompressedImage& message, std::string_view name,
-                                        const ImageLimits& limits = {});
+[[nodiscard]] panonav::Image to_image(const CompressedImage& message, std::string_view name,
+                                      const ImageLimits& limits = {});
 
 }  // namespace panonav::recordings::ros

@@ -117,7 +117,7 @@ void convert_bayer(const Image& message, Row data, const Encoding& from, panonav
 
 }  // namespace
 
-panonav::Image picture_of(const Image& message, const ImageLimits& limits) {
+panonav::Image to_image(const Image& message, const ImageLimits& limits) {
   const auto found = std::ranges::find(encodings, message.encoding, &Encoding::name);
   if (found == encodings.end()) {
     std::string known;
@@ -168,8 +168,8 @@ panonav::Image picture_of(const Image& message, const ImageLimits& limits) {
   return picture;
 }
 
-panonav::Image picture_of(const CompressedImage& message, std::string_view name,
-                          const ImageLimits& limits) {
+panonav::Image to_image(const CompressedImage& message, std::string_view name,
+                        const ImageLimits& limits) {
   const std::string format = to_lower_case(message.format);
   const auto says = [&](std::string_view word) { return format.find(word) != std::string::npos; };
   const bool known = format.empty() || says("jpeg") || says("jpg") || says("png");

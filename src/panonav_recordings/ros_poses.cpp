@@ -64,7 +64,7 @@ Pose between(const Pose& a, const Pose& b, double share) {
       mixed};
 }
 
-Pose pose_of(const Pose2& pose, const Tilt& tilt) {
+Pose to_pose(const Pose2& pose, const Tilt& tilt) {
   const auto about = [](double angle_rad) {
     return std::pair{std::sin(0.5 * angle_rad), std::cos(0.5 * angle_rad)};
   };
@@ -76,13 +76,13 @@ Pose pose_of(const Pose2& pose, const Tilt& tilt) {
       Quaternion{0.0, 0.0, sz, cz} * Quaternion{0.0, sy, 0.0, cy} * Quaternion{sx, 0.0, 0.0, cx}};
 }
 
-Pose2 planar(const Pose& pose) {
+Pose2 to_pose2(const Pose& pose) {
   const auto& [x, y, z, w] = pose.orientation;
   return {pose.position.x, pose.position.y,
           wrap_angle(std::atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z))};
 }
 
-Tilt tilt_of(const Quaternion& orientation) {
+Tilt to_tilt(const Quaternion& orientation) {
   const auto& [x, y, z, w] = orientation;
   const double sine = 2.0 * (w * y - z * x) / dot(orientation, orientation);
   return {std::atan2(2.0 * (w * x + y * z), w * w - x * x - y * y + z * z),

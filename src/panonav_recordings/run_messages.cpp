@@ -29,7 +29,7 @@ ros::PointCloud2 PointValues::message(std::int64_t stamp_ns, const std::string& 
 
 ros::PoseWithCovarianceStamped pose_message(const RunMoment& moment, std::int64_t stamp_ns,
                                             const std::string& frame) {
-  ros::PoseWithCovarianceStamped message{{stamp_ns, frame}, {ros::pose_of(*moment.pose), {}}};
+  ros::PoseWithCovarianceStamped message{{stamp_ns, frame}, {ros::to_pose(*moment.pose), {}}};
   if (!moment.covariance) return message;
   // Rows and columns of x, y and heading within those of x, y, z and the three turns.
   constexpr std::array<std::size_t, 3> at{0, 1, 5};
@@ -44,7 +44,7 @@ ros::PoseWithCovarianceStamped pose_message(const RunMoment& moment, std::int64_
 ros::PoseArray poses_message(const std::vector<Pose2>& poses, std::int64_t stamp_ns,
                              const std::string& frame) {
   ros::PoseArray message{{stamp_ns, frame}, {}};
-  for (const Pose2& pose : poses) message.poses.push_back(ros::pose_of(pose));
+  for (const Pose2& pose : poses) message.poses.push_back(ros::to_pose(pose));
   return message;
 }
 

@@ -191,7 +191,7 @@ struct RunRecorder::Implementation {
     write_plan(moment.plan, ns);
     if (!moment.directions.empty())
       directions.write(log_ns, ns, poses_message(moment.directions, ns, "map"));
-    if (moment.goal) goals.write(log_ns, ns, {{ns, "map"}, ros::pose_of(*moment.goal)});
+    if (moment.goal) goals.write(log_ns, ns, {{ns, "map"}, ros::to_pose(*moment.goal)});
     if (moment.pose) {
       poses.write(log_ns, ns, pose_message(moment, ns, "map"));
       write_path(ns, *moment.pose);
@@ -208,7 +208,7 @@ struct RunRecorder::Implementation {
   void write_transforms(const RunMoment& moment, std::int64_t ns) {
     ros::TFMessage tf;
     const auto add = [&](const char* parent, const char* child, const Pose2& parent_from_child) {
-      tf.transforms.push_back({{ns, parent}, child, ros::pose_of(parent_from_child)});
+      tf.transforms.push_back({{ns, parent}, child, ros::to_pose(parent_from_child)});
     };
     add("tf#/", "map", {});  // without it Rerun shows what is given in "map" nowhere
     if (moment.odometry) add("odom", "base_link", *moment.odometry);
@@ -228,7 +228,7 @@ struct RunRecorder::Implementation {
   void write_plan(const std::vector<Pose2>& path, std::int64_t ns) {
     if (path.empty()) return;
     ros::Path message{{ns, "map"}, {}};
-    for (const Pose2& pose : path) message.poses.push_back({{ns, "map"}, ros::pose_of(pose)});
+    for (const Pose2& pose : path) message.poses.push_back({{ns, "map"}, ros::to_pose(pose)});
     plan_points.write(log_ns, ns, make_cloud(path).message(ns, "map", "heading"));
     plan.write(log_ns, ns, message);
   }
@@ -249,7 +249,7 @@ struct RunRecorder::Implementation {
     ros::Path message{{ns, "map"}, {}};
     for (const auto& [stamp_ns, at] : path_poses) {
       cloud.add(at.position(), at.heading_rad);
-      message.poses.push_back({{stamp_ns, "map"}, ros::pose_of(at)});
+      message.poses.push_back({{stamp_ns, "map"}, ros::to_pose(at)});
     }
     path_points.write(log_ns, ns, cloud.message(ns, "map", "heading"));
     path.write(log_ns, ns, message);

@@ -49,8 +49,9 @@ struct LocalisationNode::Implementation {
     subscribe<recordings::ros::PoseStamped>(
         participant, log, "goal_pose", {}, [this](const recordings::ros::PoseStamped& goal) {
           require_frame("goal_pose", goal.header.frame_id, setup.frames.map);
-          queue.add(
-              [this, goal = recordings::ros::planar(goal.pose)] { driver.start({.goal = goal}); });
+          queue.add([this, goal = recordings::ros::to_pose2(goal.pose)] {
+            driver.start({.goal = goal});
+          });
         });
     subscribe<recordings::ros::String>(
         participant, log, "~/command", {}, [this](const recordings::ros::String& message) {
@@ -67,10 +68,11 @@ struct LocalisationNode::Implementation {
       throw ContractError("covariance of x, y and heading",
                           to_text(position_m2) + ", " + to_text(heading_rad2), ">= 0, finite");
     }
-    queue.add([this, position_m2, heading_rad2, pose = recordings::ros::planar(message.pose.pose)] {
-      localiser.start_at(pose, std::sqrt(position_m2), std::sqrt(heading_rad2));
-      motion.set_pose(pose);
-    });
+    queue.add(
+        [this, position_m2, heading_rad2, pose = recordings::ros::to_pose2(message.pose.pose)] {
+          localiser.start_at(pose, std::sqrt(position_m2), std::sqrt(heading_rad2));
+          motion.set_pose(pose);
+        });
   }
 
   // On the thread of `run`.
@@ -105,7 +107,7 @@ struct LocalisationNode::Implementation {
     if (std::exchange(last_transform_ns, stamp_ns) == stamp_ns) return;
     transforms.publish({{{{stamp_ns, setup.frames.map},
                           setup.frames.odom,
-                          recordings::ros::pose_of(*map_from_odom)}}});
+                          recordings::ros::to_pose(*map_from_odom)}}});
   }
 
   void check_inputs() const {
@@ -183,7 +185,7 @@ struct LocalisationNode::Implementation {
       } else if (command == "cancel") {
         driver.end("cancelled");
       } else if (teacher) {
-        refuse(words, "finish, because the memory is being made");
+        reject_command(words, "finish, because the memory is being made");
       } else if (command == "relocalise") {
         localiser.start_globally();
       } else if (command == "repeat" && !argument.empty()) {
@@ -195,7 +197,7 @@ struct LocalisationNode::Implementation {
       } else if (command == "load" && !argument.empty()) {
         localiser.load_neighbour(argument);
       } else {
-        refuse(words, "relocalise, cancel, repeat ROUTE, add NAME, forget NAME, load FILE");
+        reject_command(words, "relocalise, cancel, repeat ROUTE, add NAME, forget NAME, load FILE");
       }
     } catch (const Error& error) {
       return "refused: " + to_readable_line(error.what());
@@ -203,7 +205,7 @@ struct LocalisationNode::Implementation {
     return command + " done";
   }
 
-  [[noreturn]] static void refuse(const std::string& words, std::string_view allowed) {
+  [[noreturn]] static void reject_command(const std::string& words, std::string_view allowed) {
     throw ContractError("command", "'" + to_readable_line(shorten_middle(words, 80)) + "'",
                         allowed);
   }

@@ -40,9 +40,9 @@ std::optional<MotionHistory::Motion> MotionHistory::at(std::int64_t stamp_ns) co
   const Sample& before = *std::prev(after);
   const double share = static_cast<double>(stamp_ns - before.stamp_ns) /
                        static_cast<double>(after->stamp_ns - before.stamp_ns);
-  return motion(recordings::ros::planar(
-      recordings::ros::between(recordings::ros::pose_of(before.odom_from_base),
-                               recordings::ros::pose_of(after->odom_from_base), share)));
+  return motion(recordings::ros::to_pose2(
+      recordings::ros::between(recordings::ros::to_pose(before.odom_from_base),
+                               recordings::ros::to_pose(after->odom_from_base), share)));
 }
 
 std::optional<MotionHistory::Motion> MotionHistory::newest() const {

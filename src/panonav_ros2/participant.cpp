@@ -20,7 +20,7 @@ namespace panonav::ros2 {
 
 namespace {
 
-int checked(int result, const std::string& what) {
+int check_result(int result, const std::string& what) {
   if (result < 0) throw Error("DDS: " + what + ": " + dds_strretcode(result));
   return result;
 }
@@ -203,12 +203,12 @@ struct Participant::Implementation {
     const std::string enclave = "enclave=/;";
     dds_qset_userdata(qos.get(), enclave.data(), enclave.size());
     try {
-      participant =
-          checked(dds_create_participant(static_cast<dds_domainid_t>(number), qos.get(), nullptr),
-                  "no participant in domain " + std::to_string(number));
-      waitset = checked(dds_create_waitset(participant), "waitset");
-      guard = checked(dds_create_guardcondition(participant), "guard condition");
-      checked(dds_waitset_attach(waitset, guard, -1), "guard condition");
+      participant = check_result(
+          dds_create_participant(static_cast<dds_domainid_t>(number), qos.get(), nullptr),
+          "no participant in domain " + std::to_string(number));
+      waitset = check_result(dds_create_waitset(participant), "waitset");
+      guard = check_result(dds_create_guardcondition(participant), "guard condition");
+      check_result(dds_waitset_attach(waitset, guard, -1), "guard condition");
       graph = make_writer("ros_discovery_info", "rmw_dds_common/ParticipantEntitiesInfo",
                           {.depth = 1, .reliable = true, .transient_local = true});
     } catch (...) {
@@ -226,26 +226,28 @@ struct Participant::Implementation {
 
   [[nodiscard]] dds_entity_t make_topic(const std::string& name, std::string_view type) const {
     ddsi_sertype* raw = make_raw_type(dds_type_name(type));
-    return checked(
+    return check_result(
         dds_create_topic_sertype(participant, name.c_str(), &raw, nullptr, nullptr, nullptr),
         "topic " + name);
   }
   [[nodiscard]] dds_entity_t make_writer(const std::string& name, std::string_view type,
                                          const Qos& qos) const {
-    return checked(
+    return check_result(
         dds_create_writer(participant, make_topic(name, type), make_dds_qos(qos).get(), nullptr),
         "publisher of " + name);
   }
   void make_reader(std::size_t index) {
     Subscription& subscription = subscriptions[index];
-    subscription.reader = checked(dds_create_reader(participant, subscription.dds_topic,
-                                                    make_dds_qos(subscription.qos).get(), nullptr),
-                                  "subscription of " + subscription.topic);
-    checked(dds_set_status_mask(subscription.reader,
-                                DDS_DATA_AVAILABLE_STATUS | DDS_REQUESTED_INCOMPATIBLE_QOS_STATUS),
-            "status");
-    checked(dds_waitset_attach(waitset, subscription.reader, static_cast<dds_attach_t>(index)),
-            "subscription");
+    subscription.reader =
+        check_result(dds_create_reader(participant, subscription.dds_topic,
+                                       make_dds_qos(subscription.qos).get(), nullptr),
+                     "subscription of " + subscription.topic);
+    check_result(
+        dds_set_status_mask(subscription.reader,
+                            DDS_DATA_AVAILABLE_STATUS | DDS_REQUESTED_INCOMPATIBLE_QOS_STATUS),
+        "status");
+    check_result(dds_waitset_attach(waitset, subscription.reader, static_cast<dds_attach_t>(index)),
+                 "subscription");
   }
 
   /// Announces the endpoints that there are now to the graph.
@@ -253,7 +255,7 @@ struct Participant::Implementation {
     CdrWriter message;
     const auto gid = [&](dds_entity_t entity) {
       dds_guid_t guid{};
-      checked(dds_get_guid(entity, &guid), "guid");
+      check_result(dds_get_guid(entity, &guid), "guid");
       message.bytes.insert(message.bytes.end(), std::begin(guid.v), std::end(guid.v));
       message.bytes.resize(message.bytes.size() + gid_bytes(options) - sizeof guid.v);
     };
@@ -266,7 +268,7 @@ struct Participant::Implementation {
     message.number(static_cast<std::uint32_t>(writers.size()));
     for (const dds_entity_t each : writers) gid(each);
     const std::span<const std::uint8_t> bytes = message.bytes;
-    checked(dds_write(graph, &bytes), "ros_discovery_info");
+    check_result(dds_write(graph, &bytes), "ros_discovery_info");
   }
 
   void take(const Subscription& subscription) {
@@ -343,7 +345,7 @@ std::size_t Participant::publishers(const std::string& topic) const {
 }
 
 void Participant::Writer::write(std::span<const std::uint8_t> cdr) const {
-  checked(dds_write(entity_, &cdr), "a message was not taken");
+  check_result(dds_write(entity_, &cdr), "a message was not taken");
 }
 
 std::size_t Participant::Writer::subscribers() const {
@@ -362,9 +364,9 @@ Participant::Writer Participant::advertise(const std::string& topic, std::string
 void Participant::wait(std::chrono::nanoseconds longest) {
   auto& self = *implementation_;
   std::vector<dds_attach_t> ready(self.subscriptions.size() + 1);
-  const int count = checked(dds_waitset_wait(self.waitset, ready.data(), ready.size(),
-                                             std::max<std::int64_t>(0, longest.count())),
-                            "waiting");
+  const int count = check_result(dds_waitset_wait(self.waitset, ready.data(), ready.size(),
+                                                  std::max<std::int64_t>(0, longest.count())),
+                                 "waiting");
   for (int i = 0; i < std::min(count, static_cast<int>(ready.size())); ++i) {
     const dds_attach_t index = ready[static_cast<std::size_t>(i)];
     if (index >= 0) {

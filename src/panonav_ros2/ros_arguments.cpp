@@ -116,8 +116,8 @@ struct RosOption {
 };
 
 /// Appends the arguments outside `--ros-args ... --` to `others`, and returns the options inside.
-std::vector<RosOption> split_words(std::span<const std::string> words,
-                                   std::vector<std::string>& others) {
+std::vector<RosOption> split_options(std::span<const std::string> words,
+                                     std::vector<std::string>& others) {
   std::vector<RosOption> options;
   bool is_inside = false;
   for (std::size_t i = 0; i < words.size(); ++i) {
@@ -174,7 +174,7 @@ std::pair<std::string, std::string> parse_remapping(const std::string& text) {
 RosArguments read_ros_arguments(std::span<const std::string> words, const std::string& node,
                                 const std::string& name_space) {
   RosArguments read;
-  const auto options = split_words(words, read.words);
+  const auto options = split_options(words, read.words);
   for (const RosOption& option : options) {
     if (!option.matches({"-r", "--remap"})) continue;
     auto [from, to] = parse_remapping(option.value);

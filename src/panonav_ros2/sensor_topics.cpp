@@ -80,11 +80,11 @@ std::pair<Observation, std::int64_t> SensorTopics::decode(
   if (options_.pictures == PictureInput::raw) {
     const auto read = recordings::ros::read_message<recordings::ros::Image>(
         message, recordings::MessageEncoding::cdr);
-    return named(recordings::ros::picture_of(read), read.header.stamp_ns);
+    return named(recordings::ros::to_image(read), read.header.stamp_ns);
   }
   const auto read = recordings::ros::read_message<recordings::ros::CompressedImage>(
       message, recordings::MessageEncoding::cdr);
-  return named(recordings::ros::picture_of(read, picture_topic()), read.header.stamp_ns);
+  return named(recordings::ros::to_image(read, picture_topic()), read.header.stamp_ns);
 }
 
 void SensorTopics::receive(const recordings::ros::Odometry& odometry) {
@@ -112,7 +112,7 @@ void SensorTopics::receive(const recordings::ros::Imu& imu) {
     throw ContractError("orientation_covariance[0]", -1.0,
                         "another value: the sensor must state an orientation");
   }
-  const Tilt tilt = recordings::ros::tilt_of(imu.orientation);
+  const Tilt tilt = recordings::ros::to_tilt(imu.orientation);
   if (!std::isfinite(tilt.roll_rad) || !std::isfinite(tilt.pitch_rad)) {
     throw ContractError("orientation", "not finite", "a unit quaternion");
   }
@@ -132,7 +132,7 @@ void SensorTopics::receive_picture(std::int64_t stamp_ns, std::span<const std::u
 
 void SensorTopics::add_motion(const std::string& topic, std::int64_t stamp_ns,
                               const recordings::ros::Pose& pose) {
-  const MotionHistory::Added added = motion_.add(stamp_ns, recordings::ros::planar(pose));
+  const MotionHistory::Added added = motion_.add(stamp_ns, recordings::ros::to_pose2(pose));
   if (added == MotionHistory::Added::late) {
     log_.warn("order of " + topic,
               topic + ": a stamp is not after the one before it; the message is left out");

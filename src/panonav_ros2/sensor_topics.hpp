@@ -28,7 +28,7 @@ class SensorTopics {
   /// Warns of inputs that several programs publish.
   void check_publishers() const;
   /// Decodes the message of a picture, which is named by its topic; with its stamp in ns. Throws as
-  /// `ros::picture_of`.
+  /// `ros::to_image`.
   [[nodiscard]] std::pair<Observation, std::int64_t> decode(
       std::span<const std::uint8_t> message) const;
 

@@ -65,7 +65,7 @@ struct SimulatedRobot::Implementation {
         [this](const recordings::ros::Twist& twist) { set_velocity(twist); });
     subscribe<recordings::ros::PoseStamped>(participant, log, "set_pose", {},
                                             [this](const recordings::ros::PoseStamped& message) {
-                                              carry_to(recordings::ros::planar(message.pose));
+                                              carry_to(recordings::ros::to_pose2(message.pose));
                                             });
   }
 
@@ -105,7 +105,7 @@ struct SimulatedRobot::Implementation {
     now_s += step_s;
     if (now_s > velocity_until_s) velocity = {};
     const Pose2 moved = base.drive(velocity, step_s).moved;
-    const recordings::ros::Pose odom_from_base = recordings::ros::pose_of(base.odometry());
+    const recordings::ros::Pose odom_from_base = recordings::ros::to_pose(base.odometry());
     const std::int64_t stamp_ns = std::llround(1e9 * now_s);
     clocks.publish({stamp_ns});
     recordings::ros::Odometry message;
@@ -116,7 +116,7 @@ struct SimulatedRobot::Implementation {
     message.angular_velocity = {0.0, 0.0, moved.heading_rad / step_s};
     odometries.publish(message);
     transforms.publish({{{{stamp_ns, "odom"}, "base_link", odom_from_base}}});
-    truths.publish({{stamp_ns, "map"}, recordings::ros::pose_of(base.pose())});
+    truths.publish({{stamp_ns, "map"}, recordings::ros::to_pose(base.pose())});
     if (now_s < next_picture_s || is_taking_picture.exchange(true)) return;
     next_picture_s = std::max(next_picture_s + 1.0 / options.picture_rate_hz, now_s);
     camera_work.add([this, stamp_ns, pose = base.pose()] { take_picture(stamp_ns, pose); });

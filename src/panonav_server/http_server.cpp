@@ -244,7 +244,7 @@ struct HttpServer::Implementation {
         std::ranges::for_each(connections, &Implementation::tick);
         ticked = Clock::now();
       }
-      std::ranges::for_each(connections, &Implementation::look_at_first_byte);
+      std::ranges::for_each(connections, &Implementation::check_first_byte);
       MHD_run(daemon);
       if (ended && !last) {
         last = Clock::now() + options.last_answers;
@@ -270,7 +270,7 @@ struct HttpServer::Implementation {
 
   /// Starts the time of a request with its first byte. libmicrohttpd skips bytes that begin none;
   /// here they are refused, such as a TLS handshake.
-  static void look_at_first_byte(Connection& one) {
+  static void check_first_byte(Connection& one) {
     char first = 0;
     if (one.stage != Stage::idle || one.evicted ||
         recv(one.socket, &first, 1, MSG_PEEK | MSG_DONTWAIT) != 1) {

@@ -339,7 +339,7 @@ struct LocalisationServer::Implementation {
         answer = make_refusal(503, "the server is ending");
       } else if (job->came < one.failed) {
         // Each would wait for a server that is silent.
-        answer = make_refusal(503, unreadable(job->memory));
+        answer = make_refusal(503, describe_unreadable(job->memory));
       } else {
         if (is_picture) queueing.add(from - job->came);
         const std::shared_ptr<LoadedMemory> memory = one.loaded;
@@ -377,11 +377,11 @@ struct LocalisationServer::Implementation {
       json.update(place_json(place));
       return make_json_answer(json);
     } catch (const FileError& error) {
-      return refuse_for_memory(503, job.memory, error);
+      return make_memory_refusal(503, job.memory, error);
     } catch (const Error& error) {
       return make_refusal(422, error.what());
     } catch (const std::exception& error) {
-      return refuse_for_memory(500, job.memory, error);
+      return make_memory_refusal(500, job.memory, error);
     }
   }
 
@@ -395,19 +395,19 @@ struct LocalisationServer::Implementation {
       return {.type = jpeg ? "image/jpeg" : "image/png",
               .content = std::string(picture->begin(), picture->end())};
     } catch (const std::exception& error) {
-      return refuse_for_memory(is_silent ? 503 : 500, job.memory, error);
+      return make_memory_refusal(is_silent ? 503 : 500, job.memory, error);
     }
   }
 
   /// Tells the fault to whoever runs the server: it may hold addresses, which are not for clients.
-  HttpAnswer refuse_for_memory(int status, const std::string& name, const std::exception& error) {
+  HttpAnswer make_memory_refusal(int status, const std::string& name, const std::exception& error) {
     report_loss(name, to_readable_line(error.what()));
     const std::lock_guard lock(mutex);
     // One picture that cannot be answered says nothing about the others.
     if (status == 503) served.at(name).failed = Clock::now();
-    return make_refusal(status, unreadable(name));
+    return make_refusal(status, describe_unreadable(name));
   }
-  static std::string unreadable(const std::string& name) {
+  static std::string describe_unreadable(const std::string& name) {
     return "the memory " + name + " cannot be read now; try again in a moment";
   }
 

@@ -38,7 +38,7 @@ bool is_movable(const Extent& extent) {
          extent.high_m[2] > 0.1 && extent.high_m[2] <= 3.0;
 }
 
-double gap_m(const FloorArea& area, Point2 at) {
+double distance_to_area_m(const FloorArea& area, Point2 at) {
   return std::hypot(std::max({area.low.x_m - at.x_m, 0.0, at.x_m - area.high.x_m}),
                     std::max({area.low.y_m - at.y_m, 0.0, at.y_m - area.high.y_m}));
 }
@@ -80,10 +80,11 @@ bool ChangingScene::can_stand(const Object& object, Point2 centre) const {
   const double r = object.radius_m;
   // Furniture of built-in scenes stands around the floor that is driven on.
   const FloorArea& room = scene_.drivable.empty() ? floor_ : all_;
-  if (gap_m(room, centre) > gap_m(room, object.centre)) return false;
+  if (distance_to_area_m(room, centre) > distance_to_area_m(room, object.centre)) return false;
   // An object that already reaches into a drivable area may stay there, but not move farther in.
   for (const FloorArea& area : scene_.drivable) {
-    if (gap_m(area, centre) < std::min(r, gap_m(area, object.centre))) return false;
+    if (distance_to_area_m(area, centre) < std::min(r, distance_to_area_m(area, object.centre)))
+      return false;
   }
   for (const Point2 corner : scene_.tour) {
     if (distance(corner, centre) < r + 1.5 * scene_.robot_radius_m) return false;
@@ -91,7 +92,7 @@ bool ChangingScene::can_stand(const Object& object, Point2 centre) const {
   return true;
 }
 
-void ChangingScene::pass_day(double share) {
+void ChangingScene::simulate_day(double share) {
   for (Object& object : objects_) {
     // Numbers are drawn for every object, so that objects do not depend on each other.
     const bool moves = random_.uniform() < share;

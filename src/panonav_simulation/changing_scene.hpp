@@ -25,7 +25,7 @@ class ChangingScene {
   /// radii of the robot in any direction and turned by up to 0.6 rad, as `SceneVariation` moves
   /// things; within the floor, never into drivable areas or onto corners of the tour. One that
   /// finds no such place stays.
-  void pass_day(double share);
+  void simulate_day(double share);
 
   /// Returns the scene as it is now, in light times `light`.
   [[nodiscard]] Scene scene(double light) const;

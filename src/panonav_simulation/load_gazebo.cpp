@@ -78,7 +78,7 @@ std::optional<Affine3> scope_from_frame(pugi::xml_node scope, std::string_view n
   return std::nullopt;
 }
 
-bool can_be_shown(const Vector3& v) {
+bool is_renderable(const Vector3& v) {
   constexpr double reach_m = 1e6;  // single precision tells 6 cm apart there
   return std::abs(v.x_m) <= reach_m && std::abs(v.y_m) <= reach_m && std::abs(v.z_m) <= reach_m;
 }
@@ -99,7 +99,7 @@ double light_on_floor(const Scene& scene, double x_m, double y_m, double floor_m
 
 // Scales the light of Gazebo's lamps, which add up beyond white, so that it is 1 on the brightest
 // floor under a lamp, if it is more.
-void expose(Scene& scene) {
+void set_exposure(Scene& scene) {
   const double floor_m = extent(scene)->first.z_m;
   double brightest = scene.ambient;
   for (const PointLight& lamp : scene.lights) {
@@ -162,7 +162,7 @@ class WorldReader {
                           (warnings.empty() ? std::string() : "; left out: " + warnings.front()));
     }
     set_floor(scene_, visuals_.planes());
-    expose(scene_);
+    set_exposure(scene_);
     for (const std::string& warning : warnings)
       scene_.warnings.push_back(world_.string() + ": " + warning);
     return std::move(scene_);
@@ -280,7 +280,7 @@ class WorldReader {
     const std::size_t meshes_before = scene_.meshes.size();
     visuals_.add(visual, world_from_visual, place.origin);
     for (std::size_t i = meshes_before; i < scene_.meshes.size(); ++i) {
-      if (std::ranges::all_of(scene_.meshes[i].vertices, can_be_shown)) continue;
+      if (std::ranges::all_of(scene_.meshes[i].vertices, is_renderable)) continue;
       scene_.meshes.resize(meshes_before);
       throw Unusable{"it reaches farther than 1000 km"};
     }

@@ -98,7 +98,7 @@ Mesh convert_mesh(const aiMesh& source, const Affine3& world_from_mesh) {
   return mesh;
 }
 
-bool all_finite(const Mesh& mesh) {
+bool is_finite(const Mesh& mesh) {
   return std::all_of(mesh.vertices.begin(), mesh.vertices.end(),
                      [](const Vector3& v) {
                        return std::isfinite(v.x_m) && std::isfinite(v.y_m) && std::isfinite(v.z_m);
@@ -120,7 +120,7 @@ struct Collector {
       FileMesh result{node.mName.C_Str(), mesh.mName.C_Str(), materials.at(mesh.mMaterialIndex),
                       convert_mesh(mesh, world_from_node)};
       if (result.mesh.triangles.empty()) continue;
-      if (!all_finite(result.mesh)) {
+      if (!is_finite(result.mesh)) {
         throw FileError(path.string(), "mesh \"" + result.geometry +
                                            "\" has a coordinate that is not a finite number");
       }
@@ -287,7 +287,7 @@ class ColladaHoles {
 
 std::optional<std::string> repair_collada(const fs::path& path) {
   try {
-    const pugi::xml_document document = parse_xml(text_of_scene_file(path));
+    const pugi::xml_document document = parse_xml(read_scene_file(path));
     const ColladaHoles joined(document.document_element());
     std::ostringstream text;
     text.imbue(std::locale::classic());

@@ -27,7 +27,7 @@ auto make_each(Executor& executor, std::size_t count, Make make) {
 }
 
 /// Returns the processor time of the calling thread so far.
-[[nodiscard]] inline double thread_seconds() {
+[[nodiscard]] inline double get_thread_cpu_time_s() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);

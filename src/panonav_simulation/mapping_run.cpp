@@ -44,7 +44,7 @@ PlaceRecording make_empty_place(Scene scene, std::uint64_t seed, int columns, Ex
   return place;
 }
 
-OdometryNoise cheap_wheels() {
+OdometryNoise make_noisy_wheels() {
   return {.translation_from_translation = 0.06,
           .translation_from_rotation = 0.01,
           .rotation_from_translation = 0.04,

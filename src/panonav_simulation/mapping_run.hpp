@@ -28,7 +28,7 @@ struct MappingRecording {
 };
 
 /// Returns the noise of a cheap robot: a few times the errors of `OdometryNoise`'s defaults.
-[[nodiscard]] OdometryNoise cheap_wheels();
+[[nodiscard]] OdometryNoise make_noisy_wheels();
 
 /// Plans poses every `spacing_m` along the way points, on straight free lines or shortest paths,
 /// heading along the path; at most `max_poses` poses. Throws ContractError as `plan_recording`.

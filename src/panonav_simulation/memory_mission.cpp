@@ -15,7 +15,7 @@ namespace panonav::simulation {
 namespace {
 
 /// Returns the poses by node of the graph; NaN where the memory does not know them.
-std::vector<Pose2> true_poses(const NavigationGraph& graph, const MemoryFile& file) {
+std::vector<Pose2> collect_true_poses(const NavigationGraph& graph, const MemoryFile& file) {
   constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
   constexpr std::size_t batch = 1024;  // views in memory at a time
   std::vector<Pose2> poses;
@@ -57,13 +57,13 @@ MissionPlace make_mission_place(const SimulatedWorld& world) {
 
 RememberedPlace make_remembered_place(const RobotNavigator& robot) {
   const MemoryHeader& header = robot.memory().header();
-  std::vector<Pose2> truth = true_poses(robot.graph(), robot.memory());
+  std::vector<Pose2> truth = collect_true_poses(robot.graph(), robot.memory());
   const double spacing_m = median_edge_m(robot.graph(), truth);
   return {VisualMemory(header.shape, header.full_scale, header.elevations), robot.graph(),
           std::move(truth), spacing_m};
 }
 
-std::function<FourierSignature(const Pose2& pose, std::uint64_t seed)> make_sight(
+std::function<FourierSignature(const Pose2& pose, std::uint64_t seed)> make_view_sensor(
     std::shared_ptr<const Renderer> renderer, const RecordingCamera& camera,
     const FrameOptions& frame, const SensorOptions& sensor,
     std::shared_ptr<const ViewEncoder> encoder, Executor* executor, ImageReport report) {
@@ -102,9 +102,9 @@ MissionPlace make_mission_place(const std::string& scene, SimulatedWorldOptions 
   const PictureSource source = mirror ? header.source : world.source();
   MissionPlace place = make_mission_place(world);
   const SimulatedWorldOptions& settled = world.options();
-  place.sight =
-      make_sight(place.renderer, camera, settled.frame, settled.sensor,
-                 std::make_shared<const ViewEncoder>(header, source), &executor, std::move(report));
+  place.sight = make_view_sensor(place.renderer, camera, settled.frame, settled.sensor,
+                                 std::make_shared<const ViewEncoder>(header, source), &executor,
+                                 std::move(report));
   if (const RouteSource* const route = robot.route()) {
     place.line = [renderer = place.renderer, camera, frame = settled.frame, sensor = settled.sensor,
                   encoder = std::make_shared<LineEncoder>(source, *route),

@@ -24,10 +24,11 @@ using ImageReport = std::function<void(const Image& image, const Panorama& panor
 /// Makes a `MissionPlace::sight` of a camera and an encoder: what a robot sees, as its memory
 /// compares it. With a null executor the thread that calls it renders alone, and any number of
 /// threads may call; otherwise the executor must outlive it and one thread may call.
-[[nodiscard]] std::function<FourierSignature(const Pose2& pose, std::uint64_t seed)> make_sight(
-    std::shared_ptr<const Renderer> renderer, const RecordingCamera& camera,
-    const FrameOptions& frame, const SensorOptions& sensor,
-    std::shared_ptr<const ViewEncoder> encoder, Executor* executor, ImageReport report = {});
+[[nodiscard]] std::function<FourierSignature(const Pose2& pose, std::uint64_t seed)>
+make_view_sensor(std::shared_ptr<const Renderer> renderer, const RecordingCamera& camera,
+                 const FrameOptions& frame, const SensorOptions& sensor,
+                 std::shared_ptr<const ViewEncoder> encoder, Executor* executor,
+                 ImageReport report = {});
 
 /// Makes a place in which the robot sees as its memory's views were seen: by the camera, size and
 /// preprocessing of the memory's header. `options` change the scene, camera and size excepted.

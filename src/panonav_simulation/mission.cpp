@@ -29,11 +29,12 @@ constexpr double room_m = 0.2;
 // Largest distance between the lines of a route.
 constexpr double line_spacing_m = 0.1;
 
-std::vector<FourierSignature> observe_all(const MissionPlace& place,
-                                          const std::vector<Pose2>& poses, std::uint64_t seed,
-                                          Executor& executor) {
-  return make_each(executor, poses.size(),
-                   [&](std::size_t i) { return see(place, poses[i], Random(seed, i).next()); });
+std::vector<FourierSignature> render_signatures(const MissionPlace& place,
+                                                const std::vector<Pose2>& poses, std::uint64_t seed,
+                                                Executor& executor) {
+  return make_each(executor, poses.size(), [&](std::size_t i) {
+    return sense_view(place, poses[i], Random(seed, i).next());
+  });
 }
 
 // Makes a memory without views whose scale just fits the largest magnitude of these.
@@ -108,8 +109,8 @@ std::function<std::vector<float>(const Pose2& pose, std::uint64_t seed)> make_li
   };
 }
 
-FourierSignature see(const MissionPlace& place, const Pose2& pose, std::uint64_t seed,
-                     const People* people) {
+FourierSignature sense_view(const MissionPlace& place, const Pose2& pose, std::uint64_t seed,
+                            const People* people) {
   if (place.sight) return place.sight(pose, seed);
   Executor here(1);
   const double height_m = place.scene.camera_height_m;
@@ -129,7 +130,7 @@ RememberedPlace memorise_grid(const MissionPlace& place, double spacing_m, std::
     if (place.free_space->clearance_m(at.position) < place.scene.robot_radius_m + room_m) continue;
     poses.push_back({at.position.x_m, at.position.y_m, heading_rad});
   }
-  const auto views = observe_all(place, poses, seed, executor);
+  const auto views = render_signatures(place, poses, seed, executor);
   VisualMemory memory = make_empty_memory(views);
   for (std::size_t i = 0; i < views.size(); ++i) {
     static_cast<void>(memory.append(views[i], {.name = std::to_string(i)}));
@@ -147,7 +148,7 @@ RememberedPlace memorise_grid(const MissionPlace& place, double spacing_m, std::
 RememberedPlace memorise_drive(const MissionPlace& place, const std::vector<Pose2>& poses,
                                const OdometryNoise& wheels, std::uint64_t seed,
                                Executor& executor) {
-  const auto views = observe_all(place, poses, seed, executor);
+  const auto views = render_signatures(place, poses, seed, executor);
   const auto odometry = simulate_odometry(poses, wheels, seed);
   VisualMemory memory = make_empty_memory(views);
   TopologicalMapper mapper(memory);
@@ -358,7 +359,7 @@ class Voyage {
  private:
   NavigationDecision step(Navigator& navigator) {
     const FourierSignature view =
-        see(place_, robot_.pose(), noise_of_views_.next(), &robot_.people());
+        sense_view(place_, robot_.pose(), noise_of_views_.next(), &robot_.people());
     RobotReport report{.obstacle = std::exchange(obstacle_, false)};
     const Pose2 moved = robot_.take_odometry();
     if (estimator_) {
@@ -466,8 +467,8 @@ std::vector<MissionRun> run_missions(const MissionPlace& place, const Remembered
   });
 }
 
-std::vector<Mission> draw_missions(const MissionPlace& place, const RememberedPlace& remembered,
-                                   const RandomMissionOptions& options, std::uint64_t seed) {
+std::vector<Mission> sample_missions(const MissionPlace& place, const RememberedPlace& remembered,
+                                     const RandomMissionOptions& options, std::uint64_t seed) {
   require(options.count >= 0, "missions", options.count, ">= 0");
   require(options.max_distance_m > 0.0, "distance from a reference", options.max_distance_m, "> 0");
   Random random(seed, 3);

@@ -28,8 +28,8 @@ struct MissionPlace : SimulatedPlace {
   PanoramaRendering rendering{.rows = 40, .columns = 256, .rays_per_axis = 1};
   SensorOptions sensor;
   int components = 15;
-  /// Replaces the camera and preprocessing of `see`; called from any number of threads. Empty:
-  /// those of `see`.
+  /// Replaces the camera and preprocessing of `sense_view`; called from any number of threads.
+  /// Empty: those of `sense_view`.
   std::function<FourierSignature(const Pose2& pose, std::uint64_t seed)> sight;
   /// The horizon scanline that a robot takes at a pose, to record and to follow routes; any number
   /// of threads may ask. Empty: it takes none.
@@ -48,8 +48,8 @@ make_line_sensor(const MissionPlace& place);
 /// Computes the signature of the robot's view: the place's `sight`, or a panorama rendered
 /// directly, with the people that are there, and preprocessed as the command's defaults have it.
 /// The same pose, seed and people give the same bits.
-[[nodiscard]] FourierSignature see(const MissionPlace& place, const Pose2& pose, std::uint64_t seed,
-                                   const People* people = nullptr);
+[[nodiscard]] FourierSignature sense_view(const MissionPlace& place, const Pose2& pose,
+                                          std::uint64_t seed, const People* people = nullptr);
 
 /// Memory and graph of a place, with the true poses of its views.
 struct RememberedPlace {
@@ -147,10 +147,10 @@ struct RandomMissionOptions {
 
 /// Draws missions from random free places, in any heading, to references at random that are at
 /// least two spacings away.
-[[nodiscard]] std::vector<Mission> draw_missions(const MissionPlace& place,
-                                                 const RememberedPlace& remembered,
-                                                 const RandomMissionOptions& options,
-                                                 std::uint64_t seed);
+[[nodiscard]] std::vector<Mission> sample_missions(const MissionPlace& place,
+                                                   const RememberedPlace& remembered,
+                                                   const RandomMissionOptions& options,
+                                                   std::uint64_t seed);
 
 struct MissionRun {
   NavigationDecision::State end = NavigationDecision::State::moving;

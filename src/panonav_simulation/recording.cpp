@@ -105,7 +105,7 @@ void set_headings(std::vector<Pose2>& poses, const RecordingOptions& options, Ra
 }
 
 Viewpoint make_viewpoint(const Pose2& pose, const FrameOptions& options, std::uint64_t seed) {
-  const Tilt tilt = draw_tilt(options, seed);
+  const Tilt tilt = sample_tilt(options, seed);
   return {.pose = pose,
           .height_m = options.camera_height_m,
           .roll_rad = tilt.roll_rad,
@@ -139,7 +139,7 @@ void visit_options(FrameOptions& options, OptionVisitor& visitor) {
   table.visit(options, visitor);
 }
 
-Tilt draw_tilt(const FrameOptions& options, std::uint64_t seed) {
+Tilt sample_tilt(const FrameOptions& options, std::uint64_t seed) {
   Random random(seed, 1);
   const double towards = random.uniform(-std::numbers::pi, std::numbers::pi);
   return {options.tilt_rad * std::sin(towards), options.tilt_rad * std::cos(towards)};
@@ -205,7 +205,7 @@ void record(const Renderer& renderer, std::span<const RecordedPose> poses,
     const std::uint64_t seed_of_frame = frame_seed(seed, i);
     const Image picture =
         take_picture(renderer, poses[i].pose, camera, options, sensor, seed_of_frame, executor);
-    frame({i, poses[i], draw_tilt(options, seed_of_frame), picture});
+    frame({i, poses[i], sample_tilt(options, seed_of_frame), picture});
   }
 }
 

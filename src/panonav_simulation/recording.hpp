@@ -79,7 +79,7 @@ struct FrameOptions {
 void visit_options(FrameOptions& options, OptionVisitor& visitor);
 
 /// Draws the tilt of the robot in the image of this seed.
-[[nodiscard]] Tilt draw_tilt(const FrameOptions& options, std::uint64_t seed);
+[[nodiscard]] Tilt sample_tilt(const FrameOptions& options, std::uint64_t seed);
 
 /// Takes the image of the robot: a panorama for people (see `to_picture`), or the camera's
 /// image. The same options and seed give the same picture; give each frame its own seed.

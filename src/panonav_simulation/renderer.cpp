@@ -34,16 +34,16 @@ class RayMaker {
 
   [[nodiscard]] Ray operator()(const Direction3& direction) const {
     const Direction3 d = turned(direction.x, direction.y, direction.z);
-    return {as_floats(at_.x_m, at_.y_m, at_.z_m), as_floats(d.x, d.y, d.z)};
+    return {to_floats(at_.x_m, at_.y_m, at_.z_m), to_floats(d.x, d.y, d.z)};
   }
   [[nodiscard]] Ray operator()(const Vector3& from_viewpoint, const Direction3& direction) const {
     const Direction3 o = turned(from_viewpoint.x_m, from_viewpoint.y_m, from_viewpoint.z_m);
     const Direction3 d = turned(direction.x, direction.y, direction.z);
-    return {as_floats(at_.x_m + o.x, at_.y_m + o.y, at_.z_m + o.z), as_floats(d.x, d.y, d.z)};
+    return {to_floats(at_.x_m + o.x, at_.y_m + o.y, at_.z_m + o.z), to_floats(d.x, d.y, d.z)};
   }
 
  private:
-  static std::array<float, 3> as_floats(double x, double y, double z) {
+  static std::array<float, 3> to_floats(double x, double y, double z) {
     return {static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)};
   }
   [[nodiscard]] Direction3 turned(double x, double y, double z) const {
@@ -90,7 +90,7 @@ SubPixel sub_pixel(int i, int j, int n) {
   return {(i + (j + 0.5) / n) / n, (j + (i + 0.5) / n) / n};
 }
 
-float grey_of(const float* value, int channels) {
+float to_grey(const float* value, int channels) {
   return channels == 1 ? value[0] : 0.299F * value[0] + 0.587F * value[1] + 0.114F * value[2];
 }
 
@@ -104,7 +104,7 @@ struct Renderer::Implementation {
         tracer(lit.vertices, lit.indices, options.instructions) {
     bake_light(scene, tracer, options.shadows, light_spacing_m(scene), lit, executor);
     for (const Material& material : scene.materials) materials.emplace_back(material, channels);
-    if (channels == 1) background[0] = grey_of(background.data(), 3);
+    if (channels == 1) background[0] = to_grey(background.data(), 3);
   }
 
   void shade(const Ray& ray, const RayHit& hit, float spread_rad, float* colour) const {
@@ -207,7 +207,7 @@ float Renderer::radiance_along(const Vector3& origin, const Direction3& directio
   std::array<float, 3> colour{};
   implementation_->shade(ray, implementation_->tracer.first_hit(ray),
                          static_cast<float>(spread_rad), colour.data());
-  return std::clamp(grey_of(colour.data(), implementation_->channels), 0.0F, 1.0F);
+  return std::clamp(to_grey(colour.data(), implementation_->channels), 0.0F, 1.0F);
 }
 
 double Renderer::distance_along(const Vector3& origin, const Direction3& direction) const {
@@ -267,7 +267,7 @@ Panorama Renderer::render_panorama(const Viewpoint& viewpoint, const PanoramaRen
       }
       for (std::size_t c = 0; c < columns; ++c) {
         out[y * columns + c] =
-            std::clamp(grey_of(row.data() + c * channels, implementation_->channels), 0.0F, 1.0F);
+            std::clamp(to_grey(row.data() + c * channels, implementation_->channels), 0.0F, 1.0F);
       }
     }
   };

@@ -11,13 +11,13 @@ namespace panonav::simulation {
 namespace {
 
 // Returns the distance of a point from an area; 0 inside.
-double gap_to(const FloorArea& area, Point2 centre) {
+double distance_to_area_m(const FloorArea& area, Point2 centre) {
   const double dx = std::max({area.low.x_m - centre.x_m, 0.0, centre.x_m - area.high.x_m});
   const double dy = std::max({area.low.y_m - centre.y_m, 0.0, centre.y_m - area.high.y_m});
   return std::hypot(dx, dy);
 }
 
-bool inside(const FloorArea& area, Point2 centre, double margin_m) {
+bool is_inside(const FloorArea& area, Point2 centre, double margin_m) {
   return centre.x_m >= area.low.x_m + margin_m && centre.x_m <= area.high.x_m - margin_m &&
          centre.y_m >= area.low.y_m + margin_m && centre.y_m <= area.high.y_m - margin_m;
 }
@@ -203,8 +203,9 @@ Footing SceneBuilder::place_movable(const Footing& planned, double radius_m,
     if (!moves || placed) continue;
     const Point2 centre{planned.centre.x_m + step * std::cos(angle),
                         planned.centre.y_m + step * std::sin(angle)};
-    bool is_free = inside(room, centre, 0.5 * radius_m);
-    for (const auto& area : scene_.drivable) is_free = is_free && gap_to(area, centre) >= radius_m;
+    bool is_free = is_inside(room, centre, 0.5 * radius_m);
+    for (const auto& area : scene_.drivable)
+      is_free = is_free && distance_to_area_m(area, centre) >= radius_m;
     is_free = is_free && is_clear_of_tour(centre, radius_m);
     if (is_free) {
       found = {centre, planned.turn_rad + turn};

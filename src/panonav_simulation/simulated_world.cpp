@@ -29,7 +29,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Refuses options that vary built-in scenes for a scene of a file, where they would be ignored.
-void refuse_variations_of_file(const std::string& file, const FindSetOption& find_set_option) {
+void reject_variations_of_file(const std::string& file, const FindSetOption& find_set_option) {
   for (const char* name : {"scene_seed", "moved_objects", "moved_seed"}) {
     if (const auto name_of_user = find_set_option("simulation", name)) {
       throw OptionError(*name_of_user + " varies built-in scenes only; '" + file +
@@ -121,7 +121,7 @@ Scene load_scene(const std::string& name, const SceneOptions& options,
     for (const auto known : names) all += (all.empty() ? "" : ", ") + std::string(known);
     throw OptionError("'" + name + "' is neither a file nor a built-in scene; allowed: " + all);
   }
-  refuse_variations_of_file(name, find_set_option);
+  reject_variations_of_file(name, find_set_option);
   Scene scene;
   const std::string ending = to_lower_case(fs::path(name).extension().string());
   if (ending == ".world" || ending == ".sdf") {

@@ -55,10 +55,10 @@ std::string import_map() {
 
 }  // namespace
 
-std::string whole_page(std::string_view title, std::string_view generator, std::string body) {
+std::string make_page(std::string_view title, std::string_view generator, std::string body) {
   const std::string maker =
       generator.empty() ? std::string()
-                        : "<meta name=\"generator\" content=\"" + html_escaped(generator) + "\">\n";
+                        : "<meta name=\"generator\" content=\"" + escape_html(generator) + "\">\n";
   const bool moving = body.find("<pn-") != std::string::npos;
   const std::string imports =
       moving ? "<script type=\"importmap\">" + import_map() + "</script>\n" : std::string();
@@ -67,7 +67,7 @@ std::string whole_page(std::string_view title, std::string_view generator, std::
       "needs scripts to show runs and plots. Scripts are switched off in this "
       "browser.</p></noscript>\n";
   const std::string_view scripts = moving ? starting : std::string_view();
-  const std::array filled{std::pair{std::string_view("{{title}}"), html_escaped(title)},
+  const std::array filled{std::pair{std::string_view("{{title}}"), escape_html(title)},
                           std::pair{std::string_view("{{generator}}"), maker},
                           std::pair{std::string_view("{{style}}"), std::string(web::viewer_css)},
                           std::pair{std::string_view("{{imports}}"), imports},
@@ -87,7 +87,7 @@ std::string whole_page(std::string_view title, std::string_view generator, std::
   return html;
 }
 
-std::string html_escaped(std::string_view text) {
+std::string escape_html(std::string_view text) {
   std::string html;
   for (const char c : to_readable_line(text)) {
     switch (c) {
@@ -127,9 +127,9 @@ std::string data_element(std::string_view json) {
 }
 
 std::string live_page(std::string_view title, bool replay, std::string_view takes) {
-  return whole_page(
+  return make_page(
       title, {},
-      "<pn-run class=\"whole\" data-title=\"" + html_escaped(title) + "\">" +
+      "<pn-run class=\"whole\" data-title=\"" + escape_html(title) + "\">" +
           data_element(Json{{"live", "events"}, {"replay", replay}, {"takes", takes}}.dump()) +
           "</pn-run>");
 }
@@ -207,9 +207,9 @@ std::string RunPage::element() const {
 }
 
 std::string RunPage::html() const {
-  return whole_page(title_, {},
-                    "<pn-run class=\"whole\" data-title=\"" + html_escaped(title_) + "\">" +
-                        data_element(json()) + "</pn-run>");
+  return make_page(title_, {},
+                   "<pn-run class=\"whole\" data-title=\"" + escape_html(title_) + "\">" +
+                       data_element(json()) + "</pn-run>");
 }
 
 }  // namespace panonav::viewer

@@ -65,11 +65,11 @@ class RunPage {
 
 /// Returns an HTML page with styles and scripts in it. `body` is HTML; `generator`: name of the
 /// program, may be empty.
-[[nodiscard]] std::string whole_page(std::string_view title, std::string_view generator,
-                                     std::string body);
+[[nodiscard]] std::string make_page(std::string_view title, std::string_view generator,
+                                    std::string body);
 
 /// Returns text escaped for elements and quoted attributes of HTML.
-[[nodiscard]] std::string html_escaped(std::string_view text);
+[[nodiscard]] std::string escape_html(std::string_view text);
 /// Returns JSON within a script element.
 [[nodiscard]] std::string data_element(std::string_view json);
 

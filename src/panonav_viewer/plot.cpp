@@ -49,7 +49,7 @@ struct Bounds {
   [[nodiscard]] double width() const { return high.x_m - low.x_m; }
   [[nodiscard]] double height() const { return high.y_m - low.y_m; }
   /// Adds a margin; then it is no wider than 5 times and no higher than 1.2 times the other side.
-  void give_room() {
+  void add_margin() {
     if (!(low.x_m <= high.x_m)) low = high = {};
     const double side = std::max({width(), height(), 1e-6 * std::abs(low.x_m), 1e-9});
     grow(0.03 * side, 0.03 * side);
@@ -328,7 +328,7 @@ void write_plot(const fs::path& path, const HeatMap& plot) {
   const Point2 high{low.x_m + plot.columns * plot.spacing_m, low.y_m + plot.rows * plot.spacing_m};
   Bounds bounds;
   bounds.include({low, high});
-  bounds.give_room();
+  bounds.add_margin();
   constexpr double colour_bar_px = 110.0;
   PlotArea area{.x = {.label = plot.x_label}, .y = {.label = plot.y_label}};
   area.box = {left_margin_px, top_margin_px, plot_width_px - left_margin_px - colour_bar_px, 0.0};
@@ -400,7 +400,7 @@ void write_plot(const fs::path& path, const std::vector<MapPlot>& panels, int pa
   // All panels show the same part of the world, so that they can be compared.
   Bounds bounds;
   for (const MapPlot& panel : panels) bounds.include(panel);
-  bounds.give_room();
+  bounds.add_margin();
   const double panel_width = panel_columns == 1   ? plot_width_px
                              : panel_columns == 2 ? 400.0
                                                   : 320.0;

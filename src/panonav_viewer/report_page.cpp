@@ -16,7 +16,7 @@ namespace {
 
 std::string element(std::string_view name, std::string_view text) {
   std::string result = "<";
-  result.append(name).append(">").append(html_escaped(text));
+  result.append(name).append(">").append(escape_html(text));
   return result.append("</").append(name).append(">");
 }
 
@@ -35,7 +35,7 @@ std::string make_panel(std::string_view name, std::string_view title, const std:
 
 std::string make_command_block(const std::vector<std::string>& command_lines) {
   std::string html = "<pre>";
-  for (const auto& line : command_lines) html += html_escaped(line) + "\n";
+  for (const auto& line : command_lines) html += escape_html(line) + "\n";
   return html + "</pre>\n";
 }
 
@@ -73,7 +73,7 @@ std::string make_view_element(const ReportView& view) {
       std::clamp(static_cast<double>(picture.width()) / picture.height(), 2.5, 10.0);
   std::string html =
       "<figure><div class=\"view\"><img style=\"aspect-ratio:" + format_fixed(shape, 2) +
-      "\" alt=\"" + html_escaped(view.caption) + "\" src=\"" +
+      "\" alt=\"" + escape_html(view.caption) + "\" src=\"" +
       data_url("image/jpeg", encode_jpeg(picture.view())) + "\">";
   for (const ViewMark& mark : view.marks) {
     const double percent = 50.0 - mark.azimuth_rad * 50.0 / std::numbers::pi;
@@ -98,9 +98,9 @@ void ReportPage::begin_part(std::string_view title,
   const std::string number = std::to_string(++parts_);
   const std::string numbered = number + ". " + std::string(title);
   overview_ += "<a href=\"#part" + number + "\">" + element("small", numbered) +
-               element("b", value_and_meaning.first) + html_escaped(value_and_meaning.second) +
+               element("b", value_and_meaning.first) + escape_html(value_and_meaning.second) +
                "</a>\n";
-  body_.emplace_back("<h2 id=\"part" + number + "\">" + html_escaped(numbered) + "</h2>\n", "");
+  body_.emplace_back("<h2 id=\"part" + number + "\">" + escape_html(numbered) + "</h2>\n", "");
 }
 
 void ReportPage::add_text(std::string_view paragraph) {
@@ -111,7 +111,7 @@ void ReportPage::add_figures(
     const std::vector<std::pair<std::string, std::string>>& value_and_meaning) {
   std::string html = "<div class=\"figures\">\n";
   for (const auto& [value, meaning] : value_and_meaning) {
-    html += "<div>" + element("b", value) + html_escaped(meaning) + "</div>\n";
+    html += "<div>" + element("b", value) + escape_html(meaning) + "</div>\n";
   }
   body_.emplace_back(html + "</div>\n", "");
 }
@@ -131,7 +131,7 @@ void ReportPage::add_figure(const ReportPicture& picture) {
   if (!picture.file.empty()) {
     const bool plot = std::filesystem::path(picture.file).extension() == ".svg";
     body_.emplace_back("<figure><img" + std::string(plot ? " class=\"plot\"" : "") + " alt=\"" +
-                           html_escaped(picture.caption) + "\" src=\"",
+                           escape_html(picture.caption) + "\" src=\"",
                        picture.file);
     body_.emplace_back("\">", "");
   } else {
@@ -169,9 +169,9 @@ void ReportPage::add_run(const RunPage& run) {
 }
 
 void ReportPage::add_link(std::string_view file, std::string_view text) {
-  body_.emplace_back("<p class=\"link\"><a href=\"" + html_escaped(file) + "\">" +
-                         html_escaped(text) + "</a></p>\n",
-                     "");
+  body_.emplace_back(
+      "<p class=\"link\"><a href=\"" + escape_html(file) + "\">" + escape_html(text) + "</a></p>\n",
+      "");
 }
 
 void ReportPage::add_commands(const std::vector<std::string>& command_lines) {
@@ -183,15 +183,15 @@ void ReportPage::add_story(const std::vector<StoryCard>& cards, std::string_view
   story_ = "<div class=\"story\">\n";
   for (const StoryCard& card : cards) {
     story_ += "<section><h2><a href=\"#part" + std::to_string(card.part) + "\">" +
-              html_escaped(card.title) + "</a></h2>";
+              escape_html(card.title) + "</a></h2>";
     if (const auto* picture = std::get_if<ReportPicture>(&card.shown)) {
-      story_ += "<figure><img alt=\"" + html_escaped(picture->caption) + "\" src=\"" +
-                html_escaped(picture->file) + "\"></figure>\n";
+      story_ += "<figure><img alt=\"" + escape_html(picture->caption) + "\" src=\"" +
+                escape_html(picture->file) + "\"></figure>\n";
     } else {
       story_ += make_plot_element(std::get<ReportPlot>(card.shown));
     }
     story_ +=
-        "<p>" + element("b", card.value) + " " + html_escaped(card.meaning) + "</p></section>\n";
+        "<p>" + element("b", card.value) + " " + escape_html(card.meaning) + "</p></section>\n";
   }
   story_ += "</div>\n<div class=\"begin\">" + element("h2", commands_title) +
             make_command_block(command_lines) + "</div>\n";
@@ -200,15 +200,15 @@ void ReportPage::add_story(const std::vector<StoryCard>& cards, std::string_view
 void ReportPage::write(const std::filesystem::path& folder, std::string_view file,
                        std::string_view generator) const {
   std::string body =
-      "<main>\n" + element("h1", title_) + "\n<p class=\"lead\">" + html_escaped(lead_) + "</p>\n";
+      "<main>\n" + element("h1", title_) + "\n<p class=\"lead\">" + escape_html(lead_) + "</p>\n";
   body += story_;
   if (!overview_.empty()) body += "<nav class=\"figures\">\n" + overview_ + "</nav>\n";
   for (const auto& [html, picture] : body_) {
     body += html;
     if (picture.empty()) continue;
-    body += picture.starts_with("data:") ? html_escaped(picture) : embed_file(folder / picture);
+    body += picture.starts_with("data:") ? escape_html(picture) : embed_file(folder / picture);
   }
-  const std::string page = whole_page(title_, generator, body + "</main>");
+  const std::string page = make_page(title_, generator, body + "</main>");
   write_file(folder / file, std::string_view(page));
 }
 

@@ -54,13 +54,13 @@ std::optional<std::size_t> parse_index(std::string_view text) {
   return read_number(text, number) ? std::optional(number) : std::nullopt;
 }
 
-std::string_view name_of(ViewWish wish) {
+std::string_view name_of(ViewerInput wish) {
   switch (wish) {
-    case ViewWish::goal:
+    case ViewerInput::goal:
       return "goal";
-    case ViewWish::pose:
+    case ViewerInput::pose:
       return "pose";
-    case ViewWish::none:
+    case ViewerInput::none:
       break;
   }
   return "";
@@ -151,7 +151,7 @@ struct ViewServer::Implementation {
   [[nodiscard]] server::HttpAnswer answer(const server::HttpRequest& request) {
     const auto only = [](int status) { return server::HttpAnswer{.status = status}; };
     const std::string_view resource = std::string_view(request.path).substr(1 + token.size());
-    if ((options.replay || options.takes != ViewWish::none) && resource == "/control") {
+    if ((options.replay || options.takes != ViewerInput::none) && resource == "/control") {
       if (request.method != "POST") return only(405);
       return only(handle_control(request.body) ? 204 : 400);
     }
@@ -309,7 +309,7 @@ struct ViewServer::Implementation {
     const std::string key(name_of(options.takes));
     if (key.empty() || json.size() != 1 || !json.contains(key)) return false;
     const auto& values = json[key];
-    const std::size_t size = options.takes == ViewWish::pose ? 3 : 2;
+    const std::size_t size = options.takes == ViewerInput::pose ? 3 : 2;
     if (!values.is_array() || values.size() != size) return false;
     ReferencePose pose;
     if (!values[0].is_number() || !values[1].is_number()) return false;
@@ -427,7 +427,7 @@ void ViewServer::add(recordings::RunMoment moment) {
   implementation_->add(std::move(moment));
 }
 
-std::optional<ReferencePose> ViewServer::consume_wish() {
+std::optional<ReferencePose> ViewServer::consume_viewer_input() {
   const std::lock_guard lock(implementation_->mutex);
   return std::exchange(implementation_->wish, std::nullopt);
 }

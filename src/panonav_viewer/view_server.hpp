@@ -13,7 +13,7 @@
 namespace panonav::viewer {
 
 /// Wishes that a viewer may send to the run by a click on the map.
-enum class ViewWish {
+enum class ViewerInput {
   none,
   goal,  ///< where to go; without a heading
   pose,  ///< where the robot is
@@ -28,7 +28,7 @@ struct ViewServerOptions {
   /// stamps, and viewers may hold it, take it step by step, and change its pace. Two seconds after
   /// the last viewer has left it continues without waiting.
   bool replay = false;
-  ViewWish takes = ViewWish::none;  ///< anything else is refused
+  ViewerInput takes = ViewerInput::none;  ///< anything else is refused
   /// Returns the picture (PNG or JPEG) of a reference by its name, empty where there is none; it is
   /// called on a thread of its own and may be slow. Empty: viewers get no pictures of references.
   std::function<std::vector<std::uint8_t>(const std::string& name)> thumbnail;
@@ -61,7 +61,7 @@ class ViewServer {
   /// Returns the latest pose or goal that a viewer has set, and clears it. Those that the run does
   /// not accept, that are not finite or lie more than 10 m outside the bounding box of the reported
   /// references are dropped.
-  [[nodiscard]] std::optional<ReferencePose> consume_wish();
+  [[nodiscard]] std::optional<ReferencePose> consume_viewer_input();
 
  private:
   struct Implementation;

@@ -200,7 +200,7 @@ TEST_F(Walk, ARecordHoldsWhatWasSeenAndAnswered) {
   for_each_message<recordings::ros::CompressedImage>(
       path("run.mcap"), "/camera/image/compressed",
       [&](const recordings::ros::CompressedImage& picture) {
-        EXPECT_EQ(recordings::ros::picture_of(picture, "picture"),
+        EXPECT_EQ(recordings::ros::to_image(picture, "picture"),
                   read_image(folder / "walk" / view_name(number)));
         ++number;
       });

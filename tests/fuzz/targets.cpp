@@ -231,11 +231,11 @@ void read_ros_bytes(Bytes bytes) {
   expect_value_or_line<Error>([&] {
     switch (bytes[0] % 16) {
       case 0:
-        (void)recordings::ros::picture_of(read_ros_message<recordings::ros::Image>(rest, encoding),
-                                          small);
+        (void)recordings::ros::to_image(read_ros_message<recordings::ros::Image>(rest, encoding),
+                                        small);
         break;
       case 1:
-        (void)recordings::ros::picture_of(
+        (void)recordings::ros::to_image(
             read_ros_message<recordings::ros::CompressedImage>(rest, encoding), "picture", small);
         break;
       case 2:

@@ -83,12 +83,12 @@ TEST_F(DatasetFolder, WhatIsWrittenReadsBackTheSame) {
 }
 
 TEST(RoundTripDegrees, AreRoundWhereThatReadsBackTheSame) {
-  EXPECT_EQ(round_trip_degrees(radians(-30.0)), -30.0);
-  EXPECT_EQ(round_trip_degrees(radians(118.1)), 118.1);
+  EXPECT_EQ(to_exact_degrees(radians(-30.0)), -30.0);
+  EXPECT_EQ(to_exact_degrees(radians(118.1)), 118.1);
   int unchanged = 0;
   for (int i = 0; i < 1000; ++i) {
     const double angle_rad = std::sin(0.7 * i) * 3.0;
-    const double back_rad = radians(round_trip_degrees(angle_rad));
+    const double back_rad = radians(to_exact_degrees(angle_rad));
     EXPECT_NEAR(back_rad, angle_rad, 1e-15);
     unchanged += back_rad == radians(degrees(angle_rad)) ? 1 : 0;
   }

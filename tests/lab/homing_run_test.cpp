@@ -39,7 +39,7 @@ TEST(HomingRun, BothDrivesGetHomeInOfficeAndLab) {
   Executor executor(2);
   for (const char* const name : {"lab", "office"}) {
     const HomingPlace& place = place_of(name);
-    const auto tasks = draw_homing_tasks(place, 30, 1.0, 5);
+    const auto tasks = sample_homing_tasks(place, 30, 1.0, 5);
     for (const DriveKind drive : {DriveKind::differential, DriveKind::holonomic}) {
       HomingRunOptions options;
       options.motion.drive = drive;
@@ -63,7 +63,7 @@ TEST(HomingRun, ATiltedRobotGetsHomeWithAnInertialSensorAndWithout) {
   Executor executor(2);
   HomingPlace place = place_of("office");
   place.camera.frame.tilt_rad = radians(6.0);
-  const auto tasks = draw_homing_tasks(place, 20, 1.0, 5);
+  const auto tasks = sample_homing_tasks(place, 20, 1.0, 5);
   HomingRunOptions blind;
   blind.vector.tilt = false;
   EXPECT_LE(successes(run_home(place, tasks, blind, 6, executor)), 10U);
@@ -74,7 +74,7 @@ TEST(HomingRun, ATiltedRobotGetsHomeWithAnInertialSensorAndWithout) {
 
 TEST(HomingRun, AHolonomicRobotDoesNotTurn) {
   const HomingPlace& place = place_of("lab");
-  const auto tasks = draw_homing_tasks(place, 3, 1.0, 7);
+  const auto tasks = sample_homing_tasks(place, 3, 1.0, 7);
   HomingRunOptions options;
   options.motion = {.drive = DriveKind::holonomic,
                     .translation_from_translation = 0.0,
@@ -120,7 +120,7 @@ TEST(HomingRun, KeepsHowMuchTheFirstViewDiffersFromHome) {
   const HomingPlace& place = place_of("lab");
   Executor executor(2);
   for (const HomingRun& run :
-       run_home(place, draw_homing_tasks(place, 6, 0.8, 23), {}, 24, executor)) {
+       run_home(place, sample_homing_tasks(place, 6, 0.8, 23), {}, 24, executor)) {
     if (run.end != HomingRunEnd::arrived) continue;
     EXPECT_LE(run.end_difference, 0.08);
     // Views of one room differ the more the farther they are apart.
@@ -147,7 +147,7 @@ TEST(HomingRun, SaysThatItIsNotHomeWhereHomeWasSeenInAnotherRoom) {
 
 TEST(HomingRun, SameSeedSameBitsOnAnyNumberOfThreads) {
   const HomingPlace& place = place_of("lab");
-  const auto tasks = draw_homing_tasks(place, 4, 1.0, 17);
+  const auto tasks = sample_homing_tasks(place, 4, 1.0, 17);
   Executor one(1);
   Executor three(3);
   const auto a = run_home(place, tasks, {}, 18, one);
@@ -164,8 +164,8 @@ TEST(HomingRun, SameSeedSameBitsOnAnyNumberOfThreads) {
 
 TEST(HomingRun, ChecksItsInputs) {
   const HomingPlace& place = place_of("lab");
-  EXPECT_THROW((void)draw_homing_tasks(place, 0, 1.0, 1), ContractError);
-  EXPECT_THROW((void)draw_homing_tasks(place, 1, 0.0, 1), ContractError);
+  EXPECT_THROW((void)sample_homing_tasks(place, 0, 1.0, 1), ContractError);
+  EXPECT_THROW((void)sample_homing_tasks(place, 1, 0.0, 1), ContractError);
   const HomingView home = take_homing_view(place, {}, 1);
   EXPECT_THROW((void)run_home(place, home, {}, {1e3, 0.0, 0.0}, {}, 1), ContractError);
   HomingRunOptions broken;

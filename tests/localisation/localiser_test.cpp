@@ -186,8 +186,8 @@ TEST(Localiser, AnswersByAnIndexAsTheHeldMemoryDoes) {
   const Localiser held(place.memory);
   const double spacing_m = NeighbourSupport(ColumnRanking(place.memory)).spacing_m();
   HeldViewIndex index(place.memory);
-  const auto drawn =
-      std::make_shared<const VisualMemory>(index.load(draw_views(place.memory.views())));
+  const auto drawn = std::make_shared<const VisualMemory>(
+      index.load(sample_reference_views(place.memory.views())));
   const Localiser searched(drawn, held.place_model(), held.position_model(), {}, spacing_m);
   const std::vector<ViewId> excluded{place.memory.views()[3]};
   Random random(4);

@@ -113,7 +113,7 @@ TEST(SubAreas, DoorsAreNarrowAndOpenBordersAreNot) {
   const int side = 8;
   const NavigationGraph graph = rooms_in_a_row(3, side, random);
   const auto narrow =
-      find_narrow_places(graph, divide_into_areas(graph, {.views_per_area = side * side}), 1);
+      find_bottlenecks(graph, divide_into_areas(graph, {.views_per_area = side * side}), 1);
   for (std::size_t node = 0; node < graph.size(); ++node) {
     const auto column = static_cast<int>(node % side);
     const auto row = static_cast<int>(node / side % side);
@@ -128,7 +128,7 @@ TEST(SubAreas, DoorsAreNarrowAndOpenBordersAreNot) {
   const NavigationGraph open = posed_graph(poses, 1.5, [](Point2, Point2) { return true; });
   const SubAreas areas = divide_into_areas(open, {.views_per_area = 100});
   ASSERT_GT(areas.nodes.size(), 2U);
-  const auto none = find_narrow_places(open, areas, 2);
+  const auto none = find_bottlenecks(open, areas, 2);
   EXPECT_EQ(std::ranges::count(none, std::uint8_t{0}), 400);
 }
 

@@ -213,7 +213,7 @@ TEST(Navigator, ComparesAllComponentsWhereItMatters) {
   Scene scene(1, false);
   Navigator& navigator = scene.navigator;
   AreaPlanner planning = navigator.planner();
-  const auto narrow = find_narrow_places(planning.graph(), planning.areas(), 2);
+  const auto narrow = find_bottlenecks(planning.graph(), planning.areas(), 2);
   ASSERT_NE(std::ranges::count(narrow, std::uint8_t{1}), 0);
   const NavigationGraph& graph = navigator.planner().graph();
   Random noise(5);

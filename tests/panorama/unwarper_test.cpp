@@ -189,11 +189,11 @@ TEST(Unwarper, UnseenDirectionsTakeTheNearestRowSeen) {
               .has_value();
       // A value whose middle is not seen may have taps that are.
       if (expected) {
-        EXPECT_TRUE(unwarper.is_seen(y, c));
+        EXPECT_TRUE(unwarper.is_visible(y, c));
       }
-      unseen += !unwarper.is_seen(y, c);
+      unseen += !unwarper.is_visible(y, c);
       cut_by_the_frame +=
-          !unwarper.is_seen(y, c) && std::abs(view.elevation_rad(y)) < radians(28.0);
+          !unwarper.is_visible(y, c) && std::abs(view.elevation_rad(y)) < radians(28.0);
       EXPECT_NEAR(view.at(y, c), world(view.azimuth_rad(c), 0.0), 0.03) << y << " " << c;
     }
   }
@@ -275,7 +275,7 @@ TEST(Unwarper, TwoLensesAreOnePictureWithoutASeam) {
     double worst = 0.0;
     for (int y = 0; y < view.rows(); ++y) {
       for (int c = 0; c < view.columns(); ++c) {
-        EXPECT_TRUE(unwarper.is_seen(y, c));
+        EXPECT_TRUE(unwarper.is_visible(y, c));
         // As bright as the darker lens, whichever of them sees it.
         const double expected = 0.85 * world(view.azimuth_rad(c), view.elevation_rad(y));
         worst = std::max(worst, std::abs(view.at(y, c) - expected));

@@ -47,18 +47,18 @@ class RecordedTopics : public ::testing::TestWithParam<MessageEncoding> {
     ros::Odometry message;
     message.header = {start_ns + after_ns, "odom"};
     message.child_frame_id = "base_link";
-    message.pose.pose = ros::pose_of(pose_at(1e-9 * static_cast<double>(after_ns)));
+    message.pose.pose = ros::to_pose(pose_at(1e-9 * static_cast<double>(after_ns)));
     recorded_->add(topic, start_ns + after_ns + 2 * ms, message);
   }
   void add_transform(const std::string& topic, const std::string& parent, const std::string& child,
                      std::int64_t after_ns, const Pose2& pose) {
     recorded_->add(topic, start_ns + after_ns,
-                   ros::TFMessage{{{{start_ns + after_ns, parent}, child, ros::pose_of(pose)}}});
+                   ros::TFMessage{{{{start_ns + after_ns, parent}, child, ros::to_pose(pose)}}});
   }
   void add_imu(std::int64_t after_ns, const Tilt& tilt, const std::string& topic = "/imu") {
     ros::Imu message;
     message.header = {start_ns + after_ns, "imu"};
-    message.orientation = ros::pose_of({0.0, 0.0, 1.2}, tilt).orientation;
+    message.orientation = ros::to_pose({0.0, 0.0, 1.2}, tilt).orientation;
     recorded_->add(topic, start_ns + after_ns, message);
   }
   [[nodiscard]] Dataset read(const InputOptions::Topics& topics = {},
@@ -294,7 +294,7 @@ TEST_P(RecordedTopics, GroundTruthGivesPoses) {
     const std::int64_t after_ns = i * 100 * ms;
     recorded_->add(
         "/ground_truth", start_ns + after_ns,
-        ros::PoseStamped{{start_ns + after_ns, "world"}, ros::pose_of(pose_at(0.1 * i))});
+        ros::PoseStamped{{start_ns + after_ns, "world"}, ros::to_pose(pose_at(0.1 * i))});
   }
   const auto entries = read().entries;
   ASSERT_TRUE(entries[1].pose && entries[1].pose->heading_rad);

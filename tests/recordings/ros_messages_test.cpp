@@ -178,24 +178,24 @@ TEST(RosPoses, AgreeWithThePlane) {
       EXPECT_NEAR(seen.y_m, expected.y_m, 1e-12);
       EXPECT_NEAR(angle_difference(seen.heading_rad, expected.heading_rad), 0.0, 1e-12);
     };
-    expect_near(ros::planar(ros::pose_of(a)), a);
-    expect_near(ros::planar(ros::pose_of(a) * ros::pose_of(b)), a * b);
-    expect_near(ros::planar(ros::inverse(ros::pose_of(a))), inverse(a));
+    expect_near(ros::to_pose2(ros::to_pose(a)), a);
+    expect_near(ros::to_pose2(ros::to_pose(a) * ros::to_pose(b)), a * b);
+    expect_near(ros::to_pose2(ros::inverse(ros::to_pose(a))), inverse(a));
     const double share = random.uniform(0.0, 1.0);
     const double turn = angle_difference(b.heading_rad, a.heading_rad);
-    expect_near(ros::planar(ros::between(ros::pose_of(a), ros::pose_of(b), share)),
+    expect_near(ros::to_pose2(ros::between(ros::to_pose(a), ros::to_pose(b), share)),
                 {std::lerp(a.x_m, b.x_m, share), std::lerp(a.y_m, b.y_m, share),
                  wrap_angle(a.heading_rad + share * turn)});
     const Tilt tilt{random.uniform(-0.5, 0.5), random.uniform(-0.5, 0.5)};
-    const ros::Pose tilted = ros::pose_of(a, tilt);
-    expect_near(ros::planar(tilted), a);
-    EXPECT_NEAR(ros::tilt_of(tilted.orientation).roll_rad, tilt.roll_rad, 1e-12);
-    EXPECT_NEAR(ros::tilt_of(tilted.orientation).pitch_rad, tilt.pitch_rad, 1e-12);
+    const ros::Pose tilted = ros::to_pose(a, tilt);
+    expect_near(ros::to_pose2(tilted), a);
+    EXPECT_NEAR(ros::to_tilt(tilted.orientation).roll_rad, tilt.roll_rad, 1e-12);
+    EXPECT_NEAR(ros::to_tilt(tilted.orientation).pitch_rad, tilt.pitch_rad, 1e-12);
   }
   // REP 103: positive pitch lowers the front, positive roll the right side.
-  const ros::Pose front = ros::pose_of({}, {0.0, 0.3}) * ros::Pose{{1.0, 0.0, 0.0}, {}};
+  const ros::Pose front = ros::to_pose({}, {0.0, 0.3}) * ros::Pose{{1.0, 0.0, 0.0}, {}};
   EXPECT_NEAR(front.position.z, -std::sin(0.3), 1e-12);
-  const ros::Pose right = ros::pose_of({}, {0.3, 0.0}) * ros::Pose{{0.0, -1.0, 0.0}, {}};
+  const ros::Pose right = ros::to_pose({}, {0.3, 0.0}) * ros::Pose{{0.0, -1.0, 0.0}, {}};
   EXPECT_NEAR(right.position.z, -std::sin(0.3), 1e-12);
 }
 
@@ -217,7 +217,7 @@ Image pixels(int width, int height, int channels, std::vector<std::uint8_t> valu
 TEST(RosPictures, ChannelsComeInTheOrderOfTheirEncoding) {
   const Blob data = bytes_from({1, 2, 3, 4, 5, 6, 7, 8, 0, 0, 9, 8, 7, 6, 5, 4, 3, 2, 0, 0});
   const auto read = [&](const std::string& encoding, int width) {
-    return ros::picture_of(raw_image(data, width, 2, encoding, 10));
+    return ros::to_image(raw_image(data, width, 2, encoding, 10));
   };
   EXPECT_EQ(read("mono8", 3), pixels(3, 2, 1, {1, 2, 3, 9, 8, 7}));
   EXPECT_EQ(read("8UC1", 3), read("mono8", 3));
@@ -243,10 +243,10 @@ TEST(RosPictures, DeepGreyIsScaledAsAPngIs) {
   }
   const Image as_png = decode_image(make_png(7, 1, PNG_COLOR_TYPE_GRAY, 16, {row}), "16");
   ros::Image message = raw_image(little, 7, 1, "mono16", 14);
-  EXPECT_EQ(ros::picture_of(message), as_png);
+  EXPECT_EQ(ros::to_image(message), as_png);
   message.data = big;
   message.is_bigendian = 1;
-  EXPECT_EQ(ros::picture_of(message), as_png);
+  EXPECT_EQ(ros::to_image(message), as_png);
 }
 
 TEST(RosPictures, BayerPatternsGiveAPlaneOfColoursBack) {
@@ -272,7 +272,7 @@ TEST(RosPictures, BayerPatternsGiveAPlaneOfColoursBack) {
       }
     }
     const Image seen =
-        ros::picture_of(raw_image(data, width, height, "bayer_" + pattern + "8", width));
+        ros::to_image(raw_image(data, width, height, "bayer_" + pattern + "8", width));
     for (int v = 1; v + 1 < height; ++v) {
       for (int u = 1; u + 1 < width; ++u) {
         for (int c = 0; c < 3; ++c) ASSERT_EQ(seen.at(u, v, c), plane.at(u, v, c)) << u << " " << v;
@@ -287,10 +287,10 @@ TEST(RosPictures, YuvGivesTheColoursOfBt601) {
   // Black, white; red of (255, 0, 0) is Y 81, U 90, V 240.
   const Blob uyvy = bytes_from({128, 16, 128, 235, 90, 81, 240, 81});
   const Blob yuyv = bytes_from({16, 128, 235, 128, 81, 90, 81, 240});
-  const Image expected = ros::picture_of(raw_image(uyvy, 4, 1, "yuv422", 8));
-  EXPECT_EQ(ros::picture_of(raw_image(yuyv, 4, 1, "yuv422_yuy2", 8)), expected);
-  EXPECT_EQ(ros::picture_of(raw_image(yuyv, 4, 1, "yuyv", 8)), expected);
-  EXPECT_EQ(ros::picture_of(raw_image(uyvy, 4, 1, "uyvy", 8)), expected);
+  const Image expected = ros::to_image(raw_image(uyvy, 4, 1, "yuv422", 8));
+  EXPECT_EQ(ros::to_image(raw_image(yuyv, 4, 1, "yuv422_yuy2", 8)), expected);
+  EXPECT_EQ(ros::to_image(raw_image(yuyv, 4, 1, "yuyv", 8)), expected);
+  EXPECT_EQ(ros::to_image(raw_image(uyvy, 4, 1, "uyvy", 8)), expected);
   const std::vector<int> rgb{0, 0, 0, 255, 255, 255, 255, 0, 0, 255, 0, 0};
   for (std::size_t i = 0; i < rgb.size(); ++i) {
     EXPECT_NEAR(expected.pixels()[i], rgb[i], 1) << i;
@@ -300,7 +300,7 @@ TEST(RosPictures, YuvGivesTheColoursOfBt601) {
 TEST(RosPictures, WhatDoesNotFitIsOneLine) {
   const Blob data(24);
   const auto error = [&](const ros::Image& message, const ImageLimits& limits = {}) {
-    return message_of<ContractError>([&] { (void)ros::picture_of(message, limits); });
+    return message_of<ContractError>([&] { (void)ros::to_image(message, limits); });
   };
   EXPECT_EQ(error(raw_image(data, 4, 2, "mono8", 12)), "no error");
   EXPECT_EQ(error(raw_image(data, 4, 2, "rgb8", 11)),
@@ -332,17 +332,17 @@ TEST(RosPictures, CompressedOnesAreDecodedAsFilesAre) {
   message.data = png;
   for (const char* format : {"png", "bgr8; png compressed bgr8", "jpeg", ""}) {
     message.format = format;
-    EXPECT_EQ(ros::picture_of(message, "topic"), image) << format;
+    EXPECT_EQ(ros::to_image(message, "topic"), image) << format;
   }
   for (const char* format : {"h264", "16UC1; compressedDepth png"}) {
     message.format = format;
-    EXPECT_EQ(message_of<ContractError>([&] { (void)ros::picture_of(message, "topic"); }),
+    EXPECT_EQ(message_of<ContractError>([&] { (void)ros::to_image(message, "topic"); }),
               "sensor_msgs/CompressedImage format is " + std::string(format) +
                   "; allowed: jpeg, png, or such as 'rgb8; jpeg compressed bgr8'");
   }
   message.format = "jpeg";
   message.data = message.data.first(20);
-  EXPECT_THROW((void)ros::picture_of(message, "topic"), FileError);
+  EXPECT_THROW((void)ros::to_image(message, "topic"), FileError);
 }
 
 }  // namespace

@@ -56,7 +56,7 @@ TEST_F(LocalisationNodeOnTheWire, DrivesASimulatedRobotToAGoalFindsItKidnappedAn
   }));
   const auto send_to = [&](Point2 place) {
     FastPeer::write(goal, recordings::ros::PoseStamped{
-                              {0, "map"}, recordings::ros::pose_of({place.x_m, place.y_m, 0.0})});
+                              {0, "map"}, recordings::ros::to_pose({place.x_m, place.y_m, 0.0})});
     return state_of(FastPeer::next(feedback, 20s));
   };
   const Point2 there{2.8, 2.8};
@@ -71,11 +71,11 @@ TEST_F(LocalisationNodeOnTheWire, DrivesASimulatedRobotToAGoalFindsItKidnappedAn
   while (FastPeer::waiting(pose) > 0) (void)FastPeer::next(pose, 1s);
   FastPeer::write(set_pose,
                   recordings::ros::PoseStamped{
-                      {0, "map"}, recordings::ros::pose_of({elsewhere.x_m, elsewhere.y_m, 2.0})});
+                      {0, "map"}, recordings::ros::to_pose({elsewhere.x_m, elsewhere.y_m, 2.0})});
   EXPECT_TRUE(comes_true([&] {
     const auto cdr = FastPeer::next(pose, 1s);
     return !cdr.empty() && node_->counts().pictures > before &&
-           distance(recordings::ros::planar(
+           distance(recordings::ros::to_pose2(
                         read<recordings::ros::PoseWithCovarianceStamped>(cdr).pose.pose)
                         .position(),
                     elsewhere) < 0.3;
@@ -138,7 +138,7 @@ TEST_F(LocalisationNodeOnTheWire, LearnsADriveRepeatsItAndGoesOnAfterItDied) {
 
   const auto carried_back = [&] {
     FastPeer::write(set_pose, recordings::ros::PoseStamped{
-                                  {0, "map"}, recordings::ros::pose_of({0.8, 0.8, 0.2})});
+                                  {0, "map"}, recordings::ros::to_pose({0.8, 0.8, 0.2})});
     std::this_thread::sleep_for(100ms);
   };
   const auto arrives = [&] {

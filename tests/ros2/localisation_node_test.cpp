@@ -31,7 +31,7 @@ TEST_F(LocalisationNodeOnTheWire, TellsAnotherVendorsProgramsWhereTheRobotIs) {
       peer_.listen<recordings::ros::PointCloud2>("robot/panonav/references", true, true);
   const auto received = read<recordings::ros::PoseWithCovarianceStamped>(FastPeer::next(pose, 10s));
   EXPECT_EQ(received.header.frame_id, "map");
-  const Pose2 found = recordings::ros::planar(received.pose.pose);
+  const Pose2 found = recordings::ros::to_pose2(received.pose.pose);
   EXPECT_LT(distance(found.position(), truth.position()), 0.3);
   EXPECT_LT(std::abs(angle_difference(found.heading_rad, truth.heading_rad)), 0.2);
   for (const std::size_t i : {0U, 7U, 35U}) EXPECT_GT(received.pose.covariance[i], 0.0) << i;
@@ -58,13 +58,13 @@ TEST_F(LocalisationNodeOnTheWire, TellsAnotherVendorsProgramsWhereTheRobotIs) {
   EXPECT_EQ(last.transforms[0].child_frame_id, "odom");
   EXPECT_GT(last.transforms[0].header.stamp_ns, now_ns());
   EXPECT_LT(last.transforms[0].header.stamp_ns, now_ns() + 1'000'000'000);
-  const Pose2 by_tf = recordings::ros::planar(last.transforms[0].transform) * odometry(truth);
+  const Pose2 by_tf = recordings::ros::to_pose2(last.transforms[0].transform) * odometry(truth);
   EXPECT_LT(distance(by_tf.position(), truth.position()), 0.3);
 
   EXPECT_GT(read<recordings::ros::PoseArray>(FastPeer::next(particles, 1s)).poses.size(), 100U);
   const auto best_bytes = FastPeer::next(best, 1s);
   const auto match = read<recordings::ros::CompressedImage>(best_bytes);
-  EXPECT_GT(recordings::ros::picture_of(match, "best match").width(), 0);
+  EXPECT_GT(recordings::ros::to_image(match, "best match").width(), 0);
   std::map<std::string, std::string> values;
   std::string state;
   while (FastPeer::waiting(diagnostics) > 0) {
@@ -100,7 +100,7 @@ TEST_F(LocalisationNodeOnTheWire, TakesCompressedPicturesTransformsASimulatedClo
     FastPeer::write(clock, recordings::ros::Clock{ns});
     FastPeer::write(tf,
                     recordings::ros::TFMessage{
-                        {{{ns, "odom"}, "base_footprint", recordings::ros::pose_of(odometry(at))},
+                        {{{ns, "odom"}, "base_footprint", recordings::ros::to_pose(odometry(at))},
                          {{ns, "base_footprint"}, "base_link", {}}}});
     recordings::ros::Imu level;
     level.header = {ns, "imu"};
@@ -112,7 +112,7 @@ TEST_F(LocalisationNodeOnTheWire, TakesCompressedPicturesTransformsASimulatedClo
   };
   step(0);
   recordings::ros::PoseWithCovarianceStamped begin{{0, "map"},
-                                                   {recordings::ros::pose_of(first), {}}};
+                                                   {recordings::ros::to_pose(first), {}}};
   begin.pose.covariance[0] = begin.pose.covariance[7] = 0.01;
   begin.pose.covariance[35] = 0.01;
   FastPeer::write(start_pose, begin);

@@ -54,7 +54,7 @@ class LocalisationNodeOnTheWire : public ::testing::Test {
     FastPeer::Bytes last;
     while (FastPeer::waiting(poses) > 0) last = FastPeer::next(poses, 1s);
     if (last.empty()) last = FastPeer::next(poses, 10s);
-    return recordings::ros::planar(read<recordings::ros::PoseStamped>(last).pose);
+    return recordings::ros::to_pose2(read<recordings::ros::PoseStamped>(last).pose);
   }
 
   ~LocalisationNodeOnTheWire() override { stop(); }
@@ -125,7 +125,7 @@ class LocalisationNodeOnTheWire : public ::testing::Test {
     recordings::ros::Odometry message;
     message.header = {ns, "odom"};
     message.child_frame_id = "base_link";
-    message.pose.pose = recordings::ros::pose_of(odometry(pose));
+    message.pose.pose = recordings::ros::to_pose(odometry(pose));
     return message;
   }
   static FastPeer::Bytes image_message(std::int64_t ns, const Image& picture) {

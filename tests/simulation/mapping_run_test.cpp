@@ -15,7 +15,7 @@ MappingRecording small_loop(int views, std::uint64_t seed) {
   const PlaceRecording place =
       make_empty_place(make_scene("loop", {.seed = seed}), seed, 128, executor);
   return record_for_mapping(place, drive(place, {}, 0.1, static_cast<std::size_t>(views)), 17,
-                            cheap_wheels(), seed, executor);
+                            make_noisy_wheels(), seed, executor);
 }
 
 TEST(MappingRun, FewerViewsAndComponentsAreThoseOfTheRecording) {

@@ -73,7 +73,7 @@ TEST(Missions, ArriveOverAMemoryWithoutPositionsAndAreRepeatable) {
   const RememberedPlace remembered = memorise_grid(place, 0.4, 5, two);
   ASSERT_GT(remembered.truth.size(), 40U);
   ASSERT_EQ(remembered.graph.size(), remembered.truth.size());
-  const auto missions = draw_missions(place, remembered, {.count = 8}, 3);
+  const auto missions = sample_missions(place, remembered, {.count = 8}, 3);
   const auto runs = run_missions(place, remembered, missions, {}, 9, two);
   int arrived = 0;
   for (const MissionRun& run : runs) {
@@ -98,7 +98,7 @@ TEST(Missions, ARobotThatIsCarriedAwayFindsItsGoalAllTheSame) {
   Executor executor(2);
   const MissionPlace place = make_mission_place(make_scene("office", {.seed = 72}), executor);
   const RememberedPlace remembered = memorise_grid(place, 0.4, 5, executor);
-  const auto missions = draw_missions(place, remembered, {.count = 8, .kidnapped = true}, 4);
+  const auto missions = sample_missions(place, remembered, {.count = 8, .kidnapped = true}, 4);
   const auto runs = run_missions(place, remembered, missions, {}, 10, executor);
   int carried = 0;
   int arrived = 0;
@@ -195,8 +195,8 @@ TEST(Missions, RefuseWhatMakesNoSense) {
   Executor executor(2);
   const MissionPlace& place = office();
   const RememberedPlace remembered = memorise_grid(place, 1.0, 5, executor);
-  EXPECT_THROW((void)draw_missions(place, remembered, {.count = -1}, 1), ContractError);
-  EXPECT_THROW((void)draw_missions(place, remembered, {.max_distance_m = 0.0}, 1), ContractError);
+  EXPECT_THROW((void)sample_missions(place, remembered, {.count = -1}, 1), ContractError);
+  EXPECT_THROW((void)sample_missions(place, remembered, {.max_distance_m = 0.0}, 1), ContractError);
   const MemoryViewSource source(remembered.memory);
   Navigator navigator(source, AreaPlanner(remembered.graph));
   EXPECT_THROW((void)run_mission(place, remembered, navigator, {ViewId{9999}, {}, {}}, {}, 1),

@@ -76,17 +76,17 @@ TEST(ViewServer, TakesTheWishesThatTheRunTakes) {
   };
   recordings::RunMoment moment = moment_at(0.0);
   moment.references = {{0.0, 0.0}, {3.0, 4.0}};
-  ViewServer takes_pose({.takes = ViewWish::pose});
+  ViewServer takes_pose({.takes = ViewerInput::pose});
   EXPECT_EQ(post_wish(takes_pose, R"({"pose": [1, 2, 0.5]})"), 400);  // no references yet
   takes_pose.add(moment);
-  EXPECT_FALSE(takes_pose.consume_wish());
+  EXPECT_FALSE(takes_pose.consume_viewer_input());
   EXPECT_EQ(post_wish(takes_pose, R"({"pose": [9, 9, 9]})"), 400);
   EXPECT_EQ(post_wish(takes_pose, R"({"pose": [1, 2, 0.5]})"), 204);
-  EXPECT_EQ(takes_pose.consume_wish(), (ReferencePose{1.0, 2.0, 0.5}));
-  EXPECT_FALSE(takes_pose.consume_wish());  // once
+  EXPECT_EQ(takes_pose.consume_viewer_input(), (ReferencePose{1.0, 2.0, 0.5}));
+  EXPECT_FALSE(takes_pose.consume_viewer_input());  // once
   EXPECT_EQ(post_wish(takes_pose, R"({"pose": [-10, 14, null]})"), 204);
   EXPECT_EQ(post_wish(takes_pose, R"({"pose": [13, -10, null]})"), 204);  // the last one counts
-  EXPECT_EQ(takes_pose.consume_wish(), (ReferencePose{13.0, -10.0, std::nullopt}));
+  EXPECT_EQ(takes_pose.consume_viewer_input(), (ReferencePose{13.0, -10.0, std::nullopt}));
   for (const std::string wrong :
        {R"({"pose": [1, 2]})", R"({"pose": [1, 2, 0, 0]})", R"({"pose": ["1", 2, 0]})",
         R"({"pose": [null, 2, 0]})", R"({"pose": [1e999, 2, 0]})", R"({"pose": [1, NaN, 0]})",
@@ -96,7 +96,7 @@ TEST(ViewServer, TakesTheWishesThatTheRunTakes) {
         R"({"play": false})", "{}", "[]", ""}) {
     EXPECT_EQ(post_wish(takes_pose, wrong), 400) << wrong;
   }
-  EXPECT_FALSE(takes_pose.consume_wish());
+  EXPECT_FALSE(takes_pose.consume_viewer_input());
   Peer stranger(takes_pose.url());
   EXPECT_EQ(status_of(stranger.ask("/0123456789abcdef0123456789abcdef/control", "", "POST",
                                    R"({"pose": [1, 2, 0]})")),
@@ -105,13 +105,13 @@ TEST(ViewServer, TakesTheWishesThatTheRunTakes) {
   EXPECT_EQ(status_of(foreign.ask(foreign.root() + "control", "Origin: http://example.com\r\n",
                                   "POST", R"({"pose": [1, 2, 0]})")),
             404);
-  EXPECT_FALSE(takes_pose.consume_wish());
+  EXPECT_FALSE(takes_pose.consume_viewer_input());
 
-  ViewServer takes_goal({.takes = ViewWish::goal});
+  ViewServer takes_goal({.takes = ViewerInput::goal});
   takes_goal.add(moment);
   EXPECT_EQ(post_wish(takes_goal, R"({"pose": [1, 2, 0.5]})"), 400);
   EXPECT_EQ(post_wish(takes_goal, R"({"goal": [1, 2]})"), 204);
-  EXPECT_EQ(takes_goal.consume_wish(), (ReferencePose{1.0, 2.0, std::nullopt}));
+  EXPECT_EQ(takes_goal.consume_viewer_input(), (ReferencePose{1.0, 2.0, std::nullopt}));
   EXPECT_NE(ask(takes_goal.url(), "").find("\"takes\":\"goal\""), std::string::npos);
 
   ViewServer takes_none;

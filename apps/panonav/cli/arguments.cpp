@@ -221,8 +221,8 @@ void Arguments::add_section(const std::string& section, const std::string& prefi
   added.visit(lister);
 }
 
-void Arguments::in_files(const std::string& section,
-                         std::initializer_list<std::string_view> flags) {
+void Arguments::allow_in_config_files(const std::string& section,
+                                      std::initializer_list<std::string_view> flags) {
   for (const auto flag : flags) {
     std::ranges::find(implementation_->infos, flag, &ArgumentInfo::name)->section = section;
     implementation_->plain.emplace(flag, std::nullopt);
@@ -378,17 +378,17 @@ void Arguments::resolve(const std::optional<std::string>& config,
     section.check();
   }
   for (const auto& [options, used, why] : implementation_->refusals) {
-    if (!used()) refuse_unused(options, why);
+    if (!used()) reject_options(options, why);
   }
   require_separate_outputs(implementation_->values);
 }
 
-void Arguments::refuse_unless(std::vector<std::string> options, std::function<bool()> used,
-                              std::string why) {
+void Arguments::reject_options_unless(std::vector<std::string> options, std::function<bool()> used,
+                                      std::string why) {
   implementation_->refusals.push_back({std::move(options), std::move(used), std::move(why)});
 }
 
-void Arguments::refuse_unused(std::span<const std::string> options, const std::string& why) const {
+void Arguments::reject_options(std::span<const std::string> options, const std::string& why) const {
   const auto refuse = [&](const std::string& flag) {
     throw UsageError(flag + " has no effect " + why + "; leave it out");
   };
@@ -453,14 +453,14 @@ std::string Arguments::config_template(std::string_view verb) const {
       const bool is_name = option.type == "NAME";
       text += "# " + std::string(option.info.help) + (range.empty() ? "" : " (" + range + ")") +
               "\n" + (is_set(section.name, name) ? "" : "# ") + name + " = " +
-              (is_name ? toml_text(option.value) : option.value) + "\n";
+              (is_name ? quote_for_toml(option.value) : option.value) + "\n";
     });
     section.visit(lister);
     for (const ArgumentInfo& info : implementation_->infos) {
       const auto plain = implementation_->plain.find(info.name);
       if (info.section != section.name || plain == implementation_->plain.end()) continue;
       text += "# " + info.help + "\n" + (plain->second ? "" : "# ") + to_member_name(info.name) +
-              " = " + toml_text(plain->second.value_or(info.initial)) + "\n";
+              " = " + quote_for_toml(plain->second.value_or(info.initial)) + "\n";
     }
   }
   if (implementation_->sections.empty()) {

@@ -105,7 +105,8 @@ class Arguments {
 
   /// Flags declared before, of texts and one value each, that stand in the table [`section`] of a
   /// --config file beside the options of it.
-  void in_files(const std::string& section, std::initializer_list<std::string_view> flags);
+  void allow_in_config_files(const std::string& section,
+                             std::initializer_list<std::string_view> flags);
 
   /// Flags and positionals declared before whose value names what the verb writes; none may be what
   /// another value names (outputs.hpp). Throws logic_error when there is none of that name.
@@ -123,11 +124,12 @@ class Arguments {
   /// Refuses options that were typed although `used` is false, once everything is read, in one
   /// line that ends in `why` ("without --areas"). An entry is a flag, or "[section]" for each
   /// option of one. Options of a --config file are ignored: it may serve several verbs.
-  void refuse_unless(std::vector<std::string> options, std::function<bool()> used, std::string why);
+  void reject_options_unless(std::vector<std::string> options, std::function<bool()> used,
+                             std::string why);
   /// The same where the input decides: throws UsageError when one of the options was typed.
-  void refuse_unused(std::span<const std::string> options, const std::string& why) const;
-  void refuse_unused(std::initializer_list<std::string> options, const std::string& why) const {
-    refuse_unused(std::span(options.begin(), options.size()), why);
+  void reject_options(std::span<const std::string> options, const std::string& why) const;
+  void reject_options(std::initializer_list<std::string> options, const std::string& why) const {
+    reject_options(std::span(options.begin(), options.size()), why);
   }
 
   /// Throws ContractError when the user gave an option of the section, by flag or file, another

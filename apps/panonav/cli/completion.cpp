@@ -52,7 +52,7 @@ bool positionals_are_files(const Description& description) {
 }
 
 /// First words of verbs, with aliases; "route" once.
-std::vector<std::string> first_words(std::span<const Description> verbs) {
+std::vector<std::string> list_first_words(std::span<const Description> verbs) {
   std::vector<std::string> words;
   for (const auto& [verb, arguments] : verbs) {
     const std::string first(verb.name.substr(0, verb.name.find(' ')));
@@ -63,7 +63,7 @@ std::vector<std::string> first_words(std::span<const Description> verbs) {
 }
 
 /// First and second words of the verbs of two words: {"route", {"record", "follow"}}.
-std::vector<std::pair<std::string, std::vector<std::string>>> second_words(
+std::vector<std::pair<std::string, std::vector<std::string>>> list_second_words(
     std::span<const Description> verbs) {
   std::vector<std::pair<std::string, std::vector<std::string>>> found;
   for (const auto& [verb, arguments] : verbs) {
@@ -93,8 +93,9 @@ std::string bash_script(std::span<const Description> verbs) {
       "  COMPREPLY=()\n"
       "  if ((COMP_CWORD == 1)); then\n"
       "    COMPREPLY=($(compgen -W '" +
-      join_words(first_words(verbs)) + " --help --version' -- \"$current\"))\n    return\n  fi\n";
-  for (const auto& [first, seconds] : second_words(verbs)) {
+      join_words(list_first_words(verbs)) +
+      " --help --version' -- \"$current\"))\n    return\n  fi\n";
+  for (const auto& [first, seconds] : list_second_words(verbs)) {
     script += "  if [[ $verb == " + first +
               " ]]; then\n"
               "    if ((COMP_CWORD == 2)); then\n"
@@ -175,11 +176,11 @@ std::string zsh_script(std::span<const Description> verbs) {
       "  local verb=$words[2]\n"
       "  local -a verbs\n"
       "  if (( CURRENT == 2 )); then\n    verbs=(\n";
-  for (const auto& word : first_words(verbs)) {
+  for (const auto& word : list_first_words(verbs)) {
     script += "      '" + word + ":" + quote_for_zsh(find_summary(word, verbs), "") + "'\n";
   }
   script += "    )\n    _describe verb verbs\n    return\n  fi\n";
-  for (const auto& [first, seconds] : second_words(verbs)) {
+  for (const auto& [first, seconds] : list_second_words(verbs)) {
     script += "  if [[ $verb == " + first +
               " ]]; then\n"
               "    if (( CURRENT == 3 )); then\n      compadd " +
@@ -201,7 +202,8 @@ std::string zsh_script(std::span<const Description> verbs) {
         const bool attached = !argument.value.empty() && form.starts_with("--") &&
                               argument.value.find(' ') == std::string::npos;
         script += " \\\n      '" + form + (attached ? "=" : "") + "[" +
-                  quote_for_zsh(help_line(argument), "[]:\\") + "]" + zsh_values(argument) + "'";
+                  quote_for_zsh(format_help_line(argument), "[]:\\") + "]" + zsh_values(argument) +
+                  "'";
       }
     }
     script += "\n    ;;\n";
@@ -232,11 +234,11 @@ std::string fish_script(std::span<const Description> verbs) {
       "  test (count $argv) -eq 1; or string match -q -- \"$argv[2]\" \"$words[3]\"\n"
       "end\n"
       "complete -c panonav -f\n";
-  for (const auto& word : first_words(verbs)) {
+  for (const auto& word : list_first_words(verbs)) {
     script += "complete -c panonav -n __fish_use_subcommand -a " + word + " -d " +
               quote_for_fish(find_summary(word, verbs)) + "\n";
   }
-  for (const auto& [first, seconds] : second_words(verbs)) {
+  for (const auto& [first, seconds] : list_second_words(verbs)) {
     script += "complete -c panonav -n '__panonav_verb " + first +
               "; and test (count (commandline -opc)) -eq 2' -a " +
               quote_for_fish(join_words(seconds)) + "\n";

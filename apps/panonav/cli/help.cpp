@@ -17,11 +17,11 @@ std::string format_row(const std::string& left, std::string_view right, std::siz
   } else {
     line.resize(column, ' ');
   }
-  return line + wrapped(right, column, column) + "\n";
+  return line + wrap_text(right, column, column) + "\n";
 }
 
 /// Returns the first `count` lines of the examples.
-std::string first_examples(std::string_view text, std::size_t count) {
+std::string select_first_examples(std::string_view text, std::size_t count) {
   std::size_t end = 0;
   while (count-- > 0 && end < text.size())
     end = std::min(text.find('\n', end), text.size() - 1) + 1;
@@ -48,7 +48,7 @@ std::span<const ExitMeaning> exit_meanings() {
   return meanings;
 }
 
-std::string wrapped(std::string_view text, std::size_t indent, std::size_t column) {
+std::string wrap_text(std::string_view text, std::size_t indent, std::size_t column) {
   constexpr std::size_t width = 80;
   std::string lines;
   bool begins = true;
@@ -70,7 +70,7 @@ std::string wrapped(std::string_view text, std::size_t indent, std::size_t colum
   return lines;
 }
 
-std::string help_line(const ArgumentInfo& argument) {
+std::string format_help_line(const ArgumentInfo& argument) {
   std::string notes;
   const auto note = [&notes](const std::string& text) {
     if (!text.empty()) notes += (notes.empty() ? "" : "; ") + text;
@@ -83,7 +83,7 @@ std::string help_line(const ArgumentInfo& argument) {
   return argument.help + (notes.empty() ? "" : " (" + notes + ")");
 }
 
-std::string forms(const ArgumentInfo& argument) {
+std::string format_forms(const ArgumentInfo& argument) {
   return (argument.short_form.empty() ? "" : argument.short_form + ", ") + argument.name +
          (argument.value.empty() ? "" : " " + argument.value);
 }
@@ -103,18 +103,18 @@ std::string usage(const Description& description) {
   return text;
 }
 
-std::string group_title(const ArgumentInfo& argument) {
+std::string get_group_title(const ArgumentInfo& argument) {
   if (argument.of_every_verb) return "Options of every verb";
   return argument.section.empty() ? "Options" : "Options of [" + argument.section + "]";
 }
 
-std::string help_text(const Description& description, bool all) {
+std::string format_help(const Description& description, bool all) {
   const auto& [verb, arguments] = description;
   const std::string name(verb.name);
-  std::string text = wrapped(std::string(verb.summary) + ".", 0, 0) + "\n\n";
+  std::string text = wrap_text(std::string(verb.summary) + ".", 0, 0) + "\n\n";
   text += "Usage: panonav " + name + " " + usage(description) + "\n";
   if (!verb.alias.empty()) text += "Other spelling: panonav " + std::string(verb.alias) + "\n";
-  text += "\nExamples:\n" + first_examples(verb.example, all ? arguments.size() + 100 : 2);
+  text += "\nExamples:\n" + select_first_examples(verb.example, all ? arguments.size() + 100 : 2);
   std::string title;
   std::size_t hidden = 0;
   for (const bool positional : {true, false}) {
@@ -125,13 +125,15 @@ std::string help_text(const Description& description, bool all) {
         continue;
       }
       // The short help has one list of options.
-      const std::string group = positional ? "Arguments" : all ? group_title(argument) : "Options";
+      const std::string group = positional ? "Arguments"
+                                : all      ? get_group_title(argument)
+                                           : "Options";
       if (group != title) text += "\n" + group + ":\n";
       title = group;
-      text += format_row(forms(argument), help_line(argument), 28);
+      text += format_row(format_forms(argument), format_help_line(argument), 28);
     }
   }
-  if (!verb.details.empty()) text.append("\n").append(wrapped(verb.details, 0, 0)).append("\n");
+  if (!verb.details.empty()) text.append("\n").append(wrap_text(verb.details, 0, 0)).append("\n");
   if (hidden > 0) {
     text += "\nThis verb has " + std::to_string(hidden) + " more options; to list them: panonav " +
             name + " --help-all\n";
@@ -141,7 +143,7 @@ std::string help_text(const Description& description, bool all) {
 }
 
 std::string overview(std::span<const Verb> verbs) {
-  std::string text = wrapped(
+  std::string text = wrap_text(
                          "Image-based memory for robot navigation. panonav stores omnidirectional "
                          "images of places in a memory. It compares new images with this memory to "
                          "find the robot's position and heading.",
@@ -149,7 +151,7 @@ std::string overview(std::span<const Verb> verbs) {
                      "\n\nUsage: panonav VERB [OPTIONS] ARGUMENTS\n\nVerbs:\n";
   for (const auto& verb : verbs) text += format_row(std::string(verb.name), verb.summary, 17);
   text += "\n";
-  text += wrapped(
+  text += wrap_text(
       "panonav help VERB explains a verb. panonav VERB --help-all lists all its options. panonav "
       "--version prints the version.",
       0, 0);

@@ -14,11 +14,11 @@ using nlohmann::ordered_json;
 
 /// null where there is no value.
 template <class Value>
-[[nodiscard]] ordered_json or_null(const std::optional<Value>& value) {
+[[nodiscard]] ordered_json to_json_or_null(const std::optional<Value>& value) {
   return value ? ordered_json(*value) : ordered_json();
 }
 /// null where the number is not finite.
-[[nodiscard]] inline ordered_json or_null(double value) {
+[[nodiscard]] inline ordered_json to_json_or_null(double value) {
   return std::isfinite(value) ? ordered_json(value) : ordered_json();
 }
 

@@ -23,7 +23,7 @@ using panonav::command::ExitCode;
 void report(std::string_view verb, std::string_view message) {
   std::cerr << "panonav" << (verb.empty() ? "" : " ") << verb << ": "
             << panonav::to_readable_line(
-                   panonav::command::name_flags(panonav::without_passwords(message)))
+                   panonav::command::name_flags(panonav::mask_passwords(message)))
             << '\n';
 }
 

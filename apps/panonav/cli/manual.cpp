@@ -99,11 +99,11 @@ std::string manual_page(const Description& description) {
     if (!positional) text += ".SH OPTIONS\n";
     for (const auto& argument : arguments) {
       if (argument.positional() != positional) continue;
-      const std::string group = positional ? "Arguments" : group_title(argument);
+      const std::string group = positional ? "Arguments" : get_group_title(argument);
       if (group != title)
         text += (positional ? ".SH ARGUMENTS\n" : ".SS \"" + escape_roff(group) + "\"\n");
       title = group;
-      text += format_entry(forms(argument), help_line(argument) + ".");
+      text += format_entry(forms(argument), format_help_line(argument) + ".");
     }
   }
   text += ".SH EXAMPLES\n.nf\n";
@@ -127,7 +127,8 @@ std::string manual_overview(std::span<const Description> verbs) {
     text += format_entry(verb.name, std::string(verb.summary) + ".");
   text += ".SH OPTIONS\n";
   for (const auto& argument : verbs.front().arguments) {
-    if (argument.of_every_verb) text += format_entry(forms(argument), help_line(argument) + ".");
+    if (argument.of_every_verb)
+      text += format_entry(forms(argument), format_help_line(argument) + ".");
   }
   text += format_exit_status() + format_entries("ENVIRONMENT", environment) +
           format_entries("FILES", files) + ".SH SEE ALSO\n";

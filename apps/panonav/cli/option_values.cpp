@@ -12,7 +12,8 @@ namespace panonav::command {
 
 namespace {
 
-[[noreturn]] void refuse(std::string_view flag, std::string_view text, std::string_view allowed) {
+[[noreturn]] void throw_wrong_option(std::string_view flag, std::string_view text,
+                                     std::string_view allowed) {
   throw UsageError(std::string(flag) + " is '" + std::string(text) +
                    "'; allowed: " + std::string(allowed));
 }
@@ -46,7 +47,8 @@ bool looks_like_flag(std::string_view word) {
 
 double parse_number(std::string_view flag, std::string_view text) {
   double value = 0.0;
-  if (!read_number(text, value) || !std::isfinite(value)) refuse(flag, text, "a number");
+  if (!read_number(text, value) || !std::isfinite(value))
+    throw_wrong_option(flag, text, "a number");
   return value;
 }
 
@@ -59,7 +61,7 @@ void TextApplier::visit(const OptionInfo& info, int& value) {
   const std::string* typed = text(info);
   if (typed == nullptr) return;
   if (!read_number(*typed, value)) {
-    refuse(info.name, *typed, "whole numbers " + describe_range(info));
+    throw_wrong_option(info.name, *typed, "whole numbers " + describe_range(info));
   }
 }
 
@@ -70,7 +72,7 @@ void TextApplier::visit(const OptionInfo& info, double& value) {
 void TextApplier::visit(const OptionInfo& info, bool& value) {
   const std::string* typed = text(info);
   if (typed == nullptr) return;
-  if (*typed != "true" && *typed != "false") refuse(info.name, *typed, "true, false");
+  if (*typed != "true" && *typed != "false") throw_wrong_option(info.name, *typed, "true, false");
   value = *typed == "true";
 }
 
@@ -79,7 +81,7 @@ void TextApplier::visit(const OptionInfo& info, std::span<const std::string_view
   const std::string* typed = text(info);
   if (typed == nullptr) return;
   const auto found = std::ranges::find(choices, *typed);
-  if (found == choices.end()) refuse(info.name, *typed, join_texts(choices));
+  if (found == choices.end()) throw_wrong_option(info.name, *typed, join_texts(choices));
   value = static_cast<int>(found - choices.begin());
 }
 

@@ -127,7 +127,7 @@ std::shared_ptr<Declared> declare(const Verb& verb) {
   return declared;
 }
 
-ParsedCommand printing(std::string_view verb, std::string text) {
+ParsedCommand make_print_command(std::string_view verb, std::string text) {
   return {verb, {.threads = 1}, [text = std::move(text)](Session& session) {
             session.print(text);
             return ExitCode::done;
@@ -142,12 +142,12 @@ Description describe(const Verb& verb) {
 
 ParsedCommand parse(std::span<const Verb> verbs, std::span<const std::string> words) {
   if (words.size() == 1 && words[0] == "--version") {
-    return printing({}, "panonav " PANONAV_VERSION);
+    return make_print_command({}, "panonav " PANONAV_VERSION);
   }
-  if (!words.empty() && is_help_flag(words[0])) return printing({}, overview(verbs));
+  if (!words.empty() && is_help_flag(words[0])) return make_print_command({}, overview(verbs));
   if (words.size() > 1 && is_help_flag(words[1])) {
     const auto longer = find_verbs_beginning_with(verbs, words[0]);
-    if (!longer.empty()) return printing({}, "Verbs of two words: " + join_texts(longer));
+    if (!longer.empty()) return make_print_command({}, "Verbs of two words: " + join_texts(longer));
   }
   const Verb& verb = find_required_verb(verbs, words);
   const auto declared = declare(verb);
@@ -159,7 +159,8 @@ ParsedCommand parse(std::span<const Verb> verbs, std::span<const std::string> wo
   for (const auto& word : translated) {
     if (word == "--") break;
     if (!is_help_flag(word)) continue;
-    return printing(verb.name, help_text(declared->description(verb), word == "--help-all"));
+    return make_print_command(verb.name,
+                              format_help(declared->description(verb), word == "--help-all"));
   }
   const bool wants_template =
       std::ranges::find(translated, "--config-template") != translated.end();
@@ -178,7 +179,7 @@ ParsedCommand parse(std::span<const Verb> verbs, std::span<const std::string> wo
     return sections;
   });
   if (wants_template) {
-    return printing(verb.name, declared->arguments.config_template(verb.name));
+    return make_print_command(verb.name, declared->arguments.config_template(verb.name));
   }
   return {verb.name, common.session, [declared](Session& session) {
             return declared->run(session);  // with its arguments still alive

@@ -63,12 +63,12 @@ Session::Session(const SessionOptions& options)
 
 void Session::write_line(std::string_view line) {
   clear_bar();
-  std::cerr << escape_control_characters(name_flags(without_passwords(line))) << '\n';
+  std::cerr << escape_control_characters(name_flags(mask_passwords(line))) << '\n';
 }
 
 void Session::print(std::string_view text) {
   clear_bar();
-  const std::string line = without_passwords(text);
+  const std::string line = mask_passwords(text);
   std::cout << (options_.json ? line : escape_control_characters(line)) << '\n';
 }
 

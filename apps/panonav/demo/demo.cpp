@@ -248,7 +248,7 @@ ordered_json median_or_null(const std::vector<double>& values) {
   return values.empty() ? ordered_json() : ordered_json(median(values));
 }
 
-ordered_json as_json(const simulation::MissionRun& run) {
+ordered_json to_json(const simulation::MissionRun& run) {
   return {{"end", name_of(run.end)},
           {"goal_distance_m", run.end_distance_m},
           {"steps", run.decisions.size()},
@@ -256,7 +256,7 @@ ordered_json as_json(const simulation::MissionRun& run) {
           {"shortest_m", run.shortest_m}};
 }
 
-ordered_json as_json(const DemoResults& done, const fs::path& out) {
+ordered_json to_json(const DemoResults& done, const fs::path& out) {
   const DemoNavigation& navigation = done.navigation;
   return {{"report", (out / "index.html").string()},
           {"views", done.views},
@@ -268,8 +268,8 @@ ordered_json as_json(const DemoResults& done, const fs::path& out) {
           {"bytes_share", done.own.bytes_share},
           {"track_images", done.track.images},
           {"track_places_at_first", done.track.places_at_first},
-          {"track_until_localised", or_null(done.track.until_localised)},
-          {"track_until_found_again", or_null(done.track.until_found_again)},
+          {"track_until_localised", to_json_or_null(done.track.until_localised)},
+          {"track_until_found_again", to_json_or_null(done.track.until_found_again)},
           {"track_localised", done.track.localised},
           {"track_wrong", done.track.wrong},
           {"track_error_m", median_or_null(done.track.errors_m)},
@@ -287,8 +287,8 @@ ordered_json as_json(const DemoResults& done, const fs::path& out) {
           {"missions_arrived", navigation.arrived},
           {"mission_detour", median_or_null(navigation.detours)},
           {"mission_steps", median_or_null(navigation.steps)},
-          {"mission_kidnapped", as_json(navigation.kidnapped)},
-          {"mission_screen", navigation.screened ? as_json(*navigation.screened) : ordered_json()},
+          {"mission_kidnapped", to_json(navigation.kidnapped)},
+          {"mission_screen", navigation.screened ? to_json(*navigation.screened) : ordered_json()},
           {"seconds", done.seconds}};
 }
 
@@ -424,7 +424,7 @@ ExitCode demonstrate(const DemoOptions& options, Session& session) {
 
   done.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (session.json()) {
-    session.print(json_line(as_json(done, out)));
+    session.print(json_line(to_json(done, out)));
   } else {
     print(done, session);
     print_report_path(out, session);

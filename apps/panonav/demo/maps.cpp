@@ -180,8 +180,8 @@ DemoMaps demonstrate_maps(const VisualMemory& office, std::uint64_t seed, bool q
   const simulation::PlaceRecording place = simulation::make_empty_place(
       simulation::make_scene("loop", {.seed = seed}), seed, 256, session.executor());
   const simulation::MappingRecording recording = simulation::record_for_mapping(
-      place, drive(place, {}, spacing_m, quick ? 60 : 200), components, simulation::cheap_wheels(),
-      seed, session.executor());
+      place, drive(place, {}, spacing_m, quick ? 60 : 200), components,
+      simulation::make_noisy_wheels(), seed, session.executor());
   const simulation::MappedRecording mapped =
       map_recording(recording, {.odometry = {.camera_height_m = place.scene.camera_height_m}});
   maps.map_error = simulation::shape_error(mapped.estimate, mapped.truth);

@@ -46,11 +46,11 @@ simulation::RememberedPlace remember_office(const VisualMemory& memory, const La
 }
 
 /// The robot sees through the camera as it is, and understands it as it was calibrated.
-void set_sight(simulation::MissionPlace& place, const DemoRecordings& recordings,
-               const Pipeline& pipeline) {
+void set_camera_of_robot(simulation::MissionPlace& place, const DemoRecordings& recordings,
+                         const Pipeline& pipeline) {
   const simulation::SimulatedWorldOptions& settled = recordings.office_world->options();
-  place.sight = simulation::make_sight(place.renderer, recordings.true_camera, settled.frame,
-                                       settled.sensor, pipeline, nullptr);
+  place.sight = simulation::make_view_sensor(place.renderer, recordings.true_camera, settled.frame,
+                                             settled.sensor, pipeline, nullptr);
 }
 
 /// A mission, and the office with a screen across the middle of its planned way.
@@ -91,7 +91,7 @@ std::optional<ScreenedMission> find_screened_mission(
       continue;
     screened.renderer = std::make_shared<const simulation::Renderer>(
         screened.scene, simulation::RendererOptions{}, executor);
-    set_sight(screened, recordings, pipeline);
+    set_camera_of_robot(screened, recordings, pipeline);
     return ScreenedMission{mission, std::move(screened)};
   }
   return std::nullopt;
@@ -166,7 +166,7 @@ viewer::RunPage replay_run(const simulation::MissionPlace& place,
                            const simulation::MissionRun& run) {
   const simulation::SimulatedWorldOptions& settled = recordings.office_world->options();
   std::optional<Panorama> seen;
-  const auto see = simulation::make_sight(
+  const auto see = simulation::make_view_sensor(
       place.renderer, recordings.true_camera, settled.frame, settled.sensor, pipeline, nullptr,
       [&](const Image& /*picture*/, const Panorama& panorama) { seen = panorama; });
   AreaPlanner planner(remembered.graph, options);
@@ -311,10 +311,10 @@ DemoNavigation demonstrate_navigation(const DemoOptions& options, const DemoReco
   const simulation::RememberedPlace remembered =
       remember_office(memory, arranged, options.spacing_m());
   simulation::MissionPlace place = simulation::make_mission_place(*recordings.office_world);
-  set_sight(place, recordings, pipeline);
+  set_camera_of_robot(place, recordings, pipeline);
   const auto random = [&](std::uint64_t stream, int count, bool kidnapped) {
-    return simulation::draw_missions(place, remembered, {.count = count, .kidnapped = kidnapped},
-                                     Random(options.seed, stream).next());
+    return simulation::sample_missions(place, remembered, {.count = count, .kidnapped = kidnapped},
+                                       Random(options.seed, stream).next());
   };
   auto missions = random(mission_stream, options.mission_count(), false);
   missions.push_back(random(kidnapped_stream, 1, true).front());

@@ -61,10 +61,10 @@ std::string frame_title(const TrackedImage& image, std::size_t kidnapped_after, 
 }
 
 /// The particles gather: few of them, so that they fit into a small picture.
-viewer::UnfoldingMap draw_gathering(const std::vector<TrackedImage>& images,
-                                    const std::vector<Point2>& at_first,
-                                    std::vector<viewer::MapLayer> scene,
-                                    std::size_t kidnapped_after, double within_m) {
+viewer::UnfoldingMap draw_convergence(const std::vector<TrackedImage>& images,
+                                      const std::vector<Point2>& at_first,
+                                      std::vector<viewer::MapLayer> scene,
+                                      std::size_t kidnapped_after, double within_m) {
   viewer::UnfoldingMap map{.title = "", .backdrop = std::move(scene)};
   const viewer::MapLayer everywhere{
       .label = "possible positions", .colour = viewer::PlotColour::vermilion, .dots = at_first};
@@ -149,7 +149,7 @@ DemoTrack demonstrate_tracking(const DemoOptions& options, const DemoRecordings&
   result.places_at_first = images.front().estimate.modes.size();
   const std::vector<viewer::MapLayer> scene = viewer::scene_layers(recordings.corridor_scene);
   result.gathering =
-      draw_gathering(images, at_first, scene, recordings.kidnapped_after, options.spacing_m());
+      draw_convergence(images, at_first, scene, recordings.kidnapped_after, options.spacing_m());
   add_part(result, options.spacing_m(), recordings.kidnapped_after, played,
            draw_track(memory, images, {scene, recordings.kidnapped_after}), page);
   return result;

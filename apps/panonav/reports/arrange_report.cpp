@@ -80,7 +80,7 @@ LatticeWatch LatticeSteps::watch() {
 
 viewer::UnfoldingMap LatticeSteps::unfold(const Lattice& lattice,
                                           const VisualMemory& memory) const {
-  const auto end = aligned_positions(lattice, memory);
+  const auto end = align_to_truth(lattice, memory);
   const Springs springs = choose_springs(lattice);
   constexpr std::size_t numbers = 600'000;
   const std::size_t each = 1 + 2 * lattice.nodes.size() + 4 * springs.size();

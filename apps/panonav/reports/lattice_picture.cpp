@@ -40,8 +40,8 @@ bool has_true_positions(const Lattice& lattice, const VisualMemory& memory) {
   return is_comparable(arranged, truth);
 }
 
-std::vector<std::optional<Point2>> aligned_positions(const Lattice& lattice,
-                                                     const VisualMemory& memory) {
+std::vector<std::optional<Point2>> align_to_truth(const Lattice& lattice,
+                                                  const VisualMemory& memory) {
   const auto [arranged, truth] = collect_known_positions(lattice, memory);
   Alignment truth_from_lattice;
   if (is_comparable(arranged, truth)) {
@@ -56,8 +56,7 @@ std::vector<std::optional<Point2>> aligned_positions(const Lattice& lattice,
 }
 
 std::vector<viewer::MapPlot> draw_lattice(const Lattice& lattice, const VisualMemory& memory) {
-  viewer::MapPlot map =
-      draw_plot("computed positions", lattice, aligned_positions(lattice, memory));
+  viewer::MapPlot map = draw_plot("computed positions", lattice, align_to_truth(lattice, memory));
   if (!has_true_positions(lattice, memory)) {
     if (!lattice.metric) map.unit = "median distance to the nearest view";
     return {map};

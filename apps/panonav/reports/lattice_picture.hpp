@@ -15,8 +15,8 @@ namespace panonav::command {
 
 /// Places of the largest component's views, laid over the positions that the memory knows; empty
 /// for other views.
-[[nodiscard]] std::vector<std::optional<Point2>> aligned_positions(const Lattice& lattice,
-                                                                   const VisualMemory& memory);
+[[nodiscard]] std::vector<std::optional<Point2>> align_to_truth(const Lattice& lattice,
+                                                                const VisualMemory& memory);
 
 /// The largest component with its springs; where the memory knows positions, these stand before it.
 [[nodiscard]] std::vector<viewer::MapPlot> draw_lattice(const Lattice& lattice,

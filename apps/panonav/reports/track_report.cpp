@@ -64,7 +64,7 @@ viewer::LinePlot draw_particles(const std::vector<TrackedImage>& images) {
 }
 
 /// Stretches of images with one state.
-std::vector<std::vector<std::string>> stretches(const std::vector<TrackedImage>& images) {
+std::vector<std::vector<std::string>> make_stretch_rows(const std::vector<TrackedImage>& images) {
   std::vector<std::vector<std::string>> rows;
   for (std::size_t begin = 0; begin < images.size();) {
     const auto state = images[begin].estimate.state;
@@ -87,7 +87,7 @@ std::string format_share(std::size_t count, std::size_t total) {
   return format_fixed(100.0 * static_cast<double>(count) / static_cast<double>(total), 0) + " %";
 }
 
-std::string length_text(double length_m) {
+std::string format_length(double length_m) {
   return length_m < 1.0 ? format_fixed(100.0 * length_m, 1) + " cm"
                         : format_fixed(length_m, 1) + " m";
 }
@@ -99,8 +99,8 @@ std::vector<std::pair<std::string, std::string>> main_figures(const TrackSummary
       {summary.first_localised ? std::to_string(*summary.first_localised) : "never",
        summary.first_localised ? "images until the robot was first localised" : "localised"}};
   if (!summary.errors_m.empty()) {
-    figures.emplace_back(length_text(median(summary.errors_m)), "median error while localised");
-    figures.emplace_back(length_text(quantile(summary.errors_m, 0.95)),
+    figures.emplace_back(format_length(median(summary.errors_m)), "median error while localised");
+    figures.emplace_back(format_length(quantile(summary.errors_m, 0.95)),
                          "limit for 95 % of these errors");
   }
   if (!summary.heading_errors_rad.empty()) {
@@ -150,7 +150,7 @@ void write_track_report(const std::filesystem::path& folder, const VisualMemory&
                       "logarithmic scale"
                     : "Distance of the particles from their mean, on a logarithmic scale"}});
   page.begin_section("States");
-  page.add_table({"images", "state", "median error", "largest error"}, stretches(images));
+  page.add_table({"images", "state", "median error", "largest error"}, make_stretch_rows(images));
   page.begin_section("Particles");
   page.add_text(
       "The tracker uses more particles while many positions are possible, and fewer when the "

@@ -23,13 +23,13 @@ void declare_homing(Arguments& arguments, HomingArguments& values) {
   arguments.options("preprocessing", values.views.preprocessing);
   arguments.options("homing", values.homing);
   arguments.hide_from_help({"--horizon"});
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"--rising"}, [&values] { return values.homing.iterations > 0; }, "without --iterations");
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"--starting-estimates"},
       [&values] { return values.homing.turn == FourierHomingOptions::TurnEstimate::global; },
       "with --turn sequential");
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       rise, [&values] { return !values.views.horizon; }, "with --horizon");
 }
 
@@ -55,13 +55,13 @@ FourierHomingOptions make_homing_options(const Arguments& declared,
   return options;
 }
 
-void refuse_unused_rise(const Arguments& arguments, const HomingView& view,
+void reject_unused_rise(const Arguments& arguments, const HomingView& view,
                         const std::string& name) {
   if (view.elevations() && view.rows() >= 3) return;
   const std::string why = view.elevations()
                               ? " has fewer than three rows"
                               : " does not give the elevations of its rows (elevation_deg)";
-  arguments.refuse_unused(rise, "where " + name + why);
+  arguments.reject_options(rise, "where " + name + why);
 }
 
 }  // namespace panonav::command

@@ -27,7 +27,7 @@ void declare_homing(Arguments& arguments, HomingArguments& values);
 /// Throws UsageError when --vertical-motion or --tilt was typed and this view, of the file `name`,
 /// cannot tell rows that move up and down: elevations are unknown, or there are fewer than three
 /// rows.
-void refuse_unused_rise(const Arguments& arguments, const HomingView& view,
+void reject_unused_rise(const Arguments& arguments, const HomingView& view,
                         const std::string& name);
 
 }  // namespace panonav::command

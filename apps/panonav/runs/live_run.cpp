@@ -140,7 +140,7 @@ void declare_live(Arguments& arguments, LiveArguments& live) {
 std::unique_ptr<recordings::LiveObservations> open_live(
     const Arguments& arguments, const std::string& input, const PictureArguments& pictures,
     const std::optional<PictureSource>& remembered, const LiveArguments& live, Session& session) {
-  arguments.refuse_unused(
+  arguments.reject_options(
       {"--image-topic", "--odometry-topic", "--odometry-frames", "--imu-topic", "--recursive"},
       "where " + input + " is a live source");
   if (live.camera_width.has_value() != live.camera_height.has_value()) {
@@ -157,10 +157,10 @@ std::unique_ptr<recordings::LiveObservations> open_live(
                                                         options);
 }
 
-void refuse_live(const Arguments& arguments, const std::string& input, bool count) {
+void reject_live_input(const Arguments& arguments, const std::string& input, bool count) {
   const std::string why = "where " + input + " is not a live source";
-  arguments.refuse_unused({"--camera-width", "--camera-height"}, why);
-  if (count) arguments.refuse_unused({"--count"}, why);
+  arguments.reject_options({"--camera-width", "--camera-height"}, why);
+  if (count) arguments.reject_options({"--count"}, why);
 }
 
 std::string describe_events(const LiveCounts& counts, std::size_t moments_left_out) {

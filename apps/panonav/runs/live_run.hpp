@@ -31,7 +31,7 @@ void declare_live(Arguments& arguments, LiveArguments& live);
     const Arguments& arguments, const std::string& input, const PictureArguments& pictures,
     const std::optional<PictureSource>& remembered, const LiveArguments& live, Session& session);
 /// Refuses what goes with live sources only; --count, too, where a verb ends with its input.
-void refuse_live(const Arguments& arguments, const std::string& input, bool count);
+void reject_live_input(const Arguments& arguments, const std::string& input, bool count);
 
 /// Counts of a run over a source.
 struct LiveCounts {

@@ -7,7 +7,7 @@
 
 namespace panonav::command {
 
-ordered_json as_json(const LocalisedQuery& answer, bool areas) {
+ordered_json to_json(const LocalisedQuery& answer, bool areas) {
   if (!answer.error.empty()) return {{"file", answer.file}, {"error", answer.error}};
   const Place& found = answer.place;
   ordered_json json{{"file", answer.file}};
@@ -19,7 +19,7 @@ ordered_json as_json(const LocalisedQuery& answer, bool areas) {
       levels.push_back(
           {{"components", level.components},
            {"candidates", level.candidates.size()},
-           {"area_m2", or_null(level.area_m2)},
+           {"area_m2", to_json_or_null(level.area_m2)},
            {"radius_m", level.region ? ordered_json(level.region->radius_m) : ordered_json()},
            {"bytes_read", level.bytes_read}});
     }
@@ -37,7 +37,7 @@ std::string csv_row(const LocalisedQuery& answer) {
     row += field;
   };
   const auto add_degrees = [&](const std::optional<double>& angle_rad) {
-    add(angle_rad ? to_text(round_trip_degrees(*angle_rad)) : "");
+    add(angle_rad ? to_text(to_exact_degrees(*angle_rad)) : "");
   };
   add(!answer.error.empty() ? "unreadable" : place.known ? "known" : "unknown");
   add(answer.error.empty() ? format_fixed(place.known_probability, 4) : "");

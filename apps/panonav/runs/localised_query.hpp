@@ -10,7 +10,7 @@
 namespace panonav::command {
 
 /// One object, as docs/formats.md describes it.
-[[nodiscard]] ordered_json as_json(const LocalisedQuery& answer, bool areas);
+[[nodiscard]] ordered_json to_json(const LocalisedQuery& answer, bool areas);
 /// The header of the CSV table (docs/formats.md).
 inline constexpr std::string_view csv_header =
     "file,answer,known_probability,x_m,y_m,radius_m,heading_deg,best,dissimilarity,column_"

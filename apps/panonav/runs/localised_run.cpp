@@ -72,7 +72,7 @@ class RunRouteRecorder {
   std::size_t lines_ = 0;
 };
 
-RoutePoses route_poses(const Dataset& recording) {
+RoutePoses choose_route_poses(const Dataset& recording) {
   const auto all = [&](const auto& has) { return std::ranges::all_of(recording.entries, has); };
   if (all([](const DatasetEntry& e) { return e.pose && e.pose->heading_rad; })) {
     return RoutePoses::known;
@@ -82,14 +82,14 @@ RoutePoses route_poses(const Dataset& recording) {
 }
 
 /// Motion that is read from images begins again each time, and so does the frame of its poses.
-void refuse_to_continue_route(const LocaliseArguments& arguments, RoutePoses poses) {
+void reject_route_continuation(const LocaliseArguments& arguments, RoutePoses poses) {
   if (poses != RoutePoses::images || !memory_exists(arguments.memory)) return;
   if (!MemoryFile::open(arguments.memory, Access::read_only).route(*arguments.route)) return;
   throw UsageError("--route is " + *arguments.route + ", which " + arguments.memory +
                    " already contains; allowed without odometry: a new name");
 }
 
-ordered_json as_json(const RouteFollower::Step& step) {
+ordered_json to_json(const RouteFollower::Step& step) {
   if (!step.fix) return {{"on_route", false}};
   return {{"on_route", true},
           {"pose", pose_json(step.fix->pose)},
@@ -151,16 +151,16 @@ class RunMoments {
 
 /// Returns the layout of the memory's images; nullopt without a memory. Throws FileError when there
 /// is none and nothing is added; UsageError on options that it was not made with.
-std::optional<PictureSource> remembered_source(const Arguments& declared,
-                                               const LocaliseArguments& arguments) {
+std::optional<PictureSource> find_remembered_source(const Arguments& declared,
+                                                    const LocaliseArguments& arguments) {
   if (!memory_exists(arguments.memory)) {
     if (arguments.add) return std::nullopt;
     throw FileError(arguments.memory, "no such file; with --add it is created");
   }
   const auto memory = MemoryFile::open(arguments.memory, Access::read_only);
   require_components(declared, arguments, memory.header());
-  require_kept_options(declared, arguments.signature, arguments.preprocessing, memory);
-  require_kept_band(arguments.pictures, memory);
+  require_stored_options(declared, arguments.signature, arguments.preprocessing, memory);
+  require_stored_band(arguments.pictures, memory);
   return memory.header().source;
 }
 
@@ -245,7 +245,7 @@ class LocalisedRun {
   [[nodiscard]] const std::string& input() const { return arguments_.inputs.front(); }
 
   void open_source(const Arguments& declared) {
-    const auto remembered = remembered_source(declared, arguments_);
+    const auto remembered = find_remembered_source(declared, arguments_);
     if (live_) {
       auto live =
           open_live(declared, input(), arguments_.pictures, remembered, arguments_.live, session_);
@@ -255,7 +255,7 @@ class LocalisedRun {
     }
     recording_ = open_queries(arguments_, remembered, session_);
     pictures_ = recording_->source;
-    poses_ = route_poses(*recording_);
+    poses_ = choose_route_poses(*recording_);
   }
 
   /// Reads the motion between images without odometry from what they show; views are updated by it.
@@ -271,7 +271,7 @@ class LocalisedRun {
 
   void open_route() {
     if (arguments_.add) {
-      refuse_to_continue_route(arguments_, poses_);
+      reject_route_continuation(arguments_, poses_);
       route_.emplace(arguments_.memory, pictures_, *arguments_.route, poses_);
     } else {
       follower_.emplace(MemoryFile::open(arguments_.memory, Access::read_only), pictures_,
@@ -288,7 +288,7 @@ class LocalisedRun {
     const LocalisedQuery unreadable{file, 0.0, {}, {}, error.what()};
     if (arguments_.out) table_ += csv_row(unreadable);
     if (arguments_.report) queries_.push_back(unreadable);
-    return session_.json() ? json_line(command::as_json(unreadable, arguments_.areas)) : "";
+    return session_.json() ? json_line(command::to_json(unreadable, arguments_.areas)) : "";
   }
 
   /// Returns the line that is printed.
@@ -309,10 +309,10 @@ class LocalisedRun {
       return (answer_.place ? format_line(query_, session_) : query_.file + "  no memory yet") +
              (answer_.is_new ? "  added" : "") + (step ? "  " + format_line(*step, session_) : "");
     }
-    auto json = command::as_json(query_, arguments_.areas);
-    json["stamp_s"] = or_null(observation.stamp_s);
+    auto json = command::to_json(query_, arguments_.areas);
+    json["stamp_s"] = to_json_or_null(observation.stamp_s);
     if (arguments_.add) json["added"] = answer_.is_new;
-    if (step) json["route"] = as_json(*step);
+    if (step) json["route"] = to_json(*step);
     return json_line(json);
   }
 
@@ -418,13 +418,13 @@ ExitCode localise_in_order(const Arguments& declared, const LocaliseArguments& a
                            Session& session) {
   const std::string& input = arguments.inputs.front();
   const bool live = recordings::is_live(input);
-  declared.refuse_unused({"--turn-randomly", "--exclude-same-file"},
-                         live ? "where " + input + " is a live source"
-                              : "with --add, --update, --route, --record and --view");
+  declared.reject_options({"--turn-randomly", "--exclude-same-file"},
+                          live ? "where " + input + " is a live source"
+                               : "with --add, --update, --route, --record and --view");
   if (live) {
-    declared.refuse_unused({"--report"}, "where " + input + " is a live source");
+    declared.reject_options({"--report"}, "where " + input + " is a live source");
   } else {
-    refuse_live(declared, input, false);
+    reject_live_input(declared, input, false);
   }
   if (arguments.inputs.size() > 1 && live) {
     throw UsageError(input + " is a live source; allowed: one of these, or several images");

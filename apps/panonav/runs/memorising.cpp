@@ -2,8 +2,8 @@
 
 namespace panonav::command {
 
-void require_kept_options(const Arguments& declared, const SignatureOptions& signature,
-                          const PreprocessingOptions& preprocessing, const MemoryFile& memory) {
+void require_stored_options(const Arguments& declared, const SignatureOptions& signature,
+                            const PreprocessingOptions& preprocessing, const MemoryFile& memory) {
   const MemoryHeader& header = memory.header();
   const std::string as =
       ", as " + memory.path().string() + " was made with; leave it out or start a new memory";

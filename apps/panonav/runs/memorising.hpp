@@ -8,7 +8,7 @@ namespace panonav::command {
 
 /// A memory keeps the options that it was made with: throws ContractError on other values of
 /// [signature] and, where the verb has them, of [preprocessing] that the user gave.
-void require_kept_options(const Arguments& arguments, const SignatureOptions& signature,
-                          const PreprocessingOptions& preprocessing, const MemoryFile& memory);
+void require_stored_options(const Arguments& arguments, const SignatureOptions& signature,
+                            const PreprocessingOptions& preprocessing, const MemoryFile& memory);
 
 }  // namespace panonav::command

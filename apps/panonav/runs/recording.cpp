@@ -48,8 +48,8 @@ std::optional<ElevationBand> parse_elevation_band(const PictureArguments& pictur
   return ElevationBand{radians(low), radians(high)};
 }
 
-PictureSource mirror_source(const PictureArguments& pictures,
-                            const std::optional<ElevationBand>& band) {
+PictureSource make_mirror_source(const PictureArguments& pictures,
+                                 const std::optional<ElevationBand>& band) {
   if (!pictures.camera) {
     throw UsageError(
         "--camera is missing: images of a mirror need a camera file (panonav calibrate)");
@@ -169,7 +169,7 @@ std::optional<PictureSource> picture_source(const PictureArguments& pictures) {
   if (kind.empty()) throw UsageError("--kind is missing: panorama, equirectangular or mirror");
 
   const std::optional<ElevationBand> band = parse_elevation_band(pictures);
-  if (kind == "mirror") return mirror_source(pictures, band);
+  if (kind == "mirror") return make_mirror_source(pictures, band);
   if (pictures.camera) throw UsageError("--camera can only be used with --kind mirror");
   PictureSource source;
   if (pictures.columns == "counter-clockwise") {
@@ -215,7 +215,7 @@ Dataset open_recording(const std::string& input, const PictureArguments& picture
   }
 }
 
-void require_kept_band(const PictureArguments& pictures, const MemoryFile& memory) {
+void require_stored_band(const PictureArguments& pictures, const MemoryFile& memory) {
   const MemoryHeader& header = memory.header();
   if (!pictures.elevation_deg) return;
   const auto [low, high] = *pictures.elevation_deg;
@@ -239,7 +239,7 @@ void require_kept_band(const PictureArguments& pictures, const MemoryFile& memor
 Dataset open_recording(const std::string& input, const PictureArguments& pictures,
                        const MemoryFile& memory, Session& session) {
   Dataset recording = open_recording(input, pictures, memory.header().source, session);
-  require_kept_band(pictures, memory);
+  require_stored_band(pictures, memory);
   return recording;
 }
 
@@ -290,9 +290,10 @@ std::string explain_columns(const std::string& folder, const std::string& column
          table;
 }
 
-Dataset read_described(const std::string& folder, const PictureArguments& pictures,
-                       const std::optional<PictureSource>& remembered, const std::string& columns,
-                       const std::string& values, Session& session) {
+Dataset read_dataset_with_columns(const std::string& folder, const PictureArguments& pictures,
+                                  const std::optional<PictureSource>& remembered,
+                                  const std::string& columns, const std::string& values,
+                                  Session& session) {
   std::error_code ignored;
   if (fs::is_directory(folder, ignored) && !has_dataset_file(folder) &&
       !recordings::is_recording(folder) && !picture_source(pictures)) {

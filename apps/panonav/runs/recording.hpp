@@ -63,7 +63,7 @@ void declare_pictures(Arguments& arguments, PictureArguments& pictures);
                                      const std::optional<PictureSource>& remembered,
                                      Session& session);
 /// Throws UsageError on a band (--elevation-deg) that is not that of the memory's views.
-void require_kept_band(const PictureArguments& pictures, const MemoryFile& memory);
+void require_stored_band(const PictureArguments& pictures, const MemoryFile& memory);
 /// The same beside a memory, whose pictures lie as its header says. The memory's views keep their
 /// band: another --elevation-deg throws UsageError.
 [[nodiscard]] Dataset open_recording(const std::string& input, const PictureArguments& pictures,
@@ -92,9 +92,10 @@ void require_later_stamp(const std::string& dataset, const std::string& file, do
                                           const std::string& values);
 /// A data set, or what the user says of other pictures, as `open_recording` does. A folder of
 /// pictures alone throws a FileError that says how to make it a data set with these columns.
-[[nodiscard]] Dataset read_described(const std::string& folder, const PictureArguments& pictures,
-                                     const std::optional<PictureSource>& remembered,
-                                     const std::string& columns, const std::string& values,
-                                     Session& session);
+[[nodiscard]] Dataset read_dataset_with_columns(const std::string& folder,
+                                                const PictureArguments& pictures,
+                                                const std::optional<PictureSource>& remembered,
+                                                const std::string& columns,
+                                                const std::string& values, Session& session);
 
 }  // namespace panonav::command

@@ -34,11 +34,11 @@ ordered_json make_run_record(const ReproduceArguments& arguments) {
   ordered_json record;
   record["version"] = PANONAV_VERSION;
   record["quick"] = arguments.quick;
-  record["seed"] = or_null(arguments.seed);
-  record["scenes"] = or_null(arguments.scenes);
-  record["queries"] = or_null(arguments.queries);
-  record["runs"] = or_null(arguments.runs);
-  record["rows"] = or_null(arguments.rows);
+  record["seed"] = to_json_or_null(arguments.seed);
+  record["scenes"] = to_json_or_null(arguments.scenes);
+  record["queries"] = to_json_or_null(arguments.queries);
+  record["runs"] = to_json_or_null(arguments.runs);
+  record["rows"] = to_json_or_null(arguments.rows);
   record["data"] =
       data.empty() ? ordered_json(nullptr) : ordered_json(fs::weakly_canonical(data).string());
   return record;
@@ -78,7 +78,8 @@ std::string command_line(const ReproduceArguments& arguments) {
 }
 
 // Removes the options that have no meaning for the paper.
-ReproduceArguments arguments_for(const ReproducedPaper& paper, ReproduceArguments arguments) {
+ReproduceArguments make_paper_arguments(const ReproducedPaper& paper,
+                                        ReproduceArguments arguments) {
   arguments.paper = paper.name;
   if (!paper.queries) arguments.queries = std::nullopt;
   if (!paper.runs) arguments.runs = std::nullopt;
@@ -148,8 +149,8 @@ ExitCode reproduce_all(const ReproduceArguments& arguments, Session& session) {
     const fs::path file = out / paper.name / results_file;
     const bool is_done = fs::exists(file);
     if (!is_done) {
-      static_cast<void>(
-          reproduce_paper(paper, arguments_for(paper, arguments), out / paper.name, session));
+      static_cast<void>(reproduce_paper(paper, make_paper_arguments(paper, arguments),
+                                        out / paper.name, session));
     }
     lab::PaperResults results{std::string(paper.name), std::string(paper.title),
                               lab::from_json(read_text(file), file.string())};

@@ -174,7 +174,7 @@ void check_scenes(const ReproduceArguments& arguments) {
   }
 }
 
-void refuse_meaningless(const ReproducedPaper& paper, const ReproduceArguments& arguments) {
+void reject_meaningless_options(const ReproducedPaper& paper, const ReproduceArguments& arguments) {
   const auto refuse = [&](bool is_typed, bool known, const std::string& flag) {
     if (is_typed && !known) {
       throw OptionError(flag + " cannot be used with " + std::string(paper.name));

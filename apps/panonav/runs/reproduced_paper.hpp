@@ -58,6 +58,6 @@ struct ReproducedPaper {
 void check_scenes(const ReproduceArguments& arguments);
 
 /// Throws OptionError when an option is given that means nothing to the paper.
-void refuse_meaningless(const ReproducedPaper& paper, const ReproduceArguments& arguments);
+void reject_meaningless_options(const ReproducedPaper& paper, const ReproduceArguments& arguments);
 
 }  // namespace panonav::command

@@ -16,7 +16,7 @@ Ros2Robot::Ros2Robot() : options_(std::make_shared<Options>()) {}
 
 void Ros2Robot::declare(Arguments& arguments, const std::function<bool()>& is_used) {
   arguments.options("robot", options_->robot);
-  arguments.refuse_unless({"[robot]"}, is_used, "without --ros2");
+  arguments.reject_options_unless({"[robot]"}, is_used, "without --ros2");
 }
 
 ExitCode Ros2Robot::run(const simulation::SimulatedWorld& world, Session& session) const {

@@ -33,7 +33,7 @@ class RunRecord {
   /// Lists the panels and commands that viewers of a run can use.
   struct Offers {
     std::string memory;  ///< whose thumbnails they see; empty: none
-    viewer::ViewWish takes = viewer::ViewWish::none;
+    viewer::ViewerInput takes = viewer::ViewerInput::none;
   };
 
   /// Does nothing without a file or viewer. Of a live run moments are left out that the disk or a
@@ -55,7 +55,7 @@ class RunRecord {
   void add(recordings::RunMoment moment);
   /// Returns the latest input of a viewer since the last call.
   [[nodiscard]] std::optional<ReferencePose> take_viewer_input() {
-    return viewer_ ? viewer_->consume_wish() : std::nullopt;
+    return viewer_ ? viewer_->consume_viewer_input() : std::nullopt;
   }
   /// All that waits is written, and viewers know that the run has ended.
   void close();

@@ -13,28 +13,28 @@ void declare_simulation(Arguments& arguments, simulation::SimulatedWorldOptions&
   arguments.options("odometry", values.odometry, "odometry");
   require_effects(arguments, values);
   const auto& simulation = values.simulation;
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"--rows", "--columns", "--elevation-low-deg", "--elevation-high-deg"},
       [&simulation] { return simulation.kind == 1; }, "without --kind panorama");
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"--vignetting"}, [&simulation] { return simulation.kind != 1; }, "with --kind panorama");
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"--lens-seed", "--lens-distance-m"}, [&simulation] { return simulation.kind == 2; },
       "without --kind dual-fisheye");
 }
 
 void require_effects(Arguments& arguments, const simulation::SimulatedWorldOptions& values) {
   const auto& sensor = values.sensor;
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"--moved-seed"}, [&values] { return values.simulation.scene.moved_objects > 0.0; },
       "without --moved-objects");
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"--light-azimuth-rad"}, [&sensor] { return sensor.directional_light > 0.0; },
       "without --directional-light");
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"--occluders"}, [&sensor] { return sensor.occluded_fraction > 0.0; },
       "without --occluded-fraction");
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"--eight-bit"}, [&sensor] { return sensor.eight_bit; },
       "on images, whose values always have eight bits");
 }

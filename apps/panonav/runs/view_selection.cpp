@@ -38,7 +38,8 @@ void declare_selection(Arguments& arguments, ViewSelection& selection) {
                    "Only views within METRES of the position X,Y");
 }
 
-std::vector<ViewRecord> selected(std::vector<ViewRecord> views, const ViewSelection& selection) {
+std::vector<ViewRecord> select_views(std::vector<ViewRecord> views,
+                                     const ViewSelection& selection) {
   if (selection.name) {
     std::erase_if(views, [&](const ViewRecord& view) {
       return ::fnmatch(selection.name->c_str(), view.info.name.c_str(), 0) != 0;

@@ -37,8 +37,8 @@ std::vector<CoarseMotion> read_motions(const ArrangeArguments& arguments,
                                        Session& session) {
   if (!arguments.odometry) return {};
   const Dataset recording =
-      read_described(*arguments.odometry, arguments.pictures, source,
-                     "odom_x_m,odom_y_m,odom_heading_deg", "1.5,0.25,90", session);
+      read_dataset_with_columns(*arguments.odometry, arguments.pictures, source,
+                                "odom_x_m,odom_y_m,odom_heading_deg", "1.5,0.25,90", session);
   auto motions = make_coarse_motions(recording, memory, arguments.motion);
   if (motions.empty()) {
     throw FileError(*arguments.odometry,
@@ -47,7 +47,7 @@ std::vector<CoarseMotion> read_motions(const ArrangeArguments& arguments,
   return motions;
 }
 
-ordered_json as_json(const MapComparison& comparison) {
+ordered_json to_json(const MapComparison& comparison) {
   ordered_json json{{"views", comparison.compared},
                     {"procrustes_disparity", comparison.shape.value},
                     {"procrustes_disparity_with_reflection", comparison.shape.with_reflection},
@@ -57,7 +57,7 @@ ordered_json as_json(const MapComparison& comparison) {
   return json;
 }
 
-ordered_json as_json(const ArrangeArguments& arguments, const Lattice& lattice,
+ordered_json to_json(const ArrangeArguments& arguments, const Lattice& lattice,
                      const VisualMemory& memory) {
   auto components = ordered_json::array();
   for (const Lattice::Component& component : lattice.components) {
@@ -87,7 +87,7 @@ ordered_json as_json(const ArrangeArguments& arguments, const Lattice& lattice,
                     {"nodes", std::move(nodes)},
                     {"ground_truth", nullptr}};
   if (const auto comparison = compare_with_ground_truth(lattice, memory)) {
-    json["ground_truth"] = as_json(*comparison);
+    json["ground_truth"] = to_json(*comparison);
   }
   return json;
 }
@@ -155,7 +155,7 @@ ExitCode arrange_views(const ArrangeArguments& arguments, Session& session) {
     write_arrange_report(*arguments.report, memory_name(file.path()), lattice, memory, steps);
   }
   if (session.json()) {
-    session.print(json_line(as_json(arguments, lattice, memory)));
+    session.print(json_line(to_json(arguments, lattice, memory)));
   } else {
     print_result(lattice, memory, session);
     if (arguments.picture && lattice.components.size() > 1) {
@@ -189,7 +189,7 @@ Run declare_arrange(Arguments& arguments) {
   arguments.options("lattice", values->lattice);
   arguments.options("coarse_motion", values->motion, "motion");
   arguments.show_in_help({"--neighbours"});
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"[coarse_motion]"}, [values] { return values->odometry.has_value(); }, "without --odometry");
   arguments.writes({"--tum", "--graphml", "--picture", "--report"});
   return [values](Session& session) { return arrange_views(*values, session); };

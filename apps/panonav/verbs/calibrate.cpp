@@ -155,7 +155,7 @@ CameraModel make_mirror_model(const MirrorOptions& options, double rim_radius_px
   }
 }
 
-ordered_json as_json(const CalibrateArguments& arguments, std::size_t images,
+ordered_json to_json(const CalibrateArguments& arguments, std::size_t images,
                      const MirrorCircle& mirror, const Camera& camera) {
   ordered_json json{{"images", images},
                     {"width_px", mirror.image_size.width},
@@ -224,7 +224,7 @@ Image draw_lenses(ImageView picture, const Camera& camera) {
   return draw(with_left.view(), 1);
 }
 
-ordered_json as_json(const DualFisheyeCalibration& found, std::size_t images,
+ordered_json to_json(const DualFisheyeCalibration& found, std::size_t images,
                      const std::string& file) {
   const auto& lenses = std::get<DualFisheyeModel>(found.camera.model).lenses;
   ordered_json json{{"images", images},
@@ -276,7 +276,7 @@ ExitCode calibrate_lenses(const CalibrateArguments& arguments,
   }
   write_camera(arguments.out, {found.camera, std::nullopt});
   if (session.json()) {
-    session.print(json_line(as_json(found, views.size(), arguments.out)));
+    session.print(json_line(to_json(found, views.size(), arguments.out)));
     return ExitCode::done;
   }
   const auto& lenses = std::get<DualFisheyeModel>(found.camera.model).lenses;
@@ -298,7 +298,7 @@ ExitCode calibrate_lenses(const CalibrateArguments& arguments,
 ExitCode calibrate(const Arguments& declared, const CalibrateArguments& arguments,
                    Session& session) {
   if (std::ranges::all_of(arguments.inputs, is_one_picture)) {
-    declared.refuse_unused(recording_flags(), "as all inputs are single images");
+    declared.reject_options(recording_flags(), "as all inputs are single images");
   }
   std::vector<std::string> names;
   const auto images = read_images(arguments, names, session);
@@ -327,7 +327,7 @@ ExitCode calibrate(const Arguments& declared, const CalibrateArguments& argument
   }
   write_camera(arguments.out, {camera, std::nullopt});
   if (session.json()) {
-    session.print(json_line(as_json(arguments, images.size(), *mirror, camera)));
+    session.print(json_line(to_json(arguments, images.size(), *mirror, camera)));
   } else {
     print_text(declared, arguments, images.size() > arguments.inputs.size(), *mirror, camera,
                session);
@@ -357,13 +357,14 @@ Run declare_calibrate(Arguments& arguments) {
   const auto shaped = [values](int profile) {
     return [values, profile] { return values->mirror.profile == profile; };
   };
-  arguments.refuse_unless({"--inner-elevation-deg"}, shaped(0), "without --profile equiangular");
-  arguments.refuse_unless({"--mirror-a-mm", "--mirror-b-mm"}, shaped(1),
-                          "without --profile hyperboloidal");
-  arguments.refuse_unless({"--xi"}, shaped(2), "without --profile unified");
-  arguments.refuse_unless({"[lenses]"}, shaped(dual_fisheye_profile),
-                          "without --profile dual-fisheye");
-  arguments.refuse_unless(
+  arguments.reject_options_unless({"--inner-elevation-deg"}, shaped(0),
+                                  "without --profile equiangular");
+  arguments.reject_options_unless({"--mirror-a-mm", "--mirror-b-mm"}, shaped(1),
+                                  "without --profile hyperboloidal");
+  arguments.reject_options_unless({"--xi"}, shaped(2), "without --profile unified");
+  arguments.reject_options_unless({"[lenses]"}, shaped(dual_fisheye_profile),
+                                  "without --profile dual-fisheye");
+  arguments.reject_options_unless(
       {"--rim-elevation-deg", "--forward-angle-deg", "--inner-radius-px", "[mirror_search]"},
       [shaped] { return !shaped(dual_fisheye_profile)(); }, "with --profile dual-fisheye");
   arguments.writes({"--out", "--overlay"});

@@ -45,25 +45,25 @@ WorkProgress show_progress(Session& session) {
   };
 }
 
-ordered_json as_json(const CatchmentArguments& arguments, const RecordedViews& goals,
+ordered_json to_json(const CatchmentArguments& arguments, const RecordedViews& goals,
                      const CatchmentResult& result) {
   ordered_json json{{"dataset", arguments.dataset},
-                    {"current", or_null(arguments.current)},
+                    {"current", to_json_or_null(arguments.current)},
                     {"goals", result.survey.goals.size()},
                     {"places", result.survey.places.size()},
                     {"spacing_m", result.spacing_m},
                     {"typical_distance_m", result.typical_distance_m},
-                    {"up_to_m", or_null(arguments.settings.up_to_m)},
+                    {"up_to_m", to_json_or_null(arguments.settings.up_to_m)},
                     {"pairs", result.pairs},
-                    {"stages", or_null(arguments.stages)},
-                    {"homeward_component", or_null(result.component)},
-                    {"orientation_error_rad", or_null(result.orientation_error_rad)}};
+                    {"stages", to_json_or_null(arguments.stages)},
+                    {"homeward_component", to_json_or_null(result.component)},
+                    {"orientation_error_rad", to_json_or_null(result.orientation_error_rad)}};
   auto bins = ordered_json::array();
   for (const CatchmentResult::Bin& bin : result.bins) {
     bins.push_back({{"distance_m", bin.homeward.distance_m},
                     {"pairs", bin.homeward.pairs},
-                    {"homeward_component", or_null(bin.homeward.component)},
-                    {"orientation_error_rad", or_null(bin.orientation_error_rad)}});
+                    {"homeward_component", to_json_or_null(bin.homeward.component)},
+                    {"orientation_error_rad", to_json_or_null(bin.orientation_error_rad)}});
   }
   json["bins"] = std::move(bins);
   auto areas = ordered_json::array();
@@ -240,8 +240,8 @@ ExitCode catchment(const Arguments& declared, const CatchmentArguments& argument
   const CatchmentSettings settings = check_settings(declared, arguments);
   const auto recording =
       arguments.ahead ? open_recording(arguments.dataset, arguments.pictures, std::nullopt, session)
-                      : read_described(arguments.dataset, arguments.pictures, std::nullopt,
-                                       pose_columns, pose_values, session);
+                      : read_dataset_with_columns(arguments.dataset, arguments.pictures,
+                                                  std::nullopt, pose_columns, pose_values, session);
   std::optional<Dataset> second;
   if (arguments.current)
     second = open_recording(*arguments.current, arguments.pictures, recording.source, session);
@@ -250,13 +250,13 @@ ExitCode catchment(const Arguments& declared, const CatchmentArguments& argument
   if (arguments.ahead) {
     const auto views = read_views(recording, arguments.homing.views, arguments.turn_seed,
                                   session.executor(), show_progress(session));
-    refuse_unused_rise(declared, views.views.front(), arguments.dataset);
+    reject_unused_rise(declared, views.views.front(), arguments.dataset);
     return compare_ahead(arguments, views, settings.homing, session);
   }
   const auto goals = read_views(recording, arguments.homing.views, std::nullopt, session.executor(),
                                 show_progress(session));
   check_posed(goals, arguments.dataset);
-  refuse_unused_rise(declared, goals.views.front(), arguments.dataset);
+  reject_unused_rise(declared, goals.views.front(), arguments.dataset);
   const std::size_t goal = choose_goal(arguments, goals);
   const auto places = read_views(second ? *second : recording, arguments.homing.views,
                                  arguments.turn_seed, session.executor(), show_progress(session));
@@ -270,7 +270,7 @@ ExitCode catchment(const Arguments& declared, const CatchmentArguments& argument
   const auto result = survey_catchment(goals, places, settings, places_name, session.executor(),
                                        show_progress(session));
   if (session.json()) {
-    session.print(json_line(as_json(arguments, goals, result)));
+    session.print(json_line(to_json(arguments, goals, result)));
   } else {
     print_text(arguments, result, session);
   }
@@ -311,11 +311,11 @@ Run declare_catchment(Arguments& arguments) {
   declare_homing(arguments, values->homing);
   arguments.options("run", values->settings.run);
   arguments.hide_from_help({"--bin-m", "--goal"});
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"--current", "--report", "--up-to-m", "--bin-m", "--stages", "[run]"},
       [values] { return !values->ahead; },
       "with --ahead, which compares the images of one recording in their order");
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"--goal"}, [values] { return values->report.has_value(); }, "without --report");
   arguments.writes({"--report"});
   return [values, &arguments](Session& session) { return catchment(arguments, *values, session); };

@@ -13,7 +13,7 @@ struct EvaluateArguments {
   TrajectoryError::Options options;
 };
 
-ordered_json as_json(const TrajectoryError::Summary& errors) {
+ordered_json to_json(const TrajectoryError::Summary& errors) {
   return {{"rmse", errors.rms},
           {"mean", errors.mean},
           {"median", errors.median},
@@ -21,7 +21,7 @@ ordered_json as_json(const TrajectoryError::Summary& errors) {
           {"max", errors.largest}};
 }
 
-ordered_json as_json(const EstimateEvaluation& evaluation) {
+ordered_json to_json(const EstimateEvaluation& evaluation) {
   const TrajectoryError& error = evaluation.trajectory;
   const auto& alignment = error.ground_truth_from_estimate;
   ordered_json json{{"pairs", error.pairs},
@@ -32,14 +32,14 @@ ordered_json as_json(const EstimateEvaluation& evaluation) {
                       {"x_m", alignment.translation.x_m},
                       {"y_m", alignment.translation.y_m},
                       {"reflected", alignment.reflected}}},
-                    {"ate_m", as_json(error.position_m)},
-                    {"heading_rad", as_json(error.heading_rad)},
+                    {"ate_m", to_json(error.position_m)},
+                    {"heading_rad", to_json(error.heading_rad)},
                     {"relative_pairs", error.relative_pairs},
                     {"rpe_m", nullptr},
                     {"rpe_heading_rad", nullptr}};
   if (error.relative_pairs > 0) {
-    json["rpe_m"] = as_json(error.relative_position_m);
-    json["rpe_heading_rad"] = as_json(error.relative_heading_rad);
+    json["rpe_m"] = to_json(error.relative_position_m);
+    json["rpe_heading_rad"] = to_json(error.relative_heading_rad);
   }
   json["procrustes_disparity"] = nullptr;
   json["procrustes_disparity_with_reflection"] = nullptr;
@@ -68,7 +68,7 @@ ExitCode evaluate(const EvaluateArguments& arguments, Session& session) {
                              "; check that both use the same clock");
   }
   if (session.json()) {
-    session.print(json_line(as_json(*evaluation)));
+    session.print(json_line(to_json(*evaluation)));
     return ExitCode::done;
   }
   const TrajectoryError& error = evaluation->trajectory;
@@ -99,7 +99,7 @@ Run declare_evaluate(Arguments& arguments) {
   arguments.positional("GROUND_TRUTH", values->truth, "True trajectory as TUM text or CSV");
   arguments.options("evaluation", values->options);
   arguments.show_in_help({"--align", "--align-scale"});
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"--align-scale", "--align-reflection"}, [values] { return values->options.align; },
       "with --align false");
   return [values](Session& session) { return evaluate(*values, session); };

@@ -12,7 +12,7 @@ Run declare_help(Arguments& arguments) {
   return [words](Session& session) {
     const auto verbs = all_verbs();
     return print_text(words->empty() ? overview(verbs)
-                                     : help_text(describe(find_named_verb(verbs, *words)), false),
+                                     : format_help(describe(find_named_verb(verbs, *words)), false),
                       session);
   };
 }

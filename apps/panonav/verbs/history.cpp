@@ -29,7 +29,7 @@ ExitCode history(const std::string& path, Session& session) {
     auto list = ordered_json::array();
     for (const MemoryFile::KeptChange& change : changes) {
       list.push_back({{"what", change.what},
-                      {"stamp_s", or_null(change.stamp_s)},
+                      {"stamp_s", to_json_or_null(change.stamp_s)},
                       {"undoable", change.undoable},
                       {"bytes", change.bytes}});
     }

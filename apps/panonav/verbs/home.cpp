@@ -28,7 +28,7 @@ struct HomeArguments {
   std::optional<std::string> report;
 };
 
-ordered_json as_json(const std::string& goal, const HomeAnswer& answer) {
+ordered_json to_json(const std::string& goal, const HomeAnswer& answer) {
   const HomingResult& way = answer.way;
   const HomeVector& found = way.vector;
   const auto if_known = [&](double value) {
@@ -38,7 +38,7 @@ ordered_json as_json(const std::string& goal, const HomeAnswer& answer) {
           {"current", answer.file},
           {"known", way.known},
           {"probability", way.probability},
-          {"direction_rad", or_null(way.direction_rad)},
+          {"direction_rad", to_json_or_null(way.direction_rad)},
           {"length", if_known(found.length())},
           {"xi", if_known(found.xi)},
           {"eta", if_known(found.eta)},
@@ -55,8 +55,8 @@ std::string format_line(const HomeAnswer& answer, Session& session) {
     return answer.file + "  " + session.red("no answer") + ": " + explain_no_direction(way);
   const std::string sure = "; probability " + format_fixed(way.probability, 2);
   if (way.direction_rad) {
-    return answer.file + "  home is " + session.green(in_words(*way.direction_rad)) + ", about " +
-           format_fixed(way.distance_r, 2) + " R away; " +
+    return answer.file + "  home is " + session.green(describe_angle(*way.direction_rad)) +
+           ", about " + format_fixed(way.distance_r, 2) + " R away; " +
            describe_rotation(way.vector.heading_rad) + sure;
   }
   return answer.file + "  " + session.red("no direction home") + ": " + explain_no_direction(way) +
@@ -88,7 +88,7 @@ ExitCode answer_all(const HomeArguments& arguments, const HomingGuide& guide, co
       [&](std::size_t, HomeAnswer&& answer) {
         progress.clear();
         pointing += answer.way.direction_rad ? 1 : 0;
-        session.print(session.json() ? json_line(as_json(goal.name, answer))
+        session.print(session.json() ? json_line(to_json(goal.name, answer))
                                      : format_line(answer, session));
         answers.push_back(std::move(answer));
         progress.advance();
@@ -113,7 +113,7 @@ ExitCode home_from_memory(const Arguments& declared, const HomeArguments& argume
   const auto& header = file.header();
   SignatureOptions kept = arguments.homing.views.signature;
   kept.components = header.shape.components;  // fewer of them may be compared
-  require_kept_options(declared, kept, arguments.homing.views.preprocessing, file);
+  require_stored_options(declared, kept, arguments.homing.views.preprocessing, file);
   int components = header.shape.components;
   if (declared.is_set("signature", "components")) {
     components = arguments.homing.views.signature.components;
@@ -123,7 +123,7 @@ ExitCode home_from_memory(const Arguments& declared, const HomeArguments& argume
   const HomingGuide guide(file, arguments.goal, recording.source,
                           make_homing_options(declared, arguments.homing, components), components,
                           arguments.homing.views.horizon);
-  refuse_unused_rise(declared, guide.goal(), *arguments.memory);
+  reject_unused_rise(declared, guide.goal(), *arguments.memory);
   const Goal goal{guide.goal_name(), file.load({&view, 1}).info(view).pose, guide.goal(),
                   arguments.report ? thumbnail_panorama(file, view) : std::nullopt};
   return answer_all(arguments, guide, goal, recording, session);
@@ -150,7 +150,7 @@ ExitCode home(const Arguments& declared, const HomeArguments& arguments, Session
   const HomingEncoder encoder(goals.source, views);
   const Panorama picture = encoder.panorama(read_observation(goals.entries.front()));
   const Goal goal{arguments.goal, std::nullopt, encoder.view(picture), picture};
-  refuse_unused_rise(declared, goal.view, goal.name);
+  reject_unused_rise(declared, goal.view, goal.name);
   const HomingGuide guide(HomingEncoder(recording.source, views), goal.name, goal.view, options);
   return answer_all(arguments, guide, goal, recording, session);
 }

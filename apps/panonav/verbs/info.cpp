@@ -42,7 +42,7 @@ std::vector<NamedRoute> list_routes(const MemoryFile& memory) {
   return routes;
 }
 
-ordered_json as_json(const MemoryFile& memory, const MemoryFile::Info& info) {
+ordered_json to_json(const MemoryFile& memory, const MemoryFile::Info& info) {
   const auto& header = memory.header();
   const auto& steps = header.preprocessing;
   ordered_json json{{"memory", memory.path().string()},
@@ -83,7 +83,7 @@ ExitCode print_memory(const std::string& path, Session& session) {
   const auto memory = MemoryFile::open(path, Access::read_only);
   const auto info = memory.info();
   if (session.json()) {
-    session.print(json_line(as_json(memory, info)));
+    session.print(json_line(to_json(memory, info)));
     return ExitCode::done;
   }
   const auto& header = memory.header();

@@ -15,16 +15,16 @@ struct ListArguments {
   bool csv = false;
 };
 
-ordered_json as_json(const ViewRecord& record) {
+ordered_json to_json(const ViewRecord& record) {
   const auto& [view, info, links, thumbnail, component] = record;
   ordered_json json{{"id", view.value},      {"name", info.name},
-                    {"pose", nullptr},       {"stamp_s", or_null(info.stamp_s)},
-                    {"links", links},        {"connected_component", or_null(component)},
+                    {"pose", nullptr},       {"stamp_s", to_json_or_null(info.stamp_s)},
+                    {"links", links},        {"connected_component", to_json_or_null(component)},
                     {"thumbnail", thumbnail}};
   if (info.pose) {
     json["pose"] = {{"x_m", info.pose->x_m},
                     {"y_m", info.pose->y_m},
-                    {"heading_rad", or_null(info.pose->heading_rad)}};
+                    {"heading_rad", to_json_or_null(info.pose->heading_rad)}};
   }
   return json;
 }
@@ -104,7 +104,7 @@ ExitCode list(const ListArguments& arguments, Session& session) {
   const auto maps = memory.map_names();
   if (session.json()) {
     auto list = ordered_json::array();
-    for (const ViewRecord& view : views) list.push_back(as_json(view));
+    for (const ViewRecord& view : views) list.push_back(to_json(view));
     session.print(json_line(ordered_json{{"memory", arguments.memory},
                                          {"views", std::move(list)},
                                          {"routes", routes},

@@ -37,7 +37,7 @@ void print_answer(const LocalisedQuery& query, const LocaliseArguments& argument
                   Session& session) {
   if (!query.error.empty()) session.note("skipped: " + to_readable_line(query.error));
   if (session.json()) {
-    session.print(json_line(as_json(query, arguments.areas)));
+    session.print(json_line(to_json(query, arguments.areas)));
   } else if (query.error.empty()) {
     session.print(format_line(query, session));
   }
@@ -117,9 +117,9 @@ ExitCode localise(const Arguments& declared, const LocaliseArguments& arguments,
   }
   const auto file = MemoryFile::open(arguments.memory, Access::read_only);
   require_components(declared, arguments, file.header());
-  refuse_live(declared, arguments.inputs.front(), true);
+  reject_live_input(declared, arguments.inputs.front(), true);
   if (arguments.report) prepare_report_folder(*arguments.report, "localise");
-  require_kept_band(arguments.pictures, file);
+  require_stored_band(arguments.pictures, file);
   const Dataset recording = open_queries(arguments, file.header().source, session);
   PlaceRecogniserOptions options{.localiser = arguments.localiser, .source = recording.source};
   if (arguments.areas) options.areas = arguments.accuracy;
@@ -155,10 +155,10 @@ void declare_changes(Arguments& arguments, const std::shared_ptr<LocaliseArgumen
   arguments.options("update", values->update_options);
   arguments.options("signature", values->signature, "new");
   arguments.options("preprocessing", values->preprocessing);
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"--add-interval-s", "[signature]", "[preprocessing]"}, [values] { return values->add; },
       "without --add");
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"[update]"}, [values] { return values->update; }, "without --update");
 }
 
@@ -192,7 +192,7 @@ Run declare_localise(Arguments& arguments) {
   arguments.options("localiser", values->localiser);
   arguments.options("accuracy", values->accuracy, "area");
   declare_changes(arguments, values);
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"[accuracy]"}, [values] { return values->areas; }, "without --areas");
   arguments.writes({"--out", "--report"});
   return [values, &arguments](Session& session) { return localise(arguments, *values, session); };

@@ -69,7 +69,7 @@ std::size_t count_closures(const TopologicalMap& map) {
       std::ranges::count(map.edges, Link::Kind::closure, &TopologicalMap::Edge::kind));
 }
 
-ordered_json as_json(const RecordedMapComparison& comparison) {
+ordered_json to_json(const RecordedMapComparison& comparison) {
   const MapComparison& positions = comparison.positions;
   ordered_json json{{"nodes", positions.compared},
                     {"procrustes_disparity", positions.shape.value},
@@ -77,7 +77,7 @@ ordered_json as_json(const RecordedMapComparison& comparison) {
                     {"scale", positions.truth_from_map.scale}};
   json.update(neighbours_json(positions));
   json.update(closures_json(comparison.closures));
-  json["odometry_procrustes_disparity"] = or_null(comparison.odometry_shape_difference);
+  json["odometry_procrustes_disparity"] = to_json_or_null(comparison.odometry_shape_difference);
   return json;
 }
 
@@ -116,7 +116,7 @@ void print_result(const MapArguments& arguments, const Dataset& recording,
                       {"wheels", run.wheels},
                       {"step_ms", step_ms},
                       {"ground_truth", nullptr}};
-    if (comparison) json["ground_truth"] = as_json(*comparison);
+    if (comparison) json["ground_truth"] = to_json(*comparison);
     session.print(json_line(json));
     return;
   }
@@ -253,8 +253,8 @@ void record_map(const MapArguments& arguments, const Dataset& recording, const M
 
 /// Refuses what is typed and does nothing with this recording, and a height of the camera, also of
 /// a file, where lengths cannot be read from the ground.
-void refuse_without_effect(const Arguments& declared, const MapArguments& arguments,
-                           const Dataset& recording, const MemoryHeader& header) {
+void reject_options_without_effect(const Arguments& declared, const MapArguments& arguments,
+                                   const Dataset& recording, const MemoryHeader& header) {
   const auto has_odometry = [](const DatasetEntry& entry) { return entry.odometry.has_value(); };
   const bool all = std::ranges::all_of(recording.entries, has_odometry);
   const bool wheels = arguments.mapper.mapping.wheels && all;
@@ -270,13 +270,13 @@ void refuse_without_effect(const Arguments& declared, const MapArguments& argume
                     "--camera-height-m: recordings without odometry, or --wheels false");
   }
   if (wheels) {
-    declared.refuse_unused({"--scale-m", "--step-deviation"},
-                           "when odometry gives the lengths of all steps");
+    declared.reject_options({"--scale-m", "--step-deviation"},
+                            "when odometry gives the lengths of all steps");
   }
-  if (all) declared.refuse_unused({"--bridge-m"}, "when odometry gives all steps");
+  if (all) declared.reject_options({"--bridge-m"}, "when odometry gives all steps");
   if (std::ranges::none_of(recording.entries, has_odometry)) {
     if (arguments.mapper.mapping.wheels) {
-      declared.refuse_unused({"--wheels"}, "as " + arguments.dataset + " has no odometry");
+      declared.reject_options({"--wheels"}, "as " + arguments.dataset + " has no odometry");
     }
   }
 }
@@ -290,12 +290,12 @@ ExitCode map(const Arguments& declared, const MapArguments& arguments, Session& 
       memory ? open_recording(arguments.dataset, arguments.pictures, *memory, session)
              : open_recording(arguments.dataset, arguments.pictures, std::nullopt, session);
   if (memory) {
-    require_kept_options(declared, arguments.signature, memory->header().preprocessing, *memory);
-    refuse_without_effect(declared, arguments, recording, memory->header());
+    require_stored_options(declared, arguments.signature, memory->header().preprocessing, *memory);
+    reject_options_without_effect(declared, arguments, recording, memory->header());
   } else {
     const MemoryHeader header =
         make_header_of_recording(recording, arguments.signature, {}, session.executor());
-    refuse_without_effect(declared, arguments, recording, header);
+    reject_options_without_effect(declared, arguments, recording, header);
     memory = MemoryFile::create(arguments.memory, header);
   }
   MapperOptions options = arguments.mapper;
@@ -358,14 +358,14 @@ Run declare_map(Arguments& arguments) {
   arguments.options("loop_closure", values->mapper.closure, "closure");
   arguments.options("pose_graph", values->mapper.graph, "graph");
   arguments.show_in_help({"--camera-height-m", "--capture-difference"});
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"[loop_closure]", "[pose_graph]"}, [values] { return values->mapper.mapping.close_loops; },
       "with --close-loops false");
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"--distance-components", "--turn-components"},
       [values] { return values->mapper.odometry.rule == VisualOdometryOptions::Rule::published; },
       "without --rule published");
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"--iterations", "--nearer-side"},
       [values] { return values->mapper.odometry.rule == VisualOdometryOptions::Rule::home_vector; },
       "with --rule published");

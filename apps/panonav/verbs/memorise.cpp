@@ -152,12 +152,12 @@ ExitCode memorise_live(const Arguments& declared, const MemoriseArguments& argum
 ExitCode memorise(const Arguments& declared, const MemoriseArguments& arguments, Session& session) {
   const bool resumes = memory_exists(arguments.memory);
   const bool live = recordings::is_live(arguments.input);
-  if (!live) refuse_live(declared, arguments.input, true);
+  if (!live) reject_live_input(declared, arguments.input, true);
   std::optional<PictureSource> remembered;
   if (resumes) {
     const auto memory = MemoryFile::open(arguments.memory, Access::read_write);
-    require_kept_options(declared, arguments.signature, arguments.preprocessing, memory);
-    require_kept_band(arguments.pictures, memory);
+    require_stored_options(declared, arguments.signature, arguments.preprocessing, memory);
+    require_stored_band(arguments.pictures, memory);
     remembered = memory.header().source;
   }
   if (live) return memorise_live(declared, arguments, remembered, session);

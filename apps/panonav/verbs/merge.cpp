@@ -14,7 +14,7 @@ struct MergeArguments {
   SessionAlignmentOptions alignment;
 };
 
-ordered_json as_json(const std::optional<SessionAlignment>& alignment) {
+ordered_json to_json(const std::optional<SessionAlignment>& alignment) {
   if (!alignment) return nullptr;
   const Pose2& pose = alignment->first_from_second;
   return {{"x_m", pose.x_m},
@@ -42,7 +42,7 @@ ExitCode merge(const MergeArguments& arguments, Session& session) {
                                          {"views", merged.views},
                                          {"shared", merged.shared},
                                          {"renamed", merged.renamed},
-                                         {"alignment", as_json(merged.alignment)},
+                                         {"alignment", to_json(merged.alignment)},
                                          {"connected_components", merged.connected_components},
                                          {"without_position", merged.without_position}}));
     return merged.alignment ? ExitCode::done : ExitCode::no_answer;

@@ -49,8 +49,8 @@ Pose2 parse_pose(const std::string& flag, const std::string& text) {
           wrap_angle(radians(parse_number(flag, text.substr(second + 1))))};
 }
 
-Pose2 free_pose(const std::string& flag, const std::string& text,
-                const simulation::FreeSpace& space) {
+Pose2 parse_free_pose(const std::string& flag, const std::string& text,
+                      const simulation::FreeSpace& space) {
   const Pose2 pose = parse_pose(flag, text);
   if (!space.is_free(pose.position())) {
     throw UsageError(
@@ -67,7 +67,7 @@ ordered_json view_name_or_null(const std::optional<ViewId>& view, const RobotNav
   return view ? ordered_json(robot.info(*view).name) : ordered_json();
 }
 
-ordered_json as_json(const NavigationDecision& decision, const Pose2& pose,
+ordered_json to_json(const NavigationDecision& decision, const Pose2& pose,
                      const RobotNavigator& robot) {
   auto events = ordered_json::array();
   for (const NavigationDecision::Event event : decision.events) events.push_back(name_of(event));
@@ -82,7 +82,7 @@ ordered_json as_json(const NavigationDecision& decision, const Pose2& pose,
           {"next", view_name_or_null(decision.next, robot)},
           {"area", decision.area},
           {"image_difference", decision.difference},
-          {"path_left", or_null(decision.path_length)},
+          {"path_left", to_json_or_null(decision.path_length)},
           {"components", decision.components},
           {"bytes_read", decision.bytes_read},
           {"events", std::move(events)},
@@ -157,7 +157,7 @@ ordered_json summary_json(const NavigateArguments& arguments, RobotNavigator& ro
           {"goal", goal},
           {"scene", arguments.scene},
           {"edges_from", name_of(robot.origin())},
-          {"route", or_null(arguments.route)},
+          {"route", to_json_or_null(arguments.route)},
           {"views", graph.size()},
           {"edges", graph.edges().size()},
           {"areas", planner.areas().nodes.size()},
@@ -167,9 +167,9 @@ ordered_json summary_json(const NavigateArguments& arguments, RobotNavigator& ro
           {"closed_edges", planner.blocked_edges()},
           {"start", pose_json(start)},
           {"pose", pose_json(run.path.back())},
-          {"goal_distance_m", or_null(run.end_distance_m)},
+          {"goal_distance_m", to_json_or_null(run.end_distance_m)},
           {"travelled_m", run.travelled_m},
-          {"shortest_m", or_null(run.shortest_m)},
+          {"shortest_m", to_json_or_null(run.shortest_m)},
           {"kidnapped_after_step",
            run.kidnapped_at ? ordered_json(*run.kidnapped_at + 1) : ordered_json()}};
 }
@@ -211,9 +211,10 @@ simulation::Mission make_mission(const NavigateArguments& arguments, ViewId goal
   constexpr std::uint64_t stream_of_starts = 4;
   Random random(seed, stream_of_starts);
   simulation::Mission mission{goal, place.free_space->random_pose(random), std::nullopt};
-  if (arguments.start) mission.start = free_pose("--start", *arguments.start, *place.free_space);
+  if (arguments.start)
+    mission.start = parse_free_pose("--start", *arguments.start, *place.free_space);
   if (arguments.kidnap)
-    mission.kidnapped_to = free_pose("--kidnap", *arguments.kidnap, *place.free_space);
+    mission.kidnapped_to = parse_free_pose("--kidnap", *arguments.kidnap, *place.free_space);
   return mission;
 }
 
@@ -270,14 +271,14 @@ ExitCode navigate(const Arguments& declared, const NavigateArguments& arguments,
   RobotNavigator robot(arguments.memory, arguments.goal, options, std::nullopt,
                        &session.executor());
   if (robot.memory().header().source.kind != PictureKind::mirror) {
-    declared.refuse_unused({"--vignetting"}, "on the panoramas of this memory");
+    declared.reject_options({"--vignetting"}, "on the panoramas of this memory");
   }
   const simulation::RememberedPlace remembered = simulation::make_remembered_place(robot);
   if (arguments.kidnap) require_known_goal(arguments, robot, remembered);
   if (arguments.report) prepare_report_folder(*arguments.report, "navigate");
   viewer::RunPage played("", 100);
   RunRecord record(arguments.record, std::span(&arguments.memory, 1), false, session,
-                   {.memory = arguments.memory, .takes = viewer::ViewWish::goal});
+                   {.memory = arguments.memory, .takes = viewer::ViewerInput::goal});
   if (arguments.report) record.copy_to(played);
   MissionMoments moments(robot, remembered, arguments.mission.planner.field);
   simulation::ImageReport report;
@@ -303,7 +304,7 @@ ExitCode navigate(const Arguments& declared, const NavigateArguments& arguments,
           moments.restart_clock();
         }
         if (session.json()) {
-          session.print(json_line(as_json(decision, pose, robot)));
+          session.print(json_line(to_json(decision, pose, robot)));
         } else if (!decision.events.empty()) {
           session.print(format_line(decision, robot));
         }
@@ -358,17 +359,17 @@ Run declare_navigate(Arguments& arguments) {
   arguments.options("free_space", values->simulation.free_space);
   arguments.show_in_help({"--seed", "--light"});
   require_effects(arguments, values->simulation);
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"[known_route]"}, [values] { return values->route.has_value(); }, "without --route");
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"--route-coarse-deg"}, [values] { return values->known_route.fit.levels > 1; },
       "with --route-levels 1");
   const auto& homing = values->mission.navigator.homing;
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"--coarse", "--middle"},
       [&homing] { return homing.strategy != HomingPursuitOptions::Strategy::steady; },
       "with --strategy steady");
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"--fine"},
       [&homing] { return homing.strategy == HomingPursuitOptions::Strategy::coarse_to_fine; },
       "without --strategy coarse_to_fine");

@@ -16,7 +16,7 @@ struct PruneArguments {
   bool dry_run = false;
 };
 
-ordered_json as_json(const std::optional<SparseSelection::Loss::Positions>& positions) {
+ordered_json to_json(const std::optional<SparseSelection::Loss::Positions>& positions) {
   if (!positions) return nullptr;
   return {{"median_before_m", positions->median_before_m},
           {"p95_before_m", positions->p95_before_m},
@@ -34,16 +34,16 @@ void require_unchanged(const MemoryFile& file, const VisualMemory& memory) {
 }
 
 /// Places are near each other by their positions, or by links where those are not known.
-void refuse_without_effect(const Arguments& arguments, const std::string& file,
-                           const VisualMemory& memory) {
+void reject_options_without_effect(const Arguments& arguments, const std::string& file,
+                                   const VisualMemory& memory) {
   const auto posed = std::ranges::count_if(
       memory.views(), [&](ViewId view) { return memory.info(view).pose.has_value(); });
   if (posed == 0) {
-    arguments.refuse_unused({"--reach-m", "--outdated-within-m"},
-                            "as " + file + " contains no positions");
+    arguments.reject_options({"--reach-m", "--outdated-within-m"},
+                             "as " + file + " contains no positions");
   } else if (posed == std::ssize(memory.views())) {
-    arguments.refuse_unused({"--reach-links"},
-                            "as " + file + " contains the positions of all views");
+    arguments.reject_options({"--reach-links"},
+                             "as " + file + " contains the positions of all views");
   }
 }
 
@@ -75,7 +75,7 @@ ExitCode prune(const Arguments& declared, const PruneArguments& arguments, Sessi
                                arguments.dry_run ? Access::read_only : Access::read_write);
   const VisualMemory memory = file.load();
   session.detail(std::to_string(memory.size()) + " views loaded");
-  refuse_without_effect(declared, arguments.memory, memory);
+  reject_options_without_effect(declared, arguments.memory, memory);
   const SparseSelection selection = select_references(memory, arguments.options);
   session.detail("redundant views: " + std::to_string(selection.redundant.size()));
   const SparseSelection::Loss loss = measure_loss(memory, selection);
@@ -116,7 +116,7 @@ ExitCode prune(const Arguments& declared, const PruneArguments& arguments, Sessi
                                          {"factor", factor},
                                          {"median_difference", loss.median_difference},
                                          {"queries", loss.queries},
-                                         {"position_error", as_json(loss.positions)}}));
+                                         {"position_error", to_json(loss.positions)}}));
     return ExitCode::done;
   }
   print_loss(arguments, loss, memory.size(), selection.kept.size(), factor, outdated, names,

@@ -32,7 +32,7 @@ ExitCode reproduce(const ReproduceArguments& arguments, Session& session) {
     }
     throw OptionError("PAPER is '" + arguments.paper + "'; allowed: " + allowed + "all");
   }
-  refuse_meaningless(*paper, arguments);
+  reject_meaningless_options(*paper, arguments);
   const std::string out = arguments.out.value_or("reproduction/" + arguments.paper);
   const lab::Reproduction result = reproduce_paper(*paper, arguments, out, session);
   if (session.json()) {
@@ -50,7 +50,7 @@ ExitCode reproduce(const ReproduceArguments& arguments, Session& session) {
 }
 
 /// Returns " (default: 3 for elsewhere, 2 for f11, ...)".
-std::string defaults(const auto& option) {
+std::string format_defaults(const auto& option) {
   std::vector<std::string> values;
   for (const char* paper : {"elsewhere", "f11", "m03", "m04", "navigation", "s06", "y03"}) {
     values.push_back(std::to_string(lab::default_options(paper).*option) + " for " + paper);
@@ -59,8 +59,8 @@ std::string defaults(const auto& option) {
 }
 
 /// Returns what an option means for the papers that have it, each with its default.
-std::string meanings(int lab::ReproductionOptions::*option,
-                     std::initializer_list<std::pair<std::string, std::string>> of_papers) {
+std::string format_meanings(int lab::ReproductionOptions::*option,
+                            std::initializer_list<std::pair<std::string, std::string>> of_papers) {
   std::string text;
   for (const auto& [papers, meaning] : of_papers) {
     const std::string last = papers.substr(papers.find_last_of(' ') + 1);
@@ -88,22 +88,22 @@ Run declare_reproduce(Arguments& arguments) {
       "all: continue an interrupted run with the same options; finished papers are not run again");
   using Options = lab::ReproductionOptions;
   arguments.option("--seed", values->seed,
-                   "First random seed of the scenes" + defaults(&Options::seed));
+                   "First random seed of the scenes" + format_defaults(&Options::seed));
   arguments.option("--scenes", values->scenes, 1,
-                   "Variants of the scene" + defaults(&Options::scenes));
+                   "Variants of the scene" + format_defaults(&Options::scenes));
   arguments.option(
       "--queries", values->queries, 1,
-      meanings(&Options::queries, {{"m04", "queries in each"}, {"elsewhere", "the same"}}));
+      format_meanings(&Options::queries, {{"m04", "queries in each"}, {"elsewhere", "the same"}}));
   arguments.option(
       "--runs", values->runs, 2,
-      meanings(&Options::runs, {{"elsewhere", "drives home and missions in each place"},
-                                {"m04", "missions of figure 18 in each kind of place"},
-                                {"m03", "runs in each variant of an office"},
-                                {"f11", "paths in each Gazebo world"},
-                                {"navigation", "missions in each kind of place"},
-                                {"y03", "drives along routes of 60 m in each place"}}));
+      format_meanings(&Options::runs, {{"elsewhere", "drives home and missions in each place"},
+                                       {"m04", "missions of figure 18 in each kind of place"},
+                                       {"m03", "runs in each variant of an office"},
+                                       {"f11", "paths in each Gazebo world"},
+                                       {"navigation", "missions in each kind of place"},
+                                       {"y03", "drives along routes of 60 m in each place"}}));
   arguments.option("--rows", values->rows, 1,
-                   meanings(&Options::rows, {{"elsewhere, m03, m04", "rows of the views"}}));
+                   format_meanings(&Options::rows, {{"elsewhere, m03, m04", "rows of the views"}}));
   arguments.option("--data FOLDER", values->data,
                    "elsewhere, f11, m03, navigation, s06, y03: folder with the recordings and "
                    "Gazebo worlds (default: the environment variable PANONAV_DATA; if it is not "

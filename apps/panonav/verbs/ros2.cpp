@@ -147,8 +147,8 @@ Run declare_ros2(Arguments& arguments) {
                    "Name of the frame of the memory's positions");
   arguments.option("--odom-frame NAME", setup.frames.odom, "Name of the frame of the odometry");
   arguments.option("--base-frame NAME", setup.frames.base, "Name of the frame of the robot");
-  arguments.in_files("ros2",
-                     {"--node-name", "--namespace", "--map-frame", "--odom-frame", "--base-frame"});
+  arguments.allow_in_config_files(
+      "ros2", {"--node-name", "--namespace", "--map-frame", "--odom-frame", "--base-frame"});
   declare_layout(arguments, values->pictures);
   arguments.options("signature", values->teacher.signature);
   arguments.options("preprocessing", values->teacher.preprocessing);
@@ -156,7 +156,7 @@ Run declare_ros2(Arguments& arguments) {
   arguments.options("monte_carlo", setup.tracker.filter);
   arguments.options("odometry", setup.tracker.odometry, "odometry");
   arguments.options("base", setup.navigator.base);
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"--route", "--kind", "--camera", "--columns-run", "--forward-column", "--elevation-deg",
        "[signature]", "[preprocessing]"},
       [values] { return values->teach; }, "without --teach");

@@ -32,9 +32,9 @@ struct FollowArguments {
   RouteFitOptions fit;
 };
 
-ordered_json as_json(const FollowedImage& image, bool headings_known) {
+ordered_json to_json(const FollowedImage& image, bool headings_known) {
   ordered_json json{{"file", image.file},
-                    {"stamp_s", or_null(image.stamp_s)},
+                    {"stamp_s", to_json_or_null(image.stamp_s)},
                     {"on_route", image.fix.has_value()},
                     {"pose", nullptr},
                     {"origin", nullptr},
@@ -117,8 +117,8 @@ ExitCode follow_run(const Arguments& declared, const FollowArguments& arguments,
   const Dataset run =
       read_run(arguments.dataset, arguments.topics, arguments.part, memory, session);
   if (odometry_poses(run).empty()) {
-    declared.refuse_unused({"--recovery-m", "--surprise-m"},
-                           "as " + arguments.dataset + " has no odometry");
+    declared.reject_options({"--recovery-m", "--surprise-m"},
+                            "as " + arguments.dataset + " has no odometry");
   }
   RouteFollower follower(memory, run.source,
                          {.name = arguments.name,
@@ -143,7 +143,7 @@ ExitCode follow_run(const Arguments& declared, const FollowArguments& arguments,
   follow(follower, run, truth, arguments.every, recorded ? &*recorded : nullptr, session.executor(),
          [&](FollowedImage&& image) {
            progress.clear();
-           session.print(session.json() ? json_line(as_json(image, headings_known))
+           session.print(session.json() ? json_line(to_json(image, headings_known))
                                         : format_line(image, session));
            if (arguments.report) {
              recordings::RunMoment moment = *image.moment;
@@ -200,10 +200,10 @@ Run declare_route_follow(Arguments& arguments) {
                    "into this folder; the folder must be new or contain an earlier report");
   arguments.options("route_tracker", values->tracker);
   arguments.options("route_fit", values->fit);
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"--recovery-m", "--surprise-m"}, [values] { return !values->no_odometry; },
       "with --no-odometry");
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"--coarse-deg"}, [values] { return values->fit.levels > 1; }, "with --levels 1");
   arguments.writes({"--tum", "--report"});
   return [values, &arguments](Session& session) { return follow_run(arguments, *values, session); };

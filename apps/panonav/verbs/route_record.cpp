@@ -92,8 +92,8 @@ void set_line_options(const Arguments& declared, const RecordArguments& argument
                       RouteRecorderOptions& options) {
   if (arguments.horizon_rows) options.horizon_rows = parse_rows(*arguments.horizon_rows);
   if (pictures.kind == PictureKind::panorama && !pictures.layout.elevations) {
-    declared.refuse_unused({"--half-band-rad"},
-                           "because the elevations of the images are not known (--horizon-rows)");
+    declared.reject_options({"--half-band-rad"},
+                            "because the elevations of the images are not known (--horizon-rows)");
   }
   const auto route = memory ? memory->route(arguments.name) : std::nullopt;
   if (!route) {
@@ -119,9 +119,9 @@ ExitCode record(const Arguments& declared, const RecordArguments& arguments, Ses
   if (memory_exists(arguments.memory))
     memory = MemoryFile::open(arguments.memory, Access::read_write);
   const Dataset dataset =
-      read_described(arguments.dataset, arguments.pictures,
-                     memory ? std::optional(memory->header().source) : std::nullopt,
-                     position_columns, position_values, session);
+      read_dataset_with_columns(arguments.dataset, arguments.pictures,
+                                memory ? std::optional(memory->header().source) : std::nullopt,
+                                position_columns, position_values, session);
   set_line_options(declared, arguments, dataset.source, memory, options);
   const auto poses = choose_poses(arguments, dataset, options.odometry, session);
   if (arguments.report) prepare_report_folder(*arguments.report, "route record");

@@ -77,7 +77,7 @@ ExitCode serve(const Arguments& declared, const ServeArguments& arguments, Sessi
   for (const std::string& memory : arguments.memories)
     memories.push_back(parse_served_memory(memory));
   if (std::ranges::none_of(memories, is_server_address, &server::ServedMemory::path)) {
-    declared.refuse_unused({"--max-held-views"}, "if all memories are files");
+    declared.reject_options({"--max-held-views"}, "if all memories are files");
   }
   if (!place.is_local() && options.token.empty()) {
     session.note("warning: everybody who can reach " + place.address +

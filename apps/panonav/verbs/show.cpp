@@ -141,7 +141,7 @@ ExitCode show(const ShowArguments& arguments, Session& session) {
                      {"id", view.value},
                      {"name", info.name},
                      {"pose", nullptr},
-                     {"stamp_s", or_null(info.stamp_s)},
+                     {"stamp_s", to_json_or_null(info.stamp_s)},
                      {"signature_bytes", 2 * file.header().shape.size()},
                      {"thumbnail", nullptr},
                      {"links", list_links(memory, view)},
@@ -149,8 +149,9 @@ ExitCode show(const ShowArguments& arguments, Session& session) {
                      {"near", find_near(memory, view)},
                      {"maps", find_maps(file, view)}};
   if (const auto& pose = info.pose) {
-    shown["pose"] = {
-        {"x_m", pose->x_m}, {"y_m", pose->y_m}, {"heading_rad", or_null(pose->heading_rad)}};
+    shown["pose"] = {{"x_m", pose->x_m},
+                     {"y_m", pose->y_m},
+                     {"heading_rad", to_json_or_null(pose->heading_rad)}};
   }
   const auto bytes = file.thumbnail(view);
   if (!bytes && arguments.thumbnail) {

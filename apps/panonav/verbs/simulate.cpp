@@ -155,25 +155,25 @@ Run declare_simulate_verb(Arguments& arguments) {
   const auto path = [values] {
     return values->random ? simulation::RecordingPath::random : values->simulation.recording.path;
   };
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"[recording]"}, [values] { return !values->trajectory; },
       "with --trajectory, which gives places and times");
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"--spacing-m"}, [values] { return !values->grid_m; }, "with --grid, which sets the spacing");
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"--poses"}, [values] { return !values->random; }, "with --random, which sets the number");
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"--poses"},
       [path] {
         return path() == simulation::RecordingPath::walk ||
                path() == simulation::RecordingPath::random;
       },
       "without --path walk or random");
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"--spacing-m", "--speed-m-s", "[odometry]"},
       [values, path] { return values->trajectory || path() != simulation::RecordingPath::random; },
       "with random places");
-  arguments.refuse_unless(
+  arguments.reject_options_unless(
       {"--heading-rad"},
       [values, path, &arguments] {
         return arguments.is_set("recording", "heading")

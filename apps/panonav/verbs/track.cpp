@@ -88,25 +88,25 @@ void set_start(Tracker& tracker, const TrackArguments& arguments) {
   }
 }
 
-ordered_json as_json(const PoseMode& mode) {
+ordered_json to_json(const PoseMode& mode) {
   return {{"weight", mode.weight},        {"x_m", mode.mean.x_m},
           {"y_m", mode.mean.y_m},         {"heading_rad", mode.mean.heading_rad},
           {"spread_m", mode.spread_m},    {"heading_spread_rad", mode.heading_spread_rad},
           {"covariance", mode.covariance}};
 }
 
-ordered_json as_json(const TrackedImage& image) {
+ordered_json to_json(const TrackedImage& image) {
   const MonteCarloEstimate& estimate = image.estimate;
   auto modes = ordered_json::array();
-  for (const PoseMode& mode : estimate.modes) modes.push_back(as_json(mode));
+  for (const PoseMode& mode : estimate.modes) modes.push_back(to_json(mode));
   ordered_json truth;
   if (image.truth) {
     truth = {{"x_m", image.truth->x_m},
              {"y_m", image.truth->y_m},
-             {"heading_rad", or_null(image.truth->heading_rad)}};
+             {"heading_rad", to_json_or_null(image.truth->heading_rad)}};
   }
   return {{"file", image.file},
-          {"stamp_s", or_null(image.stamp_s)},
+          {"stamp_s", to_json_or_null(image.stamp_s)},
           {"state", name_of(estimate.state)},
           {"pose", estimate.pose ? pose_json(*estimate.pose) : ordered_json()},
           {"inside", estimate.inside},
@@ -117,8 +117,8 @@ ordered_json as_json(const TrackedImage& image) {
           {"effective_particles", estimate.effective_particles},
           {"resampled", estimate.resampled},
           {"injected", estimate.injected},
-          {"difference_here", or_null(estimate.difference_here)},
-          {"difference_anywhere", or_null(estimate.difference_anywhere)},
+          {"difference_here", to_json_or_null(estimate.difference_here)},
+          {"difference_anywhere", to_json_or_null(estimate.difference_anywhere)},
           {"ground_truth", std::move(truth)}};
 }
 
@@ -211,7 +211,7 @@ class LiveTrack {
                         source}),
         odometry_(visual_odometry(tracker_.memory())),
         record_(arguments.record, std::span(&arguments.memory, 1), true, session,
-                {.memory = arguments.memory, .takes = viewer::ViewWish::pose}) {
+                {.memory = arguments.memory, .takes = viewer::ViewerInput::pose}) {
     session.note("panonav track: motion is computed from the images; one unit of the views is " +
                  format_number(odometry_.scale_m()) + " m, as in the memory");
     set_start(tracker_, arguments);
@@ -255,7 +255,7 @@ class LiveTrack {
     if (arguments_.tum && is_localised(image) && later) {
       trajectory_.push_back({*observation.stamp_s, *image.estimate.pose});
     }
-    return session_.json() ? json_line(as_json(image)) : format_line(image, session_);
+    return session_.json() ? json_line(to_json(image)) : format_line(image, session_);
   }
   /// Records the image that was observed last.
   void record() {
@@ -289,7 +289,7 @@ class LiveTrack {
 
 ExitCode track_live(const Arguments& declared, const TrackArguments& arguments,
                     const MemoryFile& file, Session& session) {
-  declared.refuse_unused({"--report"}, "where " + arguments.dataset + " is a live source");
+  declared.reject_options({"--report"}, "where " + arguments.dataset + " is a live source");
   const auto source =
       open_live(declared, arguments.dataset, {}, file.header().source, arguments.live, session);
   LiveTrack track(declared, arguments, file, source->pictures(), session);
@@ -324,7 +324,7 @@ ExitCode track_run(const Arguments& declared, const TrackArguments& arguments, S
   check_arguments(declared, arguments);
   const auto file = MemoryFile::open(arguments.memory, Access::read_only);
   if (recordings::is_live(arguments.dataset)) return track_live(declared, arguments, file, session);
-  refuse_live(declared, arguments.dataset, true);
+  reject_live_input(declared, arguments.dataset, true);
   Dataset run = read_run(arguments.dataset, arguments.topics, arguments.part, file, session);
   const bool visual = odometry_poses(run).empty();
   std::vector<double> seconds;
@@ -343,7 +343,7 @@ ExitCode track_run(const Arguments& declared, const TrackArguments& arguments, S
   }
 
   RunRecord record(arguments.record, std::array{arguments.dataset, arguments.memory}, false,
-                   session, {.memory = arguments.memory, .takes = viewer::ViewWish::pose});
+                   session, {.memory = arguments.memory, .takes = viewer::ViewerInput::pose});
   const std::size_t image_count = (run.entries.size() - 1) / settings.every + 1;
   std::optional<ShownReferences> shown;
   if (record.is_active() || arguments.report) {
@@ -356,7 +356,7 @@ ExitCode track_run(const Arguments& declared, const TrackArguments& arguments, S
   Progress progress(session, "tracking", image_count);
   track(tracker, run, settings, session.executor(), [&](TrackedImage&& image) {
     progress.clear();
-    session.print(session.json() ? json_line(as_json(image)) : format_line(image, session));
+    session.print(session.json() ? json_line(to_json(image)) : format_line(image, session));
     if (arguments.report) add(played, image);
     if (record.is_active()) record.add(std::move(*image.moment));
     image.moment.reset();

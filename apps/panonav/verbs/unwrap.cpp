@@ -22,7 +22,7 @@ struct UnwrapArguments {
   UnwarperOptions unwarper;
 };
 
-ordered_json as_json(const Panorama& panorama) {
+ordered_json to_json(const Panorama& panorama) {
   ordered_json json{{"rows", panorama.rows()},
                     {"columns", panorama.columns()},
                     {"elevations_rad", nullptr},
@@ -83,7 +83,7 @@ ExitCode unwrap_series(const UnwrapArguments& arguments, const Dataset& recordin
   if (session.json()) {
     ordered_json json{
         {"input", arguments.input}, {"out", arguments.out}, {"images", recording.entries.size()}};
-    json.update(as_json(*last));
+    json.update(to_json(*last));
     session.print(json_line(json));
   } else {
     session.print(arguments.out + ": " + std::to_string(recording.entries.size()) +
@@ -99,7 +99,7 @@ ExitCode unwrap(const Arguments& declared, const UnwrapArguments& arguments, Ses
                          open_recording(input, arguments.pictures, std::nullopt, session), session);
   }
   if (fs::exists(input)) {
-    declared.refuse_unused(recording_flags(), "as " + input + " is one image");
+    declared.reject_options(recording_flags(), "as " + input + " is one image");
   }
   auto source = picture_source(arguments.pictures);
   if (!source) {
@@ -113,7 +113,7 @@ ExitCode unwrap(const Arguments& declared, const UnwrapArguments& arguments, Ses
   write_png(arguments.out, picture.view());
   if (session.json()) {
     ordered_json json{{"image", input}, {"out", arguments.out}};
-    json.update(as_json(panorama));
+    json.update(to_json(panorama));
     session.print(json_line(json));
   } else {
     session.print(arguments.out + ": " + format_line(panorama));

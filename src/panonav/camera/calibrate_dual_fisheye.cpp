@@ -79,9 +79,9 @@ std::optional<std::array<FieldCircle, 2>> find_circles(const std::vector<Image>&
       half.data += lens * width;
       half.width = width;
       planes.push_back(smooth_planes(half, reduction, 1.0));
-      fields.push_back(edge_field(planes.back()));
+      fields.push_back(make_edge_field(planes.back()));
     }
-    const EdgeField field = mean_field(fields);
+    const EdgeField field = average_fields(fields);
     const int coarser = std::max(1, std::min(field.width, field.height) / 64);
     const EdgeField coarse = reduce(field, coarser);
     const double half_side = 0.5 * std::min(coarse.width, coarse.height);
@@ -263,9 +263,9 @@ double Calibrator::azimuth_deviation(const Camera& camera, const MatrixXd& covar
     };
     for (int j = 0; j < lens_size; ++j) {
       FisheyeLens changed = now.lenses[lens];
-      add_to(changed, j, slope_step(j));
+      add_to(changed, j, get_derivative_step(j));
       slopes(i, lens_at(lens) + j) =
-          angle_difference(azimuth(changed), azimuth(now.lenses[lens])) / slope_step(j);
+          angle_difference(azimuth(changed), azimuth(now.lenses[lens])) / get_derivative_step(j);
     }
   }
   slopes.rowwise() -= slopes.colwise().mean().eval();

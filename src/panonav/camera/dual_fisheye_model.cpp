@@ -11,7 +11,7 @@ namespace panonav {
 namespace {
 
 /// dr/dtheta / f.
-double slope(const FisheyeLens& lens, double angle_rad) {
+double radius_derivative(const FisheyeLens& lens, double angle_rad) {
   const double s = angle_rad * angle_rad;
   return 1 + s * (3 * lens.k3 + s * 5 * lens.k5);
 }
@@ -39,8 +39,9 @@ void validate(const FisheyeLens& lens, const std::string& name) {
   const double vertex = lens.k5 > 0 ? std::clamp(-0.3 * lens.k3 / lens.k5, 0.0, end) : end;
   for (const double s : {end, vertex}) {
     const double angle_rad = std::sqrt(s);
-    require(slope(lens, angle_rad) > 0, name + "k3, k5: angle where the radius stops growing",
-            angle_rad, "beyond max_angle_rad " + to_text(lens.max_angle_rad));
+    require(radius_derivative(lens, angle_rad) > 0,
+            name + "k3, k5: angle where the radius stops growing", angle_rad,
+            "beyond max_angle_rad " + to_text(lens.max_angle_rad));
   }
 }
 
@@ -65,7 +66,7 @@ double angle_at(const FisheyeLens& lens, double radius_px) {
   for (int i = 0; i < 60; ++i) {
     const double excess = radius_at(lens, angle) - radius_px;
     (excess > 0 ? high : low) = angle;
-    double next = angle - excess / (lens.focal_length_px * slope(lens, angle));
+    double next = angle - excess / (lens.focal_length_px * radius_derivative(lens, angle));
     if (!(next >= low && next <= high)) next = 0.5 * (low + high);
     if (std::abs(next - angle) <= 1e-15 * lens.max_angle_rad) return next;
     angle = next;

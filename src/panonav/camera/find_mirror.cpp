@@ -55,19 +55,20 @@ struct SearchFields {
   int coarse_reduction = 1;
 };
 
-int reduction_to(int side_px, int target_px) {
+int compute_reduction(int side_px, int target_px) {
   return std::max(1, (side_px + target_px - 1) / target_px);
 }
 
 EdgeField make_middle_field(const ImageView& image) {
   const int longest = std::max(image.width, image.height);
-  return edge_field(smooth_planes(image, reduction_to(longest, middle_side_px), 1.0));
+  return make_edge_field(smooth_planes(image, compute_reduction(longest, middle_side_px), 1.0));
 }
 
 SearchFields make_search_fields(EdgeField middle, const ImageSize& size) {
   SearchFields result;
-  result.middle_reduction = reduction_to(std::max(size.width, size.height), middle_side_px);
-  result.coarse_reduction = reduction_to(std::max(middle.width, middle.height), coarse_side_px);
+  result.middle_reduction = compute_reduction(std::max(size.width, size.height), middle_side_px);
+  result.coarse_reduction =
+      compute_reduction(std::max(middle.width, middle.height), coarse_side_px);
   result.coarse = reduce(middle, result.coarse_reduction);
   result.middle = std::move(middle);
   return result;
@@ -324,7 +325,7 @@ std::optional<MirrorCircle> find_mirror(std::span<const ImageView> images,
   MirrorCircle mirror;
   mirror.image_size = size;
   const auto all =
-      search_mirror(make_search_fields(mean_field(fields), size), planes, size, options);
+      search_mirror(make_search_fields(average_fields(fields), size), planes, size, options);
   if (!all) return std::nullopt;
   if (images.size() == 1) {
     mirror.rim_per_image.emplace_back(all->rim);

@@ -121,7 +121,7 @@ void remember_address(std::string_view address) {
   remembered.masks.try_emplace(std::string(address), std::move(masked));
 }
 
-std::string without_passwords(std::string_view text) {
+std::string mask_passwords(std::string_view text) {
   std::string known(text);
   {
     RememberedAddresses& remembered = remembered_addresses();

@@ -13,12 +13,12 @@ namespace panonav {
 /// characters were forgotten to be escaped: rather too much is hidden than too little.
 [[nodiscard]] std::string mask_credentials(std::string_view address);
 
-/// Makes `without_passwords` recognise this address in texts, also with blanks and quotes in it.
+/// Makes `mask_passwords` recognise this address in texts, also with blanks and quotes in it.
 /// Texts that need no mask are not kept. Any thread may call. Memory: each address once.
 void remember_address(std::string_view address);
 
 /// Returns a text for printing with "***" for the passwords in addresses: in those that were
 /// remembered, as they stand or escaped for JSON or a shell, and in others up to a blank or quote.
-[[nodiscard]] std::string without_passwords(std::string_view text);
+[[nodiscard]] std::string mask_passwords(std::string_view text);
 
 }  // namespace panonav

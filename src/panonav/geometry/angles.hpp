@@ -30,7 +30,7 @@ namespace panonav {
 
 /// Converts to degrees as files show them: 30 rather than 29.999999999999996 where both are read
 /// back as the same radians.
-[[nodiscard]] inline double round_trip_degrees(double angle_rad) {
+[[nodiscard]] inline double to_exact_degrees(double angle_rad) {
   const double exact = degrees(angle_rad);
   constexpr double steps = 1e9;
   const double rounded = std::round(exact * steps) / steps;

@@ -38,16 +38,16 @@ std::vector<Point2> clip_to_half_plane(const std::vector<Point2>& polygon, Point
   return kept;
 }
 
-bool covers(const Circle& circle, Point2 p) {
+bool is_inside(const Circle& circle, Point2 p) {
   return distance(circle.centre, p) <= circle.radius_m * (1.0 + 1e-12) + 1e-15;
 }
 
-Circle circle_through(Point2 a, Point2 b) {
+Circle make_circle_through(Point2 a, Point2 b) {
   const Point2 centre{0.5 * (a.x_m + b.x_m), 0.5 * (a.y_m + b.y_m)};
   return {centre, std::max(distance(centre, a), distance(centre, b))};
 }
 
-Circle circle_through(Point2 a, Point2 b, Point2 c) {
+Circle make_circle_through(Point2 a, Point2 b, Point2 c) {
   const double bx = b.x_m - a.x_m;
   const double by = b.y_m - a.y_m;
   const double cx = c.x_m - a.x_m;
@@ -62,10 +62,11 @@ Circle circle_through(Point2 a, Point2 b, Point2 c) {
   }
   if (std::isfinite(best.radius_m)) return best;
   // On one line two of the three span the circle.
-  for (const Circle& pair : {circle_through(a, b), circle_through(a, c), circle_through(b, c)}) {
-    if (covers(pair, a) && covers(pair, b) && covers(pair, c)) return pair;
+  for (const Circle& pair :
+       {make_circle_through(a, b), make_circle_through(a, c), make_circle_through(b, c)}) {
+    if (is_inside(pair, a) && is_inside(pair, b) && is_inside(pair, c)) return pair;
   }
-  return circle_through(a, b);
+  return make_circle_through(a, b);
 }
 
 }  // namespace
@@ -89,13 +90,14 @@ Circle smallest_enclosing_circle(std::span<const Point2> points) {
   for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random.index(i)]);
   Circle circle{order[0], 0.0};
   for (std::size_t i = 1; i < order.size(); ++i) {
-    if (covers(circle, order[i])) continue;
+    if (is_inside(circle, order[i])) continue;
     circle = {order[i], 0.0};
     for (std::size_t j = 0; j < i; ++j) {
-      if (covers(circle, order[j])) continue;
-      circle = circle_through(order[i], order[j]);
+      if (is_inside(circle, order[j])) continue;
+      circle = make_circle_through(order[i], order[j]);
       for (std::size_t k = 0; k < j; ++k) {
-        if (!covers(circle, order[k])) circle = circle_through(order[i], order[j], order[k]);
+        if (!is_inside(circle, order[k]))
+          circle = make_circle_through(order[i], order[j], order[k]);
       }
     }
   }

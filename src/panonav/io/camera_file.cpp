@@ -123,7 +123,7 @@ void write_camera(const std::filesystem::path& path, const CameraFile& file) {
     number("centre_v_px", camera.centre.v_px);
     number("rim_radius_px", camera.rim_radius_px);
     number("inner_radius_px", camera.inner_radius_px);
-    number("forward_angle_deg", round_trip_degrees(camera.forward_angle_rad));
+    number("forward_angle_deg", to_exact_degrees(camera.forward_angle_rad));
   }
   text += "columns = \"" +
           std::string(direction_names[camera.direction == ColumnDirection::clockwise ? 0 : 1]) +
@@ -131,7 +131,7 @@ void write_camera(const std::filesystem::path& path, const CameraFile& file) {
   if (file.mask) {
     const std::string name = path.stem().string() + "_mask.png";
     write_png(path.parent_path() / name, file.mask->view());
-    text += "mask = " + toml_text(name) + "\n";
+    text += "mask = " + quote_for_toml(name) + "\n";
   }
   write_file(path, text);
 }

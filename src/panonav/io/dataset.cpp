@@ -266,7 +266,7 @@ void require_whole_fields(const std::vector<DatasetEntry>& entries) {
   }
 }
 
-std::string table_text(const std::vector<DatasetEntry>& entries, const Dataset::Fields& columns) {
+std::string format_table(const std::vector<DatasetEntry>& entries, const Dataset::Fields& columns) {
   std::string table = "file";
   if (columns.stamps) table += ",stamp_s";
   if (columns.positions) table += ",x_m,y_m";
@@ -285,15 +285,15 @@ std::string table_text(const std::vector<DatasetEntry>& entries, const Dataset::
       add(entry.pose->x_m);
       add(entry.pose->y_m);
     }
-    if (columns.headings) add(round_trip_degrees(*entry.pose->heading_rad));
+    if (columns.headings) add(to_exact_degrees(*entry.pose->heading_rad));
     if (columns.odometry) {
       add(entry.odometry->x_m);
       add(entry.odometry->y_m);
-      add(round_trip_degrees(entry.odometry->heading_rad));
+      add(to_exact_degrees(entry.odometry->heading_rad));
     }
     if (columns.tilts) {
-      add(round_trip_degrees(entry.tilt->roll_rad));
-      add(round_trip_degrees(entry.tilt->pitch_rad));
+      add(to_exact_degrees(entry.tilt->roll_rad));
+      add(to_exact_degrees(entry.tilt->pitch_rad));
     }
     table += "\n";
   }
@@ -301,7 +301,7 @@ std::string table_text(const std::vector<DatasetEntry>& entries, const Dataset::
 }
 
 /// Returns the section [images]; the camera of a mirror is written into a file of its own.
-std::string images_text(const Dataset& dataset) {
+std::string format_images_section(const Dataset& dataset) {
   const PictureSource& source = dataset.source;
   std::string text = "[images]\nkind = \"" +
                      std::string(kind_names[static_cast<std::size_t>(source.kind)]) + "\"\n";
@@ -314,8 +314,8 @@ std::string images_text(const Dataset& dataset) {
             "\"\nforward_column = " + to_text(source.layout.forward_column) + "\n";
   }
   if (band) {
-    text += "elevation_deg = [" + to_text(round_trip_degrees(band->bottom_rad)) + ", " +
-            to_text(round_trip_degrees(band->top_rad)) + "]\n";
+    text += "elevation_deg = [" + to_text(to_exact_degrees(band->bottom_rad)) + ", " +
+            to_text(to_exact_degrees(band->top_rad)) + "]\n";
   }
   if (source.kind == PictureKind::mirror) {
     require(source.camera.has_value(), "camera of mirror images", 0.0, "one camera");
@@ -362,8 +362,8 @@ Dataset read_picture_tree(const fs::path& folder, PictureSource source) {
   return find_pictures(folder, std::move(source), true);
 }
 
-std::vector<std::size_t> selected_pictures(const std::vector<double>& stamps_s,
-                                           const Dataset::Selection& selection) {
+std::vector<std::size_t> choose_pictures(const std::vector<double>& stamps_s,
+                                         const Dataset::Selection& selection) {
   constexpr double rounding_s = 1e-4;
   std::vector<std::size_t> selected;
   std::size_t passed = 0;
@@ -400,7 +400,7 @@ void select_pictures(Dataset& dataset, const Dataset::Selection& selection) {
     }
   }
   std::vector<DatasetEntry> kept;
-  for (const std::size_t i : selected_pictures(stamps_s, selection)) {
+  for (const std::size_t i : choose_pictures(stamps_s, selection)) {
     kept.push_back(std::move(dataset.entries[i]));
   }
   if (kept.empty()) {
@@ -433,7 +433,7 @@ Dataset read_single_picture(const fs::path& file, PictureSource source) {
   return dataset;
 }
 
-Dataset::Fields shared_fields(const Dataset& dataset) {
+Dataset::Fields find_shared_fields(const Dataset& dataset) {
   Dataset::Fields fields;
   for (const EntryField& field : entry_fields) {
     fields.*field.shared = std::ranges::all_of(dataset.entries, field.has);
@@ -442,7 +442,7 @@ Dataset::Fields shared_fields(const Dataset& dataset) {
 }
 
 Dataset::Fields drop_partial_fields(Dataset& dataset) {
-  const Dataset::Fields fields = shared_fields(dataset);
+  const Dataset::Fields fields = find_shared_fields(dataset);
   for (DatasetEntry& entry : dataset.entries) {
     if (!fields.stamps) entry.stamp_s.reset();
     if (!fields.positions) entry.pose.reset();
@@ -455,12 +455,12 @@ Dataset::Fields drop_partial_fields(Dataset& dataset) {
 
 void write_dataset(const Dataset& dataset) {
   require_whole_fields(dataset.entries);
-  const Dataset::Fields columns = shared_fields(dataset);
-  std::string text = images_text(dataset);
+  const Dataset::Fields columns = find_shared_fields(dataset);
+  std::string text = format_images_section(dataset);
   const bool with_poses = columns.positions || columns.odometry;
   const std::string name = with_poses ? "poses.csv" : "images.csv";
   text += std::string("\n[") + (with_poses ? "poses" : "list") + "]\nfile = \"" + name + "\"\n";
-  write_file(dataset.folder / name, table_text(dataset.entries, columns));
+  write_file(dataset.folder / name, format_table(dataset.entries, columns));
   write_file(dataset.folder / "dataset.toml", text);
 }
 

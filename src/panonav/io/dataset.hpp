@@ -92,8 +92,8 @@ struct Dataset {
 
 /// Returns the indices of the pictures with these ascending stamps that are selected. A tenth of a
 /// millisecond does not count.
-[[nodiscard]] std::vector<std::size_t> selected_pictures(const std::vector<double>& stamps_s,
-                                                         const Dataset::Selection& selection);
+[[nodiscard]] std::vector<std::size_t> choose_pictures(const std::vector<double>& stamps_s,
+                                                       const Dataset::Selection& selection);
 
 /// Keeps the selected entries. Throws FileError when the selection has times and an entry has no
 /// stamp or one before that of its predecessor, and when nothing is left.
@@ -110,7 +110,7 @@ void select_pictures(Dataset& dataset, const Dataset::Selection& selection);
 [[nodiscard]] Dataset read_single_picture(const std::filesystem::path& file, PictureSource source);
 
 /// Returns what all entries have, of which there must be one or more.
-[[nodiscard]] Dataset::Fields shared_fields(const Dataset& dataset);
+[[nodiscard]] Dataset::Fields find_shared_fields(const Dataset& dataset);
 /// Drops what only some of the entries have, so that `write_dataset` takes them. Returns the rest.
 Dataset::Fields drop_partial_fields(Dataset& dataset);
 

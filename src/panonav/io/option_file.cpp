@@ -14,7 +14,7 @@ namespace panonav {
 namespace {
 
 template <class Table>  // const or not
-auto section_in(Table& table, std::string_view section) {
+auto find_section(Table& table, std::string_view section) {
   const auto found = std::ranges::find(table, section, &TomlField::name);
   return found == table.end() ? nullptr : std::get_if<TomlTable>(&found->value.content);
 }
@@ -63,7 +63,7 @@ class OptionReader final : public OptionVisitor {
 
 }  // namespace
 
-std::string toml_text(std::string_view text) {
+std::string quote_for_toml(std::string_view text) {
   constexpr std::string_view digits = "0123456789ABCDEF";
   std::string result = "\"";
   for (const char c : text) {
@@ -99,7 +99,7 @@ OptionFile::OptionFile(OptionFile&&) noexcept = default;
 OptionFile& OptionFile::operator=(OptionFile&&) noexcept = default;
 
 void OptionFile::apply(std::string_view section, const std::function<void(OptionVisitor&)>& visit) {
-  const TomlTable* table = section_in(table_, section);
+  const TomlTable* table = find_section(table_, section);
   if (table == nullptr) return;
   OptionReader reader(path_, section, *table);
   visit(reader);
@@ -107,7 +107,7 @@ void OptionFile::apply(std::string_view section, const std::function<void(Option
 }
 
 std::optional<std::string> OptionFile::take_text(std::string_view section, std::string_view field) {
-  TomlTable* table = section_in(table_, section);
+  TomlTable* table = find_section(table_, section);
   if (table == nullptr) return std::nullopt;
   TomlFields fields(path_, std::string(section), *table);
   auto text = fields.text(field);
@@ -116,7 +116,7 @@ std::optional<std::string> OptionFile::take_text(std::string_view section, std::
 }
 
 bool OptionFile::has(std::string_view section, std::string_view field) const {
-  const TomlTable* table = section_in(table_, section);
+  const TomlTable* table = find_section(table_, section);
   return table != nullptr && std::ranges::find(*table, field, &TomlField::name) != table->end();
 }
 

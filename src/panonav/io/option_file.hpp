@@ -15,7 +15,7 @@ namespace panonav {
 struct TomlField;
 
 /// Returns the text in quotation marks as TOML writes it.
-[[nodiscard]] std::string toml_text(std::string_view text);
+[[nodiscard]] std::string quote_for_toml(std::string_view text);
 
 /// A TOML file of options (docs/formats.md): one section for each options struct, in it one field
 /// for each member that the struct's `visit_options` shows.

@@ -103,7 +103,7 @@ void write_trajectory(const std::filesystem::path& path, std::span<const Stamped
   for (const auto& [stamp_s, pose] : trajectory) {
     if (table) {
       text += to_text(stamp_s) + "," + to_text(pose.x_m) + "," + to_text(pose.y_m) + "," +
-              to_text(round_trip_degrees(pose.heading_rad)) + "\n";
+              to_text(to_exact_degrees(pose.heading_rad)) + "\n";
     } else {
       text += to_text(stamp_s) + " " + to_text(pose.x_m) + " " + to_text(pose.y_m) + " 0 0 0 " +
               to_text(std::sin(0.5 * pose.heading_rad)) + " " +

@@ -85,7 +85,7 @@ void move_nearest_first(const VisualMemory& memory, Point2 position,
   std::rotate(matches.begin(), nearest, nearest + 1);
 }
 
-std::vector<ViewId> ids_of(std::span<const RankedMatch> matches) {
+std::vector<ViewId> to_ids(std::span<const RankedMatch> matches) {
   std::vector<ViewId> ids;
   for (const RankedMatch& match : matches) ids.push_back(match.match.view);
   return ids;
@@ -244,7 +244,7 @@ class Localiser::Query {
   /// that may support them, and those of chance.
   void load_compared_views() {
     if (compared_ != nullptr) return;
-    std::vector<ViewId> views = ids_of(ranked_);
+    std::vector<ViewId> views = to_ids(ranked_);
     views.insert(views.end(), mask_.excluded_views.begin(), mask_.excluded_views.end());
     if (options_.reranked_views > 0) {
       const auto around = index_.views_within(bound_supporters(*loaded_, ranked_, own_.spacing_m_));

@@ -153,7 +153,7 @@ struct MonteCarloLocaliser::Implementation {
   /// those around the particles.
   void compare_views(const PackedSignature& view, bool was_localised) {
     likelihood.set_view(view);
-    compare_found(view, was_localised ? searched_views_when_localised : searched_views);
+    compare_searched_views(view, was_localised ? searched_views_when_localised : searched_views);
     const std::size_t max_followed =
         was_localised ? max_followed_sites_when_localised : max_followed_sites;
     const auto followed = likelihood.heaviest_sites(particles, max_followed, min_followed_weight);
@@ -169,16 +169,16 @@ struct MonteCarloLocaliser::Implementation {
       if (sites <= static_cast<std::size_t>(options.reranked_views)) {
         for (std::uint32_t site = 0; site < sites; ++site) likelihood.compare(site);
       } else if (options.reranked_views > searched_views) {
-        compare_found(view, options.reranked_views);
+        compare_searched_views(view, options.reranked_views);
       }
     }
-    compare_around_best();
+    compare_views_near_best();
     latest.difference_here = likelihood.min_difference(followed);
     latest.difference_anywhere = likelihood.min_difference(likelihood.compared_sites());
     latest.views_compared = likelihood.compared_sites().size();
   }
 
-  void compare_found(const PackedSignature& view, int count) {
+  void compare_searched_views(const PackedSignature& view, int count) {
     const SearchResult found =
         ranking->memory().search(view, {.top = count, .components = ranking->components()});
     for (const Match& match : found.matches) {
@@ -186,7 +186,7 @@ struct MonteCarloLocaliser::Implementation {
     }
   }
 
-  void compare_around_best() {
+  void compare_views_near_best() {
     const auto sites = likelihood.sites();
     std::optional<std::uint32_t> best;
     for (const std::uint32_t site : likelihood.compared_sites()) {
@@ -211,11 +211,11 @@ struct MonteCarloLocaliser::Implementation {
       const std::size_t replaced = random.index(size);
       Pose2 pose;
       if (sites.empty()) {
-        pose = sampler.draw_anywhere(particles, random);
+        pose = sampler.sample_anywhere(particles, random);
       } else {
         const std::uint32_t site = sites[random.index(sites.size())];
         likelihood.compare(site);
-        pose = sampler.draw_around({site, false}, particles, random);
+        pose = sampler.sample_around({site, false}, particles, random);
       }
       particles.set(replaced, pose, 1.0 / static_cast<double>(size));
     }
@@ -281,7 +281,7 @@ struct MonteCarloLocaliser::Implementation {
     estimate.probability = found.modes.empty() ? 0.0 : inside * found.modes.front().weight;
     estimate.state = LocalisationState::lost;
     if (inside < min_inside) return;
-    if (!found.modes.empty() && !is_memorised(found.modes.front().mean.position())) return;
+    if (!found.modes.empty() && !is_in_memorised_area(found.modes.front().mean.position())) return;
     estimate.state = LocalisationState::ambiguous;
     if (found.modes.empty()) return;
     const PoseMode& first = found.modes.front();
@@ -303,7 +303,7 @@ struct MonteCarloLocaliser::Implementation {
   }
 
   /// True if a reference is near enough to be compared with the place.
-  [[nodiscard]] bool is_memorised(Point2 place) const {
+  [[nodiscard]] bool is_in_memorised_area(Point2 place) const {
     if (!likelihood.sites_near(place).empty()) return true;
     const double reach_m = memorised_reach * std::max(model.spacing_m, model.range_m);
     return std::ranges::any_of(likelihood.sites(), [&](const ViewLikelihood::Site& site) {
@@ -382,7 +382,7 @@ void MonteCarloLocaliser::start_globally(std::optional<double> heading_rad) {
     const double share = (static_cast<double>(i) + first) / static_cast<double>(count);
     const auto site =
         std::min(sites - 1, static_cast<std::size_t>(share * static_cast<double>(sites)));
-    own.particles.set(i, own.sampler.draw_in_square(site, heading_rad, own.random),
+    own.particles.set(i, own.sampler.sample_in_square(site, heading_rad, own.random),
                       1.0 / static_cast<double>(count));
   }
   own.restart(false);

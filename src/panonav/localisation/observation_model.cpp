@@ -53,7 +53,7 @@ struct Site {
   std::optional<double> heading_rad;
 };
 
-std::vector<Site> posed_sites(const VisualMemory& memory) {
+std::vector<Site> collect_posed_sites(const VisualMemory& memory) {
   std::vector<Site> sites;
   for (const ViewId view : memory.views()) {
     if (const auto& pose = memory.info(view).pose) {
@@ -64,8 +64,8 @@ std::vector<Site> posed_sites(const VisualMemory& memory) {
 }
 
 /// Returns the nearest other sites, ascending by distance.
-std::vector<std::uint32_t> nearest_sites(std::span<const Site> sites, std::size_t own,
-                                         std::size_t count) {
+std::vector<std::uint32_t> find_nearest_sites(std::span<const Site> sites, std::size_t own,
+                                              std::size_t count) {
   std::vector<std::pair<double, std::uint32_t>> found;
   found.reserve(sites.size());
   for (std::uint32_t s = 0; s < sites.size(); ++s) {
@@ -102,7 +102,7 @@ class LeftOutView {
 };
 
 // Negative for views that differ more than views far from each other do on average.
-double similarity_of(const ColumnMatch& match, double far) {
+double to_similarity(const ColumnMatch& match, double far) {
   return far * far - match.difference * match.difference;
 }
 
@@ -174,7 +174,7 @@ double fit_sharpness(std::span<const Explained> views) {
 class LearningSample {
  public:
   LearningSample(const ColumnRanking& ranking, const LearningOptions& options)
-      : sites_(posed_sites(ranking.memory())) {
+      : sites_(collect_posed_sites(ranking.memory())) {
     require(sites_.size() >= static_cast<std::size_t>(ObservationModel::min_views),
             "views with a position in the memory", static_cast<double>(sites_.size()),
             ">= " + to_text(ObservationModel::min_views));
@@ -224,16 +224,16 @@ class LearningSample {
   }
 
   /// Learns how similarity falls with distance, and how far headings of neighbours are off.
-  void learn_fall(ObservationModel& model) {
+  void learn_decay(ObservationModel& model) {
     std::vector<std::pair<double, double>> curve;
     std::vector<double> heading_errors;
     for (std::size_t i = 0; i < own_.size(); ++i) {
       const Site& here = sites_[own_[i]];
-      for (const std::uint32_t s : nearest_sites(sites_, own_[i], fitted_sites)) {
+      for (const std::uint32_t s : find_nearest_sites(sites_, own_[i], fitted_sites)) {
         const double distance_m = distance(sites_[s].position, here.position);
         if (distance_m > fitted_spacings * spacing_m_) break;
         const ColumnMatch& match = left_out_[i].match(s);
-        curve.emplace_back(distance_m, similarity_of(match, model.far_difference));
+        curve.emplace_back(distance_m, to_similarity(match, model.far_difference));
         if (distance_m <= adjacent_site_spacings * spacing_m_ && here.heading_rad &&
             sites_[s].heading_rad) {
           heading_errors.push_back(std::abs(
@@ -269,7 +269,7 @@ class LearningSample {
  private:
   double explained_at(std::size_t i, std::uint32_t where, const ObservationModel& model) {
     if (near_[where].empty()) {
-      near_[where] = nearest_sites(sites_, where, near_sites);
+      near_[where] = find_nearest_sites(sites_, where, near_sites);
       near_[where].insert(near_[where].begin(), where);
     }
     double product = 0.0;
@@ -280,7 +280,7 @@ class LearningSample {
           std::exp(-distance(sites_[s].position, sites_[where].position) / model.range_m);
       square += expected * expected;
       product +=
-          expected * std::max(0.0, similarity_of(left_out_[i].match(s), model.far_difference));
+          expected * std::max(0.0, to_similarity(left_out_[i].match(s), model.far_difference));
     }
     return square > 0.0 ? product * product / square : 0.0;
   }
@@ -308,7 +308,7 @@ ObservationModel learn_observation_model(const ColumnRanking& ranking,
   model.explained_difference = place.threshold;
   model.sampled_views = static_cast<int>(sample.size());
   model.far_difference = sample.far_difference();
-  sample.learn_fall(model);
+  sample.learn_decay(model);
   model.sharpness = fit_sharpness(sample.explain(model));
   return model;
 }

@@ -83,7 +83,7 @@ double log_ratio(int verified, int reference) {
 
 }  // namespace
 
-std::vector<ViewId> draw_views(std::span<const ViewId> views) {
+std::vector<ViewId> sample_reference_views(std::span<const ViewId> views) {
   std::vector<std::pair<std::uint64_t, ViewId>> drawn;  // a heap, the largest number in front
   for (const ViewId view : views) {
     const std::pair number(Random(1, view.value).next(), view);
@@ -197,12 +197,13 @@ std::array<double, feature_term_count> feature_terms(const PlaceEvidence& eviden
 PlaceCriterion::PlaceCriterion(const ColumnRanking& ranking, std::size_t views)
     : ranking_(&ranking),
       views_(static_cast<int>(std::min<std::size_t>(views, std::numeric_limits<int>::max()))),
-      sample_(draw_views(ranking.memory().views())) {
+      sample_(sample_reference_views(ranking.memory().views())) {
   for (const ViewId view : sample_) profiles_.push_back(profiles(view, {}));
 }
 
 PlaceCriterion::PlaceCriterion(const ViewSource& source)
-    : views_(static_cast<int>(source.views().size())), sample_(draw_views(source.views())) {
+    : views_(static_cast<int>(source.views().size())),
+      sample_(sample_reference_views(source.views())) {
   std::vector<ViewId> ascending = sample_;
   std::ranges::sort(ascending);
   const VisualMemory loaded = source.load(ascending);

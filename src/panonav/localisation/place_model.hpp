@@ -85,7 +85,7 @@ inline constexpr int feature_term_count = 4;
 
 /// Draws the views that a `PlaceCriterion` takes from a memory of these views: 80, each by its own
 /// number, or all, in the order in which they were drawn.
-[[nodiscard]] std::vector<ViewId> draw_views(std::span<const ViewId> views);
+[[nodiscard]] std::vector<ViewId> sample_reference_views(std::span<const ViewId> views);
 
 /// Collects the evidence that separates places of the memory from unknown ones. All components of
 /// the memory count, however many the search compares.

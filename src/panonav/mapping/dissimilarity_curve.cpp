@@ -22,7 +22,7 @@ struct DistanceGroup {
 /// Makes the values rise: the nearest rising sequence in weighted least squares (pool adjacent
 /// violators).
 template <class Value>
-void make_rising(std::vector<DistanceGroup>& groups, Value value) {
+void make_monotonic(std::vector<DistanceGroup>& groups, Value value) {
   struct Block {
     double sum, weight;
     std::size_t size;
@@ -44,7 +44,7 @@ void make_rising(std::vector<DistanceGroup>& groups, Value value) {
   }
 }
 
-double interpolated(double x, double x0, double y0, double x1, double y1) {
+double interpolate(double x, double x0, double y0, double x1, double y1) {
   return x1 > x0 ? y0 + (y1 - y0) * (x - x0) / (x1 - x0) : y1;
 }
 
@@ -92,9 +92,9 @@ DissimilarityCurve::DissimilarityCurve(std::span<const DissimilarityCurve::Sampl
       group.square += missed * missed / group.weight;
     }
   }
-  make_rising(
+  make_monotonic(
       groups, [](auto& group) -> auto& { return group.distance; });
-  make_rising(
+  make_monotonic(
       groups, [](auto& group) -> auto& { return group.square; });
   knots_.push_back({});
   for (const DistanceGroup& group : groups) {
@@ -115,8 +115,8 @@ double DissimilarityCurve::distance(double dissimilarity) const {
   if (above == knots_.end()) return knots_.back().distance;
   if (above == knots_.begin()) return 0.0;
   const Knot& low = *(above - 1);
-  return interpolated(dissimilarity, low.dissimilarity, low.distance, above->dissimilarity,
-                      above->distance);
+  return interpolate(dissimilarity, low.dissimilarity, low.distance, above->dissimilarity,
+                     above->distance);
 }
 
 double DissimilarityCurve::error(double distance) const {
@@ -124,7 +124,7 @@ double DissimilarityCurve::error(double distance) const {
   if (above == knots_.end()) return knots_.back().error;
   if (above == knots_.begin()) return knots_.front().error;
   const Knot& low = *(above - 1);
-  return interpolated(distance, low.distance, low.error, above->distance, above->error);
+  return interpolate(distance, low.distance, low.error, above->distance, above->error);
 }
 
 double DissimilarityCurve::stiffness(double distance) const {

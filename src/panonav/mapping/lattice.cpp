@@ -77,7 +77,7 @@ class Arranger {
         motions_(memory, motion),
         measured_(views_, executor) {
     for (const ViewId view : memory.views()) lattice_.nodes.push_back({.view = view});
-    by_motion_ = motions_.connect_all(size());
+    by_motion_ = motions_.are_all_connected(size());
     lattice_.metric = !motions_.empty();
   }
 

@@ -19,7 +19,7 @@ namespace panonav {
 namespace {
 
 // Returns the views at most `links` links away, without the view itself.
-std::vector<ViewId> within_links(const VisualMemory& memory, ViewId view, int links) {
+std::vector<ViewId> find_views_within_links(const VisualMemory& memory, ViewId view, int links) {
   std::unordered_set<ViewId> visited{view};
   std::vector<ViewId> found;
   std::vector<ViewId> front{view};
@@ -46,7 +46,7 @@ Representatives representatives_of(const SparseSelection& selection) {
 }
 
 /// Returns the view that represents another one: itself where it is kept.
-ViewId representative(const Representatives& kept, ViewId view) {
+ViewId find_representative(const Representatives& kept, ViewId view) {
   const auto found = kept.find(view);
   return found == kept.end() ? view : found->second;
 }
@@ -99,7 +99,7 @@ SparseSelection select_references(const VisualMemory& memory, const SparseMemory
         if (distance_m <= reach_m) consider(ViewId{other}, distance_m);
       });
     } else {
-      for (const ViewId other : within_links(memory, view, options.reach_links)) {
+      for (const ViewId other : find_views_within_links(memory, view, options.reach_links)) {
         consider(other, std::nullopt);
       }
     }
@@ -121,7 +121,8 @@ std::vector<Link> contract_links(std::span<const Link> links, const SparseSelect
   std::set<std::pair<ViewId, ViewId>> pairs;
   std::vector<Link> left;
   for (const Link& link : links) {
-    const Link moved{representative(kept, link.a), representative(kept, link.b), link.kind};
+    const Link moved{find_representative(kept, link.a), find_representative(kept, link.b),
+                     link.kind};
     if (moved.a != moved.b && pairs.insert(std::minmax(moved.a, moved.b)).second)
       left.push_back(moved);
   }
@@ -133,7 +134,7 @@ TopologicalMap contract_map(const TopologicalMap& map, const SparseSelection& se
   const Representatives kept = representatives_of(selection);
   TopologicalMap left;
   for (const TopologicalMap::Node& node : map.nodes) {
-    if (representative(kept, node.view) == node.view) left.nodes.push_back(node);
+    if (find_representative(kept, node.view) == node.view) left.nodes.push_back(node);
   }
   const auto node_of = [&](ViewId view) -> const TopologicalMap::Node* {
     const auto found = std::ranges::lower_bound(left.nodes, view, {}, &TopologicalMap::Node::view);
@@ -142,8 +143,8 @@ TopologicalMap contract_map(const TopologicalMap& map, const SparseSelection& se
   std::set<std::pair<ViewId, ViewId>> pairs;
   for (const TopologicalMap::Edge& edge : map.edges) {
     TopologicalMap::Edge moved = edge;
-    moved.a = representative(kept, edge.a);
-    moved.b = representative(kept, edge.b);
+    moved.a = find_representative(kept, edge.a);
+    moved.b = find_representative(kept, edge.b);
     const TopologicalMap::Node* const a = node_of(moved.a);
     const TopologicalMap::Node* const b = node_of(moved.b);
     // A view outside of the map, or of another component, may stand for one in it.

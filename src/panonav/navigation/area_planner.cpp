@@ -78,8 +78,8 @@ std::vector<Guide> AreaPlanner::search_from(std::size_t area, std::size_t node) 
 }
 
 // Returns the index among the gate ends of the next area of the one to which the exit leads.
-std::optional<std::size_t> AreaPlanner::end_beyond(std::size_t area,
-                                                   const NavigationGraph::Exit& exit) const {
+std::optional<std::size_t> AreaPlanner::find_end_beyond(std::size_t area,
+                                                        const NavigationGraph::Exit& exit) const {
   const std::size_t beyond = areas_.area_of[exit.node];
   if (beyond == area || blocked_[exit.edge] != 0) return std::nullopt;
   const auto& nodes = ends_[beyond].nodes;
@@ -172,7 +172,7 @@ void AreaPlanner::plan_over_areas() {
       relax(at.length + ends.path_lengths[at.end * count + to], at.area, to);
     }
     for (const NavigationGraph::Exit& exit : graph_.exits(ends.nodes[at.end])) {
-      if (const auto end = end_beyond(at.area, exit)) {
+      if (const auto end = find_end_beyond(at.area, exit)) {
         relax(at.length + graph_.edges()[exit.edge].length, areas_.area_of[exit.node], *end);
       }
     }
@@ -223,7 +223,7 @@ std::vector<Guide> AreaPlanner::field(std::size_t area) const {
   if (goal_ && areas_.area_of[*goal_] == area) roots.push_back({*goal_, 0.0, *goal_, 0});
   for (const std::size_t node : ends_[area].nodes) {
     for (const NavigationGraph::Exit& exit : graph_.exits(node)) {
-      const auto end = end_beyond(area, exit);
+      const auto end = find_end_beyond(area, exit);
       if (!end) continue;
       const double length =
           ends_[areas_.area_of[exit.node]].lengths_to_goal[*end] + graph_.edges()[exit.edge].length;

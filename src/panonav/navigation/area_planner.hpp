@@ -83,8 +83,8 @@ class AreaPlanner {
   [[nodiscard]] std::pair<std::size_t, std::size_t> ends_of(std::size_t edge,
                                                             std::size_t area) const;
   [[nodiscard]] std::vector<Guide> search_from(std::size_t area, std::size_t node) const;
-  [[nodiscard]] std::optional<std::size_t> end_beyond(std::size_t area,
-                                                      const NavigationGraph::Exit& exit) const;
+  [[nodiscard]] std::optional<std::size_t> find_end_beyond(std::size_t area,
+                                                           const NavigationGraph::Exit& exit) const;
   void choose_gates(Border& border) const;
   void find_paths(std::size_t area);
   void plan_over_areas();

@@ -66,7 +66,7 @@ void count_support(std::size_t views, std::vector<Spring>& springs) {
       const double off = distance(around.position(), spring.motion->position());
       const double rotation = angle_difference(around.heading_rad, spring.motion->heading_rad);
       spring.support += static_cast<int>(std::abs(rotation) <= max_rotation_error_rad &&
-                                         off <= max_position_error * length_of(*spring.motion));
+                                         off <= max_position_error * get_length(*spring.motion));
     }
   }
 }
@@ -118,7 +118,7 @@ std::vector<Candidate> make_candidates(const std::vector<ViewId>& views,
   std::vector<double> read;
   for (const Spring& spring : springs) {
     laid_out.push_back(is_rejected(spring) ? 0.0 : spring.length);
-    read.push_back(spring.motion ? length_of(*spring.motion) : 0.0);
+    read.push_back(spring.motion ? get_length(*spring.motion) : 0.0);
   }
   const std::vector<double> spacings_laid_out = spacings_around(views.size(), springs, laid_out);
   const std::vector<double> spacings_read = spacings_around(views.size(), springs, read);
@@ -146,7 +146,7 @@ std::vector<Candidate> make_candidates(const std::vector<ViewId>& views,
 
 // Marks edges whose ends have hardly any neighbour in common: they lead to another place that looks
 // alike, and paths would be planned through them as through a hole in the wall.
-void mark_lonely_edges(std::size_t views, std::vector<Candidate>& candidates) {
+void mark_isolated_edges(std::size_t views, std::vector<Candidate>& candidates) {
   std::vector<std::vector<std::size_t>> around(views);
   for (const Candidate& candidate : candidates) {
     if (candidate.joins_only) continue;
@@ -172,7 +172,7 @@ std::vector<NavigationGraph::Edge> choose_edges(const std::vector<ViewId>& views
     return (spring.weight < min_weight || !spring.one_component) && spring.support == 0;
   });
   std::vector<Candidate> candidates = make_candidates(views, springs, min_weight);
-  mark_lonely_edges(views.size(), candidates);
+  mark_isolated_edges(views.size(), candidates);
   // Marked ones last, the nearest first: they are left out where others lead there, too.
   std::ranges::stable_sort(candidates, {}, [](const Candidate& candidate) {
     return std::pair(candidate.joins_only, candidate.spacings);
@@ -183,7 +183,7 @@ std::vector<NavigationGraph::Edge> choose_edges(const std::vector<ViewId>& views
     const bool joins = groups.join(candidate.ends.a, candidate.ends.b);
     if (joins || !candidate.joins_only) kept.push_back(candidate.edge);
   }
-  complete_lengths(kept);
+  fill_missing_lengths(kept);
   return kept;
 }
 
@@ -198,7 +198,7 @@ NavigationGraph graph_from_lattice(const Lattice& lattice, double min_weight) {
     const Lattice::Node& b = lattice.nodes.at(spring.b);
     // Without phases the arrangement has no headings, and so no directions.
     springs.push_back({{spring.a, spring.b},
-                       spring.phases ? motion_of(*spring.phases) : std::nullopt,
+                       spring.phases ? to_motion(*spring.phases) : std::nullopt,
                        distance(a.pose.position(), b.pose.position()),
                        spring.weight,
                        a.component == b.component});

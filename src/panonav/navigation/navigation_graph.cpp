@@ -133,14 +133,14 @@ NavigationGraph graph_from_links(const ViewSource& source, std::span<const Link>
   const std::span<const ViewId> views = source.views();
   std::vector<NavigationGraph::Edge> edges = read_edges(source, links, executor);
   std::vector<NavigationGraph::Edge> read = edges;
-  complete_lengths(read);
+  fill_missing_lengths(read);
   const NavigationGraph graph({views.begin(), views.end()}, std::move(read));
   for (NavigationGraph::Edge& edge : edges) {
     if (edge.a_from_b && !is_supported(graph, edge)) {
       edge = {edge.a, edge.b, 0.0, std::nullopt};
     }
   }
-  complete_lengths(edges);
+  fill_missing_lengths(edges);
   return {{views.begin(), views.end()}, std::move(edges)};
 }
 
@@ -157,16 +157,16 @@ NavigationGraph graph_from_map(const TopologicalMap& map, double min_weight) {
         *std::ranges::lower_bound(map.nodes, edge.b, {}, &TopologicalMap::Node::view);
     if (a.component != b.component) continue;
     const Pose2 a_from_b = inverse(a.pose) * b.pose;
-    edges.push_back({edge.a, edge.b, length_of(a_from_b), a_from_b});
+    edges.push_back({edge.a, edge.b, get_length(a_from_b), a_from_b});
   }
-  complete_lengths(edges);
+  fill_missing_lengths(edges);
   return {std::move(views), std::move(edges)};
 }
 
 namespace {
 
 // Returns nodes of one component within `reach` of each other that no edge joins.
-std::vector<EdgeEnds> near_pairs(const TopologicalMap& map, double reach) {
+std::vector<EdgeEnds> find_near_pairs(const TopologicalMap& map, double reach) {
   std::set<std::pair<ViewId, ViewId>> known;
   for (const TopologicalMap::Edge& edge : map.edges) known.insert(std::minmax(edge.a, edge.b));
   // In the order of x, so that nodes too far along it need not be visited.
@@ -207,7 +207,7 @@ NavigationGraph graph_from_map_and_neighbours(const TopologicalMap& map, const V
   // The diagonal of a grid over its spacing; and what nine of ten edges differ by at most.
   const double reach = 1.5 * upper_median(lengths);
   const double max_difference = quantile(differences, 0.9);
-  const std::vector<EdgeEnds> pairs = near_pairs(map, reach);
+  const std::vector<EdgeEnds> pairs = find_near_pairs(map, reach);
   std::vector<std::optional<NavigationGraph::Edge>> found(pairs.size());
   constexpr std::size_t pairs_per_chunk = 64;
   executor.for_chunks(
@@ -223,10 +223,10 @@ NavigationGraph graph_from_map_and_neighbours(const TopologicalMap& map, const V
               view_a, view_b,
               HeadingWindow{static_cast<float>(laid_out.heading_rad), max_heading_error_rad});
           if (!reading || reading->disagreement_rad > max_disagreement_rad) continue;
-          auto motion = motion_of(*reading);
+          auto motion = to_motion(*reading);
           if (!motion) continue;
-          const double length = length_of(laid_out);
-          const double read = length_of(*motion);
+          const double length = get_length(laid_out);
+          const double read = get_length(*motion);
           if (read > 0.0) scale_displacement(*motion, length / read);
           found[i] = NavigationGraph::Edge{a.view, b.view, length, motion};
         }
@@ -235,7 +235,7 @@ NavigationGraph graph_from_map_and_neighbours(const TopologicalMap& map, const V
   for (const auto& edge : found) {
     if (edge) edges.push_back(*edge);
   }
-  complete_lengths(edges);
+  fill_missing_lengths(edges);
   return {{mapped.views().begin(), mapped.views().end()}, std::move(edges)};
 }
 

@@ -47,7 +47,7 @@ MemoryScales learn_scales(const ViewSource& source, const AreaPlanner& planner,
   std::vector<double> lengths;
   for (const NavigationGraph::Edge& edge : graph.edges()) lengths.push_back(edge.length);
   if (!lengths.empty()) scales.typical_length = upper_median(std::move(lengths));
-  scales.is_narrow = find_narrow_places(graph, planner.areas(), options.near_links);
+  scales.is_narrow = find_bottlenecks(graph, planner.areas(), options.near_links);
   return scales;
 }
 

@@ -242,8 +242,8 @@ SubAreas divide_into_areas(const NavigationGraph& graph, const SubAreaOptions& o
   return areas;
 }
 
-std::vector<std::uint8_t> find_narrow_places(const NavigationGraph& graph, const SubAreas& areas,
-                                             int links) {
+std::vector<std::uint8_t> find_bottlenecks(const NavigationGraph& graph, const SubAreas& areas,
+                                           int links) {
   const auto ends_of = [&](std::size_t gate) {
     const NavigationGraph::Edge& edge = graph.edges()[gate];
     return std::pair(*graph.node_of(edge.a), *graph.node_of(edge.b));

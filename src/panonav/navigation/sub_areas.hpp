@@ -40,7 +40,7 @@ struct SubAreas {
 /// Returns 1 for each node at most `links` edges away from a narrow gate, as doors are; 0 for the
 /// others. In the open, an area of n views is about sqrt(n) of them across, and its border has
 /// three times as many edges; a third of that, over the smaller area, is narrow.
-[[nodiscard]] std::vector<std::uint8_t> find_narrow_places(const NavigationGraph& graph,
-                                                           const SubAreas& areas, int links);
+[[nodiscard]] std::vector<std::uint8_t> find_bottlenecks(const NavigationGraph& graph,
+                                                         const SubAreas& areas, int links);
 
 }  // namespace panonav

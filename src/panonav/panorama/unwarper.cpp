@@ -66,7 +66,7 @@ Unwarper::Unwarper(const Camera& camera, const UnwarperOptions& options)
   }
 }
 
-bool Unwarper::is_seen(int row, int column) const noexcept {
+bool Unwarper::is_visible(int row, int column) const noexcept {
   return !table_ || table_->seen.empty() ||
          table_->seen[static_cast<std::size_t>(row) * columns_ + column] != 0;
 }

@@ -60,7 +60,7 @@ class Unwarper {
   [[nodiscard]] const ElevationBand& elevations() const noexcept { return elevations_; }
   /// False where the value is taken from a neighbour, because the camera does not see that
   /// direction.
-  [[nodiscard]] bool is_seen(int row, int column) const noexcept;
+  [[nodiscard]] bool is_visible(int row, int column) const noexcept;
 
   /// Throws ContractError unless the image has the camera's size; colour becomes grey.
   [[nodiscard]] Panorama unwrap(ImageView image) const;

@@ -66,8 +66,8 @@ void check_known_views(const Dataset& recording, const MemoryFile& memory,
     const auto& info = views.info(*view);
     // A map may have given the view its pose.
     if ((entry.pose && info.pose != entry.pose) || info.stamp_s != entry.stamp_s) {
-      refuse_known_view(memory.path(), entry.file,
-                        "a view with another pose or stamp under the name");
+      throw_different_view(memory.path(), entry.file,
+                           "a view with another pose or stamp under the name");
     }
   }
   if (known.empty() || is_known_recording(memory, compute_fingerprint(recording, memory))) return;
@@ -82,7 +82,7 @@ void check_known_views(const Dataset& recording, const MemoryFile& memory,
     for (std::size_t i = 0; i < count; ++i) {
       const auto& entry = *known[begin + i];
       if (!is_same_picture(*signatures[i], views.packed(*views.find(entry.file)))) {
-        refuse_known_view(memory.path(), entry.file, "another image under the name");
+        throw_different_view(memory.path(), entry.file, "another image under the name");
       }
     }
     if (compared) compared(count);
@@ -111,8 +111,8 @@ bool is_same_picture(const PackedSignature& a, const PackedSignature& b) {
   return true;
 }
 
-void refuse_known_view(const std::filesystem::path& memory, const std::string& name,
-                       const std::string& what) {
+void throw_different_view(const std::filesystem::path& memory, const std::string& name,
+                          const std::string& what) {
   throw FileError(memory.string(),
                   "holds " + what + " " + name + "; names must be unique within a memory");
 }

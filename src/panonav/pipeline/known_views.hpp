@@ -32,7 +32,7 @@ void forget_recordings(MemoryFile& memory);
 [[nodiscard]] bool is_same_picture(const PackedSignature& a, const PackedSignature& b);
 
 /// Throws the FileError for a name that the memory holds with another view.
-[[noreturn]] void refuse_known_view(const std::filesystem::path& memory, const std::string& name,
-                                    const std::string& what);
+[[noreturn]] void throw_different_view(const std::filesystem::path& memory, const std::string& name,
+                                       const std::string& what);
 
 }  // namespace panonav

@@ -118,7 +118,7 @@ struct LiveMemory::Implementation {
       if (options.areas) throw ContractError("areas", "given", "none of a memory that is added to");
       memoriser.emplace(path, options.memoriser);
     } else if (!exists) {
-      throw FileError(without_passwords(path.string()),
+      throw FileError(mask_passwords(path.string()),
                       "does not exist, and no views are to be added");
     }
     if (options.update && exists && (!options.add || can_be_updated())) {

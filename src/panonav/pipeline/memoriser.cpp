@@ -25,7 +25,7 @@ double now_s() {
   return std::chrono::duration<double>(since).count();
 }
 
-std::string text_of(const Observation& observation) {
+std::string describe_observation(const Observation& observation) {
   return observation.file.empty() ? observation.name : observation.file.string();
 }
 
@@ -63,7 +63,7 @@ MemoryHeader make_memory_header(std::span<const Observation> first, const Pictur
   if (2 * header.shape.components > header.panorama_columns) {
     throw ContractError("components", header.shape.components,
                         "1 to " + std::to_string(header.panorama_columns / 2) +
-                            ", half the columns of " + text_of(first.front()));
+                            ", half the columns of " + describe_observation(first.front()));
   }
   const ViewEncoder encoder(header, source);
   std::vector<float> largest(first.size(), 0.0F);
@@ -73,7 +73,7 @@ MemoryHeader make_memory_header(std::span<const Observation> first, const Pictur
   header.full_scale = *std::ranges::max_element(largest);
   constexpr float rounding = 1e-6F;  // of the transform, for values of 0 .. 1
   if (!(header.full_scale > rounding)) {
-    throw FileError(text_of(first.front()),
+    throw FileError(describe_observation(first.front()),
                     "the first " + std::to_string(first.size()) +
                         " views have only one colour; a memory needs views with structure");
   }
@@ -96,7 +96,7 @@ Memoriser::Memoriser(const std::filesystem::path& memory, MemoriserOptions optio
     file_ = MemoryFile::open(path_, Access::read_write);
     encoder_.emplace(file_->header(), options_.source.value_or(file_->header().source));
   } else if (!options_.source) {
-    throw ContractError("source of " + without_passwords(path_.string()), "empty",
+    throw ContractError("source of " + mask_passwords(path_.string()), "empty",
                         "the type of images, because the file is new");
   }
 }
@@ -199,10 +199,11 @@ void Memoriser::require_same_view(const Observation& observation, const PackedSi
   const ReferenceInfo& info = there.info(view);
   // A map may have given the view its pose.
   if ((observation.pose && info.pose != observation.pose) || info.stamp_s != observation.stamp_s) {
-    refuse_known_view(path_, observation.name, "a view with another pose or stamp under the name");
+    throw_different_view(path_, observation.name,
+                         "a view with another pose or stamp under the name");
   }
   if (!is_same_picture(signature, there.packed(view))) {
-    refuse_known_view(path_, observation.name, "another image under the name");
+    throw_different_view(path_, observation.name, "another image under the name");
   }
 }
 

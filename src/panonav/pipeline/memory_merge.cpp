@@ -95,7 +95,7 @@ TopologicalMap select_components(const TopologicalMap& map, bool largest) {
   return part;
 }
 
-TopologicalMap with_new_ids(const TopologicalMap& map, const NewIds& ids) {
+TopologicalMap replace_ids(const TopologicalMap& map, const NewIds& ids) {
   TopologicalMap result;
   for (TopologicalMap::Node node : map.nodes) {
     node.view = ids.at(node.view);
@@ -112,7 +112,7 @@ TopologicalMap with_new_ids(const TopologicalMap& map, const NewIds& ids) {
 
 /// Appends a map whose nodes are in frames of their own. A node that is there already joins
 /// nothing: it stays where it is.
-void add_apart(TopologicalMap& map, const TopologicalMap& more) {
+void append_disconnected(TopologicalMap& map, const TopologicalMap& more) {
   std::size_t next = 0;
   for (const TopologicalMap::Node& node : map.nodes) next = std::max(next, node.component + 1);
   const std::vector<TopologicalMap::Node> there = map.nodes;
@@ -255,16 +255,16 @@ class Merge {
   TopologicalMap join_maps(const VisualMemory& all) {
     const std::array own{read_or_make_map(*files_[0], views_[0]),
                          read_or_make_map(*files_[1], views_[1])};
-    const std::array maps{with_new_ids(own[0], ids_[0]), with_new_ids(own[1], ids_[1])};
+    const std::array maps{replace_ids(own[0], ids_[0]), replace_ids(own[1], ids_[1])};
     const std::array largest{select_components(maps[0], true), select_components(maps[1], true)};
     result_.alignment = align_sessions(all, largest[0], largest[1], alignment_);
     TopologicalMap map = largest[0];
     if (result_.alignment) {
       map = join_sessions(largest[0], largest[1], *result_.alignment, graph_);
     } else {
-      add_apart(map, largest[1]);
+      append_disconnected(map, largest[1]);
     }
-    for (const TopologicalMap& one : maps) add_apart(map, select_components(one, false));
+    for (const TopologicalMap& one : maps) append_disconnected(map, select_components(one, false));
     return map;
   }
 
@@ -343,7 +343,7 @@ MergedMemory merge_memories(const std::filesystem::path& first, const std::files
   const MemoryFile b = MemoryFile::open(second, Access::read_only);
   require_comparable(a, b);
   if (memory_exists(memory)) {
-    throw FileError(without_passwords(memory.string()),
+    throw FileError(mask_passwords(memory.string()),
                     "already exists; a merged memory is a new one");
   }
   const UnfinishedMemory unfinished(memory);

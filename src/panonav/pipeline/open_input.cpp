@@ -91,7 +91,7 @@ void add_warning_of_other_kind(Dataset& opened) {
                             "panorama has an elevation band");
 }
 
-void refuse_topics(const fs::path& path, const InputOptions::Topics& topics) {
+void reject_topics(const fs::path& path, const InputOptions::Topics& topics) {
   for (const auto& [is_set, option] :
        {std::pair{topics.image.has_value(), "the option image_topic"},
         {topics.odometry.has_value(), "the option odometry_topic"},
@@ -102,7 +102,7 @@ void refuse_topics(const fs::path& path, const InputOptions::Topics& topics) {
 }
 
 /// Throws FileError on a kind of file that is known but not read by this program.
-void refuse_unregistered(const fs::path& path) {
+void throw_unregistered_kind(const fs::path& path) {
   constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kinds{{
       {".mcap", "recording"},
       {".bag", "recording"},
@@ -135,7 +135,7 @@ const PictureSource& choose_source(const fs::path& path, const InputOptions& opt
 
 Dataset open_registered(const fs::path& path, const DatasetReader& reader,
                         const InputOptions& options) {
-  if (!reader.has_topics) refuse_topics(path, options.topics);
+  if (!reader.has_topics) reject_topics(path, options.topics);
   if (options.topics.odometry && options.topics.odometry_frames) {
     throw OptionError(
         "the option odometry_topic and the option odometry_frames cannot be combined");
@@ -169,7 +169,7 @@ Dataset open_described(const fs::path& folder, const InputOptions& options) {
 }
 
 Dataset open_pictures(const fs::path& path, const InputOptions& options) {
-  refuse_unregistered(path);
+  throw_unregistered_kind(path);
   const PictureSource& source =
       choose_source(path, options, "has no dataset.toml; set the type of the images");
   std::error_code ignored;
@@ -205,7 +205,7 @@ Dataset open_input(const fs::path& path, const InputOptions& options) {
   if (!fs::exists(path, ignored)) {
     throw FileError(path.string(), "there is no such file or folder");
   }
-  refuse_topics(path, options.topics);
+  reject_topics(path, options.topics);
   Dataset opened =
       has_dataset_file(path) ? open_described(path, options) : open_pictures(path, options);
   select_pictures(opened, options.selection);

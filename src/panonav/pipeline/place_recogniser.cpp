@@ -64,7 +64,7 @@ void check_options(const PlaceRecogniserOptions& options, const MemoryHeader& he
   }
 }
 
-[[noreturn]] void refuse_empty(const MemoryFile& file) {
+[[noreturn]] void throw_empty_memory(const MemoryFile& file) {
   throw FileError(file.path().string(), "contains no view; memorise a recording first");
 }
 
@@ -77,8 +77,8 @@ struct PlaceRecogniser::Implementation {
         memory(file.load()),
         encoder(file.header(), options.source.value_or(file.header().source)) {
     check_options(options, file.header(), true);
-    if (memory->empty()) refuse_empty(file);
-    learn_held(file);
+    if (memory->empty()) throw_empty_memory(file);
+    learn_from_held_views(file);
     if (options.areas) areas.emplace(*memory);
   }
   /// Searches the memory on its server.
@@ -89,11 +89,11 @@ struct PlaceRecogniser::Implementation {
         indexed(std::move(index_)),
         encoder(file.header(), options.source.value_or(file.header().source)) {
     check_options(options, file.header(), false);
-    learn_indexed(file);
+    learn_from_index(file);
   }
 
   // Kept models were learnt over all components.
-  [[nodiscard]] bool takes_kept_models() const { return options.localiser.components == 0; }
+  [[nodiscard]] bool can_use_kept_models() const { return options.localiser.components == 0; }
 
   /// Empty where the memory has no features.
   FeatureSource get_or_create_features(const MemoryFile& file, std::optional<ViewId> last_view) {
@@ -102,21 +102,21 @@ struct PlaceRecogniser::Implementation {
     return [cache = features](ViewId view) { return cache->features(view); };
   }
 
-  void learn_held(const MemoryFile& file) {
+  void learn_from_held_views(const MemoryFile& file) {
     const FeatureSource source = get_or_create_features(file, std::ranges::max(memory->views()));
-    if (takes_kept_models()) models = load_kept_models(file, *memory);
+    if (can_use_kept_models()) models = load_kept_models(file, *memory);
     if (!models) models = learn_place_models(*memory, source, options.localiser.components);
     Localiser localiser(*memory, models->place, models->position, options.localiser,
                         models->spacing_m);
     publish(std::move(localiser), source);
   }
 
-  void learn_indexed(const MemoryFile& file) {
+  void learn_from_index(const MemoryFile& file) {
     const std::vector<ViewId> views = indexed->views();
-    if (views.empty()) refuse_empty(file);
+    if (views.empty()) throw_empty_memory(file);
     const FeatureSource source = get_or_create_features(file, std::nullopt);
     const std::unique_ptr<ViewIndex> index = indexed->index();
-    const std::vector<ViewId> drawn = draw_views(views);
+    const std::vector<ViewId> drawn = sample_reference_views(views);
     models = find_models(file, *index, views, drawn, source);
     Localiser localiser(std::make_shared<const VisualMemory>(index->load(drawn)), models->place,
                         models->position, options.localiser, models->spacing_m);
@@ -133,7 +133,7 @@ struct PlaceRecogniser::Implementation {
     std::optional<LearntModels> found;
     std::optional<VisualMemory> all;
     if (is_small) all.emplace(index.load(views));
-    if (takes_kept_models())
+    if (can_use_kept_models())
       found = is_small ? load_kept_models(file, *all) : load_kept_models(file);
     if (!found && !is_small) found = models;
     if (found) return *found;
@@ -241,7 +241,7 @@ const Localiser& PlaceRecogniser::localiser() const {
 bool PlaceRecogniser::refresh() {
   Implementation& own = *implementation_;
   if (!own.indexed || !own.indexed->refresh()) return false;
-  own.learn_indexed(MemoryFile::open(own.path, Access::read_only));
+  own.learn_from_index(MemoryFile::open(own.path, Access::read_only));
   return true;
 }
 std::uint64_t PlaceRecogniser::index_bytes() const {

@@ -26,12 +26,12 @@ PictureSource cut_to_band(const MemoryHeader& header, PictureSource source) {
   return source;
 }
 
-bool are_ready_made(const MemoryHeader& header, const PictureSource& source) {
+bool is_ready_made(const MemoryHeader& header, const PictureSource& source) {
   return source.kind == PictureKind::panorama && header.source.kind == PictureKind::panorama;
 }
 
 PanoramaShape choose_resampled_shape(const MemoryHeader& header, const PictureSource& source) {
-  if (are_ready_made(header, source) && !header.picture_shape) return {};
+  if (is_ready_made(header, source) && !header.picture_shape) return {};
   return {header.shape.rows, header.panorama_columns};
 }
 
@@ -103,7 +103,7 @@ ViewEncoder::ViewEncoder(const MemoryHeader& header, const PictureSource& source
       extractor_({header.shape.rows, header.panorama_columns}, header.shape.components,
                  header.preprocessing),
       workspaces_(std::make_unique<Workspaces>()) {
-  if (are_ready_made(header, source)) picture_shape_ = header.picture_shape;
+  if (is_ready_made(header, source)) picture_shape_ = header.picture_shape;
 }
 ViewEncoder::~ViewEncoder() = default;
 ViewEncoder::ViewEncoder(ViewEncoder&&) noexcept = default;

@@ -63,7 +63,7 @@ std::string view_table(std::span<const ViewRecord> views, std::span<const std::s
     add(to_sheet_field(info.name));
     add(pose ? to_text(pose->x_m) : "");
     add(pose ? to_text(pose->y_m) : "");
-    add(pose && pose->heading_rad ? to_text(round_trip_degrees(*pose->heading_rad)) : "");
+    add(pose && pose->heading_rad ? to_text(to_exact_degrees(*pose->heading_rad)) : "");
     add(info.stamp_s ? to_text(*info.stamp_s) : "");
     add(std::to_string(links));
     add(component ? std::to_string(*component) : "");

@@ -14,7 +14,7 @@ namespace panonav {
 namespace {
 
 /// Estimates the scale from pairs of neighbours whose positions the memory knows.
-double scale_of(const VisualMemory& memory, const VisualOdometryOptions& options) {
+double compute_scale(const VisualMemory& memory, const VisualOdometryOptions& options) {
   std::vector<ViewId> posed;
   for (const ViewId view : memory.views()) {
     if (memory.info(view).pose) posed.push_back(view);
@@ -50,7 +50,7 @@ OdometryNoise visual_odometry_noise() {
 
 VisualOdometry visual_odometry(const VisualMemory& memory) {
   VisualOdometryOptions options;
-  options.scale_m = scale_of(memory, options);
+  options.scale_m = compute_scale(memory, options);
   return VisualOdometry(options);
 }
 

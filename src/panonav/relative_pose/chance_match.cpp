@@ -70,7 +70,7 @@ class NoiseGenerator {
     }
   }
 
-  [[nodiscard]] HomingView draw_view(Random random) const {
+  [[nodiscard]] HomingView sample_view(Random random) const {
     const std::size_t size = rows_ * static_cast<std::size_t>(view_.components());
     std::vector<float> cosines(size, 0.0F);
     std::vector<float> sines(size, 0.0F);
@@ -140,7 +140,7 @@ ChanceMatch compare_with_chance(const HomingView& home, const HomingView& curren
   constexpr std::uint64_t seed = 1;
   std::vector<double> matches;
   for (std::uint64_t i = 0; i < noise_views; ++i) {
-    matches.push_back(sum_correlation_both_ways(goal, noise.draw_view(Random(seed, i)), options));
+    matches.push_back(sum_correlation_both_ways(goal, noise.sample_view(Random(seed, i)), options));
     result.chance += matches.back() / noise_views;
   }
   double square = 0.0;

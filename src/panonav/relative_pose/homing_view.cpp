@@ -35,7 +35,7 @@ struct Direction {
   float sine;
 };
 
-const std::array<Direction, 256>& byte_directions() {
+const std::array<Direction, 256>& make_byte_directions() {
   static const std::array<Direction, 256> table = [] {
     std::array<Direction, 256> filled{};
     PackedSignature packed{{1, 1}, {255}, {0}};
@@ -54,7 +54,7 @@ const std::array<Direction, 256>& byte_directions() {
 
 HomingView homing_view(const VisualMemory& memory, ViewId view) {
   const PackedSignature packed = memory.packed(view);
-  const auto& table = byte_directions();
+  const auto& table = make_byte_directions();
   const float unit = memory.full_scale() / 255.0F;
   const auto rows = static_cast<std::size_t>(packed.shape.rows);
   std::vector<float> cosines(packed.shape.size());

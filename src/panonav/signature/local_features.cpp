@@ -179,7 +179,7 @@ std::vector<Corner> find_corners(const Grey& smooth, int first_row, int end_row)
 }
 
 // Pairs of places around a corner, denser near it, the same for every view [Calonder et al. 2010].
-std::array<std::array<int, 4>, descriptor_bits> draw_point_pairs(int rows, int columns) {
+std::array<std::array<int, 4>, descriptor_bits> sample_point_pairs(int rows, int columns) {
   Random random(5);
   const auto draw_offset = [&](int radius) {
     double value = 0.0;
@@ -333,7 +333,7 @@ std::optional<LocalFeatures> extract_features(const Panorama& panorama,
   const std::vector<Corner> corners =
       find_corners(smooth, std::max(margin_rows, preprocessing.masked_rows_top),
                    shape.rows - std::max(margin_rows, preprocessing.masked_rows_bottom));
-  const auto pairs = draw_point_pairs(radius_rows, radius_columns);
+  const auto pairs = sample_point_pairs(radius_rows, radius_columns);
   std::array<std::pair<std::ptrdiff_t, std::ptrdiff_t>, descriptor_bits> offsets;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     const auto& [x0, y0, x1, y1] = pairs[i];

@@ -60,7 +60,7 @@ std::shared_ptr<const MemoryScheme> find_memory_scheme(const std::filesystem::pa
   if (scheme || colon == std::string::npos || colon == 0) return scheme;
   const std::string name = memory.native().substr(0, colon);
   if (!std::ranges::all_of(name, [](char c) { return c >= 'a' && c <= 'z'; })) return nullptr;
-  throw FileError(without_passwords(memory.native()),
+  throw FileError(mask_passwords(memory.native()),
                   "is an address, and this program was built without memories at '" + name +
                       "'; allowed: the path of a memory file");
 }

@@ -52,7 +52,7 @@ void require_view(const NewView& view, SignatureShape shape) {
 }
 
 // Throws the ContractError for a `kind` ("map", "route") of a name that the file does not have.
-[[noreturn]] void refuse_unknown(const char* kind, std::string_view name) {
+[[noreturn]] void throw_unknown_name(const char* kind, std::string_view name) {
   throw ContractError(kind, std::string(name), "a " + std::string(kind) + " of the memory file");
 }
 
@@ -95,7 +95,7 @@ struct MemoryFile::Implementation {
     packed.phases.assign(signature.begin() + half, signature.end());
     memory.append_with_id(row.id, packed, row.info);
   }
-  /// Throws as `refuse_view`.
+  /// Throws as `throw_unknown_view`.
   void change_info(ViewId view, const std::function<void(ReferenceInfo&)>& change) {
     write([&](MemoryTables&) {
       std::optional<ReferenceInfo> info;
@@ -222,7 +222,7 @@ void MemoryFile::remove(std::span<const ViewId> views) {
     tables.require_views(views);
     std::set<ViewId> removed;
     for (const ViewId view : views) {
-      if (!removed.insert(view).second) refuse_view(view);
+      if (!removed.insert(view).second) throw_unknown_view(view);
     }
     tables.remove(views);
     forget_in_maps(tables, views);
@@ -315,7 +315,7 @@ std::optional<TopologicalMap> MemoryFile::map(std::string_view name) const {
 
 void MemoryFile::remove_map(std::string_view name) {
   implementation_->write([&](MemoryTables& tables) {
-    if (!erase_map(tables, name)) refuse_unknown("map", name);
+    if (!erase_map(tables, name)) throw_unknown_name("map", name);
   });
 }
 
@@ -335,13 +335,13 @@ std::optional<RoutePanorama> MemoryFile::route(std::string_view name) const {
 std::uint64_t MemoryFile::route_bytes(std::string_view name) const {
   const std::int64_t bytes =
       implementation_->read([&](MemoryTables& tables) { return tables.route_bytes(name); });
-  if (bytes == 0) refuse_unknown("route", name);
+  if (bytes == 0) throw_unknown_name("route", name);
   return static_cast<std::uint64_t>(bytes);
 }
 
 void MemoryFile::remove_route(std::string_view name) {
   implementation_->write([&](MemoryTables& tables) {
-    if (!erase_route(tables, name)) refuse_unknown("route", name);
+    if (!erase_route(tables, name)) throw_unknown_name("route", name);
   });
 }
 
@@ -349,9 +349,9 @@ void MemoryFile::rename_route(std::string_view name, std::string_view new_name) 
   require_name("route", new_name);
   implementation_->write([&](MemoryTables& tables) {
     const auto names = route_names();
-    if (std::ranges::find(names, name) == names.end()) refuse_unknown("route", name);
+    if (std::ranges::find(names, name) == names.end()) throw_unknown_name("route", name);
     if (std::ranges::find(names, new_name) != names.end()) {
-      refuse_used_name("route", new_name, path());
+      throw_used_name("route", new_name, path());
     }
     panonav::rename_route(tables, name, new_name);
     // The source of its lines is renamed with it.

@@ -47,7 +47,7 @@ void require_picture(int rows, int columns, std::string_view rows_name,
 }
 
 // Doubles as little-endian bytes.
-std::vector<std::uint8_t> bytes_of(const std::vector<double>& values) {
+std::vector<std::uint8_t> to_bytes(const std::vector<double>& values) {
   std::vector<std::uint8_t> bytes;
   for (const double value : values) {
     append_little_endian(bytes, std::bit_cast<std::uint64_t>(value));
@@ -55,7 +55,7 @@ std::vector<std::uint8_t> bytes_of(const std::vector<double>& values) {
   return bytes;
 }
 
-std::vector<double> doubles_of(const std::vector<std::uint8_t>& bytes) {
+std::vector<double> to_doubles(const std::vector<std::uint8_t>& bytes) {
   std::vector<double> values;
   for (std::size_t i = 0; i + 8 <= bytes.size(); i += 8) {
     values.push_back(std::bit_cast<double>(read_little_endian<std::uint64_t>(&bytes[i])));
@@ -64,7 +64,7 @@ std::vector<double> doubles_of(const std::vector<std::uint8_t>& bytes) {
 }
 
 // One bit a pixel, rows one after the other, the first pixel in the lowest bit.
-std::vector<std::uint8_t> bits_of(const Image& mask) {
+std::vector<std::uint8_t> to_bits(const Image& mask) {
   std::vector<std::uint8_t> bits((mask.pixels().size() + 7) / 8);
   for (std::size_t i = 0; i < mask.pixels().size(); ++i) {
     if (mask.pixels()[i] != 0) bits[i / 8] |= static_cast<std::uint8_t>(1U << (i % 8));
@@ -72,7 +72,7 @@ std::vector<std::uint8_t> bits_of(const Image& mask) {
   return bits;
 }
 
-Image mask_of(const std::vector<std::uint8_t>& bits, ImageSize size) {
+Image to_mask(const std::vector<std::uint8_t>& bits, ImageSize size) {
   const auto pixels =
       static_cast<std::uint64_t>(size.width) * static_cast<std::uint64_t>(size.height);
   require(bits.size() == (pixels + 7) / 8, "bytes of the mask", static_cast<double>(bits.size()),
@@ -111,7 +111,7 @@ class SettingsWriter final : public OptionFields<SettingsWriter> {
   void field(const std::string& key, double value) { put(key, value); }
   void field(const std::string& key, float value) { put(key, static_cast<double>(value)); }
   void field(const std::string& key, const std::vector<double>& value) {
-    put(key, bytes_of(value));
+    put(key, to_bytes(value));
   }
   void field(const std::string& key, const std::optional<double>& value) {
     if (value) put(key, *value);
@@ -164,7 +164,7 @@ class SettingsReader final : public OptionFields<SettingsReader> {
   void field(const std::string& key, double& value) { value = get<double>(key); }
   void field(const std::string& key, float& value) { value = static_cast<float>(get<double>(key)); }
   void field(const std::string& key, std::vector<double>& value) {
-    value = doubles_of(get<std::vector<std::uint8_t>>(key));
+    value = to_doubles(get<std::vector<std::uint8_t>>(key));
   }
   void field(const std::string& key, std::optional<double>& value) {
     if (const auto* found = find<double>(key)) value = *found;
@@ -327,7 +327,7 @@ Settings to_settings(const MemoryHeader& header) {
   visit_header(writer, header);
   const PictureSource& source = header.source;
   if (source.camera) visit_camera(writer, *source.camera);
-  if (source.mask) writer.put("source.mask", bits_of(*source.mask));
+  if (source.mask) writer.put("source.mask", to_bits(*source.mask));
   return std::move(writer.settings);
 }
 
@@ -340,7 +340,7 @@ MemoryHeader to_header(const Settings& settings) {
     visit_camera(reader, source.camera.emplace());
     require_camera(*source.camera);
     if (const auto* mask = reader.find<std::vector<std::uint8_t>>("source.mask")) {
-      source.mask = mask_of(*mask, source.camera->image_size);
+      source.mask = to_mask(*mask, source.camera->image_size);
     }
   }
   reader.require_all_used();

@@ -42,7 +42,7 @@ std::optional<FoundMemory> find_memory(MemoriesConnection& memories, const Serve
   return FoundMemory{rows.integer(0, 0), std::string(rows.text(0, 1))};
 }
 
-void refuse_missing_memory(const ServerAddress& address) {
+void throw_missing_memory(const ServerAddress& address) {
   throw FileError(address.printable.native(), "there is no memory '" + address.memory +
                                                   "' on this server that this login may see");
 }
@@ -111,7 +111,7 @@ class PostgresqlScheme final : public MemoryScheme {
   static std::unique_ptr<MemoryTables> open_tables(const ServerAddress& address, Access access) {
     MemoriesConnection memories = connect_to_memories(address, false);
     const auto found = find_memory(memories, address);
-    if (!found) refuse_missing_memory(address);
+    if (!found) throw_missing_memory(address);
     if (access == Access::read_write &&
         memories.connection.run("SELECT has_table_privilege('panonav.views', 'INSERT')::int4::int8")
                 .integer(0, 0) == 0) {

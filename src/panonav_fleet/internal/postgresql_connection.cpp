@@ -138,7 +138,7 @@ PostgresqlConnection::PostgresqlConnection(const ServerAddress& address)
 std::string PostgresqlConnection::message() const {
   std::string text = PQerrorMessage(connection_.get());
   while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
-  return without_passwords(to_readable_line(text));
+  return mask_passwords(to_readable_line(text));
 }
 
 bool PostgresqlConnection::is_in_transaction() const noexcept {

@@ -34,7 +34,7 @@ void add_info(Fields& fields, const ReferenceInfo& info) {
   return info;
 }
 
-[[nodiscard]] inline std::vector<std::int64_t> numbers_of(std::span<const ViewId> views) {
+[[nodiscard]] inline std::vector<std::int64_t> to_numbers(std::span<const ViewId> views) {
   std::vector<std::int64_t> numbers;
   for (const ViewId view : views) numbers.push_back(view.value);
   return numbers;
@@ -177,7 +177,7 @@ struct MemoriesConnection {
                                                      bool make_schema);
 [[nodiscard]] std::optional<FoundMemory> find_memory(MemoriesConnection& memories,
                                                      const ServerAddress& address);
-[[noreturn]] void refuse_missing_memory(const ServerAddress& address);
+[[noreturn]] void throw_missing_memory(const ServerAddress& address);
 /// Makes an empty memory on the server and, with enough rights, the schema and the roles where
 /// there are none (docs/scale.md); `fill` is run in the same transaction. Throws FileError when
 /// there is a memory of that name.

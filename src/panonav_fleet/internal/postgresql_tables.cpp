@@ -280,17 +280,17 @@ void PostgresqlTables::insert(std::span<const ViewId> ids, std::span<const NewVi
       "WHERE v.memory = $1 AND v.name = i.name) OR EXISTS (SELECT FROM pg_temp.panonav_incoming j "
       "WHERE j.name = i.name AND j.id < i.id) ORDER BY i.id LIMIT 1");
   if (duplicate.size() == 0) fail_damaged("the id of a new view is taken");
-  refuse_used_name("view", duplicate.text(0, 0), path());
+  throw_used_name("view", duplicate.text(0, 0), path());
 }
 
 void PostgresqlTables::require_views(std::span<const ViewId> views) {
   if (views.empty()) return;
-  const auto numbers = numbers_of(views);
+  const auto numbers = to_numbers(views);
   const Rows missing = connection_.run(
       "SELECT w.id FROM unnest($2) WITH ORDINALITY w(id, place) WHERE NOT EXISTS (SELECT FROM "
       "panonav.views v WHERE v.memory = $1 AND v.id = w.id) ORDER BY place LIMIT 1",
       Values().add(memory_).add(std::span<const std::int64_t>(numbers)));
-  if (missing.size() > 0) refuse_view({static_cast<std::uint32_t>(missing.integer(0, 0))});
+  if (missing.size() > 0) throw_unknown_view({static_cast<std::uint32_t>(missing.integer(0, 0))});
 }
 
 void PostgresqlTables::note_changed_rows(const Rows& rows) {
@@ -298,7 +298,7 @@ void PostgresqlTables::note_changed_rows(const Rows& rows) {
 }
 
 void PostgresqlTables::remove(std::span<const ViewId> views) {
-  const auto numbers = numbers_of(views);
+  const auto numbers = to_numbers(views);
   const Values values = Values().add(memory_).add(std::span<const std::int64_t>(numbers));
   for (const char* sql :
        {"DELETE FROM panonav.links WHERE memory = $1 AND (a = ANY($2) OR b = ANY($2))",
@@ -321,7 +321,7 @@ void PostgresqlTables::write_info(ViewId view, const ReferenceInfo& info, std::i
           "UPDATE panonav.views SET checksum = $3, name = $4, x_m = $5, y_m = $6, "
           "heading_rad = $7, stamp_s = $8 WHERE memory = $1 AND id = $2",
           &values)) {
-    refuse_used_name("view", info.name, path());
+    throw_used_name("view", info.name, path());
   }
   note_changed_rows(before);
   note_changed_area(info.pose);
@@ -335,14 +335,14 @@ void PostgresqlTables::read_views(const Consume<ViewRow>& consume) {
 }
 
 void PostgresqlTables::read_views(std::span<const ViewId> views, const Consume<ViewRow>& consume) {
-  const auto numbers = numbers_of(views);
+  const auto numbers = to_numbers(views);
   connection_.stream("SELECT " + std::string(view_fields) +
                          ", w.id FROM unnest($2) WITH ORDINALITY w(id, place) LEFT JOIN "
                          "panonav.views v ON v.memory = $1 AND v.id = w.id ORDER BY w.place",
                      Values().add(memory_).add(std::span<const std::int64_t>(numbers)),
                      [&](const Rows& rows) {
                        if (rows.is_null(0, 0)) {
-                         refuse_view({static_cast<std::uint32_t>(rows.integer(0, 8))});
+                         throw_unknown_view({static_cast<std::uint32_t>(rows.integer(0, 8))});
                        }
                        consume(read_view_row(rows));
                      });
@@ -350,7 +350,7 @@ void PostgresqlTables::read_views(std::span<const ViewId> views, const Consume<V
 
 void PostgresqlTables::read_available_views(std::span<const ViewId> views,
                                             const Consume<ViewRow>& consume) {
-  const auto numbers = numbers_of(views);
+  const auto numbers = to_numbers(views);
   connection_.stream("SELECT " + std::string(view_fields) +
                          " FROM panonav.views v WHERE v.memory = $1 AND v.id = ANY($2)",
                      Values().add(memory_).add(std::span<const std::int64_t>(numbers)),

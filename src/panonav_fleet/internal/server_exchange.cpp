@@ -99,7 +99,7 @@ std::map<ViewId, std::int64_t> ServerExchange::checksums_in(const PostgresqlRows
   return checksums;
 }
 
-void ServerExchange::refuse_removed() const {
+void ServerExchange::throw_memory_removed() const {
   throw FileError(tables_.path().native(),
                   "was removed from its server, or belongs to another fleet now");
 }
@@ -107,7 +107,7 @@ void ServerExchange::refuse_removed() const {
 ServerExchange::State ServerExchange::read_state() {
   const PostgresqlRows rows =
       connection().run("SELECT identity, last_view FROM panonav.memories WHERE id = $1", values());
-  if (rows.size() == 0) refuse_removed();
+  if (rows.size() == 0) throw_memory_removed();
   return {std::string(rows.text(0, 0)), rows.integer(0, 1)};
 }
 
@@ -126,7 +126,7 @@ std::vector<Upload> ServerExchange::to_uploads(const PostgresqlRows& rows) const
 std::vector<Upload> ServerExchange::read_uploads(const std::string& file,
                                                  std::span<const ViewId> views) {
   if (views.empty()) return {};
-  const auto numbers = numbers_of(views);
+  const auto numbers = to_numbers(views);
   return to_uploads(connection().run(
       upload_fields + std::string("panonav.uploads u WHERE u.memory = $1 AND u.file = $2 AND "
                                   "u.view = ANY($3) ORDER BY u.server_view"),
@@ -135,7 +135,7 @@ std::vector<Upload> ServerExchange::read_uploads(const std::string& file,
 
 std::vector<Upload> ServerExchange::read_settled_uploads(const std::string& file,
                                                          std::span<const ViewId> views) {
-  const auto numbers = numbers_of(views);
+  const auto numbers = to_numbers(views);
   return to_uploads(
       connection().run(upload_fields + std::string("panonav.uploads_of($1, $2, $3) u"),
                        values().add(std::string_view(file)).add(Numbers(numbers))));
@@ -154,7 +154,7 @@ std::vector<ServerView> ServerExchange::find_views_by_name(std::span<const std::
 
 std::vector<ServerView> ServerExchange::read_infos(std::span<const ViewId> ids) {
   if (ids.empty()) return {};
-  const auto numbers = numbers_of(ids);
+  const auto numbers = to_numbers(ids);
   return read_server_views(connection().run(
       std::string(server_view_fields) +
           " FROM panonav.views v WHERE v.memory = $1 AND v.id = ANY($2) ORDER BY v.id",
@@ -163,7 +163,7 @@ std::vector<ServerView> ServerExchange::read_infos(std::span<const ViewId> ids) 
 
 std::map<ViewId, std::int64_t> ServerExchange::read_checksums(std::span<const ViewId> views) {
   if (views.empty()) return {};
-  const auto numbers = numbers_of(views);
+  const auto numbers = to_numbers(views);
   return checksums_in(
       connection().run("SELECT id, checksum FROM panonav.views WHERE memory = $1 AND id = ANY($2)",
                        values().add(Numbers(numbers))));
@@ -221,7 +221,7 @@ std::map<ViewId, std::int64_t> ServerExchange::read_signature_checksums(
     std::span<const ViewId> views) {
   std::map<ViewId, std::int64_t> signatures;
   if (views.empty()) return signatures;
-  const auto numbers = numbers_of(views);
+  const auto numbers = to_numbers(views);
   connection().stream("SELECT id, signature FROM panonav.views WHERE memory = $1 AND id = ANY($2)",
                       values().add(Numbers(numbers)), [&](const PostgresqlRows& rows) {
                         signatures.emplace(read_view_id(rows, 0, 0),
@@ -233,7 +233,7 @@ std::map<ViewId, std::int64_t> ServerExchange::read_signature_checksums(
 std::vector<FullServerView> ServerExchange::read_full_views(std::span<const ViewId> ids) {
   std::vector<FullServerView> views;
   if (ids.empty()) return views;
-  const auto numbers = numbers_of(ids);
+  const auto numbers = to_numbers(ids);
   RecordBytes scratch;
   connection().stream(
       std::string(server_view_fields) +
@@ -307,7 +307,7 @@ std::int64_t empty_recordings_checksum() {
 std::uint32_t ServerExchange::reserve_ids(std::size_t count) {
   const PostgresqlRows rows = connection().run("SELECT panonav.reserve_ids($1, $2)",
                                                values().add(static_cast<std::int64_t>(count)));
-  if (rows.is_null(0, 0)) refuse_removed();
+  if (rows.is_null(0, 0)) throw_memory_removed();
   const std::int64_t last = rows.integer(0, 0);
   if (last < 0 || last + static_cast<std::int64_t>(count) >= std::int64_t{UINT32_MAX}) {
     tables_.fail_damaged("there is no id left for another view");

@@ -141,7 +141,7 @@ class ServerExchange {
                  const FoundMemory& found);
   [[nodiscard]] PostgresqlConnection& connection() noexcept { return tables_.connection(); }
   [[nodiscard]] PostgresqlValues values() const;
-  [[noreturn]] void refuse_removed() const;
+  [[noreturn]] void throw_memory_removed() const;
   [[nodiscard]] std::vector<Upload> to_uploads(const PostgresqlRows& rows) const;
   [[nodiscard]] ServerView read_server_view(const PostgresqlRows& rows, int row) const;
   [[nodiscard]] std::vector<ServerView> read_server_views(const PostgresqlRows& rows) const;

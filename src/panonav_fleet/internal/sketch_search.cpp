@@ -71,7 +71,7 @@ class SketchSearch {
   }
 
  private:
-  [[nodiscard]] bool excluded(ViewId view) const {
+  [[nodiscard]] bool is_excluded(ViewId view) const {
     return !excluded_.empty() && std::ranges::binary_search(excluded_, view);
   }
 
@@ -181,7 +181,7 @@ class SketchSearch {
                    [this](std::uint32_t number, std::size_t place, SegmentScratch& scratch,
                           std::size_t /*chunk*/) {
                      order_[place].first =
-                         least_of_sample(*segments_[number].sketches, number, scratch);
+                         find_sample_minimum(*segments_[number].sketches, number, scratch);
                    });
       std::ranges::sort(order_);
     }
@@ -192,23 +192,23 @@ class SketchSearch {
       std::vector<std::vector<SketchedView>> found(end - begin);
       for_segments(begin, end, 1,
                    [&](std::uint32_t number, std::size_t /*place*/, SegmentScratch& scratch,
-                       std::size_t chunk) { take_best(number, scratch, found[chunk]); });
+                       std::size_t chunk) { collect_best(number, scratch, found[chunk]); });
       for (const auto& of_segment : found) {
         best.insert(best.end(), of_segment.begin(), of_segment.end());
       }
       begin = end;
     }
-    keep_best(best, kept_by_cells());
+    keep_best(best, count_kept_by_cells());
     refine(best, 1);
     keep_best(best, 128 + 4 * top_);
     refine(best, 2);
     keep_best(best, top_ + 6);
     read(best);
   }
-  [[nodiscard]] std::size_t kept_by_cells() const noexcept { return 1024 + 8 * top_; }
+  [[nodiscard]] std::size_t count_kept_by_cells() const noexcept { return 1024 + 8 * top_; }
 
-  std::uint32_t least_of_sample(const SketchSegment& segment, std::size_t number,
-                                SegmentScratch& scratch) const {
+  std::uint32_t find_sample_minimum(const SketchSegment& segment, std::size_t number,
+                                    SegmentScratch& scratch) const {
     segment.make_tables(layout_, kernels_, query_, scratch.tables);
     std::uint32_t min_bound = std::numeric_limits<std::uint32_t>::max();
     for (std::size_t block = number % sampled_every; block < segment.blocks();
@@ -223,8 +223,8 @@ class SketchSearch {
   }
 
   /// Finds the best views of a segment by their cells.
-  void take_best(std::uint32_t number, SegmentScratch& scratch,
-                 std::vector<SketchedView>& best) const {
+  void collect_best(std::uint32_t number, SegmentScratch& scratch,
+                    std::vector<SketchedView>& best) const {
     const LiveSegment& segment = segments_[number];
     const SketchSegment& sketches = *segment.sketches;
     sketches.make_tables(layout_, kernels_, query_, scratch.tables);
@@ -233,13 +233,13 @@ class SketchSearch {
     std::array<std::size_t, 256> counts{};
     for (std::size_t row = 0; row < sketches.rows(); ++row) ++counts[scratch.bounds[row]];
     std::size_t limit = 0;
-    for (std::size_t within = counts[0]; within < kept_by_cells() && limit < 255;) {
+    for (std::size_t within = counts[0]; within < count_kept_by_cells() && limit < 255;) {
       within += counts[++limit];
     }
     for (std::uint32_t row = 0; row < sketches.rows(); ++row) {
       if (scratch.bounds[row] > limit || !segment.has(row)) continue;
       const ViewId view = sketches.views()[row];
-      if (!excluded(view)) best.push_back({scratch.bounds[row], number, row, view});
+      if (!is_excluded(view)) best.push_back({scratch.bounds[row], number, row, view});
     }
   }
 
@@ -268,20 +268,20 @@ class SketchSearch {
       for_segments(begin, end, chunk,
                    [&](std::uint32_t number, std::size_t /*place*/, SegmentScratch& scratch,
                        std::size_t of_chunk) {
-                     take_within(number, nearest_.limit(), scratch, found[of_chunk]);
+                     collect_within(number, nearest_.limit(), scratch, found[of_chunk]);
                    });
       for (const auto& of_chunk : found) {
         waiting.insert(waiting.end(), of_chunk.begin(), of_chunk.end());
       }
-      if (waiting.size() >= max_waiting) read_some(waiting);
+      if (waiting.size() >= max_waiting) read_batch(waiting);
       begin = end;
     }
-    while (!waiting.empty()) read_some(waiting);
+    while (!waiting.empty()) read_batch(waiting);
   }
 
   /// Those views of a segment whose bounds are within the limit.
-  void take_within(std::uint32_t number, std::uint32_t limit, SegmentScratch& scratch,
-                   std::vector<SketchedView>& found) const {
+  void collect_within(std::uint32_t number, std::uint32_t limit, SegmentScratch& scratch,
+                      std::vector<SketchedView>& found) const {
     const LiveSegment& segment = segments_[number];
     const SketchSegment& sketches = *segment.sketches;
     sketches.make_tables(layout_, kernels_, query_, scratch.tables);
@@ -305,13 +305,13 @@ class SketchSearch {
     }
     for (std::size_t i = 0; i < kept; ++i) {
       const ViewId view = sketches.views()[rows[i]];
-      if (!excluded(view)) found.push_back({scratch.level_bounds[i], number, rows[i], view});
+      if (!is_excluded(view)) found.push_back({scratch.level_bounds[i], number, rows[i], view});
     }
   }
 
   /// The best of them, more each time; all where they are few. Of the others those stay that can be
   /// among the nearest then.
-  void read_some(std::vector<SketchedView>& waiting) {
+  void read_batch(std::vector<SketchedView>& waiting) {
     const auto drop = [&] {
       std::erase_if(waiting, [this](const SketchedView& candidate) {
         return nearest_.can_exclude(candidate.bound, candidate.view) ||

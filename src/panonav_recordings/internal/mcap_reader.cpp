@@ -53,7 +53,7 @@ class McapFile : public ChunkedFile {
         head.packed_bytes != length - fixed) {
       fail("the chunk at byte " + std::to_string(block.at) + " is damaged: its head is wrong");
     }
-    const auto packing = packing_named(name);
+    const auto packing = find_packing(name);
     if (!packing || *packing == Packing::bz2) {
       fail("the chunk at byte " + std::to_string(block.at) + " is packed by '" + std::string(name) +
            "'; allowed: none, lz4, zstd");

@@ -80,7 +80,7 @@ bool unpack_bz2(std::span<const std::uint8_t> from, std::span<std::uint8_t> to,
 
 }  // namespace
 
-std::optional<Packing> packing_named(std::string_view name) noexcept {
+std::optional<Packing> find_packing(std::string_view name) noexcept {
   if (name.empty() || name == "none") return Packing::none;
   if (name == "lz4") return Packing::lz4;
   if (name == "zstd") return Packing::zstd;

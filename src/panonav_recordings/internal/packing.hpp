@@ -15,7 +15,7 @@ namespace panonav::recordings {
 enum class Packing { none, lz4, zstd, bz2 };
 
 /// Finds the compression by its name in recordings: "" or "none", "lz4", "zstd", "bz2".
-[[nodiscard]] std::optional<Packing> packing_named(std::string_view name) noexcept;
+[[nodiscard]] std::optional<Packing> find_packing(std::string_view name) noexcept;
 
 /// Bytes that are not cleared first, so that memory is used only as it is filled.
 struct Buffer {

@@ -33,7 +33,7 @@ bool is_pose_type(std::string_view type) {
 }
 
 /// True if a record of a run makes this topic of the pictures of its camera.
-bool is_made_of_pictures(std::string_view topic) {
+bool is_derived_from_images(std::string_view topic) {
   return topic == "/panorama/compressed" || topic == "/best_match/compressed";
 }
 
@@ -59,7 +59,7 @@ class TopicChooser {
     constexpr std::string_view types = "sensor_msgs/Image or sensor_msgs/CompressedImage";
     if (name) return use(find_named(*name, is_picture_type, types), TopicRole::picture);
     auto names = names_of(is_picture_type);
-    if (names.size() > 1) std::erase_if(names, is_made_of_pictures);
+    if (names.size() > 1) std::erase_if(names, is_derived_from_images);
     if (names.size() == 1) return use(numbers_of(names[0], is_picture_type), TopicRole::picture);
     if (names.empty()) {
       throw FileError(path_.string(), "has no images of " + std::string(types) +

@@ -11,7 +11,7 @@ namespace panonav::recordings {
 namespace {
 
 /// ROS 1 writes "/odom" and "odom" alike.
-std::string plain_frame(std::string_view name) {
+std::string normalise_frame_name(std::string_view name) {
   return std::string(name.starts_with('/') ? name.substr(1) : name);
 }
 
@@ -47,14 +47,14 @@ std::optional<ros::Pose> RecordedTrack::at(std::int64_t ns) const {
 }
 
 TransformChain::TransformChain(std::string_view top, std::string_view bottom)
-    : top_(plain_frame(top)), bottom_(plain_frame(bottom)) {
+    : top_(normalise_frame_name(top)), bottom_(normalise_frame_name(bottom)) {
   if (top_ == bottom_) throw ContractError("odometry frames", top_ + " twice", "two frames");
 }
 
 void TransformChain::add(const ros::TransformStamped& transform, std::int64_t log_ns,
                          bool is_static) {
-  const std::string child = plain_frame(transform.child_frame_id);
-  const std::string parent = plain_frame(transform.header.frame_id);
+  const std::string child = normalise_frame_name(transform.child_frame_id);
+  const std::string parent = normalise_frame_name(transform.header.frame_id);
   auto found = links_.find(child);
   if (found == links_.end()) {
     if (connected_) return;

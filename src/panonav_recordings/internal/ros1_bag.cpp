@@ -97,7 +97,7 @@ class BagFile : public ChunkedFile {
     if (!fields.good() || named.kind() != BagRecord::chunk || !unpacked) {
       fail(where + " is damaged: its head is wrong");
     }
-    const auto packing = packing_named(name);
+    const auto packing = find_packing(name);
     if (!packing || *packing == Packing::zstd) {
       fail(where + " is packed by '" + std::string(name) + "'; allowed: none, bz2, lz4");
     }

@@ -77,7 +77,7 @@ class DatabaseFile : public RecordingFile {
     try {
       const Statement rows = prepare("SELECT id, topic_id, timestamp FROM messages");
       while (step(rows)) {
-        const auto place = place_in(rows);
+        const auto place = read_place(rows);
         if (!place) continue;
         ++topics_[place->topic].messages;
         if (!time_) time_ = TimeSpan{place->time_ns, place->time_ns};
@@ -106,7 +106,7 @@ class DatabaseFile : public RecordingFile {
       sqlite3_bind_int64(rows.get(), 2, within.end_ns);
     }
     while (step(rows)) {
-      const auto place = place_in(rows);
+      const auto place = read_place(rows);
       if (!place || !chosen_topics[place->topic]) continue;
       places.push_back(*place);
       require_room(places.size(), max_places);
@@ -119,7 +119,7 @@ class DatabaseFile : public RecordingFile {
                                                                          sqlite3_reset);
     sqlite3_bind_int64(find_.get(), 1, static_cast<std::int64_t>(place.offset));
     steps_left_ = steps_allowed_;
-    const auto found = step(find_) ? place_in(find_) : std::nullopt;
+    const auto found = step(find_) ? read_place(find_) : std::nullopt;
     if (!found || sqlite3_column_type(find_.get(), 3) != SQLITE_BLOB) {
       fail("is damaged: message " + std::to_string(place.offset) + " is missing or no blob");
     }
@@ -188,7 +188,7 @@ class DatabaseFile : public RecordingFile {
 
   // Reads the place of a message from a row that begins with id, topic and time. Empty where these
   // have other types.
-  [[nodiscard]] std::optional<MessagePlace> place_in(const Statement& row) const {
+  [[nodiscard]] std::optional<MessagePlace> read_place(const Statement& row) const {
     for (int column = 0; column < 3; ++column) {
       if (sqlite3_column_type(row.get(), column) != SQLITE_INTEGER) {
         warn("messages without a time or topic are left out");

@@ -66,19 +66,19 @@ class RobotTopics {
              const std::optional<Tilt>& tilt, const std::optional<ReferencePose>& truth) {
     if (odometry) {
       odometry_.write(log_ns, ns,
-                      {{ns, "odom"}, "base_link", {ros::pose_of(*odometry), {}}, {}, {}, {}});
+                      {{ns, "odom"}, "base_link", {ros::to_pose(*odometry), {}}, {}, {}, {}});
     }
     if (tilt) {
       ros::Imu message;
       message.header = {ns, "base_link"};
-      message.orientation = ros::pose_of({}, *tilt).orientation;
+      message.orientation = ros::to_pose({}, *tilt).orientation;
       message.angular_velocity_covariance[0] = -1.0;
       message.linear_acceleration_covariance[0] = -1.0;
       imu_.write(log_ns, ns, message);
     }
     if (truth && truth->heading_rad) {
       poses_.write(log_ns, ns,
-                   {{ns, world_}, ros::pose_of({truth->x_m, truth->y_m, *truth->heading_rad})});
+                   {{ns, world_}, ros::to_pose({truth->x_m, truth->y_m, *truth->heading_rad})});
     } else if (truth) {
       positions_.write(log_ns, ns, {{ns, world_}, {truth->x_m, truth->y_m, 0.0}});
     }

@@ -248,7 +248,7 @@ Image V4l2Camera::decode(std::span<const std::uint8_t> bytes, const ImageLimits&
                                                 : "yuv422";
   const std::size_t needed = std::size_t{step_} * raw.height;
   raw.data = bytes.first(std::min(needed, bytes.size()));
-  return picture_of(raw, limits);
+  return to_image(raw, limits);
 }
 
 }  // namespace panonav::recordings

@@ -34,13 +34,13 @@ class HeadReader {
     if (bytes > max_head_bytes) {
       result_.status = 431;
     } else if (request_.host.empty() || (is_lenient_version() && !ends_there)) {
-      refuse(400);
+      set_refusal(400);
     }
     return result_;
   }
 
  private:
-  void refuse(int status) {
+  void set_refusal(int status) {
     if (result_.status == 0) result_.status = status;
   }
 
@@ -60,25 +60,25 @@ class HeadReader {
     const auto is_text = [](unsigned char c) { return (c >= ' ' && c != 0x7F) || c == '\t'; };
     if (name.empty() || !std::ranges::all_of(name, is_token) ||
         !std::ranges::all_of(value, is_text)) {
-      refuse(400);
+      set_refusal(400);
     }
     if (name == "host") read_once(request_.host, value);
     if (name == "origin") read_once(request_.origin, value);
     if (name == "authorization") read_once(request_.authorization, value);
-    if (name == "transfer-encoding") refuse(501);
+    if (name == "transfer-encoding") set_refusal(501);
     if (name == "content-length") read_length(value);
   }
   void read_once(std::string& field, std::string_view value) {
-    if (!field.empty() || value.empty()) refuse(400);
+    if (!field.empty() || value.empty()) set_refusal(400);
     field = value;
   }
   void read_length(std::string_view value) {
     const char* const end = value.data() + value.size();
     const auto [read, error] = std::from_chars(value.data(), end, result_.body_bytes);
     if (std::exchange(has_length_, true) || error == std::errc::invalid_argument || read != end) {
-      refuse(400);
+      set_refusal(400);
     } else if (error != std::errc() || result_.body_bytes > max_body_) {
-      refuse(413);
+      set_refusal(413);
     }
   }
 

@@ -70,7 +70,7 @@ void require_scene_file(const fs::path& file) {
   }
 }
 
-std::string text_of_scene_file(const fs::path& file) {
+std::string read_scene_file(const fs::path& file) {
   require_scene_file(file);
   std::ifstream stream(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
@@ -145,7 +145,7 @@ pugi::xml_node GazeboFiles::sdf(const fs::path& file) {
     return known->second.document_element();
   pugi::xml_document document;
   try {
-    document = parse_xml(text_of_scene_file(file));
+    document = parse_xml(read_scene_file(file));
   } catch (const FileError&) {
     throw;
   } catch (const Error& error) {
@@ -165,7 +165,7 @@ fs::path GazeboFiles::find_description(const fs::path& folder) {
     if (!fs::is_regular_file(folder / list, code)) continue;
     pugi::xml_document config;
     try {
-      config = parse_xml(text_of_scene_file(folder / list));
+      config = parse_xml(read_scene_file(folder / list));
     } catch (const Error&) {
       break;  // the usual names may do
     }

@@ -16,7 +16,7 @@ namespace panonav::simulation {
 void require_scene_file(const std::filesystem::path& file);
 
 /// Reads the bytes of a file. Throws FileError as require_scene_file does.
-[[nodiscard]] std::string text_of_scene_file(const std::filesystem::path& file);
+[[nodiscard]] std::string read_scene_file(const std::filesystem::path& file);
 
 /// True if two texts differ at most in the case of their ASCII letters.
 [[nodiscard]] bool equals_ignoring_case(std::string_view a, std::string_view b);

@@ -45,7 +45,7 @@ constexpr std::array<NamedColour, 21> gazebo_colours{{
 }};
 
 // Splits a script into words; braces stand alone, comments are left out.
-std::vector<std::string> split_words(const fs::path& file) {
+std::vector<std::string> read_words(const fs::path& file) {
   require_scene_file(file);
   std::ifstream stream(file);
   std::vector<std::string> words;
@@ -62,7 +62,7 @@ std::vector<std::string> split_words(const fs::path& file) {
         spaced += c;
       }
     }
-    for (std::string& word : panonav::split_words(spaced)) words.push_back(std::move(word));
+    for (std::string& word : panonav::read_words(spaced)) words.push_back(std::move(word));
   }
   return words;
 }
@@ -80,7 +80,7 @@ std::optional<std::array<float, 3>> parse_colour(const std::vector<std::string>&
 }
 
 std::optional<ScriptMaterial> find_in_file(std::string_view name, const fs::path& file) {
-  const std::vector<std::string> words = split_words(file);
+  const std::vector<std::string> words = read_words(file);
   for (std::size_t i = 0; i + 1 < words.size(); ++i) {
     if (words[i] != "material" || words[i + 1] != name) continue;
     ScriptMaterial material;

@@ -50,7 +50,7 @@ Interval span_between(const std::vector<Vector3>& polygon, double y_low, double 
   return span;
 }
 
-int clamped_cell(double coordinate, int count) {
+int clamp_cell(double coordinate, int count) {
   return static_cast<int>(std::clamp(std::floor(coordinate), -1.0, static_cast<double>(count)));
 }
 
@@ -58,19 +58,17 @@ void mark(const std::vector<Vector3>& polygon, const Raster& raster,
           std::vector<std::uint8_t>& cells) {
   Interval y;
   for (const Vector3& v : polygon) y.add(v.y_m);
-  const int first =
-      std::max(0, clamped_cell((y.low - raster.low.y_m) / raster.cell_m, raster.rows));
-  const int last = std::min(raster.rows - 1,
-                            clamped_cell((y.high - raster.low.y_m) / raster.cell_m, raster.rows));
+  const int first = std::max(0, clamp_cell((y.low - raster.low.y_m) / raster.cell_m, raster.rows));
+  const int last =
+      std::min(raster.rows - 1, clamp_cell((y.high - raster.low.y_m) / raster.cell_m, raster.rows));
   for (int j = first; j <= last; ++j) {
     const double y_low = raster.low.y_m + j * raster.cell_m;
     const Interval x = span_between(polygon, y_low, y_low + raster.cell_m);
     if (!(x.low <= x.high)) continue;
     const int left =
-        std::max(0, clamped_cell((x.low - raster.low.x_m) / raster.cell_m, raster.columns));
-    const int right =
-        std::min(raster.columns - 1,
-                 clamped_cell((x.high - raster.low.x_m) / raster.cell_m, raster.columns));
+        std::max(0, clamp_cell((x.low - raster.low.x_m) / raster.cell_m, raster.columns));
+    const int right = std::min(
+        raster.columns - 1, clamp_cell((x.high - raster.low.x_m) / raster.cell_m, raster.columns));
     for (int i = left; i <= right; ++i) {
       cells[static_cast<std::size_t>(j) * static_cast<std::size_t>(raster.columns) +
             static_cast<std::size_t>(i)] = 1;

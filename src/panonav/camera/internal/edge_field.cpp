@@ -9,13 +9,13 @@
 namespace panonav {
 namespace {
 
-struct Slope {
+struct Gradient {
   float u = 0.0F;
   float v = 0.0F;
   float squared = 0.0F;
 };
 
-std::vector<float> gaussian(double sigma_px) {
+std::vector<float> make_gaussian_kernel(double sigma_px) {
   const int reach = std::max(1, static_cast<int>(std::ceil(3 * sigma_px)));
   std::vector<float> kernel(2 * reach + 1);
   float sum = 0;
@@ -57,15 +57,15 @@ std::vector<float> smooth(const std::vector<float>& plane, int width, int height
 }
 
 /// The steepest slope over the channels; one-sided at the frame.
-Slope steepest_slope(const SmoothPlanes& planes, int u, int v) {
+Gradient find_largest_gradient(const SmoothPlanes& planes, int u, int v) {
   const int left = std::max(0, u - 1);
   const int right = std::min(planes.width - 1, u + 1);
   const int above = std::max(0, v - 1);
   const int below = std::min(planes.height - 1, v + 1);
-  Slope best;
+  Gradient best;
   for (const std::vector<float>& plane : planes.channels) {
     const auto at = [&](int x, int y) { return plane[planes.index(x, y)]; };
-    Slope slope;
+    Gradient slope;
     slope.u = (at(right, v) - at(left, v)) / static_cast<float>(std::max(1, right - left));
     slope.v = (at(u, below) - at(u, above)) / static_cast<float>(std::max(1, below - above));
     slope.squared = slope.u * slope.u + slope.v * slope.v;
@@ -86,7 +86,7 @@ SmoothPlanes smooth_planes(ImageView image, int reduction, double sigma_px) {
   planes.width = image.width / reduction;
   planes.height = image.height / reduction;
   const std::size_t size = planes.index(0, planes.height);
-  const std::vector<float> kernel = gaussian(sigma_px);
+  const std::vector<float> kernel = make_gaussian_kernel(sigma_px);
   const float area = static_cast<float>(reduction) * static_cast<float>(reduction);
   for (int channel = 0; channel < image.channels; ++channel) {
     std::vector<float> plane(size);
@@ -106,7 +106,8 @@ SmoothPlanes smooth_planes(ImageView image, int reduction, double sigma_px) {
   std::vector<float> slopes;
   slopes.reserve(size);
   for (int v = 0; v < planes.height; ++v) {
-    for (int u = 0; u < planes.width; ++u) slopes.push_back(steepest_slope(planes, u, v).squared);
+    for (int u = 0; u < planes.width; ++u)
+      slopes.push_back(find_largest_gradient(planes, u, v).squared);
   }
   const auto fifth = slopes.begin() + static_cast<std::ptrdiff_t>(slopes.size() * 4 / 5);
   std::nth_element(slopes.begin(), fifth, slopes.end());
@@ -114,7 +115,7 @@ SmoothPlanes smooth_planes(ImageView image, int reduction, double sigma_px) {
   return planes;
 }
 
-EdgeField edge_field(const SmoothPlanes& planes) {
+EdgeField make_edge_field(const SmoothPlanes& planes) {
   EdgeField field;
   field.width = planes.width;
   field.height = planes.height;
@@ -124,7 +125,7 @@ EdgeField edge_field(const SmoothPlanes& planes) {
   const float scale = planes.slope_scale * planes.slope_scale;
   for (int v = 0; v < field.height; ++v) {
     for (int u = 0; u < field.width; ++u) {
-      const Slope slope = steepest_slope(planes, u, v);
+      const Gradient slope = find_largest_gradient(planes, u, v);
       // |g|^2 / (|g|^2 + scale) times (cos 2t, sin 2t) = (u^2 - v^2, 2 u v) / |g|^2.
       const float weight = 1.0F / (slope.squared + scale);
       field.cosine.push_back(weight * (slope.u * slope.u - slope.v * slope.v));
@@ -134,7 +135,7 @@ EdgeField edge_field(const SmoothPlanes& planes) {
   return field;
 }
 
-EdgeField mean_field(std::span<const EdgeField> fields) {
+EdgeField average_fields(std::span<const EdgeField> fields) {
   require(!fields.empty(), "number of fields", 0, "at least 1");
   EdgeField mean = fields[0];
   for (const EdgeField& field : fields.subspan(1)) {

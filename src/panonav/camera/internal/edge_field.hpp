@@ -42,10 +42,10 @@ struct EdgeField {
   }
 };
 
-[[nodiscard]] EdgeField edge_field(const SmoothPlanes& planes);
+[[nodiscard]] EdgeField make_edge_field(const SmoothPlanes& planes);
 
 /// Mean of fields of one size. Throws ContractError on none or on different sizes.
-[[nodiscard]] EdgeField mean_field(std::span<const EdgeField> fields);
+[[nodiscard]] EdgeField average_fields(std::span<const EdgeField> fields);
 
 /// Averages blocks of `reduction` x `reduction` pixels.
 [[nodiscard]] EdgeField reduce(const EdgeField& field, int reduction);

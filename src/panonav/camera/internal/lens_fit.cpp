@@ -49,8 +49,8 @@ class LensFit::Linearised {
       for (int i = 0; i < own; ++i) {
         FisheyeLens lens = state.lenses[view % 2];
         RigRotation rotation = state.rotations[view / 2];
-        i < lens_size ? add_to(lens, i, slope_step(i))
-                      : add_to(rotation, i - lens_size, slope_step(i));
+        i < lens_size ? add_to(lens, i, get_derivative_step(i))
+                      : add_to(rotation, i - lens_size, get_derivative_step(i));
         changed_[view].emplace_back(lens, rotation, mirror_sign);
       }
     }
@@ -70,7 +70,7 @@ class LensFit::Linearised {
       for (int i = 0; i < own; ++i) {
         const int column = side * own + i;
         places[column] = parameter_index(point, i);
-        const Vector3d change = (side == 0 ? 1.0 : -1.0) / slope_step(i) *
+        const Vector3d change = (side == 0 ? 1.0 : -1.0) / get_derivative_step(i) *
                                 (changed_[point.view()][i].ray(point.pixel) - unchanged);
         slopes.col(column) =
             match.whitener * Vector2d(match.east.dot(change), match.north.dot(change));

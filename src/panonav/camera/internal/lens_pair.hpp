@@ -35,7 +35,7 @@ inline constexpr int rotation_size = 3;
 }
 /// Returns the change of a parameter over which its slope is taken: thousandths of a pixel for a
 /// centre, millionths for all else.
-[[nodiscard]] constexpr double slope_step(int parameter) {
+[[nodiscard]] constexpr double get_derivative_step(int parameter) {
   return parameter < 2 ? 1e-3 : 1e-6;
 }
 

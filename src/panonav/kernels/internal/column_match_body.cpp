@@ -65,8 +65,8 @@ void match_by_sad(const uint8_t* query, const uint8_t* reference, uint16_t* cost
     Words sums[2] = {};  // turns of f = 0 and 1, side by side; of 2 and 3
     for (int c = 0; c < matched_query_columns; ++c) {
       const uint8_t* const column = query + c * matched_bands;
-      const Register upper = Vector::repeat(load_group(column));
-      const Register lower = Vector::repeat(load_group(column + 8));
+      const Register upper = Vector::broadcast(load_group(column));
+      const Register lower = Vector::broadcast(load_group(column + 8));
       const auto l1 = [&](int f) {
         return Vector::sad(upper, Vector::load(halved.at[f][0][first + c])) +
                Vector::sad(lower, Vector::load(halved.at[f][1][first + c]));

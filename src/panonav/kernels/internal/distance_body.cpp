@@ -4,7 +4,7 @@ namespace panonav::kernels {
 namespace {
 
 template <Instructions set, bool masked>
-uint32_t l1_of(const uint8_t* a, const uint8_t* b, const uint8_t* mask, size_t count) {
+uint32_t compute_l1(const uint8_t* a, const uint8_t* b, const uint8_t* mask, size_t count) {
   using Vector = ByteVector<set>;
   using Register = typename Vector::Register;
   Register sums{};
@@ -48,8 +48,8 @@ uint32_t interleaved_bounds(const uint8_t* sketches, const int32_t* slacks, size
   Register kept_values[kept];
   Register kept_steps[kept];
   for (size_t group = 0; group < fixed_groups; ++group) {
-    kept_values[group] = Vector::repeat(load_group(query.values + group * 8));
-    kept_steps[group] = Vector::repeat(query.steps[group]);
+    kept_values[group] = Vector::broadcast(load_group(query.values + group * 8));
+    kept_steps[group] = Vector::broadcast(query.steps[group]);
   }
   const size_t groups = fixed_groups > 0 ? fixed_groups : query.groups;
   EightInts smallest = EightInts{} + 0x7FFFFFFF;
@@ -60,12 +60,12 @@ uint32_t interleaved_bounds(const uint8_t* sketches, const int32_t* slacks, size
     for (size_t group = 0; group < groups; ++group) {
       const Register values = fixed_groups > 0
                                   ? kept_values[group]
-                                  : Vector::repeat(load_group(query.values + group * 8));
+                                  : Vector::broadcast(load_group(query.values + group * 8));
       const Register step =
-          fixed_groups > 0 ? kept_steps[group] : Vector::repeat(query.steps[group]);
+          fixed_groups > 0 ? kept_steps[group] : Vector::broadcast(query.steps[group]);
       for (size_t r = 0; r < registers; ++r) {
         Register x = Vector::load(sketches + group * 64 + r * sizeof(Register));
-        if (masked) x = x & Vector::repeat(load_group(query.mask + group * 8));
+        if (masked) x = x & Vector::broadcast(load_group(query.mask + group * 8));
         sums[r] = sums[r] + Vector::product(Vector::sad(x, values), step);
       }
     }
@@ -86,7 +86,7 @@ uint32_t interleaved_bounds(const uint8_t* sketches, const int32_t* slacks, size
   return min_bound;
 }
 
-bool counts_everywhere(const DistanceKernels::SketchQuery& query) {
+bool is_unmasked(const DistanceKernels::SketchQuery& query) {
   for (size_t group = 0; group < query.groups; ++group) {
     if (load_group(query.mask + group * 8) != ~uint64_t{0}) return false;
   }
@@ -97,13 +97,13 @@ bool counts_everywhere(const DistanceKernels::SketchQuery& query) {
 
 template <Instructions set>
 uint32_t DistanceBody<set>::l1(const uint8_t* a, const uint8_t* b, size_t count) {
-  return l1_of<set, false>(a, b, nullptr, count);
+  return compute_l1<set, false>(a, b, nullptr, count);
 }
 
 template <Instructions set>
 uint32_t DistanceBody<set>::masked_l1(const uint8_t* a, const uint8_t* b, const uint8_t* mask,
                                       size_t count) {
-  return l1_of<set, true>(a, b, mask, count);
+  return compute_l1<set, true>(a, b, mask, count);
 }
 
 template <Instructions set>
@@ -113,7 +113,7 @@ uint32_t DistanceBody<set>::sketch_bounds(const uint8_t* sketches, const int32_t
   // 15 components make 5 groups; other shapes take the general body, and so do sets that have too
   // few registers to keep the query in them.
   if constexpr (set == Instructions::avx512) {
-    if (query.groups == 5 && counts_everywhere(query)) {
+    if (query.groups == 5 && is_unmasked(query)) {
       return interleaved_bounds<set, 5, false>(sketches, slacks, octets, query, bounds);
     }
   }

@@ -6,7 +6,7 @@ namespace panonav::kernels {
 namespace {
 
 // ln x of 2^-33 <= x <= 1; error below 1e-7 of the value and 1e-7.
-inline float logarithm_of(float x) {
+inline float approximate_log(float x) {
   int bits;
   __builtin_memcpy(&bits, &x, sizeof bits);
   // From sqrt(1/2) up to sqrt(2), so that the exponent of 1 is 0.
@@ -35,7 +35,7 @@ void MotionBody<set>::normal_pairs(const uint64_t* __restrict bits, float* __res
     const float share = (static_cast<float>(radius_bits) + 0.5F) * 0x1.0p-32F;
     const float radius_share = share < 1.0F ? share : 1.0F;
     const float quarters = (static_cast<float>(angle_bits) + 0.5F) * 0x1.0p-30F;
-    const float radius = __builtin_sqrtf(-2.0F * logarithm_of(radius_share));
+    const float radius = __builtin_sqrtf(-2.0F * approximate_log(radius_share));
     const float rounded = quarters + rounder;
     int quarter;
     __builtin_memcpy(&quarter, &rounded, sizeof quarter);

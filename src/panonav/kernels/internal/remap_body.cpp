@@ -5,7 +5,8 @@ namespace {
 
 /// The four pixels of each of `count` taps. Measured: ordinary loads beat the gather instructions
 /// of AVX2 and AVX-512, and NEON has none.
-inline void look_up(const uint16_t* pairs, const uint32_t* positions, int count, uint32_t* pixels) {
+inline void gather_pairs(const uint16_t* pairs, const uint32_t* positions, int count,
+                         uint32_t* pixels) {
 #pragma GCC unroll 8
   for (int i = 0; i < count; i += 2) {
     uint64_t two;  // one load for two positions; both machines are little endian
@@ -17,14 +18,14 @@ inline void look_up(const uint16_t* pairs, const uint32_t* positions, int count,
 
 /// Samples i .. i + count - 1.
 template <Instructions set, int count>
-[[gnu::always_inline]] inline void remap_together(const RemapJob& job, int i) {
+[[gnu::always_inline]] inline void remap_lanes(const RemapJob& job, int i) {
   using Vector = ByteVector<set>;
   constexpr int lanes = lanes_of<set>;
   alignas(64) uint32_t pixels[count];
   typename Vector::Register sums[count / lanes] = {};
   for (long t = 0; t < job.taps; ++t) {
     const long entry = t * job.count + i;
-    look_up(job.pairs, job.positions + entry, count, pixels);
+    gather_pairs(job.pairs, job.positions + entry, count, pixels);
     for (int j = 0; j < count / lanes; ++j) {
       // Pixels are unsigned, weights add up to 127: sums of two stay below 2^15.
       sums[j] = Vector::add_products(sums[j], Vector::load(pixels + j * lanes),
@@ -87,8 +88,8 @@ void RemapBody<set>::remap(const RemapJob& job) {
   int i = 0;
   if constexpr (set != Instructions::scalar) {
     constexpr int lanes = lanes_of<set>;
-    for (; i + 64 <= job.count; i += 64) remap_together<set, 64>(job, i);
-    for (; i + lanes <= job.count; i += lanes) remap_together<set, lanes>(job, i);
+    for (; i + 64 <= job.count; i += 64) remap_lanes<set, 64>(job, i);
+    for (; i + lanes <= job.count; i += lanes) remap_lanes<set, lanes>(job, i);
   }
   for (; i < job.count; ++i) {
     uint32_t sum = 0;

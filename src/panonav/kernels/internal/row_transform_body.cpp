@@ -15,7 +15,7 @@ inline void store(float* to, typename Vectors<lanes>::Floats value) {
 
 /// Two floats, repeated over all lanes.
 template <int lanes>
-inline typename Vectors<lanes>::Floats repeat_pair(const float* pair) {
+inline typename Vectors<lanes>::Floats broadcast_pair(const float* pair) {
   int64_t bits;
   __builtin_memcpy(&bits, pair, sizeof bits);
   const typename Vectors<lanes>::Longs repeated = bits - typename Vectors<lanes>::Longs{};
@@ -23,7 +23,7 @@ inline typename Vectors<lanes>::Floats repeat_pair(const float* pair) {
 }
 
 template <int lanes>
-inline typename Vectors<lanes>::Floats reversed(typename Vectors<lanes>::Floats v) {
+inline typename Vectors<lanes>::Floats reverse_lanes(typename Vectors<lanes>::Floats v) {
   if constexpr (lanes == 16) {
     return __builtin_shufflevector(v, v, 15, 14, 13, 12, 11, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0);
   } else if constexpr (lanes == 8) {
@@ -56,8 +56,8 @@ template <int lanes>
 inline void fold_quarter(const float* row, int columns, int c, float* even, float* odd) {
   const int half = columns / 2;
   const auto a = load<lanes>(row + c);
-  const auto b = reversed<lanes>(load<lanes>(row + columns - c - lanes + 1));
-  const auto d = reversed<lanes>(load<lanes>(row + half - c - lanes + 1));
+  const auto b = reverse_lanes<lanes>(load<lanes>(row + columns - c - lanes + 1));
+  const auto d = reverse_lanes<lanes>(load<lanes>(row + half - c - lanes + 1));
   const auto f = load<lanes>(row + half + c);
   const auto near_sum = a + b;
   const auto near_difference = a - b;
@@ -139,8 +139,8 @@ inline void transform_rows(const RowTransformJob& job, int first_row) {
       const Floats sine = load<lanes>(sines + static_cast<long>(c) * row_transform_block);
 #pragma GCC unroll 4
       for (int r = 0; r < rows; ++r) {
-        real[r] += repeat_pair<lanes>(even + static_cast<long>(r) * length + 2 * c) * cosine;
-        imaginary[r] += repeat_pair<lanes>(odd + static_cast<long>(r) * length + 2 * c) * sine;
+        real[r] += broadcast_pair<lanes>(even + static_cast<long>(r) * length + 2 * c) * cosine;
+        imaginary[r] += broadcast_pair<lanes>(odd + static_cast<long>(r) * length + 2 * c) * sine;
       }
     }
     for (int k = 0; k < lanes && first + k < job.components; ++k) {

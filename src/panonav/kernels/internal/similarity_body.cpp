@@ -9,7 +9,7 @@ namespace {
 constexpr float rounder = 12582912.0F;
 
 // exp(x) for x < 80, 2^min_exponent for what is less; relative error below 4e-6.
-inline float exp_of(float x, float min_exponent) {
+inline float approximate_exp(float x, float min_exponent) {
   const float product = x * 1.44269504088896F;
   const float y = product > min_exponent ? product : min_exponent;
   const float whole = (y + rounder) - rounder;
@@ -31,11 +31,11 @@ inline float wrapped(float angle_rad) {
 // Poses whose sums stay in registers.
 constexpr int poses_together = 16;
 
-inline void explain_similarity_together(const SimilarityLanes& lanes,
-                                        const SimilarityLanes::Fall& fall,
-                                        const float* __restrict x_m, const float* __restrict y_m,
-                                        const float* __restrict heading_rad,
-                                        float* __restrict explained) {
+inline void explain_similarity_lanes(const SimilarityLanes& lanes,
+                                     const SimilarityLanes::Fall& fall, const float* __restrict x_m,
+                                     const float* __restrict y_m,
+                                     const float* __restrict heading_rad,
+                                     float* __restrict explained) {
   constexpr float min_exponent = -60.0F;  // the squares are normal numbers still: others are slow
   float squares[poses_together] = {};
   float products[poses_together] = {};
@@ -44,14 +44,14 @@ inline void explain_similarity_together(const SimilarityLanes& lanes,
       const float dx = lanes.x_m[i] - x_m[p];
       const float dy = lanes.y_m[i] - y_m[p];
       const float apart = __builtin_sqrtf(dx * dx + dy * dy + fall.blur_square_m2);
-      const float expected = exp_of(-apart * fall.per_metre, min_exponent);
+      const float expected = approximate_exp(-apart * fall.per_metre, min_exponent);
       const float turn = wrapped(heading_rad[p] - lanes.heading_rad[i]);
       const float other_turn = wrapped(heading_rad[p] - lanes.other_heading_rad[i]);
       const float facing = lanes.log_similarity[i] + turn * turn * lanes.per_square_turn[i];
       const float other =
           lanes.other_log_similarity[i] + other_turn * other_turn * lanes.per_square_turn[i];
       squares[p] += expected * expected;
-      products[p] += exp_of(facing > other ? facing : other, min_exponent) * expected;
+      products[p] += approximate_exp(facing > other ? facing : other, min_exponent) * expected;
     }
   }
   for (int p = 0; p < poses_together; ++p) {
@@ -72,8 +72,8 @@ void SimilarityBody<set>::explain_similarity(const SimilarityLanes& lanes,
                                              float* __restrict explained, int count) {
   int done = 0;
   for (; done + poses_together <= count; done += poses_together) {
-    explain_similarity_together(lanes, fall, x_m + done, y_m + done, heading_rad + done,
-                                explained + done);
+    explain_similarity_lanes(lanes, fall, x_m + done, y_m + done, heading_rad + done,
+                             explained + done);
   }
   if (done == count) return;
   float x[poses_together] = {};
@@ -85,14 +85,14 @@ void SimilarityBody<set>::explain_similarity(const SimilarityLanes& lanes,
     y[p - done] = y_m[p];
     heading[p - done] = heading_rad[p];
   }
-  explain_similarity_together(lanes, fall, x, y, heading, last);
+  explain_similarity_lanes(lanes, fall, x, y, heading, last);
   for (int p = done; p < count; ++p) explained[p] = last[p - done];
 }
 
 template <Instructions set>
 void SimilarityBody<set>::exponentials(const float* __restrict logarithms, float scale,
                                        float* __restrict values, int count) {
-  for (int i = 0; i < count; ++i) values[i] = exp_of(scale * logarithms[i], -126.0F);
+  for (int i = 0; i < count; ++i) values[i] = approximate_exp(scale * logarithms[i], -126.0F);
 }
 
 template struct SimilarityBody<Instructions::PANONAV_TARGET>;

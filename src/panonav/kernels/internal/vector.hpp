@@ -74,7 +74,7 @@ struct ByteVector<Instructions::scalar> {
   using Register = uint64_t;
   typedef uint8_t Octet __attribute__((vector_size(8)));
   static Register load(const void* from) { return load_group(from); }
-  static Register repeat(uint64_t number) { return number; }
+  static Register broadcast(uint64_t number) { return number; }
   static Register sad(Register a, Register b) {
     Octet x;
     Octet y;
@@ -105,7 +105,7 @@ struct ByteVector<Instructions::avx2> {
   static Register load(const void* from) {
     return _mm256_loadu_si256(static_cast<const Register*>(from));
   }
-  static Register repeat(uint64_t number) {
+  static Register broadcast(uint64_t number) {
     return _mm256_set1_epi64x(static_cast<long long>(number));
   }
   static Register sad(Register a, Register b) { return _mm256_sad_epu8(a, b); }
@@ -132,11 +132,11 @@ struct ByteVector<Instructions::avx2> {
     return write_set_bits(static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(low))),
                           first, to);
   }
-  static Register repeated_table(const uint8_t* table) {
+  static Register broadcast_table(const uint8_t* table) {
     return _mm256_broadcastsi128_si256(_mm_loadu_si128(reinterpret_cast<const __m128i*>(table)));
   }
   static Register lookup(const uint8_t* table, Register bytes) {
-    return _mm256_shuffle_epi8(repeated_table(table), bytes & _mm256_set1_epi8(15));
+    return _mm256_shuffle_epi8(broadcast_table(table), bytes & _mm256_set1_epi8(15));
   }
   static Register lookup_upper(const uint8_t* table, Register bytes) {
     return lookup(table, _mm256_srli_epi16(bytes, 4));
@@ -173,7 +173,7 @@ struct ByteVector<Instructions::avx512> {
   static Register load_first(const void* from, size_t count) {
     return _mm512_maskz_loadu_epi8(~__mmask64{0} >> (64 - count), from);
   }
-  static Register repeat(uint64_t number) {
+  static Register broadcast(uint64_t number) {
     return _mm512_set1_epi64(static_cast<long long>(number));
   }
   static Register sad(Register a, Register b) { return _mm512_sad_epu8(a, b); }
@@ -241,7 +241,7 @@ struct ByteVector<Instructions::neon> {
   static Register load(const void* from) {
     return vreinterpretq_u64_u8(vld1q_u8(static_cast<const uint8_t*>(from)));
   }
-  static Register repeat(uint64_t number) { return vdupq_n_u64(number); }
+  static Register broadcast(uint64_t number) { return vdupq_n_u64(number); }
   static Register sad(Register a, Register b) {
     return vpaddlq_u32(vpaddlq_u16(vpaddlq_u8(vabdq_u8(bytes(a), bytes(b)))));
   }

@@ -24,7 +24,7 @@ constexpr double max_log_loss = 9.0;
 /// Larger log-likelihood ratios decide alone; keeps exponentials finite.
 constexpr double max_log_odds = 50.0;
 
-double sum_of(const std::vector<double>& values) {
+double sum_values(const std::vector<double>& values) {
   double sum = 0.0;
   for (const double value : values) sum += value;
   return sum;
@@ -69,17 +69,17 @@ bool ExplainedInjection::find_places(const Particles& particles, Random& random)
   // In all other places and headings the view is unexplained.
   const double share = heading_share_ / static_cast<double>(sites.size());
   const double unexplained = std::max(0.0, 1.0 - share * static_cast<double>(likelihoods_.size()));
-  log_evidence_ =
-      log_largest_ + std::log(share * sum_of(likelihoods_) + unexplained * std::exp(-log_largest_));
+  log_evidence_ = log_largest_ + std::log(share * sum_values(likelihoods_) +
+                                          unexplained * std::exp(-log_largest_));
   return true;
 }
 
-Particles ExplainedInjection::draw(const Particles& particles, std::size_t count,
-                                   Random& random) const {
+Particles ExplainedInjection::sample_particles(const Particles& particles, std::size_t count,
+                                               Random& random) const {
   const std::vector<std::size_t> drawn = resample_systematically(likelihoods_, count, random);
   Particles fresh;
   for (const std::size_t d : drawn) {
-    fresh.add(sampler_->draw_around(places_[d], particles, random), 0.0);
+    fresh.add(sampler_->sample_around(places_[d], particles, random), 0.0);
   }
   std::vector<double> log_ratios(fresh.size());
   likelihood_->compute_log_ratios(fresh, log_ratios);
@@ -95,13 +95,13 @@ int ExplainedInjection::inject(Particles& particles, double probability, Random&
   if (probability * size < min_injected_particles) return 0;
   const double replaced = std::max(min_replaced_share, replaced_share_factor * probability) * size;
   const auto count = static_cast<std::size_t>(std::max(1L, std::lround(replaced)));
-  const Particles fresh = draw(particles, count, random);
+  const Particles fresh = sample_particles(particles, count, random);
   const std::vector<std::size_t> lightest = find_lightest(particles, fresh.size());
   for (std::size_t n = 0; n < fresh.size(); ++n) particles.set(lightest[n], fresh.pose(n), 0.0);
-  const double kept = sum_of(particles.weight);
+  const double kept = sum_values(particles.weight);
   for (double& weight : particles.weight) weight *= kept > 0.0 ? (1.0 - probability) / kept : 0.0;
   const double fresh_share = (kept > 0.0 ? probability : 1.0);
-  const double fresh_sum = sum_of(fresh.weight);
+  const double fresh_sum = sum_values(fresh.weight);
   for (std::size_t n = 0; n < fresh.size(); ++n) {
     particles.weight[lightest[n]] = fresh_share * fresh.weight[n] / fresh_sum;
   }

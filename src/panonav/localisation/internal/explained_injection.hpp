@@ -30,7 +30,8 @@ class ExplainedInjection {
 
  private:
   /// Draws particles around the places, weighed by their likelihood over that of the place.
-  [[nodiscard]] Particles draw(const Particles& particles, std::size_t count, Random& random) const;
+  [[nodiscard]] Particles sample_particles(const Particles& particles, std::size_t count,
+                                           Random& random) const;
 
   ViewLikelihood* likelihood_;
   const PoseSampler* sampler_;

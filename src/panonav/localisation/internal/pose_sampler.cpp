@@ -38,8 +38,8 @@ Pose2 PoseSampler::make_pose_at(Candidate candidate, const Particles& particles,
   return {site.position.x_m, site.position.y_m, wrap_angle(heading_rad)};
 }
 
-Pose2 PoseSampler::draw_around(Candidate candidate, const Particles& particles,
-                               Random& random) const {
+Pose2 PoseSampler::sample_around(Candidate candidate, const Particles& particles,
+                                 Random& random) const {
   Pose2 pose = make_pose_at(candidate, particles, random);
   pose.x_m += random.normal(0.0, position_deviation_spacings * model_->spacing_m);
   pose.y_m += random.normal(0.0, position_deviation_spacings * model_->spacing_m);
@@ -51,8 +51,8 @@ Pose2 PoseSampler::draw_around(Candidate candidate, const Particles& particles,
   return pose;
 }
 
-Pose2 PoseSampler::draw_in_square(std::size_t site, std::optional<double> heading_rad,
-                                  Random& random) const {
+Pose2 PoseSampler::sample_in_square(std::size_t site, std::optional<double> heading_rad,
+                                    Random& random) const {
   const Point2 centre = likelihood_->sites()[site].position;
   const double half = 0.5 * model_->spacing_m;
   const double x = centre.x_m + random.uniform(-half, half);
@@ -61,10 +61,10 @@ Pose2 PoseSampler::draw_in_square(std::size_t site, std::optional<double> headin
   return {x, y, heading_rad.value_or(any_heading_rad)};
 }
 
-Pose2 PoseSampler::draw_anywhere(const Particles& particles, Random& random) const {
+Pose2 PoseSampler::sample_anywhere(const Particles& particles, Random& random) const {
   const double borrowed_rad = borrow_heading(particles, random);
   const std::size_t site = random.index(likelihood_->sites().size());
-  return draw_in_square(site, compass_ ? std::nullopt : std::optional(borrowed_rad), random);
+  return sample_in_square(site, compass_ ? std::nullopt : std::optional(borrowed_rad), random);
 }
 
 }  // namespace panonav

@@ -28,14 +28,14 @@ class PoseSampler {
   [[nodiscard]] Pose2 make_pose_at(Candidate candidate, const Particles& particles,
                                    Random& random) const;
   /// Draws a pose around it, as far as the truth may lie.
-  [[nodiscard]] Pose2 draw_around(Candidate candidate, const Particles& particles,
-                                  Random& random) const;
+  [[nodiscard]] Pose2 sample_around(Candidate candidate, const Particles& particles,
+                                    Random& random) const;
   /// Draws a position in the site's square of the grid, with this heading or any.
-  [[nodiscard]] Pose2 draw_in_square(std::size_t site, std::optional<double> heading_rad,
-                                     Random& random) const;
+  [[nodiscard]] Pose2 sample_in_square(std::size_t site, std::optional<double> heading_rad,
+                                       Random& random) const;
   /// Draws a position in the square of any site; without a compass with the heading of a random
   /// particle.
-  [[nodiscard]] Pose2 draw_anywhere(const Particles& particles, Random& random) const;
+  [[nodiscard]] Pose2 sample_anywhere(const Particles& particles, Random& random) const;
 
  private:
   const ViewLikelihood* likelihood_;

@@ -21,7 +21,7 @@ constexpr double min_spread_spacings = 2.0;
 /// Error of odometry, as a share of the distance travelled: wheels that slip.
 constexpr double travel_error = 0.05;
 
-Pose2 carry_to(const Pose2& odometry, const PoseWitness& witness) {
+Pose2 predict_pose(const Pose2& odometry, const PoseWitness& witness) {
   return witness.pose * (inverse(witness.odometry) * odometry);
 }
 
@@ -32,7 +32,7 @@ std::optional<Pose2> find_witnessed_pose(const Pose2& odometry,
                                          const std::optional<PoseWitness>& own, double spacing_m) {
   if (witnesses.size() < min_witnesses) return std::nullopt;
   std::vector<Pose2> poses;
-  for (const PoseWitness& witness : witnesses) poses.push_back(carry_to(odometry, witness));
+  for (const PoseWitness& witness : witnesses) poses.push_back(predict_pose(odometry, witness));
   const auto agree = [&](std::size_t a, std::size_t b) {
     const double travelled_m = witnesses[a].travelled_m + witnesses[b].travelled_m;
     return distance(poses[a].position(), poses[b].position()) <=

@@ -13,44 +13,44 @@ void PositionError::move(const Pose2& step) {
   per_scale_m_ = {cosine * x + sine * y, cosine * y - sine * x};
 }
 
-void PositionError::begin(double after_m2) {
-  last_ = {after_m2, after_m2, after_m2};
+void PositionError::begin(double variance_after_m2) {
+  last_ = {variance_after_m2, variance_after_m2, variance_after_m2};
   per_scale_m_ = {};
 }
 
-void PositionError::observe(double before_m2, double after_m2, double share, double correlation,
-                            double effective) {
-  const double ratio = before_m2 > 0.0 ? after_m2 / before_m2 : 1.0;
+void PositionError::observe(double variance_before_m2, double variance_after_m2, double share,
+                            double correlation, double effective) {
+  const double ratio = variance_before_m2 > 0.0 ? variance_after_m2 / variance_before_m2 : 1.0;
   const double kept = std::min(1.0, ratio);
   const double gain = 1.0 - kept;
   // Particles that a view moves to another place spread; the error grows with them.
-  const double error_m2 = variance_at(before_m2) * std::max(1.0, ratio);
+  const double error_m2 = variance_at(variance_before_m2) * std::max(1.0, ratio);
   const double with_view_m2 = last_ ? correlation * last_->of_error_and_view_m2 : 0.0;
   // By the particles the view's share has the variance after / gain, and so the whole view `share`
   // times that.
-  last_ = {after_m2,
-           kept * kept * error_m2 + gain * share * after_m2 + 2.0 * kept * gain * with_view_m2 +
-               after_m2 / effective,
-           kept * with_view_m2 + share * after_m2};
+  last_ = {variance_after_m2,
+           kept * kept * error_m2 + gain * share * variance_after_m2 +
+               2.0 * kept * gain * with_view_m2 + variance_after_m2 / effective,
+           kept * with_view_m2 + share * variance_after_m2};
   per_scale_m_ = {kept * per_scale_m_.x_m, kept * per_scale_m_.y_m};
 }
 
-double PositionError::variance_at(double particles_m2) const {
-  if (!last_ || !(last_->of_particles_m2 > 0.0)) return particles_m2;
+double PositionError::variance_at(double particle_variance_m2) const {
+  if (!last_ || !(last_->of_particles_m2 > 0.0)) return particle_variance_m2;
   // Odometry adds its random errors to both.
-  if (particles_m2 >= last_->of_particles_m2) {
-    return last_->of_error_m2 + particles_m2 - last_->of_particles_m2;
+  if (particle_variance_m2 >= last_->of_particles_m2) {
+    return last_->of_error_m2 + particle_variance_m2 - last_->of_particles_m2;
   }
-  return last_->of_error_m2 * particles_m2 / last_->of_particles_m2;
+  return last_->of_error_m2 * particle_variance_m2 / last_->of_particles_m2;
 }
 
 std::array<double, 9> PositionError::corrected_covariance(std::array<double, 9> particles,
                                                           double heading_rad,
                                                           double translation_scale_error) const {
   std::array<double, 9> covariance = particles;
-  const double particles_m2 = particles[0] + particles[4];
-  if (particles_m2 > 0.0) {
-    const double ratio = variance_at(particles_m2) / particles_m2;
+  const double particle_variance_m2 = particles[0] + particles[4];
+  if (particle_variance_m2 > 0.0) {
+    const double ratio = variance_at(particle_variance_m2) / particle_variance_m2;
     for (const std::size_t i : {0U, 1U, 3U, 4U}) covariance[i] *= ratio;
     for (const std::size_t i : {2U, 5U, 6U, 7U}) covariance[i] *= std::sqrt(ratio);
   }

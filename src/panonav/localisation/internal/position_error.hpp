@@ -20,12 +20,12 @@ class PositionError {
   /// Takes a motion of the robot, robot_old_from_robot_new.
   void move(const Pose2& step);
   /// Starts with the variance of the particles after the first view, which decides alone.
-  void begin(double after_m2);
+  void begin(double variance_after_m2);
   /// Takes a view that counted by the exponent `share` of its likelihood, and whose error has this
   /// correlation with that of the one before. Variances of the particles before and after it, > 0;
   /// `effective`: their effective sample size, > 0.
-  void observe(double before_m2, double after_m2, double share, double correlation,
-               double effective);
+  void observe(double variance_before_m2, double variance_after_m2, double share,
+               double correlation, double effective);
 
   /// Returns the covariance of x, y (m) and heading (rad), row by row, of a robot with this heading
   /// whose particles have the covariance `particles`. `translation_scale_error` as `OdometryNoise`.
@@ -34,8 +34,8 @@ class PositionError {
                                                            double translation_scale_error) const;
 
  private:
-  // Returns the variance of the random errors when the particles' is `particles_m2`.
-  [[nodiscard]] double variance_at(double particles_m2) const;
+  // Returns the variance of the random errors when the particles' is `particle_variance_m2`.
+  [[nodiscard]] double variance_at(double particle_variance_m2) const;
 
   struct Variances {
     double of_particles_m2;

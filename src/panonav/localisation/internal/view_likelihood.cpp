@@ -115,11 +115,11 @@ double ViewLikelihood::compare(std::uint32_t site) {
   const auto [match, other] = match_columns_twice(*view_, profiles_[site]);
   const double far = model_.far_difference;
   s.compared_at = number_;
-  const auto similarity_of = [far](const ColumnMatch& m) {
+  const auto to_similarity = [far](const ColumnMatch& m) {
     return static_cast<float>(std::max(0.0, far * far - m.difference * m.difference));
   };
-  s.similarity = similarity_of(match);
-  s.other_similarity = similarity_of(other);
+  s.similarity = to_similarity(match);
+  s.other_similarity = to_similarity(other);
   s.log_similarity = std::log(s.similarity);
   s.other_log_similarity = std::log(s.other_similarity);
   if (static_cast<double>(s.similarity) > max_similarity_) {

@@ -100,7 +100,7 @@ SampledBands sample_bands(const Bands& view, const std::array<double, columns>& 
 }
 
 // Returns the change over elevation, upwards, by the difference of the adjacent bands.
-Pixels elevation_slopes(const Pixels& values, double band_height_rad) {
+Pixels compute_elevation_gradients(const Pixels& values, double band_height_rad) {
   Pixels slopes = Pixels::Zero(values.rows(), values.cols());
   const auto step = static_cast<float>(2.0 * band_height_rad);
   for (Eigen::Index r = 1; r + 1 < values.rows(); ++r) {
@@ -131,7 +131,7 @@ class FlowProblem {
         rise_[band] = static_cast<float>(std::sin(elevation) * std::cos(elevation));
       }
     }
-    now_up_ = elevation_slopes(now_.values, band_height_rad_);
+    now_up_ = compute_elevation_gradients(now_.values, band_height_rad_);
     update_residuals();
   }
 
@@ -184,7 +184,7 @@ class FlowProblem {
                  flow_.b2 * at.s2;
     }
     const SampledBands then = sample_bands(earlier_, moved);
-    const Pixels then_up = elevation_slopes(then.values, band_height_rad_);
+    const Pixels then_up = compute_elevation_gradients(then.values, band_height_rad_);
     across_ = 0.5F * (now_.slopes + then.slopes);
     up_ = rise_.asDiagonal() * (0.5F * (now_up_ + then_up));
     difference_ = now_.values - then.values;

@@ -37,8 +37,8 @@ std::vector<double> slopes_to_nearest(std::span<const Lattice::Spring> measured,
 
 /// Returns the dissimilarity of far views: the mean over the farther quarter of pairs drawn.
 /// nullopt where no views are far from each other: at most twice `near`.
-std::optional<double> level_of_far_views(const SpringViews& views, const LatticeStart& layout,
-                                         double near) {
+std::optional<double> estimate_far_dissimilarity(const SpringViews& views,
+                                                 const LatticeStart& layout, double near) {
   const std::size_t nodes = layout.poses.size();
   Random random(1);
   std::vector<DissimilarityCurve::Sample> drawn;
@@ -105,7 +105,7 @@ std::optional<DissimilarityCurve> fit_curve(std::span<const Lattice::Spring> mea
     max_dissimilarity = std::max(max_dissimilarity, pair.dissimilarity);
   }
   // Where all views are near, the curve has no flat part.
-  const auto far = level_of_far_views(views, layout, upper_median(lengths));
+  const auto far = estimate_far_dissimilarity(views, layout, upper_median(lengths));
   return DissimilarityCurve(pairs, far.value_or(2.0 * max_dissimilarity));
 }
 

@@ -125,7 +125,7 @@ class Grower {
         if (q < p) continue;
         const JoinHypothesis best = find_best_hypothesis(layout_, p, q);
         if (!(best.evidence > 0.0)) continue;
-        const auto near = near_pairs(p, q, best.p_from_q);
+        const auto near = find_near_pairs(p, q, best.p_from_q);
         for (std::size_t i = 0; i < std::min(max_proposals, near.size()); ++i) {
           proposals.push_back(near[i].second);
         }
@@ -134,8 +134,8 @@ class Grower {
     return proposals;
   }
   /// Returns distances and pairs of views of both components, the nearest first.
-  [[nodiscard]] std::vector<std::pair<double, NodePair>> near_pairs(std::size_t p, std::size_t q,
-                                                                    const Pose2& p_from_q) const {
+  [[nodiscard]] std::vector<std::pair<double, NodePair>> find_near_pairs(
+      std::size_t p, std::size_t q, const Pose2& p_from_q) const {
     std::vector<std::pair<double, NodePair>> near;
     for (const std::size_t b : layout_.members(q)) {
       const Point2 at = (p_from_q * layout_.poses()[b]).position();

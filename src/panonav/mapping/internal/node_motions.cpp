@@ -48,7 +48,7 @@ const NodeMotion* NodeMotions::find(NodePair pair) const {
   return found == first_.end() ? nullptr : &motions_[found->second];
 }
 
-bool NodeMotions::connect_all(std::size_t nodes) const {
+bool NodeMotions::are_all_connected(std::size_t nodes) const {
   if (motions_.empty()) return false;
   std::vector<GraphEdge> edges;
   for (const NodeMotion& motion : motions_) edges.push_back({motion.a, motion.b, 1.0});

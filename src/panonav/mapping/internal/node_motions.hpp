@@ -22,7 +22,7 @@ class NodeMotions {
   /// Returns the first motion between two nodes, or null.
   [[nodiscard]] const NodeMotion* find(NodePair pair) const;
   /// True if the motions connect all of `nodes` nodes.
-  [[nodiscard]] bool connect_all(std::size_t nodes) const;
+  [[nodiscard]] bool are_all_connected(std::size_t nodes) const;
   /// The headings of the second node in the frame of the first that the motion between them allows;
   /// nullopt without a motion.
   [[nodiscard]] std::optional<HeadingWindow> heading_between(NodePair pair) const;

@@ -14,7 +14,7 @@ namespace {
 constexpr double min_length_share = 0.1;
 
 // Reads some edges from the phases of their views, which are all held at once.
-void read_some_edges(const ViewSource& source, std::span<const Link> links,
+void read_edge_batch(const ViewSource& source, std::span<const Link> links,
                      std::span<NavigationGraph::Edge> edges, Executor& executor) {
   std::set<ViewId> ids;
   for (const Link& link : links) ids.insert({link.a, link.b});
@@ -27,7 +27,7 @@ void read_some_edges(const ViewSource& source, std::span<const Link> links,
           const auto reading = read_phases(homing_view(memory.signature(links[i].a)),
                                            homing_view(memory.signature(links[i].b)));
           if (!reading) continue;
-          edges[i].a_from_b = motion_of(*reading);
+          edges[i].a_from_b = to_motion(*reading);
           if (edges[i].a_from_b) edges[i].length = reading->length;
         }
       });
@@ -35,12 +35,12 @@ void read_some_edges(const ViewSource& source, std::span<const Link> links,
 
 }  // namespace
 
-std::optional<Pose2> motion_of(const PhaseReading& reading) {
+std::optional<Pose2> to_motion(const PhaseReading& reading) {
   if (reading.has_direction && reading.disagreement_rad > max_disagreement_rad) return std::nullopt;
   return reading.a_from_b();
 }
 
-void complete_lengths(std::vector<NavigationGraph::Edge>& edges) {
+void fill_missing_lengths(std::vector<NavigationGraph::Edge>& edges) {
   std::vector<double> lengths;
   for (const NavigationGraph::Edge& edge : edges) {
     if (edge.length > 0.0) lengths.push_back(edge.length);
@@ -59,7 +59,7 @@ std::vector<NavigationGraph::Edge> read_edges(const ViewSource& source, std::spa
   constexpr std::size_t links_at_once = 2048;
   for (std::size_t first = 0; first < links.size(); first += links_at_once) {
     const std::size_t count = std::min(links_at_once, links.size() - first);
-    read_some_edges(source, links.subspan(first, count), std::span(edges).subspan(first, count),
+    read_edge_batch(source, links.subspan(first, count), std::span(edges).subspan(first, count),
                     executor);
   }
   return edges;

@@ -29,16 +29,16 @@ inline void scale_displacement(Pose2& motion, double factor) {
 }
 
 /// Returns the length of a motion's displacement.
-[[nodiscard]] inline double length_of(const Pose2& motion) {
+[[nodiscard]] inline double get_length(const Pose2& motion) {
   return std::hypot(motion.x_m, motion.y_m);
 }
 
 /// Returns the mean motion that both views of a reading show; nullopt where they disagree.
-[[nodiscard]] std::optional<Pose2> motion_of(const PhaseReading& reading);
+[[nodiscard]] std::optional<Pose2> to_motion(const PhaseReading& reading);
 
 /// Sets the length of edges of which neither length nor motion is known from that of the others,
 /// and raises those between images of one place to a minimum.
-void complete_lengths(std::vector<NavigationGraph::Edge>& edges);
+void fill_missing_lengths(std::vector<NavigationGraph::Edge>& edges);
 
 /// Reads edges from the phases of their views; length 0 and no motion where nothing is read.
 [[nodiscard]] std::vector<NavigationGraph::Edge> read_edges(const ViewSource& source,

@@ -21,7 +21,7 @@ struct Tap {
   int u = -1;  // -1: nothing is seen there
   int v = -1;
   std::uint32_t weights = 0;
-  [[nodiscard]] bool is_seen() const { return u >= 0; }
+  [[nodiscard]] bool is_visible() const { return u >= 0; }
 };
 
 /// Taps of one row: tap t of column c at t * columns + c. With two lenses, the taps of both for one
@@ -174,9 +174,9 @@ class RowSampler {
           // A direction that one lens shows alone costs the other a tap without weight.
           Tap& first = tap[c];
           Tap& second = tap[columns_ + c];
-          if (first.is_seen() == second.is_seen()) continue;
-          Tap& unseen = first.is_seen() ? second : first;
-          unseen = first.is_seen() ? first : second;
+          if (first.is_visible() == second.is_visible()) continue;
+          Tap& unseen = first.is_visible() ? second : first;
+          unseen = first.is_visible() ? first : second;
           unseen.weights = 0;
         }
       }
@@ -223,11 +223,11 @@ std::vector<std::uint8_t> fill_missing_taps(Taps& taps, int columns, int lenses)
   for (int c = 0; c < columns; ++c) {
     const auto tap = [&](int t) -> Tap& { return taps[static_cast<std::size_t>(t) * columns + c]; };
     int instead = 0;
-    while (instead < count && !tap(instead).is_seen()) instead += lenses;
+    while (instead < count && !tap(instead).is_visible()) instead += lenses;
     if (instead == count) continue;
     seen[c] = 1;
     for (int t = 0; t < count; ++t) {
-      if (!tap(t).is_seen()) tap(t) = tap(instead + t % lenses);
+      if (!tap(t).is_visible()) tap(t) = tap(instead + t % lenses);
     }
   }
   return seen;
@@ -256,8 +256,8 @@ std::optional<int> find_nearest_index(int start, int count, bool wraps, Predicat
 
 /// Fills directions that the camera does not see with the taps of the nearest row seen in the same
 /// column, and columns in which nothing is seen with those of the nearest column.
-void fill_unseen_directions(std::vector<Taps>& rows,
-                            const std::vector<std::vector<std::uint8_t>>& seen, int columns) {
+void fill_invisible_directions(std::vector<Taps>& rows,
+                               const std::vector<std::vector<std::uint8_t>>& seen, int columns) {
   const int count = static_cast<int>(rows.size());
   std::vector<std::uint8_t> column_seen(static_cast<std::size_t>(columns), 0);
   for (const auto& row : seen) {
@@ -338,7 +338,7 @@ UnwarpTable make_unwarp_table(const Camera& camera, int rows, int columns,
     taps_of_rows.push_back(sampler.sample(y));
     seen.push_back(fill_missing_taps(taps_of_rows.back(), columns, lens_count(camera)));
   }
-  fill_unseen_directions(taps_of_rows, seen, columns);
+  fill_invisible_directions(taps_of_rows, seen, columns);
 
   UnwarpTable table;
   lay_out_levels(taps_of_rows, table);

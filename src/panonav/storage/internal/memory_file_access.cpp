@@ -133,14 +133,14 @@ void prepare_for_changes(Database& database) {
   database.watch_for_moves();
 }
 
-[[noreturn]] void refuse_existing(const fs::path& path) {
+[[noreturn]] void throw_name_taken(const fs::path& path) {
   throw FileError(path.string(), "already exists; allowed: a name that is free");
 }
 
 void require_free_name(const fs::path& path) {
   std::error_code ignored;
   const std::string name = path.string();
-  if (fs::exists(fs::symlink_status(path, ignored))) refuse_existing(path);
+  if (fs::exists(fs::symlink_status(path, ignored))) throw_name_taken(path);
   const fs::path folder = parent_folder(path);
   if (!fs::is_directory(folder, ignored)) {
     throw FileError(name, "cannot be created: there is no folder " + folder.string());
@@ -161,7 +161,7 @@ void require_free_name(const fs::path& path) {
 // A link refuses a name that is used meanwhile; a rename would replace that file.
 void link_to_final_name(const fs::path& unfinished, const fs::path& path) {
   if (::link(unfinished.c_str(), path.c_str()) != 0) {
-    if (errno == EEXIST) refuse_existing(path);
+    if (errno == EEXIST) throw_name_taken(path);
     if ((errno != EPERM && errno != EOPNOTSUPP && errno != ENOSYS) ||
         ::rename(unfinished.c_str(), path.c_str()) != 0) {
       throw FileError(path.string(), "cannot be created: " + system_message());

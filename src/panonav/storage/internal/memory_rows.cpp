@@ -58,12 +58,12 @@ std::int64_t undo_checksum(std::string_view what, double stamp_s,
   return static_cast<std::int64_t>(checksum(changes, checksum(record.bytes())));
 }
 
-void refuse_view(ViewId view) {
+void throw_unknown_view(ViewId view) {
   throw ContractError("view", std::to_string(view.value), "a view of the memory file");
 }
 
-void refuse_used_name(std::string_view what, std::string_view name,
-                      const std::filesystem::path& file) {
+void throw_used_name(std::string_view what, std::string_view name,
+                     const std::filesystem::path& file) {
   throw ContractError(std::string(what) + " name",
                       "\"" + std::string(name) + "\", which " + file.string() + " already contains",
                       "a name that is unique");

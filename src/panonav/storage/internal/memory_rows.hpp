@@ -39,11 +39,11 @@ void pack_signature(const PackedSignature& signature, std::vector<std::uint8_t>&
                                          std::span<const std::uint8_t> changes);
 
 /// Throws the ContractError for a view that is not in the file.
-[[noreturn]] void refuse_view(ViewId view);
+[[noreturn]] void throw_unknown_view(ViewId view);
 
 /// Throws the ContractError for a name that another `what` ("view", "route") of the file has.
-[[noreturn]] void refuse_used_name(std::string_view what, std::string_view name,
-                                   const std::filesystem::path& file);
+[[noreturn]] void throw_used_name(std::string_view what, std::string_view name,
+                                  const std::filesystem::path& file);
 
 /// Throws ContractError on a new name that people could not type or read.
 void require_name(std::string_view what, std::string_view name);

@@ -82,7 +82,7 @@ std::string to_hexadecimal(std::uint32_t value) {
   return text.data();
 }
 
-SettingValue value_in(const Statement& row, int column) {
+SettingValue read_value(const Statement& row, int column) {
   switch (row.type(column)) {
     case SQLITE_INTEGER:
       return row.integer(column);
@@ -183,7 +183,7 @@ Settings read_settings(Database& database) {
   Statement rows(database, "SELECT key, value, checksum FROM settings ORDER BY key");
   while (rows.step()) {
     std::string key(rows.text(0));
-    SettingValue value = value_in(rows, 1);
+    SettingValue value = read_value(rows, 1);
     if (rows.integer(2) != setting_checksum(key, value)) {
       database.fail_damaged("checksum of setting " + to_readable_line(key));
     }

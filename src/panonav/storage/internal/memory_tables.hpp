@@ -114,17 +114,17 @@ class MemoryTables {
 
   /// The largest id that was ever given to a view; 0: none.
   [[nodiscard]] virtual std::uint32_t last_id() = 0;
-  /// Views with ids above `last_id`, ascending. Throws as `refuse_used_name`.
+  /// Views with ids above `last_id`, ascending. Throws as `throw_used_name`.
   virtual void insert(std::span<const ViewId> ids, std::span<const NewView> views) = 0;
-  /// Throws as `refuse_view` for the first that is not there.
+  /// Throws as `throw_unknown_view` for the first that is not there.
   virtual void require_views(std::span<const ViewId> views) = 0;
   /// With their links, thumbnails and features.
   virtual void remove(std::span<const ViewId> views) = 0;
-  /// Replaces all but the signature. Throws as `refuse_used_name`.
+  /// Replaces all but the signature. Throws as `throw_used_name`.
   virtual void write_info(ViewId view, const ReferenceInfo& info, std::int64_t checksum) = 0;
   /// All, ascending.
   virtual void read_views(const Consume<ViewRow>& consume) = 0;
-  /// These, in this order. Throws as `refuse_view`.
+  /// These, in this order. Throws as `throw_unknown_view`.
   virtual void read_views(std::span<const ViewId> views, const Consume<ViewRow>& consume) = 0;
   /// Those of them that are there, in any order.
   virtual void read_available_views(std::span<const ViewId> views,
@@ -143,8 +143,8 @@ class MemoryTables {
   [[nodiscard]] virtual std::vector<ViewId> views_with_attachment(ViewAttachment table) = 0;
   [[nodiscard]] virtual bool has_attachments(ViewAttachment table) = 0;
   [[nodiscard]] virtual std::optional<StoredBytes> bytes(ViewAttachment table, ViewId view) = 0;
-  /// The same bytes, checked. Throws as `refuse_view`, and FileError when they do not match their
-  /// checksum.
+  /// The same bytes, checked. Throws as `throw_unknown_view`, and FileError when they do not match
+  /// their checksum.
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> read_checked_bytes(ViewAttachment table,
                                                                             ViewId view);
 

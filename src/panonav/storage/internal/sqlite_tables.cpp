@@ -121,7 +121,7 @@ void SqliteTables::insert(std::span<const ViewId> ids, std::span<const NewView> 
     bind_info(insert_view_, 2, view.info);
     insert_view_.bind(7, signature_).bind(8, view_checksum(scratch_, id, view.info, signature_));
     const int constraint = insert_view_.run();
-    if (constraint == SQLITE_CONSTRAINT_UNIQUE) refuse_used_name("view", view.info.name, path_);
+    if (constraint == SQLITE_CONSTRAINT_UNIQUE) throw_used_name("view", view.info.name, path_);
     if (constraint != 0) fail_damaged("the id of a new view is taken");
     insert_attachment(ViewAttachment::thumbnails, id, view.thumbnail);
     insert_attachment(ViewAttachment::features, id, view.features);
@@ -142,7 +142,7 @@ void SqliteTables::insert_attachment(ViewAttachment table, ViewId view,
 void SqliteTables::require_views(std::span<const ViewId> views) {
   Statement statement(database_, "SELECT 1 FROM views WHERE id = ?");
   for (const ViewId view : views) {
-    if (!statement.bind(1, view).step()) refuse_view(view);
+    if (!statement.bind(1, view).step()) throw_unknown_view(view);
     statement.reset();
   }
 }
@@ -165,7 +165,7 @@ void SqliteTables::write_info(ViewId view, const ReferenceInfo& info, std::int64
                   "checksum = ? WHERE id = ?");
   bind_info(write, 1, info);
   write.bind(6, checksum).bind(7, view);
-  if (write.run() != 0) refuse_used_name("view", info.name, path_);
+  if (write.run() != 0) throw_used_name("view", info.name, path_);
 }
 
 void SqliteTables::read_views(const Consume<ViewRow>& consume) {
@@ -190,7 +190,7 @@ void SqliteTables::read_views(std::span<const ViewId> views, const Consume<ViewR
       // The index of the names is on other pages: it still has rows that the table has lost.
       Statement named(database_,
                       "SELECT 1 FROM views INDEXED BY sqlite_autoindex_views_1 WHERE id = ?", view);
-      if (!named.step()) refuse_view(view);
+      if (!named.step()) throw_unknown_view(view);
       fail_damaged("view " + std::to_string(view.value) + " is missing");
     }
     consume(read_view_row(find_view_));
