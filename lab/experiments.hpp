@@ -38,7 +38,7 @@ struct OptionMinimum {
 /// Throws ContractError on the first value below its minimum.
 void require_minima(std::initializer_list<OptionMinimum> options);
 
-/// The experiments of [F11] and what its authors left to later work.
+/// The experiments of [F11], and those that its authors left to future work.
 struct MappingExperiments : Experiments {
   /// Figures 4 and 6 (a): 200 views 10 cm apart along the round trip of `loop`.
   void reproduce_first_set() const;
@@ -78,7 +78,7 @@ struct NavigationExperiments : Experiments {
   void reproduce_blocked_missions() const;
 };
 
-/// The experiments of [Y03] and what its author left to later work.
+/// The experiments of [Y03], and those that its author left to future work.
 struct RouteExperiments : Experiments {
   /// Reproduces section 5: drives across a straight path through `lab`, sweeps, time, the run to a
   /// goal; figures 3, 5, 9 and 10.

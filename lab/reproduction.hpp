@@ -13,7 +13,7 @@
 
 namespace panonav::lab {
 
-/// A built-in scene whose references lie on a grid.
+/// A built-in scene whose references are on a grid.
 struct MissionGrid {
   std::string scene;
   double spacing_m = 0.0;
@@ -45,7 +45,7 @@ struct ReproductionOptions {
   int views = 200;              ///< [F11]: of the first set; the second has three quarters of them
   int max_views = 10'000;       ///< [F11]: of the largest map
   int swept = 10;               ///< [Y03]: scenes that take part in the sweeps, 1 to scenes
-  /// Elsewhere: built-in scenes that take part; worlds and recordings are those that exist.
+  /// Elsewhere: number of built-in scenes; worlds and recordings are all that exist.
   std::vector<std::string> built_in{"office", "hall", "lab", "loop", "corridor", "garden"};
   bool floors = true;      ///< elsewhere: whole floors of the worlds are arranged
   int days = 30;           ///< elsewhere: that a place changes while its memory learns

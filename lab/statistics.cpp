@@ -54,7 +54,7 @@ Proportion success_rate(std::size_t successes, std::size_t trials) {
   const double p = static_cast<double>(successes) / n;
   const double centre = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);
   const double half = z * std::sqrt(p * (1.0 - p) / n + z * z / (4.0 * n * n)) / (1.0 + z * z / n);
-  // Exact where the interval ends with what can be.
+  // At 0 or all successes one end of the interval is exact.
   return {p, successes == 0 ? 0.0 : std::max(0.0, centre - half),
           successes == trials ? 1.0 : std::min(1.0, centre + half)};
 }

@@ -54,7 +54,7 @@ ExpectedImageHoming::ExpectedImageHoming(int columns, int max_positions)
   require(columns >= 4 && columns <= 65536, "columns", columns, "4 .. 65536");
   require(max_positions >= 5 && max_positions <= 10000, "positions", max_positions, "5 .. 10000");
   const auto points = make_lattice(max_positions);
-  // Whole rings of equally far points, the next of which would lie at the reach.
+  // Returns whole rings of points at equal distances, up to the reach.
   std::size_t count = 0;
   while (true) {
     std::size_t next = count;

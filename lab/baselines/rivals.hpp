@@ -13,8 +13,8 @@ namespace panonav::lab {
 /// One view as the rivals may use it.
 struct RivalView {
   Panorama panorama;
-  /// The same view as a picture, for rivals that use its colours or finer pixels; one grey pixel
-  /// where nobody asks for it.
+  /// The view as a colour image, for methods that use colour or finer pixels; one grey pixel
+  /// otherwise.
   Image picture{1, 1, 1};
 };
 

@@ -67,7 +67,7 @@ class RememberedPlace {
   Localiser localiser_;
 };
 
-/// Records the memory again in the place as it is on that day.
+/// Records the memory again with the scene of that day.
 RememberedPlace record_again(simulation::PlaceRecording today, std::uint64_t seed,
                              Executor& executor) {
   std::vector<Pose2> grid;

@@ -30,7 +30,7 @@ struct FloorMissions {
   std::map<NavigationDecision::State, std::size_t> ends;
 };
 
-// True if the view nearest to the position lies in the largest component.
+// True if the view nearest to the position is in the largest component.
 bool is_in_largest_component(const simulation::RememberedPlace& remembered,
                              const Point2& position) {
   const auto nearest = std::ranges::min_element(

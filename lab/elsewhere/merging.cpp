@@ -110,7 +110,7 @@ std::optional<Joined> join(const Session& first, const Session& second,
   return joined;
 }
 
-/// Pairs of walks, and how many of them were joined.
+/// Counts the pairs of walks, and how many of them were joined.
 struct Pairs {
   std::size_t all = 0;
   std::size_t joined = 0;

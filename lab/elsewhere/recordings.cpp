@@ -1,4 +1,4 @@
-// Each picture of a recording, turned, asked of the memory of all others.
+// Leave-one-out tests on recordings: each image, rotated, is a query to the memory of all others.
 
 #include <algorithm>
 #include <cmath>

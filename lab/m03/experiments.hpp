@@ -86,7 +86,7 @@ struct RunRows {
   void append_single_image_rates() const;
 };
 
-/// The experiments of [M03] and what its authors only announced.
+/// The experiments of [M03], and those that its authors announced.
 struct TrackingExperiments : Experiments {
   std::vector<OfficeRuns> offices{};  ///< the first four experiments need one at least
 

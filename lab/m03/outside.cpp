@@ -88,7 +88,7 @@ OutsideRuns record_excursions(const TrackingExperiments& m03, const std::string&
     RunSet set{remembered,
                record_runs(ways, place, *place.renderer, *remembered, {}, seed * 100003U, executor),
                {}};
-    // Single images are asked of places that the memory holds.
+    // Single-image queries are taken only within the memorised area.
     std::vector<TrackingRun> inside = set.runs;
     for (std::size_t r = 0; r < inside.size(); ++r) {
       const auto& ways_m = outside.ways_m[outside.ways_m.size() - inside.size() + r];
@@ -107,7 +107,7 @@ constexpr std::size_t bins = 16;
 
 /// States that the filter reports over the runs.
 struct Reports {
-  // By distance to the nearest reference, from the sixth image on.
+  // Rows by distance to the nearest reference, from the sixth image on.
   std::array<std::size_t, bins> queries{};
   std::array<std::size_t, bins> lost{};
   std::array<std::size_t, bins> localised{};

@@ -34,7 +34,7 @@ constexpr int view_columns = 256;
 constexpr std::array component_counts{3, 6};
 constexpr std::size_t level_count = component_counts.size();
 constexpr double area_tolerance = 0.25;
-// The same places in every scene.
+// Grid of positions, the same in every scene.
 constexpr std::size_t places_along_x = 6;
 constexpr std::size_t places_along_y = 3;
 constexpr std::size_t place_count = places_along_x * places_along_y;

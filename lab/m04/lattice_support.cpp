@@ -107,7 +107,7 @@ simulation::Scene make_small_room(std::uint64_t seed) {
 std::vector<CoarseMotion> simulate_coarse_motion(const ViewGrid& grid, double distance_share,
                                                  double direction_share, std::uint64_t seed) {
   Random random(seed, 92);
-  // Deviation of what is spread evenly over -1 .. 1.
+  // Standard deviation of a uniform distribution over -1 .. 1.
   const double even = 1.0 / std::sqrt(3.0);
   const double max_rad = direction_share * std::numbers::pi;
   const auto views = grid.memory.views();

@@ -48,7 +48,7 @@ Surroundings measure_surroundings(const simulation::PlaceRecording& place, Point
     }
   }
   for (std::size_t i = 0; i < shape_directions; ++i) {
-    // Nothing all around, as outdoors: farther than any room.
+    // Distance to open air, as outdoors: farther than any room.
     constexpr double far_m = 1000.0;
     result.free_m[i] = nearness[i] > 0.0 ? rays[i] / nearness[i] : far_m;
     result.parallax_m[i] =
@@ -85,8 +85,8 @@ Directional predict_extents(const simulation::PlaceRecording& place, const Pose2
       const double upwards =
           above == below ? 0.0
                          : (view.at(above, c) - view.at(below, c)) / ((below - above) * row_rad);
-      // A step along theta turns what is seen by sin(azimuth - theta) / (range cos(elevation)), and
-      // lifts it by cos(azimuth - theta) sin(elevation) / range.
+      // A step along theta shifts a point of the view by sin(azimuth - theta) / (range
+      // cos(elevation)), and raises it by cos(azimuth - theta) sin(elevation) / range.
       const double turn = around / (range_m * std::max(std::cos(elevation), 1e-3));
       const double lift = upwards * std::sin(elevation) / range_m;
       const double x = turn * std::sin(azimuth) + lift * std::cos(azimuth);

@@ -13,7 +13,7 @@ std::string format_count(std::size_t count, const std::string& one, const std::s
   return std::to_string(count) + " " + (count == 1 ? one : many);
 }
 
-// Characters that Markdown would take for its own.
+// Escapes the characters that have a meaning in Markdown.
 std::string escape_markdown(const std::string& text) {
   std::string result;
   for (const char c : text) {

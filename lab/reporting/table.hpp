@@ -65,7 +65,7 @@ struct TargetCount {
 /// Returns the array that `reproduce --json` prints (docs/formats.md). The reason of a row that
 /// holds is left out.
 [[nodiscard]] std::string to_json(std::span<const ResultRow> rows);
-/// Reads what `to_json` writes; rows without `over` or `reason` too. Throws FileError, which names
+/// Parses the output of `to_json`; rows may lack `over` and `reason`. Throws FileError, which names
 /// `file`, the row and the field.
 [[nodiscard]] std::vector<ResultRow> from_json(std::string_view text, std::string_view file);
 }  // namespace panonav::lab

@@ -40,7 +40,7 @@ using TrackedRun = std::vector<TrackedImage>;
 struct FilterSetting {
   MonteCarloOptions options;  ///< but for the injection, and the seed that each run has of its own
   InjectionMethod injection = InjectionMethod::explained;
-  /// As many particles as this times the references, at all times; empty: as the options say.
+  /// Number of particles for each reference, kept constant; empty: as the options say.
   std::optional<double> particles_per_reference;
   OdometryNoise odometry;          ///< of the robot
   OdometryNoise assumed_odometry;  ///< by the filter

@@ -81,8 +81,8 @@ class TrackingPlace {
 /// One step of a run.
 struct TrackingStep {
   Pose2 truth;  ///< world_from_robot after the step
-  /// robot_old_from_robot_new as it truly was; empty at the start, and where the robot was
-  /// kidnapped to `truth` without noticing.
+  /// True robot_old_from_robot_new; empty at the start, and where the robot was kidnapped to
+  /// `truth` without noticing.
   std::optional<Pose2> moved;
   std::optional<PackedSignature> view;  ///< empty: no picture was taken
 };
@@ -92,7 +92,7 @@ struct TrackingRun {
   std::vector<TrackingStep> steps;
 };
 
-/// Makes a run through `poses` with a view at each of them.
+/// Makes a run through `poses` with one view at each.
 [[nodiscard]] TrackingRun make_tracking_run(std::span<const Pose2> poses,
                                             std::vector<PackedSignature> views);
 

@@ -125,7 +125,7 @@ void report_variant(const std::string& id, const std::string& what, const Catchm
 void reproduce_snapshot_bytes(ArenaSurveys& surveys, Reproduction& result) {
   const std::size_t places = surveys.arena().currents.views.size();
   constexpr float accepted_m = 0.1F + 1e-6F;
-  // Returns for each goal whether each place lies in its catchment area.
+  // Returns for each goal and place whether the place is in the goal's catchment area.
   const auto inside = [&](const HomingStrategy& strategy) {
     const auto distances = surveys.compute_final_distances(strategy);
     std::vector<std::vector<bool>> areas(distances.size() / places, std::vector<bool>(places));

@@ -12,8 +12,8 @@
 namespace panonav::lab {
 
 inline constexpr double s06_spacing_m = 0.025;
-/// No place is nearer to the border of the floor; so about 1250 places are free, the farthest two
-/// of them 1.4 m apart as in [S06 figure 11].
+/// Distance that places keep from the border of the floor; about 1250 places are free, the farthest
+/// two 1.4 m apart as in [S06 figure 11].
 inline constexpr double s06_margin_m = 0.15;
 inline constexpr int s06_columns = 72;
 /// Components of a view of 72 pixels: k = 0 .. 35.
@@ -36,8 +36,7 @@ struct ArenaOptions {
   double spacing_m = s06_spacing_m;
 };
 
-/// A view and where it was taken. The heading is the truth that home vectors are judged by; rules
-/// never see it.
+/// A view and its true pose. Home vectors are judged by the heading; homing rules never see it.
 struct ArenaView {
   Pose2 pose;
   HomingView view;

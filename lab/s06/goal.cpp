@@ -16,7 +16,7 @@ const std::vector<double> difference_limits{0.05, 0.1, 0.2, 0.4, 0.8};
 const std::vector<double> distance_limits{0.0126, 0.0501, 0.1001, 0.2001, 0.4001};
 constexpr double reached_m = 0.1 + 1e-6;
 
-// A goal and all that the pictures need of it.
+// A goal and the data that its figures need.
 class GoalPictures {
  public:
   GoalPictures(ArenaSurveys& surveys, std::size_t goal)

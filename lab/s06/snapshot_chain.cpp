@@ -14,8 +14,8 @@ namespace {
 
 // Recorder: vectors between a candidate and the last snapshot may be off by this much.
 constexpr double direction_tolerance_rad = 0.6;
-// A snapshot is taken at this share of the distance over which homing worked, so that a robot
-// beside the route or in other light still reaches it.
+// Share of the distance over which homing worked at which the next snapshot is taken, so that a
+// robot off the route or in other light still reaches it.
 constexpr double margin = 0.7;
 constexpr double min_spacing_m = 0.3;
 // Views nearer to a snapshot are not used for its direction, which is dominated by noise there.
@@ -28,8 +28,8 @@ constexpr double view_spacing_m = 0.1;
 constexpr double switch_length = 0.1;
 // A vector that points farther from where odometry expects the snapshot is not followed.
 constexpr double mistrust_rad = 1.0;
-// The same for the heading that the compass finds, at any distance: odometry drifts less between
-// two snapshots.
+// Largest difference between the compass heading and odometry, at any distance: odometry drifts
+// less between two snapshots.
 constexpr double mistrust_heading_rad = 0.5;
 // Nearer than this to where odometry expects the snapshot, vectors are followed in any direction,
 // because the drift of odometry dominates there.

@@ -21,8 +21,8 @@ struct Snapshot {
   friend bool operator==(const Snapshot&, const Snapshot&) = default;
 };
 
-/// A route as a few snapshots, in the order in which they were taken. Each can be reached by homing
-/// from its neighbours, in both directions.
+/// A route as a few snapshots in the order in which they were taken. Homing reaches each from its
+/// neighbours, in both directions.
 using SnapshotChain = std::vector<Snapshot>;
 
 /// Returns the distance along the route from the first snapshot to the last; 0 for fewer than two.

@@ -39,7 +39,7 @@ struct HomingStrategy {
 [[nodiscard]] HomingStrategy own_strategy();
 [[nodiscard]] HomingStrategy expected_image_strategy();
 
-/// The surveys of one arena, each computed when it is first asked for.
+/// The surveys of one arena, each computed on first use.
 class ArenaSurveys {
  public:
   /// Keeps references.
@@ -75,7 +75,7 @@ class ArenaSurveys {
 
 /// Reproduces [S06] figures 3, 6, 7 and 8.
 void reproduce_view_figures(const Arena& arena, const Experiments& context);
-/// Adds the heading error where both views are taken at the same place, with the tracker's noise.
+/// Adds the heading error of two views from the same place, with the tracker's noise.
 void reproduce_heading_with_pose_noise(const Arena& arena, Reproduction& result);
 /// Reproduces [S06] figures 10 to 13.
 void reproduce_homing_figures(ArenaSurveys& surveys, const Experiments& context);

@@ -119,10 +119,10 @@ void draw_spectrum(const Arena& arena, Reproduction& result) {
     for (const double power : powers) square += (power - mean_power) * (power - mean_power);
     const double deviation = std::sqrt(square / static_cast<double>(powers.size()));
     series.add(k, mean_power);
-    // On an axis of logarithms a bar cannot reach 0.
+    // A logarithmic axis has no 0 at which a bar could begin.
     series.y_low.push_back(std::max(mean_power - deviation, 0.1 * mean_power));
     series.y_high.push_back(mean_power + deviation);
-    // Above, pixels of 5 degrees blur what they see: they leave 77 % of the power at k = 20.
+    // Above, pixels of 5 degrees blur the view: they keep 77 % of the power at k = 20.
     if (k <= 15) {
       log_k.push_back(std::log(k));
       log_power.push_back(std::log(mean_power));

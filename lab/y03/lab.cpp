@@ -123,8 +123,8 @@ double changed_share(const simulation::Renderer& before, const simulation::Rende
   return static_cast<double>(changed) / static_cast<double>(all);
 }
 
-// Things stand elsewhere so that about a tenth of what is seen is another [Y03 section 5.1]: a
-// tenth of the things moved by chance may be none of them, or a wardrobe's width of everything.
+// Moves objects until about a tenth of the view differs [Y03 section 5.1]: a tenth of the objects
+// moved at random may change nothing, or a wardrobe's width of everything.
 ChangedLab change_lab(std::uint64_t seed, const simulation::Renderer& before,
                       const std::vector<Pose2>& drive, const simulation::LineCamera& camera,
                       Executor& executor) {

@@ -1,4 +1,4 @@
-// Routes of 60 m repeated in closed loop, what they take in a file, and a real route.
+// Repeats routes of 60 m in closed loop, measures their size in a file, and repeats a real route.
 
 #include <algorithm>
 #include <cmath>

@@ -171,7 +171,7 @@ std::vector<Pose2> plan_curved_route(const RouteScene& place, double length_m, d
   }
   constexpr double fine_m = 0.05;
   const std::vector<Pose2> sharp = simulation::resample(corners, fine_m);
-  // As round as leaves the room that the corners leave, but for a cell of the map.
+  // Rounds the corners as far as the free space allows, with a margin of one map cell.
   constexpr double cell_m = 0.025;
   const double room_kept_m = std::min(min_clearance_m(place, sharp) - cell_m,
                                       place.scene.robot_radius_m + side_room_m - cell_m);

@@ -17,7 +17,7 @@ struct SynchronisationOptions {
   std::optional<std::vector<MemoryArea>> areas;
 };
 
-/// Counts of what `synchronise_memory` did.
+/// Counts of the changes that `synchronise_memory` made.
 struct SynchronisationReport {
   std::size_t views = 0;              ///< number of views of the file afterwards
   std::size_t uploaded = 0;           ///< number of views that the server got
@@ -36,8 +36,8 @@ struct SynchronisationReport {
   std::size_t left = 0;            ///< views removed from the file as they are outside of its areas
   std::size_t links_uploaded = 0;  ///< added, changed and removed on the server
   std::size_t links_downloaded = 0;  ///< added, changed and removed in the file
-  /// True if the server was older than what it had acknowledged, as after a restored backup; the
-  /// views that it had lost were uploaded again.
+  /// True if the server was older than its acknowledgements, as after a restored backup; the lost
+  /// views were uploaded again.
   bool restored = false;
   double seconds = 0.0;  ///< from the beginning to the end
   friend bool operator==(const SynchronisationReport&, const SynchronisationReport&) = default;

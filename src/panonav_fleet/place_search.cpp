@@ -35,7 +35,7 @@ std::optional<MemoryArea> area_at(const std::optional<Point2>& position) {
 class Sketcher {
  public:
   explicit Sketcher(SignatureShape shape) : sketches(shape) {}
-  /// Returns true if a batch of them was just sketched.
+  /// Adds a row; returns true if a batch was sketched.
   bool add(MemoryTables& tables, const MagnitudesRow& row) {
     if (row.magnitudes.size() != sketches.shape().size()) {
       tables.fail_damaged("view " + std::to_string(row.id.value) + " has another shape");

@@ -70,7 +70,7 @@ class PlaceSearch final : public IndexedMemory {
   /// it again.
   [[nodiscard]] Snapshot snapshot() const;
   [[nodiscard]] std::unique_ptr<ViewIndex> index() const override;  ///< Begins a snapshot.
-  /// Searches in a snapshot of its own.
+  /// Searches in a new snapshot.
   [[nodiscard]] SearchResult search(const PackedSignature& query, const SearchOptions& options = {},
                                     const SearchMask& mask = {}) const;
 

@@ -128,7 +128,7 @@ class AddressInput final : public Input {
   DecodedVideo video_;
 };
 
-/// Not without Huffman tables, which cameras leave out and viewers need.
+/// Adds the Huffman tables that cameras leave out and viewers need.
 bool is_whole_jpeg(std::span<const std::uint8_t> bytes) {
   constexpr std::array<std::uint8_t, 2> begin{0xff, 0xd8};
   constexpr std::array<std::uint8_t, 2> tables{0xff, 0xc4};
@@ -242,7 +242,7 @@ LivePictures::LivePictures(std::string address, const LiveOptions& options)
   if (self.stop_event < 0) throw Error("no event can be made");
   try {
     self.input = self.open();
-    // Only the first picture shows whether an address can be opened.
+    // Only the first image shows whether an address can be opened.
     if (self.address != "-" && !is_camera(self.address)) {
       self.newest = std::pair(self.input->take().value(), self.input);
     }

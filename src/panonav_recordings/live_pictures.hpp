@@ -25,7 +25,7 @@ struct LivePicture {
   std::vector<std::uint8_t> encoded;  ///< the JPEG it was decoded from; empty if it was none
   /// Time of arrival, or from a camera of the exposure, in seconds since 1970-01-01 UTC.
   double stamp_s = 0.0;
-  /// The same moment by the clock that is never set.
+  /// Time of the image on the monotonic clock.
   std::chrono::steady_clock::time_point arrived{};
   std::chrono::steady_clock::duration decoding{};  ///< how long it took, where we do it
 };

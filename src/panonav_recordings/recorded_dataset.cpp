@@ -82,7 +82,7 @@ std::optional<std::vector<std::uint8_t>> RecordedPictures::encoded(std::size_t i
   }
 }
 
-/// Makes the entry of each picture, in order, and counts what it lacks.
+/// Makes the entry of each image, in order, and counts missing fields.
 class EntryMaker {
  public:
   EntryMaker(const RecordedMessages& messages, bool by_log)

@@ -77,7 +77,7 @@ class Recording {
   [[nodiscard]] virtual const std::vector<RecordedTopic>& topics() const noexcept = 0;
   /// Returns the times of the first and the last message; nullopt without messages.
   [[nodiscard]] virtual std::optional<TimeSpan> time() const noexcept = 0;
-  /// Returns warnings about what was damaged or left out, a line each. Reading can find more.
+  /// Returns warnings about damaged or skipped parts, one line each. Reading can add more.
   [[nodiscard]] virtual std::vector<std::string> warnings() const = 0;
 
   /// Returns the places of the messages of these topics within the span, by time; of one time, in

@@ -207,7 +207,7 @@ struct OccupancyGrid {
   std::vector<std::int8_t> cells;  ///< row-major; 0 .. 100, -1 unknown
 };
 
-/// A name and what is said of it.
+/// A key and its value.
 struct KeyValue {
   std::string key;    ///< unique within a status
   std::string value;  ///< as text

@@ -224,7 +224,7 @@ struct RunRecorder::Implementation {
     for (const Pose2& pose : poses) cloud.add(pose.position(), pose.heading_rad);
     return cloud;
   }
-  /// As PointCloud2 and as Path, whose poses have the stamp of their message.
+  /// Writes a path as PointCloud2 and as Path, whose poses have the stamp of their message.
   void write_plan(const std::vector<Pose2>& path, std::int64_t ns) {
     if (path.empty()) return;
     ros::Path message{{ns, "map"}, {}};
@@ -233,8 +233,8 @@ struct RunRecorder::Implementation {
     plan.write(log_ns, ns, message);
   }
 
-  /// So that a long run does not write a path of all its poses each time, every second one of them
-  /// is dropped when there are many.
+  /// Drops every second pose when there are many, so that a long run does not write all its poses
+  /// each time.
   void write_path(std::int64_t ns, const Pose2& pose) {
     constexpr std::size_t max_poses = 1024;
     if (moments_on_path++ % path_every == 0) {

@@ -25,13 +25,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Stamps of the pictures as the container has them, in its own unit of time.
+/// Stamps of the images in the container's unit of time.
 struct VideoIndex {
   double unit_s = 0.0;
   std::vector<std::int64_t> stamps;  ///< ascending
 };
 
-/// Standard output of a program that ends by itself.
+/// Returns the standard output of a program that ends by itself.
 std::string read_output(const std::vector<std::string>& arguments, const std::string& file) {
   constexpr std::size_t max_bytes = std::size_t{256} << 20;
   const auto child = start_ffmpeg(arguments, file);

@@ -75,7 +75,7 @@ struct LocalisationNode::Implementation {
         });
   }
 
-  // On the thread of `run`.
+  // Called on the thread of `run`.
 
   void run() {
     std::thread worker([this] { work(); });
@@ -103,7 +103,7 @@ struct LocalisationNode::Implementation {
     if (!map_from_odom) return;
     const auto ahead_ns = static_cast<std::int64_t>(1e9 * setup.node.transform_tolerance_s);
     const std::int64_t stamp_ns = sensors.now_ns() + ahead_ns;
-    // Nothing is sent while the clock stands: TF accepts no two transforms of one time.
+    // Sends nothing while the clock stands still: TF accepts no two transforms of one time.
     if (std::exchange(last_transform_ns, stamp_ns) == stamp_ns) return;
     transforms.publish({{{{stamp_ns, setup.frames.map},
                           setup.frames.odom,
@@ -118,7 +118,7 @@ struct LocalisationNode::Implementation {
     diagnostics.publish(recordings::diagnostics_message(moment, sensors.now_ns()));
   }
 
-  // On the thread that works.
+  // Called on the worker thread.
 
   void work() {
     while (const auto work = queue.next()) {

@@ -142,7 +142,7 @@ void MemoryLocaliser::correct_motion(const Pose2& map_from_base, const Pose2& pa
   moment.values.emplace_back("correction_rad", format_fixed(std::abs(turn_rad), 4));
 }
 
-/// Publishes a pose if the moment is sure of it; particles and the best match if a node subscribes.
+/// Publishes a pose if the estimate is certain; particles and the best match if a node subscribes.
 void MemoryLocaliser::publish_estimate(recordings::RunMoment& moment, std::int64_t stamp_ns,
                                        const PackedSignature& view) const {
   constexpr std::size_t max_shown_particles = 500;  // of thousands, no more tell a person more

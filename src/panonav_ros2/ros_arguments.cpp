@@ -50,8 +50,7 @@ std::string to_text_value(const YAML::Node& node, const std::string& name,
   return text == "False" || text == "FALSE" ? "false" : text;
 }
 
-/// Throws YAML's exceptions on what is no parameter. `nodes_left` bounds what aliases of aliases
-/// multiply.
+/// Throws YAML's exceptions on invalid parameters. `nodes_left` bounds the expansion of aliases.
 void flatten(const YAML::Node& node, const std::string& name, const std::string& where, int depth,
              int& nodes_left, Parameters& parameters) {
   if (depth > max_depth) throw FileError(where, name + " is nested too deeply");

@@ -14,8 +14,8 @@
 
 namespace panonav::ros2 {
 
-/// Subscribes to what a robot measures (odometry or TF, tilt, pictures, the time of a simulation),
-/// checks it and hands it on. Lives on the thread that serves the participant.
+/// Subscribes to the robot's sensors (odometry or TF, tilt, images, the time of a simulation),
+/// checks the messages and passes them on. Runs on the thread that serves the participant.
 class SensorTopics {
  public:
   SensorTopics(Participant& participant, const LocalisationNodeOptions& options,

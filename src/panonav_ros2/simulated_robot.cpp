@@ -122,7 +122,7 @@ struct SimulatedRobot::Implementation {
     camera_work.add([this, stamp_ns, pose = base.pose()] { take_picture(stamp_ns, pose); });
   }
 
-  /// On a thread of its own, so that the world does not stand still for a picture.
+  /// Renders on a thread of its own, so that the simulation does not wait for an image.
   void take_picture(std::int64_t stamp_ns, const Pose2& pose) {
     try {
       const Image picture = surroundings.picture(pose, Random(seed, ++picture_number).next());

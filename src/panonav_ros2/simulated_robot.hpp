@@ -28,10 +28,10 @@ struct SimulatedSurroundings {
   std::function<Image(const Pose2& pose, std::uint64_t seed)> picture;
 };
 
-/// A simulated robot as ROS 2 sees a real one, in time of its own: /clock, odom, odom -> base_link
-/// on /tf, pictures on image and, for evaluation, ground_truth out; cmd_vel in, and set_pose
-/// (PoseStamped), which carries the robot elsewhere without changing its odometry. Obstacles stop
-/// it.
+/// A simulated robot with the ROS 2 interface of a real one, in simulated time. It publishes
+/// /clock, odom, odom -> base_link on /tf, images on image and, for evaluation, ground_truth; it
+/// subscribes to cmd_vel and set_pose (PoseStamped), which moves the robot without changing its
+/// odometry. Obstacles stop it.
 class SimulatedRobot {
  public:
   /// Throws OptionError, and as `Participant`.

@@ -88,7 +88,7 @@ struct Connection {
     if (!trusted) return 0;
     return stage == Stage::idle ? 1 : 2;
   }
-  /// libmicrohttpd closes the connection when it reads the end of it.
+  /// libmicrohttpd closes the connection when it reads its end.
   void evict() {
     evicted = true;
     resume();
@@ -215,7 +215,7 @@ struct HttpServer::Implementation {
         MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_SUPPRESS_DATE_NO_CLOCK, 0, nullptr,
         nullptr, &take, this, MHD_OPTION_SOCK_ADDR, reinterpret_cast<sockaddr*>(&place),
         MHD_OPTION_STRICT_FOR_CLIENT, is_lenient_version() ? 0 : 1,
-        // Those that were evicted are there a moment longer.
+        // Evicted connections exist a moment longer.
         MHD_OPTION_CONNECTION_LIMIT, static_cast<unsigned>(2 * max_connections),
         MHD_OPTION_CONNECTION_TIMEOUT, request_timeout_s, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
         connection_bytes, MHD_OPTION_NOTIFY_CONNECTION, &connect_or_close, this,
@@ -376,7 +376,7 @@ struct HttpServer::Implementation {
     }
   }
 
-  /// True if what was received of all bodies, and `more` bytes, are beyond the limit.
+  /// True if the received bytes of all bodies and `more` bytes exceed the limit.
   [[nodiscard]] bool has_full_bodies(std::size_t more) const {
     std::size_t bytes = more;
     for (const Connection& one : connections) bytes += one.request.body.size();

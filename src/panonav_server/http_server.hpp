@@ -24,9 +24,9 @@ struct HttpAnswer {
   int status = 200;
   std::string type = "text/plain; charset=utf-8";  ///< of the content
   std::string content;
-  /// If set, the answer is a stream: the server calls this whenever all was sent, and at least
-  /// twice a second, for the next part (may be empty), until it returns nullopt. It is destroyed
-  /// with the connection.
+  /// If set, the answer is a stream: after each sent part, and at least twice a second, the server
+  /// calls this for the next part (may be empty), until it returns nullopt. It is destroyed with
+  /// the connection.
   std::function<std::optional<std::string>()> more;
   /// If set, the answer is not ready yet: the server calls this after each `poke`, and at least
   /// twice a second, until it returns the answer, which has no `later` of its own. It is destroyed
@@ -45,7 +45,7 @@ struct HttpServerOptions {
   int port = 0;                       ///< 0 .. 65535; 0: a free one
   std::string headers;                ///< headers of every answer, each ended by "\r\n"
   std::size_t max_body = 1024;        ///< largest body of a request, bytes
-  /// Largest total size of what was received of unfinished bodies; a body beyond gets status 503.
+  /// Largest number of received bytes of unfinished bodies together; a body beyond gets status 503.
   std::size_t max_bodies = std::size_t{64} * 1024;
   /// Judges a request by its head, before a byte of its body is kept; called on the server's
   /// thread. Empty: all are trusted.

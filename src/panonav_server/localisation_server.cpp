@@ -399,7 +399,8 @@ struct LocalisationServer::Implementation {
     }
   }
 
-  /// Tells the fault to whoever runs the server: it may hold addresses, which are not for clients.
+  /// Reports the fault to the operator of the server: it may hold addresses, which clients must not
+  /// see.
   HttpAnswer make_memory_refusal(int status, const std::string& name, const std::exception& error) {
     report_loss(name, to_readable_line(error.what()));
     const std::lock_guard lock(mutex);

@@ -31,7 +31,7 @@ struct LocalisationServerOptions {
   std::size_t max_held_views = 200'000;
   /// Poll interval of memory files for changes.
   std::chrono::milliseconds look_every{1000};
-  /// Receives, in one line, what happens to a memory while it is served; called on another thread.
+  /// Receives one line for each event of a memory while it is served; called on another thread.
   std::function<void(const std::string& line)> note;
 };
 

@@ -27,7 +27,7 @@ class ChangingScene {
   /// finds no such place stays.
   void simulate_day(double share);
 
-  /// Returns the scene as it is now, in light times `light`.
+  /// Returns the present scene, with its light multiplied by `light`.
   [[nodiscard]] Scene scene(double light) const;
 
  private:

@@ -139,7 +139,7 @@ void FreeSpace::keep_connected_component(std::optional<Point2> seed) {
         const Cell cell = open.back();
         open.pop_back();
         ++sizes[number];
-        // Only across edges: a robot does not squeeze through a corner.
+        // Steps go across edges only: a robot does not squeeze through a corner.
         for (std::size_t n = 0; n < 4; ++n) {
           const Cell next{cell.i + neighbours[n].di, cell.j + neighbours[n].dj};
           if (next.i < 0 || next.j < 0 || next.i >= columns_ || next.j >= rows_) continue;

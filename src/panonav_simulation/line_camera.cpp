@@ -32,7 +32,7 @@ LineCamera make_line_camera(double height_m, int columns) {
   UnwarperOptions cylinder{.rows = 3, .columns = 2 * columns};
   cylinder.elevations = ElevationBand{-line.half_band_rad, line.half_band_rad};
   LineCamera result{camera, Unwarper(camera, cylinder), {}, line, height_m, 0.0, {}, {}};
-  // The same as for whole images.
+  // Applies the sensor as to whole images.
   result.spread_rad = 1.0 / (camera.rim_radius_px * 2.0 / 3.0) / rays_per_axis;
   // An unwarper interpolates between the pixels next to a point.
   constexpr double neighbours_px = 1.5;

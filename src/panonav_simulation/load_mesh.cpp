@@ -61,7 +61,7 @@ Material convert_material(const aiMaterial& source, const fs::path& path, Textur
     material.texture = textures.find(file.C_Str(), path.parent_path());
   }
   // Formats differ in whether the colour tints the texture, and exporters write black or grey
-  // beside a texture that is meant to be seen as it is.
+  // beside a texture that is meant to be shown unchanged.
   if (material.texture) material.colour = {1.0F, 1.0F, 1.0F};
   aiColor3D emissive;
   if (!material.texture && source.Get(AI_MATKEY_COLOR_EMISSIVE, emissive) == AI_SUCCESS) {

@@ -217,8 +217,8 @@ void MissionRobot::command(const Velocity& velocity) {
   const Pose2 step = sample_step(commanded, motion_, random_);
   const Pose2 there = pose_ * step;
   if (!is_clear(pose_.position(), there.position())) {
-    // It touches something: it turns, but does not move. Wheels that slip as it turns on the spot
-    // say nothing of what stands ahead.
+    // In contact, the robot rotates but does not move. Wheels that slip while it rotates on the
+    // spot say nothing about obstacles ahead.
     obstacle_ |= commanded.x_m != 0.0 || commanded.y_m != 0.0;
     pose_.heading_rad = there.heading_rad;
     odometry_ = odometry_ * Pose2{0.0, 0.0, commanded.heading_rad};

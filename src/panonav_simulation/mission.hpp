@@ -130,7 +130,7 @@ struct MissionOptions {
   bool monte_carlo = false;
 };
 
-/// A goal to reach, and what happens on the way.
+/// A goal to reach, and the events on the way.
 struct Mission {
   ViewId goal;
   Pose2 start;
@@ -201,8 +201,8 @@ using GoalSource = std::function<std::optional<ViewId>()>;
                                                std::span<const ViewId> goals,
                                                const MissionOptions& options, std::uint64_t seed);
 
-/// Runs all missions, each by a navigator of its own with the routes of what is
-/// remembered; run i has the stream (seed, i).
+/// Runs all missions, each with a navigator of its own and the remembered routes; run i has the
+/// random stream (seed, i).
 [[nodiscard]] std::vector<MissionRun> run_missions(const MissionPlace& place,
                                                    const RememberedPlace& remembered,
                                                    const std::vector<Mission>& missions,

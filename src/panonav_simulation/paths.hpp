@@ -49,7 +49,7 @@ struct GridPosition {
   friend bool operator==(const GridPosition&, const GridPosition&) = default;
 };
 
-/// In which order `grid_positions` goes through the rows.
+/// Order in which `grid_positions` goes through the rows.
 enum class GridOrder {
   raster,  ///< every row from low x to high x
   zigzag,  ///< every second row backwards, as a robot would drive it [M04 section 4]

@@ -97,7 +97,7 @@ void People::paint(Panorama& view, const Pose2& camera, double camera_height_m) 
     const double near_m = far_m(person) - radius_m;
     const double feet_rad = std::atan2(-camera_height_m, near_m);
     const double head_rad = std::atan2(height_m - camera_height_m, near_m);
-    // Trousers are darker than what is worn above.
+    // Trousers are darker than the clothes above.
     const double belt_rad = std::atan2(0.55 * height_m - camera_height_m, near_m);
     for (int c = 0; c < view.columns(); ++c) {
       if (std::abs(angle_difference(view.azimuth_rad(c), bearing_rad)) > half_width_rad) continue;

@@ -17,7 +17,8 @@
 
 namespace panonav::simulation {
 
-/// A scene with what a robot in it needs. Shared by any number of runs on any number of threads.
+/// A scene with its renderer, free space and camera. Shared by any number of runs on any number of
+/// threads.
 struct SimulatedPlace {
   Scene scene;
   std::shared_ptr<const FreeSpace> free_space;  ///< where the robot of the scene can be

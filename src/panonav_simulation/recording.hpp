@@ -95,7 +95,7 @@ void visit_options(FrameOptions& options, OptionVisitor& visitor);
                                      const FrameOptions& options, const SensorOptions& sensor,
                                      std::uint64_t seed, Executor& executor);
 
-/// One picture of a recording, for as long as it is looked at.
+/// One image of a recording, valid during the call.
 struct RecordedFrame {
   std::size_t number = 0;    ///< counted from 0
   const RecordedPose& pose;  ///< belongs to the poses that `record` was given

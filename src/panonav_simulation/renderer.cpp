@@ -136,7 +136,7 @@ struct Renderer::Implementation {
     for (int c = 0; c < channels; ++c) colour[c] *= factor;
   }
 
-  // Adds what the rays see, `rays_per_pixel` neighbouring rays to one pixel.
+  // Adds the colours of the rays, `rays_per_pixel` neighbouring rays to one pixel.
   void shade(std::span<const Ray> rays, std::span<const RayHit> hits, float spread_rad,
              float weight, std::size_t rays_per_pixel, float* values) const {
     std::array<float, 3> colour{};

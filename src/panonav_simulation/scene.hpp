@@ -87,9 +87,9 @@ struct Scene {
   std::vector<std::string> warnings;  ///< missing textures and the like; shown once by the command
 };
 
-/// Throws ContractError that names the mesh and what is wrong with it: an index out of range, a
-/// number of texture coordinates that is not the number of vertices, a coordinate that is not
-/// finite or out of reach.
+/// Throws ContractError that names the mesh and its fault: an index out of range, a number of
+/// texture coordinates that is not the number of vertices, a coordinate that is not finite or out
+/// of reach.
 void validate(const Scene& scene);
 using panonav::validate;  // for options
 

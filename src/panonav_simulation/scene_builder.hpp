@@ -61,7 +61,7 @@ class SceneBuilder {
                     double top_m, double radius_m, int facets = 16,
                     double bottom_radius_factor = 1.0);
 
-  /// Adds a round body with dents and bumps of its own: tree crowns, bushes. `roughness` is the
+  /// Adds a round body with random dents and bumps: tree crowns, bushes. `roughness` is the
   /// standard deviation of its radius.
   void add_blob(const std::string& object, int material, Vector3 centre, Vector3 radii,
                 double roughness);

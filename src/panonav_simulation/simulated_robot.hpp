@@ -34,10 +34,11 @@ struct OpenDirection {
 /// Behaviour of a robot in front of an obstacle.
 enum class ObstacleRule {
   stop,  ///< it stops there, and the run ends
-  /// It goes past: with feelers as long as the step, it tries directions left and right of the one
-  /// it wants, 15 degrees apart, up to 165 degrees off, nearest first, and takes the first in which
-  /// half a step is free. As long as the wanted way stays blocked it keeps to the side it has
-  /// chosen, and changes it where that side has no way. Nowhere a way: it stops.
+  /// Drives past obstacles: with feelers as long as the step, it tries directions left and right of
+  /// the requested one, 15 degrees apart, up to 165 degrees off, nearest first, and takes the first
+  /// in which half a step is free. While the requested direction stays blocked it keeps to the side
+  /// that it has chosen, and changes the side where that one is blocked. If no direction is free,
+  /// it stops.
   pass,
 };
 

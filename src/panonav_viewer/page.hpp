@@ -17,8 +17,8 @@
 /// The page that shows a run, and the run as a part of a report (report_page.hpp).
 namespace panonav::viewer {
 
-/// Returns a page that reads "events" and "picture/N/NAME" next to its own address. Buttons of a
-/// replay post to "control", and so do clicks if the run `takes` a "goal" or a "pose".
+/// Returns a page that reads "events" and "picture/N/NAME" relative to its own address. Buttons of
+/// a replay post to "control", and so do clicks if the run accepts a "goal" or a "pose".
 [[nodiscard]] std::string live_page(std::string_view title, bool replay,
                                     std::string_view takes = "");
 
@@ -31,8 +31,8 @@ struct RouteMark {
   std::vector<std::pair<double, double>> changed_deg;
 };
 
-/// A page with a finished run, which plays by itself. Pictures (panorama and best match) are those
-/// of about 300 moments, evenly chosen; of at most 600 if there are more moments than expected.
+/// A page with a finished run, which plays by itself. Images (panorama and best match) are those of
+/// about 300 evenly chosen moments; of at most 600 if there are more moments than expected.
 class RunPage {
  public:
   /// `moments`: expected number of moments.

@@ -257,7 +257,7 @@ void draw_colour_bar(SvgDrawing& drawing, const SvgBox& box, const PlotAxis& axi
                    {.anchor = "middle", .rotation_deg = -90.0});
 }
 
-/// Draws what a layer holds; only its first kind of mark carries its label.
+/// Draws a layer; only its first kind of mark has the label.
 void draw_layer(SvgDrawing& drawing, Legend& legend, const PlotArea& area, const MapLayer& layer) {
   std::string label = layer.label;
   const auto explain = [&](LegendSymbol symbol) {

@@ -163,7 +163,7 @@ void PlotArea::draw_axes(SvgDrawing& drawing, const std::string& title) const {
 void PlotArea::draw_names(SvgDrawing& drawing) const {
   constexpr std::size_t max_characters = 47;
   const bool is_turned = has_turned_names();
-  // Only every n-th name where even turned ones are too wide.
+  // Only every n-th name if even rotated ones are too wide.
   const auto every = static_cast<std::size_t>(1.0 + static_cast<double>(x.names.size()) *
                                                         min_turned_px / box.width);
   for (std::size_t i = 0; i < x.names.size(); i += every) {

@@ -68,7 +68,7 @@ std::string embed_file(const std::filesystem::path& path) {
 
 std::string make_view_element(const ReportView& view) {
   const Image picture = to_picture(view.panorama);
-  // As wide as high in angle would be true to the eye, but a small view must be seen at all.
+  // Equal scales of both angles would be true to the eye, but a small view must be visible at all.
   const double shape =
       std::clamp(static_cast<double>(picture.width()) / picture.height(), 2.5, 10.0);
   std::string html =

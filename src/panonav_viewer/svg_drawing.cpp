@@ -28,7 +28,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// To a hundredth of a pixel.
+/// Rounds to a hundredth of a pixel.
 std::string format_px(double value) {
   const double rounded = std::round(value * 100.0) / 100.0;
   std::array<char, 32> text;

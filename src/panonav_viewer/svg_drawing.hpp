@@ -56,7 +56,7 @@ class SvgDrawing {
   void add_text(Point2 at, std::string_view text, const TextStyle& style = {});
   /// Fills the box with the pixels, whose edges stay sharp.
   void add_image(const SvgBox& box, ImageView image);
-  /// Shows what is drawn until `end_clip` only within the box.
+  /// Clips drawing to the box until `end_clip`.
   void begin_clip(const SvgBox& box);
   void end_clip();
 
@@ -70,9 +70,9 @@ class SvgDrawing {
 /// Estimates the width in pixels of text of 12 px; a little more than most fonts need.
 [[nodiscard]] double estimate_text_width(std::string_view text);
 
-/// Writes SVG text to `path`, or, where that does not end in .svg, a PNG that the program ffmpeg
-/// makes of it; the file appears whole or not at all. Throws FileError when it cannot be written,
-/// Error when ffmpeg cannot be started.
+/// Writes SVG text to `path`, or a PNG made by the program ffmpeg if the name does not end in .svg;
+/// the file appears whole or not at all. Throws FileError if it cannot be written, Error if ffmpeg
+/// cannot be started.
 void write_drawing(const std::filesystem::path& path, const std::string& svg);
 
 }  // namespace panonav::viewer

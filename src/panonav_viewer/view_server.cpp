@@ -212,7 +212,7 @@ struct ViewServer::Implementation {
     return {.type = bytes->starts_with("\x89PNG") ? "image/png" : "image/jpeg", .content = *bytes};
   }
 
-  /// One viewer's events, as long as it is there.
+  /// Sends the events to one viewer while it is connected.
   class Viewer {
    public:
     explicit Viewer(Implementation& all) : all_(all) {

@@ -283,7 +283,7 @@ TEST_F(Kill, Undo) {
 }
 
 TEST_F(Kill, LocaliseAdd) {
-  // What it adds depends on what it knows, so that a second run adds other views.
+  // The views that it adds depend on those that it knows, so that a second run adds others.
   kill_at_random({"localise"}, {run(), "--add"}, {}, false, false);
 }
 

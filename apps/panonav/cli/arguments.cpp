@@ -38,8 +38,7 @@ struct Arguments::Implementation {
   std::deque<Section> sections = {};  ///< a deque: takes keep references into it
   std::vector<Refusal> refusals = {};
   std::set<std::string, std::less<>> typed = {};  ///< flags
-  /// Flags outside options structs that stand in option files, and what a file or the command line
-  /// says.
+  /// Reads and writes the flags outside options structs that may stand in option files.
   std::map<std::string, std::optional<std::string>, std::less<>> plain = {};
   std::set<std::string, std::less<>> outputs = {};  ///< names of arguments that the verb writes
   std::vector<NamedValue> values = {};              ///< all that were taken
@@ -205,7 +204,7 @@ void Arguments::add_section(const std::string& section, const std::string& prefi
   OptionLister lister([&](const ListedOption& option) {
     auto& text = added.entries[std::string(option.info.name)].text;
     std::string help(option.info.help);
-    // A symbol stays as it is; a word begins a line.
+    // Begins with a capital letter, unless the first word is a symbol.
     if (help.size() > 1 && help[1] >= 'a' && help[1] <= 'z' && help[0] >= 'a' && help[0] <= 'z') {
       help[0] = static_cast<char>(help[0] - 'a' + 'A');
     }

@@ -31,7 +31,7 @@ struct CommonArguments {
   bool config_template = false;
 };
 
-/// One argument of a verb for all that is made of it: help, completion, manual, option files.
+/// Describes one argument of a verb, for help, completion, manual and option files.
 struct ArgumentInfo {
   std::string name;        ///< "--cell-size-m"; of a positional "MEMORY"
   std::string short_form;  ///< "-o", or empty
@@ -67,7 +67,7 @@ class Arguments {
   /// One or more; the last positional of a verb.
   void positionals(const std::string& name, std::vector<std::string>& values,
                    const std::string& help);
-  /// The same, or none.
+  /// Declares positionals that may be missing.
   void optional_positionals(const std::string& name, std::vector<std::string>& values,
                             const std::string& help, std::vector<std::string> choices = {});
   void option(const std::string& flag, std::string& value, const std::string& help);
@@ -103,13 +103,13 @@ class Arguments {
         [&values] { validate(values); });
   }
 
-  /// Flags declared before, of texts and one value each, that stand in the table [`section`] of a
-  /// --config file beside the options of it.
+  /// Allows flags declared before, of texts and with one value each, in the table [`section`] of a
+  /// --config file, beside its options.
   void allow_in_config_files(const std::string& section,
                              std::initializer_list<std::string_view> flags);
 
-  /// Flags and positionals declared before whose value names what the verb writes; none may be what
-  /// another value names (outputs.hpp). Throws logic_error when there is none of that name.
+  /// Declares which flags and positionals name files that the verb writes; none may be a file that
+  /// another value names (outputs.hpp). Throws logic_error if there is none of that name.
   void writes(std::initializer_list<std::string_view> names);
 
   /// Flags declared before that `--help` shows, or leaves to `--help-all`. Throws logic_error when
@@ -126,14 +126,16 @@ class Arguments {
   /// option of one. Options of a --config file are ignored: it may serve several verbs.
   void reject_options_unless(std::vector<std::string> options, std::function<bool()> used,
                              std::string why);
-  /// The same where the input decides: throws UsageError when one of the options was typed.
+  /// Throws UsageError if one of the options was typed, for conditions known only after the input
+  /// was read.
   void reject_options(std::span<const std::string> options, const std::string& why) const;
   void reject_options(std::initializer_list<std::string> options, const std::string& why) const {
     reject_options(std::span(options.begin(), options.size()), why);
   }
 
-  /// Throws ContractError when the user gave an option of the section, by flag or file, another
-  /// value than what is there already has. `as` ends the line: whose value counts, and what to do.
+  /// Throws ContractError if the user set an option of the section, by flag or file, to another
+  /// value than `kept`, that of an existing memory. `as` ends the message: whose value counts, and
+  /// what to do.
   template <class Options>
   void require_same(const std::string& section, Options typed, Options kept,
                     const std::string& as) const {
@@ -187,7 +189,7 @@ struct ParsedCommand {
 [[nodiscard]] const Verb* find_verb(std::span<const Verb> verbs,
                                     std::span<const std::string> words);
 
-/// The same where there must be one: throws UsageError with the verb that may have been meant.
+/// Returns the verb as `find_verb`; throws UsageError with the most similar name if there is none.
 [[nodiscard]] const Verb& find_required_verb(std::span<const Verb> verbs,
                                              std::span<const std::string> words);
 

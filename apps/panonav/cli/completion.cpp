@@ -22,7 +22,7 @@ std::string join_words(const std::vector<std::string>& words) {
   return text;
 }
 
-/// All that may be typed for the options of a verb.
+/// Lists the flags of a verb, in all their forms.
 std::string list_flags(const Description& description) {
   std::string text;
   for (const auto& argument : description.arguments) {

@@ -37,7 +37,7 @@ using OptionEntries = std::map<std::string, OptionEntry>;
   return all;
 }
 
-/// True for what is neither a positional nor a number below 0.
+/// True if the word is a flag, not a positional or a negative number.
 [[nodiscard]] bool looks_like_flag(std::string_view word);
 
 /// Throws UsageError unless the whole text is one finite number.

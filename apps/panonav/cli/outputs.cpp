@@ -102,7 +102,7 @@ void require_separate_outputs(std::span<const NamedValue> values) {
     if (!values[i].is_output) continue;
     fs::path path = values[i].value;
     auto found = find_file(path);
-    // Only the page in a folder would be replaced; a verb that fills a folder wants an empty one.
+    // A report replaces only the page in its folder; other verbs require an empty folder.
     const bool is_page = found && S_ISDIR(found->mode);
     if (is_page) found = find_file(path /= "index.html");
     const bool exists = found && S_ISREG(found->mode);

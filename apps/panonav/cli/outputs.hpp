@@ -12,10 +12,10 @@ struct NamedValue {
   bool is_output = false;  ///< the verb writes it
 };
 
-/// Throws UsageError where writing an output would replace what another value names: the same file
-/// (device and inode, also through links), a file in a folder that is named, one that a TOML file
-/// names, or a log of a memory file; likewise where two outputs are one file. Costs a look at each
-/// file of the folders, only where an output exists already.
+/// Throws UsageError if an output would replace a file that another value names: the same file
+/// (device and inode, also through links), a file in a named folder, one that a TOML file names, or
+/// a log of a memory file. Also throws if two outputs are the same file. Cost: a look at each file
+/// of the folders, only if an output exists already.
 void require_separate_outputs(std::span<const NamedValue> values);
 
 }  // namespace panonav::command

@@ -24,8 +24,7 @@ bool supports_colours(int descriptor) {
          std::string_view(terminal) != "dumb";
 }
 
-// A name may hold anything, also what a terminal takes for a command. Lines and our own styles
-// stay.
+// Names may contain control sequences of a terminal. Line ends and the session's own styles stay.
 std::string escape_control_characters(std::string_view text) {
   constexpr std::array<std::string_view, 5> kept{"\n", "\033[0m", "\033[1m", "\033[31m",
                                                  "\033[32m"};

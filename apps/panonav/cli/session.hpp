@@ -36,7 +36,7 @@ class Session {
   void note(std::string_view line);
   /// One line on standard error that the user needs to go on: not silent with --quiet either.
   void prompt(std::string_view line) { write_line(line); }
-  /// With --verbose: the line on standard error, behind the seconds since the start.
+  /// Prints the line on standard error with --verbose, after the seconds since the start.
   void detail(std::string_view line);
   /// Says why there is no answer, on standard error.
   [[nodiscard]] ExitCode no_answer(std::string_view line);
@@ -66,9 +66,9 @@ class Session {
   Executor executor_;
 };
 
-/// A bar on standard error with the time left, only where that is a terminal, only once the work
-/// has taken longer than a second, and not with --quiet. The bar is gone when the object is. With
-/// --verbose, begin and end of the work are said. Not thread-safe: advance it from one thread.
+/// Shows a progress bar with the time left on standard error: only on a terminal, only if the work
+/// takes longer than a second, and not with --quiet. The destructor removes the bar. With
+/// --verbose, begin and end of the work are printed. Not thread-safe: advance it from one thread.
 class Progress {
  public:
   Progress(Session& session, std::string label, std::size_t total);

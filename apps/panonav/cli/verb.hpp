@@ -33,7 +33,8 @@ struct Verb {
   std::string_view example;  ///< command lines that work as they stand, the most useful ones first
   Run (*declare)(Arguments&);
   std::string_view alias = {};  ///< another spelling that is taken
-  /// Says in words of the command line what words of another convention mean; null: there is none.
+  /// Translates arguments of another convention (ROS) to those of the command line; null: there is
+  /// none.
   std::vector<std::string> (*translate)(std::span<const std::string> words,
                                         std::span<const ArgumentInfo> infos) = nullptr;
 };

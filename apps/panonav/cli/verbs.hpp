@@ -16,7 +16,8 @@
 /// of all verbs.
 namespace panonav::command {
 
-/// Makes what this build has beside the library known to it; called once, before a verb runs.
+/// Registers the components of this build (recordings, fleet, ...) with the library; called once,
+/// before a verb runs.
 void register_outbuildings();
 
 /// Returns every verb of this build, in the order in which a newcomer meets them.
@@ -26,7 +27,7 @@ void register_outbuildings();
 [[nodiscard]] const Verb& find_named_verb(std::span<const Verb> verbs,
                                           const std::vector<std::string>& words);
 
-/// Prints the text as it is, or as {"text": ...}.
+/// Prints the text, or {"text": ...} with --json.
 ExitCode print_text(const std::string& text, Session& session);
 
 }  // namespace panonav::command

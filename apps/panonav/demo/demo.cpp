@@ -37,8 +37,8 @@ std::string format_percent(double share) {
   return format_fixed(100.0 * share, 0) + " %";
 }
 
-// Raw picture, what calibration found in it, and the cylinder made of it. Gives the first for the
-// page's beginning.
+// Adds the camera's image, the calibrated mirror in it and the panorama made of it to the page.
+// Returns the first image for the beginning of the page.
 viewer::ReportPicture add_camera_part(const DemoRecordings& recordings, Session& session,
                                       viewer::ReportPage& page) {
   const Dataset& queries = recordings.query_run;

@@ -69,7 +69,7 @@ viewer::UnfoldingMap draw_runs(const simulation::Scene& office,
   return map;
 }
 
-/// The view at home, turned as the robot faces, above what it sees.
+/// Shows the view at home, rotated to the robot's heading, above the robot's view.
 std::vector<viewer::ReportView> make_report_views(const Panorama& home, const Panorama& current,
                                                   const HomeVector& vector) {
   std::vector<viewer::ViewMark> marks{{.azimuth_rad = 0.0, .colour = viewer::PlotColour::grey}};

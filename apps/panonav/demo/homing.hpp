@@ -9,7 +9,8 @@
 
 namespace panonav::command {
 
-/// Robots that go home to places in the office, each from one view of it and about a metre away.
+/// Runs robots home to places in the office, each from one view of the place and about a metre
+/// away.
 struct DemoHoming {
   std::vector<lab::HomingRun> runs;
   std::size_t arrived = 0;          ///< within 10 cm, and they know it

@@ -48,8 +48,8 @@ struct Growth {
   std::vector<std::size_t> groups;
 };
 
-/// The views as dots, coloured by where they were taken, from west to east: whoever looks sees at
-/// once whether they are sorted.
+/// Draws the views as dots coloured by their true positions from west to east, so that a sorted map
+/// shows as a gradient.
 std::vector<viewer::MapLayer> colour_by_position(const std::vector<Point2>& positions,
                                                  const std::vector<Point2>& truth) {
   constexpr std::array colours{viewer::PlotColour::blue,   viewer::PlotColour::sky,
@@ -125,7 +125,7 @@ viewer::MapPlot draw_truth(const VisualMemory& office) {
   return {.title = "True positions", .layers = colour_by_position(truth, truth)};
 }
 
-/// The longer side of the floor on which the views were taken.
+/// Returns the longer side of the bounding box of the views.
 double room_length_m(const VisualMemory& office) {
   std::vector<double> x_m;
   std::vector<double> y_m;

@@ -45,7 +45,7 @@ simulation::RememberedPlace remember_office(const VisualMemory& memory, const La
   return remembered;
 }
 
-/// The robot sees through the camera as it is, and understands it as it was calibrated.
+/// Images are rendered with the true camera and unwarped with the calibrated one.
 void set_camera_of_robot(simulation::MissionPlace& place, const DemoRecordings& recordings,
                          const Pipeline& pipeline) {
   const simulation::SimulatedWorldOptions& settled = recordings.office_world->options();
@@ -131,7 +131,7 @@ viewer::UnfoldingMap draw_runs(const DemoNavigation& navigation,
   return map;
 }
 
-/// One run, look by look, over what the memory tells of the way.
+/// Draws one run, decision by decision, over the planned path.
 viewer::UnfoldingMap draw_run(const std::string& title, const simulation::MissionPlace& place,
                               const simulation::RememberedPlace& remembered,
                               const PlannerOptions& options, ViewId goal,
@@ -158,7 +158,7 @@ viewer::UnfoldingMap draw_run(const std::string& title, const simulation::Missio
   return map;
 }
 
-/// A mission with what the robot sees and decides at each look.
+/// Plays a mission with the robot's view and decision at each step.
 viewer::RunPage replay_run(const simulation::MissionPlace& place,
                            const simulation::RememberedPlace& remembered,
                            const DemoRecordings& recordings, const MemoryFile& file,
@@ -226,7 +226,7 @@ std::string describe_end(const simulation::MissionRun& run, double within_m) {
   return run.arrives(within_m) ? "arrived" : "arrived, but too far from the goal";
 }
 
-/// A heading with what came of a run, and a line for each step.
+/// Formats a heading with the outcome of a run, and a line for each step.
 std::string format_log(const std::string& title, const std::string& goal,
                        const simulation::MissionRun& run, double within_m) {
   std::string text = title + ", to " + goal + ": " + describe_end(run, within_m) + ", " +

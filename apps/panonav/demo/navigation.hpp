@@ -31,7 +31,7 @@ struct DemoNavigation {
   std::vector<std::string> first_mission;
 };
 
-/// Sends them over the views of `memory`, which is what `file` holds, and adds a part that plays
+/// Runs the missions over the views of `memory`, the content of `file`, and adds a part that plays
 /// them to the page, with a log. The same seed gives the same runs.
 DemoNavigation demonstrate_navigation(const DemoOptions& options, const DemoRecordings& recordings,
                                       const MemoryFile& file, const VisualMemory& memory,

@@ -11,7 +11,7 @@
 
 namespace panonav::command {
 
-/// A view that was asked for, and what the memory said.
+/// A query view and the memory's answer to it.
 struct LocalisedView {
   Pose2 truth;
   PackedSignature signature;

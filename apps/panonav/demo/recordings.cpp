@@ -159,7 +159,8 @@ std::pair<PlannedRun, std::size_t> plan_kidnapped_walk(const simulation::Simulat
 
 // Gives all runs the camera of the mirror that was found in their pictures.
 void set_calibrated_camera(DemoRecordings& recordings, const MirrorCircle& mirror) {
-  // No picture shows a mirror's shape and how it is mounted; these are known of the robot.
+  // The shape and the mounting of the mirror cannot be read from images; the robot's maker knows
+  // them.
   const Camera camera =
       camera_from_mirror(mirror, {.model = recordings.true_camera.model,
                                   .direction = recordings.true_camera.direction,
@@ -171,7 +172,7 @@ void set_calibrated_camera(DemoRecordings& recordings, const MirrorCircle& mirro
   }
 }
 
-// Renders what the robot sees in colour, for people.
+// Returns a camera that renders colour images of the robot's views for the page.
 std::function<Image(const DatasetEntry&, Executor&)> make_colour_camera(
     const simulation::SimulatedWorld& world, const Camera& camera,
     const simulation::SensorOptions& sensor_options, Executor& executor) {

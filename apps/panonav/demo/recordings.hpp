@@ -54,8 +54,8 @@ struct DemoRecordings {
 [[nodiscard]] simulation::SimulatedWorldOptions demo_world_options(const DemoOptions& options,
                                                                    int stream);
 
-/// Makes the folder, or clears away what an earlier demo made in it and nothing else. Throws
-/// FileError when it holds anything and was not made by a demo, or cannot be written.
+/// Makes the folder, or removes the files of an earlier demonstration from it. Throws FileError if
+/// it holds anything else or cannot be written.
 void prepare_demo_folder(const std::filesystem::path& out);
 
 /// Renders all pictures, calibrates, and writes the three data sets. Empty when calibration finds

@@ -22,7 +22,7 @@ struct DemoStory {
   viewer::UnfoldingMap missions;
 };
 
-/// Four pictures that tell what the program does, how well, and how to use it.
+/// Four pictures that show what the program does, how well, and how to use it.
 void add_story(DemoStory story, viewer::ReportPage& page);
 
 }  // namespace panonav::command

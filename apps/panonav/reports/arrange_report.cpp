@@ -17,7 +17,7 @@ namespace {
 
 using Springs = std::vector<std::pair<std::size_t, std::size_t>>;
 
-/// Those that hold, at most two of each view where there are many.
+/// Selects the springs that hold, at most two of each view if there are many.
 Springs choose_springs(const Lattice& lattice) {
   constexpr std::size_t many = 1500;
   std::vector<const Lattice::Spring*> all;

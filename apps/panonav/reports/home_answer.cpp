@@ -17,7 +17,8 @@ std::string describe_angle(double direction_rad) {
 }
 
 std::string describe_rotation(double heading_rad) {
-  // heading_rad is home's heading seen from here, so the robot has turned the other way.
+  // heading_rad is the heading at home in the robot's present frame; the robot has rotated by its
+  // negative.
   const double turned = wrap_angle(-heading_rad);
   if (std::abs(degrees(turned)) < 0.5) return "same heading as at home";
   if (std::abs(degrees(turned)) >= 179.5) return "opposite heading to the heading at home";

@@ -12,7 +12,7 @@
 
 namespace panonav::command {
 
-/// A picture and what the memory says of it.
+/// An image and the memory's answer to it.
 struct LocalisedQuery {
   std::string file;
   double turned_rad = 0.0;  ///< before it was asked about
@@ -21,9 +21,9 @@ struct LocalisedQuery {
   std::string error;                  ///< why it could not be read; empty: it could
 };
 
-/// A page with what was seen above the best match, turned alike, a map, and the figures by which a
-/// person can judge the answer: of 200 of the queries, evenly spread, and a table of the first 500.
-/// `panorama` gives that of a query by its number. Throws FileError.
+/// Writes a page that shows each query above its best match, rotated to the same heading, a map,
+/// and the figures by which a person can judge the answer: for 200 evenly chosen queries, and a
+/// table of the first 500. `panorama` returns that of a query by its number. Throws FileError.
 void write_localise_report(const std::filesystem::path& folder, const MemoryFile& file,
                            const PlaceRecogniser& recogniser,
                            const std::vector<LocalisedQuery>& queries,

@@ -15,7 +15,7 @@ namespace panonav::command {
 
 namespace {
 
-/// The nodes of the largest component beside what is known of them.
+/// The nodes of the largest component with their estimated and true positions.
 struct Nodes {
   std::vector<Point2> map;
   std::vector<Point2> truth;     // as many, or none where one is not known

@@ -15,7 +15,7 @@ namespace panonav::command {
 /// The largest component of the map with its closures; where the recording knows positions, the map
 /// is laid over them, and so is the odometry of its wheels.
 [[nodiscard]] viewer::MapPlot draw_map(const Dataset& recording, const Mapper::Result& run);
-/// The same as a PNG or SVG file. Throws what `write_plot` throws.
+/// Writes the map as a PNG or SVG file. Throws as `write_plot`.
 void write_map_picture(const std::filesystem::path& path, const Dataset& recording,
                        const Mapper::Result& run);
 

@@ -21,7 +21,7 @@ bool is_made_by(const std::filesystem::path& page, std::string_view generator) {
          std::string::npos;
 }
 
-/// True if the folder holds nothing, or only what a killed process left of the page.
+/// True if the folder is empty, or holds only what a killed process left of the page.
 bool is_free(const std::filesystem::path& folder, const std::string& page) {
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {

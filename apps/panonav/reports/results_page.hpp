@@ -13,7 +13,7 @@ namespace panonav::command {
 void write_paper_page(const std::filesystem::path& folder, const ReproducedPaper& paper,
                       const std::string& lead, const lab::Reproduction& reproduction);
 
-/// Writes index.html of all papers, whose own pages lie in a folder each of their name. Throws
+/// Writes index.html of all papers; the page of each paper is in the folder of its name. Throws
 /// FileError.
 void write_results_page(const std::filesystem::path& folder, const lab::ResultsDocument& document);
 

@@ -82,7 +82,7 @@ std::vector<std::size_t> choose_evenly(const std::vector<FollowedImage>& images,
   return chosen;
 }
 
-/// For each chosen picture two bands: seen above, shown by the route below.
+/// Draws two bands for each chosen image: the observed line above the line that the route predicts.
 viewer::PicturePlot draw_lines(const RouteLines& route, const std::vector<FollowedImage>& images,
                                const std::vector<std::size_t>& chosen) {
   constexpr int band = 3;

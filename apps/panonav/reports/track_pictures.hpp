@@ -17,7 +17,8 @@ struct TrackBackground {
   std::optional<std::size_t> kidnapped_after;
 };
 
-/// True and estimated path of a run from above, and what the filter said of each image.
+/// Draws the true and the estimated path of a run from above, with the filter's state at each
+/// image.
 [[nodiscard]] viewer::MapPlot draw_track(const VisualMemory& memory,
                                          const std::vector<TrackedImage>& images,
                                          const TrackBackground& background);

@@ -14,8 +14,8 @@ namespace panonav::command {
 /// the page stays a few megabytes.
 [[nodiscard]] std::size_t count_shown_particles(std::size_t images);
 
-/// A page that plays the run, with the particles as in [M03] figures 7 to 9, and figures of the
-/// whole of it. `images`: at least one. Throws FileError.
+/// Writes a page that plays the run, with the particles as in [M03] figures 7 to 9, and figures of
+/// the whole run. `images`: at least one. Throws FileError.
 void write_track_report(const std::filesystem::path& folder, const VisualMemory& memory,
                         double spacing_m, const std::vector<TrackedImage>& images,
                         const TrackSummary& summary, const viewer::RunPage& played);

@@ -32,10 +32,10 @@ struct FollowedImage {
       moment;  ///< what a record holds of it; nullopt: nothing is recorded
 };
 
-/// Follows a run along a route, every N-th picture of it. Lines are read on all threads, the
-/// follower runs in order; the same on any number of threads. `truth`: poses of all entries, or
-/// empty. `recorded`: makes panoramas of the pictures for moments; null: there are none. `report`
-/// is called after each picture, in order. Throws FileError on a picture that cannot be read.
+/// Follows every N-th image of a run along a route. Lines are computed on all threads, the follower
+/// runs in order; results do not depend on the number of threads. `truth`: poses of all entries, or
+/// empty. `recorded`: makes panoramas for moments, or null. `report` is called after each image, in
+/// order. Throws FileError on an image that cannot be read.
 void follow(RouteFollower& follower, const Dataset& run, const std::vector<Pose2>& truth,
             int every_nth, const PanoramaReader* recorded, Executor& executor,
             const std::function<void(FollowedImage&&)>& report);

@@ -18,8 +18,8 @@ namespace panonav::command {
 
 namespace {
 
-/// Prints lines on a thread of its own. A reader that is slow does not hold up the robot: beyond
-/// `max_waiting` lines the oldest are left out and counted.
+/// Prints lines on a thread of its own, so that a slow reader does not delay the robot: beyond
+/// `max_waiting` lines the oldest are dropped and counted.
 class LinePrinter {
  public:
   LinePrinter(Session& session, bool wait)
@@ -157,7 +157,7 @@ std::unique_ptr<recordings::LiveObservations> open_live(
                                                         options);
 }
 
-void reject_live_input(const Arguments& arguments, const std::string& input, bool count) {
+void reject_live_options(const Arguments& arguments, const std::string& input, bool count) {
   const std::string why = "where " + input + " is not a live source";
   arguments.reject_options({"--camera-width", "--camera-height"}, why);
   if (count) arguments.reject_options({"--count"}, why);

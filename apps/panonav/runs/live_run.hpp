@@ -24,14 +24,14 @@ struct LiveArguments {
 /// Adds --count, --camera-width and --camera-height.
 void declare_live(Arguments& arguments, LiveArguments& live);
 
-/// A live source (`is_live`) whose pictures lie as the user says, or else as `remembered`: refuses
-/// what goes with recordings only. Notes of the source go to the session, which must outlive it.
-/// Throws UsageError, FileError.
+/// Opens a live source (`is_live`) with the image layout that the user states, or else
+/// `remembered`. Rejects options for recordings. Notes of the source go to the session, which must
+/// outlive it. Throws UsageError, FileError.
 [[nodiscard]] std::unique_ptr<recordings::LiveObservations> open_live(
     const Arguments& arguments, const std::string& input, const PictureArguments& pictures,
     const std::optional<PictureSource>& remembered, const LiveArguments& live, Session& session);
-/// Refuses what goes with live sources only; --count, too, where a verb ends with its input.
-void reject_live_input(const Arguments& arguments, const std::string& input, bool count);
+/// Rejects options that apply to live sources only; also --count if the verb ends with its input.
+void reject_live_options(const Arguments& arguments, const std::string& input, bool count);
 
 /// Counts of a run over a source.
 struct LiveCounts {
@@ -49,9 +49,9 @@ struct LiveCounts {
 /// `moments_left_out`: of a record.
 [[nodiscard]] std::string describe_events(const LiveCounts& counts, std::size_t moments_left_out);
 
-/// Takes observations one by one until their source ends, the user or the system asks the program
-/// to end (SIGINT, SIGTERM), or as many were taken as the user wants. What is printed of them never
-/// holds up a live source: a slow reader loses the oldest lines.
+/// Processes observations until the source ends, the program is asked to end (SIGINT, SIGTERM), or
+/// the requested number is reached. Printing never delays a live source: a slow reader loses the
+/// oldest lines.
 class LiveRun {
  public:
   /// All must outlive *this. `part`: which pictures of a live source are taken; of others that is
@@ -64,8 +64,8 @@ class LiveRun {
 
   /// Returns the line to print of an image that cannot be read (null) or answered; empty: none.
   using Skip = std::function<std::string(const Observation*, const Error&)>;
-  /// Prints what `answer` says of each observation, unless that is empty, then calls `keep`. An
-  /// Error of the source or of `answer` skips the image, one of `keep` ends the run.
+  /// Prints the line that `answer` returns for each observation, unless it is empty, then calls
+  /// `keep`. An Error of the source or of `answer` skips the image, one of `keep` ends the run.
   void run(const std::function<std::string(const Observation&)>& answer,
            const std::function<void(Observation&&)>& keep, const Skip& skip = {});
   /// Waits until all lines are printed: what is to be stored comes before.

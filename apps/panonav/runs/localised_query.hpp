@@ -17,7 +17,7 @@ inline constexpr std::string_view csv_header =
     "difference,turn_deg,next,next_dissimilarity,next_column_difference,error\n";
 /// Returns its row; unknown values are empty.
 [[nodiscard]] std::string csv_row(const LocalisedQuery& answer);
-/// A line for people, and one for each area that was asked for.
+/// Formats a line for people, followed by one for each requested area.
 [[nodiscard]] std::string format_line(const LocalisedQuery& answer, Session& session);
 
 }  // namespace panonav::command

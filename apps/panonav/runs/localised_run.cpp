@@ -258,7 +258,7 @@ class LocalisedRun {
     poses_ = choose_route_poses(*recording_);
   }
 
-  /// Reads the motion between images without odometry from what they show; views are updated by it.
+  /// Estimates missing odometry from the images; --update needs it.
   void read_missing_motion() {
     const bool moves = std::ranges::all_of(
         recording_->entries, [](const DatasetEntry& entry) { return entry.odometry.has_value(); });
@@ -316,7 +316,7 @@ class LocalisedRun {
     return json_line(json);
   }
 
-  /// Stores what waits, and says what was changed. A reader of the lines may never go on.
+  /// Stores waiting views before the summary is printed, as a reader that stalls would block here.
   std::string finish() {
     std::string text;
     const auto changes = memory_->finish("update from " + mask_credentials(input()));
@@ -424,7 +424,7 @@ ExitCode localise_in_order(const Arguments& declared, const LocaliseArguments& a
   if (live) {
     declared.reject_options({"--report"}, "where " + input + " is a live source");
   } else {
-    reject_live_input(declared, input, false);
+    reject_live_options(declared, input, false);
   }
   if (arguments.inputs.size() > 1 && live) {
     throw UsageError(input + " is a live source; allowed: one of these, or several images");

@@ -74,7 +74,7 @@ std::vector<Pose2> MissionMoments::planned_path(ViewId from) const {
   return path;
 }
 
-/// Returns the direction from what the robot sees to where the goal's view was taken.
+/// Returns the home vector from the robot's view to the goal's view.
 recordings::RunHoming MissionMoments::homing() const {
   const ViewId goal = robot_.goal();
   const VisualMemory views = robot_.memory().load({&goal, 1});

@@ -20,7 +20,7 @@ class MissionMoments {
                  const FieldOptions& field)
       : robot_(robot), remembered_(remembered), field_(field) {}
 
-  /// Keeps what the robot sees for the next moment.
+  /// Stores the robot's view for the next moment.
   void set_image(const Image& image, const Panorama& panorama);
   /// Makes the moment of a decision.
   [[nodiscard]] recordings::RunMoment make(const NavigationDecision& decision, const Pose2& pose,

@@ -38,7 +38,7 @@ struct PictureArguments {
 void declare_layout(Arguments& arguments, PictureArguments& pictures);
 /// Adds --image-topic, --odometry-topic, --odometry-frames and --imu-topic.
 void declare_topics(Arguments& arguments, InputOptions::Topics& topics);
-/// Adds --from and --to, and unless the verb has one of its own, --every.
+/// Adds --from and --to, and --every unless the verb has one of its own.
 void declare_part(Arguments& arguments, PartArguments& part, bool every);
 /// All three.
 void declare_pictures(Arguments& arguments, PictureArguments& pictures);
@@ -55,17 +55,17 @@ void declare_pictures(Arguments& arguments, PictureArguments& pictures);
 /// Checks and converts the part. Throws UsageError on values out of range.
 [[nodiscard]] Dataset::Selection to_selection(const PartArguments& part);
 
-/// Opens what `open_input` does, as the flags say, and notes its warnings. `remembered` is how the
-/// pictures lie that a memory was made from: so lie those that come without a description of their
-/// own. Throws UsageError on flags that do not fit the input and on live sources but standard
-/// input, which is read to its end; FileError.
+/// Opens the input as `open_input` with the options of the flags, and prints its warnings.
+/// `remembered`: image layout of the memory, used for images without a description of their own.
+/// Throws UsageError on flags that do not fit the input and on live sources except standard input,
+/// which is read to its end; FileError.
 [[nodiscard]] Dataset open_recording(const std::string& input, const PictureArguments& pictures,
                                      const std::optional<PictureSource>& remembered,
                                      Session& session);
 /// Throws UsageError on a band (--elevation-deg) that is not that of the memory's views.
 void require_stored_band(const PictureArguments& pictures, const MemoryFile& memory);
-/// The same beside a memory, whose pictures lie as its header says. The memory's views keep their
-/// band: another --elevation-deg throws UsageError.
+/// Opens images for a memory: their layout is that of its header. Throws UsageError if
+/// --elevation-deg differs from the memory's band.
 [[nodiscard]] Dataset open_recording(const std::string& input, const PictureArguments& pictures,
                                      const MemoryFile& memory, Session& session);
 
@@ -90,8 +90,8 @@ void require_later_stamp(const std::string& dataset, const std::string& file, do
 /// set gets them, a folder of images needs a dataset.toml first. `values`: an example of a line.
 [[nodiscard]] std::string explain_columns(const std::string& folder, const std::string& columns,
                                           const std::string& values);
-/// A data set, or what the user says of other pictures, as `open_recording` does. A folder of
-/// pictures alone throws a FileError that says how to make it a data set with these columns.
+/// Opens a data set as `open_recording`. Throws FileError on a folder without a table and says
+/// which columns to add.
 [[nodiscard]] Dataset read_dataset_with_columns(const std::string& folder,
                                                 const PictureArguments& pictures,
                                                 const std::optional<PictureSource>& remembered,

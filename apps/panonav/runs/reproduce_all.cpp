@@ -130,7 +130,7 @@ ExitCode reproduce_all(const ReproduceArguments& arguments, Session& session) {
     std::error_code error;
     fs::create_directories(out, error);
     if (error) throw FileError(out.string(), "cannot be created: " + error.message());
-    // Nothing of an earlier run may be taken for a part of this one.
+    // Removes files of an earlier run, so that none is taken for a part of this one.
     for (const ReproducedPaper& paper : papers) remove_file(out / paper.name / results_file);
     write_file(out / run_file, record.dump(1) + "\n");
   }

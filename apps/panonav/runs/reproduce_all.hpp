@@ -13,9 +13,9 @@ class Session;
                                                 const ReproduceArguments& arguments,
                                                 const std::filesystem::path& out, Session& session);
 
-/// Runs paper after paper, each in a folder of its own, and writes the table of all. With
-/// `continues` the papers that an earlier run of the same options and version has finished are
-/// read. Throws OptionError when the earlier run had others.
+/// Runs all papers, each in a folder of its own, and writes the table of all results. With
+/// `continues`, results of papers that an earlier run with the same options and version finished
+/// are read instead. Throws OptionError if the earlier run had other options.
 ExitCode reproduce_all(const ReproduceArguments& arguments, Session& session);
 
 }  // namespace panonav::command

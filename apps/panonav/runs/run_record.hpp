@@ -57,7 +57,7 @@ class RunRecord {
   [[nodiscard]] std::optional<ReferencePose> take_viewer_input() {
     return viewer_ ? viewer_->consume_viewer_input() : std::nullopt;
   }
-  /// All that waits is written, and viewers know that the run has ended.
+  /// Writes what is waiting and tells viewers that the run has ended.
   void close();
   [[nodiscard]] std::size_t left_out() const { return recorder_ ? recorder_->left_out() : 0; }
 

@@ -19,10 +19,10 @@ void add_component(recordings::RunMoment& moment, const TopologicalMap& map, std
 /// Shows a map while it grows: the connected component of the newest node.
 class GrowingMap {
  public:
-  /// The map as it is after the observation of this moment; `is_node`: which became a node. Nodes
-  /// and edges are told when a closure came or a twentieth of the nodes is new. The truth is moved
-  /// into the frame of the map, by the first node of the component; without a heading of it there
-  /// is none.
+  /// Adds the map after this observation to the moment; `is_node`: the observation became a node.
+  /// Nodes and edges are sent after a loop closure or when a twentieth of the nodes is new. The
+  /// truth is moved into the frame of the map by the first node of the component; without a heading
+  /// there is no truth.
   void add_to(recordings::RunMoment& moment, const TopologicalMap& map, bool is_node,
               const std::string& name);
   /// The finished map: its largest component.

@@ -20,7 +20,7 @@
 
 namespace panonav::command {
 
-/// One picture of a run and what the filter said after it.
+/// One image of a run and the filter's estimate after it.
 struct TrackedImage {
   std::size_t index = 0;  ///< in the data set, from 0
   std::string file;
@@ -57,8 +57,8 @@ struct TrackSettings {
   const MemoryFile* recorded = nullptr;
   /// Which references the views are compared with, for moments; null: with none.
   const ShownReferences* shown = nullptr;
-  /// Asked before each image: whether somebody has told the tracker where the robot is. Empty:
-  /// nobody can.
+  /// Called before each image: returns true if a viewer has set the robot's pose. Empty: no viewer
+  /// can.
   std::function<bool()> has_viewer_input;
 };
 
@@ -67,7 +67,7 @@ struct TrackSettings {
                                        const TrackSettings& settings,
                                        std::optional<recordings::RunMoment> moment);
 
-/// That a viewer has told where the robot is.
+/// Notes in the moment that a viewer has set the robot's pose.
 void note_viewer_pose(recordings::RunMoment& moment);
 
 /// Adds the image to the page that plays the run. Its moment must be there.

@@ -172,7 +172,7 @@ void check_posed(const RecordedViews& views, const std::string& name) {
   }
 }
 
-/// The view asked for, or the one nearest to the middle of all.
+/// Returns the requested view, or the one nearest to the middle of all.
 std::size_t choose_goal(const CatchmentArguments& arguments, const RecordedViews& goals) {
   if (arguments.goal) {
     const auto found = std::ranges::find(goals.files, *arguments.goal);

@@ -39,7 +39,7 @@ ExitCode convert(const ConvertArguments& arguments, Session& session) {
                      " does not end in .mcap; a folder is converted to a recording, and a "
                      "recording to a folder");
   }
-  // A recording does not say how its pictures lie.
+  // A recording does not state the layout of its images.
   PictureSource any{.kind = PictureKind::equirectangular};
   any.layout.elevations = ElevationBand{-1.0, 1.0};
   const Dataset dataset = open_recording(arguments.input, arguments.pictures,

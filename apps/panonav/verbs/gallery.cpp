@@ -58,7 +58,7 @@ Groups group_by_squares(const std::vector<ViewRecord>& views, const std::string&
   return groups;
 }
 
-/// By the folder in their names, by the component of the map, then by place.
+/// Groups views by the folder in their names, then by the component of the map, then by position.
 Groups group_views(const std::vector<ViewRecord>& views) {
   std::map<std::string, std::pair<std::vector<ViewRecord>, std::vector<ViewRecord>>> areas;
   const bool parts = std::ranges::any_of(views, [](const auto& v) { return v.component > 0U; });

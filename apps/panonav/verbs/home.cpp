@@ -63,7 +63,7 @@ std::string format_line(const HomeAnswer& answer, Session& session) {
          sure;
 }
 
-/// A picture beside a dataset.toml lies as that says.
+/// The layout of an image beside a dataset.toml is stated there.
 std::optional<PictureSource> source_of_folder(const std::string& picture) {
   const fs::path folder = fs::path(picture).parent_path();
   std::error_code ignored;
@@ -138,7 +138,7 @@ ExitCode home(const Arguments& declared, const HomeArguments& arguments, Session
   if (fs::is_directory(arguments.goal, ignored)) {
     throw FileError(arguments.goal, "is a folder; allowed: one image, or a view of --memory");
   }
-  // Either picture may be the one whose folder says how both lie.
+  // The folder of either image may state the layout of both.
   std::optional<PictureSource> known = source_of_folder(arguments.current);
   if (!known) known = source_of_folder(arguments.goal);
   const auto recording = open_recording(arguments.current, arguments.pictures, known, session);

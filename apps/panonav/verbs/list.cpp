@@ -29,7 +29,7 @@ ordered_json to_json(const ViewRecord& record) {
   return json;
 }
 
-/// A title and what it shows of a view; empty: nothing.
+/// A column's title and its text for a view; empty: nothing.
 struct Column {
   std::string title;
   std::string (*cell)(const ViewRecord&);

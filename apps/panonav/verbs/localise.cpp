@@ -43,8 +43,8 @@ void print_answer(const LocalisedQuery& query, const LocaliseArguments& argument
   }
 }
 
-/// Answers all images on all threads and prints the answers as they come. Images that cannot be
-/// read are named; throws where none can.
+/// Answers all images on all threads and prints the answers in order. Images that cannot be read
+/// are named; throws if none can.
 std::vector<LocalisedQuery> answer_all(const PlaceRecogniser& recogniser,
                                        const LocaliseArguments& arguments, const Dataset& recording,
                                        Session& session) {
@@ -67,7 +67,7 @@ std::vector<LocalisedQuery> answer_all(const PlaceRecogniser& recogniser,
           return {{entry.file, 0.0, {}, entry.pose, error.what()}, std::current_exception()};
         }
         const double turned_rad = turn_randomly(*observation, recogniser, arguments, i);
-        // Several images are called as they were typed.
+        // Several images are named as they were typed.
         const std::string name =
             arguments.inputs.size() > 1 ? entry.path.filename().string() : entry.file;
         Place place = recogniser.localise(*observation,
@@ -117,13 +117,13 @@ ExitCode localise(const Arguments& declared, const LocaliseArguments& arguments,
   }
   const auto file = MemoryFile::open(arguments.memory, Access::read_only);
   require_components(declared, arguments, file.header());
-  reject_live_input(declared, arguments.inputs.front(), true);
+  reject_live_options(declared, arguments.inputs.front(), true);
   if (arguments.report) prepare_report_folder(*arguments.report, "localise");
   require_stored_band(arguments.pictures, file);
   const Dataset recording = open_queries(arguments, file.header().source, session);
   PlaceRecogniserOptions options{.localiser = arguments.localiser, .source = recording.source};
   if (arguments.areas) options.areas = arguments.accuracy;
-  // A report shows all views of the memory, so that it is held whatever its size.
+  // A report shows all views of the memory, so the memory is loaded whatever its size.
   if (arguments.report) options.max_held_views = std::numeric_limits<std::size_t>::max();
   const PlaceRecogniser recogniser(arguments.memory, options);
   const auto answers = answer_all(recogniser, arguments, recording, session);

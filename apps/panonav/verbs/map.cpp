@@ -163,7 +163,7 @@ Mapper::Result map_recording(const Dataset& recording, Mapper& mapper, Session& 
   return mapper.map(recording, session.executor(), [&] { progress.advance(); });
 }
 
-/// As `map_recording`, and viewers see how it grows.
+/// Maps the recording as `map_recording` while viewers watch the map grow.
 Mapper::Result map_in_view(const MapArguments& arguments, const Dataset& recording, Mapper& mapper,
                            Session& session) {
   RunRecord record({.file = std::nullopt, .view = arguments.record.view},
@@ -251,8 +251,8 @@ void record_map(const MapArguments& arguments, const Dataset& recording, const M
   record.close();
 }
 
-/// Refuses what is typed and does nothing with this recording, and a height of the camera, also of
-/// a file, where lengths cannot be read from the ground.
+/// Rejects typed options that have no effect on this recording, and a camera height, also of a
+/// file, if lengths cannot be read from the ground.
 void reject_options_without_effect(const Arguments& declared, const MapArguments& arguments,
                                    const Dataset& recording, const MemoryHeader& header) {
   const auto has_odometry = [](const DatasetEntry& entry) { return entry.odometry.has_value(); };

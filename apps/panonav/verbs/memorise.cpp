@@ -40,8 +40,8 @@ void note_skipped(const std::string& file, const Error& error, std::vector<Skipp
   skipped.push_back({file, error.what()});
 }
 
-/// Appends what is missing; notes which recording it is of as soon as there is a file. Adds the
-/// pictures that cannot be read to `skipped`; with `strict` the first of them ends it.
+/// Appends missing images and notes the recording's name once there is a file. Images that cannot
+/// be read are added to `skipped`; with `strict` the first of them ends the run.
 void memorise_missing(const Dataset& missing, const Dataset& recording, bool strict,
                       Memoriser& memoriser, std::vector<Skipped>& skipped, Session& session) {
   bool noted = false;
@@ -127,7 +127,7 @@ void print_result(const MemoriseArguments& arguments, const MemoryFile& memory,
   session.suggest({"panonav", "localise", arguments.memory, "INPUT"});
 }
 
-/// Memorises pictures as they come until the source ends or the user interrupts.
+/// Memorises images of a live source until it ends or the user interrupts.
 ExitCode memorise_live(const Arguments& declared, const MemoriseArguments& arguments,
                        const std::optional<PictureSource>& remembered, Session& session) {
   const auto source =
@@ -152,7 +152,7 @@ ExitCode memorise_live(const Arguments& declared, const MemoriseArguments& argum
 ExitCode memorise(const Arguments& declared, const MemoriseArguments& arguments, Session& session) {
   const bool resumes = memory_exists(arguments.memory);
   const bool live = recordings::is_live(arguments.input);
-  if (!live) reject_live_input(declared, arguments.input, true);
+  if (!live) reject_live_options(declared, arguments.input, true);
   std::optional<PictureSource> remembered;
   if (resumes) {
     const auto memory = MemoryFile::open(arguments.memory, Access::read_write);

@@ -205,7 +205,7 @@ void write_log(const std::string& path, const simulation::MissionRun& run) {
   write_file(path, text);
 }
 
-/// Where the run begins, who is kidnapped to where.
+/// Returns the start of the run and the pose to which the robot is kidnapped.
 simulation::Mission make_mission(const NavigateArguments& arguments, ViewId goal,
                                  const simulation::MissionPlace& place, std::uint64_t seed) {
   constexpr std::uint64_t stream_of_starts = 4;
@@ -218,7 +218,7 @@ simulation::Mission make_mission(const NavigateArguments& arguments, ViewId goal
   return mission;
 }
 
-// Writes the log, the picture and the report that were asked for.
+// Writes the requested log, picture and report.
 void write_results(const NavigateArguments& arguments, const simulation::MissionPlace& place,
                    const simulation::RememberedPlace& remembered, ViewId goal,
                    const std::string& goal_file, const simulation::MissionRun& run,

@@ -47,7 +47,7 @@ void reject_options_without_effect(const Arguments& arguments, const std::string
   }
 }
 
-/// Prints for people what was kept, and what it costs.
+/// Prints how many views were kept and what the pruning costs.
 void print_loss(const PruneArguments& arguments, const SparseSelection::Loss& loss,
                 std::size_t before, std::size_t kept, double factor, std::size_t outdated,
                 const std::vector<std::string>& names, Session& session) {

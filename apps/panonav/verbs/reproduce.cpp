@@ -58,7 +58,7 @@ std::string format_defaults(const auto& option) {
   return " (default: " + join_texts(values) + ")";
 }
 
-/// Returns what an option means for the papers that have it, each with its default.
+/// Formats the meaning of an option for each paper that has it, with its default.
 std::string format_meanings(int lab::ReproductionOptions::*option,
                             std::initializer_list<std::pair<std::string, std::string>> of_papers) {
   std::string text;

@@ -24,7 +24,7 @@ struct ServeArguments {
   LocaliserOptions localiser;
 };
 
-/// "office=/data/monday.panonav", or a file that gives its own name.
+/// Parses "office=/data/monday.panonav", or a file whose name becomes the memory's.
 server::ServedMemory parse_served_memory(const std::string& text) {
   const std::size_t equals = text.find('=');
   const bool named = equals != std::string::npos && text.find('/') > equals;

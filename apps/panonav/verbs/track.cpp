@@ -184,7 +184,7 @@ ExitCode to_exit_code(const TrackSummary& summary) {
   return summary.localised > 0 ? ExitCode::done : ExitCode::no_answer;
 }
 
-/// A viewer has told where the robot is; false where none did.
+/// Restarts the tracker at the pose that a viewer has set; false if none did.
 bool start_at_viewer_pose(Tracker& tracker, RunRecord& record) {
   // A finger on a map, and an arrow beside it.
   constexpr double deviation_m = 0.3;
@@ -219,7 +219,8 @@ class LiveTrack {
     settings_ = {.recorded = &file, .shown = shown_ ? &*shown_ : nullptr};
   }
 
-  /// Moves by what the image shows and looks at every N-th one; returns the line that is printed.
+  /// Moves the tracker by the image's motion and localises every N-th image; returns the line to
+  /// print.
   std::string observe(const Observation& observation, std::optional<double> decoding_ms) {
     const std::size_t number = count_++;
     const ViewEncoder& encoder = tracker_.encoder();
@@ -324,7 +325,7 @@ ExitCode track_run(const Arguments& declared, const TrackArguments& arguments, S
   check_arguments(declared, arguments);
   const auto file = MemoryFile::open(arguments.memory, Access::read_only);
   if (recordings::is_live(arguments.dataset)) return track_live(declared, arguments, file, session);
-  reject_live_input(declared, arguments.dataset, true);
+  reject_live_options(declared, arguments.dataset, true);
   Dataset run = read_run(arguments.dataset, arguments.topics, arguments.part, file, session);
   const bool visual = odometry_poses(run).empty();
   std::vector<double> seconds;

@@ -34,13 +34,13 @@ constexpr double min_turn_deg = 10.0;
 /// the overlap of the lenses serves, and so more directions are searched.
 constexpr int coarse_directions = 250, coarse_directions_of_one = 1000;
 constexpr int fine_directions = 2000, fine_directions_of_one = 6000;
-/// Patches with contrast that the last fit needs, and the share of them that must be found again:
-/// chance alone finds some 0.1.
+/// Smallest number of patches with contrast that the last fit needs, and the share of them that
+/// must be found again: chance alone finds some 0.1.
 constexpr int min_textured = 100;
 constexpr double min_inlier_share = 0.3;
 /// Largest deviation of an azimuth that is accepted: a column of a panorama of 360.
 constexpr double max_azimuth_deviation_deg = 1.0;
-/// No correlation is better than this everywhere, in pixels: grids and smoothing.
+/// Smallest deviation of a correlation, in pixels: grids and smoothing allow no better one.
 constexpr double correlation_error_px = 0.05;
 
 /// Returns the standard deviations of the parameters before anything is matched: how cameras are
@@ -165,7 +165,7 @@ State Calibrator::make_initial_state(double field_of_view_rad) const {
 }
 
 std::optional<std::string> Calibrator::fit_fields_of_view() {
-  // The field of view decides how far apart the lenses' pictures lie.
+  // The field of view decides the distance between the images of both lenses.
   std::vector<double> fields_deg(fields_of_view_deg.begin(), fields_of_view_deg.end());
   if (known_.field_of_view_rad) fields_deg = {degrees(*known_.field_of_view_rad)};
   const int directions = grey_.size() == 1 ? coarse_directions_of_one : coarse_directions;

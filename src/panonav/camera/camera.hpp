@@ -29,7 +29,7 @@ struct EquirectangularModel {
   friend bool operator==(const EquirectangularModel&, const EquirectangularModel&) = default;
 };
 
-/// One of the projection models, each defined in its own header; the only list of them.
+/// One of the projection models, each defined in its own header. This is the only list of them.
 using CameraModel = std::variant<HyperboloidalModel, PolynomialModel, UnifiedModel,
                                  EquiangularModel, EquirectangularModel, DualFisheyeModel>;
 
@@ -43,7 +43,7 @@ enum class ColumnDirection {
 /// together. The axis of a mirror is vertical. Invariant checked by `validate(const Camera&)`; the
 /// functions below expect a valid camera.
 struct Camera {
-  /// Where a direction is seen, and how much it counts there in a blended picture.
+  /// A pixel that sees a direction, and its weight in a blended panorama.
   struct WeightedPixel {
     PixelPoint pixel;     ///< where the direction is seen
     double weight = 1.0;  ///< shares of the lenses that see a direction; they add up to 1
@@ -92,8 +92,8 @@ void validate(const Camera& camera);
 [[nodiscard]] inline int lens_count(const Camera& camera) {
   return std::holds_alternative<DualFisheyeModel>(camera.model) ? 2 : 1;
 }
-/// Index of the lens of a dual fisheye camera in whose half of the picture a point lies; 0 of any
-/// other camera.
+/// Returns the index of the lens of a dual fisheye camera in whose half of the image a point is; 0
+/// for any other camera.
 [[nodiscard]] inline int lens_at(const Camera& camera, PixelPoint pixel) {
   return lens_count(camera) == 2 && pixel.u_px >= 0.5 * camera.image_size.width ? 1 : 0;
 }

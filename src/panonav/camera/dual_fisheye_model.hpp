@@ -52,13 +52,14 @@ struct FisheyeLens {
   friend bool operator==(const FisheyeLens&, const FisheyeLens&) = default;
 };
 
-/// Two fisheye lenses back to back whose circles lie side by side in one picture, as 360 degree
-/// cameras deliver it live: lens 0 in the left half, lens 1 in the right one. Together they see
-/// all directions when each sees more than half of them.
+/// Two fisheye lenses back to back whose circles are side by side in one image, as 360 degree
+/// cameras deliver it live: lens 0 in the left half, lens 1 in the right one. Together they see all
+/// directions if each sees more than half of them.
 struct DualFisheyeModel {
   std::array<FisheyeLens, 2> lenses;  ///< in the order of their halves of the picture
-  /// Each lens's viewpoint lies half of this before the middle of the camera, along its own axis.
-  /// Simulated pictures have this parallax; projection takes everything as far away.
+  /// Distance between the viewpoints of both lenses; each is half of it in front of the middle of
+  /// the camera, along its own axis. Simulated images have this parallax; projection takes
+  /// everything as far away.
   double baseline_m = 0.0;
   friend bool operator==(const DualFisheyeModel&, const DualFisheyeModel&) = default;
 };
@@ -78,9 +79,10 @@ void validate(const DualFisheyeModel& model);
 [[nodiscard]] std::optional<Direction3> unproject(const FisheyeLens& lens, double right_px,
                                                   double up_px);
 
-/// The share of the first lens in the blended picture of a direction that both see, by how far it
-/// lies within either field of view: 1/2 on the seam, where both are the same, 1 and 0 from a
-/// quarter of the overlap before its borders on. Continuous, and 1 less the share of the second.
+/// Returns the share of the first lens in the blended image of a direction that both see, by its
+/// distance from the borders of both fields of view: 1/2 on the seam, where both are equal, 1 and 0
+/// from a quarter of the overlap before its borders on. Continuous; the share of the second lens is
+/// 1 less it.
 [[nodiscard]] double blend_share(double margin_rad, double other_margin_rad);
 
 }  // namespace panonav

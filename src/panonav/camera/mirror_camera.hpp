@@ -13,7 +13,7 @@ struct MirrorKnowledge {
   /// Any but EquirectangularModel. When the mirror's shape is unknown: EquiangularModel with the
   /// elevations seen at the inner radius and at the rim.
   CameraModel model;
-  /// Overrides what was found; for when nothing was found.
+  /// Overrides the found value; needed if nothing was found.
   std::optional<double> inner_radius_px = std::nullopt;
   ColumnDirection direction = ColumnDirection::clockwise;  ///< see Camera
   double forward_angle_rad = 0.0;                          ///< see Camera
@@ -29,14 +29,14 @@ struct MirrorKnowledge {
 /// elevation and radius_px > 0.
 [[nodiscard]] HyperboloidalModel fit_focal_length(HyperboloidalModel model, double radius_px,
                                                   double elevation_rad);
-/// The same for a unified model. Throws as above.
+/// Fits the focal length of a unified model likewise. Throws as above.
 [[nodiscard]] UnifiedModel fit_focal_length(UnifiedModel model, double radius_px,
                                             double elevation_rad);
 
-/// Draws what was found on a colour copy of the image: the rim in green, the inner radius in orange
-/// (where found), the centre as a red cross, and from inner radius to rim a yellow line in the
-/// robot's forward direction where it is given (image angle, counter-clockwise as shown, from +u).
-/// Throws ContractError when the image's size is not the mirror's.
+/// Draws the mirror on a colour copy of the image: the rim in green, the inner radius in orange (if
+/// found), the centre as a red cross, and a yellow line from inner radius to rim in the robot's
+/// forward direction if it is given (image angle, counter-clockwise as shown, from +u). Throws
+/// ContractError if the image's size is not the mirror's.
 [[nodiscard]] Image draw_mirror(ImageView image, const MirrorCircle& mirror,
                                 std::optional<double> forward_angle_rad = std::nullopt);
 

@@ -33,8 +33,8 @@ double bisect(std::span<const double> coefficients, double low, double high) {
   return 0.5 * (low + high);
 }
 
-/// Where the polynomial changes its sign within (low, high), ascending. Between two neighbouring
-/// extrema it is monotonic, so the sign changes of the derivative bracket all of them.
+/// Returns where the polynomial changes its sign within (low, high), ascending. It is monotonic
+/// between two neighbouring extrema, so the sign changes of the derivative bracket all of them.
 std::vector<double> sign_changes(std::span<const double> coefficients, double low, double high) {
   if (coefficients.size() < 2) return {};
   std::vector<double> borders = sign_changes(derivative(coefficients), low, high);

@@ -72,7 +72,7 @@ std::string mask(std::string_view address, bool is_whole) {
     hide(colon + 1, at);
   } else if (is_whole && colon != std::string_view::npos &&
              !address.substr(scheme + 3).starts_with('[')) {
-    // No port: a password whose host was forgotten.
+    // Without a port the text is a password whose host was forgotten.
     const std::size_t end = std::min(address.find_first_of("/?#,", colon), address.size());
     const std::string_view port = address.substr(colon + 1, end - colon - 1);
     if (port.find_first_not_of("0123456789") != std::string_view::npos) hide(colon + 1, end);

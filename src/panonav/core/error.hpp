@@ -20,7 +20,7 @@ class ContractError : public Error {
   using Error::Error;
   /// Message "`field` is `value`; allowed: `allowed`".
   ContractError(std::string_view field, std::string_view value, std::string_view allowed);
-  /// The same, with the value as `to_text` writes it.
+  /// Message with the value as `to_text` writes it.
   ContractError(std::string_view field, double value, std::string_view allowed);
 };
 

@@ -50,7 +50,7 @@ class Image {
   [[nodiscard]] ImageSize size() const noexcept { return {width_, height_}; }
   /// All width * height * channels bytes, row-major without gaps, channels interleaved.
   [[nodiscard]] std::span<const std::uint8_t> pixels() const& noexcept { return pixels_; }
-  /// The same, to be written.
+  /// Returns the pixels for writing.
   [[nodiscard]] std::span<std::uint8_t> pixels() & noexcept { return pixels_; }
   std::span<const std::uint8_t> pixels() const&& = delete;  // would dangle
   /// Returns a view of the pixels; valid as long as the image lives and is not assigned to.
@@ -62,7 +62,7 @@ class Image {
   [[nodiscard]] std::uint8_t at(int u, int v, int channel = 0) const noexcept {
     return pixels_[offset(u, v, channel)];
   }
-  /// The same, to be written.
+  /// Returns a pixel's channel for writing.
   [[nodiscard]] std::uint8_t& at(int u, int v, int channel = 0) noexcept {
     return pixels_[offset(u, v, channel)];
   }

@@ -18,11 +18,11 @@ namespace panonav {
 [[nodiscard]] std::string to_fixed_text(double value, int digits);
 /// Writes a number as "%.<significant>g" does.
 [[nodiscard]] std::string to_general_text(double value, int significant);
-/// Writes a whole number with digits 0 to f, at least `digits` of them.
+/// Writes a number in hexadecimal digits, padded with zeros to `digits`.
 [[nodiscard]] std::string to_hex_digits(std::uint64_t value, std::size_t digits = 1);
 
-/// Reads what `to_hex_text` wrote, to the bit. False, and `value` as before, unless the whole text
-/// is one such number.
+/// Reads the output of `to_hex_text`, to the bit. False, and `value` unchanged, unless the whole
+/// text is one such number.
 [[nodiscard]] bool read_hex_number(std::string_view text, double& value);
 
 /// Reads a number in decimal digits, or a whole number of another `base`, 2 .. 36. False, and

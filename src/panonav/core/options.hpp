@@ -41,9 +41,9 @@ class OptionVisitor {
   virtual ~OptionVisitor() = default;
   /// An int. A visitor may change `value`; it checks `info`'s range itself.
   virtual void visit(const OptionInfo& info, int& value) = 0;
-  /// The same for a double, in the unit in which the member's name ends.
+  /// Visits a double, in the unit in which the member's name ends.
   virtual void visit(const OptionInfo& info, double& value) = 0;
-  /// The same for a bool, which has no range.
+  /// Visits a bool, which has no range.
   virtual void visit(const OptionInfo& info, bool& value) = 0;
   /// `value` is an index into `choices`.
   virtual void visit(const OptionInfo& info, std::span<const std::string_view> choices,

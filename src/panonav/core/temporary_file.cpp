@@ -31,8 +31,8 @@ int create_exclusively(const fs::path& path) {
   return ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
 }
 
-// The lock is held by nobody else, and the file still has the name: a process that is done gives
-// its file another one before it unlocks it.
+// True if nobody else holds the lock and the file still has the name: a finished process renames
+// its file before it unlocks it.
 bool lock_if_current(int descriptor, const fs::path& path) {
   struct stat file {};
   struct stat named {};
@@ -81,7 +81,7 @@ TemporaryFile::TemporaryFile(const fs::path& target) {
     descriptor_ = create_exclusively(path_);
   }
   if (descriptor_ >= 0 && lock_if_current(descriptor_, path_)) return;
-  // In use, or on a file system without locks.
+  // The name is in use, or the file system has no locks.
   if (descriptor_ >= 0) ::close(descriptor_);
   path_ = target.parent_path() / (stem + random_digits() + ".tmp");
   descriptor_ = create_exclusively(path_);

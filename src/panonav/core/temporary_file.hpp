@@ -25,7 +25,7 @@ class TemporaryFile {
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
   /// Open for reading and writing, at the beginning.
   [[nodiscard]] int descriptor() const noexcept { return descriptor_; }
-  /// Leaves the file in place, as after it has got its own name.
+  /// Keeps the file, as after it was renamed.
   void keep() noexcept { kept_ = true; }
 
  private:

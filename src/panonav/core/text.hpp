@@ -29,9 +29,9 @@ namespace panonav {
 /// break, is empty or has a blank at an end.
 [[nodiscard]] std::string to_csv_field(std::string_view text);
 
-/// The same for a table that people open as a sheet: a text that a sheet would compute as a formula
-/// (it begins with =, +, -, @ or a tab) has an apostrophe in front. No reader of ours takes it
-/// away.
+/// Escapes a field for a table that people open in a spreadsheet: a text that it would compute as a
+/// formula (beginning with =, +, -, @ or a tab) gets an apostrophe in front. Readers of panonav do
+/// not remove it.
 [[nodiscard]] std::string to_sheet_field(std::string_view text);
 
 /// Leaves out the middle ("...") of valid UTF-8 where it has more than `max_characters` (>= 8).

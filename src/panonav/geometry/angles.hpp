@@ -9,7 +9,7 @@ namespace panonav {
 
 /// Wraps any angle to [-pi, pi). NaN and infinities give NaN.
 [[nodiscard]] double wrap_angle_far(double angle_rad);
-/// Wraps an angle to [-pi, pi), fast where it lies there already. NaN and infinities give NaN.
+/// Wraps an angle to [-pi, pi); fast for angles already within. NaN and infinities give NaN.
 [[nodiscard]] inline double wrap_angle(double angle_rad) {
   // Most angles are already there, and the remainder is slow.
   if (angle_rad >= -std::numbers::pi && angle_rad < std::numbers::pi) return angle_rad;

@@ -17,11 +17,12 @@ namespace panonav {
 [[nodiscard]] constexpr double cauchy_weight(double squared) noexcept {
   return 1.0 / (1.0 + squared);
 }
-/// The same by the loss of Geman and McClure: what is far beyond the scale counts for nothing.
+/// Returns the weight of the loss of Geman and McClure: residuals far beyond the scale have almost
+/// none.
 [[nodiscard]] constexpr double geman_mcclure_weight(double squared) noexcept {
   return 1.0 / ((1.0 + squared) * (1.0 + squared));
 }
-/// The same by Tukey's loss: 0 beyond the scale.
+/// Returns the weight of Tukey's loss: 0 beyond the scale.
 [[nodiscard]] constexpr double tukey_weight(double squared) noexcept {
   return squared < 1.0 ? (1.0 - squared) * (1.0 - squared) : 0.0;
 }
@@ -56,7 +57,7 @@ struct DenseEquations {
   }
 };
 
-/// The same for many unknowns of which few share a residual.
+/// Normal equations of many unknowns of which few share a residual.
 class SparseEquations {
  public:
   /// Sets all to zero, for this number of unknowns.
@@ -70,7 +71,7 @@ class SparseEquations {
   }
   /// Entry of the right side.
   [[nodiscard]] double& right(int unknown) { return right_[unknown]; }
-  /// Makes the matrix of what was added.
+  /// Builds the matrix from the added entries.
   void assemble() {
     const Eigen::Index size = right_.size();
     Matrix made(size, size);

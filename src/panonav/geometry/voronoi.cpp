@@ -61,7 +61,7 @@ Circle make_circle_through(Point2 a, Point2 b, Point2 c) {
     best = {centre, std::max({distance(centre, a), distance(centre, b), distance(centre, c)})};
   }
   if (std::isfinite(best.radius_m)) return best;
-  // On one line two of the three span the circle.
+  // If the three are on one line, two of them span the circle.
   for (const Circle& pair :
        {make_circle_through(a, b), make_circle_through(a, c), make_circle_through(b, c)}) {
     if (is_inside(pair, a) && is_inside(pair, b) && is_inside(pair, c)) return pair;
@@ -208,7 +208,7 @@ std::vector<Point2> VoronoiCells::cell(std::size_t site) const {
   require(site < sites_.size(), "site", static_cast<double>(site),
           "0 .. " + to_text(static_cast<double>(sites_.size()) - 1.0));
   if (spacing_m_ == 0.0) return {};
-  // No site farther than twice the half-diagonal of the square cuts it.
+  // Sites farther than twice the half-diagonal of the square cannot cut it.
   const double reach_m = spacing_m_ * std::sqrt(2.0);
   const Point2 here = sites_[site];
   std::vector<std::pair<double, Point2>> near;  // distance and offset of the other sites

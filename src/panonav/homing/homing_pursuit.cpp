@@ -104,7 +104,7 @@ HomingPursuit::Decision HomingPursuit::decide(const HomingView& view) {
     const HomeVector vector = home_vector(home_, current, options);
     decision.vector = vector;
     decision.stage = stage_;
-    // In a constant frame: that of the robot at home.
+    // Vectors are in the constant frame of the robot at home.
     const double direction_in_home_rad = vector.direction_rad() - vector.heading_rad;
     if (direction_in_home_rad_) {
       const bool is_opposing = std::cos(direction_in_home_rad - *direction_in_home_rad_) < 0.0;

@@ -36,11 +36,11 @@ struct HomingSurvey {
 
   std::vector<Pose2> goals;   ///< where the home views were taken
   std::vector<Pose2> places;  ///< where the current views were taken, and where runs may be
-  /// For each goal the number of the place to which the step from each place leads; the place
-  /// itself where the run stops.
+  /// For each goal and place, the number of the place to which the step leads; the place itself
+  /// where the run stops.
   std::vector<std::uint32_t> next;
-  /// For each goal and place the cosine between home vector and true direction of the goal, 0 for a
-  /// vector of length 0; NaN where place and goal are the same.
+  /// For each goal and place, the cosine between home vector and true direction of the goal; 0 for
+  /// a vector of length 0, NaN where place and goal are the same.
   std::vector<float> homeward;
 
   /// The part of `next` for one goal: a number for each place.

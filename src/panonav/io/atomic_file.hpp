@@ -15,7 +15,7 @@ namespace panonav {
 /// regular file (a pipe, /dev/stdout) is written to directly. Throws FileError; whatever was at
 /// `path` is then still there.
 void write_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
-/// The same with the bytes of a text, as it is: no line end is added.
+/// Writes the bytes of a text; no line end is added.
 void write_file(const std::filesystem::path& path, std::string_view text);
 
 /// All bytes of a file. Throws FileError when it cannot be read or is larger than `limit_bytes`.

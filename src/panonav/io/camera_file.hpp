@@ -14,7 +14,8 @@ struct CameraFile {
   std::optional<Image> mask;  ///< grey, of the camera's size; 0 where the robot itself is seen
 };
 
-/// Throws FileError with one line that names the field, the value and what is allowed.
+/// Reads a camera file. Throws FileError with one line that names the field, the value and the
+/// allowed values.
 [[nodiscard]] CameraFile read_camera(const std::filesystem::path& path);
 
 /// Writes the file whole or not at all; a mask goes beside it as NAME_mask.png. Throws FileError,

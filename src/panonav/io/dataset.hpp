@@ -23,7 +23,7 @@ class PictureStore {
   /// Reads the picture of this number. Several threads may call at a time; in ascending order it
   /// costs least. Throws FileError.
   [[nodiscard]] virtual Image read(std::size_t index) const = 0;
-  /// Returns the JPEG or PNG that holds it, as it was recorded; nullopt where there is none.
+  /// Returns the recorded JPEG or PNG; nullopt if there is none.
   [[nodiscard]] virtual std::optional<std::vector<std::uint8_t>> encoded(
       std::size_t /*index*/) const {
     return std::nullopt;
@@ -34,7 +34,7 @@ class PictureStore {
 struct DatasetEntry {
   std::string file;            ///< as the data set names it, relative to its folder; unique
   std::filesystem::path path;  ///< where it lies: its own file, or that of all pictures
-  /// When it was taken, in seconds on the recording's clock.
+  /// Time of the image, in seconds on the recording's clock.
   std::optional<double> stamp_s;
   std::optional<ReferencePose> pose;  ///< in the world frame
   std::optional<Pose2> odometry;      ///< in the odometry frame
@@ -45,7 +45,7 @@ struct DatasetEntry {
   friend bool operator==(const DatasetEntry&, const DatasetEntry&) = default;
 };
 
-/// Reads the picture from its own file or from its store. Throws FileError.
+/// Reads the image from its own file or from its store. Throws FileError.
 [[nodiscard]] Image read_picture(const DatasetEntry& entry);
 /// Reads the picture as a JPEG or PNG: the bytes of its own file, or those of its store; else a new
 /// PNG.
@@ -103,15 +103,16 @@ void select_pictures(Dataset& dataset, const Dataset::Selection& selection);
 /// ("view_9" before "view_10"). Throws FileError when there is none.
 [[nodiscard]] Dataset read_picture_folder(const std::filesystem::path& folder,
                                           PictureSource source);
-/// The same with the pictures of all folders within ("morning/view_1"); links are not followed.
+/// Reads a folder with the images of all folders within ("morning/view_1"); links are not followed.
 [[nodiscard]] Dataset read_picture_tree(const std::filesystem::path& folder, PictureSource source);
 
 /// Makes a data set of one picture.
 [[nodiscard]] Dataset read_single_picture(const std::filesystem::path& file, PictureSource source);
 
-/// Returns what all entries have, of which there must be one or more.
+/// Returns the fields that all entries have; at least one entry.
 [[nodiscard]] Dataset::Fields find_shared_fields(const Dataset& dataset);
-/// Drops what only some of the entries have, so that `write_dataset` takes them. Returns the rest.
+/// Drops fields that only some entries have, so that `write_dataset` accepts them. Returns the
+/// remaining ones.
 Dataset::Fields drop_partial_fields(Dataset& dataset);
 
 /// Writes dataset.toml, the table (poses.csv, or images.csv when no position is known) and, for

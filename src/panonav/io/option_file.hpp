@@ -33,7 +33,7 @@ class OptionFile {
   /// with one line that names file, section, field, value and what is allowed: an unknown field, a
   /// wrong type, a value out of range.
   void apply(std::string_view section, const std::function<void(OptionVisitor&)>& visit);
-  /// The same for a struct of options: the members that its table shows.
+  /// Applies a section to a struct of options: the members in its table.
   template <class Options>
   requires requires(Options& options, OptionVisitor& visitor) { visit_options(options, visitor); }
   void apply(std::string_view section, Options& options) {

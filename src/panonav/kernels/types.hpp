@@ -80,8 +80,7 @@ struct DistanceKernels {
 /// Views that `cell_bounds` compares together.
 inline constexpr size_t cell_block = 64;
 
-/// Sizes of what `match_columns` compares.
-/// Columns of the query.
+/// Sizes that `match_columns` compares: columns of the query.
 inline constexpr int matched_query_columns = 32;
 /// Columns of the reference; also the number of turns.
 inline constexpr int matched_reference_columns = 128;
@@ -114,7 +113,7 @@ struct MatchedBearings {
 
 /// Directions of motion of which the opposite ones are tried as well.
 inline constexpr int motion_axes = 16;
-/// Axes of motion that are tried, and when one of them explains a matched bearing.
+/// Candidate axes of motion, and the condition under which one explains a matched bearing.
 struct MotionHypotheses {
   float cosine[motion_axes],  ///< of each axis, along x, forward at angle 0
       sine[motion_axes];      ///< of each axis, along y

@@ -114,7 +114,8 @@ std::vector<PositionBounds> join_overlapping(std::vector<PositionBounds> boxes) 
   return boxes;
 }
 
-// Returns where the references lie that may support one of the matches (`NeighbourSupport`).
+// Returns rectangles around the references that may support one of the matches
+// (`NeighbourSupport`).
 std::vector<PositionBounds> bound_supporters(const VisualMemory& memory,
                                              std::span<const RankedMatch> ranked,
                                              double spacing_m) {
@@ -158,7 +159,7 @@ void visit_options(LocaliserOptions& options, OptionVisitor& visitor) {
   table.visit(options, visitor);
 }
 
-/// The views that queries are compared with, and what is kept of them for comparing.
+/// The views that queries are compared with, and the data derived from them.
 struct Localiser::ComparedViews {
   ComparedViews(const VisualMemory& memory_, const LocaliserOptions& options,
                 std::optional<double> spacing_m, std::size_t views)
@@ -240,8 +241,8 @@ class Localiser::Query {
                   .rank(view_, found.matches, mask_.allowed_rows);
   }
 
-  /// Loads the views that the answer needs of a memory that is not held: the candidates, references
-  /// that may support them, and those of chance.
+  /// Loads the views that the answer needs from a memory that is not held: the candidates,
+  /// references that may support them, and those of chance.
   void load_compared_views() {
     if (compared_ != nullptr) return;
     std::vector<ViewId> views = to_ids(ranked_);

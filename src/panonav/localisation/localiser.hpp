@@ -27,8 +27,8 @@ class Localiser {
   Localiser(const VisualMemory& memory, const PlaceModel& place_model,
             const PositionModel& position_model, const LocaliserOptions& options = {},
             std::optional<double> spacing_m = std::nullopt);
-  /// For a memory that is not held, with models learnt before. `drawn`: the views that
-  /// `sample_reference_views` draws from it. Throws as above.
+  /// Uses a memory that is not held, with models learnt before. `drawn`: the views that
+  /// `sample_reference_views` returns for it. Throws as above.
   Localiser(std::shared_ptr<const VisualMemory> drawn, const PlaceModel& place_model,
             const PositionModel& position_model, const LocaliserOptions& options, double spacing_m);
 

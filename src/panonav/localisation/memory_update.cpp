@@ -143,8 +143,7 @@ void MemoryUpdate::decide(std::size_t index) {
       unlike.push_back(view);
     }
   }
-  // Where nothing explains the view, something may stand before the camera: no reference has
-  // failed.
+  // If nothing explains the view, something may be in front of the camera: no reference has failed.
   if (is_explained) failed_.insert(unlike.begin(), unlike.end());
   const auto own = image.witness();
   const bool is_sure = own && distance(own->pose.position(), pose->position()) <= half_spacing_m;

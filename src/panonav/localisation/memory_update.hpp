@@ -95,7 +95,7 @@ class MemoryUpdate {
   void add(AnsweredView view);
   /// True if the image may still be added to the memory: it waits for a decision or was chosen.
   [[nodiscard]] bool can_become_view(std::size_t number) const;
-  /// True if the last image lies within the reach of a sure answer before it, so that it may become
+  /// True if the last image is within reach of a certain answer before it, so that it may become
   /// certain.
   [[nodiscard]] bool is_near_known_place() const;
   /// Decides the remaining images. Nothing may be added afterwards.

@@ -58,8 +58,8 @@ constexpr double log_ratio_per_margin = 4.0;
 /// Smallest distance between the two that counts; keeps the margin finite where they coincide.
 constexpr double min_margin_unit = 0.05;
 
-/// Smallest exponent of a view's likelihood, however near it was taken to the one before, so that a
-/// robot that stands still can be localised.
+/// Smallest exponent of a view's likelihood, however close it is to the view before, so that a
+/// standing robot can be localised.
 constexpr double min_view_exponent = 0.05;
 
 // When the robot is localised (docs/decisions.md, "Localised means").
@@ -143,8 +143,8 @@ struct MonteCarloLocaliser::Implementation {
     return latest;
   }
 
-  /// Views from nearly the same place are alike, also in what misleads: a view counts as far as it
-  /// is new.
+  /// Views from nearly the same place share their errors: a view is weighted by how independent it
+  /// is of the last one.
   [[nodiscard]] double correlation_with_last_view() const {
     return std::exp(-travelled_m / model.range_m);
   }
@@ -243,7 +243,7 @@ struct MonteCarloLocaliser::Implementation {
     if (options.injection == MonteCarloOptions::Injection::explained) {
       evidence = std::max(evidence, latest.log_there + std::log(p_kidnap));
     }
-    // Where nothing is known yet, a view like one of the memory's is evidence for being inside.
+    // Before anything is known, a view like one of the memory's is evidence for being inside.
     if (latest.difference_anywhere) {
       const double unit =
           std::max(min_margin_unit, model.far_difference - model.explained_difference);

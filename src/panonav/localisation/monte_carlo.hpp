@@ -68,8 +68,9 @@ struct MonteCarloEstimate {
   double log_here = 0.0;
   double log_there = 0.0;  ///< the same anywhere in the memory (only with `Injection::explained`)
   double inside = 0.0;  ///< belief that the robot is in the memorised area, 0 .. 1; lost below 0.5
-  /// That the robot is at the heaviest mode: `inside` times the mode's weight. Of estimates with
-  /// 0.9 and more inside the memorised area, more than nine of ten are right (docs/decisions.md).
+  /// Probability that the robot is at the heaviest mode: `inside` times the mode's weight. Of
+  /// estimates with 0.9 and more inside the memorised area, more than nine of ten are right
+  /// (docs/decisions.md).
   double probability = 0.0;
   std::uint64_t views_compared = 0;  ///< column by column
 };

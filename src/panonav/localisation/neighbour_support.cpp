@@ -18,7 +18,7 @@ namespace {
 constexpr std::size_t max_neighbours = 8;
 /// Views that explain a query together: the corners of a grid's square.
 constexpr std::size_t counted_views = 4;
-/// Spacings within which neighbours lie: more than the diagonal of a grid's square.
+/// Radius of the neighbourhood in spacings: more than the diagonal of a grid's square.
 constexpr double radius_spacings = 1.5;
 /// Largest ratio of an examined match's score to that of the best: places that look alike differ by
 /// less (tests/localisation/neighbour_support_test.cpp).

@@ -20,7 +20,7 @@ class NeighbourSupport {
   explicit NeighbourSupport(const ColumnRanking& ranking,
                             std::optional<double> spacing_m = std::nullopt);
 
-  /// Radius within which neighbours lie, for this spacing of a memory.
+  /// Returns the radius of the neighbourhood for this spacing of a memory.
   [[nodiscard]] static double radius_m(double spacing_m) noexcept;
   /// Matches that `rank_by_support` examines, at most.
   static constexpr std::size_t max_examined = 30;

@@ -37,8 +37,8 @@ constexpr double adjacent_site_spacings = 1.5;
 /// common, at longer ones the fitted four spacings show no fall.
 constexpr double min_range_spacings = 0.4;
 constexpr double max_range_spacings = 20.0;
-/// Largest log-likelihood of a typical view at its own place: beyond it no view is placed better,
-/// and one odd view would outweigh all others.
+/// Largest log-likelihood of a typical view at its own place: a higher one would place no view
+/// better, and one wrong view would outweigh all others.
 constexpr double max_log_likelihood = 50.0;
 /// Smallest width of headings: three steps of the columns, by which a neighbouring view may be off.
 constexpr double min_heading_width_rad = 3.0 * 2.0 * std::numbers::pi / ColumnProfiles::columns;
@@ -127,7 +127,7 @@ double fit_range(std::span<const std::pair<double, double>> distance_and_similar
     product -= counts[b] * distance_m * std::log(similarities[b] / (counts[b] * far * far));
     square += counts[b] * distance_m * distance_m;
   }
-  // No view resembles its neighbours: the range is at most the smallest one.
+  // If no view resembles its neighbours, the range is at most the smallest one.
   if (!(square > 0.0)) return min_range_spacings * spacing_m;
   if (!(product > 0.0)) return max_range_spacings * spacing_m;
   return std::clamp(square / product, min_range_spacings * spacing_m,
@@ -219,7 +219,7 @@ class LearningSample {
         far.push_back(left_out_[i].match(c).difference);
       }
     }
-    // In a smaller memory that of places that have nothing in common.
+    // A smaller memory has no far views; this is the difference of places with nothing in common.
     return far.empty() ? PlaceModel::unrelated_difference : quantile(far, 0.5);
   }
 
@@ -251,7 +251,7 @@ class LearningSample {
                                              min_heading_width_rad);
   }
 
-  /// Returns the squared similarity that each view left out explains at its own place and at the
+  /// Returns the squared similarity that each left-out view explains at its own place and at the
   /// candidates.
   std::vector<Explained> explain(const ObservationModel& model) {
     near_.resize(sites_.size());

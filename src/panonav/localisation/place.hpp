@@ -28,11 +28,11 @@ struct PlaceEvidence {
   /// stands in view or has moved changes the other half.
   double difference = 1.0;
   double of_all_columns = 1.0;  ///< the smallest over all columns
-  /// As `difference`, of the tenth best match: many views of an unknown place fit equally badly.
+  /// Difference of the tenth best match: many views of an unknown place fit equally badly.
   double tenth = 1.0;
-  /// As `difference`, of the mirrored query and views drawn from the memory: mean less 1.28
-  /// standard deviations, below which one of ten lies if they are Gaussian. The query's own
-  /// brightness, edges and textures reach this by chance in this memory.
+  /// Difference that chance reaches: mean less 1.28 standard deviations of the mirrored query to
+  /// sampled views; one of ten would be below if they are Gaussian. It measures what the query's
+  /// brightness, edges and textures reach in this memory without being from it.
   double chance = 1.0;
   int views = 0;                                    ///< of which the best was chosen
   int components = 0;                               ///< of the memory

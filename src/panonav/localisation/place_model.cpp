@@ -23,7 +23,7 @@ PackedSignature mirror(PackedSignature signature) {
   return signature;
 }
 
-// Returns the nearest view taken elsewhere: a robot that stands still takes the same view again.
+// Returns the nearest view taken at another position: a standing robot takes the same view again.
 std::optional<ViewId> find_nearest_in_space(const VisualMemory& memory, ViewId view) {
   const auto& pose = memory.info(view).pose;
   if (!pose) return std::nullopt;
@@ -52,8 +52,8 @@ constexpr std::size_t examined_matches = 16;
 /// Standard deviations of a Gaussian between its mean and its first decile.
 constexpr double decile_deviations = 1.2816;
 
-// Returns the difference over the better half of the columns, at the rotation at which all of them
-// fit best.
+// Returns the mean difference over the better half of the columns, at the rotation at which all
+// columns fit best.
 double better_half_difference(const ColumnProfiles& query, const ColumnProfiles& reference,
                               double heading_rad) {
   auto columns = column_distances_near(query, reference, heading_rad);
@@ -71,7 +71,7 @@ double tenth_smallest(std::vector<double> differences) {
 }
 
 double log_odds_by_columns(const PlaceEvidence& evidence) {
-  // By `bench/place_probability` (docs/decisions.md), in the order of `column_terms`.
+  // Learnt by `bench/place_probability` (docs/decisions.md), in the order of `column_terms`.
   constexpr std::array<double, column_term_count> learnt{-1.58, -16.46, -9.30, -0.60, -6.43, 0.91};
   const auto features = column_terms(evidence);
   return std::inner_product(learnt.begin(), learnt.end(), features.begin(), 0.0);
@@ -173,7 +173,7 @@ double place_probability(const PlaceEvidence& evidence) noexcept {
   if (evidence.views < 1 || !(evidence.chance > 0.0)) return 0.0;
   const double by_columns = 1.0 / (1.0 + std::exp(-log_odds_by_columns(evidence)));
   if (!evidence.features || !is_inconclusive(evidence)) return by_columns;
-  // By `bench/place_probability` (docs/decisions.md), in the order of `feature_terms`.
+  // Learnt by `bench/place_probability` (docs/decisions.md), in the order of `feature_terms`.
   constexpr std::array<double, feature_term_count> learnt{-2.99, 0.23, 3.10, 1.53};
   const PlaceEvidence::Features& found = *evidence.features;
   if (learnt[0] + learnt[2] * log_ratio(found.seen, found.chance) <= 0.0) return by_columns;
@@ -300,7 +300,7 @@ std::optional<PlaceEvidence::Features> PlaceCriterion::feature_evidence(
     found.verified = std::max(found.verified, verified);
     candidates.push_back(std::move(*there));
   }
-  // Without another view there are no neighbours.
+  // A memory of one view has no neighbours.
   if (candidates.size() < 2) found.neighbour = found.verified;
   for (std::size_t i = 0; i < std::min(candidates.size(), feature_views + 1); ++i) {
     if (i == best) continue;

@@ -35,8 +35,8 @@ struct PlaceModel {
   double neighbouring = 0.0;  ///< median difference of a view to the most similar one of all others
   double arbitrary = 0.0;     ///< median difference between two views
   double mirrored = 0.0;      ///< median difference of a mirrored view to the most similar one
-  /// Nine of ten views differ by no more from the one taken nearest to them; nullopt where fewer
-  /// than `min_views` of the sampled views have a position.
+  /// Difference that nine of ten views have at most to the nearest one; nullopt if fewer than
+  /// `min_views` of the sampled views have a position.
   std::optional<double> beside;
   friend bool operator==(const PlaceModel&, const PlaceModel&) = default;
 };
@@ -91,11 +91,11 @@ inline constexpr int feature_term_count = 4;
 /// the memory count, however many the search compares.
 class PlaceCriterion {
  public:
-  /// Keeps the column profiles of 80 views drawn from the memory, each by its own number, so that a
-  /// view more or less keeps the others. The ranking must outlive *this. `views`: size of the
-  /// memory of which the ranking's is a part that has these 80 views; 0: it is the whole.
+  /// Keeps the column profiles of 80 views sampled from the memory, each by its own number, so that
+  /// adding or removing a view keeps the others. The ranking must outlive *this. `views`: size of
+  /// the whole memory if the ranking's is a part with these 80 views; 0: it is the whole.
   explicit PlaceCriterion(const ColumnRanking& ranking, std::size_t views = 0);
-  /// For a memory that is not held whole: loads the drawn views, and no others later.
+  /// Uses a memory that is not held: loads the sampled views, and no others later.
   explicit PlaceCriterion(const ViewSource& source);
 
   /// Compares the query with the 16 of `matches` that differ least, which the search over the

@@ -22,8 +22,8 @@ namespace {
 /// for signatures that change linearly with the position but has no unique solution.
 constexpr std::array<double, 6> neighbourhoods = {1.6, 2.3, 3.2, 4.5, 6.5, 9.0};
 constexpr std::array<double, 3> exponents = {1.0, 1.25, 1.5};
-/// Share of the true positions that lie within the radius; of the rest, half may lie in a place
-/// that only looks alike.
+/// Share of the true positions that are within the radius; of the rest, half may be at another
+/// place that looks alike.
 constexpr double coverage = 0.95;
 constexpr double max_wrong_share = 0.5 * (1.0 - coverage);
 /// Matches searched for a view left out: its doubles at up to 48 places can be removed.
@@ -36,8 +36,8 @@ constexpr double min_difference_unit = 1e-4;
 /// Views that were left out of the memory in turn, and the views that resemble them there.
 struct LeftOutViews {
   std::vector<Point2> truths;
-  /// All that the search finds, doubles included, which matter most where there are few views: the
-  /// interpolation is learnt from them.
+  /// Matches of the search, duplicates of the place included: the interpolation is learnt from
+  /// them, and they matter most if there are few views.
   std::vector<ResemblingViews> found;
   /// The views of an answer: the radius is learnt from them.
   std::vector<ResemblingViews> answered;
@@ -51,7 +51,7 @@ struct LeftOutViews {
   }
 };
 
-// Returns the best match of each place except the one at `truth`, where the view was taken.
+// Returns the best match of each place except that of the view itself, at `truth`.
 std::vector<ViewId> find_doubles(const VisualMemory& memory, Point2 truth,
                                  std::span<const RankedMatch> ranked, double spacing_m) {
   std::vector<Point2> places{truth};
@@ -88,7 +88,7 @@ void leave_out(const ColumnRanking& ranking, const NeighbourSupport& support, Vi
     std::erase_if(ranked, [&](const RankedMatch& match) { return match.match.view == other; });
   }
   support.rank_by_support(ranking.profiles(view), ranked, excluded);
-  // As in an answer, the nearest view must have a pose.
+  // The nearest view must have a pose, as in an answer.
   const auto begins_posed = [&](std::span<const RankedMatch> matches) {
     return !matches.empty() && memory.info(matches[0].match.view).pose;
   };
@@ -193,7 +193,7 @@ bool learn_radii(const LeftOutViews& left_out, const InterpolationErrors& errors
     (is_surrounded(left_out.answered[i], model.spacing_m) ? surrounded : at_edge)
         .push_back(all.back());
   }
-  // Where none is near, every answer is ambiguous.
+  // If none is near, every answer is ambiguous.
   if (all.empty() && model.ambiguous_from) all.push_back(0.0);
   if (all.empty()) return false;
   // Returns the quantile of a sample of n that a further draw stays below with at least this

@@ -30,7 +30,7 @@ struct PositionModel {
   /// Radius that holds 95 % over the kriging deviation, where similar references surround the
   /// nearest one: they leave no half of a circle free around it.
   double radius_m_per_deviation = 0.0;
-  /// The same elsewhere: the place may lie beyond the outermost references.
+  /// Radius beyond the references: the place may be outside of the outermost ones.
   double edge_radius_m_per_deviation = 0.0;
   double spacing_m = 0.0;  ///< of the posed views
   /// From this ratio on, of the best match's difference to that of the best match elsewhere (more

@@ -17,7 +17,7 @@ struct LearningOptions {
 };
 void visit_options(LearningOptions& options, OptionVisitor& visitor);
 
-/// Returns all of `views` when there are at most `count`, else `count` of them drawn without
+/// Returns all of `views` if there are at most `count`, else `count` of them sampled without
 /// repetition; in ascending order.
 [[nodiscard]] std::vector<ViewId> sample_views(std::span<const ViewId> views, int count,
                                                std::uint64_t seed);

@@ -17,7 +17,7 @@ constexpr std::size_t max_latest = 15;
 constexpr std::size_t min_latest = 3;
 /// Starts of the first steps, times the length by the default scale: octaves around it.
 constexpr std::array<double, 4> first_guesses{0.5, 1.0, 2.0, 4.0};
-/// Largest standard deviation of a length that counts, as a share of it.
+/// Largest standard deviation of a length that is used, as a share of it.
 constexpr double max_relative_deviation = 0.2;
 /// Largest factor between a length and the one by the latest steps, either way.
 constexpr double max_relative_change = 2.0;

@@ -85,7 +85,7 @@ class Graph {
         final_scale_(options.doubt_deviations * options.doubt_deviations),
         weights_(edges.size(), 1.0),
         fixed_(choose_fixed_nodes(nodes.size(), edges, fixed)) {
-    // In the first steps every edge has full weight.
+    // Every edge has full weight in the first steps.
     const bool doubtful = std::ranges::any_of(edges, &PoseEdge::doubtful);
     scale_ = doubtful ? std::numeric_limits<double>::infinity() : final_scale_;
   }

@@ -17,9 +17,9 @@ namespace {
 /// Standard deviation of a match in metres and radians: the default of `PoseEdge`.
 constexpr double match_position_deviation_m = 0.1;
 constexpr double match_heading_deviation_rad = 0.05;
-/// Standard deviations of the motion between two nodes of an optimised map, for each metre of it
-/// (m/m, rad/m) and for one of length 0: a quarter and a half of those of a single step
-/// (`MappingOptions`), as the steps and closures around have corrected it.
+/// Standard deviations of the motion between two nodes of an optimised map, for each metre (m/m,
+/// rad/m) and for length 0: a quarter and a half of those of a single step (`MappingOptions`), as
+/// the steps and closures around have corrected it.
 constexpr double edge_deviation = 0.02;
 constexpr double edge_turn_deviation = 0.01;
 constexpr double shape_position_deviation_m = 0.005;

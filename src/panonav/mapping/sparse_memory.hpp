@@ -18,8 +18,8 @@ struct SparseMemoryOptions {
   /// Largest distance of the kept view where positions are known: far places may look alike.
   double reach_m = 1.0;
   int reach_links = 10;  ///< links between them, at most, where positions are not known
-  /// A view is outdated when a newer one was taken within this distance, however it looks: it shows
-  /// what has changed since. 0: no view is.
+  /// A view is outdated if a newer one was taken within this distance, however it looks, as the
+  /// newer one shows what has changed. 0: none is.
   double outdated_within_m = 0.0;
 };
 void visit_options(SparseMemoryOptions& options, OptionVisitor& visitor);

@@ -33,8 +33,8 @@ struct TopologicalMap {
 };
 
 /// Throws ContractError unless nodes ascend by view, their components have numbers below the number
-/// of nodes, edges join two different nodes of the map, all poses are finite and weights lie in
-/// 0 .. 1.
+/// of nodes, edges join two different nodes of the map, all poses are finite and weights are 0 ..
+/// 1.
 void validate(const TopologicalMap& map);
 
 /// Numbers the connected components from 0 without gaps, in their order.

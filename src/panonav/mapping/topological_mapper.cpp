@@ -22,7 +22,8 @@ constexpr double min_heading_deviation_rad = 0.003;
 /// residuals shorten the displacement between views. And that without a residual.
 constexpr double closure_deviation = 1.0;
 constexpr double closure_position_deviation_m = 0.02;
-/// The same of its heading: in radians for each metre between the views, and at one place.
+/// Standard deviations of the heading by a closure: in radians for each metre between the views,
+/// and for views at one place.
 constexpr double closure_turn_deviation = 0.05;
 constexpr double closure_heading_deviation_rad = 0.01;
 /// Latest steps with wheels by which scale and error of the views are learnt, as both change from

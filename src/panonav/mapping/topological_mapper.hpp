@@ -20,8 +20,9 @@ struct MappingOptions {
   /// capture by threshold, as in F11's second set. 0 keeps every view.
   double capture_difference = 0.0;
   bool close_loops = true;  ///< search for places passed before
-  /// Assumed length of a step that neither views nor wheels give, straight ahead and as uncertain
-  /// as it is long: for recordings whose images are far apart. 0: a new connected component begins.
+  /// Assumed length of a step that neither views nor wheels give, straight ahead and with a
+  /// standard deviation of its own length: for recordings whose images are far apart. 0: a new
+  /// connected component begins.
   double bridge_m = 0.0;
   /// Steps come from the wheels where these are known: length and direction are theirs, and the
   /// turn is the mean of theirs and that of the views, weighted by their variances. The error of
@@ -30,7 +31,7 @@ struct MappingOptions {
   bool wheels = true;
   /// Standard deviation of the position after a step read from views, for each metre of it.
   double step_deviation = 0.08;
-  /// The same of the heading (rad).
+  /// Standard deviation of the heading after a step (rad).
   double turn_deviation = 0.02;
 };
 void visit_options(MappingOptions& options, OptionVisitor& visitor);

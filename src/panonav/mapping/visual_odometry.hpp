@@ -34,7 +34,8 @@ struct VisualOdometryOptions {
   /// Height of the camera above level ground; with it `VisualOdometry` and maps read lengths from
   /// the ground, in metres (`GroundLengths`). 0: not known.
   double camera_height_m = 0.0;
-  /// For `published`: components compared for the distance (k1) and for the turn (k2); 0 takes all.
+  /// Numbers of components that `published` compares for the distance (k1) and for the rotation
+  /// (k2); 0: all.
   int distance_components = 0;
   int turn_components = 0;  ///< for the turn
   /// Refinements of the solution of `home_vector`.

@@ -36,12 +36,12 @@ class ViewIndex {
   [[nodiscard]] virtual VisualMemory load(std::span<const ViewId> views) = 0;
   /// Returns the view of that name; empty when there is none.
   [[nodiscard]] virtual std::optional<ViewId> find(std::string_view name) = 0;
-  /// Returns the views whose positions lie within one of the rectangles, ascending, each once.
+  /// Returns the views with positions within one of the rectangles, ascending, each once.
   [[nodiscard]] virtual std::vector<ViewId> views_within(
       std::span<const PositionBounds> bounds) = 0;
 };
 
-/// The index of a memory that is held, which must outlive it.
+/// Searches a memory that is held, which must outlive it.
 class HeldViewIndex final : public ViewIndex {
  public:
   /// Keeps a reference to the memory; copies nothing.
@@ -59,7 +59,7 @@ class HeldViewIndex final : public ViewIndex {
   const VisualMemory* memory_;
 };
 
-/// Counts the exact searches in a memory that is not held.
+/// Counters of the exact searches in a memory that is not held.
 struct SearchCounters {
   std::uint64_t searches = 0;    ///< a picture needs one or two
   std::uint64_t views_read = 0;  ///< views that searches read in full
@@ -75,8 +75,8 @@ class IndexedMemory {
   [[nodiscard]] virtual std::vector<ViewId> views() const = 0;  ///< Ascending. Cost: a pass.
   [[nodiscard]] virtual std::uint64_t bytes() const = 0;        ///< That the index takes.
   [[nodiscard]] virtual SearchCounters counters() const = 0;    ///< Since the index was made.
-  /// Returns the views as they are now; what others change meanwhile is not seen. *this must
-  /// outlive it. Throws FileError when the memory cannot be reached; the next call may reach it.
+  /// Returns a snapshot of the views; later changes do not show in it. *this must outlive it.
+  /// Throws FileError if the memory cannot be reached; the next call may reach it.
   [[nodiscard]] virtual std::unique_ptr<ViewIndex> index() const = 0;
   /// Updates the index to the views that came and went since; searches continue meanwhile. Returns
   /// whether anything changed. Throws FileError; then the index stays, and the next call compares

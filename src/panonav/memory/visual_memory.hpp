@@ -116,7 +116,7 @@ class VisualMemory {
   ViewId append(const FourierSignature& signature, ReferenceInfo info);
   /// Appends under this id, which must be larger than all before, as readers of files do.
   void append_with_id(ViewId id, const PackedSignature& signature, ReferenceInfo info);
-  /// Also drops the links of the view. Throws ContractError when there is no such view.
+  /// Removes a view and its links. Throws ContractError if there is no such view.
   void remove(ViewId view);
 
   /// Ascending.

@@ -9,7 +9,7 @@ namespace panonav {
 
 /// Length of the polyline through the positions; 0 for fewer than two.
 [[nodiscard]] double path_length_m(std::span<const Pose2> path);
-/// The same for positions alone.
+/// Returns the length of a path of positions.
 [[nodiscard]] double path_length_m(std::span<const Point2> path);
 
 /// Adds headings along the path to positions, for a robot that drove forwards through them. Each

@@ -28,7 +28,7 @@ Pose2 apply_alignment(const Alignment& ground_truth_from_estimate, const Pose2& 
           wrap_angle(heading_rad + ground_truth_from_estimate.rotation_rad)};
 }
 
-/// Compares each pose with the first one that lies `distance_m` farther along the true path.
+/// Compares each pose with the first one that is `distance_m` farther along the true path.
 void compute_relative_errors(const std::vector<Pair>& pairs, double distance_m,
                              TrajectoryError& error) {
   std::vector<double> travelled_m{0.0};

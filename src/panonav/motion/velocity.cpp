@@ -37,7 +37,8 @@ Velocity compute_command_towards(double direction_rad, double distance_m,
   const double angle = wrap_angle(direction_rad);
   const double turn = std::clamp(angle / options.period_s, -options.turn_rad_s, options.turn_rad_s);
   if (std::abs(angle) > options.on_spot_rad) return {0.0, 0.0, turn};
-  // No faster than the turn can follow: the arc to the point has the curvature 2 sin(angle) / d.
+  // Limits the speed to what the rotation allows: the arc to the point has the curvature 2
+  // sin(angle) / d.
   const double arc =
       0.5 * options.turn_rad_s * distance_m / std::max(std::abs(std::sin(angle)), 1e-9);
   const double forward = std::min(speed * std::cos(angle), arc);

@@ -6,7 +6,7 @@
 
 namespace panonav {
 
-/// Speeds of a robot in its own frame: x forward, y left, turning counter-clockwise.
+/// Velocity of a robot in its own frame: x forward, y left, rotation counter-clockwise.
 struct Velocity {
   double forward_m_s = 0.0;  ///< along the heading, below 0 backwards
   double left_m_s = 0.0;     ///< 0 for a differential drive

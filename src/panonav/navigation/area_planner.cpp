@@ -88,7 +88,7 @@ std::optional<std::size_t> AreaPlanner::find_end_beyond(std::size_t area,
   return static_cast<std::size_t>(found - nodes.begin());
 }
 
-// Chooses the gate that lies farthest from those chosen before, one after the other.
+// Chooses gates one after the other, each the farthest from those chosen before.
 void AreaPlanner::choose_gates(Border& border) const {
   std::vector<std::size_t> open;
   for (const std::size_t gate : border.edges) {

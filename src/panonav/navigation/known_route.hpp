@@ -22,16 +22,15 @@ struct KnownRouteOptions {
 };
 void visit_options(KnownRouteOptions& options, OptionVisitor& visitor);
 
-/// A recorded route together with the references of the memory that lie on it, so that plans over
-/// the memory may follow it. Made by `make_known_route`; a copy costs as much as one of the
-/// tracker.
+/// A recorded route and the references of the memory along it, so that plans over the memory can
+/// follow it. Made by `make_known_route`; a copy costs as much as one of the tracker.
 struct KnownRoute {
   /// A reference view and its pose in the route's frame.
   struct View {
     ViewId view;  ///< an id of the memory
     Pose2 pose;   ///< in the route's frame
   };
-  /// A view that lies on the route.
+  /// A view along the route.
   struct Reference {
     ViewId view;                  ///< an id of the memory
     std::vector<double> along_m;  ///< distances along the route at which it passes, ascending

@@ -33,8 +33,8 @@ constexpr double max_position_error = 0.4;
 /// several views, each with an error, is a tenth below the spacing, so this means two spacings:
 /// views of a square grid have others at 1.41 and 2.
 constexpr double max_spacings = 2.3;
-/// The same of springs that a torn arrangement rejected although they are right: as short as those
-/// to nearest views are, and confirmed by this number of third views.
+/// Limits for springs that a distorted arrangement rejected although they are right: as short as
+/// those to nearest views, and confirmed by this number of third views.
 constexpr double max_spacings_of_rejected = 1.5;
 constexpr int min_support_of_rejected = 3;
 /// Share of their neighbours that the ends of an edge have in common. On an open square grid with
@@ -196,7 +196,7 @@ NavigationGraph graph_from_lattice(const Lattice& lattice, double min_weight) {
   for (const Lattice::Spring& spring : lattice.springs) {
     const Lattice::Node& a = lattice.nodes.at(spring.a);
     const Lattice::Node& b = lattice.nodes.at(spring.b);
-    // Without phases the arrangement has no headings, and so no directions.
+    // An arrangement without phases has no headings, and so no directions.
     springs.push_back({{spring.a, spring.b},
                        spring.phases ? to_motion(*spring.phases) : std::nullopt,
                        distance(a.pose.position(), b.pose.position()),

@@ -92,7 +92,7 @@ NavigationGraph::NavigationGraph(std::vector<ViewId> views,
   std::partial_sum(begins_.begin(), begins_.end(), begins_.begin());
   exits_.resize(begins_.back());
   std::vector<std::size_t> next(begins_.begin(), begins_.end() - 1);
-  // In this order the exits of a node to lower nodes come before those to higher ones.
+  // This order puts the exits of a node to lower nodes before those to higher ones.
   for (const Ends& e : ends) {
     exits_[next[e.high]++] = {e.low, edges_.size()};
     edges_.push_back(edges[e.edge]);
@@ -169,7 +169,7 @@ namespace {
 std::vector<EdgeEnds> find_near_pairs(const TopologicalMap& map, double reach) {
   std::set<std::pair<ViewId, ViewId>> known;
   for (const TopologicalMap::Edge& edge : map.edges) known.insert(std::minmax(edge.a, edge.b));
-  // In the order of x, so that nodes too far along it need not be visited.
+  // Sorted by x, so that nodes too far along it need not be visited.
   std::vector<std::size_t> order(map.nodes.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::ranges::stable_sort(order, {}, [&](std::size_t i) { return map.nodes[i].pose.x_m; });

@@ -86,11 +86,11 @@ inline constexpr double max_disagreement_rad = 0.78539816339744831;
 /// as `validate`.
 [[nodiscard]] NavigationGraph graph_from_map(const TopologicalMap& map, double min_weight = 0.1);
 
-/// As `graph_from_map`, with edges between nodes of one component that lie side by side in the map,
-/// up to one and a half of the median length of its edges, when their views are as similar as those
-/// of most edges and agree on a direction: a robot that passes a place for the second time
-/// continues as it did the first time. The memory must hold the map's views. Cost: a home vector
-/// and a half for each such pair.
+/// Like `graph_from_map`, with edges also between nodes of one component that are near each other
+/// in the map, up to one and a half of the median length of its edges, if their views are as
+/// similar as those of most edges and agree on a direction: a robot that passes a place for the
+/// second time can continue as it did the first time. The memory must hold the map's views. Cost: a
+/// home vector and a half for each such pair.
 [[nodiscard]] NavigationGraph graph_from_map_and_neighbours(const TopologicalMap& map,
                                                             const VisualMemory& memory,
                                                             Executor& executor,

@@ -129,7 +129,7 @@ void Navigator::Core::home_to_goal(Step& step) {
     HomingPursuitOptions pursuit = options.homing;
     pursuit.max_step_m = std::min(pursuit.max_step_m, options.step_m);
     pursuit.arrived_difference = arrival.max_difference;
-    // Well inside, as the vector has an error of its own.
+    // Keeps a margin for the error of the vector.
     pursuit.stop_length = 0.25 * arrival.max_length;
     homing.emplace(goal->view, pursuit);
     step.add_event(NavigationDecision::Event::homing);
@@ -244,11 +244,11 @@ void Navigator::Core::follow_field(Step& step) {
   const std::size_t from = plan.committed ? plan.committed->from : *place.node;
   const Guide ahead = plan.committed ? plan.committed->guide : guide();
   std::optional<double> direction = direction_along_edge(from, ahead, step);
-  // Where no view shows a direction, the robot continues in that of the step before.
+  // If no view shows a direction, the robot continues in that of the step before.
   if (!direction) direction = obstruction.is_present ? 0.0 : step.last_direction_rad.value_or(0.0);
   double detour = detour_rad();
   if (obstruction.is_present && place.doubt.unknown_steps > 0 && step.last_direction_rad) {
-    // The robot backs away from what hides the place, to recognise it.
+    // Backs away from the obstacle that hides the place, to recognise it.
     direction = step.last_direction_rad;
     detour = std::numbers::pi;
   }
@@ -311,7 +311,7 @@ void Navigator::Core::decide(Step& step) {
   if (state == NavigationDecision::State::moving && !guide().is_reachable() &&
       !relocalise_with_path(step)) {
     unblock_edges_or_end(step, NavigationDecision::State::unreachable);
-    // Nothing was blocked that could be unblocked.
+    // No edge is blocked that could be unblocked.
     if (!guide().is_reachable()) state = NavigationDecision::State::unreachable;
   }
   update_probability(step);

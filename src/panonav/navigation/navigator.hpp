@@ -106,7 +106,8 @@ struct NavigationDecision {
 };
 /// "moving", "arrived", "blocked", "lost", "unreachable".
 [[nodiscard]] std::string_view name_of(NavigationDecision::State state);
-/// In lower case with underscores, as logs and JSON have it: "relocalised", "entered_area", ...
+/// Returns the event in lower case with underscores, as in logs and JSON: "relocalised",
+/// "entered_area", ...
 [[nodiscard]] std::string_view name_of(NavigationDecision::Event event);
 /// Returns one line for a log.
 [[nodiscard]] std::string describe(const NavigationDecision& decision);
@@ -150,7 +151,8 @@ class Navigator {
 
   /// The planner with its graph, its areas and the edges blocked now.
   [[nodiscard]] const AreaPlanner& planner() const noexcept;
-  /// Number of views held: of an area and its surroundings, and prefetched ones of the next.
+  /// Returns the number of loaded views: of an area and its surroundings, and prefetched ones of
+  /// the next area.
   [[nodiscard]] std::size_t loaded_views() const noexcept;
 
  private:

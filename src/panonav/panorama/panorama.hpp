@@ -38,7 +38,7 @@ class Panorama {
 
   /// All rows * columns values, row after row.
   [[nodiscard]] std::span<const float> values() const& noexcept { return values_; }
-  /// The same, to be written; the caller keeps them finite.
+  /// Returns the values for writing; the caller keeps them finite.
   [[nodiscard]] std::span<float> values() & noexcept { return values_; }
   std::span<const float> values() const&& = delete;  // would dangle
   /// Row y, all azimuths. The caller guarantees 0 <= y < rows.
@@ -50,7 +50,7 @@ class Panorama {
   [[nodiscard]] float at(int y, int column) const noexcept {
     return values_[static_cast<std::size_t>(y) * columns_ + column];
   }
-  /// The same, to be written.
+  /// Returns a value for writing.
   [[nodiscard]] float& at(int y, int column) noexcept {
     return values_[static_cast<std::size_t>(y) * columns_ + column];
   }

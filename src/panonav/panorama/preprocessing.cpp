@@ -12,7 +12,7 @@ namespace panonav {
 
 namespace {
 
-/// Sums are taken row by row in double precision, so that a turn changes them by rounding only.
+/// Sums row by row in double precision, so that a rotation changes them by rounding only.
 struct Moments {
   double mean = 0.0;
   double deviation = 0.0;

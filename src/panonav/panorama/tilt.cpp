@@ -13,7 +13,7 @@ namespace panonav {
 
 namespace {
 
-/// Where a direction of the level robot lies in the tilted one's panorama, in rows and columns;
+/// Position of a direction of the level robot in the tilted one's panorama, in rows and columns;
 /// columns as the difference to its own, which changes slowly.
 struct Shift {
   float row = 0.0F;

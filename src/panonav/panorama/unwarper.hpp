@@ -58,24 +58,22 @@ class Unwarper {
   /// Elevations of its panoramas: the band of the options, or all that the camera sees at every
   /// azimuth.
   [[nodiscard]] const ElevationBand& elevations() const noexcept { return elevations_; }
-  /// False where the value is taken from a neighbour, because the camera does not see that
-  /// direction.
+  /// False if the camera does not see that direction, so that the value is copied from a neighbour.
   [[nodiscard]] bool is_visible(int row, int column) const noexcept;
 
   /// Throws ContractError unless the image has the camera's size; colour becomes grey.
   [[nodiscard]] Panorama unwrap(ImageView image) const;
-  /// The same with buffers of the caller, which spare their allocation from the second image on.
+  /// Unwraps with buffers of the caller, which saves their allocation from the second image on.
   [[nodiscard]] Panorama unwrap(ImageView image, Workspace& workspace) const;
 
-  /// The same values, handed over in blocks of `rows_per_block` rows (the last may be smaller) from
-  /// the top while they are in the cache: take(first row, values of whole rows). Throws as
-  /// `unwrap`.
+  /// Passes the same values in blocks of `rows_per_block` rows (the last may be smaller) from the
+  /// top while they are in the cache: take(first row, values of whole rows). Throws as `unwrap`.
   void unwrap_blocks(ImageView image, Workspace& workspace,
                      const std::function<void(int, std::span<const float>)>& take) const;
 
  private:
   void require_camera_size(ImageView image) const;
-  /// Halves and pairs what the table needs.
+  /// Halves the image and pairs its rows as the table needs.
   void halve_and_pair(ImageView image, Workspace& workspace) const;
   void compute_row(std::span<const std::uint16_t> pairs, int row, std::span<float> values) const;
 

@@ -20,7 +20,7 @@ int check_components(const SignatureShape& shape, int requested) {
   return requested;
 }
 
-/// That view alone.
+/// Loads that view alone.
 VisualMemory load_goal_view(const MemoryFile& memory, const std::string& goal) {
   const ViewId view = find_view_by_name_or_id(memory, goal);
   return memory.load({&view, 1});

@@ -38,10 +38,10 @@ class HomingEncoder {
   /// Throws ContractError (FileError where the observation has a file) on a picture that is too
   /// small for the components or covered by the masks; else as `ViewEncoder::panorama`.
   [[nodiscard]] Panorama panorama(const Observation& observation) const;
-  /// Returns what homing compares of a panorama that `panorama` made.
+  /// Returns the homing view of a panorama that `panorama` made.
   [[nodiscard]] HomingView view(const Panorama& panorama) const;
-  /// The same of an existing signature: all of its rows or the horizon alone, as the encoder was
-  /// made.
+  /// Returns the homing view of an existing signature: all of its rows or the horizon alone, as the
+  /// encoder was made.
   [[nodiscard]] HomingView view(const FourierSignature& signature) const;
 
  private:

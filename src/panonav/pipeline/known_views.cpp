@@ -19,8 +19,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Returns a text that changes with every change of a name, a pose, a file's size or time, or of
-/// how the pictures lie.
+/// Returns a text that changes with a name, a pose, a file's size or time, or the layout of the
+/// images.
 std::string compute_fingerprint(const Dataset& recording, const MemoryFile& memory) {
   RecordBytes bytes;
   MemoryHeader read_as = memory.header();

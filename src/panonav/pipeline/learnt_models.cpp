@@ -17,7 +17,7 @@ namespace panonav {
 namespace {
 
 constexpr const char* parameter_name = "learnt models";
-/// Counts up when what is learnt changes, so that models of an older version are not used.
+/// Version of the learning, raised when its results change, so that older models are not used.
 constexpr std::string_view learning_version = "4";
 
 // The members of each model in the order in which they are kept.
@@ -63,7 +63,7 @@ class Writer {
   mutable std::string text_;
 };
 
-/// Fails for good at the first word that is not what was written.
+/// Reads models word by word; fails from the first wrong word on.
 class Reader {
  public:
   explicit Reader(const std::string& text) : words_(split_words(text)) {}

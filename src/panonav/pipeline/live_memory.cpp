@@ -97,7 +97,7 @@ class Storer {
   std::thread thread_;
 };
 
-/// The same moment with its panorama, which is that of a level robot.
+/// Returns the observation with its levelled panorama in place of the image.
 Observation with_panorama(const Observation& observation, Panorama panorama) {
   Observation same(std::move(panorama));
   same.name = observation.name;
@@ -143,8 +143,8 @@ struct LiveMemory::Implementation {
     return std::make_unique<PlaceRecogniser>(path, recogniser_options);
   }
 
-  /// Learns from all views when a quarter of them is new, and then uses models that were learnt
-  /// concurrently.
+  /// Learns from all views on another thread if a quarter of them is new, and uses models learnt
+  /// before until they are ready.
   void refresh() {
     constexpr std::size_t min_new = 16;
     const std::size_t views = recogniser ? recogniser->size() : 0;
@@ -193,7 +193,7 @@ LiveMemory::Answer LiveMemory::answer(const Observation& observation) {
   Answer answer;
   self.panorama.reset();
   if (self.recogniser) {
-    // Unwrapped once, for the answer and for what is learnt.
+    // Unwraps once, for the answer and for learning.
     const auto before = std::chrono::steady_clock::now();
     self.panorama = self.recogniser->encoder().panorama(observation);
     answer.unwrapping = std::chrono::steady_clock::now() - before;

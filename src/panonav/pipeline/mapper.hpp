@@ -28,11 +28,11 @@ struct MapperOptions {
   bool thumbnails = true;          ///< keep small pictures of the views
 };
 
-/// Makes a map of observations in the order in which they were taken: the views that become nodes
-/// are appended to a memory file, and the map is stored there as "map". Views that the file knows
-/// by name are not appended again; their ids must ascend in the order of the observations. What was
-/// appended stays, whatever happens later. `docs/equations.md` and `TopologicalMapper` have the
-/// method. One thread at a time, except `encode`.
+/// Maps observations in the order in which they were taken: views that become nodes are appended to
+/// a memory file, and the map is stored there as "map". Views that the file knows by name are not
+/// appended again; their ids must ascend in the order of the observations. Appended views stay,
+/// whatever happens later. `docs/equations.md` and `TopologicalMapper` describe the method. One
+/// thread at a time, except `encode`.
 class Mapper {
  public:
   /// Result of mapping.

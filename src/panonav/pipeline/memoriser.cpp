@@ -114,7 +114,7 @@ void Memoriser::add(std::vector<Observation> observations, Executor& executor) {
   if (waiting_.size() >= scale_views) make_file(executor);
 }
 
-// Where one of the first does not fit, those of the most frequent size decide.
+// If one of the first images has another size, the most frequent size decides.
 MemoryHeader Memoriser::header_of_waiting(Executor& executor) const {
   const auto first = std::span(waiting_).first(std::min(scale_views, waiting_.size()));
   const auto header_of = [&](std::span<const Observation> some) {

@@ -69,7 +69,7 @@ class Memoriser {
   /// refused one are stored.
   void add(std::vector<Observation> observations, Executor& executor);
 
-  /// Numbers of observations by what became of them.
+  /// Numbers of observations by their outcome.
   struct Counts {
     std::size_t appended = 0;      ///< views that the file got
     std::size_t known_before = 0;  ///< observations whose views were there

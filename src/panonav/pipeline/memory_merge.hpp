@@ -28,7 +28,7 @@ struct MergedMemory {
 /// and the second loses its positions.
 ///
 /// A view with the same name and picture in both is stored once, as in the first; other used names
-/// of the second become "STEM/NAME", after its file. `memory` appears whole or not at all.
+/// of the second become "STEM/NAME". `memory` appears whole or not at all.
 /// `advance` is called for each view written.
 ///
 /// Throws FileError: unreadable or unwritable files, something at `memory`, positions without

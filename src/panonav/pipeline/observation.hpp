@@ -46,8 +46,8 @@ struct Observation {
   std::optional<Tilt> tilt;
 };
 
-/// Returns what `make()` returns. Where the picture was read from a file, a ContractError becomes a
-/// FileError that names it.
+/// Returns `make()`. If the image was read from a file, a ContractError becomes a FileError that
+/// names it.
 template <class Make>
 auto rethrow_with_file_name(const Observation& observation, const Make& make) {
   try {

@@ -21,7 +21,7 @@ namespace panonav {
 /// are those of the path: the tangent fitted to the positions within 0.3 m of path to either side.
 /// Empty without positions.
 [[nodiscard]] std::vector<Pose2> dataset_poses(const Dataset& dataset);
-/// Returns the odometry of all entries likewise; empty without odometry.
+/// Returns the odometry of all entries; empty without odometry.
 [[nodiscard]] std::vector<Pose2> odometry_poses(const Dataset& dataset);
 
 /// Calls `make(i)` for 0 .. count - 1 on all threads, and `use(i, made)` in order on this one. An

@@ -123,8 +123,9 @@ struct PlaceRecogniser::Implementation {
     publish(std::move(localiser), source);
   }
 
-  /// Finds the models of a memory that is not held: of a small one as of a held one; of a large one
-  /// those that the file keeps, else the current ones, else those learnt from a part of the views.
+  /// Finds the models of a memory that is not held: of a small one by learning from all views; of a
+  /// large one those that the file keeps, else the current ones, else those learnt from a part of
+  /// the views.
   [[nodiscard]] LearntModels find_models(const MemoryFile& file, ViewIndex& index,
                                          std::span<const ViewId> views,
                                          std::span<const ViewId> drawn,

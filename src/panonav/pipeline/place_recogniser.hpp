@@ -56,7 +56,7 @@ class PlaceRecogniser {
                            const PlaceRecogniserOptions& options = {});
   /// Uses an open file or memory on a server; its views are held.
   explicit PlaceRecogniser(const MemoryFile& file, const PlaceRecogniserOptions& options = {});
-  /// Uses a memory that is not held, by its index.
+  /// Uses a memory that is not held, through its index.
   PlaceRecogniser(std::unique_ptr<IndexedMemory> index, const std::filesystem::path& memory,
                   const PlaceRecogniserOptions& options = {});
   ~PlaceRecogniser();
@@ -79,15 +79,15 @@ class PlaceRecogniser {
   /// in a new PlaceRecogniser. The file is not changed. No other thread may use *this meanwhile.
   /// Throws ContractError as `VisualMemory::append`, and where the memory is not held.
   void append(const ReferenceInfo& info, const PackedSignature& signature);
-  /// Returns the views that are held. Throws ContractError if the memory is not held.
+  /// Returns the held views. Throws ContractError if the memory is not held.
   [[nodiscard]] const VisualMemory& memory() const;
   /// Returns the localiser, which compares views; `localise` adds areas. Throws ContractError where
   /// the memory is not held.
   [[nodiscard]] const Localiser& localiser() const;
 
-  /// Reads, for a memory that is not held, which views were added and removed since, and the models
-  /// learnt of them (`IndexedMemory::refresh`). Other threads may localise meanwhile, but only one
-  /// may refresh. Returns true if anything changed.
+  /// Updates the index of a memory that is not held to views that were added and removed since, and
+  /// the models learnt from them (`IndexedMemory::refresh`). Other threads may localise meanwhile,
+  /// but only one may refresh. Returns true if anything changed.
   bool refresh();
   [[nodiscard]] std::uint64_t index_bytes() const;       ///< Returns 0 if the memory is held.
   [[nodiscard]] SearchCounters search_counters() const;  ///< Returns zeros if the memory is held.

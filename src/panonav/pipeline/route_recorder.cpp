@@ -71,7 +71,7 @@ std::size_t RouteRecorder::skip_recorded(std::span<const Pose2> drive) {
   const auto route = file_.route(options_.name);
   if (!route || last_) return 0;
   const std::span<const Pose2> known = route->poses();
-  // The same distance within which `RoutePanorama::append` leaves lines out.
+  // Equal to the distance within which `RoutePanorama::append` leaves lines out.
   const auto same_place = [](const Pose2& a, const Pose2& b) {
     return distance(a.position(), b.position()) < RoutePanorama::min_step_m;
   };

@@ -36,7 +36,7 @@ struct RouteRecorderOptions {
 /// odometry, as the options say. One thread at a time, except `encode`.
 class RouteRecorder {
  public:
-  /// The recorded route, and what this recorder added to it.
+  /// The recorded route, and the lines that this recorder added to it.
   struct Recorded {
     RoutePanorama route;       ///< all of its lines, those of earlier drives included
     std::size_t appended = 0;  ///< lines
@@ -80,8 +80,7 @@ class RouteRecorder {
   /// each line. Throws as `add` and `finish`; those before a picture that cannot be read are kept.
   Recorded record(const Dataset& drive, std::span<const Pose2> poses, Executor& executor,
                   const std::function<void(std::size_t lines)>& recorded = {});
-  /// Writes what was added to the disk. Throws FileError; ContractError when nothing ever was
-  /// added.
+  /// Writes the added lines to the disk. Throws FileError; ContractError if nothing was ever added.
   Recorded finish();
 
   /// Returns the file of the route.

@@ -27,8 +27,8 @@ struct SignatureOptions {
 };
 void visit_options(SignatureOptions& options, OptionVisitor& visitor);
 
-/// Makes of a picture what a memory compares, as the memory's header says. Tables are made once and
-/// buffers are kept for the next picture. Several threads may use one at a time.
+/// Encodes images as the views that a memory compares, as the memory's header says. Tables are made
+/// once and buffers are reused. Several threads may use one encoder.
 class ViewEncoder {
  public:
   /// `source`: layout of the pictures; that of the memory's own camera is `header.source`. Throws

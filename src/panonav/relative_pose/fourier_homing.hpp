@@ -39,7 +39,7 @@ struct FourierHomingOptions {
     sequential,  ///< S06's rule: each component refines those before [S06 eq. 40-43]
     global,      ///< the maximum of the correlation over all headings
   };
-  /// At which view the slope of the image is taken.
+  /// The view at which the derivative of the image is taken.
   enum class Gradient {
     current,  ///< as published [S06 eq. 20]
     both,     ///< the mean of both views: errors of second order in the displacement cancel
@@ -47,9 +47,9 @@ struct FourierHomingOptions {
   /// Weights of components and rows.
   enum class Weights {
     equal,  ///< as published: all alike
-    /// By the coherence of both views: components fade out where their phases are unrelated, which
-    /// happens at lower frequencies the farther the views are apart. A far view is thus compared
-    /// coarsely and a near one finely, without a known distance.
+    /// Weights by the coherence of both views: components fade out where their phases are
+    /// unrelated, which happens at lower frequencies the farther the views are apart. A far view is
+    /// thus compared coarsely and a near one finely, without a known distance.
     coherence,
   };
 

@@ -120,7 +120,7 @@ int find_highest_peaks(const TurnCorrelation& correlation, std::span<float> turn
     float value;
     float turn_rad;
   };
-  // A maximum may lie between two points: more are refined than returned.
+  // A maximum may be between two points: more are refined than returned.
   std::array<Peak, max_points / 2> peaks;
   std::size_t found = 0;
   for (std::size_t i = 0; i < count; ++i) {

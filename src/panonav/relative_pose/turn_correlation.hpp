@@ -24,7 +24,7 @@ struct HeadingWindow {
   float middle_rad = 0.0F;      ///< expected heading
   float half_width_rad = 4.0F;  ///< more than pi: all turns
 
-  /// True if a heading lies in the window.
+  /// True if the heading is within the window.
   [[nodiscard]] bool contains(float turn_rad) const noexcept {
     return std::abs(std::remainder(turn_rad - middle_rad, 6.2831853F)) <= half_width_rad;
   }

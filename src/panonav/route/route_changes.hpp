@@ -21,7 +21,7 @@ class RouteChanges {
   /// Azimuths in the robot's frame, counter-clockwise from the first to the second.
   struct AzimuthRange {
     double from_rad = 0.0;  ///< in [-pi, pi)
-    /// In [-pi, pi); below `from_rad` where the range includes straight behind.
+    /// End of the range in [-pi, pi); below `from_rad` if the range includes straight behind.
     double to_rad = 0.0;
   };
 

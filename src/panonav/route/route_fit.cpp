@@ -315,9 +315,9 @@ std::optional<RouteLines::Linearised> RouteLines::Linearised::make(const std::ve
   return result;
 }
 
-// Returns for each direction in the world how far the measured value lies outside of all expected
-// ones within `shift` columns, or the expected one outside of the measured ones, whichever is less;
-// NaN where the path is not crossed.
+// Returns for each direction in the world the distance of the measured value from the range of
+// expected values within `shift` columns, or of the expected value from the range of measured ones,
+// whichever is less; NaN where the path is not crossed.
 std::vector<float> RouteLines::shift_tolerant_residuals(const std::vector<Term>& terms,
                                                         std::size_t columns, double gain,
                                                         double offset, int shift) {

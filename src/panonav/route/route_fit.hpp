@@ -23,7 +23,7 @@ struct RouteFitOptions {
 };
 void visit_options(RouteFitOptions& options, OptionVisitor& visitor);
 
-/// The pose from which a scanline was taken, and how well it fits there.
+/// An estimated pose of a scanline, and the quality of the fit there.
 struct RouteFix {
   /// Source of the position in a tracker.
   enum class Origin {
@@ -54,8 +54,8 @@ struct RouteFix {
 /// Immutable; several threads may use one.
 class RouteLines {
  public:
-  /// Copies what it needs: 4 bytes a value and level. Throws OptionError, and ContractError on a
-  /// route of fewer than two lines.
+  /// Copies the route: 4 bytes a value and level. Throws OptionError, and ContractError on a route
+  /// of fewer than two lines.
   explicit RouteLines(const RoutePanorama& route, const RouteFitOptions& options = {});
 
   /// Finds the pose at which the route shows the line: least squares of all directions at once over
@@ -71,7 +71,7 @@ class RouteLines {
   /// where no line of sight crosses the path.
   [[nodiscard]] std::vector<float> synthesise(const Pose2& pose) const;
 
-  /// A pose from which a line may have been taken.
+  /// A candidate pose of a line.
   struct Candidate {
     Pose2 pose;                ///< in the route's frame
     double correlation = 0.0;  ///< at the coarsest level
@@ -89,7 +89,7 @@ class RouteLines {
   [[nodiscard]] std::span<const Pose2> poses() const& noexcept { return poses_; }
   std::span<const Pose2> poses() const&& = delete;                 // would dangle
   [[nodiscard]] int columns() const noexcept { return columns_; }  ///< Values of a line.
-  /// As passed to the constructor.
+  /// Options as passed to the constructor.
   [[nodiscard]] const RouteFitOptions& options() const noexcept { return options_; }
 
  private:

@@ -41,7 +41,7 @@ RouteTracker::RouteTracker(const RoutePanorama& route, const RouteTrackerOptions
 
 double RouteTracker::learn_min_correlation(const RoutePanorama& route,
                                            const RouteFitOptions& options) const {
-  // If nothing can be learnt: half of the variance is explained.
+  // Threshold if nothing can be learnt: half of the variance is explained.
   constexpr double default_correlation = 0.7071;
   constexpr std::size_t samples = 40;
   if (route.size() < 6) return default_correlation;
@@ -119,7 +119,7 @@ std::optional<RouteFix> RouteTracker::find_best_on_route(std::span<const float> 
   std::vector<Point2> tried;
   for (const auto& candidate : found) {
     if (tried.size() >= static_cast<std::size_t>(options_.max_candidates)) break;
-    // A fit finds nearby positions by itself.
+    // Leaves out nearby positions, which a fit finds by itself.
     const bool near = std::ranges::any_of(tried, [&](Point2 other) {
       return distance(other, candidate.pose.position()) < 1.5 * options_.search_lateral_m;
     });

@@ -23,7 +23,7 @@ constexpr float bytes_per_contrast = 40.0F;
 // A column's own contrast counts together with this share of that of all columns, so that the noise
 // of a blank wall is not blown up to a pattern.
 constexpr float mean_contrast_share = 0.2F;
-// With fewer bands than this a column has no shape of its own.
+// Smallest number of bands with which a column has a shape.
 constexpr int min_bands_for_shape = 4;
 
 // Each band of all columns; a band is the unit of the vector loops.
@@ -228,7 +228,8 @@ std::array<ColumnMatch, 2> match_columns_twice(const ColumnProfiles& query,
                                                const ColumnProfiles& reference) {
   constexpr std::size_t apart = (columns + 5) / 6;
   const auto costs = compute_costs(query, reference);
-  // With its turn as the last bits a cost is found together with it, and the first of equal ones.
+  // Packs each cost with its rotation in the last bits, so that the minimum finds both, and the
+  // first of equal ones.
   std::uint32_t min_cost = ~0U;
   for (std::uint32_t turn = 0; turn < columns; ++turn) {
     min_cost = std::min(min_cost, static_cast<std::uint32_t>(costs[turn]) * columns + turn);

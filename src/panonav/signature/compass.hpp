@@ -29,15 +29,15 @@ struct CompassReading {
                                                     const FourierSignature& reference,
                                                     int components = 0);
 
-/// The same from packed signatures, without unpacking; the full scale cancels. Phases in steps of 2
-/// pi / 256 change the heading by a few thousandths of a radian at most.
+/// Reads the compass from packed signatures, without unpacking; the full scale cancels. Phases in
+/// steps of 2 pi / 256 change the heading by a few thousandths of a radian at most.
 [[nodiscard]] std::optional<CompassReading> compass(const PackedSignature& query,
                                                     const PackedSignature& reference,
                                                     int components = 0);
 
-/// The same, but the maximum is searched only within `within_rad` of `heading_rad`, for a heading
-/// that is known coarsely from another source. `distinctness` is 1, as no other heading is
-/// considered. Throws ContractError also unless 0 < within_rad <= pi.
+/// Reads the compass within `within_rad` of `heading_rad`, a heading that is known coarsely from
+/// another source. `distinctness` is 1, as no other heading is considered. Throws ContractError
+/// also unless 0 < within_rad <= pi.
 [[nodiscard]] std::optional<CompassReading> compass_near(const PackedSignature& query,
                                                          const PackedSignature& reference,
                                                          double heading_rad, double within_rad,

@@ -55,7 +55,7 @@ class FourierSignature {
   }
   /// Component-major: index k * rows + row.
   [[nodiscard]] std::span<const float> magnitudes() const& noexcept { return magnitudes_; }
-  /// In the order of the magnitudes.
+  /// Phases in the order of the magnitudes.
   [[nodiscard]] std::span<const float> phases_rad() const& noexcept { return phases_rad_; }
   std::span<const float> magnitudes() const&& = delete;  // would dangle
   std::span<const float> phases_rad() const&& = delete;  // would dangle
@@ -75,8 +75,8 @@ class FourierSignature {
 /// columns * components / 4 multiplications (an odd number of columns: / 2).
 [[nodiscard]] FourierSignature compute_signature(const Panorama& panorama, int components = 15);
 
-/// The same with the tables of the transform made once, for many panoramas of the same width.
-/// Throws ContractError when the panorama has another number of columns.
+/// Computes the signature with existing tables of the transform, for many panoramas of the same
+/// width. Throws ContractError if the panorama has another number of columns.
 [[nodiscard]] FourierSignature compute_signature(const Panorama& panorama,
                                                  const kernels::RowTransform& transform);
 

@@ -419,7 +419,7 @@ LocalFeatures::Match match_features(const LocalFeatures& query, const LocalFeatu
     made.max_ratio = max_ratio;
     return made;
   }();
-  // No turn explains more than the features that it brings within a right angle of each other.
+  // A rotation can explain at most the features that it brings within a right angle of each other.
   std::array<MutualMatches::Window, turns> windows;
   for (std::size_t t = 0; t < turns; ++t) {
     windows[t] = matched.within_right_angle(static_cast<int>(t), 2.0 * std::numbers::pi / turns);

@@ -26,8 +26,8 @@ class SignatureExtractor {
         imaginary;                  ///< the sine parts
   };
 
-  /// For cylinders of this shape. Throws ContractError unless 1 <= components <= columns / 2 and
-  /// the masks leave a row; OptionError.
+  /// Makes an extractor for cylinders of this shape. Throws ContractError unless 1 <= components <=
+  /// columns / 2 and the masks leave a row; OptionError.
   explicit SignatureExtractor(PanoramaShape cylinder, int components = 15,
                               const PreprocessingOptions& preprocessing = {});
 

@@ -76,7 +76,8 @@ struct MemoryFile::Implementation {
       return result;
     }
   }
-  /// The same for work that changes nothing: it reads one state of the memory.
+  /// Returns what `work(tables)` returns within a transaction that only reads: it sees one state of
+  /// the memory.
   template <class Work>
   auto read(const Work& work) {
     const auto transaction = tables->transaction(MemoryTables::Kind::reading);

@@ -144,8 +144,8 @@ class SettingsWriter final : public OptionFields<SettingsWriter> {
   Settings settings;
 };
 
-// Reads what SettingsWriter wrote, and knows which settings were never read. Every option must be
-// there: a default that changes must not change what a file means.
+// Reads the output of SettingsWriter, and records which settings were never read. Every option must
+// exist: a changed default must not change the meaning of a file.
 class SettingsReader final : public OptionFields<SettingsReader> {
  public:
   explicit SettingsReader(const Settings& settings) : settings_(settings) {}
@@ -257,7 +257,7 @@ void visit_camera(Fields& fields, AnyCamera& camera) {
   fields.field(prefix + "forward_column", camera.forward_column);
 }
 
-// The same of all of the header but the camera and its mask.
+// Reads or writes all fields of the header except the camera and its mask.
 template <class Fields, class Header>
 void visit_header(Fields& fields, Header& header) {
   fields.field("rows", header.shape.rows);

@@ -92,7 +92,7 @@ PostgresqlConnection::PostgresqlConnection(const ServerAddress& address)
                     "postgresql://USER@HOST:PORT/DATABASE?memory=NAME, special characters as %40");
   }
   PQconninfoFree(parsed);
-  // Those before the address are replaced by what it says.
+  // Parameters of the address replace these.
   const std::array<const char*, 9> keys{
       "connect_timeout",           "tcp_user_timeout", "keepalives_idle",
       "keepalives_interval",       "keepalives_count", "dbname",
@@ -117,8 +117,8 @@ PostgresqlConnection::PostgresqlConnection(const ServerAddress& address)
                         std::to_string(PQserverVersion(connection_.get()) / 10000) +
                         "; allowed: 15 and newer");
   }
-  // The text of statements must mean the same whatever the server's settings are, and what was
-  // acknowledged must be on its disk.
+  // Statements must mean the same whatever the server's settings are, and acknowledged changes must
+  // be on its disk.
   execute("SET search_path = pg_catalog; SET lock_timeout = '" + seconds +
           "s'; SET bytea_output = hex; "
           "SET extra_float_digits = 1; SET standard_conforming_strings = on; "
@@ -186,13 +186,13 @@ bool PostgresqlConnection::wait_for_server(bool is_sending) const {
   using Clock = std::chrono::steady_clock;
   pollfd waiting{PQsocket(connection_.get()), POLLIN, 0};
   if (is_sending) waiting.events |= POLLOUT;
-  // In steps, as the time-out may be shortened meanwhile.
+  // Waits in steps, as the time-out may be shortened meanwhile.
   constexpr int step_ms = 250;
   const auto begin = Clock::now();
   int ready = 0;
   while ((ready = ::poll(&waiting, 1, step_ms)) == 0) {
     if (Clock::now() - begin < reply_timeout()) continue;
-    // Whatever else is asked of this connection fails at once.
+    // Makes every later request on this connection fail at once.
     ::shutdown(PQsocket(connection_.get()), SHUT_RDWR);
     throw FileError(printable_address_.native(),
                     "its server did not answer within " +

@@ -26,7 +26,7 @@ class PostgresqlValues {
   PostgresqlValues& add(std::span<const std::uint8_t> bytes);
   PostgresqlValues& add(std::span<const std::int64_t> values);
   PostgresqlValues& add(std::span<const std::string> texts);
-  /// No text.
+  /// Adds a missing text.
   PostgresqlValues& add_null();
 
   /// The values in the form of libpq; valid while these values are.
@@ -87,7 +87,7 @@ class PostgresqlConnection {
   /// forbids it.
   [[nodiscard]] bool try_unique(const std::string& sql, const PostgresqlValues* values = nullptr);
   PostgresqlRows run(const std::string& sql, const PostgresqlValues& values = {});
-  /// Passes one row after the other to `take`, without holding all of them.
+  /// Passes the rows to `take` one after the other, without holding all of them.
   void stream(const std::string& sql, const PostgresqlValues& values,
               const std::function<void(const PostgresqlRows&)>& take);
   /// A COPY ... FROM STDIN with these bytes.
@@ -96,10 +96,10 @@ class PostgresqlConnection {
   /// null.
   void copy_out(const std::string& sql, int fields,
                 const std::function<void(std::span<const std::optional<std::string_view>>)>& take);
-  /// Not within a transaction: waits until the server sends a notification and returns what it
-  /// says; empty when none arrived within the time.
+  /// Waits outside of a transaction until the server sends a notification and returns its payload;
+  /// empty if none arrived within the time.
   [[nodiscard]] std::optional<std::string> wait_for_notification(double seconds);
-  /// Rolls back what can still be rolled back.
+  /// Rolls back the transaction if the connection still works.
   void try_execute(const char* sql) noexcept;
 
   [[nodiscard]] bool is_in_transaction() const noexcept;
@@ -115,10 +115,10 @@ class PostgresqlConnection {
   /// connection is lost: the next call of libpq says why. After the time-out shuts the connection
   /// and throws FileError.
   [[nodiscard]] bool wait_for_server(bool is_sending) const;
-  /// Sends what libpq still holds. False if the connection is lost.
+  /// Sends the bytes that libpq still buffers. False if the connection is lost.
   bool flush() const;
   void send(const std::string& sql, const PostgresqlValues* values) const;
-  /// The next result of what was sent; null after the last.
+  /// Returns the next result of the sent statement; null after the last.
   [[nodiscard]] pg_result* next_result() const;
   /// Same as PQgetCopyData, but waits: the size of `sent`, -1 at the end, -2 on a fault.
   [[nodiscard]] int next_copy_data(char*& sent) const;

@@ -23,7 +23,7 @@ void add_info(Fields& fields, const ReferenceInfo& info) {
       .add(info.stamp_s);
 }
 
-/// The same fields of a row, from column `first` on.
+/// Reads the same fields from a row, from column `first` on.
 [[nodiscard]] inline ReferenceInfo read_info(const PostgresqlRows& rows, int row, int first) {
   ReferenceInfo info;
   info.name = rows.text(row, first);
@@ -40,7 +40,7 @@ void add_info(Fields& fields, const ReferenceInfo& info) {
   return numbers;
 }
 
-/// The rows of one memory on a server, by a connection of its own.
+/// Accesses the rows of one memory on a server through a connection of its own.
 class PostgresqlTables final : public MemoryTables {
  public:
   using Values = PostgresqlValues;
@@ -138,7 +138,7 @@ class PostgresqlTables final : public MemoryTables {
 
  private:
   class ServerTransaction;
-  /// With the memory as $1.
+  /// Runs a statement with the memory as $1.
   Rows run(const std::string& sql) { return connection_.run(sql, Values().add(memory_)); }
   Rows run(const std::string& sql, std::string_view name) {
     return connection_.run(sql, Values().add(memory_).add(name));

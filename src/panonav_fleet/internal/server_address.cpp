@@ -35,8 +35,8 @@ std::optional<std::string> decode_percent(std::string_view text) {
   return decoded;
 }
 
-// False if a password may reach into what libpq takes for a host, port or database, which it names
-// in its messages.
+// False if a part of a password could be taken for a host, port or database, which libpq names in
+// its messages.
 bool has_escaped_password(std::string_view address) {
   const std::string_view rest = address.substr(address.find("://") + 3);
   const std::string_view authority = rest.substr(0, rest.find_first_of("/?#"));

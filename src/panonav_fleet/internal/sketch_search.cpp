@@ -229,7 +229,7 @@ class SketchSearch {
     const SketchSegment& sketches = *segment.sketches;
     sketches.make_tables(layout_, kernels_, query_, scratch.tables);
     cells(sketches, 0, 0, sketches.blocks(), scratch);
-    // The bound that enough of them keep to.
+    // Finds the smallest limit that enough of the bounds keep to.
     std::array<std::size_t, 256> counts{};
     for (std::size_t row = 0; row < sketches.rows(); ++row) ++counts[scratch.bounds[row]];
     std::size_t limit = 0;
@@ -279,14 +279,14 @@ class SketchSearch {
     while (!waiting.empty()) read_batch(waiting);
   }
 
-  /// Those views of a segment whose bounds are within the limit.
+  /// Collects the views of a segment whose bounds are within the limit.
   void collect_within(std::uint32_t number, std::uint32_t limit, SegmentScratch& scratch,
                       std::vector<SketchedView>& found) const {
     const LiveSegment& segment = segments_[number];
     const SketchSegment& sketches = *segment.sketches;
     sketches.make_tables(layout_, kernels_, query_, scratch.tables);
     const auto passed = cells(sketches, limit, 0, sketches.blocks(), scratch);
-    // In place: kept entries are before the current one.
+    // Filters in place: kept entries are before the current one.
     const std::span<std::uint32_t> rows(scratch.indices.data(), passed.size());
     std::size_t kept = 0;
     for (const std::uint32_t row : rows) {
@@ -309,8 +309,8 @@ class SketchSearch {
     }
   }
 
-  /// The best of them, more each time; all where they are few. Of the others those stay that can be
-  /// among the nearest then.
+  /// Reads the best candidates in growing batches, all if there are few, and drops those that can
+  /// no longer be among the nearest.
   void read_batch(std::vector<SketchedView>& waiting) {
     const auto drop = [&] {
       std::erase_if(waiting, [this](const SketchedView& candidate) {

@@ -14,7 +14,8 @@ namespace panonav::fleet {
 
 /// Layout of the sketches of views that are not held: sums of packed magnitudes over blocks of
 /// neighbouring rows at three levels, each finer than the one before. A block of a level consists
-/// of blocks of the next one. docs/search.md says why their differences bound the dissimilarity.
+/// of blocks of the next one. docs/search.md explains why their differences bound the
+/// dissimilarity.
 class SegmentLayout {
  public:
   static constexpr int levels = 3;  ///< cells of 4 bits, then two levels of a byte a sum
@@ -71,7 +72,7 @@ class SketchSegment {
                 std::span<const std::uint8_t> magnitudes);
 
   [[nodiscard]] std::size_t rows() const noexcept { return views_.size(); }
-  /// In the order of the rows.
+  /// Ids in the order of the rows.
   [[nodiscard]] std::span<const ViewId> views() const noexcept { return views_; }
   [[nodiscard]] ViewId smallest_id() const noexcept { return smallest_id_; }
   [[nodiscard]] ViewId largest() const noexcept { return largest_; }

@@ -43,13 +43,13 @@ class Synchronisation {
   /// Throws FileError if the file belongs to another memory, ContractError if its views cannot be
   /// compared with the server's.
   void match_with_server();
-  /// Reads what the file knows of the server, and the checksums of its views.
+  /// Loads the file's record of the server, and the checksums of its views.
   void load_file_state();
   void set_row(ViewId view, const SynchronisedView& row);
   void drop_row(ViewId view);
   /// True if the file holds all that is known.
   [[nodiscard]] bool is_stored() const;
-  /// Stores what is known, with what else the transaction holds.
+  /// Stores the record of the server and commits it with the other changes of the transaction.
   void store_and_commit(MemoryTables::Transaction& writing);
   /// Begins a writing transaction of the file. Throws FileError if another program synchronised the
   /// file meanwhile.
@@ -71,17 +71,17 @@ class Synchronisation {
 
   // synchronisation_upload.cpp
 
-  /// Finds out whether the server accepted what was sent before without an answer. The server
+  /// Finds out whether the server accepted earlier uploads that were not acknowledged. The server
   /// answers under its lock, as messages of a killed process may still arrive.
   void resolve_unacknowledged_uploads();
   /// Notes that the server has the view. `is_current_upload`: it accepted what was sent last;
   /// otherwise the file is older than what it once sent, and the server's row counts as changed
   /// since.
   static void acknowledge(SynchronisedView& row, const Upload& upload, bool is_current_upload);
-  /// Decides what is uploaded, gives it names that are free on the server, and notes it in the file
-  /// before it is sent.
+  /// Decides which views to upload, gives them names that are free on the server, and notes both in
+  /// the file before anything is sent.
   void prepare_upload();
-  /// Finds what has changed in the file and this login may upload: the views with their names. Sets
+  /// Finds the changed views of the file that this login may upload, with their names. Sets
   /// `removed_locally_`.
   std::map<ViewId, std::string> find_local_changes();
   /// Returns the server's views that have one of these names, by name.
@@ -111,7 +111,7 @@ class Synchronisation {
   // synchronisation_download.cpp
 
   static std::vector<std::int64_t> find_differing_blocks(const Blocks& a, const Blocks& b);
-  /// Applies what others did, as one snapshot of the server shows it.
+  /// Applies changes of others, from one snapshot of the server.
   void download();
   /// Sorts views whose rows on the server have changed into changed views (`changes`) and ids that
   /// a restored server has given to another view (`reused`).

@@ -284,7 +284,7 @@ void Synchronisation::upload_changes() {
     }
     if (changes.empty()) return;
     const auto accepted = server_.submit_changes(state_.file, upload_number_, changes);
-    // If another robot was first, `download` shows its change.
+    // If another robot was first, `download` brings its change.
     for (const ViewId view : ids) {
       SynchronisedView row = synchronised_.at(view);
       row.sent.reset();

@@ -12,10 +12,10 @@
 
 namespace panonav::fleet {
 
-/// Sketches of views that are held elsewhere, such as on a server: enough for a search to select
-/// the few views that can be among the nearest, which alone are read in full (docs/search.md). Of
-/// 80 x 15 they take 350 bytes a view in place of 2400. A copy shares the sketches with the
-/// original and costs little, so that one thread changes a copy while others search the original.
+/// Sketches of views that are stored elsewhere, such as on a server: a search selects by them the
+/// few views that can be among the nearest, and reads only these in full (docs/search.md). For 80 x
+/// 15 they take 350 bytes a view in place of 2400. A copy shares the sketches with the original and
+/// costs little, so that one thread changes a copy while others search the original.
 class ViewSketches {
  public:
   /// Takes a view that was read and its magnitudes, component-major.

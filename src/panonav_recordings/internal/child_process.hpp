@@ -7,8 +7,8 @@
 
 namespace panonav::recordings {
 
-/// A program of its own whose output is read through pipes; it is killed with the object. No shell
-/// sees the arguments.
+/// A child process whose output is read through pipes; it is killed with the object. No shell sees
+/// the arguments.
 class ChildProcess {
  public:
   /// Finds arguments[0] in PATH. Standard input is empty. Throws Error when it cannot be started.

@@ -116,7 +116,7 @@ Unpacked unpack(std::span<const std::uint8_t> packed, Packing packing, std::size
 }
 
 Unpacked unpack_frame(std::span<const std::uint8_t> packed, std::size_t max_bytes) {
-  // Where the frame does not say its size, this is a number beyond all sizes.
+  // If the frame does not state its size, this is a number beyond all sizes.
   const auto stated_size = ZSTD_getFrameContentSize(packed.data(), packed.size());
   std::size_t size = static_cast<std::size_t>(std::min<std::uint64_t>(stated_size, max_bytes));
   if (stated_size == ZSTD_CONTENTSIZE_UNKNOWN)

@@ -17,7 +17,7 @@ enum class Packing { none, lz4, zstd, bz2 };
 /// Finds the compression by its name in recordings: "" or "none", "lz4", "zstd", "bz2".
 [[nodiscard]] std::optional<Packing> find_packing(std::string_view name) noexcept;
 
-/// Bytes that are not cleared first, so that memory is used only as it is filled.
+/// A buffer that is not cleared, so that memory is used only as it is filled.
 struct Buffer {
   Buffer() = default;
   explicit Buffer(std::size_t bytes)
@@ -40,7 +40,7 @@ struct Unpacked {
 /// A Zstandard frame of a size that is not known, of at most `max_bytes` bytes.
 [[nodiscard]] Unpacked unpack_frame(std::span<const std::uint8_t> packed, std::size_t max_bytes);
 
-/// Writes what the Zstandard frames of a file unpack to: at most `max_bytes` bytes. Memory: two
+/// Unpacks the Zstandard frames of a file to another file, at most `max_bytes` bytes. Memory: two
 /// buffers of 128 KiB and the frames' window, at most 128 MiB.
 struct UnpackedFile {
   std::uint64_t bytes = 0;  ///< written

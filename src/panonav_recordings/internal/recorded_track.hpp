@@ -55,7 +55,7 @@ class TransformChain {
   void sort(bool by_log);
   /// top_from_bottom, of a chain that is connected.
   [[nodiscard]] std::optional<ros::Pose> at(std::int64_t ns) const;
-  /// All that there is, for what is not connected.
+  /// Lists all frames, for messages about those that are not connected.
   [[nodiscard]] std::string known() const;
 
  private:

@@ -19,7 +19,7 @@
 
 namespace panonav::recordings {
 
-/// A message and what keeps its bytes.
+/// A message and the buffer that holds its bytes.
 struct RecordedMessage {
   std::int64_t time_ns = 0;
   std::uint32_t topic = 0;
@@ -146,7 +146,7 @@ class ChunkedFile : public RecordingFile {
 
   /// Throws a FileError on damage.
   [[nodiscard]] virtual ChunkHead chunk_head(const Block& block) const = 0;
-  /// Appends what the index behind the chunk says. False where it is damaged.
+  /// Appends the entries of the index after the chunk. False if it is damaged.
   virtual bool list_index(const Block& block, std::vector<Entry>& entries) const = 0;
   /// The message whose record begins there, without owner; empty where none does.
   [[nodiscard]] virtual std::optional<RecordedMessage> message_at(
@@ -156,8 +156,8 @@ class ChunkedFile : public RecordingFile {
   /// Appends the messages of unpacked records up to the first damaged one. Whether all were whole.
   virtual bool walk(std::span<const std::uint8_t> block, std::vector<Entry>& entries) const = 0;
 
-  /// For passes over the file: unpacks a chunk, notes its topics and messages and makes a block of
-  /// it. `is_cut`: the file ends within the chunk; its beginning is kept. Damage is warned of.
+  /// Unpacks a chunk during a pass over the file, notes its topics and messages and makes a block
+  /// of it. `is_cut`: the file ends within the chunk; its beginning is kept. Warns of damage.
   void add_chunk(std::uint64_t at, bool is_cut);
   /// A message outside of chunks, in the record of `bytes` bytes at `at`.
   void add_loose(std::uint64_t at, std::uint64_t bytes, std::int64_t time_ns, std::uint32_t topic);
@@ -167,8 +167,8 @@ class ChunkedFile : public RecordingFile {
   [[nodiscard]] std::uint64_t size() const noexcept { return size_; }
   /// Reads `count` bytes of the file. Throws FileError where it lacks them.
   [[nodiscard]] Buffer bytes_at(std::uint64_t at, std::uint64_t count) const;
-  /// As that for small records one after another, which are read ahead; fewer at the end of the
-  /// file. They are there until the next call.
+  /// Returns bytes for small records one after another, reading ahead; fewer at the end of the
+  /// file. They are valid until the next call.
   [[nodiscard]] std::span<const std::uint8_t> peek(std::uint64_t at, std::size_t max_bytes);
 
   RecordingLimits limits_;

@@ -95,7 +95,7 @@ class DatabaseFile : public RecordingFile {
   void list(std::size_t, const std::vector<bool>& chosen_topics, const TimeSpan& within,
             std::size_t max_places, std::vector<MessagePlace>& places) const override {
     const std::lock_guard lock(mutex_);
-    // The index of times pays for a part of them alone.
+    // The index of times is faster only for a part of the messages.
     const bool is_all = within.begin_ns <= time_->begin_ns && within.end_ns >= time_->end_ns;
     const Statement rows =
         prepare(is_all ? "SELECT id, topic_id, timestamp FROM messages"

@@ -22,7 +22,7 @@ namespace panonav::recordings {
 
 namespace {
 
-/// In order of preference.
+/// Pixel formats in order of preference.
 constexpr std::array<std::uint32_t, 5> usable{
     V4L2_PIX_FMT_MJPEG, V4L2_PIX_FMT_JPEG, V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_UYVY, V4L2_PIX_FMT_GREY};
 

@@ -17,7 +17,7 @@ namespace panonav::recordings {
 /// A V4L2 camera that streams into mapped buffers.
 class V4l2Camera {
  public:
-  /// Throws FileError that says what is wrong with the device.
+  /// Opens the device. Throws FileError that states the fault.
   V4l2Camera(std::string device, const std::optional<ImageSize>& size);
   ~V4l2Camera();
   V4l2Camera(const V4l2Camera&) = delete;

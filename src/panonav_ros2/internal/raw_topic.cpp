@@ -32,7 +32,7 @@ const RawSample& raw(const ddsi_serdata* sample) {
   return *static_cast<const RawSample*>(sample);
 }
 
-/// Nothing may be thrown through C: null where there is no memory for it.
+/// Exceptions must not pass through C: null if there is no memory.
 RawSample* make_sample(const ddsi_sertype* type, ddsi_serdata_kind kind, std::size_t size) {
   try {
     return new RawSample(type, kind, size);
@@ -78,7 +78,7 @@ ddsi_serdata* from_bytes(const ddsi_sertype* type, ddsi_serdata_kind kind, const
   RawSample* const sample = make_sample(type, kind, size);
   if (sample == nullptr) return nullptr;
   std::ranges::copy(bytes, sample->bytes.begin());
-  // The last bits of the header's options count what is no part of the message.
+  // The last bits of the header's options count padding bytes that are not part of the message.
   constexpr std::size_t options_at = 3;
   if (size > options_at) sample->bytes[options_at] = static_cast<std::uint8_t>(size - bytes.size());
   return sample;

@@ -64,7 +64,7 @@ constexpr FloorArea loop_outside{{-1.5, -1.5}, {7.5, 5.5}};
 constexpr FloorArea loop_block{{1.0, 1.0}, {5.0, 3.0}};
 constexpr double loop_height_m = 2.5;
 
-// Adds the block's walls, each with pictures of its own.
+// Adds the block's walls, each with its own images.
 void add_block(SceneBuilder& builder) {
   Random& random = builder.random();
   const auto inner = compute_corners(loop_block);

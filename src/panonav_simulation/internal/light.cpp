@@ -314,8 +314,8 @@ void bake_light(const Scene& scene, const RayTracer& tracer, bool shadows, doubl
   const LightProbe probe(scene, tracer, lit, shadows, spacing_m);
   executor.for_chunks(points.size(), 256, [&](std::size_t begin, std::size_t end, std::size_t) {
     for (std::size_t i = begin; i < end; ++i) {
-      // A point on the border of a surface often lies within the next one, where all is dark: it is
-      // drawn in by a third of the way to its triangles. Within a surface the ways cancel out.
+      // A point on the border of a surface is often inside the next one, where all is dark: it is
+      // moved by a third of the way to its triangles. Within a surface the moves cancel.
       const LightPoint& point = points[i];
       const Float3 position = point.position + (0.33F / point.sharers) * point.inwards;
       points[i].light = probe.light_at(position, point.normal);

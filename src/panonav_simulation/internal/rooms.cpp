@@ -45,7 +45,7 @@ void furnish_row(SceneBuilder& builder, const FloorArea& room, const std::string
     const Point2 at{from.x_m + ux * (along + 0.5 * width), from.y_m + uy * (along + 0.5 * width)};
     const std::string piece = name + " " + std::to_string(number++);
     const Footing planned{at, turn_rad + random.normal(0.0, 0.05)};
-    // Nobody moves a wardrobe.
+    // Wardrobes are not movable.
     const Footing footing =
         is_wardrobe ? planned : builder.place_movable(planned, 0.5 * width, room);
     if (is_desk) {

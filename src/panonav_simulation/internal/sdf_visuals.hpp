@@ -14,7 +14,7 @@ class SdfVisuals {
   /// `context` outlives *this.
   explicit SdfVisuals(SdfContext& context) : context_(context), meshes_(context.textures) {}
 
-  /// Adds what a <visual> shows. Throws Unusable, Error.
+  /// Adds the mesh and material of a <visual>. Throws Unusable, Error.
   void add(pugi::xml_node visual, const Affine3& world_from_visual, const SdfOrigin& origin);
 
   /// Numbers of the scene's meshes that are planes.

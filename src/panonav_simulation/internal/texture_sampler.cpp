@@ -77,7 +77,7 @@ void MaterialSampler::bilinear(const Level& level, float u, float v, float weigh
   const float y_floor = std::floor(y);
   const float fx = x - x_floor;
   const float fy = y - y_floor;
-  // u and v are in [0, 1], so the neighbours lie at most one texel outside.
+  // u and v are in [0, 1], so the neighbours are at most one texel outside.
   const auto wrap = [](int i, int n) { return i < 0 ? i + n : (i >= n ? i - n : i); };
   const int x0 = wrap(static_cast<int>(x_floor), level.width);
   const int y0 = wrap(static_cast<int>(y_floor), level.height);

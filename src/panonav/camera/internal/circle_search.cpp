@@ -60,7 +60,7 @@ std::array<Direction, coarse_directions> make_directions() {
   return result;
 }
 
-/// Adds up what is seen around one circle.
+/// Sums the edge field along one circle.
 class SectorScore {
  public:
   static constexpr int sectors = 12;
@@ -111,8 +111,8 @@ double coarse_merit(const EdgeField& field, const std::array<Direction, coarse_d
   return figure_of_merit(total.result(coarse_directions, range.evenness), range);
 }
 
-/// The same for all centres at once: a circle about every pixel is a sum of the field shifted by
-/// its radius in each direction, in loops that a compiler vectorises.
+/// Computes the merit of all centres at once: a circle about every pixel is a sum of the field
+/// shifted by its radius in each direction, in loops that a compiler vectorises.
 class ShiftedSums {
  public:
   explicit ShiftedSums(const EdgeField& field) : width_(field.width), height_(field.height) {
@@ -256,7 +256,7 @@ class CircleProblem {
     for (const EdgePoint& p : points_) {
       deviations.push_back(std::abs(std::hypot(p.u - circle.u, p.v - circle.v) - circle.radius));
     }
-    // A tenth of a pixel is what the parabola of the edge gives at best.
+    // A parabola through an edge is accurate to a tenth of a pixel at best.
     const double scale = tukey * std::max(0.1, 1.4826 * upper_median(deviations));
     equations.set_zero();
     double weights = 0;

@@ -40,7 +40,7 @@ int parameter_index(const ImagePoint& point, int parameter) {
 
 }  // namespace
 
-/// The views as they stand, and with each of their parameters changed a little.
+/// The lenses of a state, and those with each parameter changed a little.
 class LensFit::Linearised {
  public:
   Linearised(const State& state, double mirror_sign)
@@ -56,7 +56,7 @@ class LensFit::Linearised {
     }
   }
 
-  /// Adds what a match says, with the weight of its residual, to the normal equations.
+  /// Adds the residual of a match, with its weight, to the normal equations.
   void add(const Match& match, double deviation_rad, MatrixXd& matrix, VectorXd& right) const {
     const Vector2d apart = residual(here_, match);
     const double t = apart.norm() / (tukey * deviation_rad);

@@ -39,7 +39,7 @@ class LensFit {
   [[nodiscard]] State state() const { return apply_change(at_.prior, at_.offset); }
   /// Returns the standard deviation of a match.
   [[nodiscard]] double deviation_rad() const { return deviation_rad_; }
-  /// Returns the covariance of all parameters, with what residuals of one region have in common
+  /// Returns the covariance of all parameters for residuals that are correlated within a region
   /// (White's sandwich with clusters).
   [[nodiscard]] Eigen::MatrixXd covariance(const std::vector<Match>& matches) const;
 

@@ -33,8 +33,8 @@ inline constexpr int rotation_size = 3;
 [[nodiscard]] constexpr int rotation_at(int picture) {
   return 2 * lens_size + picture * rotation_size;
 }
-/// Returns the change of a parameter over which its slope is taken: thousandths of a pixel for a
-/// centre, millionths for all else.
+/// Returns the step of a parameter for its numerical derivative: thousandths of a pixel for a
+/// centre, millionths for all others.
 [[nodiscard]] constexpr double get_derivative_step(int parameter) {
   return parameter < 2 ? 1e-3 : 1e-6;
 }

@@ -110,7 +110,7 @@ std::optional<Eigen::Matrix2d> compute_whitener(const Patch& patch) {
   return Eigen::Matrix2d(axes * roots.asDiagonal() * axes.transpose());
 }
 
-/// A direction of the world, and what lies across it.
+/// A direction of the world with two directions orthogonal to it.
 struct Direction {
   Vector3d middle, east, north;
   int region = 0;
@@ -238,7 +238,7 @@ void PatchMatcher::estimate_yaws(State& state, double step_rad, double left_azim
   }
 }
 
-/// Looks in one direction of the world for what pairs of views both see.
+/// Matches patches around one direction of the world between pairs of views that see it.
 class PatchMatcher::Search {
  public:
   Search(const std::vector<View>& views, const Direction& direction, double step_rad, int search)

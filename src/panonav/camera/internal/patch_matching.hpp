@@ -26,7 +26,7 @@ struct ImagePoint {
   [[nodiscard]] int view() const { return 2 * picture + lens; }
 };
 
-/// The same thing of the world seen by two lenses, or by one in two pictures.
+/// A point of the world seen by two lenses, or by one in two images.
 struct Match {
   std::array<ImagePoint, 2> points;
   Eigen::Vector3d east, north;  ///< across the direction
@@ -43,7 +43,8 @@ struct Matching {
   [[nodiscard]] int count_near_expected() const;
 };
 
-/// Finds what two lenses, or one in two pictures, both see, by normalised correlation of patches.
+/// Finds points that two lenses, or one in two images, both see, by normalised correlation of
+/// patches.
 class PatchMatcher {
  public:
   /// Takes grey pictures of one size, which outlive the matcher. `mirror_sign`: see `PosedLens`.
@@ -53,7 +54,8 @@ class PatchMatcher {
   /// Sets each picture's yaw to the turn by which its panorama, of values about `step_rad` apart,
   /// is most like the first one's.
   void estimate_yaws(State& state, double step_rad, double left_azimuth_rad);
-  /// Looks in each of `directions` for what is within `search` steps of where the state expects it.
+  /// Searches around each of `directions` for patches within `search` steps of the position that
+  /// the state predicts.
   [[nodiscard]] Matching match(const State& state, double step_rad, int search, int directions);
 
  private:

@@ -41,9 +41,8 @@ struct Reader {
   std::longjmp(reader->on_failure, 1);
 }
 
-// libjpeg fills what is lost with grey and only warns. A view that is partly made up must not pass
-// for one that was seen, so warnings of lost pixels count as damage; those of untidy headers do
-// not.
+// libjpeg fills lost pixels with grey and only warns. A partly invented view must not pass for a
+// real one, so warnings of lost pixels count as damage; those of untidy headers do not.
 void on_message(j_common_ptr jpeg, int level) {
   if (level >= 0) return;
   switch (jpeg->err->msg_code) {
@@ -74,7 +73,7 @@ bool open_steps(Reader& reader, const std::uint8_t* data, std::size_t size) {
   if (setjmp(reader.on_failure)) return false;
   jpeg_create_decompress(&reader.jpeg);
   reader.created = true;
-  // Not before: creating clears the struct.
+  // Must come after creating, which clears the struct.
   reader.jpeg.progress = &reader.progress;
   reader.jpeg.mem->max_memory_to_use = 1L << 30U;
   jpeg_mem_src(&reader.jpeg, data, static_cast<unsigned long>(size));

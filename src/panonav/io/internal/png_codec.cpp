@@ -48,8 +48,7 @@ void on_read(png_structp png, png_bytep to, png_size_t count) {
 
 bool open_steps(Reader& reader, ImageSize& size) {
   if (setjmp(png_jmpbuf(reader.png))) return false;
-  // Sizes are checked by the caller, with its own message; ancillary chunks must not take much
-  // memory.
+  // The caller checks sizes, with its own message; ancillary chunks must not take much memory.
   png_set_user_limits(reader.png, 0x7FFFFFFF, 0x7FFFFFFF);
   png_set_chunk_malloc_max(reader.png, 8U << 20U);
   png_set_chunk_cache_max(reader.png, 64);
@@ -82,7 +81,7 @@ bool set_transforms(Reader& reader, int& channels) {
 bool read_pixels(Reader& reader, png_bytepp rows) {
   if (setjmp(png_jmpbuf(reader.png))) return false;
   png_read_image(reader.png, rows);
-  // Also reads the end of the file: a picture without its end is cut short.
+  // Also reads the end of the file: an image without its end was cut short.
   png_read_end(reader.png, nullptr);
   return true;
 }

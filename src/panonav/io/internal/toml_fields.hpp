@@ -53,9 +53,9 @@ class TomlFields {
   std::optional<std::vector<double>> numbers(std::string_view field);
   /// A table within this one; its own `finish` is the caller's to call.
   std::optional<TomlFields> section(std::string_view field);
-  /// The same, FileError when absent.
+  /// Returns the number; throws FileError if it is absent.
   double required_number(std::string_view field);
-  /// The same of a text; `allowed` stands in the message.
+  /// Returns the text; throws FileError with `allowed` if it is absent.
   std::string required_text(std::string_view field, std::string_view allowed);
   /// Index into `choices`; empty when absent.
   std::optional<std::size_t> choice(std::string_view field,
@@ -64,7 +64,7 @@ class TomlFields {
   /// Throws FileError: the field of this table is `found`, and what is allowed instead.
   [[noreturn]] void fail(std::string_view field, std::string_view found,
                          std::string_view allowed) const;
-  /// Throws FileError when the table has a field that nobody asked for.
+  /// Throws FileError if the table has a field that was never read.
   void finish() const;
 
  private:

@@ -2,8 +2,8 @@
 
 namespace panonav::kernels {
 
-// Without vectors the library's arc tangent; else one loop without branches, which the compiler
-// vectorises for each instruction set.
+// Without vector instructions, the library's arc tangent; else one loop without branches, which the
+// compiler vectorises for each instruction set.
 template <Instructions set>
 void PolarBody<set>::to_polar(const float* __restrict real, const float* __restrict imaginary,
                               float* __restrict magnitudes, float* __restrict phases_rad,

@@ -113,7 +113,7 @@ inline void fold(const float* row, int columns, int folded, float* even, float* 
   }
 }
 
-/// `rows` folded rows at once, so that each entry of the tables is read once for all of them and
+/// Transforms `rows` folded rows at once, so that each table entry is read once for all of them and
 /// the sums of different rows hide each other's latency.
 template <int lanes, int rows>
 inline void transform_rows(const RowTransformJob& job, int first_row) {

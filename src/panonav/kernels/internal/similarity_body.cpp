@@ -8,7 +8,7 @@ namespace {
 // Adding it rounds to whole numbers: 1.5 * 2^23.
 constexpr float rounder = 12582912.0F;
 
-// exp(x) for x < 80, 2^min_exponent for what is less; relative error below 4e-6.
+// Approximates exp(x) for x < 80, at least 2^min_exponent; relative error below 4e-6.
 inline float approximate_exp(float x, float min_exponent) {
   const float product = x * 1.44269504088896F;
   const float y = product > min_exponent ? product : min_exponent;

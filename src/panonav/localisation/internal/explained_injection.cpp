@@ -66,7 +66,7 @@ bool ExplainedInjection::find_places(const Particles& particles, Random& random)
   likelihood_->compute_log_ratios(poses, likelihoods_);
   log_largest_ = std::max(0.0, *std::ranges::max_element(likelihoods_));
   for (double& value : likelihoods_) value = std::exp(value - log_largest_);
-  // In all other places and headings the view is unexplained.
+  // The view is unexplained at all other positions and headings.
   const double share = heading_share_ / static_cast<double>(sites.size());
   const double unexplained = std::max(0.0, 1.0 - share * static_cast<double>(likelihoods_.size()));
   log_evidence_ = log_largest_ + std::log(share * sum_values(likelihoods_) +

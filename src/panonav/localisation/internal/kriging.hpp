@@ -22,8 +22,8 @@ struct ResemblingViews {
   std::vector<ViewId> views;
   std::vector<Point2> positions;
   Eigen::VectorXd to_query;  ///< squared differences of columns
-  /// The same between the views. (i, j): view j is the query, view i the reference. Comparing
-  /// columns is not quite symmetric; in this order the answer to view j is view j.
+  /// Similarities between the views: (i, j) compares query j with reference i. Comparing columns is
+  /// not quite symmetric; in this order the answer to view j is view j.
   Eigen::MatrixXd between;
 };
 /// Compares the first `PositionModel::candidates` posed views of the matches with each other.

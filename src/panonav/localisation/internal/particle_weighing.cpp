@@ -19,7 +19,7 @@ constexpr double min_effective_sample_size = 200.0;
 constexpr double min_effective_share = 1.0 / 3.0;
 /// Halvings in the search for a stage's exponent: it is found to 1/64 of what is left.
 constexpr int exponent_halvings = 6;
-/// Smallest share of what is left that a stage takes: the resolution of that search.
+/// Smallest share of the remaining exponent that a stage takes: the resolution of the search.
 constexpr double min_exponent_share = 1.0 / 64.0;
 /// A rest of the exponent below it is rounding.
 constexpr double exponent_tolerance = 1e-9;

@@ -8,9 +8,9 @@
 
 namespace panonav {
 
-/// Weighs particles by views, in stages where one would leave only few of them: after each stage
+/// Weighs particles by views, in stages if one stage would keep only few of them: after each stage
 /// they are resampled and spread (progressive correction of a regularised particle filter; Musso,
-/// Oudjane and Le Gland 2001). Keeps its buffers from view to view.
+/// Oudjane and Le Gland 2001). Reuses its buffers from view to view.
 class ParticleWeighing {
  public:
   /// Multiplies the weights by the likelihood of the view of `likelihood`, to the power of

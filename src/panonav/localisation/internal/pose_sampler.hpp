@@ -27,7 +27,7 @@ class PoseSampler {
   /// particle.
   [[nodiscard]] Pose2 make_pose_at(Candidate candidate, const Particles& particles,
                                    Random& random) const;
-  /// Draws a pose around it, as far as the truth may lie.
+  /// Samples a pose around the candidate, as far away as the true pose may be.
   [[nodiscard]] Pose2 sample_around(Candidate candidate, const Particles& particles,
                                     Random& random) const;
   /// Draws a position in the site's square of the grid, with this heading or any.

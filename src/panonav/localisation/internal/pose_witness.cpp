@@ -15,8 +15,8 @@ namespace {
 constexpr std::size_t min_witnesses = 3;
 /// Share of the witnesses that agree; of sure answers 99 % are right (docs/decisions.md).
 constexpr double agreeing_share = 0.8;
-/// Spacings by which the images of the witnesses lie apart at least, so that they do not all see
-/// the same references.
+/// Smallest distance between the images of the witnesses, in reference spacings, so that they do
+/// not all see the same references.
 constexpr double min_spread_spacings = 2.0;
 /// Error of odometry, as a share of the distance travelled: wheels that slip.
 constexpr double travel_error = 0.05;

@@ -12,7 +12,7 @@ namespace panonav {
 /// neighbouring views, far below the quarter rotation after which rooms look alike.
 inline constexpr double agreeing_heading_rad = radians(20.0);
 
-/// A sure answer to one image of a run, as evidence of where another image was taken.
+/// A certain answer to one image of a run, as evidence of the pose of another image.
 struct PoseWitness {
   Pose2 odometry;            ///< at the answered image, in the odometry's frame
   Pose2 pose;                ///< of the answer, in the frame of the memory's positions

@@ -20,7 +20,7 @@ namespace panonav {
 [[nodiscard]] std::vector<std::size_t> resample_systematically(std::span<const double> weights,
                                                                std::size_t count, Random& random);
 
-/// Replaces the particles by `count` of them, resampled systematically, with equal weights.
+/// Replaces the particles by `count` systematically resampled ones of equal weight.
 void resample_particles(Particles& particles, std::size_t count, Random& random);
 
 /// Replaces the particles by as many, each spread within its mode by the kernel for the mode's

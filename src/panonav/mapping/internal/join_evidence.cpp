@@ -12,7 +12,7 @@ namespace panonav {
 
 namespace {
 
-// Where no other source is given, values were chosen as `lattice_growth.hpp` says.
+// Values without another source were chosen as `lattice_growth.hpp` says.
 
 /// Probability that a wrong link agrees with the relative pose of others: once in five times, as
 /// rooms and shelves stand parallel to each other. q in docs/equations.md.

@@ -104,7 +104,7 @@ std::optional<DissimilarityCurve> fit_curve(std::span<const Lattice::Spring> mea
     lengths.push_back(pair.distance);
     max_dissimilarity = std::max(max_dissimilarity, pair.dissimilarity);
   }
-  // Where all views are near, the curve has no flat part.
+  // If all views are near each other, the curve has no flat part.
   const auto far = estimate_far_dissimilarity(views, layout, upper_median(lengths));
   return DissimilarityCurve(pairs, far.value_or(2.0 * max_dissimilarity));
 }

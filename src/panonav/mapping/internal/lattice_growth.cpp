@@ -18,7 +18,7 @@ namespace {
 
 /// Odds for a join, times the views of the smaller component: 95 % (docs/decisions.md).
 constexpr double min_join_odds = 19.0;
-/// The same of a remaining single view, which can misplace nothing but itself.
+/// Smallest odds to attach a single remaining view, which can misplace nothing but itself.
 constexpr double min_odds_of_single_views = 1.0;
 /// Averages of each component in the end; more change positions by less than phases resolve.
 constexpr int last_averages = 3;

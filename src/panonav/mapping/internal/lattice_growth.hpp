@@ -13,8 +13,8 @@ namespace panonav {
 
 struct GrownLayout {
   LatticeStart start;
-  /// By spring, if its views are in one component: 1 where the layout has them as the phases do,
-  /// 0.25 at the limit of what counts as agreeing.
+  /// For each spring whose views are in one component, its agreement with the layout: 1 if the
+  /// layout has the views as the phases do, 0.25 at the limit.
   std::map<std::pair<std::size_t, std::size_t>, double> weights;
   /// Pairs of views, with repetitions, to measure before the components grow again.
   std::vector<std::pair<std::size_t, std::size_t>> proposals;

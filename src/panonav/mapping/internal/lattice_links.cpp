@@ -79,7 +79,7 @@ struct RankPool {
   [[nodiscard]] double share() const { return count > 0.0 ? closing / count : 0.0; }
 };
 
-/// Returns the links of each rank, and how many of them are supported.
+/// Returns the number of links of each rank, and of the supported ones among them.
 std::vector<RankPool> count_ranks(std::span<const std::size_t> ranks,
                                   std::span<const unsigned char> supported) {
   std::vector<RankPool> counts(ranks.empty() ? 0 : *std::ranges::max_element(ranks) + 1);

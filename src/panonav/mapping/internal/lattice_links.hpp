@@ -12,8 +12,8 @@ namespace panonav {
 /// Largest difference between a turn by phases and in the layout: three times the error of phases
 /// between adjacent places.
 inline constexpr double turn_tolerance_rad = 15.0 * std::numbers::pi / 180.0;
-/// The same of a position, as a share of the link's length; chosen on the worlds of
-/// `lattice_growth.hpp`.
+/// Largest error of a position of agreeing links, as a share of the link's length; chosen on the
+/// worlds of `lattice_growth.hpp`.
 inline constexpr double position_tolerance = 0.6;
 
 /// A spring whose two views agree, as a relative pose that may be wrong.

@@ -68,7 +68,7 @@ Strain compute_strain(const SpringTerm& spring, const Pose2& a, const Pose2& b) 
     strain.add(length, dy, {0.0, -1.0, 0.0, 0.0, 1.0, 0.0}, spring.length_deviation);
   } else {
     const double distance = std::hypot(dx, dy);
-    // If the nodes coincide any direction is right.
+    // If the nodes coincide, any direction is right.
     const double ux = distance > 0.0 ? dx / distance : 1.0;
     const double uy = distance > 0.0 ? dy / distance : 0.0;
     const Row slope{-ux, -uy, 0.0, ux, uy, 0.0};
@@ -154,7 +154,7 @@ class SpringEnergy {
 
   [[nodiscard]] bool has_unknowns() const { return unknowns_ > 0 && !springs_.empty(); }
 
-  /// Widens the losses until no spring is beyond half of them.
+  /// Widens the losses until every spring is within half of their width.
   void widen_losses() {
     widths_.fill(final_width);
     for (const SpringTerm& spring : springs_) {

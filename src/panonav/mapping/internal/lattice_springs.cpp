@@ -21,9 +21,10 @@ namespace {
 constexpr double max_disagreement_rad = 0.25 * std::numbers::pi;
 /// Largest sum of three turns that cancel: those by phases err by some 5 degrees each.
 constexpr double turn_closing_rad = 10.0 * std::numbers::pi / 180.0;
-/// The same of three displacements as a share of the longest: lengths err by a quarter.
+/// Largest gap of three displacements around a triangle, as a share of the longest: lengths err by
+/// a quarter.
 constexpr double displacement_closing = 0.5;
-/// Error of a length as a share of it, before the curve is known: that by phases.
+/// Relative error of a length before the curve is known: that of lengths by phases.
 constexpr double default_length_error = 0.25;
 /// Smallest deviation of an angle, 0.2 degrees: rounding of packed phases, whose steps of 0.025 rad
 /// leave 0.4 degrees each, averaged over the components.

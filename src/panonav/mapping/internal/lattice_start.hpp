@@ -34,7 +34,7 @@ struct LatticeStart {
 [[nodiscard]] LatticeStart lay_out_by_motion(std::size_t nodes, std::span<const NodeMotion> motions,
                                              std::span<const Lattice::Spring> springs);
 
-/// True if the phases lie within three deviations of the motion.
+/// True if the phases are within three standard deviations of the motion.
 [[nodiscard]] bool is_compatible(const PhaseReading& phases, const CoarseMotion& motion);
 
 }  // namespace panonav

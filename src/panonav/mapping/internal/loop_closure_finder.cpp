@@ -168,7 +168,7 @@ bool LoopClosureFinder::is_reciprocal(std::span<const PassedNode> nodes,
 
 bool LoopClosureFinder::is_in_reach(std::span<const PassedNode> nodes, std::span<const Pose2> poses,
                                     const LoopClosure& closure) const {
-  // No drift leads from one connected component to another.
+  // Components have no common frame, so drift does not limit closures between them.
   if (nodes[closure.earlier].component != nodes[closure.later].component) return true;
   const double here_m = nodes[closure.later].path_m;
   const double loop_m = here_m - nodes[closure.earlier].path_m;

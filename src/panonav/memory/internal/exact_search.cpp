@@ -72,15 +72,15 @@ class Search {
     return comparison_.distance(row);
   }
 
-  /// Fine bounds of rows first + places[i], which lie in one segment.
+  /// Computes the fine bounds of rows first + places[i], all in one segment.
   void compute_fine_bounds(Row first, std::span<const std::uint32_t> places,
                            std::uint32_t* bounds) {
     result_.bytes_read += places.size() * fine_.bytes();
     fine_(first, places, bounds);
   }
 
-  /// A distance within which `top` views lie, from the views that look best by their bounds. A good
-  /// one is worth some bytes: it decides how many views the bounds leave.
+  /// Returns a distance within which `top` views are, from the views with the smallest bounds. A
+  /// good one is worth reading some bytes: it decides how many views the bounds exclude.
   std::uint32_t find_first_limit() {
     std::vector<Bounded> best_blocks(smallest_.size());
     for (std::size_t i = 0; i < best_blocks.size(); ++i) {
@@ -101,7 +101,7 @@ class Search {
     }
     if (has_fine_) {
       keep_smallest(best, 64 + 8 * top_);
-      // In the order of the rows, so that the query is encoded once for each segment.
+      // Goes through the rows in order, so that the query is encoded once for each segment.
       std::ranges::sort(best, {}, &Bounded::second);
       constexpr std::uint32_t here = 0;
       for (Bounded& candidate : best)
@@ -122,7 +122,7 @@ class Search {
   void scan(NearestMatches& nearest) {
     constexpr std::size_t chunk = 1024;
     static_assert(SketchIndex::rows_per_segment % chunk == 0);
-    // Now and then the fine bounds get a new chance: the limit sinks while the scan runs.
+    // Tries fine bounds again from time to time, as the limit falls during the scan.
     constexpr std::size_t retry = 16;
     constexpr std::size_t max_waiting = 2048;
     std::array<std::uint32_t, chunk + 16> found{};

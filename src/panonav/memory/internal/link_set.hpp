@@ -13,7 +13,7 @@ class LinkSet {
  public:
   /// A second link of the same two views replaces the first.
   void insert(const Link& link);
-  /// No link between the two: nothing happens.
+  /// Removes the link between the two, if there is one.
   void erase(ViewId a, ViewId b);
   void erase_all_of(ViewId view);
 

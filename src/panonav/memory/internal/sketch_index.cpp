@@ -35,8 +35,8 @@ std::int32_t sum_bytes(const std::uint8_t* bytes, int count) {
   return sum;
 }
 
-/// The codes nearest to the sums of one group, and what they miss. Any code would be safe, so
-/// rounding of the float product does no harm.
+/// Returns the codes nearest to the sums of one group, and the remainder. Bounds are valid for any
+/// code, so rounding of the float product does no harm.
 std::int32_t encode_group(const std::int32_t* sums, const std::int32_t* offsets,
                           std::uint64_t group_step, float inverse_step, std::uint8_t* codes) {
   const auto step = static_cast<std::int32_t>(group_step);
@@ -107,7 +107,7 @@ void encode_query(const SketchScale& scale, bool covers, std::span<const std::in
 }  // namespace
 
 SketchLayout::SketchLayout(SignatureShape shape_) : shape(shape_) {
-  // Where a block would hold fewer than about three rows, a sketch costs as much as what it saves.
+  // A sketch of blocks with fewer than about three rows would cost as much as it saves.
   if (shape.rows >= 3) coarse_blocks = shape.rows >= 6 ? 2 : 1;
   if (shape.rows >= 20) {
     fine_blocks = BlockSums::blocks_per_component;

@@ -84,8 +84,7 @@ class SketchIndex {
 
   /// Row `row` of the store holds a new view. Rows beyond the last come one by one.
   void insert(const ViewStore& store, Row row);
-  /// The same for many rows at once: each segment's scale is learnt once, from all of
-  /// its rows.
+  /// Inserts many rows at once: each segment's scale is learnt once, from all of its rows.
   void insert(const ViewStore& store, std::span<const Row> rows);
   void erase(Row row);
 

@@ -9,9 +9,9 @@
 
 namespace panonav {
 
-/// Packed signatures in rows that never move while they are in use, so that a memory grows without
-/// copying what it holds. Magnitudes start on 64-byte borders and are padded with zeros up to the
-/// next one. A freed row is given out again. Row numbers are below `rows_end()`.
+/// Stores packed signatures in rows that do not move while they are in use, so that a memory grows
+/// without copying. Magnitudes start on 64-byte borders and are padded with zeros up to the next
+/// one. Freed rows are reused. Row numbers are below `rows_end()`.
 class ViewStore {
  public:
   using Row = std::uint32_t;

@@ -34,7 +34,7 @@ class AreaViews {
   /// *this.
   AreaViews(const ViewSource& source, int links) : source_(&source), links_(links) {}
 
-  /// Loads the area, as far as it was not prefetched.
+  /// Loads the part of the area that was not prefetched.
   void enter(const NavigationGraph& graph, const SubAreas& areas, std::size_t area);
   /// Loads at most `max_views` further views of the area that will be entered next. Drops what was
   /// prefetched of another area.
@@ -58,7 +58,7 @@ class AreaViews {
   [[nodiscard]] std::optional<FoundView> find_nearest(const NavigationGraph& graph,
                                                       std::span<const std::size_t> nodes,
                                                       const QueryView& query);
-  /// The same among all loaded views.
+  /// Finds the nearest view among all loaded ones.
   [[nodiscard]] std::optional<FoundView> find_nearest(const NavigationGraph& graph,
                                                       const QueryView& query);
   /// Returns the view, then the `count` others of least dissimilarity to the query.

@@ -13,7 +13,7 @@ namespace {
 /// Smallest length of an edge over the median length: that between images of one place.
 constexpr double min_length_share = 0.1;
 
-// Reads some edges from the phases of their views, which are all held at once.
+// Computes a batch of edges from the phases of their views, which are all loaded at once.
 void read_edge_batch(const ViewSource& source, std::span<const Link> links,
                      std::span<NavigationGraph::Edge> edges, Executor& executor) {
   std::set<ViewId> ids;

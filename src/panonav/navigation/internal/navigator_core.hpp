@@ -27,7 +27,7 @@ struct MemoryScales {
   double typical_length = 1.0;          ///< median length of an edge
   std::vector<std::uint8_t> is_narrow;  ///< by node: not 0 near a narrow gate
 
-  /// A reference that differs from the view by more was taken at another place.
+  /// Largest difference between a view and a reference of the same place.
   [[nodiscard]] double max_difference(const QueryView& view) const noexcept {
     return (view.components == components ? place : coarse).max_difference();
   }

@@ -58,8 +58,8 @@ Navigator::Core::PlaceCandidates Navigator::Core::find_candidates(const QueryVie
   PlaceCandidates found;
   found.around = nodes_around(graph(), {&*place.node, 1}, options.near_links);
   found.here = views.find_nearest(graph(), found.around, view);
-  // If references stand densely, a step leads beyond those: the search continues around the
-  // outermost one while it finds more similar ones.
+  // If references are dense, a step leads beyond them: the search continues around the outermost
+  // one while it finds more similar ones.
   std::size_t centre = *place.node;
   for (int round = 0; round < max_search_rounds && found.here; ++round) {
     const auto inner = nodes_around(graph(), {&centre, 1}, options.near_links - 1);
@@ -180,8 +180,8 @@ double Navigator::Core::place_probability_of(const Step& step) const {
 void Navigator::Core::update_probability(Step& step) {
   step.decision.probability = place_probability_of(step);
   int& improbable_steps = place.doubt.improbable_steps;
-  // No place is probable between references that stand far apart, nor with an obstacle in view:
-  // such a run ends when every path was tried.
+  // No place is probable between references that are far apart, nor with an obstacle in view: such
+  // a run ends after every path was tried.
   if (step.decision.probability < 0.5 && !plan.committed && !is_localised_on_route() &&
       obstruction.level == 0) {
     ++improbable_steps;

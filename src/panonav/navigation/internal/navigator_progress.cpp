@@ -152,7 +152,7 @@ void Navigator::Core::detect_obstruction(Step& step) {
       place.known_position_m = inverse(moved) * *place.known_position_m;
     }
   }
-  // Where the place hardly matches, a step aside may lead to an unknown one.
+  // If the place hardly matches, a detour may lead to an unknown one.
   const bool is_known = place.doubt.unknown_steps == 0;
   const bool is_well_known =
       is_known && step.decision.difference <= 0.5 * scales.max_difference(step.view);

@@ -11,8 +11,8 @@ struct PlaceScale {
   double neighbour_difference = 0.0;  ///< median between views with an edge
   double stranger_difference = 1.0;   ///< median between random views
 
-  /// A view that differs by more from the reference assumed for its place was taken elsewhere: a
-  /// robot between references is nearer to one of them than they are to each other.
+  /// Largest difference between a view and the reference of its place: a robot between references
+  /// is nearer to one of them than they are to each other.
   [[nodiscard]] double max_difference() const noexcept {
     return 0.5 * (neighbour_difference + stranger_difference);
   }

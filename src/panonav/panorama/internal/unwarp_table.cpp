@@ -106,7 +106,7 @@ class RowSampler {
     double low_px, high_px;
   };
 
-  /// Distances from the centre at which all four pixels of a tap lie within the mirror, corners
+  /// Distances from the centre at which all four pixels of a tap are within the mirror, corners
   /// included. An inner radius of 0 is no border.
   [[nodiscard]] static RadiusRange usable_radii(const ImageCircle& circle, double pixel) {
     const double reach_px = 1.5 * std::numbers::sqrt2 * pixel;
@@ -157,7 +157,7 @@ class RowSampler {
           const double azimuth_rad = column_rad_ * (c + (j + 0.5) / across - 0.5);
           const auto points =
               project_all(camera_, Direction3::from_angles(azimuth_rad, tap_elevation_rad));
-          // The sum over both lenses is what is rounded: equal shares add up to the whole.
+          // Rounds the sum over both lenses, so that equal shares add up to the whole.
           double share = 0.0;
           int assigned = 0;
           for (int lens = 0; lens < lenses_; ++lens) {

@@ -18,7 +18,7 @@ struct UnwarpTable {
         right = 0,              ///< one beyond the last column
         bottom = 0;             ///< one beyond the last row
     std::size_t halved_at = 0;  ///< in the buffer of halved images
-    // The part of it that taps look up; empty where right <= left.
+    // The part of the level that taps read; empty where right <= left.
     int pair_left = 0,         ///< in pixels of this level
         pair_top = 0,          ///< in pixels of this level
         pair_right = 0,        ///< one beyond the last column
@@ -35,7 +35,7 @@ struct UnwarpTable {
     std::size_t first_entry = 0;  ///< of `positions` and `weights`
   };
 
-  /// Only those that some tap needs, directly or through the next one.
+  /// Levels that some tap needs, directly or through the next one.
   std::vector<Level> levels;
   std::size_t halved_size = 0;           ///< bytes of all halved images
   std::size_t pairs_size = 0;            ///< pairs of all levels, 16 bit each
@@ -45,7 +45,8 @@ struct UnwarpTable {
   std::vector<std::uint8_t> seen;        ///< row-major, 0: the camera does not see that direction
 };
 
-/// For all cameras but equirectangular ones. Throws ContractError when nothing of the band is seen.
+/// Makes the table for any camera that is not equirectangular. Throws ContractError if the camera
+/// sees nothing of the band.
 [[nodiscard]] UnwarpTable make_unwarp_table(const Camera& camera, int rows, int columns,
                                             const ElevationBand& band);
 

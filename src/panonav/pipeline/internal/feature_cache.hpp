@@ -10,8 +10,8 @@
 
 namespace panonav {
 
-/// Local features of the views of a memory, read by a handle of its own when they are first needed
-/// and kept, up to a number. Several threads may use it.
+/// Caches local features of a memory's views, up to a number; reads them on first use through a
+/// file handle of its own. Several threads may use it.
 class FeatureCache {
  public:
   /// Opens the memory again. Views above `last_view` were added later and have no features here;

@@ -16,7 +16,7 @@ struct LearntModels {
   PlaceModel place;        ///< for whether a place is known
   PositionModel position;  ///< for positions between references
   double spacing_m = 0.0;  ///< of references with headings (`NeighbourSupport`)
-  /// Empty for a memory with too few views with a position, or all of them in one place.
+  /// Empty if the memory has too few views with a position, or all of them at one place.
   std::optional<ObservationModel> observation;
   /// True if local features decide between the best matches
   /// (`FeatureTrial::is_significantly_better`).

@@ -118,7 +118,7 @@ void displace(Displacement displacement, std::span<const float> from_a,
   const DisplacementMatrix& matrix = all.matrices[static_cast<std::size_t>(displacement.ring - 1)];
   const auto& cosine = all.cosines[static_cast<std::size_t>(displacement.direction)];
   const auto& sine = all.sines[static_cast<std::size_t>(displacement.direction)];
-  // In the frame of a robot that faces the direction.
+  // Coefficients in the frame of a robot that faces the direction.
   std::array<float, size> a;
   std::array<float, size> b;
   for (std::size_t k = 0; k < from; ++k) {

@@ -16,7 +16,7 @@ void append_little_endian(std::vector<std::uint8_t>& bytes, Word word) {
   }
 }
 
-/// Reads what `append_little_endian` appended.
+/// Reads a word as `append_little_endian` writes it.
 template <class Word>
 [[nodiscard]] Word read_little_endian(const std::uint8_t* from) {
   Word word = 0;

@@ -118,7 +118,7 @@ class MemoryTables {
   virtual void insert(std::span<const ViewId> ids, std::span<const NewView> views) = 0;
   /// Throws as `throw_unknown_view` for the first that is not there.
   virtual void require_views(std::span<const ViewId> views) = 0;
-  /// With their links, thumbnails and features.
+  /// Removes views with their links, thumbnails and features.
   virtual void remove(std::span<const ViewId> views) = 0;
   /// Replaces all but the signature. Throws as `throw_used_name`.
   virtual void write_info(ViewId view, const ReferenceInfo& info, std::int64_t checksum) = 0;
@@ -126,10 +126,10 @@ class MemoryTables {
   virtual void read_views(const Consume<ViewRow>& consume) = 0;
   /// These, in this order. Throws as `throw_unknown_view`.
   virtual void read_views(std::span<const ViewId> views, const Consume<ViewRow>& consume) = 0;
-  /// Those of them that are there, in any order.
+  /// Reads those of the views that exist, in any order.
   virtual void read_available_views(std::span<const ViewId> views,
                                     const Consume<ViewRow>& consume) = 0;
-  /// Those with ids first .. last, ascending; of each signature the first `bytes`.
+  /// Reads the first `bytes` of each signature of the views with ids first .. last, ascending.
   virtual void read_magnitudes(ViewId first, ViewId last, std::size_t bytes,
                                const Consume<MagnitudesRow>& consume) = 0;
   [[nodiscard]] virtual std::optional<ViewId> find(std::string_view name) = 0;
@@ -143,12 +143,12 @@ class MemoryTables {
   [[nodiscard]] virtual std::vector<ViewId> views_with_attachment(ViewAttachment table) = 0;
   [[nodiscard]] virtual bool has_attachments(ViewAttachment table) = 0;
   [[nodiscard]] virtual std::optional<StoredBytes> bytes(ViewAttachment table, ViewId view) = 0;
-  /// The same bytes, checked. Throws as `throw_unknown_view`, and FileError when they do not match
-  /// their checksum.
+  /// Reads the bytes and checks them. Throws as `throw_unknown_view`, and FileError if they do not
+  /// match their checksum.
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> read_checked_bytes(ViewAttachment table,
                                                                             ViewId view);
 
-  /// With a < b; a pair that is there gets the new kind.
+  /// Writes links with a < b; an existing pair gets the new kind.
   virtual void write_links(std::span<const Link> links) = 0;
   virtual void erase_link(ViewId a, ViewId b) = 0;
   /// Reads all links, ascending.
@@ -162,7 +162,7 @@ class MemoryTables {
 
   virtual void write_route(std::string_view name, const RouteRow& row) = 0;
   [[nodiscard]] virtual std::optional<RouteRow> route(std::string_view name) = 0;
-  /// With its blocks.
+  /// Erases a route with its blocks.
   virtual void erase_route(std::string_view name) = 0;
   /// Returns the names, ascending.
   [[nodiscard]] virtual std::vector<std::string> route_names() = 0;

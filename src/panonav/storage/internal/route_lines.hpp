@@ -15,8 +15,8 @@ namespace panonav {
 [[nodiscard]] std::vector<std::uint8_t> pack_route_lines(const RoutePanorama& route,
                                                          std::size_t first, std::size_t count);
 
-/// Lines unpack to no more than this for each byte, so that what a file unpacks to is bounded by
-/// its size. Pictures of real places are far below.
+/// Largest number of bytes to which one packed byte unpacks, so that the size of a file bounds the
+/// memory it takes. Images of real places are far below.
 inline constexpr std::size_t max_unpacked_for_each_byte = 100;
 
 /// Appends `count` lines that `pack_route_lines` packed. False where `bytes` are anything else; the

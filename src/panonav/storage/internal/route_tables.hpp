@@ -22,7 +22,7 @@ namespace panonav {
 std::size_t append_to_route(MemoryTables& tables, std::string_view name, const RoutePanorama& more);
 /// Empty when there is no such route.
 [[nodiscard]] std::optional<RoutePanorama> read_route(MemoryTables& tables, std::string_view name);
-/// There must be a route of the one name and none of the other.
+/// Renames a route; there must be one of the old name and none of the new one.
 void rename_route(MemoryTables& tables, std::string_view name, std::string_view new_name);
 /// Returns true if there was one.
 bool erase_route(MemoryTables& tables, std::string_view name);

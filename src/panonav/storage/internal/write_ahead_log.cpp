@@ -31,7 +31,7 @@ struct Marks {
   Mark now{};
 };
 
-// Where the file itself, without any log, keeps its mark, and the mark.
+// The position of the mark in the file itself, without any log, and the mark.
 struct FileMark {
   std::uint32_t page = 0;
   Mark now{};
